@@ -1,0 +1,42 @@
+"""pyverlet: real-time 2D particle physics on NumPy arrays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pyverlet import errors, forces, integrators
+from pyverlet.bounds import Boundary, Box, Circle, Open
+from pyverlet.broadphase import BruteForce, Fast
+from pyverlet.clock import Clock, FrameBudget
+from pyverlet.collisions import Collisions, Overlap
+from pyverlet.energy import Energy
+from pyverlet.errors import InputError, NonFiniteError, PyverletError
+from pyverlet.integrators import (
+    RK4,
+    ExplicitEuler,
+    Integrator,
+    PositionVerlet,
+    SemiImplicitEuler,
+    TimeCorrectedVerlet,
+    VelocityVerlet,
+    Yoshida4,
+)
+from pyverlet.state import Group
+from pyverlet.warmup import warm_up
+from pyverlet.world import World
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "RK4", "Boundary", "Box", "BruteForce", "Circle", "Clock", "Collisions", "Energy", "ExplicitEuler", "Fast", "FrameBudget",
+    "Group", "InputError", "Integrator", "NonFiniteError", "Open", "Overlap", "PositionVerlet", "PyverletError",
+    "SemiImplicitEuler", "TimeCorrectedVerlet", "VelocityVerlet", "World", "Yoshida4", "errors", "forces", "integrators", "view",
+    "warm_up",
+]  # fmt: skip
+
+
+def view(world: World, **options: Any) -> None:
+    """Show a world on its live page; see `pyverlet.viewers.view` for the options. Returns when the page is ended with Ctrl-C."""
+    from pyverlet.viewers import view as view_page
+
+    view_page(world, **options)

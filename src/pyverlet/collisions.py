@@ -1,0 +1,118 @@
+"""Collisions between particles: what a user sets (`Collisions`) and the solver that runs it (`ContactSolver`)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pyverlet import checks
+from pyverlet.broadphase import BruteForce, Fast
+from pyverlet.constants import LARGEST_PUSH, REST_ACCELERATIONS
+from pyverlet.errors import InputError
+from pyverlet.kernels import contacts
+from pyverlet.state import Slots, State
+
+
+@dataclass(frozen=True, kw_only=True)
+class Collisions:
+    """How particles collide with each other.
+
+    Args:
+        restitution: e, 0 to 1. An impact leaves with e times the normal speed it came with; contact at rest never bounces.
+        friction: mu of Coulomb, 0 or more. 0 leaves spin alone.
+        method: how pairs are found, Fast() or the O(n^2) reference BruteForce(). Both find the same contacts.
+    """
+
+    restitution: float = 0.0
+    friction: float = 0.0
+    method: Fast | BruteForce = field(default_factory=Fast)
+
+    def __post_init__(self) -> None:
+        checks.fraction("restitution", self.restitution)
+        checks.number("friction", self.friction, least=0.0)
+        if not isinstance(self.method, Fast | BruteForce):
+            raise InputError(f"method is {self.method!r}; allowed are pyverlet.Fast() and pyverlet.BruteForce()")
+
+
+class Overlap(NamedTuple):
+    """Overlap of the touching pairs, as a fraction of the contact distance r_i + r_j."""
+
+    mean: float
+    max: float
+    contacts: int
+
+
+class ContactSolver:
+    """The contact stages of a substep, in the order `World.step` calls them."""
+
+    def __init__(self, settings: Collisions, dtype: np.dtype[Any]) -> None:
+        self.settings = settings
+        self.broad_phase = settings.method.start(dtype)
+
+    def find(self, state: Slots) -> None:
+        """Broad phase: bring the list of candidate pairs up to date."""
+        self.broad_phase.update(state)
+
+    def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
+        """Move overlapping circles apart, let impacts bounce, and note who touches."""
+        pairs, real = self.broad_phase.list, state.real
+        moving, bodies = (state.position, state.velocity), (state.radius, state.inverse_mass)
+        which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
+        notes = (pairs.touching, pairs.impulse, pairs.touches)
+        e = self.settings.restitution
+        if e == 0.0:
+            contacts.project(*moving, *bodies, *which, real(1 / h), real(LARGEST_PUSH), *notes)
+        else:
+            settings = map(real, (h, LARGEST_PUSH, lag, e, REST_ACCELERATIONS * strongest * h))
+            contacts.bounce(*moving, state.acceleration, *bodies, *which, *settings, *notes)
+
+    def still(self, state: Slots, h: float) -> None:
+        """Take from touching circles the velocity that projection has put in, and rub them."""
+        pairs, real = self.broad_phase.list, state.real
+        which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
+        mu = self.settings.friction
+        if mu == 0.0:
+            contacts.still(state.position, state.velocity, state.inverse_mass, *which, pairs.touching, pairs.touches)
+        else:
+            where = (state.position, state.velocity, state.spin, state.radius, state.inverse_mass)
+            contacts.rub(*where, *which, real(h), real(mu), pairs.touching, pairs.impulse, pairs.touches)
+
+    def mark_resting(self, state: Slots) -> None:
+        """Set `state.resting` for particles that touch another without bouncing off it."""
+        pairs = self.broad_phase.list
+        contacts.mark_touching(
+            pairs.first, pairs.count, pairs.pair_i, pairs.pair_j, pairs.touching, pairs.touches, state.resting
+        )
+
+
+def find_contacts(state: State, method: Fast | BruteForce) -> np.ndarray[Any, np.dtype[np.int64]]:
+    """(k, 2) user's indices i < j of all overlapping pairs of a state, sorted; leaves the state alone."""
+    slots, phase = _listed(state, method)
+    pairs = phase.list.pairs()
+    a, b = slots.position[pairs[:, 0]].astype(np.float64), slots.position[pairs[:, 1]].astype(np.float64)
+    reach = slots.radius[pairs].astype(np.float64).sum(axis=1)
+    touching = pairs[np.hypot(*(a - b).T) < reach]
+    named = np.sort(slots.particle[touching].astype(np.int64), axis=1)
+    return named[np.lexsort(named.T[::-1])]
+
+
+def measure_overlap(state: State) -> Overlap:
+    """Overlap of all touching pairs of a state; leaves the state alone."""
+    if len(state) < 2:
+        return Overlap(0.0, 0.0, 0)
+    slots, phase = _listed(state, Fast(skin=0.0))
+    pairs = phase.list
+    number, total, largest = contacts.overlaps(
+        slots.position, slots.radius, pairs.first, pairs.count, pairs.pair_i, pairs.pair_j
+    )
+    return Overlap(total / number if number else 0.0, largest, number)
+
+
+def _listed(state: State, method: Fast | BruteForce) -> tuple[Slots, Any]:
+    slots = Slots(state.dtype)
+    slots.gather(state)
+    phase = method.start(state.dtype)
+    phase.update(slots)
+    return slots, phase

@@ -1,0 +1,32 @@
+"""The errors pyverlet raises on purpose. Each message is one sentence naming the argument, its value and what is allowed."""
+
+from __future__ import annotations
+
+
+class PyverletError(Exception):
+    """Base of every error pyverlet raises on purpose."""
+
+
+class InputError(PyverletError, ValueError):
+    """An argument is outside what is allowed; nothing was changed."""
+
+
+class NonFiniteError(PyverletError, ArithmeticError):
+    """The state turned NaN or infinite; the world keeps the last good frame readable.
+
+    Attributes:
+        particle: index of the first particle concerned, in the order particles were added.
+        stage: name of the stage after which it first showed.
+    """
+
+    def __init__(self, particle: int, stage: str, time: float) -> None:
+        self.particle = particle
+        self.stage = stage
+        super().__init__(
+            f"particle {particle} turned non-finite in stage '{stage}' at time {time:.6g} s; "
+            "the world holds the last good frame (use more substeps, a smaller dt or weaker forces)"
+        )
+
+    def __reduce__(self) -> tuple[type[PyverletError], tuple[str]]:
+        # An exception with a computed message does not pickle by itself; sweeps send errors between processes.
+        return (PyverletError, (str(self),))

@@ -1,0 +1,262 @@
+"""Narrow phase and contact solver, one pass over the candidate pairs a substep.
+
+For circles i and j: normal n from i to j, depth = r_i + r_j - |x_j - x_i|, w = 1 / m.
+
+Position: an overlapping pair is moved apart along n, each by its share w / (w_i + w_j). The correction is fed into the velocities,
+divided by h: that is what carries the weight of a pile from one substep to the next (Mueller et al. 2007, Position Based Dynamics).
+
+Velocity: what projection feeds in must not become a bounce. A second pass sets the normal velocity of touching pairs
+to 0, and applies Coulomb friction with the normal impulse the projection has found (Mueller et al. 2020, Detailed Rigid Body
+Simulation, section 3.5). A pair that approaches faster than contact at rest explains is an impact when e > 0: it gets the exact
+impulse (1 + e) v_n instead, and the time left after the impact is travelled with the new velocities, so that e = 1 keeps the
+kinetic energy to rounding, in whatever order the pairs come.
+
+Everything here runs strip by strip as kernels.grid explains: even strips in parallel, then odd ones.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pyverlet._jit import kernel, parallel_kernel, prange
+
+# Golden angle, rad: coincident centres part in directions spread evenly over the circle.
+_GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
+
+# m^2 (m where a distance is meant): added to a divisor that is 0 for coincident centres. Below the rounding of any real distance.
+_TINY = 1e-30
+
+
+@kernel
+def _any_normal(i, j):  # type: ignore[no-untyped-def]
+    """A unit vector for circles whose centres coincide, where the normal is 0 / 0."""
+    angle = _GOLDEN_ANGLE * (i + j)
+    return np.cos(angle), np.sin(angle)
+
+
+@kernel
+def _project_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rate, most, touching, impulse):  # type: ignore[no-untyped-def]
+    zero = rate - rate
+    count = 0
+    for k in range(pair_i.shape[0]):
+        i, j = pair_i[k], pair_j[k]
+        xi, yi, xj, yj = position[i, 0], position[i, 1], position[j, 0], position[j, 1]
+        wi, wj = inverse_mass[i], inverse_mass[j]
+        dx, dy = xj - xi, yj - yi
+        reach = radius[i] + radius[j]
+        distance = np.sqrt(dx * dx + dy * dy)
+        if distance == zero:
+            nx, ny = _any_normal(i, j)
+            dx, dy, distance = reach * position.dtype.type(nx), reach * position.dtype.type(ny), reach
+            depth = most * reach
+        else:
+            # No branch on touching: half the candidates do and half do not, and a wrong guess costs 15 ns.
+            depth = min(max(reach - distance, zero), most * reach)
+        share = depth / (wi + wj)
+        cx, cy = dx * (share / distance), dy * (share / distance)
+        position[i, 0] = xi - cx * wi
+        position[i, 1] = yi - cy * wi
+        position[j, 0] = xj + cx * wj
+        position[j, 1] = yj + cy * wj
+        cx *= rate
+        cy *= rate
+        velocity[i, 0] -= cx * wi
+        velocity[i, 1] -= cy * wi
+        velocity[j, 0] += cx * wj
+        velocity[j, 1] += cy * wj
+        touching[count] = k
+        impulse[count] = share * rate
+        count += depth > zero
+    return count
+
+
+@kernel
+def _bounce_strip(
+    position, velocity, acceleration, radius, inverse_mass, pair_i, pair_j, h, most, lag, e, rest_speed, touching, impulse
+):  # type: ignore[no-untyped-def]
+    zero = h - h
+    two = position.dtype.type(2)
+    count = 0
+    for k in range(pair_i.shape[0]):
+        i, j = pair_i[k], pair_j[k]
+        dx = position[j, 0] - position[i, 0]
+        dy = position[j, 1] - position[i, 1]
+        reach = radius[i] + radius[j]
+        square = dx * dx + dy * dy
+        if square >= reach * reach:
+            continue
+        wi, wj = inverse_mass[i], inverse_mass[j]
+        distance = np.sqrt(square)
+        if distance == zero:
+            ax, ay = _any_normal(i, j)
+            nx, ny = position.dtype.type(ax), position.dtype.type(ay)
+        else:
+            nx, ny = dx / distance, dy / distance
+        depth = min(reach - distance, most * reach)
+        # As at a wall (kernels.bounds): the impact lies in the past, under the relative acceleration an.
+        an = (acceleration[j, 0] - acceleration[i, 0]) * nx + (acceleration[j, 1] - acceleration[i, 1]) * ny
+        before = (velocity[j, 0] - velocity[i, 0]) * nx + (velocity[j, 1] - velocity[i, 1]) * ny
+        vn = before + lag * an
+        hit = np.sqrt(max(vn * vn + two * an * depth, zero))
+        impact = (vn < zero) & (hit > rest_speed)
+        if impact:
+            time = min(two * depth / (hit - vn), h)
+            travelled = e * hit * time + an * time * time / two
+            shift = (depth + max(travelled, zero)) / (wi + wj)
+            kick = (e * hit + an * time - lag * an - before) / (wi + wj)
+        elif vn > rest_speed:
+            # Already parting: make room, but do not throw them apart any faster.
+            kick = zero
+            shift = depth / (wi + wj)
+        else:
+            shift = depth / (wi + wj)
+            kick = shift / h
+        if vn <= rest_speed and not impact:
+            touching[count] = k
+            impulse[count] = kick
+            count += 1
+        position[i, 0] -= shift * wi * nx
+        position[i, 1] -= shift * wi * ny
+        position[j, 0] += shift * wj * nx
+        position[j, 1] += shift * wj * ny
+        velocity[i, 0] -= kick * wi * nx
+        velocity[i, 1] -= kick * wi * ny
+        velocity[j, 0] += kick * wj * nx
+        velocity[j, 1] += kick * wj * ny
+    return count
+
+
+@kernel
+def _still_strip(position, velocity, inverse_mass, pair_i, pair_j, touching):  # type: ignore[no-untyped-def]
+    tiny = position.dtype.type(_TINY)
+    for t in range(touching.shape[0]):
+        k = touching[t]
+        i, j = pair_i[k], pair_j[k]
+        wi, wj = inverse_mass[i], inverse_mass[j]
+        dx = position[j, 0] - position[i, 0]
+        dy = position[j, 1] - position[i, 1]
+        vxi, vyi, vxj, vyj = velocity[i, 0], velocity[i, 1], velocity[j, 0], velocity[j, 1]
+        vn = (vxj - vxi) * dx + (vyj - vyi) * dy
+        kick = vn / ((wi + wj) * (dx * dx + dy * dy + tiny))
+        cx, cy = kick * dx, kick * dy
+        velocity[i, 0] = vxi + cx * wi
+        velocity[i, 1] = vyi + cy * wi
+        velocity[j, 0] = vxj - cx * wj
+        velocity[j, 1] = vyj - cy * wj
+
+
+@kernel
+def _rub_strip(position, velocity, spin, radius, inverse_mass, pair_i, pair_j, h, mu, touching, impulse):  # type: ignore[no-untyped-def]
+    two = position.dtype.type(2)
+    three = position.dtype.type(3)
+    tiny = position.dtype.type(_TINY)
+    for t in range(touching.shape[0]):
+        k = touching[t]
+        i, j = pair_i[k], pair_j[k]
+        wi, wj = inverse_mass[i], inverse_mass[j]
+        dx = position[j, 0] - position[i, 0]
+        dy = position[j, 1] - position[i, 1]
+        distance = np.sqrt(dx * dx + dy * dy) + tiny
+        nx, ny = dx / distance, dy / distance
+        vx = velocity[j, 0] - velocity[i, 0]
+        vy = velocity[j, 1] - velocity[i, 1]
+        kick = -(vx * nx + vy * ny) / (wi + wj)
+        # Tangent (ny, -nx). A disc has I = m r^2 / 2, so the contact point has the inverse mass w + r^2 / I = 3 w.
+        slip = vx * ny - vy * nx + spin[i] * radius[i] + spin[j] * radius[j]
+        most = mu * max(impulse[t] + min(kick, h - h), h - h)
+        rub = max(min(-slip / (three * (wi + wj)), most), -most)
+        px = kick * nx + rub * ny
+        py = kick * ny - rub * nx
+        velocity[i, 0] -= px * wi
+        velocity[i, 1] -= py * wi
+        velocity[j, 0] += px * wj
+        velocity[j, 1] += py * wj
+        spin[i] += two * rub * wi / radius[i]
+        spin[j] += two * rub * wj / radius[j]
+        # Friction held during the substep too: without this a heap creeps by g h^2 each substep.
+        sx, sy = h * rub * ny, -h * rub * nx
+        position[i, 0] -= sx * wi
+        position[i, 1] -= sy * wi
+        position[j, 0] += sx * wj
+        position[j, 1] += sy * wj
+
+
+@parallel_kernel
+def project(position, velocity, radius, inverse_mass, first, count, pair_i, pair_j, rate, most, touching, impulse, touches):  # type: ignore[no-untyped-def]
+    """Move overlapping pairs apart (e = 0) and list them. rate = 1 / h; touches[s]: how many strip s has in touching, impulse."""
+    for parity in range(2):
+        for half in prange((first.shape[0] + 1 - parity) // 2):
+            s = 2 * half + parity
+            a, b = first[s], first[s] + count[s]
+            touches[s] = _project_strip(
+                position, velocity, radius, inverse_mass, pair_i[a:b], pair_j[a:b], rate, most, touching[a:b], impulse[a:b]
+            )
+
+
+@parallel_kernel
+def bounce(  # type: ignore[no-untyped-def]
+    position, velocity, acceleration, radius, inverse_mass, first, count, pair_i, pair_j, h, most, lag, e, rest_speed,
+    touching, impulse, touches,
+):  # fmt: skip
+    """The same for e > 0: impacts bounce, everything slower than rest_speed is treated as `project` does."""
+    for parity in range(2):
+        for half in prange((first.shape[0] + 1 - parity) // 2):
+            s = 2 * half + parity
+            a, b = first[s], first[s] + count[s]
+            touches[s] = _bounce_strip(
+                position, velocity, acceleration, radius, inverse_mass, pair_i[a:b], pair_j[a:b], h, most, lag, e, rest_speed,
+                touching[a:b], impulse[a:b],
+            )  # fmt: skip
+
+
+@parallel_kernel
+def still(position, velocity, inverse_mass, first, count, pair_i, pair_j, touching, touches):  # type: ignore[no-untyped-def]
+    """Set the normal velocity of touching pairs to 0."""
+    for parity in range(2):
+        for half in prange((first.shape[0] + 1 - parity) // 2):
+            s = 2 * half + parity
+            a, b = first[s], first[s] + count[s]
+            _still_strip(position, velocity, inverse_mass, pair_i[a:b], pair_j[a:b], touching[a : a + touches[s]])
+
+
+@parallel_kernel
+def rub(  # type: ignore[no-untyped-def]
+    position, velocity, spin, radius, inverse_mass, first, count, pair_i, pair_j, h, mu, touching, impulse, touches
+):
+    """The same, with Coulomb friction: at most mu times the normal impulse, and no more than stops the slip."""
+    for parity in range(2):
+        for half in prange((first.shape[0] + 1 - parity) // 2):
+            s = 2 * half + parity
+            a, b = first[s], first[s] + count[s]
+            t = a + touches[s]
+            _rub_strip(
+                position, velocity, spin, radius, inverse_mass, pair_i[a:b], pair_j[a:b], h, mu, touching[a:t], impulse[a:t]
+            )
+
+
+@kernel
+def mark_touching(first, count, pair_i, pair_j, touching, touches, flag):  # type: ignore[no-untyped-def]
+    """flag[i] = 1 for every particle of a touching pair."""
+    for s in range(first.shape[0]):
+        a = first[s]
+        for t in range(a, a + touches[s]):
+            flag[pair_i[a + touching[t]]] = 1
+            flag[pair_j[a + touching[t]]] = 1
+
+
+@kernel
+def overlaps(position, radius, first, count, pair_i, pair_j):  # type: ignore[no-untyped-def]
+    """(number of touching pairs, sum and maximum of depth / (r_i + r_j))."""
+    number, total, largest = 0, 0.0, 0.0
+    for s in range(first.shape[0]):
+        for k in range(first[s], first[s] + count[s]):
+            i, j = pair_i[k], pair_j[k]
+            dx = np.float64(position[j, 0]) - np.float64(position[i, 0])
+            dy = np.float64(position[j, 1]) - np.float64(position[i, 1])
+            reach = np.float64(radius[i]) + np.float64(radius[j])
+            overlap = 1.0 - np.sqrt(dx * dx + dy * dy) / reach
+            if overlap > 0.0:
+                number += 1
+                total += overlap
+                largest = max(largest, overlap)
+    return number, total, largest

@@ -1,0 +1,117 @@
+"""Compile what a world needs before it is shown or timed, telling how far it is."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from pyverlet import _jit
+from pyverlet.bounds import Boundary, Box, Circle, Open
+from pyverlet.broadphase import BruteForce
+from pyverlet.collisions import Collisions
+from pyverlet.constants import SERIAL_BELOW
+from pyverlet.forces import Drag
+from pyverlet.world import World
+
+Progress = Callable[[int, int], None]
+
+
+def warm_up(world: World, progress: Progress | None = None) -> float:
+    """Compile or load every kernel this world may need, without touching it.
+
+    The first time on a machine all kernels of the world's dtype are compiled, so that nothing stalls when a setting is changed
+    later; the compiled code is kept on disk, and afterwards only the kernels in use are loaded.
+
+    Args:
+        world: the world about to be stepped.
+        progress: called as progress(done, total) when a kernel begins to compile; not at all if none needs to.
+
+    Returns:
+        Seconds spent.
+    """
+    start = perf_counter()
+    total = len(_jit.KERNELS)
+    done = 0
+
+    def started() -> None:
+        nonlocal done
+        done += 1
+        if progress:
+            progress(min(done, total), total)
+
+    with _jit.watch_compiling(started):
+        if not _compiled_before(world.dtype):
+            _compile_all(world.dtype)
+            _remember_compiled(world.dtype)
+        _rehearse(world)
+    if done and progress:
+        progress(total, total)
+    return perf_counter() - start
+
+
+def _rehearse(world: World) -> None:
+    """One frame of a small world of the same kind."""
+    small = _lattice(
+        SERIAL_BELOW if len(world) >= SERIAL_BELOW else 9,
+        world.dtype,
+        type(world.boundary),
+        getattr(world.boundary, "restitution", 0.0),
+        world.collisions,
+    )
+    small.integrator = world.integrator
+    _use(small)
+
+
+def _compile_all(dtype: np.dtype[Any]) -> None:
+    for count, boundary, collisions in (
+        (SERIAL_BELOW, Circle, Collisions()),
+        (9, Box, Collisions(restitution=0.5, friction=0.5)),
+        (9, Open, Collisions(method=BruteForce())),
+    ):
+        small = _lattice(count, dtype, boundary, 0.5, collisions)
+        small.step(1e-3)
+        small.forces.append(Drag(linear=0.1))
+        _use(small)
+
+
+def _use(world: World) -> None:
+    world.step(1e-3)
+    world.energy()
+    world.momentum()
+    world.overlap()
+
+
+def _lattice(
+    count: int, dtype: np.dtype[Any], boundary: type[Boundary], restitution: float, collisions: Collisions | None
+) -> World:
+    side = int(np.ceil(np.sqrt(count)))
+    room: Boundary = Open()
+    if boundary is Circle:
+        room = Circle(radius=2.0 * side, restitution=restitution)
+    elif boundary is Box:
+        room = Box((-side, -side), (side, side), restitution=restitution)
+    world = World(boundary=room, collisions=collisions, substeps=1, dtype=dtype)
+    row, column = np.divmod(np.arange(count), side)
+    world.add(position=np.column_stack((column, row)) - 0.5 * side, radius=0.5)
+    return world
+
+
+def _marker(dtype: np.dtype[Any]) -> Any:
+    folder = _jit.cache_dir()
+    return folder / f"compiled-{dtype.name}" if folder else None
+
+
+def _compiled_before(dtype: np.dtype[Any]) -> bool:
+    marker = _marker(dtype)
+    return marker is not None and marker.exists()
+
+
+def _remember_compiled(dtype: np.dtype[Any]) -> None:
+    marker = _marker(dtype)
+    if marker is not None:
+        with contextlib.suppress(OSError):
+            marker.touch()

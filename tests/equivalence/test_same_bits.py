@@ -1,0 +1,99 @@
+"""Equal bits: for any number of threads, after save and restore, and however often a frame is drawn."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+
+# Threads of the pool are fixed when Numba starts, so a process of its own gets eight, whatever this machine has.
+RUN_WITH_THREADS = """
+import json, sys
+import numpy as np
+import pyverlet as pv
+hashes = {}
+for threads in (1, 2, 4, 8):
+    for restitution, friction in ((0.0, 0.0), (0.5, 0.3)):
+        world = pv.World(boundary=pv.Circle(radius=45, restitution=restitution, friction=friction),
+                         collisions=pv.Collisions(restitution=restitution, friction=friction), threads=threads)
+        x, y = np.meshgrid(np.arange(-30, 30, 1.05), np.arange(-30, 30, 1.05))
+        position = np.column_stack((x.ravel(), y.ravel())) + np.random.default_rng(0).uniform(-0.02, 0.02, (x.size, 2))
+        world.add(position=position, radius=0.5)
+        world.run(seconds=2)
+        hashes.setdefault(f"{restitution} {friction}", []).append(world.state_hash())
+json.dump(hashes, sys.stdout)
+"""
+
+
+def test_threads_do_not_change_a_bit() -> None:
+    run = subprocess.run(
+        [sys.executable, "-c", RUN_WITH_THREADS],
+        env={**os.environ, "NUMBA_NUM_THREADS": "8"},
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=300,
+    )
+    hashes = json.loads(run.stdout)
+    assert len(hashes) == 2
+    for values in hashes.values():
+        assert len(values) == 4
+        assert len(set(values)) == 1
+
+
+def falling_heap(**options: Any) -> pv.World:
+    world = pv.World(boundary=pv.Box((0, 0), (30, 100)), **options)
+    rng = np.random.default_rng(1)
+    x, y = np.meshgrid(np.arange(1, 29.0), np.arange(1, 29.0))
+    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=rng.uniform(0.3, 0.45, x.size))
+    return world
+
+
+@pytest.mark.parametrize("name", pv.integrators.BY_NAME)
+def test_restore_continues_with_the_same_bits(name: str) -> None:
+    world = falling_heap(integrator=pv.integrators.BY_NAME[name]())
+    world.run(seconds=0.7)
+    saved = world.save()
+    world.run(seconds=0.7)
+    expected = world.state_hash()
+    world.restore(saved)
+    assert world.time == saved.time
+    world.run(seconds=0.7)
+    assert world.state_hash() == expected
+
+
+def test_measuring_does_not_change_the_motion() -> None:
+    watched, alone = falling_heap(), falling_heap()
+    for _ in range(60):
+        watched.step(1 / 60)
+        watched.overlap(), watched.energy(), watched.state_hash(), watched.save(), watched.momentum()
+        alone.step(1 / 60)
+    assert watched.state_hash() == alone.state_hash()
+
+
+@pytest.mark.parametrize("drawn_per_second", [10, 30, 60, 144])
+def test_the_trajectory_does_not_depend_on_the_drawing(drawn_per_second: int) -> None:
+    # A4: two seconds of wall time, whatever the interval between pictures, are the same 120 frames of physics.
+    world, clock = falling_heap(), pv.Clock(dt=1 / 60, max_catch_up=6)
+    for _ in range(2 * drawn_per_second):
+        for _ in range(clock.advance(1 / drawn_per_second)):
+            world.step(clock.dt)
+    reference = falling_heap()
+    reference.run(seconds=2)
+    assert clock.dropped == 0
+    assert world.frames == 120
+    assert world.state_hash() == reference.state_hash()
+
+
+def test_the_hash_sees_one_bit() -> None:
+    world = falling_heap()
+    before = world.state_hash()
+    world.position[17, 0] = np.nextafter(world.position[17, 0], np.float32(1e9))
+    assert world.state_hash() != before

@@ -1,0 +1,184 @@
+"""Rebounds: a circle dropped from H rises to e^2 H; a bounce with e = 1 keeps the energy; friction turns sliding into rolling."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+
+G = 9.81
+RADIUS = 0.5
+
+
+def rebound_height(world: pv.World, ball: pv.Group, rest_height: float) -> float:
+    """Height of the apex after the first bounce, from v^2 / 2 g on the way up (a frame rarely falls on the apex itself)."""
+    for _ in range(600):
+        before = float(ball.velocity[0, 1])
+        world.step(1 / 60)
+        if before < 0 <= float(ball.velocity[0, 1]):
+            break
+    height = float(ball.position[0, 1]) - rest_height
+    return height + float(ball.velocity[0, 1]) ** 2 / (2 * G)
+
+
+def dropped_on(floor: str, e: float, drop: float, integrator: pv.Integrator, dtype: type) -> tuple[pv.World, pv.Group, float]:
+    boundary: pv.Boundary = pv.Open()
+    if floor == "box":
+        boundary = pv.Box((-20, 0), (20, 40), restitution=e)
+    elif floor == "cage":
+        boundary = pv.Circle(center=(0, 20), radius=20, restitution=e)
+    world = pv.World(boundary=boundary, integrator=integrator, collisions=pv.Collisions(restitution=e), dtype=dtype)
+    rest = RADIUS
+    if floor == "circle":
+        world.add(position=(0, 0), radius=RADIUS, mass=np.inf)
+        rest = 2 * RADIUS
+    return world, world.add(position=(0, rest + drop), radius=RADIUS), rest
+
+
+@pytest.mark.parametrize("floor", ["box", "cage", "circle"])
+@pytest.mark.parametrize("drop", [0.5, 2.0, 10.0])
+@pytest.mark.parametrize("e", [0.0, 0.3, 0.5, 0.8, 0.95, 1.0])
+def test_rebound_is_e_squared_of_the_drop(floor: str, drop: float, e: float) -> None:
+    # v'^2 / 2g = e^2 v^2 / 2g = e^2 H. The impact is solved where it happened, so that only float32 rounding remains:
+    # the position near 10 m is rounded to 1e-6 m in each of some hundred substeps.
+    height = rebound_height(*dropped_on(floor, e, drop, pv.PositionVerlet(), np.float32))
+    assert height == pytest.approx(e * e * drop, abs=1e-4 * drop)
+
+
+@pytest.mark.parametrize("floor", ["box", "cage", "circle"])
+@pytest.mark.parametrize("name", [n for n, c in pv.integrators.BY_NAME.items() if c.order >= 2])
+def test_rebound_is_exact_in_float64(floor: str, name: str) -> None:
+    # Ballistic flight is exact for methods of order 2 and more, and so is the impact.
+    height = rebound_height(*dropped_on(floor, 0.8, 2.0, pv.integrators.BY_NAME[name](), np.float64))
+    assert height == pytest.approx(0.64 * 2.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["explicit-euler", "semi-implicit-euler"])
+def test_rebound_of_first_order_methods(name: str) -> None:
+    # Their energy is off by up to m g v h / 2 at the impact: relative h g / v, 0.33 % of a drop of 2 m at 480 substeps a second;
+    # explicit Euler gains g^2 h^2 / 2 a step besides, g h / v relative over the fall and as much again on the way up.
+    height = rebound_height(*dropped_on("box", 1.0, 2.0, pv.integrators.BY_NAME[name](), np.float64))
+    h, v = 1 / 480, np.sqrt(2 * G * 2.0)
+    assert height == pytest.approx(2.0, rel=4 * h * G / v)
+
+
+def test_one_ball_in_a_box_keeps_its_energy_for_a_million_steps() -> None:
+    world = pv.World(
+        boundary=pv.Box((0, 0), (10, 10), restitution=1.0),
+        integrator=pv.VelocityVerlet(),
+        collisions=None,
+        substeps=10_000,
+        dtype=np.float64,
+    )
+    world.add(position=(3, 7.1), velocity=(2.2, 1.1), radius=RADIUS)
+    start = world.energy().total
+    for _ in range(100):
+        world.step(10_000 / 480)
+    assert world.energy().total == pytest.approx(start, rel=1e-9)
+
+
+def test_corner_reflects_both_axes() -> None:
+    world = pv.World(gravity=(0, 0), boundary=pv.Box((0, 0), (10, 10), restitution=1.0), collisions=None, dtype=np.float64)
+    ball = world.add(position=(1, 1), velocity=(-3, -3), radius=RADIUS)
+    world.run(seconds=1)
+    assert ball.velocity[0] == pytest.approx([3, 3], rel=1e-12)
+    # 0.5 m to the rim's contact, back again 3 - 0.5 m
+    assert ball.position[0] == pytest.approx([3, 3], rel=1e-12)
+
+
+def test_rim_touches_the_wall_not_the_centre() -> None:
+    world = pv.World(boundary=pv.Circle(radius=5), dtype=np.float64)
+    ball = world.add(position=(0, 0), radius=1.5)
+    world.run(seconds=5)
+    assert ball.position[0] == pytest.approx([0, -3.5], abs=1e-9)
+    assert world.escaped() == 0
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_elastic_gas_keeps_energy_and_angular_momentum(dtype: type) -> None:
+    # 300 elastic circles, area fraction 0.3, no gravity. Each impulse keeps the pair's energy exactly, in any order, so that
+    # rounding alone remains; the share of angular momentum is measured against sum |x| |m v|.
+    n = 300
+    cage = np.sqrt(n * RADIUS**2 / 0.3)
+    axis = np.arange(-cage, cage, 1.3)
+    x, y = np.meshgrid(axis, axis)
+    position = np.column_stack((x.ravel(), y.ravel()))
+    position = position[np.hypot(*position.T) < cage - 0.6][:n]
+    rng = np.random.default_rng(0)
+    world = pv.World(
+        gravity=(0, 0),
+        boundary=pv.Circle(radius=cage, restitution=1.0),
+        collisions=pv.Collisions(restitution=1.0),
+        dtype=dtype,
+    )
+    gas = world.add(position=position, velocity=rng.normal(0, 2, position.shape), radius=RADIUS)
+    scale = float((np.hypot(*gas.position.T) * np.hypot(*gas.velocity.T)).sum())
+    energy, turning = world.energy().total, world.angular_momentum()
+    world.run(seconds=10)
+    assert world.energy().total == pytest.approx(energy, rel=1e-12 if dtype is np.float64 else 2e-4)
+    assert world.angular_momentum() == pytest.approx(turning, abs=1e-3 * scale)
+    assert world.escaped() == 0
+
+
+def test_two_equal_circles_exchange_their_velocities() -> None:
+    world = pv.World(gravity=(0, 0), collisions=pv.Collisions(restitution=1.0), dtype=np.float64)
+    balls = world.add(position=[(0, 0), (3, 0)], velocity=[(2, 0), (0, 0)], radius=RADIUS)
+    world.run(seconds=2)
+    assert balls.velocity == pytest.approx(np.array([[0, 0], [2, 0]]), abs=1e-12)
+    # Contact after 1 s at x = 2; the second then travels 1 s at 2 m/s. No part of the substep is lost.
+    assert balls.position == pytest.approx(np.array([[2, 0], [5, 0]]), abs=1e-9)
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+def test_unequal_masses_follow_newton(e: float) -> None:
+    # v1' = (m1 v1 - e m2 v1) / (m1 + m2), v2' = m1 v1 (1 + e) / (m1 + m2), for v2 = 0
+    m1, m2, v = 1.0, 1000.0, 3.0
+    world = pv.World(gravity=(0, 0), collisions=pv.Collisions(restitution=e), dtype=np.float64)
+    balls = world.add(position=[(0, 0), (2, 0)], velocity=[(v, 0), (0, 0)], radius=RADIUS, mass=[m1, m2])
+    world.run(seconds=1)
+    expected = [(m1 * v - e * m2 * v) / (m1 + m2), m1 * v * (1 + e) / (m1 + m2)]
+    assert balls.velocity[:, 0] == pytest.approx(expected, abs=1e-9)
+    assert world.momentum() == pytest.approx([m1 * v, 0], rel=1e-12, abs=1e-12)
+
+
+def test_sliding_disc_ends_rolling_at_two_thirds() -> None:
+    # Angular momentum about the contact point is kept: m v0 r = m v r + m r^2 / 2 * v / r, so v = 2/3 v0 and spin = -v / r.
+    world = pv.World(boundary=pv.Box((0, 0), (1000, 10), friction=0.3), collisions=None, dtype=np.float64)
+    ball = world.add(position=(1, RADIUS), velocity=(5, 0), radius=RADIUS)
+    world.run(seconds=3)
+    assert ball.velocity[0, 0] == pytest.approx(10 / 3, rel=1e-9)
+    assert ball.spin[0] == pytest.approx(-10 / 3 / RADIUS, rel=1e-9)
+
+
+@pytest.mark.parametrize("degrees", [10, 20, 40, 60])
+def test_disc_on_a_slope(degrees: float) -> None:
+    # Rolls with g sin(a) / 1.5 while tan(a) <= 3 mu, slides with g (sin a - mu cos a) beyond. The velocity of a held circle is the
+    # mean one of the last substep, h / 2 behind.
+    mu, a = 0.3, np.radians(degrees)
+    world = pv.World(
+        gravity=(G * np.sin(a), -G * np.cos(a)), boundary=pv.Box((0, 0), (1000, 9), friction=mu), collisions=None, dtype=np.float64
+    )
+    ball = world.add(position=(1, RADIUS), radius=RADIUS)
+    world.run(seconds=2)
+    rolls = np.tan(a) <= 3 * mu
+    acceleration = G * np.sin(a) / 1.5 if rolls else G * (np.sin(a) - mu * np.cos(a))
+    assert ball.velocity[0, 0] == pytest.approx(acceleration * (2 - 0.5 / 480), rel=1e-6)
+
+
+def test_friction_between_circles_spins_them_and_keeps_angular_momentum() -> None:
+    world = pv.World(gravity=(0, 0), collisions=pv.Collisions(friction=0.5), dtype=np.float64)
+    balls = world.add(position=[(0, 0), (2, 0.6)], velocity=[(2, 0), (0, 0)], radius=RADIUS)
+    start = world.angular_momentum()
+    world.run(seconds=1.5)
+    assert abs(balls.spin).min() > 0.1
+    assert world.momentum() == pytest.approx([2, 0], abs=1e-12)
+    # Projection displaces the pair along the normal at the end of the substep: an error of order v h.
+    assert world.angular_momentum() == pytest.approx(start, abs=2 * 2 / 480)
+
+
+def test_spin_is_left_alone_without_friction() -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (5, 5)))
+    balls = world.add(position=[(1, 1), (2.1, 1), (1.5, 2)], radius=RADIUS, spin=[1.0, -2.0, 3.0])
+    world.run(seconds=2)
+    assert balls.spin.tolist() == [1.0, -2.0, 3.0]

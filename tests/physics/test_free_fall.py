@@ -1,0 +1,106 @@
+"""One particle without bounds, against y = y0 + v0 t + g t^2 / 2 and against what each method conserves exactly."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+
+G = 9.81
+Y0, V0 = 3.0, 7.0
+
+
+def falling(integrator: pv.Integrator, frames: int, h: float) -> tuple[float, float, list[float]]:
+    world = pv.World(integrator=integrator, collisions=None, substeps=1, dtype=np.float64)
+    ball = world.add(position=(0, Y0), velocity=(0, V0), mass=2.0)
+    energy = [world.energy().total]
+    for _ in range(frames):
+        world.step(h)
+        energy.append(world.energy().total)
+    return float(ball.position[0, 1]), float(ball.velocity[0, 1]), energy
+
+
+@pytest.mark.parametrize("name", [n for n, c in pv.integrators.BY_NAME.items() if c.order >= 2])
+def test_second_order_methods_are_exact(name: str) -> None:
+    # The solution is a polynomial of degree 2: methods of order 2 and more have no truncation error here.
+    frames, h = 300, 0.01
+    y, v, energy = falling(pv.integrators.BY_NAME[name](), frames, h)
+    t = frames * h
+    assert y == pytest.approx(Y0 + V0 * t - G * t * t / 2, abs=1e-11)
+    assert v == pytest.approx(V0 - G * t, abs=1e-11)
+    assert energy == pytest.approx([energy[0]] * len(energy), rel=1e-12)
+
+
+def test_explicit_euler_gains_half_m_g2_h2_a_step() -> None:
+    # E' - E = m/2 ((v - g h)^2 - v^2) + m g v h = m g^2 h^2 / 2, whatever v is.
+    h = 0.01
+    gain = np.diff(falling(pv.ExplicitEuler(), 200, h)[2])
+    assert gain == pytest.approx(np.full(200, 2.0 * G**2 * h**2 / 2), rel=1e-9)
+
+
+def test_semi_implicit_euler_conserves_its_own_energy() -> None:
+    # v^2/2 + g y - (h/2) g v is constant to rounding (J1); its own energy is only off by the last term.
+    h = 0.01
+    world = pv.World(integrator=pv.SemiImplicitEuler(), collisions=None, substeps=1, dtype=np.float64)
+    ball = world.add(position=(0, Y0), velocity=(0, V0))
+
+    def modified() -> float:
+        y, v = float(ball.position[0, 1]), float(ball.velocity[0, 1])
+        return v * v / 2 + G * y - h / 2 * G * v
+
+    start = modified()
+    for _ in range(500):
+        world.step(h)
+        assert modified() == pytest.approx(start, rel=1e-12)
+
+
+def test_verlet_and_semi_implicit_euler_are_one_method() -> None:
+    # J3: with V = (x - x_prev) / h they are the same map; from V0 = v0 - a h / 2 the positions agree to rounding.
+    h = 0.01
+    verlet = pv.World(integrator=pv.PositionVerlet(), collisions=None, substeps=1, dtype=np.float64)
+    euler = pv.World(integrator=pv.SemiImplicitEuler(), collisions=None, substeps=1, dtype=np.float64)
+    a = verlet.add(position=(0, Y0), velocity=(0, V0))
+    b = euler.add(position=(0, Y0), velocity=(0, V0 + G * h / 2))
+    for _ in range(400):
+        verlet.step(h)
+        euler.step(h)
+        assert a.position[0, 1] == pytest.approx(b.position[0, 1], abs=1e-11)
+
+
+def test_substeps_are_n_steps_of_dt_over_n() -> None:
+    coarse = pv.World(integrator=pv.SemiImplicitEuler(), collisions=None, substeps=5, dtype=np.float64)
+    fine = pv.World(integrator=pv.SemiImplicitEuler(), collisions=None, substeps=1, dtype=np.float64)
+    a, b = (world.add(position=(0, Y0), velocity=(1, V0)) for world in (coarse, fine))
+    for _ in range(10):
+        coarse.step(0.05)
+    for _ in range(50):
+        fine.step(0.01)
+    assert a.position == pytest.approx(b.position, rel=1e-14)
+
+
+def test_changing_the_substeps_does_not_change_the_motion() -> None:
+    # A slider may be moved at any time: the method restarts from position and velocity.
+    world = pv.World(collisions=None, substeps=8, dtype=np.float64)
+    ball = world.add(position=(0, Y0), velocity=(0, V0))
+    for substeps in (8, 4, 1, 20):
+        world.substeps = substeps
+        world.run(seconds=0.5, dt=0.01)
+    assert ball.position[0, 1] == pytest.approx(Y0 + V0 * 2 - G * 2, abs=1e-11)
+
+
+def test_mass_does_not_matter_in_free_fall() -> None:
+    world = pv.World(collisions=None, dtype=np.float64)
+    balls = world.add(position=[(0, 0), (5, 0)], mass=[1.0, 1000.0])
+    world.run(seconds=1)
+    assert balls.position[0, 1] == balls.position[1, 1]
+
+
+def test_pinned_particles_stay() -> None:
+    world = pv.World(dtype=np.float64)
+    balls = world.add(position=[(0, 0), (0.9, 3)], mass=[np.inf, 1.0], radius=0.5)
+    world.forces.append(pv.forces.Drag(linear=0.1))
+    world.run(seconds=2)
+    assert balls.position[0] == pytest.approx([0, 0], abs=0)
+    assert balls.position[1, 1] < -2  # it hit the pinned one off centre, slid down its side and fell on
+    assert np.isfinite(world.energy().total)

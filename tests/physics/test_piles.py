@@ -1,0 +1,105 @@
+"""Piles settle, stay together and lose energy only; nothing escapes; crowded starts come apart."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+
+G = 9.81
+RADIUS = 0.5
+
+
+def cage(n: int, *, seed: int = 0, **options: object) -> tuple[pv.World, pv.Group]:
+    """n circles of radius 0.5 m on a shaken lattice in a cage of which they fill 60 %."""
+    size = np.sqrt(0.25 * n / 0.6)
+    axis = np.arange(-size, size, 1.05)
+    x, y = np.meshgrid(axis, axis)
+    position = np.column_stack((x.ravel(), y.ravel()))
+    position = position[np.argsort(np.hypot(*position.T), kind="stable")][:n]
+    position += np.random.default_rng(seed).uniform(-0.02, 0.02, position.shape)
+    world = pv.World(boundary=pv.Circle(radius=size), **options)  # type: ignore[arg-type]
+    return world, world.add(position=position, radius=RADIUS)
+
+
+def test_a_cage_of_20000_settles() -> None:
+    n = 20_000
+    world, _ = cage(n)
+    scale = n * G * world.boundary.extent()[3]  # type: ignore[index]
+    energy = [world.energy().total]
+    for _ in range(15):
+        world.run(seconds=1)
+        assert world.escaped() == 0
+        energy.append(world.energy().total)
+    overlap = world.overlap()
+    assert overlap.mean <= 0.005
+    assert overlap.max <= 0.10
+    assert overlap.contacts > n
+    assert np.diff(energy).max() < 1e-4 * scale
+    assert world.energy().kinetic < 0.05 * n * G * RADIUS
+
+
+@pytest.mark.parametrize("name", pv.integrators.BY_NAME)
+def test_every_integrator_settles_a_small_cage(name: str) -> None:
+    world, _ = cage(300, integrator=pv.integrators.BY_NAME[name]())
+    world.run(seconds=10)
+    assert world.escaped() == 0
+    assert world.overlap().max < 0.02
+    assert world.energy().kinetic < 0.05 * 300 * G * RADIUS
+
+
+def test_overlap_falls_with_the_square_of_the_substeps() -> None:
+    # At rest the lowest contact of a column of n needs an overlap of about 2 n g h^2 = 2 n g (dt / substeps)^2.
+    n = 50
+    bottom = []
+    for substeps in (4, 8, 16):
+        world = pv.World(boundary=pv.Box((0, 0), (2 * RADIUS, 4 * n * RADIUS)), substeps=substeps, dtype=np.float64)
+        world.add(position=np.column_stack((np.full(n, RADIUS), RADIUS + np.arange(n) * 2 * RADIUS)), radius=RADIUS)
+        world.run(seconds=10)
+        bottom.append(world.overlap().max)
+        assert bottom[-1] < 2 * n * G * (1 / 60 / substeps) ** 2
+    assert bottom[0] > 3 * bottom[1] > 9 * bottom[2]
+
+
+def test_coincident_circles_separate_and_stay_inside() -> None:
+    world = pv.World(boundary=pv.Circle(radius=10))
+    balls = world.add(position=np.zeros((50, 2)), radius=RADIUS)
+    world.run(seconds=10)
+    assert np.isfinite(balls.position).all()
+    assert world.escaped() == 0
+    assert world.overlap().max < 0.01
+
+
+def test_mixed_radii_and_masses_settle() -> None:
+    rng = np.random.default_rng(3)
+    n = 1500
+    radius = rng.uniform(0.1, 0.4, n)
+    side = int(np.ceil(np.sqrt(n)))
+    row, column = np.divmod(np.arange(n), side)
+    world = pv.World(boundary=pv.Box((0, 0), (40, 60)))
+    world.add(position=np.column_stack((1 + column, 1 + row)), radius=radius, mass=radius**2 * 10)
+    world.run(seconds=10)
+    assert world.escaped() == 0
+    overlap = world.overlap()
+    assert overlap.mean < 0.01
+    assert overlap.max < 0.15
+
+
+def test_a_fast_circle_does_not_leave_the_cage() -> None:
+    world = pv.World(boundary=pv.Circle(radius=5, restitution=0.5))
+    world.add(position=(0, 0), velocity=(1e4, 3e3), radius=0.1)
+    for _ in range(60):
+        world.step(1 / 60)
+        assert world.escaped() == 0
+
+
+def test_an_outlier_far_away_loses_no_contact() -> None:
+    # The grid does not stretch to it: it shares a rim cell, and the heap's contacts stay what they are.
+    rng = np.random.default_rng(5)
+    position = rng.uniform(0, 20, (400, 2))
+    world = pv.World(gravity=(0, 0))
+    world.add(position=position, radius=RADIUS)
+    contacts = world.overlap().contacts
+    world.add(position=[(1e6, -2e6), (1e6, -2e6 + 0.5)], radius=RADIUS)
+    assert world.overlap().contacts == contacts + 1
