@@ -1,0 +1,58 @@
+"""The `pyverlet` command: the only place where strings become objects and errors become sentences."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+
+import typer
+
+from pyverlet.cli._app import app
+from pyverlet.errors import InputError, PyverletError
+
+__all__ = ["app", "main"]
+
+BAD_INPUT = 2
+FAILED = 1
+INTERRUPTED = 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code: 0 done, 2 bad input, 1 failed, 130 interrupted.
+
+    Whatever goes wrong is told in one sentence on standard error. With PYVERLET_TRACEBACK=1 in the environment the
+    traceback of an unexpected error comes along.
+    """
+    try:
+        code = app(args=arguments, prog_name="pyverlet", standalone_mode=False)
+        sys.stdout.flush()
+    except typer.TyperException as error:
+        return _complain(error.format_message(), error.exit_code)
+    except InputError as error:
+        return _complain(str(error), BAD_INPUT)
+    except PyverletError as error:
+        return _complain(str(error), FAILED)
+    except KeyboardInterrupt:
+        return _complain("interrupted", INTERRUPTED)
+    except BrokenPipeError:
+        # Whoever read our output (`| head`) has gone. Python would complain once more when it flushes at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return FAILED
+    except MemoryError as error:
+        return _complain(f"not enough memory for this many particles ({error})", FAILED)
+    except Exception as error:
+        if os.environ.get("PYVERLET_TRACEBACK"):
+            traceback.print_exc()
+        hint = "PYVERLET_TRACEBACK=1 in the environment shows where"
+        return _complain(f"unexpected {type(error).__name__}: {error} ({hint})", FAILED)
+    if code == INTERRUPTED:  # typer has turned Ctrl-C into this
+        return _complain("interrupted", INTERRUPTED)
+    return code if isinstance(code, int) else 0
+
+
+def _complain(message: str, code: int) -> int:
+    sentence = " ".join(message.split()).rstrip(".")
+    sys.stderr.write(f"pyverlet: {sentence}\n")
+    return code

@@ -1,0 +1,226 @@
+"""The commands: run, bench, list."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pyverlet import __version__, report, scenes, warm_up
+from pyverlet.cli import _options as options
+from pyverlet.cli import _print as out
+from pyverlet.errors import InputError
+from pyverlet.report import Report
+from pyverlet.scenes import Scene, Settings
+from pyverlet.viewers import DEFAULT_PORT
+from pyverlet.world import World
+
+DEFAULT_DT = 1 / 60
+DEFAULT_SECONDS = 5.0
+
+app = typer.Typer(
+    name="pyverlet",
+    help="Real-time 2D particle physics: thousands of circles that fall, bounce, roll and pile up.",
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        out.write(f"pyverlet {__version__}")
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def _pyverlet(
+    context: typer.Context,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    if context.invoked_subcommand is None:
+        out.write(context.get_help())
+
+
+@app.command(name="list")
+def list_scenes(as_json: options.Json = False) -> None:
+    """List the scenes, a line each."""
+    if as_json:
+        out.write_json([{"name": scene.name, "summary": scene.summary} for scene in scenes.SCENES.values()])
+    else:
+        out.write(out.table((scene.name, scene.summary) for scene in scenes.SCENES.values()))
+
+
+@app.command()
+def run(
+    scene: options.SceneName = "cage",
+    particles: options.Particles = None,
+    substeps: options.Substeps = None,
+    integrator: options.IntegratorName = None,
+    restitution: options.Restitution = None,
+    friction: options.Friction = None,
+    radius_spread: options.RadiusSpread = None,
+    seed: options.Seed = None,
+    threads: options.Threads = None,
+    dtype: options.Precision = None,
+    collisions: options.CollisionMethod = None,
+    dt: options.Dt = DEFAULT_DT,
+    seconds: options.Seconds = None,
+    frames: options.Frames = None,
+    as_json: options.Json = False,
+    headless: Annotated[
+        bool, typer.Option("--headless", help=f"Run without the page, {DEFAULT_SECONDS:g} s unless said, and report.")
+    ] = False,
+    no_open: Annotated[bool, typer.Option("--no-open", help="Do not open a browser tab.")] = False,
+    port: Annotated[
+        int | None, typer.Option(parser=options.whole, help="Port of the live page.", metavar="N", show_default=str(DEFAULT_PORT))
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(help="Write y(t) beside the closed form (scene fall).", metavar="FILE", show_default=False),
+    ] = None,
+) -> None:
+    """Run a scene on a live page, or without one and report.
+
+    --seconds, --frames, --json and --plot ask for a run that ends, and imply --headless.
+    """
+    chosen = scenes.get(scene)
+    settings = options.settings(
+        chosen,
+        particles=particles,
+        substeps=substeps,
+        integrator_name=integrator,
+        restitution=restitution,
+        friction=friction,
+        radius_spread=radius_spread,
+        seed=seed,
+        threads=threads,
+        dtype=dtype,
+        collisions=collisions,
+    )
+    if not (headless or as_json or plot or seconds is not None or frames is not None):
+        _show(chosen, settings, dt=dt, port=DEFAULT_PORT if port is None else port, open_browser=not no_open)
+        return
+    if port is not None:
+        raise InputError(f"port is {port}; allowed is none, since this run has no live page")
+    count = report.frame_count(seconds=seconds, frames=frames, dt=dt, default_seconds=DEFAULT_SECONDS)
+    if plot is None:
+        world, compile_s = _build(chosen, settings)
+        result = _measure(world, chosen, count, dt, compile_s)
+    else:
+        result = _run_and_plot(chosen, settings, count, dt, plot)
+    _tell(result, as_json)
+
+
+@app.command()
+def bench(
+    scene: options.SceneName = "cage",
+    particles: options.Particles = None,
+    substeps: options.Substeps = None,
+    integrator: options.IntegratorName = None,
+    restitution: options.Restitution = None,
+    friction: options.Friction = None,
+    radius_spread: options.RadiusSpread = None,
+    seed: options.Seed = None,
+    threads: options.Threads = None,
+    dtype: options.Precision = None,
+    collisions: options.CollisionMethod = None,
+    dt: options.Dt = DEFAULT_DT,
+    seconds: options.Seconds = None,
+    frames: options.Frames = None,
+    as_json: options.Json = False,
+    settle: Annotated[
+        float, typer.Option(parser=options.real, help="Simulated seconds to run before measuring.", metavar="S", show_default="5")
+    ] = DEFAULT_SECONDS,
+) -> None:
+    """Measure a scene once it is warm: kernels compiled, circles settled.
+
+    Prints the median frame and, beside it, NumPy's a = b + s c on the same machine, so that figures from two machines
+    can be compared.
+    """
+    chosen = scenes.get(scene)
+    settings = options.settings(
+        chosen,
+        particles=particles,
+        substeps=substeps,
+        integrator_name=integrator,
+        restitution=restitution,
+        friction=friction,
+        radius_spread=radius_spread,
+        seed=seed,
+        threads=threads,
+        dtype=dtype,
+        collisions=collisions,
+    )
+    count = report.frame_count(seconds=seconds, frames=frames, dt=dt, default_seconds=DEFAULT_SECONDS)
+    warm = report.settle_count(settle, dt)
+    world, compile_s = _build(chosen, settings)
+    with out.Progress("settling, frame") as progress:
+        for done in range(warm):
+            world.step(dt)
+            progress(done + 1, warm)
+    triad = report.triad()
+    result = _measure(world, chosen, count, dt, compile_s)
+    ratio = result.ns_per_particle_substep / triad["ns_per_element"]
+    _tell(replace(result, extra={"settle_seconds": settle, "triad": triad, "ratio_to_triad": ratio}), as_json)
+
+
+def _show(scene: Scene, settings: Settings, *, dt: float, port: int, open_browser: bool) -> None:
+    from pyverlet.viewers import serve
+
+    serve(partial(scene.build, settings), scene_name=scene.name, port=port, open_browser=open_browser, dt=dt)
+
+
+def _build(scene: Scene, settings: Settings) -> tuple[World, float]:
+    """The world, and the seconds its kernels took to compile or load."""
+    world = scene.build(settings)
+    with out.Progress("compiling kernels, once") as progress:
+        return world, warm_up(world, progress)
+
+
+def _measure(world: World, scene: Scene, frames: int, dt: float, compile_s: float) -> Report:
+    with out.Progress("frame") as progress:
+        return report.run(world, scene=scene.name, frames=frames, dt=dt, compile_s=compile_s, progress=progress)
+
+
+def _run_and_plot(scene: Scene, settings: Settings, frames: int, dt: float, path: Path) -> Report:
+    from pyverlet.lab import trajectory
+
+    trajectory.check_can_plot(path)
+    if scene.closed_form is None:
+        known = ", ".join(other.name for other in scenes.SCENES.values() if other.closed_form)
+        raise InputError(f"plot is for scenes with a closed form to compare with ({known}), got {scene.name!r}")
+    world, compile_s = _build(scene, settings)
+    recorder = trajectory.HeightRecorder()
+    recorder(world)
+    with out.Progress("frame") as progress:
+        result = report.run(
+            world,
+            scene=scene.name,
+            frames=frames,
+            dt=dt,
+            compile_s=compile_s,
+            progress=progress,
+            observe=recorder,
+        )
+    heights = recorder.against(scene, settings)
+    title = (
+        f"{scene.name}: {result.integrator}, {result.substeps} substeps of {1e3 * dt / result.substeps:.3g} ms, {result.dtype}"
+    )
+    trajectory.plot(heights, path, title)
+    out.note(f"wrote {path}; largest error in y: {heights.largest_error:.3g} m")
+    return replace(result, extra={"largest_error_m": heights.largest_error})
+
+
+def _tell(result: Report, as_json: bool) -> None:
+    values = result.as_dict()
+    if as_json:
+        out.write_json(values)
+    else:
+        out.write(out.report(values))

@@ -1,0 +1,110 @@
+"""The options `run` and `bench` share, and how their strings become a scene's settings."""
+
+from __future__ import annotations
+
+import difflib
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import typer
+
+from pyverlet import integrators
+from pyverlet.broadphase import BruteForce, Fast
+from pyverlet.errors import InputError
+from pyverlet.scenes import Scene, Settings
+
+DType = Literal["float32", "float64"]
+Method = Literal["fast", "brute", "none"]
+
+
+def whole(text: str) -> int:
+    """A whole number, or the sentence that says what was given instead."""
+    try:
+        return int(text)
+    except ValueError:
+        raise typer.BadParameter(f"{text!r} is not a whole number") from None
+
+
+def real(text: str) -> float:
+    """A number or a fraction such as 1/60, or the sentence that says what was given instead."""
+    try:
+        above, _, below = str(text).partition("/")
+        return float(above) / float(below or 1)
+    except (ValueError, ZeroDivisionError):
+        raise typer.BadParameter(f"{text!r} is not a number") from None
+
+
+SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="Name of a scene, see `pyverlet list`.")]
+Particles = Annotated[int | None, typer.Option(parser=whole, help="Number of circles.", metavar="N", show_default=False)]
+Substeps = Annotated[int | None, typer.Option(parser=whole, help="Substeps a frame.", metavar="N", show_default=False)]
+IntegratorName = Annotated[
+    str | None,
+    typer.Option("--integrator", help=", ".join(integrators.BY_NAME) + ".", metavar="NAME", show_default=False),
+]
+Restitution = Annotated[
+    float | None, typer.Option(parser=real, help="Of circles and bounds, 0 to 1.", metavar="E", show_default=False)
+]
+Friction = Annotated[
+    float | None, typer.Option(parser=real, help="Coulomb friction of circles and bounds.", metavar="MU", show_default=False)
+]
+RadiusSpread = Annotated[
+    float | None, typer.Option(parser=real, help="Largest / smallest radius.", metavar="X", show_default=False)
+]
+Seed = Annotated[int | None, typer.Option(parser=whole, help="Seed of the random start.", metavar="N", show_default=False)]
+Threads = Annotated[int | None, typer.Option(parser=whole, help="Threads to use.", metavar="N", show_default=False)]
+Precision = Annotated[DType | None, typer.Option("--dtype", help="Precision of the state.", show_default=False)]
+CollisionMethod = Annotated[
+    Method | None,
+    typer.Option("--collisions", help="How contacts are found; none: they are not.", show_default=False),
+]
+Dt = Annotated[float, typer.Option(parser=real, help="Simulated seconds a frame.", metavar="S", show_default="1/60")]
+Seconds = Annotated[float | None, typer.Option(parser=real, help="Simulated seconds to run.", metavar="S", show_default=False)]
+Frames = Annotated[
+    int | None, typer.Option(parser=whole, help="Frames to run, in place of --seconds.", metavar="N", show_default=False)
+]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+
+METHODS: dict[Method, Any] = {"fast": Fast(), "brute": BruteForce(), "none": False}
+
+
+def integrator(name: str) -> integrators.Integrator:
+    """The integrator called `name`.
+
+    Raises:
+        InputError: there is none; the message suggests the nearest and names the known ones.
+    """
+    known = integrators.BY_NAME
+    if name in known:
+        return known[name]()
+    near = difflib.get_close_matches(name.lower().replace("_", "-"), known, n=1, cutoff=0.5)
+    suggestion = f" (did you mean {near[0]!r}?)" if near else ""
+    raise InputError(f"unknown integrator {name!r}{suggestion}; known: {', '.join(known)}")
+
+
+def settings(
+    scene: Scene,
+    *,
+    particles: int | None,
+    substeps: int | None,
+    integrator_name: str | None,
+    restitution: float | None,
+    friction: float | None,
+    radius_spread: float | None,
+    seed: int | None,
+    threads: int | None,
+    dtype: DType | None,
+    collisions: Method | None,
+) -> Settings:
+    """The scene's settings with what the user gave in place of its defaults."""
+    return scene.settings(
+        particles=particles,
+        substeps=substeps,
+        integrator=None if integrator_name is None else integrator(integrator_name),
+        restitution=restitution,
+        friction=friction,
+        radius_spread=radius_spread,
+        seed=seed,
+        threads=threads,
+        dtype=None if dtype is None else {"float32": np.float32, "float64": np.float64}[dtype],
+        collisions=None if collisions is None else METHODS[collisions],
+    )

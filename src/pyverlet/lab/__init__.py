@@ -1,0 +1,1 @@
+"""The laboratory: worlds measured against what is known on paper."""

@@ -1,0 +1,33 @@
+"""Scenes by name. One scene is one file; adding one is a file and a line here."""
+
+from __future__ import annotations
+
+import difflib
+
+from pyverlet.errors import InputError
+from pyverlet.scenes import box, cage, fall
+from pyverlet.scenes._scene import Scene, Settings
+
+__all__ = ["SCENES", "Scene", "Settings", "get"]
+
+SCENES: dict[str, Scene] = {
+    scene.name: scene
+    for scene in (
+        cage.SCENE,
+        box.SCENE,
+        fall.SCENE,
+    )
+}
+
+
+def get(name: str) -> Scene:
+    """The scene called `name`.
+
+    Raises:
+        InputError: there is none; the message suggests the nearest and names the known ones.
+    """
+    if name in SCENES:
+        return SCENES[name]
+    near = difflib.get_close_matches(name.lower(), SCENES, n=1)
+    suggestion = f" (did you mean {near[0]!r}?)" if near else ""
+    raise InputError(f"unknown scene {name!r}{suggestion}; known: {', '.join(SCENES)}")

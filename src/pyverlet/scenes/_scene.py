@@ -1,0 +1,121 @@
+"""What a scene is: a name, a line about it, its settings, and a function that builds the world from them."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet import checks
+from pyverlet.broadphase import BruteForce, Fast
+from pyverlet.collisions import Collisions
+from pyverlet.errors import InputError
+from pyverlet.integrators import Integrator, PositionVerlet
+from pyverlet.world import World
+
+Floats = NDArray[np.float64]
+
+MOST_PARTICLES = 2**31 - 1
+"""The engine counts particles with 32 bits."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a user may change about a scene without writing a new one.
+
+    Attributes:
+        particles: how many circles, at least 1.
+        substeps: substeps a frame.
+        integrator: how the circles move between contacts.
+        restitution: of circles and bounds, 0 to 1.
+        friction: Coulomb coefficient of circles and bounds, >= 0.
+        radius_spread: bound on largest radius / smallest radius, >= 1; 1 makes all equal.
+        seed: of everything random in the start, >= 0. The same seed gives the same start.
+        dtype: numpy.float32 or numpy.float64.
+        collisions: how contacts are found; None switches collisions off.
+        threads: threads to use; None leaves the choice to the engine.
+        gravity: (x, y) in m/s^2.
+    """
+
+    particles: int = 5_000
+    substeps: int = 8
+    integrator: Integrator = field(default_factory=PositionVerlet)
+    restitution: float = 0.0
+    friction: float = 0.0
+    radius_spread: float = 1.0
+    seed: int = 0
+    dtype: type[np.float32] | type[np.float64] = np.float32
+    collisions: Fast | BruteForce | None = field(default_factory=Fast)
+    threads: int | None = None
+    gravity: tuple[float, float] = (0.0, -9.81)
+
+    def __post_init__(self) -> None:
+        """Check what the engine cannot, and what a scene without bounds and collisions would never look at."""
+        checks.whole("particles", self.particles, most=MOST_PARTICLES)
+        checks.number("radius_spread", self.radius_spread, least=1.0)
+        checks.whole("seed", self.seed, least=0)
+        checks.fraction("restitution", self.restitution)
+        checks.number("friction", self.friction, least=0.0)
+
+    def empty_world(self, boundary: Any) -> World:
+        """A world with these settings inside `boundary`, still without circles."""
+        collisions = None
+        if self.collisions is not None:
+            collisions = Collisions(restitution=self.restitution, friction=self.friction, method=self.collisions)
+        return World(
+            gravity=self.gravity,
+            integrator=self.integrator,
+            boundary=boundary,
+            collisions=collisions,
+            substeps=self.substeps,
+            dtype=self.dtype,
+            threads=self.threads,
+        )
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A world to run by name: demonstration, test, benchmark and recording are all made from it.
+
+    Attributes:
+        name: as on the command line.
+        summary: one line.
+        defaults: the settings where nothing else is said.
+        build: makes the world, ready at time 0.
+        closed_form: of (settings, t (m,) in seconds): the exact height y (m, n) in metres of every circle, for scenes
+            that have a solution on paper.
+    """
+
+    name: str
+    summary: str
+    build: Callable[[Settings], World]
+    defaults: Settings = field(default_factory=Settings)
+    closed_form: Callable[[Settings, Floats], Floats] | None = None
+
+    @property
+    def description(self) -> str:
+        """The documentation of the scene's build function."""
+        return inspect.getdoc(self.build) or self.summary
+
+    def settings(self, **overrides: Any) -> Settings:
+        """The defaults with `overrides`; those that are None are ignored, and collisions=False switches collisions off.
+
+        Raises:
+            InputError: there is no such setting, or a value is outside what is allowed.
+        """
+        known = {f.name for f in dataclasses.fields(Settings)}
+        if unknown := sorted(set(overrides) - known):
+            raise InputError(f"a scene has no setting {unknown[0]!r}; known: {', '.join(sorted(known))}")
+        changes = {name: value for name, value in overrides.items() if value is not None}
+        if changes.get("collisions") is False:
+            changes["collisions"] = None
+        return dataclasses.replace(self.defaults, **changes)
+
+    def world(self, **overrides: Any) -> World:
+        """Build the scene's world at time 0; `overrides` as for `settings`."""
+        return self.build(self.settings(**overrides))

@@ -1,0 +1,52 @@
+"""Circles of mixed sizes thrown about inside a box, bouncing until friction and restitution bring them to rest."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pyverlet.bounds import Box
+from pyverlet.scenes import _start
+from pyverlet.scenes._scene import Scene, Settings
+from pyverlet.world import World
+
+RADIUS = 0.5
+"""Root mean square radius of the circles, m."""
+
+AREA_FRACTION = 0.35
+"""Part of the box's area the circles cover."""
+
+ASPECT = 16 / 9
+"""Width / height of the box."""
+
+SPEED = 3.0
+"""Standard deviation of each component of the starting velocity, m/s."""
+
+
+def build(settings: Settings) -> World:
+    """2,000 circles of mixed radii in a box, three times as large as each other at most, thrown in every direction.
+
+    They cover 35 % of the box, rebound with half their speed, rub against each other and the walls, and come to rest.
+    Masses go with the area, 1 kg at a radius of 0.5 m.
+    """
+    rng = np.random.default_rng(settings.seed)
+    radii = _start.draw_radii(rng, settings.particles, settings.radius_spread, RADIUS)
+    area = np.pi * float(radii @ radii) / AREA_FRACTION
+    # One large circle among few must fit between floor and ceiling; the rest of the height is what starting rows waste.
+    height = max(float(np.sqrt(area / ASPECT)), 2.2 * float(radii.max()))
+    width = max(area / height, 2.2 * float(radii.max()))
+    while (centres := _start.in_box(rng, radii, width, height)) is None:
+        height *= 1.05
+    world = settings.empty_world(
+        Box((-width / 2, 0), (width / 2, height), restitution=settings.restitution, friction=settings.friction)
+    )
+    velocity = rng.normal(0.0, SPEED, (settings.particles, 2))
+    world.add(position=centres, velocity=velocity, radius=radii, mass=(radii / RADIUS) ** 2)
+    return world
+
+
+SCENE = Scene(
+    "box",
+    "2,000 circles of mixed sizes bounce about a box and come to rest",
+    build,
+    Settings(particles=2_000, restitution=0.5, friction=0.2, radius_spread=3.0),
+)

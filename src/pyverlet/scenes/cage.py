@@ -1,0 +1,42 @@
+"""Thousands of circles fall into a heap inside a circular cage: the scene to look at first, and the benchmark."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pyverlet.bounds import Circle
+from pyverlet.scenes import _start
+from pyverlet.scenes._scene import Scene, Settings
+from pyverlet.world import World
+
+RADIUS = 0.5
+"""Root mean square radius of the circles, m. With a radius_spread of 1 it is the radius of each."""
+
+AREA_FRACTION = 0.6
+"""Part of the cage's area the circles cover."""
+
+GROWTH = 1.01
+"""Step by which the cage grows while a handful of circles does not fit it (two equal ones cover half a cage at most)."""
+
+
+def build(settings: Settings) -> World:
+    """N circles of radius 0.5 m fall inside a circular cage of radius sqrt(0.25 N / 0.6) m.
+
+    They cover 60 % of its area and start on a slightly shaken lattice that fills it. Restitution and friction are 0, so
+    they end in a heap at rest at the bottom. With a radius_spread the radii are drawn uniformly and scaled so that the
+    area stays the same; masses go with the area, 1 kg at 0.5 m. Only a handful of circles may not fit 60 % of a cage:
+    then it is a little larger.
+    """
+    rng = np.random.default_rng(settings.seed)
+    radii = _start.draw_radii(rng, settings.particles, settings.radius_spread, RADIUS)
+    cage_radius = RADIUS * np.sqrt(settings.particles / AREA_FRACTION)
+    while (centres := _start.in_circle(rng, radii, cage_radius)) is None:
+        cage_radius *= GROWTH
+    world = settings.empty_world(
+        Circle(center=(0, 0), radius=cage_radius, restitution=settings.restitution, friction=settings.friction)
+    )
+    world.add(position=centres, velocity=0.0, radius=radii, mass=(radii / RADIUS) ** 2)
+    return world
+
+
+SCENE = Scene("cage", "5,000 circles fall into a heap inside a circular cage", build)

@@ -1,0 +1,299 @@
+"""The commands through their own door, `main`: what they print, where, and what they refuse."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+import pyverlet.viewers
+from pyverlet import __version__, scenes
+from pyverlet.cli import main
+
+KEYS = {
+    "scene", "particles", "substeps", "integrator", "dtype", "threads", "frames", "seconds", "compile_s", "ms_per_frame",
+    "ns_per_particle_substep", "stages", "energy", "overlap", "contacts", "escaped", "state_hash",
+}  # fmt: skip
+SMALL = ["cage", "--particles", "60", "--frames", "5"]
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Any:
+    """Run a command line: (exit code, standard output, standard error)."""
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        code = main(list(arguments))
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return run
+
+
+@pytest.fixture
+def served(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
+    """In place of the live page: what it would have been asked to show."""
+    asked: list[dict[str, Any]] = []
+    monkeypatch.setattr(pyverlet.viewers, "serve", lambda build, **options: asked.append({"world": build(), **options}))
+    return asked
+
+
+# ---- what works ----
+
+
+def test_json_is_one_object_with_the_promised_keys(run: Any) -> None:
+    code, out, _ = run("run", *SMALL, "--headless", "--json")
+    report = json.loads(out)
+    assert code == 0
+    assert set(report) >= KEYS
+    assert set(report["ms_per_frame"]) == {"median", "p95"}
+    assert set(report["energy"]) == {"kinetic", "potential", "links", "total"}
+    assert set(report["overlap"]) == {"mean", "max"}
+    assert (report["scene"], report["particles"], report["frames"], report["substeps"]) == ("cage", 60, 5, 8)
+    assert (report["integrator"], report["dtype"], report["escaped"]) == ("position-verlet", "float32", 0)
+    assert report["seconds"] == pytest.approx(5 / 60)
+    assert report["ns_per_particle_substep"] == pytest.approx(1e6 * report["ms_per_frame"]["median"] / (60 * 8))
+    assert report["stages"]
+    assert 0 < sum(report["stages"].values()) < 5 * report["ms_per_frame"]["p95"]
+    assert report["energy"]["total"] == pytest.approx(sum(report["energy"][k] for k in ("kinetic", "potential", "links")))
+
+
+def test_report_agrees_with_the_library(run: Any) -> None:
+    world = scenes.get("cage").world(particles=60)
+    world.run(seconds=5 / 60, dt=1 / 60)
+    report = json.loads(run("run", *SMALL, "--json")[1])
+    assert report["state_hash"] == world.state_hash()
+    assert report["energy"]["total"] == world.energy().total
+
+
+def test_table_says_the_same(run: Any) -> None:
+    code, out, _ = run("run", *SMALL, "--headless")
+    assert code == 0
+    for word in ("cage", "60", "position-verlet", "8 substeps", "ms per frame", "energy", "overlap", "escaped", "state hash"):
+        assert word in out
+
+
+@pytest.mark.parametrize("name", scenes.SCENES)
+def test_every_scene_runs_headless(run: Any, name: str) -> None:
+    code, out, err = run("run", name, "--particles", "20", "--frames", "3", "--json")
+    assert code == 0, err
+    assert json.loads(out)["scene"] == name
+
+
+@pytest.mark.parametrize("name", pv.integrators.BY_NAME)
+def test_every_integrator_by_name(run: Any, name: str) -> None:
+    code, out, err = run("run", *SMALL, "--integrator", name, "--json")
+    assert code == 0, err
+    assert json.loads(out)["integrator"] == name
+
+
+def test_options_reach_the_world(run: Any) -> None:
+    options = ["--substeps", "3", "--restitution", "0.5", "--friction", "0.1", "--radius-spread", "2", "--seed", "4"]
+    options += ["--threads", "1", "--dtype", "float64", "--collisions", "brute", "--dt", "1/100", "--seconds", "0.05"]
+    code, out, err = run("run", "box", "--particles", "30", *options, "--json")
+    assert code == 0, err
+    report = json.loads(out)
+    assert (report["substeps"], report["threads"], report["dtype"], report["frames"]) == (3, 1, "float64", 5)
+    world = scenes.get("box").world(
+        particles=30, substeps=3, restitution=0.5, friction=0.1, radius_spread=2.0, seed=4, dtype=np.float64,
+        collisions=pv.BruteForce(),
+    )  # fmt: skip
+    world.run(seconds=0.05, dt=0.01)
+    assert report["state_hash"] == world.state_hash()
+
+
+def test_collisions_none_lets_circles_overlap(run: Any) -> None:
+    report = json.loads(run("run", "cage", "--particles", "100", "--seconds", "3", "--collisions", "none", "--json")[1])
+    assert report["overlap"]["max"] > 0.5
+
+
+def test_bench_measures_beside_the_machine(run: Any) -> None:
+    code, out, _ = run("bench", "cage", "--particles", "60", "--frames", "5", "--settle", "0.1", "--json")
+    report = json.loads(out)
+    assert code == 0
+    assert set(report) >= KEYS | {"triad", "ratio_to_triad", "settle_seconds"}
+    assert report["triad"]["ns_per_element"] > 0
+    assert report["ratio_to_triad"] == pytest.approx(report["ns_per_particle_substep"] / report["triad"]["ns_per_element"])
+    table = run("bench", "cage", "--particles", "60", "--frames", "5", "--settle", "0")[1]
+    assert "a = b + s c" in table
+    assert "ratio" in table
+
+
+def test_list(run: Any) -> None:
+    code, out, _ = run("list")
+    assert code == 0
+    assert [line.split()[0] for line in out.splitlines()] == list(scenes.SCENES)
+    as_json = json.loads(run("list", "--json")[1])
+    assert as_json == [{"name": s.name, "summary": s.summary} for s in scenes.SCENES.values()]
+
+
+def test_version_and_help(run: Any) -> None:
+    assert run("--version")[:2] == (0, f"pyverlet {__version__}\n")
+    code, out, _ = run()
+    assert code == 0
+    for command in ("run", "bench", "list"):
+        assert command in out
+        assert run(command, "--help")[0] == 0
+    assert "explicit-euler" in run("run", "--help")[1]
+
+
+def test_run_without_more_opens_the_page(run: Any, served: list[dict[str, Any]]) -> None:
+    code, _, err = run("run", "box", "--particles", "30", "--port", "8123", "--no-open", "--dt", "0.02")
+    assert code == 0, err
+    (asked,) = served
+    assert len(asked["world"]) == 30
+    assert (asked["scene_name"], asked["port"], asked["open_browser"], asked["dt"]) == ("box", 8123, False, 0.02)
+    run("run")
+    assert len(served[1]["world"]) == 5_000
+    assert (served[1]["scene_name"], served[1]["port"], served[1]["open_browser"]) == ("cage", 8000, True)
+
+
+def test_plot_of_a_fall(run: Any, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    picture = tmp_path / "y.png"
+    code, out, err = run("run", "fall", "--seconds", "1", "--dtype", "float64", "--plot", str(picture), "--json")
+    assert code == 0, err
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert json.loads(out)["largest_error_m"] < 1e-11
+    assert "largest error" in err
+
+
+def test_figure_has_labels_with_units(run: Any) -> None:
+    pytest.importorskip("matplotlib")
+    from pyverlet.lab import trajectory
+
+    scene = scenes.get("fall")
+    settings = scene.settings(particles=20, integrator=pv.ExplicitEuler(), dtype=np.float64)
+    world, record = scene.build(settings), trajectory.HeightRecorder()
+    for _ in range(10):
+        record(world)
+        world.step(1 / 60)
+    heights = record.against(scene, settings)
+    # x is late by g t h / 2 when the position moves with the old velocity.
+    h = 1 / 60 / 8
+    assert heights.largest_error == pytest.approx(9.81 * heights.time[-1] * h / 2, rel=1e-6)
+    top, bottom = trajectory.figure(heights, "title").axes
+    assert (top.get_ylabel(), bottom.get_xlabel()) == ("height y (m)", "time t (s)")
+    assert bottom.get_ylabel() == "error in y (m)"
+    assert len(top.lines) == 2 * trajectory.MOST_CURVES
+
+
+# ---- what is refused: one sentence, exit code 2 ----
+
+REFUSED = [
+    ("run nowhere", "unknown scene 'nowhere'; known: cage, box, fall"),
+    ("run cagee --headless", "did you mean 'cage'"),
+    ("run --integrator position-verle --headless", "did you mean 'position-verlet'"),
+    ("run --integrator zzz --headless", "known: explicit-euler"),
+    ("run --particles 0 --headless", "particles is 0"),
+    ("run --particles -5", "particles is -5"),
+    ("run --particles many", "'many' is not a whole number"),
+    ("run --particles 1.5", "'1.5' is not a whole number"),
+    ("run --particles 99999999999999999999 --headless", "particles is 99999999999999999999"),
+    ("run --seconds soon", "'soon' is not a number"),
+    ("run --port http", "'http' is not a whole number"),
+    ("run --substeps 0 --headless", "substeps is 0"),
+    ("run --restitution 1.5 --headless", "restitution is 1.5"),
+    ("run --restitution nan --headless", "restitution is nan"),
+    ("run --friction -1 --headless", "friction is -1"),
+    ("run --friction inf --headless", "friction is inf"),
+    ("run --radius-spread 0 --headless", "radius_spread is 0"),
+    ("run --radius-spread nan --headless", "radius_spread is nan"),
+    ("run --seed -1 --headless", "seed is -1"),
+    ("run --threads 0 --headless", "threads is 0"),
+    ("run --threads 4096 --headless", "threads is 4096"),
+    ("run --dtype float16 --headless", "'float16' is not one of 'float32', 'float64'"),
+    ("run --collisions slow --headless", "'slow' is not one of 'fast', 'brute', 'none'"),
+    ("run --dt 1/0 --headless", "'1/0' is not a number"),
+    ("run --dt 0 --headless", "dt is 0"),
+    ("run --dt -0.1 --headless", "dt is -0.1"),
+    ("run --dt nan --headless", "dt is nan"),
+    ("run --seconds 0", "seconds is 0"),
+    ("run --seconds nan", "seconds is nan"),
+    ("run --seconds inf", "seconds is inf"),
+    ("run --seconds 1e300", "at most 10,000,000"),
+    ("run --frames 0", "frames is 0"),
+    ("run --frames 5 --seconds 1", "not both"),
+    ("run --headless --port 8000", "port is 8000"),
+    ("run --port 99999", "port is 99999"),
+    ("run --nonsense", "--nonsense"),
+    ("run cage box", "box"),
+    ("run cage --plot y.png", "closed form"),
+    ("run fall --plot no-such-folder/y.png", "folder that exists"),
+    ("run fall --plot y.doc", ".png"),
+    ("run fall --plot .", "folder"),
+    ("bench nowhere", "unknown scene"),
+    ("bench --settle -1", "settle is -1"),
+    ("bench --settle nan", "settle is nan"),
+    ("bench --dt 0", "dt is 0"),
+    ("rnu", "rnu"),
+]
+
+
+@pytest.mark.parametrize(("line", "says"), REFUSED, ids=[line for line, _ in REFUSED])
+def test_bad_input_is_one_sentence(run: Any, line: str, says: str) -> None:
+    code, out, err = run(*line.split())
+    assert code == 2, err
+    assert out == ""
+    assert says in err
+    assert_one_sentence(err)
+
+
+def assert_one_sentence(err: str) -> None:
+    assert err.startswith("pyverlet: ")
+    assert err.endswith("\n")
+    assert err.count("\n") == 1
+    assert "Traceback" not in err
+    assert "Usage" not in err
+
+
+def test_missing_matplotlib_names_the_command(run: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    code, out, err = run("run", "fall", "--plot", str(tmp_path / "y.png"))
+    assert (code, out) == (2, "")
+    assert "pip install 'pyverlet[plot]'" in err
+    assert_one_sentence(err)
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "says"),
+    [
+        (pv.errors.NonFiniteError(3, "contacts", 0.5), 1, "particle 3"),
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (MemoryError("Unable to allocate 3 TiB"), 1, "not enough memory"),
+        (ZeroDivisionError("a bug"), 1, "unexpected ZeroDivisionError: a bug"),
+        (OSError(28, "No space left on device"), 1, "No space left"),
+    ],
+)
+def test_failures_are_one_sentence(run: Any, monkeypatch: pytest.MonkeyPatch, error: BaseException, code: int, says: str) -> None:
+    def fail(self: pv.World, dt: float) -> None:
+        raise error
+
+    monkeypatch.setattr(pv.World, "step", fail)
+    got, out, err = run("run", *SMALL, "--json")
+    assert (got, out) == (code, "")
+    assert says in err
+    assert_one_sentence(err)
+
+
+def test_unexpected_error_shows_where_on_request(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(self: pv.World, dt: float) -> None:
+        raise ZeroDivisionError("a bug")
+
+    monkeypatch.setattr(pv.World, "step", fail)
+    monkeypatch.setenv("PYVERLET_TRACEBACK", "1")
+    assert "Traceback" in run("run", *SMALL)[2]
+
+
+def test_nothing_in_the_report_is_not_a_number(run: Any) -> None:
+    def numbers(value: Any) -> list[float]:
+        if isinstance(value, dict):
+            return [n for v in value.values() for n in numbers(v)]
+        return [value] if isinstance(value, int | float) else []
+
+    report = json.loads(run("run", "fall", "--frames", "2", "--json")[1])
+    assert all(math.isfinite(n) for n in numbers(report))

@@ -1,0 +1,100 @@
+"""The installed command as a process of its own: streams, signals, what it loads."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import sysconfig
+import time
+from pathlib import Path
+
+import pytest
+
+COMMAND = [sys.executable, "-m", "pyverlet"]
+SMALL = ["run", "cage", "--particles", "60", "--frames", "5"]
+
+
+def call(*arguments: str, **options: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(  # type: ignore[call-overload, no-any-return]
+        [*COMMAND, *arguments], capture_output=True, text=True, timeout=120, **options
+    )
+
+
+def test_json_alone_on_standard_output() -> None:
+    done = call(*SMALL, "--headless", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["particles"] == 60
+    assert "Traceback" not in done.stderr
+
+
+def test_script_is_installed() -> None:
+    script = Path(sysconfig.get_path("scripts")) / ("pyverlet.exe" if os.name == "nt" else "pyverlet")
+    if not script.exists():
+        pytest.skip("the package is not installed here, only importable")
+    done = subprocess.run([script, "list"], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0
+    assert "cage" in done.stdout
+
+
+def test_bad_input_in_a_real_process() -> None:
+    done = call("run", "cagee")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.count("\n") == 1
+
+
+def test_compiling_is_announced_on_standard_error(tmp_path: Path) -> None:
+    # An empty cache: everything has to be compiled.
+    done = call("run", "fall", "--frames", "2", "--json", env=os.environ | {"PYVERLET_CACHE_DIR": str(tmp_path)})
+    assert done.returncode == 0, done.stderr
+    assert "compiling kernels, once: " in done.stderr
+    assert json.loads(done.stdout)["compile_s"] > 0
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no SIGINT to a child on Windows")
+def test_ctrl_c_ends_a_run_with_130() -> None:
+    process = subprocess.Popen(
+        [*COMMAND, "run", "cage", "--particles", "200", "--seconds", "100000", "--json"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stderr is not None
+    first = process.stderr.readline()  # progress: it is running
+    assert "of" in first
+    time.sleep(0.2)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert out == ""
+    assert err.splitlines()[-1] == "pyverlet: interrupted"
+    assert "Traceback" not in err
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a POSIX shell's pipe")
+def test_a_closed_pipe_is_no_drama() -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    process = subprocess.Popen([*COMMAND, "list", "--json"], stdout=writer, stderr=subprocess.PIPE, text=True)
+    os.close(writer)
+    _, err = process.communicate(timeout=60)
+    assert "Traceback" not in err
+    assert "Error" not in err
+
+
+@pytest.mark.parametrize(
+    ("statement", "never"),
+    [
+        ("import pyverlet", ["starlette", "uvicorn", "websockets", "typer", "matplotlib", "pyverlet.viewers.launch"]),
+        ("from pyverlet.cli import main; main(['list'])", ["starlette", "uvicorn", "websockets", "matplotlib"]),
+        ("from pyverlet.cli import main; main(['run', 'fall', '--frames', '1'])", ["starlette", "uvicorn", "matplotlib"]),
+    ],
+    ids=["import", "list", "headless"],
+)
+def test_loads_only_what_it_needs(statement: str, never: list[str]) -> None:
+    check = f"import sys; {statement}; print([m for m in {never} if m in sys.modules], file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", check], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.splitlines()[-1] == "[]"

@@ -1,0 +1,71 @@
+"""Every Python example and every command in the README and docs runs as it stands there."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import pyverlet
+import pyverlet.viewers
+from pyverlet.cli import main
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+
+
+def blocks(page: Path, language: str) -> list[tuple[int, str]]:
+    """(line, source) of every fenced block in that language."""
+    text = page.read_text(encoding="utf-8")
+    return [(text.count("\n", 0, match.start(2)), match[2]) for match in BLOCK.finditer(text) if match[1] == language]
+
+
+def commands() -> list[str]:
+    """Every line of the shell blocks, and every row of the README's table, that starts with our command."""
+    shell = [line for page in PAGES for _, source in blocks(page, "sh") for line in source.splitlines()]
+    table = re.findall(r"^\| `(pyverlet [^`]*)`", (ROOT / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
+    return sorted({line for line in shell + table if line.startswith("pyverlet ")})
+
+
+@pytest.fixture
+def shown(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Any]:
+    """In place of a live page: what would have been shown on it. Files go to a folder that is forgotten."""
+    shown: list[Any] = []
+
+    def serve(build: Any, **options: Any) -> None:
+        build()
+        shown.append(options)
+
+    monkeypatch.setattr(pyverlet, "view", lambda world, **options: shown.append((world, options)))
+    monkeypatch.setattr(pyverlet.viewers, "serve", serve)
+    monkeypatch.chdir(tmp_path)
+    return shown
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if blocks(p, "python")], ids=lambda p: p.relative_to(ROOT).as_posix())
+def test_python_examples(page: Path, shown: list[Any]) -> None:
+    names: dict[str, Any] = {"__name__": "example"}
+    for line, source in blocks(page, "python"):
+        # Blank lines in front: a failure names the line of the page.
+        exec(compile("\n" * line + source, page, "exec"), names)
+
+
+@pytest.mark.parametrize("command", commands())
+def test_commands(command: str, shown: list[Any], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(shlex.split(command)[1:]) == 0, capsys.readouterr().err
+
+
+def test_the_pages_have_examples() -> None:
+    assert len(commands()) >= 8
+    assert sum(len(blocks(page, "python")) for page in PAGES) >= 8
+
+
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "CONTRIBUTING.md"], ids=lambda p: p.relative_to(ROOT).as_posix())
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text(encoding="utf-8")):
+        if not target.startswith(("http://", "https://")):
+            assert (page.parent / target).exists(), target
