@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pyverlet import errors, forces, integrators
+from pyverlet import errors, forces, integrators, scenes
 from pyverlet.bounds import Boundary, Box, Circle, Open
 from pyverlet.broadphase import BruteForce, Fast
 from pyverlet.clock import Clock, FrameBudget
@@ -30,7 +30,7 @@ __version__ = "0.1.0"
 __all__ = [
     "RK4", "Boundary", "Box", "BruteForce", "Circle", "Clock", "Collisions", "Energy", "ExplicitEuler", "Fast", "FrameBudget",
     "Group", "InputError", "Integrator", "NonFiniteError", "Open", "Overlap", "PositionVerlet", "PyverletError",
-    "SemiImplicitEuler", "TimeCorrectedVerlet", "VelocityVerlet", "World", "Yoshida4", "errors", "forces", "integrators", "view",
+    "SemiImplicitEuler", "TimeCorrectedVerlet", "VelocityVerlet", "World", "Yoshida4", "errors", "forces", "integrators", "scenes", "view",
     "warm_up",
 ]  # fmt: skip
 

@@ -85,9 +85,9 @@ def _compile_lazily(function: Function, parallel: bool) -> Function:
     numba.config.CACHE_DIR = str(folder) if folder else previous
     try:
         # No fastmath: it would break NaN checks and equal bits. error_model: a division is a division, not a branch and a raise.
-        compiled = numba.njit(
-            nogil=True, error_model="numpy", cache=folder is not None, parallel=parallel, fastmath=False
-        )(function)
+        compiled = numba.njit(nogil=True, error_model="numpy", cache=folder is not None, parallel=parallel, fastmath=False)(
+            function
+        )
     finally:
         numba.config.CACHE_DIR = previous
     KERNELS[f"{function.__module__}.{function.__qualname__}"] = compiled

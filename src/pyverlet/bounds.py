@@ -1,7 +1,7 @@
 """Bounds: the room the particles live in.
 
-To add one: a class here or anywhere with `confine`, `extent`, `outside` and `check`, a kernel that calls `kernels.bounds.meet` for each
-wall, and a parameter in the tests of bounds.
+To add one: a class here or anywhere with `confine`, `extent`, `outside` and `check`, a kernel that calls `kernels.bounds.meet`
+for each wall, and a parameter in the tests of bounds.
 """
 
 from __future__ import annotations
@@ -101,13 +101,16 @@ class Circle(_Walls):
         return (x - r, y - r, x + r, y + r)
 
     def outside(self, position: Array) -> Array:
-        return np.hypot(*(position.astype(np.float64) - self.center).T) > self.radius
+        x, y = (position.astype(np.float64) - self.center).T
+        return np.asarray(np.hypot(x, y) > self.radius)
 
     def check(self, radius: Array) -> None:
         _fits(radius, self.radius, f"the radius of the cage, {self.radius:g} m")
 
     def __repr__(self) -> str:
-        return f"Circle(center={self.center}, radius={self.radius:g}, restitution={self.restitution:g}, friction={self.friction:g})"
+        return (
+            f"Circle(center={self.center}, radius={self.radius:g}, restitution={self.restitution:g}, friction={self.friction:g})"
+        )
 
 
 class Box(_Walls):
@@ -137,7 +140,7 @@ class Box(_Walls):
 
     def outside(self, position: Array) -> Array:
         inside = (position >= self.lower) & (position <= self.upper)
-        return ~inside.all(axis=1)
+        return np.asarray(~inside.all(axis=1))
 
     def check(self, radius: Array) -> None:
         half = 0.5 * min(self.upper[0] - self.lower[0], self.upper[1] - self.lower[1])

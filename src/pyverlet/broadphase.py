@@ -1,4 +1,4 @@
-"""Broad phases: objects that keep a list of the pairs that may touch. `Fast` is the default, `BruteForce` the readable reference."""
+"""Broad phases keep a list of the pairs that may touch. `Fast` is the default, `BruteForce` the readable reference."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet import checks
 from pyverlet.constants import (
     CELLS_PER_PARTICLE,
     COLOUR_SLOTS,
     GRID_SPREAD,
-    SERIAL_BELOW,
     SKIN,
     SKIN_LEAST,
     SKIN_MOST,
     STRIP_PARTICLES,
     STRIPS,
 )
-from pyverlet.kernels import grid, motion
-from pyverlet.state import Slots
+from pyverlet.kernels import grid
+from pyverlet.state import Slots, farthest
 
 Array = NDArray[Any]
 
@@ -121,6 +121,10 @@ class Fast:
 
     skin: float | None = None
 
+    def __post_init__(self) -> None:
+        if self.skin is not None:
+            checks.number("skin", self.skin, least=0.0)
+
     def start(self, dtype: np.dtype[Any]) -> BroadPhase:
         """The working part of one world."""
         return _SortedCells(dtype, self.skin)
@@ -144,7 +148,8 @@ class _Layout:
         layout = cls._over(x0, y0, x1, y1, cell)
         if layout.columns * layout.rows > most:
             mean, spread = position.mean(axis=0, dtype=np.float64), position.std(axis=0, dtype=np.float64) * GRID_SPREAD
-            (x0, y0), (x1, y1) = np.maximum(mean - spread, (x0, y0)), np.minimum(mean + spread, (x1, y1))
+            if np.isfinite(spread).all():
+                (x0, y0), (x1, y1) = np.maximum(mean - spread, (x0, y0)), np.minimum(mean + spread, (x1, y1))
             layout = cls._over(x0, y0, x1, y1, cell)
         while layout.columns * layout.rows > most:
             cell *= 1.5
@@ -163,15 +168,14 @@ class _SortedCells(BroadPhase):
         self._adapts = skin is None
         self._room = 4  # pairs kept free for each particle; six neighbours make three pairs
         self._age = 0
-        self._allowed = -1.0  # square of the distance anyone may move before the list is rebuilt
+        self._allowed = -1.0  # distance anyone may move before the list is rebuilt, m; negative: rebuild now
         self.built = np.empty((0, 2), dtype)
         self._reserve(0)
 
     def update(self, state: Slots) -> None:
         self._age += 1
         if self._allowed >= 0:
-            look = motion.farthest_serial if len(state) < SERIAL_BELOW else motion.farthest_parallel
-            if look(state.position, self.built) <= self._allowed:
+            if farthest(state.position, self.built) <= self._allowed:
                 return
             if self._adapts:
                 self._adapt()
@@ -212,7 +216,7 @@ class _SortedCells(BroadPhase):
         self.list.set_strips(strips)
         self._fill(state, layout, start, strip_row[: strips + 1], state.real(skin))
         self.built = state.position.copy()
-        self._allowed = (0.5 * skin) ** 2
+        self._allowed = 0.5 * skin
 
     def _sort(self, state: Slots, layout: _Layout) -> Array:
         real = state.real

@@ -65,7 +65,8 @@ class ContactSolver:
         if e == 0.0:
             contacts.project(*moving, *bodies, *which, real(1 / h), real(LARGEST_PUSH), *notes)
         else:
-            settings = map(real, (h, LARGEST_PUSH, lag, e, REST_ACCELERATIONS * strongest * h))
+            rest_speed = REST_ACCELERATIONS * strongest * h
+            settings = (real(h), real(LARGEST_PUSH), real(lag), real(e), real(rest_speed))
             contacts.bounce(*moving, state.acceleration, *bodies, *which, *settings, *notes)
 
     def still(self, state: Slots, h: float) -> None:
@@ -82,9 +83,7 @@ class ContactSolver:
     def mark_resting(self, state: Slots) -> None:
         """Set `state.resting` for particles that touch another without bouncing off it."""
         pairs = self.broad_phase.list
-        contacts.mark_touching(
-            pairs.first, pairs.count, pairs.pair_i, pairs.pair_j, pairs.touching, pairs.touches, state.resting
-        )
+        contacts.mark_touching(pairs.first, pairs.count, pairs.pair_i, pairs.pair_j, pairs.touching, pairs.touches, state.resting)
 
 
 def find_contacts(state: State, method: Fast | BruteForce) -> np.ndarray[Any, np.dtype[np.int64]]:
@@ -104,9 +103,7 @@ def measure_overlap(state: State) -> Overlap:
         return Overlap(0.0, 0.0, 0)
     slots, phase = _listed(state, Fast(skin=0.0))
     pairs = phase.list
-    number, total, largest = contacts.overlaps(
-        slots.position, slots.radius, pairs.first, pairs.count, pairs.pair_i, pairs.pair_j
-    )
+    number, total, largest = contacts.overlaps(slots.position, slots.radius, pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
     return Overlap(total / number if number else 0.0, largest, number)
 
 

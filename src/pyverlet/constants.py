@@ -16,10 +16,10 @@ CELLS_PER_PARTICLE: Final = 4
 
 SKIN_LEAST: Final = 0.1
 SKIN_MOST: Final = 0.6
-"""Mean diameters between which the skin adapts: below, a pile that trembles rebuilds; above, twice the pairs are listed for nothing."""
+"""Mean diameters between which the skin adapts: below, trembling piles rebuild; above, most pairs are listed for nothing."""
 
 GRID_SPREAD: Final = 4.0
-"""The grid covers mean +- this many standard deviations when a few outliers would stretch it; the outliers share its rim cells."""
+"""Standard deviations about the mean that the grid covers when a few outliers would stretch it; those share its rim cells."""
 
 STRIPS: Final = 64
 """Strips of grid rows a large world is cut into: 32 even and 32 odd ones keep 8 threads busy and even.
@@ -45,7 +45,7 @@ substep; on a busy machine (a browser drawing the world, say) each wait may last
 1.7 ms a frame when nothing else runs, and lost a hundredfold when two other processes did."""
 
 REST_ACCELERATIONS: Final = 16.0
-"""An approach slower than this many |a| h is contact at rest, not an impact (0.33 m/s under gravity at 480 substeps a second). One
+"""An approach slower than this many |a| h is contact at rest, not an impact: 0.33 m/s under gravity at 480 substeps a second. One
 substep of gravity is 1; the trembling of a pile with e = 0.3 reaches 10, and with 4 here it never came to rest."""
 
 LARGEST_PUSH: Final = 0.3
@@ -53,4 +53,4 @@ LARGEST_PUSH: Final = 0.3
 on top of each other come apart over several substeps, slower than they would in one."""
 
 FRAME_BUDGET_MS: Final = 5.0
-"""Milliseconds of physics a frame may take, of the 16.7 ms of a 60 Hz frame: the rest belongs to drawing and the user's own code."""
+"""Milliseconds of physics a frame may take, of the 16.7 ms at 60 Hz: the rest belongs to drawing and the user's own code."""

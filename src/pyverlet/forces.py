@@ -58,7 +58,9 @@ class Drag:
 
 
 class PointSpring:
-    """A spring of zero length from every particle to one point: F = -stiffness (x - center), potential stiffness |x - center|^2 / 2.
+    """A spring of zero length from every particle to one point.
+
+    F = -stiffness (x - center), with the potential stiffness |x - center|^2 / 2.
 
     Args:
         center: (x, y), m.

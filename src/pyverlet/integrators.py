@@ -23,9 +23,12 @@ from pyverlet.state import Slots, advance
 class Forces(Protocol):
     """What an integrator may ask of the world: fill `state.acceleration` for the positions, velocities and time given."""
 
-    velocity_dependent: bool
+    @property
+    def velocity_dependent(self) -> bool:
+        """Whether the acceleration may depend on the velocity."""
 
-    def __call__(self, state: Slots, t: float) -> None: ...
+    def __call__(self, state: Slots, t: float) -> None:
+        """Evaluate."""
 
 
 class Integrator(ABC):
@@ -122,7 +125,7 @@ class _Stormer(Integrator):
     def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
         if motion.any_nan(state.acceleration):
             fresh = np.isnan(state.acceleration[:, 0])
-            # x_prev = x - v h + a h^2 / 2 makes u = v - a h / 2 (order 2); the naive start x_prev = x - v h makes u = v (order 1).
+            # x_prev = x - v h + a h^2 / 2 makes u = v - a h / 2: order 2. The naive x_prev = x - v h makes u = v: order 1.
             _swap_acceleration(state)
             known = state.scratch(0)
             if self.naive_start:

@@ -167,8 +167,17 @@ class Slots:
 
 def advance(out: Array, base: Array, slope: Array, h: float) -> None:
     """out = base + h * slope on (n, 2) arrays; the move every integrator is made of. out may be base."""
-    move = motion.advance_serial if len(out) < SERIAL_BELOW else motion.advance_parallel
-    move(out, base, slope, out.dtype.type(h))
+    if len(out) < SERIAL_BELOW:
+        motion.advance_serial(out, base, slope, out.dtype.type(h))
+    else:
+        motion.advance_parallel(out, base, slope, out.dtype.type(h))
+
+
+def farthest(position: Array, reference: Array) -> float:
+    """The largest distance any particle has moved from its row of `reference`, m."""
+    if len(position) < SERIAL_BELOW:
+        return float(np.sqrt(motion.farthest_serial(position, reference)))
+    return float(np.sqrt(motion.farthest_parallel(position, reference)))
 
 
 class Group:

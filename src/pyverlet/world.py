@@ -68,6 +68,7 @@ class World:
         threads: int | None = None,
     ) -> None:
         self._state = State(checks.floating("dtype", dtype))
+        self._h_last: float | None = None  # substep of the frame before; None: the integrator starts anew
         self._slots = Slots(self._state.dtype)
         self.forces: list[Force] = []
         self._force_sum = ForceSum(checks.vector("gravity", gravity), self.forces)
@@ -104,7 +105,8 @@ class World:
 
     def _frame(self, h: float, done: Callable[[str], None]) -> None:
         """The table of contents of the engine. `done` is told the name of each stage as it ends."""
-        state, forces, integrator, contacts = self._slots, self._force_sum, self.integrator, self._contacts
+        state, forces, integrator = self._slots, self._force_sum, self.integrator
+        contacts = self._contacts if len(self) > 1 else None
         lag = integrator.velocity_lag * h
         self._gather()
         done("gather")
@@ -262,7 +264,7 @@ class World:
     @substeps.setter
     def substeps(self, value: int) -> None:
         self._substeps = checks.whole("substeps", value)
-        self._h_last: float | None = None
+        self._h_last = None
 
     @property
     def integrator(self) -> Integrator:
@@ -343,7 +345,7 @@ class World:
         """16 hex digits of time and every particle's position, velocity, spin, radius and mass: equal bits, equal hash."""
         digest = hashlib.blake2b(np.float64(self.time).tobytes(), digest_size=8)
         for array in (self.position, self.velocity, self.spin, self.radius, self.mass):
-            digest.update(np.ascontiguousarray(array))
+            digest.update(array.tobytes())
         return digest.hexdigest()
 
     @property

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,7 +15,7 @@ from pyverlet.collisions import find_contacts
 from pyverlet.state import State
 
 
-def random_state(seed: int, n: int, room: float, spread: float, dtype: np.dtype) -> State:  # type: ignore[type-arg]
+def random_state(seed: int, n: int, room: float, spread: float, dtype: np.dtype[Any]) -> State:
     rng = np.random.default_rng(seed)
     state = State(dtype)
     state.append(
@@ -39,7 +41,12 @@ def random_state(seed: int, n: int, room: float, spread: float, dtype: np.dtype)
     skin=st.sampled_from([0.0, 0.2, 0.6]),
 )
 def test_fast_and_brute_find_the_same_contacts(
-    seed: int, n: int, room: float, spread: float, dtype: np.dtype, skin: float  # type: ignore[type-arg]
+    seed: int,
+    n: int,
+    room: float,
+    spread: float,
+    dtype: np.dtype[Any],
+    skin: float,
 ) -> None:
     state = random_state(seed, n, room, spread, dtype)
     assert find_contacts(state, Fast(skin=skin)).tolist() == find_contacts(state, BruteForce()).tolist()

@@ -153,11 +153,14 @@ def test_sliding_disc_ends_rolling_at_two_thirds() -> None:
 
 @pytest.mark.parametrize("degrees", [10, 20, 40, 60])
 def test_disc_on_a_slope(degrees: float) -> None:
-    # Rolls with g sin(a) / 1.5 while tan(a) <= 3 mu, slides with g (sin a - mu cos a) beyond. The velocity of a held circle is the
-    # mean one of the last substep, h / 2 behind.
+    # Rolls with g sin(a) / 1.5 while tan(a) <= 3 mu, slides with g (sin a - mu cos a) beyond. The velocity of a held circle is
+    # the mean one of the last substep, h / 2 behind.
     mu, a = 0.3, np.radians(degrees)
     world = pv.World(
-        gravity=(G * np.sin(a), -G * np.cos(a)), boundary=pv.Box((0, 0), (1000, 9), friction=mu), collisions=None, dtype=np.float64
+        gravity=(G * np.sin(a), -G * np.cos(a)),
+        boundary=pv.Box((0, 0), (1000, 9), friction=mu),
+        collisions=None,
+        dtype=np.float64,
     )
     ball = world.add(position=(1, RADIUS), radius=RADIUS)
     world.run(seconds=2)

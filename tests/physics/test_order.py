@@ -52,7 +52,7 @@ def largest_error(integrator: pv.Integrator, problem: Closed, dts: Steps) -> flo
 def steps(frames: int, jitter: float = 0.0) -> Steps:
     """One second in so many frames, each longer or shorter by up to `jitter` of itself."""
     dts = 1 + jitter * np.random.default_rng(frames).uniform(-1, 1, frames)
-    return dts / dts.sum()
+    return np.asarray(dts / dts.sum())
 
 
 def fitted_order(integrator: pv.Integrator, problem: Closed, jitter: float = 0.0) -> float:

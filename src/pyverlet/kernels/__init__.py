@@ -1,1 +1,1 @@
-"""Pure compiled functions on arrays. No classes, no input or output, no choice of method: that is the business of the layer above."""
+"""Pure compiled functions on arrays: no classes, no input or output. Which one to call is the business of the layer above."""

@@ -14,7 +14,7 @@ from pyverlet._jit import kernel, parallel_kernel, prange
 
 
 @kernel
-def meet(i, nx, ny, depth, position, velocity, acceleration, spin, radius, inverse_mass, resting, h, lag, e, mu, rest_speed):  # type: ignore[no-untyped-def]
+def meet(i, nx, ny, depth, position, velocity, acceleration, spin, radius, inverse_mass, resting, h, lag, e, mu, rest_speed):
     """Circle i is `depth` > 0 beyond a wall of normal (nx, ny): bounce it or hold it, with friction mu."""
     zero = h - h
     two = position.dtype.type(2)
@@ -56,7 +56,7 @@ def meet(i, nx, ny, depth, position, velocity, acceleration, spin, radius, inver
 
 
 @parallel_kernel
-def circle(x0, y0, size, position, velocity, acceleration, spin, radius, inverse_mass, resting, h, lag, e, mu, rest_speed):  # type: ignore[no-untyped-def]
+def circle(x0, y0, size, position, velocity, acceleration, spin, radius, inverse_mass, resting, h, lag, e, mu, rest_speed):
     """A cage: everything stays inside the circle of radius `size` about (x0, y0)."""
     zero = h - h
     for i in prange(position.shape[0]):
@@ -72,7 +72,7 @@ def circle(x0, y0, size, position, velocity, acceleration, spin, radius, inverse
 
 
 @parallel_kernel
-def box(x0, y0, x1, y1, position, velocity, acceleration, spin, radius, inverse_mass, resting, h, lag, e, mu, rest_speed):  # type: ignore[no-untyped-def]
+def box(x0, y0, x1, y1, position, velocity, acceleration, spin, radius, inverse_mass, resting, h, lag, e, mu, rest_speed):
     """Four walls; in a corner both axes act, one after the other."""
     zero = h - h
     one = h / h

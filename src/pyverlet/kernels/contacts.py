@@ -2,8 +2,9 @@
 
 For circles i and j: normal n from i to j, depth = r_i + r_j - |x_j - x_i|, w = 1 / m.
 
-Position: an overlapping pair is moved apart along n, each by its share w / (w_i + w_j). The correction is fed into the velocities,
-divided by h: that is what carries the weight of a pile from one substep to the next (Mueller et al. 2007, Position Based Dynamics).
+Position: an overlapping pair is moved apart along n, each by its share w / (w_i + w_j). The correction is fed into the
+velocities, divided by h: that is what carries the weight of a pile from one substep to the next (Mueller et al. 2007,
+Position Based Dynamics).
 
 Velocity: what projection feeds in must not become a bounce. A second pass sets the normal velocity of touching pairs
 to 0, and applies Coulomb friction with the normal impulse the projection has found (Mueller et al. 2020, Detailed Rigid Body
@@ -28,14 +29,14 @@ _TINY = 1e-30
 
 
 @kernel
-def _any_normal(i, j):  # type: ignore[no-untyped-def]
+def _any_normal(i, j):
     """A unit vector for circles whose centres coincide, where the normal is 0 / 0."""
     angle = _GOLDEN_ANGLE * (i + j)
     return np.cos(angle), np.sin(angle)
 
 
 @kernel
-def _project_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rate, most, touching, impulse):  # type: ignore[no-untyped-def]
+def _project_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rate, most, touching, impulse):
     zero = rate - rate
     count = 0
     for k in range(pair_i.shape[0]):
@@ -73,7 +74,7 @@ def _project_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rat
 @kernel
 def _bounce_strip(
     position, velocity, acceleration, radius, inverse_mass, pair_i, pair_j, h, most, lag, e, rest_speed, touching, impulse
-):  # type: ignore[no-untyped-def]
+):
     zero = h - h
     two = position.dtype.type(2)
     count = 0
@@ -127,7 +128,7 @@ def _bounce_strip(
 
 
 @kernel
-def _still_strip(position, velocity, inverse_mass, pair_i, pair_j, touching):  # type: ignore[no-untyped-def]
+def _still_strip(position, velocity, inverse_mass, pair_i, pair_j, touching):
     tiny = position.dtype.type(_TINY)
     for t in range(touching.shape[0]):
         k = touching[t]
@@ -146,7 +147,7 @@ def _still_strip(position, velocity, inverse_mass, pair_i, pair_j, touching):  #
 
 
 @kernel
-def _rub_strip(position, velocity, spin, radius, inverse_mass, pair_i, pair_j, h, mu, touching, impulse):  # type: ignore[no-untyped-def]
+def _rub_strip(position, velocity, spin, radius, inverse_mass, pair_i, pair_j, h, mu, touching, impulse):
     two = position.dtype.type(2)
     three = position.dtype.type(3)
     tiny = position.dtype.type(_TINY)
@@ -182,7 +183,7 @@ def _rub_strip(position, velocity, spin, radius, inverse_mass, pair_i, pair_j, h
 
 
 @parallel_kernel
-def project(position, velocity, radius, inverse_mass, first, count, pair_i, pair_j, rate, most, touching, impulse, touches):  # type: ignore[no-untyped-def]
+def project(position, velocity, radius, inverse_mass, first, count, pair_i, pair_j, rate, most, touching, impulse, touches):
     """Move overlapping pairs apart (e = 0) and list them. rate = 1 / h; touches[s]: how many strip s has in touching, impulse."""
     for parity in range(2):
         for half in prange((first.shape[0] + 1 - parity) // 2):
@@ -194,7 +195,7 @@ def project(position, velocity, radius, inverse_mass, first, count, pair_i, pair
 
 
 @parallel_kernel
-def bounce(  # type: ignore[no-untyped-def]
+def bounce(
     position, velocity, acceleration, radius, inverse_mass, first, count, pair_i, pair_j, h, most, lag, e, rest_speed,
     touching, impulse, touches,
 ):  # fmt: skip
@@ -210,7 +211,7 @@ def bounce(  # type: ignore[no-untyped-def]
 
 
 @parallel_kernel
-def still(position, velocity, inverse_mass, first, count, pair_i, pair_j, touching, touches):  # type: ignore[no-untyped-def]
+def still(position, velocity, inverse_mass, first, count, pair_i, pair_j, touching, touches):
     """Set the normal velocity of touching pairs to 0."""
     for parity in range(2):
         for half in prange((first.shape[0] + 1 - parity) // 2):
@@ -220,9 +221,7 @@ def still(position, velocity, inverse_mass, first, count, pair_i, pair_j, touchi
 
 
 @parallel_kernel
-def rub(  # type: ignore[no-untyped-def]
-    position, velocity, spin, radius, inverse_mass, first, count, pair_i, pair_j, h, mu, touching, impulse, touches
-):
+def rub(position, velocity, spin, radius, inverse_mass, first, count, pair_i, pair_j, h, mu, touching, impulse, touches):
     """The same, with Coulomb friction: at most mu times the normal impulse, and no more than stops the slip."""
     for parity in range(2):
         for half in prange((first.shape[0] + 1 - parity) // 2):
@@ -235,7 +234,7 @@ def rub(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def mark_touching(first, count, pair_i, pair_j, touching, touches, flag):  # type: ignore[no-untyped-def]
+def mark_touching(first, count, pair_i, pair_j, touching, touches, flag):
     """flag[i] = 1 for every particle of a touching pair."""
     for s in range(first.shape[0]):
         a = first[s]
@@ -245,7 +244,7 @@ def mark_touching(first, count, pair_i, pair_j, touching, touches, flag):  # typ
 
 
 @kernel
-def overlaps(position, radius, first, count, pair_i, pair_j):  # type: ignore[no-untyped-def]
+def overlaps(position, radius, first, count, pair_i, pair_j):
     """(number of touching pairs, sum and maximum of depth / (r_i + r_j))."""
     number, total, largest = 0, 0.0, 0.0
     for s in range(first.shape[0]):

@@ -17,22 +17,24 @@ from pyverlet._jit import kernel, parallel_kernel, prange
 
 
 @kernel
-def extent(position):  # type: ignore[no-untyped-def]
-    """(min x, min y, max x, max y) over finite comparisons: NaN never wins one."""
-    x0 = x1 = position[0, 0]
-    y0 = y1 = position[0, 1]
+def extent(position):
+    """(min x, min y, max x, max y) of the particles with finite positions; zeros if there are none."""
+    found = False
+    x0 = x1 = y0 = y1 = position.dtype.type(0)
     for i in range(position.shape[0]):
         x = position[i, 0]
         y = position[i, 1]
-        x0 = min(x0, x)
-        x1 = max(x1, x)
-        y0 = min(y0, y)
-        y1 = max(y1, y)
+        if np.isfinite(x) and np.isfinite(y):
+            x0 = min(x0, x) if found else x
+            x1 = max(x1, x) if found else x
+            y0 = min(y0, y) if found else y
+            y1 = max(y1, y) if found else y
+            found = True
     return x0, y0, x1, y1
 
 
 @kernel
-def _cell_number(value, cells):  # type: ignore[no-untyped-def]
+def _cell_number(value, cells):
     # Outliers share the rim cells: clamping keeps neighbours neighbours. NaN fails both comparisons and lands in cell 0.
     last = cells - 1
     if value >= last:
@@ -43,7 +45,7 @@ def _cell_number(value, cells):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def count_cells(position, x0, y0, per_length, columns, rows, cell, start):  # type: ignore[no-untyped-def]
+def count_cells(position, x0, y0, per_length, columns, rows, cell, start):
     """Cell of each particle, and for each cell the number of particles in all cells before it (start has one more entry)."""
     start[:] = 0
     for i in range(position.shape[0]):
@@ -57,7 +59,7 @@ def count_cells(position, x0, y0, per_length, columns, rows, cell, start):  # ty
 
 
 @kernel
-def sort_by_cell(cell, start, order):  # type: ignore[no-untyped-def]
+def sort_by_cell(cell, start, order):
     """Stable counting sort: order[k] is the particle that belongs into slot k."""
     following = start[:-1].copy()
     for i in range(cell.shape[0]):
@@ -67,7 +69,7 @@ def sort_by_cell(cell, start, order):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def cut_strips(start, columns, rows, least, strip_row):  # type: ignore[no-untyped-def]
+def cut_strips(start, columns, rows, least, strip_row):
     """First row of each strip of at least `least` particles; returns the number of strips."""
     strips = 0
     strip_row[0] = 0
@@ -80,7 +82,7 @@ def cut_strips(start, columns, rows, least, strip_row):  # type: ignore[no-untyp
 
 
 @kernel
-def _list_strip(position, radius, inverse_mass, start, columns, rows, row0, row1, skin, raw_i, raw_j, colour, room, slots):  # type: ignore[no-untyped-def]
+def _list_strip(position, radius, inverse_mass, start, columns, rows, row0, row1, skin, raw_i, raw_j, colour, room, slots):
     """Candidate pairs of the rows row0 to row1, unsorted, with their colours; returns how many there are, also beyond `room`."""
     zero = skin - skin
     found = 0
@@ -122,7 +124,7 @@ def _list_strip(position, radius, inverse_mass, start, columns, rows, row0, row1
 
 
 @kernel
-def _sort_by_colour(raw_i, raw_j, colour, found, colours, pair_i, pair_j):  # type: ignore[no-untyped-def]
+def _sort_by_colour(raw_i, raw_j, colour, found, colours, pair_i, pair_j):
     begin = np.zeros(colours + 1, np.int64)
     for p in range(found):
         begin[colour[p] + 1] += 1
@@ -136,7 +138,7 @@ def _sort_by_colour(raw_i, raw_j, colour, found, colours, pair_i, pair_j):  # ty
 
 
 @parallel_kernel
-def list_pairs(  # type: ignore[no-untyped-def]
+def list_pairs(
     position, radius, inverse_mass, start, columns, rows, strip_row, skin, room, slots,
     raw_i, raw_j, colour, pair_i, pair_j, first, count,
 ):  # fmt: skip
@@ -160,7 +162,7 @@ def list_pairs(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def list_all_pairs(position, radius, inverse_mass, pair_i, pair_j):  # type: ignore[no-untyped-def]
+def list_all_pairs(position, radius, inverse_mass, pair_i, pair_j):
     """The readable reference, O(n^2): every overlapping pair, in natural order. Returns how many, also beyond the room."""
     found = 0
     for i in range(position.shape[0]):

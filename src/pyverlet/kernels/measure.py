@@ -1,4 +1,4 @@
-"""Sums over all particles in float64, in the user's order and on one thread, so that they never depend on the number of threads."""
+"""Sums over all particles in float64, in the user's order and on one thread: they never depend on the number of threads."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from pyverlet._jit import kernel
 
 
 @kernel
-def energies(position, velocity, spin, radius, mass, gx, gy):  # type: ignore[no-untyped-def]
-    """(kinetic energy of motion, of spin, potential energy of gravity with its zero at the origin), J. Pinned particles have none."""
+def energies(position, velocity, spin, radius, mass, gx, gy):
+    """(kinetic energy of motion, of spin, potential energy of gravity, 0 at the origin), J. Pinned particles have none."""
     motion = turning = height = 0.0
     for i in range(mass.shape[0]):
         m = np.float64(mass[i])
@@ -23,7 +23,7 @@ def energies(position, velocity, spin, radius, mass, gx, gy):  # type: ignore[no
 
 
 @kernel
-def momenta(position, velocity, spin, radius, mass):  # type: ignore[no-untyped-def]
+def momenta(position, velocity, spin, radius, mass):
     """(momentum x, momentum y, angular momentum about the origin, spin included); kg m/s and kg m^2/s."""
     px = py = turning = 0.0
     for i in range(mass.shape[0]):

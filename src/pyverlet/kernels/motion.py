@@ -11,7 +11,7 @@ from pyverlet._jit import kernel, parallel_kernel, prange
 
 
 @kernel
-def advance_serial(out, base, slope, h):  # type: ignore[no-untyped-def]
+def advance_serial(out, base, slope, h):
     """out = base + h * slope, on (n, 2) arrays; out may be base."""
     for i in range(out.shape[0]):
         out[i, 0] = base[i, 0] + h * slope[i, 0]
@@ -19,7 +19,7 @@ def advance_serial(out, base, slope, h):  # type: ignore[no-untyped-def]
 
 
 @parallel_kernel
-def advance_parallel(out, base, slope, h):  # type: ignore[no-untyped-def]
+def advance_parallel(out, base, slope, h):
     """The same on many threads: each element has one writer and one formula, so the bits are the same."""
     for i in prange(out.shape[0]):
         out[i, 0] = base[i, 0] + h * slope[i, 0]
@@ -27,7 +27,7 @@ def advance_parallel(out, base, slope, h):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def uniform_acceleration(acceleration, inverse_mass, gx, gy):  # type: ignore[no-untyped-def]
+def uniform_acceleration(acceleration, inverse_mass, gx, gy):
     """a = g for every free particle, 0 for a pinned one."""
     zero = gx - gx
     for i in range(acceleration.shape[0]):
@@ -37,7 +37,7 @@ def uniform_acceleration(acceleration, inverse_mass, gx, gy):  # type: ignore[no
 
 
 @kernel
-def newton(acceleration, force, inverse_mass, gx, gy):  # type: ignore[no-untyped-def]
+def newton(acceleration, force, inverse_mass, gx, gy):
     """a = g + F / m for every free particle, 0 for a pinned one (Newton's second law)."""
     zero = gx - gx
     for i in range(acceleration.shape[0]):
@@ -48,7 +48,7 @@ def newton(acceleration, force, inverse_mass, gx, gy):  # type: ignore[no-untype
 
 
 @kernel
-def largest_norm(vectors):  # type: ignore[no-untyped-def]
+def largest_norm(vectors):
     """Largest length among the rows of an (n, 2) array; 0 if there are none."""
     largest = vectors.dtype.type(0)
     for i in range(vectors.shape[0]):
@@ -57,7 +57,7 @@ def largest_norm(vectors):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def farthest_serial(position, reference):  # type: ignore[no-untyped-def]
+def farthest_serial(position, reference):
     """Square of the largest distance any particle has moved from its reference position."""
     farthest = position.dtype.type(0)
     for i in range(position.shape[0]):
@@ -68,7 +68,7 @@ def farthest_serial(position, reference):  # type: ignore[no-untyped-def]
 
 
 @parallel_kernel
-def farthest_parallel(position, reference):  # type: ignore[no-untyped-def]
+def farthest_parallel(position, reference):
     """The same on many threads; a maximum does not depend on the order it is taken in."""
     farthest = position.dtype.type(0)
     for i in prange(position.shape[0]):
@@ -79,7 +79,7 @@ def farthest_parallel(position, reference):  # type: ignore[no-untyped-def]
 
 
 @parallel_kernel
-def take_rows(out, source, index):  # type: ignore[no-untyped-def]
+def take_rows(out, source, index):
     """out[k] = source[index[k]] for (n, 2) arrays."""
     for k in prange(index.shape[0]):
         out[k, 0] = source[index[k], 0]
@@ -87,7 +87,7 @@ def take_rows(out, source, index):  # type: ignore[no-untyped-def]
 
 
 @parallel_kernel
-def put_rows(out, source, index):  # type: ignore[no-untyped-def]
+def put_rows(out, source, index):
     """out[index[k]] = source[k] for (n, 2) arrays; index is a permutation, so every row has one writer."""
     for k in prange(index.shape[0]):
         out[index[k], 0] = source[k, 0]
@@ -95,7 +95,7 @@ def put_rows(out, source, index):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def take_checking(out, source, index):  # type: ignore[no-untyped-def]
+def take_checking(out, source, index):
     """out[k] = source[index[k]] for (n,) arrays; returns whether anything in out changed."""
     changed = False
     for k in range(index.shape[0]):
@@ -106,14 +106,14 @@ def take_checking(out, source, index):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def put(out, source, index):  # type: ignore[no-untyped-def]
+def put(out, source, index):
     """out[index[k]] = source[k] for (n,) arrays; index is a permutation."""
     for k in range(index.shape[0]):
         out[index[k]] = source[k]
 
 
 @kernel
-def clear_where(vectors, flag):  # type: ignore[no-untyped-def]
+def clear_where(vectors, flag):
     """Set the flagged rows of an (n, 2) array to 0."""
     zero = vectors.dtype.type(0)
     for i in range(vectors.shape[0]):
@@ -123,7 +123,7 @@ def clear_where(vectors, flag):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def any_nan(vectors):  # type: ignore[no-untyped-def]
+def any_nan(vectors):
     """Whether the first column of an (n, 2) array has a NaN."""
     found = False
     for i in range(vectors.shape[0]):
@@ -132,7 +132,7 @@ def any_nan(vectors):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def first_non_finite(vectors):  # type: ignore[no-untyped-def]
+def first_non_finite(vectors):
     """Index of the first row that is NaN or infinite; -1 if all are finite."""
     for i in range(vectors.shape[0]):
         if not (np.isfinite(vectors[i, 0]) and np.isfinite(vectors[i, 1])):

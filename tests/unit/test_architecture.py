@@ -1,0 +1,105 @@
+"""The house: each module imports only from lower layers, kernels from next to nothing, and `import pyverlet` stays light."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import pyverlet
+
+ROOT = Path(pyverlet.__file__).parent
+
+# From the ground up. A module may import from its own layer only within its own package (the first part of its name).
+LAYERS = (
+    {"errors", "constants", "_jit", "checks"},
+    {"state", "kernels"},
+    {"integrators", "forces", "bounds", "broadphase", "collisions", "energy"},
+    {"world", "profile", "clock", "warmup"},
+    {"scenes", "report", "lab"},
+    {"viewers"},
+    {"cli"},
+)
+# Steps within a layer: module -> what it may use beside it.
+BESIDE = {
+    "checks": {"errors"},
+    "state": {"kernels"},
+    "collisions": {"broadphase"},
+    "energy": {"forces"},
+    "world": {"profile"},
+    "warmup": {"world"},
+    "report": {"scenes"},
+    "lab": {"scenes"},
+}
+
+
+MODULE_NAMES = set().union(*LAYERS)
+
+
+def layer(module: str) -> int:
+    (found,) = [k for k, names in enumerate(LAYERS) if module in names]
+    return found
+
+
+def imported(path: Path) -> set[str]:
+    """First parts, below pyverlet, of every module this file imports, wherever in the file it does so."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "pyverlet":
+            parts = node.module.split(".")
+            names |= {parts[1]} if len(parts) > 1 else {alias.name for alias in node.names} & MODULE_NAMES
+        elif isinstance(node, ast.Import):
+            names |= {alias.name.split(".")[1] for alias in node.names if alias.name.startswith("pyverlet.")}
+    return names
+
+
+MODULES = sorted(path for path in ROOT.rglob("*.py") if path.relative_to(ROOT).as_posix() not in ("__init__.py", "__main__.py"))
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_layers_look_down(path: Path) -> None:
+    own = path.relative_to(ROOT).parts[0].removesuffix(".py")
+    for name in imported(path) - {own}:
+        allowed = layer(name) < layer(own) or name in BESIDE.get(own, set())
+        assert allowed, f"{own} imports {name}, which is not below it"
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "kernels").glob("*.py")), ids=lambda path: path.stem)
+def test_kernels_stand_on_the_compiler_alone(path: Path) -> None:
+    # The cache of compiled kernels is keyed by these sources; one more import and it would miss edits.
+    assert imported(path) <= {"_jit", "constants", "kernels"}
+
+
+@pytest.mark.parametrize("path", [p for p in MODULES if p.name != "_jit.py"], ids=lambda p: p.relative_to(ROOT).as_posix())
+def test_only_one_place_compiles(path: Path) -> None:
+    assert "import numba" not in path.read_text(encoding="utf-8")
+
+
+def test_import_is_light() -> None:
+    # Numba brings SciPy along where it is installed: what counts is what pyverlet adds to NumPy and Numba.
+    code = (
+        "import sys, numpy, numba; before = set(sys.modules); import pyverlet\n"
+        "print(' '.join({name.split('.')[0] for name in set(sys.modules) - before}))"
+    )
+    added = set(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split())
+    assert "pyverlet" in added
+    third_party = {
+        name for name in added - {"pyverlet", "numpy", "numba", "llvmlite", "scipy"} if name not in sys.stdlib_module_names
+    }
+    assert third_party == set()
+
+
+def test_files_hold_one_idea() -> None:
+    long = {path.name for path in ROOT.rglob("*.*") if path.suffix in {".py", ".js"} and len(path.read_text().splitlines()) > 400}
+    assert long == set()
+
+
+def test_world_step_fits_on_a_screen() -> None:
+    tree = ast.parse((ROOT / "world.py").read_text(encoding="utf-8"))
+    functions = {node.name: node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+    first, last = functions["step"].lineno, functions["_frame"].end_lineno
+    assert last is not None
+    assert last - first < 60

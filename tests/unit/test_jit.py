@@ -1,0 +1,120 @@
+"""The cache of compiled kernels: named after the sources, so that an edit anywhere among them compiles anew."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet import _jit
+
+SOURCES = Path(pv.__file__).parent
+
+
+def test_the_hash_sees_an_edit_in_any_kernel_and_no_other(tmp_path: Path) -> None:
+    copy = tmp_path / "pyverlet"
+    shutil.copytree(SOURCES, copy)
+    before = _jit.sources_hash(copy)
+    assert before == _jit.sources_hash()
+    (copy / "world.py").write_text("# edited")
+    assert _jit.sources_hash(copy) == before
+    for name in ("kernels/contacts.py", "kernels/motion.py", "constants.py", "_jit.py"):
+        with (copy / name).open("a") as file:
+            file.write("\n# edited\n")
+        after = _jit.sources_hash(copy)
+        assert after != before
+        before = after
+
+
+CALL_A_KERNEL = """
+import numpy as np
+from pyverlet.kernels import motion
+from pyverlet import _jit
+out = np.zeros((1, 2))
+motion.advance_serial(out, out, np.ones((1, 2)), 1.0)
+print(out[0, 0], sum(motion.advance_serial.stats.cache_hits.values()))
+"""
+
+
+def test_an_edited_helper_is_not_served_from_the_cache(tmp_path: Path) -> None:
+    # Numba alone would miss this: the file of the kernel that is called does not change, that of an inlined one does.
+    copy = tmp_path / "site" / "pyverlet"
+    shutil.copytree(SOURCES, copy)
+    kernels = copy / "kernels"
+    (kernels / "_helper.py").write_text("from pyverlet._jit import kernel\n\n\n@kernel\ndef gain():\n    return 1.0\n")
+    motion = (kernels / "motion.py").read_text()
+    motion = motion.replace("import numpy as np\n", "import numpy as np\nfrom pyverlet.kernels._helper import gain\n", 1)
+    motion = motion.replace("out[i, 0] = base[i, 0] + h * slope[i, 0]", "out[i, 0] = base[i, 0] + gain() * h * slope[i, 0]", 1)
+    (kernels / "motion.py").write_text(motion)
+
+    def call() -> list[str]:
+        env = {**os.environ, "PYTHONPATH": str(copy.parent), "PYVERLET_CACHE_DIR": str(tmp_path / "cache")}
+        return subprocess.run(
+            [sys.executable, "-c", CALL_A_KERNEL], env=env, capture_output=True, text=True, check=True
+        ).stdout.split()
+
+    assert call() == ["1.0", "0"]
+    assert call() == ["1.0", "1"]  # from the cache
+    helper = kernels / "_helper.py"
+    helper.write_text(helper.read_text().replace("1.0", "2.0"))
+    assert call() == ["2.0", "0"]
+
+
+def test_caches_nobody_used_for_a_month_go(tmp_path: Path) -> None:
+    current, stale, recent = (tmp_path / name for name in ("current", "stale", "recent"))
+    for folder in (current, stale, recent):
+        folder.mkdir()
+    long_ago = time.time() - 40 * 24 * 3600
+    os.utime(stale, (long_ago, long_ago))
+    _jit._forget_stale(current)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["current", "recent"]
+
+
+def test_without_a_writable_folder_it_still_runs(tmp_path: Path) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    env = {**os.environ, "PYVERLET_CACHE_DIR": str(blocked), "TMPDIR": str(tmp_path)}
+    code = "from pyverlet import _jit; print(_jit.cache_dir())"
+    run = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True)
+    assert Path(run.stdout.strip()).is_relative_to(tmp_path)
+
+
+@pytest.mark.parametrize("boundary", [pv.Circle(radius=10), pv.Box((0, 0), (10, 10)), pv.Open()])
+def test_warm_up_leaves_the_world_alone_and_nothing_to_compile(boundary: pv.Boundary) -> None:
+    world = pv.World(boundary=boundary, collisions=pv.Collisions(restitution=0.5, friction=0.5))
+    world.add(position=[(3, 3), (4, 4)])
+    before = world.state_hash()
+    assert pv.warm_up(world) > 0
+    assert world.state_hash() == before
+    compiled: list[int] = []
+    with _jit.watch_compiling(lambda: compiled.append(1)):
+        world.step(1 / 60)
+        world.energy(), world.overlap(), world.momentum(), world.escaped()
+    assert compiled == []
+
+
+def test_warm_up_reports_progress(tmp_path: Path) -> None:
+    code = (
+        "import pyverlet as pv; world = pv.World(); world.add(position=(0, 0)); seen = []\n"
+        "pv.warm_up(world, lambda done, total: seen.append((done, total)))\n"
+        "assert seen[0][0] == 1 and seen[-1][0] == seen[-1][1] > 20, seen\n"
+        "assert [d for d, _ in seen] == sorted(d for d, _ in seen)\n"
+        "pv.warm_up(world, lambda done, total: exit('compiled twice'))\n"
+    )
+    subprocess.run([sys.executable, "-c", code], env={**os.environ, "PYVERLET_CACHE_DIR": str(tmp_path)}, check=True, timeout=300)
+
+
+def test_float32_stays_float32() -> None:
+    # A stray float64 constant would widen the arithmetic: 1 + 2^-24 is 1 in float32.
+    out = np.zeros((1, 2), np.float32)
+    from pyverlet.state import advance
+
+    advance(out, np.ones((1, 2), np.float32), np.ones((1, 2), np.float32), 2.0**-25)
+    assert out[0, 0] == 1.0

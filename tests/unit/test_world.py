@@ -1,0 +1,293 @@
+"""The library's contract: what goes in, what comes out, and what a wrong argument is told."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+
+
+def test_the_first_example_of_the_library() -> None:
+    xy = np.array([(0.0, 0.0), (0.5, 0.2), (-1.0, 3.0)])
+    world = pv.World(
+        gravity=(0, -9.81),
+        integrator=pv.PositionVerlet(),
+        boundary=pv.Circle(center=(0, 0), radius=10, restitution=0.0),
+        collisions=pv.Collisions(restitution=0.0, friction=0.0),
+        substeps=8,
+        dtype=np.float32,
+    )
+    balls = world.add(position=xy, velocity=(1, 0), radius=0.05, mass=1.0)
+    world.step(1 / 60)
+    world.run(seconds=1.0, dt=1 / 60)
+    assert len(balls) == len(world) == 3
+    assert balls.position.shape == (3, 2)
+    assert balls.position.dtype == np.float32
+    assert world.time == pytest.approx(1 + 1 / 60)
+    assert world.frames == 61
+    assert world.energy().total == pytest.approx(world.energy().kinetic + world.energy().potential)
+    assert world.momentum().shape == (2,)
+    assert {"integrate", "broad phase", "contacts", "bounds", "velocities"} <= set(world.profile.stages)
+    assert world.profile.frame_ms == pytest.approx(sum(world.profile.stages.values()), rel=0.2)
+    assert len(world.state_hash()) == 16
+
+
+def test_groups_are_views_in_the_order_added() -> None:
+    rng = np.random.default_rng(0)
+    world = pv.World(gravity=(0, 0), boundary=pv.Box((0, 0), (50, 50)))
+    first = world.add(position=rng.uniform(1, 49, (400, 2)), radius=np.linspace(0.1, 0.2, 400))
+    second = world.add(position=(25, 25), velocity=(3, 0), radius=0.5)
+    assert np.shares_memory(first.position, world.position)
+    start = first.position.copy()
+    world.step(1e-6)
+    # The engine has sorted its own copy; nobody else sees that.
+    assert np.abs(first.position - start).max() < 0.2
+    assert first.radius == pytest.approx(np.linspace(0.1, 0.2, 400))
+    assert second.index.tolist() == [400]
+    assert repr(second) == "Group of 1 particles, 400 to 400"
+    first.velocity[7] = (0, 5)
+    second.position = (10, 10)
+    assert world.velocity[7].tolist() == [0, 5]
+    assert world.position[400].tolist() == [10, 10]
+    second.mass, second.radius, second.spin = 2.0, 0.25, 1.0
+    second.velocity = (0, 0)
+    assert (world.mass[400], world.radius[400], world.spin[400]) == (2.0, 0.25, 1.0)
+
+
+def test_adding_while_running_keeps_what_is_there() -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (40, 40)), dtype=np.float64)
+    groups = []
+    for k in range(30):
+        groups.append(world.add(position=(1 + k, 5), radius=0.4))
+        world.step(1 / 60)
+    assert len(world) == 30
+    # Each fell freely since it was added: y = 5 - g t^2 / 2, exact for Verlet from its second-order start.
+    for k, group in enumerate(groups):
+        t = (30 - k) / 60
+        assert group.position[0, 1] == pytest.approx(max(5 - 9.81 * t * t / 2, 0.4), abs=1e-9)
+
+
+def test_a_change_of_radius_or_mass_is_noticed() -> None:
+    world = pv.World(gravity=(0, 0), dtype=np.float64)
+    balls = world.add(position=[(0, 0), (3, 0)], radius=0.5)
+    world.step(1 / 60)
+    assert world.overlap().contacts == 0
+    balls.radius[:] = 1.6
+    balls.mass[0] = np.inf
+    world.run(seconds=0.5)
+    assert world.overlap().max < 0.01
+    assert balls.position[0].tolist() == [0, 0]
+
+
+def test_collisions_none_lets_them_pass() -> None:
+    world = pv.World(gravity=(0, 0), collisions=None, dtype=np.float64)
+    balls = world.add(position=[(0, 0), (2, 0)], velocity=[(4, 0), (0, 0)], radius=0.5)
+    world.run(seconds=1)
+    assert balls.velocity.tolist() == [[4, 0], [0, 0]]
+    world.collisions = pv.Collisions()
+    assert world.overlap().contacts == 0
+
+
+def test_escaped_counts_centres_outside() -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (10, 10)))
+    world.add(position=[(5, 5), (-1, 5), (5, 11)])
+    assert world.escaped() == 2
+    world.step(1 / 60)
+    assert world.escaped() == 0
+
+
+def test_an_empty_world_runs() -> None:
+    world = pv.World(boundary=pv.Circle(radius=5))
+    world.run(seconds=0.1)
+    assert world.energy().total == 0
+    assert world.overlap() == (0.0, 0.0, 0)
+
+
+def test_the_boundary_may_move() -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (10, 10)))
+    ball = world.add(position=(9, 9), radius=0.5)
+    world.boundary = pv.Box((0, 0), (5, 5))
+    world.step(1 / 60)
+    assert (ball.position <= 4.5 + 1e-6).all()
+
+
+def test_forces_act_and_have_potentials() -> None:
+    # Terminal velocity under quadratic drag: m g = c v^2.
+    world = pv.World(collisions=None, dtype=np.float64)
+    ball = world.add(position=(0, 0), mass=2.0)
+    world.forces.append(pv.forces.Drag(quadratic=0.5))
+    world.run(seconds=10)
+    assert -ball.velocity[0, 1] == pytest.approx(np.sqrt(2.0 * 9.81 / 0.5), rel=1e-9)
+
+    spring = pv.World(gravity=(0, 0), collisions=None, dtype=np.float64)
+    spring.add(position=(3, 4))
+    spring.forces.append(pv.forces.PointSpring(center=(0, 0), stiffness=2.0))
+    assert spring.energy().potential == pytest.approx(25.0)
+
+
+def test_grip_pulls_one_particle_to_its_target() -> None:
+    world = pv.World(boundary=pv.Box((-5, -5), (5, 5)))
+    balls = world.add(position=[(0, 0), (3, -4.5)], radius=0.5)
+    grip = pv.forces.Grip(0, target=(2, 3), frequency=5.0)
+    world.forces.append(grip)
+    world.run(seconds=2)
+    # A spring of frequency f sags by g / (2 pi f)^2 = 1 cm.
+    assert balls.position[0] == pytest.approx([2, 3 - 9.81 / (10 * np.pi) ** 2], abs=1e-3)
+    grip.target = (-2, 0)
+    world.run(seconds=2)
+    assert balls.position[0, 0] == pytest.approx(-2, abs=1e-3)
+    assert balls.position[1] == pytest.approx([3, -4.5], abs=1e-3)
+
+
+def test_push_clears_a_hole() -> None:
+    world = pv.World(gravity=(0, 0), collisions=None)
+    x, y = np.meshgrid(np.linspace(-3, 3, 13), np.linspace(-3, 3, 13))
+    balls = world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.1)
+    far = np.hypot(*balls.position.T) > 2
+    before = balls.position[far].copy()
+    world.forces.append(pv.forces.Push(center=(0, 0), radius=2, acceleration=200))
+    world.run(seconds=0.2)
+    assert balls.position[far].tolist() == before.tolist()
+    near = np.hypot(*balls.position[~far].T)
+    assert np.sort(near)[1] > 1.5  # all but the one at the very centre
+
+
+# ---- bad input: one sentence naming argument, value and what is allowed ----------------------------------------------------
+
+
+def two_balls() -> pv.World:
+    world = pv.World(boundary=pv.Circle(radius=10))
+    world.add(position=[(0, 0), (2, 0)])
+    return world
+
+
+BAD: dict[str, tuple[Callable[[], Any], tuple[str, ...]]] = {
+    "nan position": (lambda: pv.World().add(position=[(0, 0), (np.nan, 1)]), ("position[1]", "nan", "finite")),
+    "infinite position": (lambda: pv.World().add(position=(np.inf, 1)), ("position[0]", "inf", "finite")),
+    "position shape": (lambda: pv.World().add(position=np.zeros((3, 3))), ("position", "(3, 3)", "(n, 2)")),
+    "velocity shape": (
+        lambda: pv.World().add(position=np.zeros((3, 2)), velocity=np.zeros((2, 2))),
+        ("velocity", "(2, 2)", "(3, 2)"),
+    ),
+    "nan velocity": (lambda: pv.World().add(position=(0, 0), velocity=(0, np.nan)), ("velocity[0]", "nan")),
+    "nan spin": (lambda: pv.World().add(position=(0, 0), spin=np.nan), ("spin[0]", "nan")),
+    "radius shape": (lambda: pv.World().add(position=np.zeros((3, 2)), radius=[1, 2]), ("radius", "(2,)", "(3,)")),
+    "negative radius": (lambda: pv.World().add(position=(0, 0), radius=-0.5), ("radius[0]", "-0.5", "greater than 0")),
+    "infinite radius": (lambda: pv.World().add(position=(0, 0), radius=np.inf), ("radius[0]", "inf", "finite")),
+    "negative mass": (lambda: pv.World().add(position=(0, 0), mass=-1), ("mass[0]", "-1", "greater than 0")),
+    "nan mass": (lambda: pv.World().add(position=(0, 0), mass=np.nan), ("mass[0]", "nan")),
+    "not numbers": (lambda: pv.World().add(position="here"), ("position", "numbers")),
+    "larger than the cage": (
+        lambda: pv.World(boundary=pv.Circle(radius=1)).add(position=(0, 0), radius=[2.0]),
+        ("radius[0]", "2 m", "cage", "1 m"),
+    ),
+    "larger than the box": (
+        lambda: pv.World(boundary=pv.Box((0, 0), (1, 9))).add(position=(0, 0), radius=0.6),
+        ("radius[0]", "0.6 m", "box", "0.5 m"),
+    ),
+    "cage smaller than the circles": (lambda: setattr(two_balls(), "boundary", pv.Circle(radius=0.1)), ("radius[0]", "cage")),
+    "substeps 0": (lambda: pv.World(substeps=0), ("substeps", "0", "at least 1")),
+    "substeps 1.5": (lambda: pv.World(substeps=1.5), ("substeps", "1.5", "whole")),  # type: ignore[arg-type]
+    "dt 0": (lambda: two_balls().step(0), ("dt", "0", "greater than 0")),
+    "dt negative": (lambda: two_balls().step(-0.1), ("dt", "-0.1", "greater than 0")),
+    "dt nan": (lambda: two_balls().step(float("nan")), ("dt", "nan", "finite")),
+    "seconds negative": (lambda: two_balls().run(seconds=-1), ("seconds", "-1", "at least 0")),
+    "threads": (lambda: pv.World(threads=10_000), ("threads", "10000", "from 1 to", "cores")),
+    "gravity": (lambda: pv.World(gravity=(0, np.nan)), ("gravity", "nan", "finite")),
+    "gravity shape": (lambda: pv.World(gravity=9.81), ("gravity", "9.81", "(x, y)")),  # type: ignore[arg-type]
+    "dtype": (lambda: pv.World(dtype=np.int32), ("dtype", "int32", "float32")),
+    "dtype name": (lambda: pv.World(dtype="float16x"), ("dtype", "float16x", "float32")),
+    "integrator": (lambda: pv.World(integrator="rk4"), ("integrator", "'rk4'", "PositionVerlet()")),  # type: ignore[arg-type]
+    "boundary": (lambda: pv.World(boundary=5), ("boundary", "5", "Circle")),  # type: ignore[arg-type]
+    "collisions": (lambda: pv.World(collisions=True), ("collisions", "True", "None")),  # type: ignore[arg-type]
+    "restitution": (lambda: pv.Collisions(restitution=1.5), ("restitution", "1.5", "0 to 1")),
+    "friction": (lambda: pv.Collisions(friction=-1), ("friction", "-1", "at least 0")),
+    "method": (lambda: pv.Collisions(method="brute"), ("method", "'brute'", "BruteForce()")),  # type: ignore[arg-type]
+    "cage radius": (lambda: pv.Circle(radius=0), ("radius", "0", "greater than 0")),
+    "box corners": (lambda: pv.Box((0, 0), (-1, 1)), ("upper", "(-1.0, 1.0)", "lower")),
+    "wall restitution": (lambda: pv.Box((0, 0), (1, 1), restitution=2), ("restitution", "2")),
+    "grip": (lambda: pv.forces.Grip(-1, target=(0, 0)), ("particle", "-1", "at least 0")),
+    "clock": (lambda: pv.Clock(dt=0), ("dt", "0", "greater than 0")),
+    "clock elapsed": (lambda: pv.Clock().advance(-1), ("elapsed", "-1", "at least 0")),
+    "skin": (lambda: pv.Fast(skin=-0.1), ("skin", "-0.1", "at least 0")),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_gets_one_sentence(case: str) -> None:
+    act, parts = BAD[case]
+    with pytest.raises(pv.InputError) as caught:
+        act()
+    message = str(caught.value)
+    assert "\n" not in message
+    for part in parts:
+        assert part in message, message
+    assert isinstance(caught.value, ValueError)
+
+
+def test_a_refused_addition_changes_nothing() -> None:
+    world = two_balls()
+    before = world.state_hash()
+    with pytest.raises(pv.InputError):
+        world.add(position=[(1, 1), (2, np.nan)])
+    assert world.state_hash() == before
+    assert len(world) == 2
+
+
+def test_a_wrong_radius_written_later_is_refused_at_the_next_step() -> None:
+    world = two_balls()
+    world.radius[1] = -2
+    with pytest.raises(pv.InputError, match=r"radius\[1\] is -2"):
+        world.step(1 / 60)
+
+
+def test_saved_states_belong_to_their_world() -> None:
+    world = two_balls()
+    saved = world.save()
+    world.add(position=(5, 5))
+    with pytest.raises(pv.InputError, match="2 particles.*3 particles"):
+        world.restore(saved)
+
+
+class Explode:
+    """A force that turns NaN at a given time, for one particle."""
+
+    velocity_dependent = False
+
+    def apply(self, state: Any, t: float) -> None:
+        if t > 0.5:
+            state.force[state.slot_of(3)] = np.nan
+
+
+def test_a_non_finite_state_stops_the_world_and_keeps_the_last_good_frame() -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (20, 20)))
+    rng = np.random.default_rng(0)
+    world.add(position=rng.uniform(1, 19, (50, 2)), radius=0.2)
+    world.forces.append(Explode())
+    with pytest.raises(pv.NonFiniteError, match="particle 3 turned non-finite in stage 'integrate'") as caught:
+        world.run(seconds=2)
+    assert (caught.value.particle, caught.value.stage) == (3, "integrate")
+    assert 0.4 < world.time <= 0.51
+    assert np.isfinite(world.position).all()
+    assert np.isfinite(world.energy().total)
+    world.forces.clear()
+    world.run(seconds=0.5)
+    assert np.isfinite(world.position).all()
+
+
+def test_nan_written_by_the_user_is_found_where_it_enters() -> None:
+    world = two_balls()
+    world.position[1, 0] = np.nan
+    with pytest.raises(pv.NonFiniteError, match="particle 1 .* stage 'gather'"):
+        world.step(1 / 60)
+
+
+def test_errors_travel_between_processes() -> None:
+    error = pickle.loads(pickle.dumps(pv.NonFiniteError(3, "contacts", 1.5)))
+    assert "particle 3" in str(error)
+    assert isinstance(error, pv.PyverletError)
