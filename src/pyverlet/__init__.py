@@ -30,7 +30,8 @@ __version__ = "0.1.0"
 __all__ = [
     "RK4", "Boundary", "Box", "BruteForce", "Circle", "Clock", "Collisions", "Energy", "ExplicitEuler", "Fast", "FrameBudget",
     "Group", "InputError", "Integrator", "NonFiniteError", "Open", "Overlap", "PositionVerlet", "PyverletError",
-    "SemiImplicitEuler", "TimeCorrectedVerlet", "VelocityVerlet", "World", "Yoshida4", "errors", "forces", "integrators", "scenes", "view",
+    "SemiImplicitEuler", "TimeCorrectedVerlet", "VelocityVerlet", "World", "Yoshida4", "errors", "forces", "integrators",
+    "scenes", "view",
     "warm_up",
 ]  # fmt: skip
 

@@ -28,7 +28,7 @@ Fixed, never derived from the number of threads, so that any number gives the sa
 STRIP_PARTICLES: Final = 256
 """A strip has at least this many particles: below it, starting a thread costs more than it saves."""
 
-COLOUR_SLOTS: Final = 8
+COLOUR_SLOTS: Final = 6
 """Pairs of one cell that get colours of their own; later ones share the last. Six circles touch a circle, three pairs of its own.
 Only speed depends on it, never correctness."""
 

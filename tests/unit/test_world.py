@@ -250,7 +250,7 @@ def test_saved_states_belong_to_their_world() -> None:
     world = two_balls()
     saved = world.save()
     world.add(position=(5, 5))
-    with pytest.raises(pv.InputError, match="2 particles.*3 particles"):
+    with pytest.raises(pv.InputError, match=r"2 particles.*3 particles"):
         world.restore(saved)
 
 
@@ -283,7 +283,7 @@ def test_a_non_finite_state_stops_the_world_and_keeps_the_last_good_frame() -> N
 def test_nan_written_by_the_user_is_found_where_it_enters() -> None:
     world = two_balls()
     world.position[1, 0] = np.nan
-    with pytest.raises(pv.NonFiniteError, match="particle 1 .* stage 'gather'"):
+    with pytest.raises(pv.NonFiniteError, match=r"particle 1 .* stage 'gather'"):
         world.step(1 / 60)
 
 
