@@ -53,8 +53,9 @@ def _project_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rat
         else:
             # No branch on touching: half the candidates do and half do not, and a wrong guess costs 15 ns.
             depth = min(max(reach - distance, zero), most * reach)
-        share = depth / (wi + wj)
-        cx, cy = dx * (share / distance), dy * (share / distance)
+        # One division for all: they do not overlap, and each costs as much as four products.
+        scale = depth / (distance * (wi + wj))
+        cx, cy = dx * scale, dy * scale
         position[i, 0] = xi - cx * wi
         position[i, 1] = yi - cy * wi
         position[j, 0] = xj + cx * wj
@@ -66,7 +67,7 @@ def _project_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rat
         velocity[j, 0] += cx * wj
         velocity[j, 1] += cy * wj
         touching[count] = k
-        impulse[count] = share * rate
+        impulse[count] = scale * distance * rate
         count += depth > zero
     return count
 

@@ -1,0 +1,69 @@
+"""Seeing a world live. Importing this package loads nothing but itself; the server is loaded when a viewer starts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pyverlet.world import World
+
+__all__ = ["serve", "view"]
+
+DEFAULT_PORT = 8000
+
+
+def view(
+    world: World,
+    *,
+    port: int = DEFAULT_PORT,
+    open_browser: bool = True,
+    title: str = "pyverlet",
+    dt: float = 1 / 60,
+) -> None:
+    """Show `world` on a live page until Ctrl-C, stepping it in real time.
+
+    The page's reset goes back to the state the world has now. Where there is no screen the address is printed instead.
+
+    Args:
+        world: the world to step and show; nobody else may touch it until this returns.
+        port: TCP port on this machine, 1 to 65535; 0 takes any free one.
+        open_browser: open a tab when there is a screen to open it on.
+        title: heading of the page.
+        dt: simulated seconds per frame.
+
+    Raises:
+        InputError: the port is taken or not a port, or dt is not positive.
+    """
+    from pyverlet.viewers import launch
+
+    launch.serve(lambda: world, title=title, host="127.0.0.1", port=port, open_browser=open_browser, dt=dt)
+
+
+def serve(
+    build: Callable[[], World],
+    *,
+    scene_name: str,
+    host: str = "127.0.0.1",
+    port: int = DEFAULT_PORT,
+    open_browser: bool = True,
+    dt: float = 1 / 60,
+) -> None:
+    """Build a world, compile what it needs and show it on a live page until Ctrl-C. What the command line uses.
+
+    The port is taken before the world is built, so that a taken one is told at once.
+
+    Args:
+        build: makes the world.
+        scene_name: heading of the page.
+        host: address to listen on; anything but this machine's own lets the whole network in.
+        port: TCP port, 1 to 65535; 0 takes any free one.
+        open_browser: open a tab when there is a screen to open it on.
+        dt: simulated seconds per frame.
+
+    Raises:
+        InputError: the host or port cannot be used, dt is not positive, or whatever `build` refuses.
+    """
+    from pyverlet.viewers import launch
+
+    launch.serve(build, title=scene_name, host=host, port=port, open_browser=open_browser, dt=dt)

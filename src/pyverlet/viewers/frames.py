@@ -1,0 +1,159 @@
+"""What a session publishes: immutable pictures of a world, ready to be sent anywhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, singledispatch
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.bounds import Circle
+
+if TYPE_CHECKING:
+    from pyverlet.world import World
+
+Rect = tuple[float, float, float, float]
+"""x0, y0, x1, y1 in metres."""
+
+GRID_MAX = 65535
+"""Largest coordinate on the 16-bit grid: 65,536 places across the view are 1/30 of a pixel on a 2,000 pixel screen."""
+
+VIEW_MARGIN = 0.03
+"""Free space around the bounds, as a fraction of their longer side."""
+
+OPEN_GROWTH = 8.0
+"""An unbounded view grows with its particles to this multiple of its start: one runaway does not shrink the rest."""
+
+ROOM = 1.25
+"""Size of an unbounded view, in terms of what must fit."""
+
+MEDIAN_SAMPLE = 1000
+"""Particles whose median the view follows: a median of all would take milliseconds."""
+
+OUTLINE_POINTS = 240
+"""Points of a circle's outline: off the true circle by less than a tenth of a pixel on a screen of 2,000."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What stays the same from frame to frame: sent once to each viewer, again when it changes."""
+
+    title: str
+    dt: float
+    budget_ms: float
+    bounded: bool
+    outlines: tuple[tuple[tuple[float, float], ...], ...]
+    """Closed lines of the bounds, metres."""
+    radius: NDArray[np.float32]
+    """(n,) metres, read-only."""
+
+
+@dataclass(frozen=True)
+class Status:
+    """The numbers on show with a frame. Energies in joules, times in seconds, physics in milliseconds a frame."""
+
+    time: float
+    frames: int
+    particles: int
+    dropped: int
+    physics_ms: float
+    physics_median_ms: float
+    physics_p95_ms: float
+    kinetic: float
+    energy: float
+    gravity: tuple[float, float]
+    substeps: int
+    paused: bool
+    error: str | None
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One picture of the world. `seq` grows by one with every frame published."""
+
+    seq: int
+    shape: Shape
+    view: Rect
+    status: Status
+    position: NDArray[np.float32]
+    """(n, 2) metres, read-only copy, in the order the particles were added."""
+
+    @cached_property
+    def grid(self) -> NDArray[np.uint16]:
+        """(n, 2) positions on the 16-bit grid over `view`, y up. 0 and 65535 mean outside the view.
+
+        Computed when first asked for, by whoever sends the frame, so that the physics thread never pays for it.
+        """
+        return quantise(self.position, self.view)
+
+
+def quantise(position: NDArray[np.float32], view: Rect) -> NDArray[np.uint16]:
+    """Round (n, 2) positions in metres to the 16-bit grid over `view`; clipped, so that nothing wraps around."""
+    x0, y0, x1, y1 = view
+    origin = np.array([x0, y0], dtype=np.float32)
+    scale = np.array([GRID_MAX / (x1 - x0), GRID_MAX / (y1 - y0)], dtype=np.float32)
+    grid = position - origin
+    grid *= scale
+    grid += np.float32(0.5)
+    # fmax rather than clip: it turns a NaN into 0, "outside", where a cast of NaN would be undefined.
+    np.fmax(grid, np.float32(0.0), out=grid)
+    np.fmin(grid, np.float32(GRID_MAX), out=grid)
+    return grid.astype(np.uint16)
+
+
+@singledispatch
+def outline(boundary: Any) -> tuple[tuple[tuple[float, float], ...], ...]:
+    """The closed lines that draw a boundary, metres. By default the rectangle of its extent; Open has none."""
+    extent: Rect | None = boundary.extent()
+    if extent is None:
+        return ()
+    x0, y0, x1, y1 = (float(value) for value in extent)
+    return (((x0, y0), (x1, y0), (x1, y1), (x0, y1)),)
+
+
+@outline.register
+def _(boundary: Circle) -> tuple[tuple[tuple[float, float], ...], ...]:
+    angle = np.linspace(0.0, 2.0 * np.pi, OUTLINE_POINTS, endpoint=False)
+    x = boundary.center[0] + boundary.radius * np.cos(angle)
+    y = boundary.center[1] + boundary.radius * np.sin(angle)
+    return (tuple(zip(x.tolist(), y.tolist(), strict=True)),)
+
+
+class Camera:
+    """Chooses the part of the plane on show: the bounds with a margin or, without bounds, where the particles are."""
+
+    def __init__(self, world: World) -> None:
+        extent = world.boundary.extent()
+        self._fixed: Rect | None = None
+        if extent is not None:
+            x0, y0, x1, y1 = (float(value) for value in extent)
+            margin = VIEW_MARGIN * max(x1 - x0, y1 - y0)
+            self._fixed = (x0 - margin, y0 - margin, x1 + margin, y1 + margin)
+            return
+        _, _, reach = _middle_and_reach(world.position)
+        self._half = ROOM * max(reach, 12.0 * float(np.max(world.radius, initial=0.0))) or 1.0
+        self._largest_half = OPEN_GROWTH * self._half
+        self._centre = (0.0, 0.0)
+
+    def view(self, position: NDArray[np.float32]) -> Rect:
+        """The rectangle to show (n, 2) positions in."""
+        if self._fixed is not None:
+            return self._fixed
+        x, y, reach = _middle_and_reach(position)
+        if np.isfinite([x, y, reach]).all():
+            self._centre = (x, y)
+            # Grow only: a view that breathes with every bounce makes people seasick.
+            self._half = max(self._half, min(ROOM * reach, self._largest_half))
+        (x, y), half = self._centre, self._half
+        return (x - half, y - half, x + half, y + half)
+
+
+def _middle_and_reach(position: NDArray[np.float32]) -> tuple[float, float, float]:
+    """The median of (n, 2) positions, which no runaway moves, and the farthest anybody is from it in x or y; metres."""
+    if not len(position):
+        return 0.0, 0.0, 0.0
+    middle = np.median(position[:: 1 + len(position) // MEDIAN_SAMPLE], axis=0)
+    reach = np.maximum(position.max(axis=0) - middle, middle - position.min(axis=0)).max()
+    return float(middle[0]), float(middle[1]), float(reach)

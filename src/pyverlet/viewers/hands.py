@@ -1,0 +1,93 @@
+"""The mice in the world: each hand drags one particle or pokes a hole, until it lets go."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pyverlet.forces import Grip, Push
+
+if TYPE_CHECKING:
+    from pyverlet.world import World
+
+GRIP_FREQUENCY = 4.0
+"""Hz of the spring between mouse and particle: it follows a hand within a quarter of a second."""
+
+LEASH = 0.08
+"""The spring stretches to this part of the view at most: a flick of the mouse shoots no particle through a pile."""
+
+POKE_RADIUS = 0.08
+"""Of the view."""
+
+POKE_TIME_S = 0.09
+"""Seconds a particle at rest near the middle of a poke takes to its rim; the acceleration follows. Opens a heap to the ground."""
+
+
+class Hands:
+    """What every hand holds. Called on the physics thread only.
+
+    Args:
+        world: its `forces` gain one entry for every hand that holds something.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._held: dict[int, Grip | Push | None] = {}
+        self._aim: dict[int, tuple[float, float]] = {}
+
+    def drag(self, hand: int, x: float, y: float, reach: float) -> None:
+        """Aim this hand at (x, y), metres.
+
+        An unused hand first takes the particle whose rim is nearest, if within `reach` metres.
+        """
+        if hand not in self._held:
+            particle = self._nearest(x, y, reach)
+            self._hold(hand, None if particle is None else Grip(particle, target=(x, y), frequency=GRIP_FREQUENCY))
+        self._aim[hand] = (x, y)
+
+    def poke(self, hand: int, x: float, y: float, view_size: float) -> None:
+        """Push everything around (x, y), metres, away from it. `view_size`, metres, sets how wide."""
+        if hand not in self._held:
+            radius = POKE_RADIUS * view_size
+            self._hold(hand, Push(center=(x, y), radius=radius, acceleration=2.0 * radius / POKE_TIME_S**2))
+        self._aim[hand] = (x, y)
+
+    def release(self, hand: int) -> None:
+        """Let go. A hand that holds nothing is none the worse."""
+        force = self._held.pop(hand, None)
+        self._aim.pop(hand, None)
+        if force is not None and force in self._world.forces:
+            self._world.forces.remove(force)
+
+    def release_all(self) -> None:
+        """Every hand lets go."""
+        for hand in list(self._held):
+            self.release(hand)
+
+    def move(self, view_size: float) -> None:
+        """Bring the forces to where the hands aim; before every frame."""
+        for hand, force in self._held.items():
+            if isinstance(force, Push):
+                force.center = self._aim[hand]
+            elif isinstance(force, Grip):
+                force.target = self._leashed(force.particle, self._aim[hand], LEASH * view_size)
+
+    def _leashed(self, particle: int, aim: tuple[float, float], leash: float) -> tuple[float, float]:
+        x, y = (float(value) for value in self._world.position[particle])
+        dx, dy = aim[0] - x, aim[1] - y
+        shorten = min(1.0, leash / max(float(np.hypot(dx, dy)), 1e-30))
+        return (x + dx * shorten, y + dy * shorten)
+
+    def _nearest(self, x: float, y: float, reach: float) -> int | None:
+        if not len(self._world):
+            return None
+        offset = self._world.position - np.array([x, y], dtype=self._world.position.dtype)
+        gap = np.hypot(offset[:, 0], offset[:, 1]) - self._world.radius
+        nearest = int(np.argmin(gap))
+        return nearest if gap[nearest] <= reach else None
+
+    def _hold(self, hand: int, force: Grip | Push | None) -> None:
+        self._held[hand] = force
+        if force is not None:
+            self._world.forces.append(force)

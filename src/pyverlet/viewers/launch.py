@@ -1,0 +1,211 @@
+"""From a world to an open tab: take the port, build, compile, say where to look, serve until Ctrl-C."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import errno
+import getpass
+import os
+import signal
+import socket
+import sys
+import threading
+import webbrowser
+from collections.abc import Callable, Iterator
+from types import FrameType
+from typing import TYPE_CHECKING, TextIO
+
+import uvicorn
+
+from pyverlet import checks
+from pyverlet.errors import InputError
+from pyverlet.viewers.protocol import MAX_MESSAGE
+from pyverlet.viewers.session import Session
+from pyverlet.viewers.web import LOOPBACK_NAMES, make_app
+
+if TYPE_CHECKING:
+    from pyverlet.world import World
+
+GOODBYE_S = 1
+"""Whole seconds open tabs get to hang up."""
+
+
+def serve(build: Callable[[], World], *, title: str, host: str, port: int, open_browser: bool, dt: float) -> None:
+    """Show the world that `build` makes until Ctrl-C. See `pyverlet.viewers.serve`."""
+    _refuse_running_loop()
+    with contextlib.suppress(KeyboardInterrupt), _take_port(host, port) as listener:
+        world = build()
+        _compile(world)
+        session = Session(world, title=title, dt=dt)
+        with _on_air(session, listener, only_loopback=host in LOOPBACK_NAMES), _ended_by_signals(session):
+            address = _address(host, listener)
+            _announce(title, address, host, open_browser)
+            if open_browser and has_screen():
+                # In a thread of its own: some browsers' launchers return only when the browser does.
+                threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+            session.run()  # here, in the thread that built the world: see there
+
+
+@contextlib.contextmanager
+def _on_air(session: Session, listener: socket.socket, *, only_loopback: bool) -> Iterator[None]:
+    """Serve the page from a thread. Should the server fail, the session ends and the error is raised here."""
+    server = uvicorn.Server(server_config(session, only_loopback=only_loopback))
+    failures: list[BaseException] = []
+
+    def run() -> None:
+        try:
+            server.run(sockets=[listener])
+        except BaseException as error:  # uvicorn leaves with SystemExit too
+            failures.append(error)
+        finally:
+            session.stop()
+
+    thread = threading.Thread(target=run, name="pyverlet-web", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        server.should_exit = True
+        thread.join(2.0 * GOODBYE_S + 1.0)
+    if failures:
+        raise RuntimeError("the web server has failed") from failures[0]
+
+
+@contextlib.contextmanager
+def _ended_by_signals(session: Session) -> Iterator[None]:
+    """Ctrl-C, or SIGTERM, lets the frame under way finish, so that the world is whole afterwards; a second one does not wait."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # only the main thread may listen to signals
+        return
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    caught: list[int] = []
+
+    def restore() -> None:
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+
+    def end(number: int, frame: FrameType | None) -> None:
+        caught.append(number)
+        restore()
+        session.stop()
+
+    for number in before:
+        signal.signal(number, end)
+    try:
+        yield
+    finally:
+        restore()
+    if signal.SIGTERM in caught:
+        signal.raise_signal(signal.SIGTERM)
+
+
+def server_config(session: Session, *, only_loopback: bool = True) -> uvicorn.Config:
+    """How uvicorn serves a session."""
+    return uvicorn.Config(
+        make_app(session, only_loopback=only_loopback),
+        loop="asyncio",
+        http="h11",
+        ws="websockets-sansio",
+        ws_max_size=MAX_MESSAGE,
+        ws_per_message_deflate=False,  # compressing a frame of 400 kB takes 16 ms
+        lifespan="off",
+        log_level="error",
+        access_log=False,
+        server_header=False,
+        timeout_graceful_shutdown=GOODBYE_S,
+    )
+
+
+def has_screen() -> bool:
+    """Whether a browser opened here would be seen: not over ssh, and on Linux only with a display."""
+    if os.environ.get("SSH_CONNECTION"):
+        return False
+    return not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def _take_port(host: str, port: int) -> socket.socket:
+    checks.whole("port", port, least=0, most=65535)
+    try:
+        family, kind, protocol, _, where = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+    except (OSError, UnicodeError):
+        allowed = "an address or name of this machine, such as '127.0.0.1'"
+        raise InputError(f"host is {host!r}; allowed is {allowed}") from None
+    listener = socket.socket(family, kind, protocol)
+    try:
+        # This lets a port be taken again while old connections time out; on Windows it would share it with its owner.
+        if os.name == "posix":
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(where)
+        # Two programs may bind a port, the first to listen has it. Early calls wait until the server is up.
+        listener.listen()
+    except OSError as error:
+        listener.close()
+        raise InputError(_why_not(error, host, port)) from None
+    return listener
+
+
+def _why_not(error: OSError, host: str, port: int) -> str:
+    if error.errno == errno.EADDRINUSE:
+        return f"port is {port}, which another program is using; allowed is a free port, or 0 to have one chosen"
+    if error.errno in (errno.EACCES, errno.EPERM):
+        return f"port is {port}, which this user may not open; allowed are 1024 to 65535, or 0 to have one chosen"
+    return f"host is {host!r}, which cannot be listened on ({error.strerror}); allowed is an address of this machine"
+
+
+def _compile(world: World) -> None:
+    from pyverlet import warm_up
+
+    bar = _Progress(sys.stderr)
+    warm_up(world, bar)
+    bar.close()
+
+
+class _Progress:
+    """`compiling kernels, once: 12 of 31` on one line of a terminal, on a few lines of anything else."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._shown = False
+
+    def __call__(self, done: int, total: int) -> None:
+        text = f"compiling kernels, once: {done} of {total}"
+        if self._stream.isatty():
+            self._stream.write(f"\r{text}")
+        elif done in (1, total):
+            self._stream.write(f"{text}\n")
+        self._stream.flush()
+        self._shown = True
+
+    def close(self) -> None:
+        if self._shown and self._stream.isatty():
+            self._stream.write("\n")
+
+
+def _address(host: str, listener: socket.socket) -> str:
+    name = f"[{host}]" if ":" in host else host
+    return f"http://{name}:{listener.getsockname()[1]}/"
+
+
+def _announce(title: str, address: str, host: str, open_browser: bool) -> None:
+    sys.stdout.write(f"{title}: {address}   (Ctrl-C ends it)\n")
+    if host in LOOPBACK_NAMES and not (open_browser and has_screen()):
+        port = address.rstrip("/").rpartition(":")[2]
+        tunnel = f"ssh -L {port}:{host}:{port} {_user()}@{socket.gethostname()}"
+        sys.stdout.write(f"from another machine: {tunnel}   then open {address} there\n")
+    sys.stdout.flush()
+
+
+def _user() -> str:
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError, ImportError):  # a container's user may have no name
+        return "you"
+
+
+def _refuse_running_loop() -> None:
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:
+        return
+    raise InputError("view() was called inside a running event loop, which it would block; allowed is a plain script")

@@ -1,0 +1,113 @@
+"""The words on the wire: what is understood, what is refused, what a frame looks like in bytes."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import struct
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet.viewers import commands
+from pyverlet.viewers.protocol import MAX_MESSAGE, Ack, decode, encode_frame, encode_refusal, encode_shape
+from pyverlet.viewers.session import Session
+
+
+def unpack(data: bytes) -> tuple[dict[str, Any], bytes]:
+    (length,) = struct.unpack_from("<I", data)
+    assert length % 4 == 0
+    head: dict[str, Any] = json.loads(data[4 : 4 + length])
+    return head, data[4 + length :]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ('{"type": "ack", "seq": 12}', Ack(12)),
+        ('{"type": "pause", "on": true}', commands.Pause(True)),
+        ('{"type": "step"}', commands.Step(1)),
+        ('{"type": "reset"}', commands.Reset()),
+        ('{"type": "gravity", "x": 0, "y": -9.81}', commands.SetGravity(0.0, -9.81)),
+        ('{"type": "substeps", "value": 8}', commands.SetSubsteps(8)),
+        ('{"type": "drag", "x": 1, "y": 2, "reach": 0.5}', commands.Drag(7, 1.0, 2.0, 0.5)),
+        ('{"type": "poke", "x": 1, "y": 2}', commands.Poke(7, 1.0, 2.0)),
+        ('{"type": "release", "hand": 3}', commands.Release(7)),  # a tab has its own hand and no other
+    ],
+)
+def test_understood(text: str, expected: object) -> None:
+    assert decode(text, hand=7) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("", "JSON"),
+        ("{", "JSON"),
+        ("[" * 4000, "JSON"),
+        ("[]", "object"),
+        ("null", "object"),
+        ('"step"', "object"),
+        ("{}", "type"),
+        ('{"type": 1}', "type"),
+        ('{"type": ["step"]}', "type"),
+        ('{"type": "explode"}', "explode"),
+        ('{"type": "ack"}', "seq"),
+        ('{"type": "ack", "seq": 1.5}', "seq"),
+        ('{"type": "ack", "seq": true}', "seq"),
+        ('{"type": "pause", "on": 1}', "on"),
+        ('{"type": "gravity", "x": 0}', "y is None"),
+        ('{"type": "gravity", "x": 0, "y": "down"}', "y"),
+        ('{"type": "gravity", "x": 0, "y": NaN}', "gravity y"),
+        ('{"type": "gravity", "x": -Infinity, "y": 0}', "gravity x"),
+        ('{"type": "gravity", "x": 0, "y": 1e6}', "gravity y"),
+        ('{"type": "gravity", "x": 0, "y": 1' + "0" * 400 + "}", "y"),
+        ('{"type": "substeps", "value": 0}', "substeps"),
+        ('{"type": "substeps", "value": 100000}', "substeps"),
+        ('{"type": "substeps", "value": 2.0}', "value"),
+        ('{"type": "drag", "x": 1e999, "y": 0, "reach": 1}', "x"),
+        ('{"type": "poke", "x": 0}', "y"),
+        ('{"type": "step", "pad": "' + "x" * MAX_MESSAGE + '"}', "characters"),
+    ],
+)
+def test_refused_in_one_short_sentence(text: str, named: str) -> None:
+    with pytest.raises(pv.InputError, match=named) as refusal:
+        decode(text, hand=0)
+    assert len(str(refusal.value)) < 200
+    assert "allowed" in str(refusal.value)
+
+
+def test_a_frame_in_bytes(world: pv.World) -> None:
+    frame = Session(world).latest
+    head, body = unpack(encode_frame(frame))
+    assert head["kind"] == "frame"
+    assert head["seq"] == frame.seq
+    assert head["status"]["particles"] == 9
+    assert head["status"]["gravity"] == [0.0, -9.81]
+    grid = np.frombuffer(body, dtype="<u2").reshape(-1, 2)
+    x0, y0, x1, y1 = head["view"]
+    back = grid / 65535.0 * (x1 - x0, y1 - y0) + (x0, y0)
+    np.testing.assert_allclose(back, world.position, atol=(x1 - x0) / 65535)
+
+
+def test_a_shape_in_bytes(world: pv.World) -> None:
+    head, body = unpack(encode_shape(Session(world, title="nine").latest.shape))
+    assert (head["kind"], head["title"], head["bounded"]) == ("shape", "nine", True)
+    assert head["outlines"] == [[[-10, 0], [10, 0], [10, 20], [-10, 20]]]
+    assert np.frombuffer(body, dtype="<f4").tolist() == [0.5] * 9
+
+
+def test_numbers_json_does_not_have_become_null(world: pv.World) -> None:
+    frame = Session(world).latest
+    status = dataclasses.replace(frame.status, kinetic=math.inf, energy=math.nan)
+    head, _ = unpack(encode_frame(dataclasses.replace(frame, status=status)))
+    assert head["status"]["kinetic"] is None
+    assert head["status"]["energy"] is None
+
+
+def test_a_refusal_in_bytes() -> None:
+    head, body = unpack(encode_refusal("no"))
+    assert (head, body) == ({"kind": "refused", "reason": "no"}, b"")

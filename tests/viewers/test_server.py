@@ -1,0 +1,259 @@
+"""The real server over real sockets: who gets in, what is refused, how a slow or lost tab is treated."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import socket
+import struct
+import threading
+import time
+import urllib.request
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+import uvicorn
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin
+
+import pyverlet as pv
+from pyverlet.viewers.launch import server_config
+from pyverlet.viewers.protocol import MAX_MESSAGE
+from pyverlet.viewers.session import Session
+from pyverlet.viewers.web import MAX_IN_FLIGHT, welcome
+
+WaitUntil = Callable[[Callable[[], bool]], None]
+
+
+@dataclass(frozen=True)
+class Server:
+    """A session on the air."""
+
+    session: Session
+    port: int
+
+    @property
+    def http(self) -> str:
+        return f"http://127.0.0.1:{self.port}"
+
+    @property
+    def socket(self) -> str:
+        return f"ws://127.0.0.1:{self.port}/socket"
+
+
+@pytest.fixture
+def server(session: Session, wait_until: WaitUntil) -> Iterator[Server]:
+    """The real server, with the settings it has in earnest, in a thread of this process."""
+    with contextlib.closing(socket.create_server(("127.0.0.1", 0))) as listener:
+        port = listener.getsockname()[1]
+        program = uvicorn.Server(server_config(session))
+        thread = threading.Thread(target=program.run, kwargs={"sockets": [listener]})
+        thread.start()
+        wait_until(lambda: program.started)
+        yield Server(session, port)
+        program.should_exit = True
+        thread.join(10.0)
+        assert not thread.is_alive()
+
+
+def dial(server: Server, origin: str | None = None, headers: dict[str, str] | None = None) -> ClientConnection:
+    """A WebSocket to the server, by default with the origin of its own page."""
+    return connect(server.socket, origin=Origin(origin or server.http), additional_headers=headers)
+
+
+class Tab:
+    """A page reduced to its manners."""
+
+    def __init__(self, connection: ClientConnection) -> None:
+        self.connection = connection
+        self.shapes: list[dict[str, Any]] = []
+
+    def head(self, timeout: float = 5.0) -> dict[str, Any]:
+        data = self.connection.recv(timeout)
+        assert isinstance(data, bytes)
+        (length,) = struct.unpack_from("<I", data)
+        head: dict[str, Any] = json.loads(data[4 : 4 + length])
+        return head
+
+    def frame(self, timeout: float = 5.0) -> dict[str, Any]:
+        while (head := self.head(timeout))["kind"] != "frame":
+            self.shapes.append(head)
+        return head
+
+    def send(self, **message: Any) -> None:
+        self.connection.send(json.dumps(message))
+
+    def ack(self, frame: dict[str, Any]) -> None:
+        self.send(type="ack", seq=frame["seq"])
+
+    def rate(self, seconds: float) -> float:
+        """Frames a second, when each is acknowledged at once."""
+        count, end = 0, time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.ack(self.frame())
+            count += 1
+        return count / seconds
+
+    def refusal(self) -> str:
+        """The next refusal; frames before it are acknowledged."""
+        while True:
+            head = self.head()
+            if head["kind"] == "refused":
+                return str(head["reason"])
+            if head["kind"] == "frame":
+                self.ack(head)
+
+
+@pytest.fixture
+def tab(server: Server) -> Iterator[Tab]:
+    with dial(server) as connection:
+        yield Tab(connection)
+
+
+@pytest.mark.parametrize(
+    ("path", "media_type", "holds"),
+    [
+        ("/", "text/html", b'data-testid="physics-ms"'),
+        ("/page.js", "text/javascript", b"WebSocket"),
+        ("/draw.js", "text/javascript", b"UNMASKED_RENDERER_WEBGL"),
+        ("/chart.js", "text/javascript", b"class Chart"),
+        ("/page.css", "text/css", b"prefers-color-scheme"),
+    ],
+)
+def test_the_page_is_served_and_fetches_nothing_from_elsewhere(server: Server, path: str, media_type: str, holds: bytes) -> None:
+    with urllib.request.urlopen(server.http + path) as answer:
+        content = answer.read()
+        assert answer.headers["Content-Type"].startswith(media_type)
+        assert "default-src 'self'" in answer.headers["Content-Security-Policy"]
+        assert answer.headers["Cache-Control"] == "no-store"
+    assert holds in content
+    assert b"https://" not in content
+    assert b"http://" not in content.replace(b"http://www.w3.org/", b"")
+
+
+def test_a_tab_gets_the_shape_and_then_frames_at_the_pace_of_the_clock(tab: Tab) -> None:
+    first = tab.frame()
+    assert tab.shapes[0]["title"] == "nine"
+    tab.ack(first)
+    assert 40 <= tab.rate(1.5) <= 66
+    assert len(tab.shapes) == 1
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "https://127.0.0.1.evil.example", "null", "http://127.0.0.1:1"])
+def test_a_foreign_origin_is_refused_and_the_simulation_goes_on(
+    server: Server, tab: Tab, wait_until: WaitUntil, origin: str
+) -> None:
+    with pytest.raises(InvalidStatus) as refusal, dial(server, origin):
+        pass
+    assert refusal.value.response.status_code == 403
+    frames = server.session.latest.status.frames
+    wait_until(lambda: server.session.latest.status.frames > frames + 5)
+    tab.ack(tab.frame())
+
+
+def test_a_name_pointed_at_this_machine_is_refused(server: Server) -> None:
+    """DNS rebinding: the page of evil.example, whose name now means 127.0.0.1, has a matching Origin and Host."""
+    evil = f"http://evil.example:{server.port}"
+    with (
+        pytest.raises(InvalidStatus),
+        dial(server, evil, {"Host": f"evil.example:{server.port}"}),
+    ):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("origin", "host", "only_loopback", "expected"),
+    [
+        ("http://127.0.0.1:8000", "127.0.0.1:8000", True, True),
+        ("http://localhost:9000", "localhost:9000", True, True),  # the near end of ssh -L
+        ("http://[::1]:8000", "[::1]:8000", True, True),
+        (None, "127.0.0.1:8000", True, True),  # not a browser
+        ("http://localhost:3000", "localhost:8000", True, False),  # another server's page on this machine
+        ("http://evil.example", "127.0.0.1:8000", True, False),
+        ("http://evil.example", "evil.example", True, False),
+        ("http://lab.example:8000", "lab.example:8000", False, True),  # listening to the network was asked for
+        ("http://evil.example", "lab.example:8000", False, False),
+        (None, "[", True, False),
+        (None, "", True, False),
+    ],
+)
+def test_who_is_welcome(origin: str | None, host: str, only_loopback: bool, expected: bool) -> None:
+    assert welcome(origin, host, only_loopback) is expected
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"type": "explode"}', '{"type": "substeps", "value": 0}', "\x00"])
+def test_a_malformed_message_is_refused_with_a_reason_and_the_tab_goes_on(tab: Tab, text: str) -> None:
+    before = tab.frame()
+    tab.ack(before)
+    tab.connection.send(text)
+    assert "allowed" in tab.refusal()
+    after = tab.frame()
+    assert after["seq"] > before["seq"]
+    assert after["status"]["error"] is None
+
+
+def test_a_binary_message_is_refused(tab: Tab) -> None:
+    tab.connection.send(b"\x00\x01")
+    assert "binary" in tab.refusal()
+
+
+def test_an_oversized_message_ends_its_tab_and_nothing_else(server: Server, tab: Tab) -> None:
+    with dial(server) as rude:
+        rude.send("x" * (MAX_MESSAGE + 1))
+        with contextlib.suppress(ConnectionClosed):
+            while True:
+                rude.recv(5.0)
+        assert rude.close_code == 1009
+    assert tab.rate(0.5) > 30
+
+
+def test_two_tabs_see_the_same_frames_and_one_steers_for_both(server: Server, tab: Tab) -> None:
+    with dial(server) as connection:
+        other = Tab(connection)
+        other.send(type="pause", on=True)
+        other.send(type="gravity", x=0, y=-3.5)
+        for each in (tab, other):
+            while not ((frame := each.frame())["status"]["paused"] and frame["status"]["gravity"] == [0, -3.5]):
+                each.ack(frame)
+
+
+def test_a_stalled_tab_has_few_frames_in_flight_and_then_gets_the_newest(server: Server, tab: Tab) -> None:
+    sent = [tab.frame()]
+    with contextlib.suppress(TimeoutError):
+        while True:
+            sent.append(tab.frame(timeout=0.7))
+    assert len(sent) == MAX_IN_FLIGHT <= 3
+    now = server.session.latest.seq
+    assert now > sent[-1]["seq"] + 20
+    tab.ack(sent[0])
+    assert tab.frame()["seq"] >= now  # none of those in between
+
+
+def test_an_acknowledgement_of_a_frame_never_sent_is_refused(tab: Tab) -> None:
+    frame = tab.frame()
+    for seq in (frame["seq"] + 1_000_000, -1):
+        tab.send(type="ack", seq=seq)
+        assert "seq" in tab.refusal()
+
+
+def test_a_stalled_tab_does_not_slow_the_others(server: Server, tab: Tab) -> None:
+    with dial(server) as stalled:
+        stalled.recv(5.0)
+        assert tab.rate(1.0) > 40
+
+
+def test_a_lost_tab_lets_go_and_costs_nothing(server: Server, tab: Tab, world: pv.World, wait_until: WaitUntil) -> None:
+    for _ in range(5):
+        with contextlib.suppress(OSError, ConnectionClosed), dial(server) as lost:
+            Tab(lost).send(type="drag", x=0.0, y=0.5, reach=1.0)
+            wait_until(lambda: len(world.forces) == 1)
+            lost.socket.shutdown(socket.SHUT_RDWR)  # no goodbye
+        wait_until(lambda: world.forces == [])
+    assert tab.rate(0.5) > 30
+
+
+def test_frames_travel_uncompressed(tab: Tab) -> None:
+    assert tab.connection.protocol.extensions == []

@@ -1,0 +1,254 @@
+"""The narrow door, without any server: commands in, frames out."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet.viewers.commands import Drag, Pause, Poke, Release, Reset, SetGravity, SetSubsteps, Step
+from pyverlet.viewers.hands import LEASH
+from pyverlet.viewers.session import MAX_CATCH_UP, Session
+
+WaitUntil = Callable[[Callable[[], bool]], None]
+
+
+def test_runs_in_real_time(session: Session) -> None:
+    before, began = session.latest.status.time, time.perf_counter()
+    time.sleep(0.7)
+    simulated = session.latest.status.time - before + session.latest.status.dropped / 60
+    assert simulated == pytest.approx(time.perf_counter() - began, abs=0.12)
+
+
+def test_pause_holds_time_and_resume_does_not_catch_up(paused: Session, wait_until: WaitUntil) -> None:
+    held = paused.latest.status
+    time.sleep(0.3)
+    assert paused.latest.status.time == held.time
+    paused.submit(Pause(False))
+    wait_until(lambda: paused.latest.status.frames > held.frames)
+    assert paused.latest.status.frames <= held.frames + MAX_CATCH_UP
+    assert paused.latest.status.dropped == held.dropped
+
+
+def test_step_pauses_and_advances_by_exactly_the_frames_asked(session: Session, wait_until: WaitUntil) -> None:
+    session.submit(Pause(True))
+    session.submit(Step(3))
+    session.submit(Step())
+    wait_until(lambda: session.latest.status.paused)
+    frames = session.latest.status.frames
+    session.submit(Step(5))
+    wait_until(lambda: session.latest.status.frames != frames)
+    assert session.latest.status.frames == frames + 5
+    assert session.latest.status.time == pytest.approx((frames + 5) / 60)
+
+
+def test_reset_goes_back_to_the_bits_of_the_start(world: pv.World, wait_until: WaitUntil) -> None:
+    world.velocity[:, 1] = 5.0
+    world.run(seconds=0.1)  # the start of the session is not the start of the world
+    start, start_time, start_frames = world.state_hash(), world.time, world.frames
+    with Session(world) as session:
+        wait_until(lambda: session.latest.status.frames > start_frames + 5)
+        session.submit(Pause(True))
+        session.submit(Reset())
+        wait_until(lambda: session.latest.status.time == start_time)
+    assert world.state_hash() == start
+    assert session.latest.status.paused
+
+
+def test_gravity_and_substeps_reach_the_world_and_survive_reset(paused: Session, world: pv.World, wait_until: WaitUntil) -> None:
+    paused.submit(SetGravity(1.0, 2.5))
+    paused.submit(SetSubsteps(3))
+    wait_until(lambda: paused.latest.status.substeps == 3)
+    assert paused.latest.status.gravity == (1.0, 2.5)
+    assert (world.gravity, world.substeps) == ((1.0, 2.5), 3)
+    paused.submit(Reset())
+    wait_until(lambda: paused.latest.status.time == 0.0)
+    assert (world.gravity, world.substeps) == ((1.0, 2.5), 3)
+    paused.submit(Step(10))
+    wait_until(lambda: paused.latest.status.frames == 10)
+    assert paused.latest.position[:, 1].min() > 0.5  # they fall upward now
+
+
+def test_one_thread_and_no_other_steps_the_world(world: pv.World, monkeypatch: pytest.MonkeyPatch, wait_until: WaitUntil) -> None:
+    callers = set()
+    step = world.step
+
+    def spy(dt: float) -> None:
+        callers.add(threading.current_thread())
+        step(dt)
+
+    monkeypatch.setattr(world, "step", spy)
+    with Session(world) as session:
+        commands = (Step(2), Reset(), Pause(False), SetSubsteps(2))
+        threads = [threading.Thread(target=session.submit, args=(command,)) for command in commands]
+        for thread in threads:
+            thread.start()
+        wait_until(lambda: world.frames > 10 or session.latest.status.paused)
+    assert len(callers) == 1
+    assert callers.isdisjoint({threading.current_thread(), *threads})
+
+
+def test_non_finite_stops_the_stepping_and_reset_cures_it(session: Session, world: pv.World, wait_until: WaitUntil) -> None:
+    class Poison:
+        velocity_dependent = False
+
+        def apply(self, state: pv.state.Slots, t: float) -> None:
+            state.force[:] = np.nan
+
+    wait_until(lambda: session.latest.status.frames > 3)
+    world.forces.append(Poison())
+    wait_until(lambda: session.latest.status.error is not None)
+    assert "non-finite" in str(session.latest.status.error)
+    stopped = session.latest.status.frames
+    assert np.isfinite(session.latest.position).all()
+    session.submit(Step())
+    session.submit(SetSubsteps(2))  # still readable, still obeying
+    wait_until(lambda: session.latest.status.substeps == 2)
+    assert session.latest.status.frames == stopped
+    world.forces.clear()
+    session.submit(Reset())
+    session.submit(Pause(False))
+    wait_until(lambda: session.latest.status.error is None and session.latest.status.frames > 3)
+
+
+def test_an_error_in_a_users_force_is_shown_and_logged(
+    session: Session, world: pv.World, wait_until: WaitUntil, caplog: pytest.LogCaptureFixture
+) -> None:
+    class Broken:
+        velocity_dependent = False
+
+        def apply(self, state: pv.state.Slots, t: float) -> None:
+            raise KeyError("wind")
+
+    world.forces.append(Broken())
+    wait_until(lambda: session.latest.status.error is not None)
+    assert session.latest.status.error == "KeyError: 'wind'"
+    assert "Traceback" in caplog.text
+
+
+def test_a_slow_world_drops_frames_counts_them_and_still_publishes_each_step(
+    world: pv.World, monkeypatch: pytest.MonkeyPatch, wait_until: WaitUntil
+) -> None:
+    step = world.step
+
+    def slow(dt: float) -> None:
+        time.sleep(0.03)
+        step(dt)
+
+    monkeypatch.setattr(world, "step", slow)
+    seen: list[int] = []
+    with Session(world) as session:
+        session.subscribe(lambda: seen.append(session.latest.status.frames))
+        wait_until(lambda: session.latest.status.dropped > 10)
+    assert seen == list(range(seen[0], seen[0] + len(seen)))
+    assert session.latest.status.physics_median_ms > 30.0
+
+
+def test_drag_takes_the_nearest_circle_moves_it_and_lets_go(session: Session, world: pv.World, wait_until: WaitUntil) -> None:
+    session.submit(Drag(hand=1, x=2.3, y=0.9, reach=0.3))  # particle 5 stands at (2, 0.5)
+    session.submit(Drag(hand=1, x=2.0, y=8.0))
+    wait_until(lambda: session.latest.position[5, 1] > 7.0)
+    others = np.delete(session.latest.position, 5, axis=0)
+    assert others[:, 1].max() < 1.0
+    session.submit(Release(hand=1))
+    wait_until(lambda: session.latest.position[5, 1] < 1.0)
+    assert world.forces == []
+
+
+def test_a_hand_that_missed_stays_empty(paused: Session, world: pv.World, wait_until: WaitUntil) -> None:
+    paused.submit(Drag(hand=1, x=2.0, y=5.0, reach=0.3))
+    paused.submit(Drag(hand=1, x=2.0, y=0.5, reach=0.3))
+    paused.submit(SetSubsteps(7))
+    wait_until(lambda: paused.latest.status.substeps == 7)
+    assert world.forces == []
+
+
+def test_two_hands_hold_two_circles(paused: Session, world: pv.World, wait_until: WaitUntil) -> None:
+    paused.submit(Drag(hand=1, x=-8.0, y=0.5, reach=0.1))
+    paused.submit(Drag(hand=2, x=8.0, y=0.5, reach=0.1))
+    paused.submit(SetSubsteps(7))
+    wait_until(lambda: paused.latest.status.substeps == 7)
+    assert sorted(force.particle for force in world.forces if isinstance(force, pv.forces.Grip)) == [0, 8]
+    paused.submit(Release(hand=1))
+    paused.submit(Release(hand=3))  # never held anything
+    wait_until(lambda: len(world.forces) == 1)
+
+
+def test_the_grip_is_leashed(paused: Session, world: pv.World, wait_until: WaitUntil) -> None:
+    paused.submit(Drag(hand=1, x=0.0, y=0.5, reach=0.1))
+    paused.submit(Drag(hand=1, x=0.0, y=19.0))
+    frames = paused.latest.status.frames
+    paused.submit(Step())
+    wait_until(lambda: paused.latest.status.frames == frames + 1)
+    (grip,) = world.forces
+    assert isinstance(grip, pv.forces.Grip)
+    x0, y0, x1, y1 = paused.latest.view
+    assert grip.target[1] - 0.5 == pytest.approx(LEASH * max(x1 - x0, y1 - y0), rel=1e-3)
+
+
+def test_poke_pushes_everything_near_away(session: Session, world: pv.World, wait_until: WaitUntil) -> None:
+    start = session.latest.position
+    session.submit(Poke(hand=1, x=1.0, y=0.5))  # between particles 4 and 5
+    wait_until(lambda: bool(session.latest.position[5, 0] - session.latest.position[4, 0] > 2.5))
+    session.submit(Release(hand=1))
+    wait_until(lambda: world.forces == [])
+    np.testing.assert_allclose(session.latest.position[[0, 8]], start[[0, 8]], atol=0.2)
+
+
+def test_frames_are_immutable_and_numbered(session: Session, wait_until: WaitUntil) -> None:
+    frame = session.latest
+    kept = frame.position.copy()
+    wait_until(lambda: session.latest.seq >= frame.seq + 5)
+    np.testing.assert_array_equal(frame.position, kept)
+    with pytest.raises(ValueError, match="read-only"):
+        frame.position[0] = 0.0
+    assert session.latest.shape is frame.shape
+
+
+def test_added_particles_get_a_new_shape(paused: Session, world: pv.World, wait_until: WaitUntil) -> None:
+    world.add(position=(0.0, 10.0), radius=0.25)
+    paused.submit(Step())
+    wait_until(lambda: len(paused.latest.position) == 10)
+    assert paused.latest.shape.radius.tolist() == [0.5] * 9 + [0.25]
+
+
+def test_unsubscribed_listeners_hear_nothing(session: Session, wait_until: WaitUntil) -> None:
+    heard: list[int] = []
+    unsubscribe = session.subscribe(lambda: heard.append(1))
+    wait_until(lambda: len(heard) > 2)
+    unsubscribe()
+    time.sleep(0.05)
+    count = len(heard)
+    time.sleep(0.1)
+    assert len(heard) == count
+
+
+def test_stop_gives_the_world_back(world: pv.World) -> None:
+    session = Session(world)
+    session.start()
+    session.submit(Drag(hand=1, x=0.0, y=0.5, reach=1.0))
+    time.sleep(0.1)
+    session.stop()
+    session.stop()
+    session.submit(Step())
+    frames = world.frames
+    time.sleep(0.1)
+    assert world.frames == frames
+    assert world.forces == []
+
+
+def test_an_empty_world_can_be_watched(wait_until: WaitUntil) -> None:
+    with Session(pv.World()) as session:
+        session.submit(Drag(hand=1, x=0.0, y=0.0, reach=1.0))
+        wait_until(lambda: session.latest.status.frames > 3)
+    assert session.latest.grid.shape == (0, 2)
+
+
+@pytest.mark.parametrize(("name", "value"), [("dt", 0.0), ("dt", float("nan")), ("budget_ms", -1.0)])
+def test_bad_arguments_are_named(world: pv.World, name: str, value: float) -> None:
+    with pytest.raises(pv.InputError, match=name):
+        Session(world, **{name: value})  # type: ignore[arg-type]
