@@ -28,15 +28,19 @@ def test_a_cage_of_20000_settles() -> None:
     world, _ = cage(n)
     scale = n * G * world.boundary.extent()[3]  # type: ignore[index]
     energy = [world.energy().total]
-    for _ in range(15):
-        world.run(seconds=1)
-        assert world.escaped() == 0
+    for _ in range(15 * 60):
+        world.step(1 / 60)
         energy.append(world.energy().total)
+        assert world.escaped() == 0
     overlap = world.overlap()
     assert overlap.mean <= 0.005
     assert overlap.max <= 0.10
     assert overlap.contacts > n
+    # No frame gains more than 1e-4 of the scale. A second may, by a little: overlap is compressed height, 0.2 % of 130 layers is
+    # worth n g (0.002 * 130 m) / 2 = 25 kJ or 1.4e-3, and a rebuilt list, solved in another order, finds another share of it.
     assert np.diff(energy).max() < 1e-4 * scale
+    assert (np.array(energy) - np.minimum.accumulate(energy)).max() < 1.4e-3 * scale
+    assert energy[-1] < energy[0] - 0.2 * scale
     assert world.energy().kinetic < 0.05 * n * G * RADIUS
 
 

@@ -15,7 +15,7 @@ ROOT = Path(pyverlet.__file__).parent
 
 # From the ground up. A module may import from its own layer only within its own package (the first part of its name).
 LAYERS = (
-    {"errors", "constants", "_jit", "checks"},
+    {"errors", "constants", "_jit", "checks", "progress"},
     {"state", "kernels"},
     {"integrators", "forces", "bounds", "broadphase", "collisions", "energy"},
     {"world", "profile", "clock", "warmup"},

@@ -92,6 +92,33 @@ def test_one_thread_and_no_other_steps_the_world(world: pv.World, monkeypatch: p
     assert callers.isdisjoint({threading.current_thread(), *threads})
 
 
+def test_run_steps_in_the_calling_thread_until_stopped(world: pv.World, monkeypatch: pytest.MonkeyPatch) -> None:
+    callers = set()
+    step = world.step
+
+    def spy(dt: float) -> None:
+        callers.add(threading.current_thread())
+        step(dt)
+
+    monkeypatch.setattr(world, "step", spy)
+    session = Session(world)
+    session.submit(Poke(hand=1, x=0.0, y=0.5))
+    timer = threading.Timer(0.3, session.stop)
+    timer.start()
+    session.run()
+    assert callers == {threading.current_thread()}
+    assert world.forces == []
+
+
+def test_stop_ends_a_paused_run(world: pv.World) -> None:
+    session = Session(world)
+    session.submit(Pause(True))
+    timer = threading.Timer(0.3, session.stop)
+    timer.start()
+    session.run()
+    assert session.latest.status.paused
+
+
 def test_non_finite_stops_the_stepping_and_reset_cures_it(session: Session, world: pv.World, wait_until: WaitUntil) -> None:
     class Poison:
         velocity_dependent = False

@@ -13,6 +13,7 @@ from pyverlet import __version__, report, scenes, warm_up
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.errors import InputError
+from pyverlet.progress import Progress
 from pyverlet.report import Report
 from pyverlet.scenes import Scene, Settings
 from pyverlet.viewers import DEFAULT_PORT
@@ -161,7 +162,7 @@ def bench(
     count = report.frame_count(seconds=seconds, frames=frames, dt=dt, default_seconds=DEFAULT_SECONDS)
     warm = report.settle_count(settle, dt)
     world, compile_s = _build(chosen, settings)
-    with out.Progress("settling, frame") as progress:
+    with Progress("settling, frame") as progress:
         for done in range(warm):
             world.step(dt)
             progress(done + 1, warm)
@@ -180,12 +181,12 @@ def _show(scene: Scene, settings: Settings, *, dt: float, port: int, open_browse
 def _build(scene: Scene, settings: Settings) -> tuple[World, float]:
     """The world, and the seconds its kernels took to compile or load."""
     world = scene.build(settings)
-    with out.Progress("compiling kernels, once") as progress:
+    with Progress("compiling kernels, once") as progress:
         return world, warm_up(world, progress)
 
 
 def _measure(world: World, scene: Scene, frames: int, dt: float, compile_s: float) -> Report:
-    with out.Progress("frame") as progress:
+    with Progress("frame") as progress:
         return report.run(world, scene=scene.name, frames=frames, dt=dt, compile_s=compile_s, progress=progress)
 
 
@@ -199,7 +200,7 @@ def _run_and_plot(scene: Scene, settings: Settings, frames: int, dt: float, path
     world, compile_s = _build(scene, settings)
     recorder = trajectory.HeightRecorder()
     recorder(world)
-    with out.Progress("frame") as progress:
+    with Progress("frame") as progress:
         result = report.run(
             world,
             scene=scene.name,

@@ -1,0 +1,48 @@
+"""Progress of long work on standard error, where it disturbs nobody who reads standard output."""
+
+from __future__ import annotations
+
+import sys
+from time import monotonic
+
+QUIET_S = 0.4
+"""Work that is over sooner shows no progress."""
+
+EVERY_S = 0.1
+"""Time between updates on a terminal."""
+
+EVERY_LOGGED_S = 5.0
+"""Time between lines where standard error is a file or a pipe."""
+
+
+class Progress:
+    """A line on standard error saying how much of some work is done; used as a context manager.
+
+    On a terminal it rewrites itself and disappears at the end. Elsewhere a line is written now and then.
+    """
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+        self._started = monotonic()
+        self._live = sys.stderr.isatty()
+        self._next = self._started + QUIET_S
+        self._width = 0
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def __call__(self, done: int, total: int) -> None:
+        """Say that `done` of `total` are done."""
+        now = monotonic()
+        if now < self._next:
+            return
+        self._next = now + (EVERY_S if self._live else EVERY_LOGGED_S)
+        line = f"{self._text}: {done} of {total}"
+        sys.stderr.write(f"\r{line:<{self._width}}" if self._live else f"{line}\n")
+        sys.stderr.flush()
+        self._width = max(self._width, len(line))
+
+    def __exit__(self, *_: object) -> None:
+        if self._live and self._width:
+            sys.stderr.write("\r" + " " * self._width + "\r")
+            sys.stderr.flush()
