@@ -1,0 +1,145 @@
+"""Run the comparison and print it: `python -m benchmarks --particles 2000 20000`."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import importlib.metadata
+import os
+import platform
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+
+import numpy as np
+
+import pyverlet as pv
+from benchmarks.engines import DT, ENGINES, RADIUS, Array, Engine
+from pyverlet import report
+
+SETTLE_SECONDS = 10.0
+"""Simulated before anything is measured, by pyverlet: one settled heap for all."""
+
+OWN_FRAMES = 60
+"""Frames each engine then gets to come to terms with the heap in its own way."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One engine on one heap."""
+
+    particles: int
+    engine: str
+    settings: str
+    ms_per_frame: float
+    ratio: float
+    overlap_mean: float
+    overlap_max: float
+    outside: int
+
+
+def settled_heap(particles: int) -> tuple[Array, float, float]:
+    """Positions of a settled cage, its radius, and the seconds spent on compiling."""
+    world = pv.scenes.get("cage").world(particles=particles)
+    compile_s = pv.warm_up(world)
+    world.run(seconds=SETTLE_SECONDS, dt=DT)
+    extent = world.boundary.extent()
+    assert extent is not None
+    return world.position.copy(), extent[2], compile_s
+
+
+def overlap(position: Array) -> pv.Overlap:
+    """Overlap of discs at these positions, measured alike for every engine."""
+    world = pv.World(dtype=np.float64)
+    world.add(position=position, radius=RADIUS)
+    return world.overlap()
+
+
+def measure(engines: list[type[Engine]], position: Array, cage: float, frames: int) -> list[Row]:
+    """Step all engines in turn, frame by frame, so that the machine's moods hit them alike."""
+    worlds = [engine(position, cage) for engine in engines]
+    for world in worlds:
+        for _ in range(OWN_FRAMES):
+            world.step()
+    times: list[list[float]] = [[] for _ in worlds]
+    for _ in range(frames):
+        for world, spent in zip(worlds, times, strict=True):
+            start = perf_counter()
+            world.step()
+            spent.append(1e3 * (perf_counter() - start))
+    rows = []
+    fastest_of_ours = min(median(t) for world, t in zip(worlds, times, strict=True) if world.name.startswith("pyverlet"))
+    for world, spent in zip(worlds, times, strict=True):
+        now = world.position()
+        found = overlap(now)
+        rows.append(
+            Row(
+                particles=len(position),
+                engine=world.name,
+                settings=world.settings,
+                ms_per_frame=median(spent),
+                ratio=median(spent) / fastest_of_ours,
+                overlap_mean=found.mean,
+                overlap_max=found.max,
+                outside=int((np.hypot(*now.astype(float).T) > cage).sum()),
+            )
+        )
+    return rows
+
+
+def installed(engine: type[Engine]) -> bool:
+    """Whether this engine can be built here; says so on standard error if not."""
+    try:
+        engine(np.zeros((1, 2)), 10.0)
+    except ImportError as error:
+        sys.stderr.write(f"left out: {engine.name} ({error}; pip install 'pyverlet[bench]')\n")
+        return False
+    return True
+
+
+def machine() -> str:
+    """What this was measured on."""
+    versions = []
+    for name in ("pyverlet", "numpy", "numba", "pymunk", "pyb2d3"):
+        try:
+            versions.append(f"{name} {importlib.metadata.version(name)}")
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    triad = report.triad()
+    return (
+        f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, "
+        f"{', '.join(versions)}; NumPy triad {triad['ns_per_element']:.2f} ns an element"
+    )
+
+
+def main() -> None:
+    """Print one table for each number of particles; write them all as CSV if asked to."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("--particles", type=int, nargs="+", default=[2_000, 20_000], help="discs in the cage")
+    parser.add_argument("--frames", type=int, default=60, help="frames measured for each engine")
+    parser.add_argument("--csv", type=Path, help="write the rows to this file too")
+    arguments = parser.parse_args()
+    engines = [engine for engine in ENGINES if installed(engine)]
+    print(machine())
+    rows: list[Row] = []
+    for particles in arguments.particles:
+        position, cage, compile_s = settled_heap(particles)
+        print(f"\n{particles:,} discs settled for {SETTLE_SECONDS:g} s; compiling or loading took {compile_s:.1f} s")
+        print(f"{'engine':<28}{'settings':<34}{'ms a frame':>11}{'ratio':>8}{'mean overlap':>14}{'max':>8}{'outside':>9}")
+        for row in measure([e for e in engines if particles <= e.most], position, cage, arguments.frames):
+            rows.append(row)
+            print(
+                f"{row.engine:<28}{row.settings:<34}{row.ms_per_frame:>11.2f}{row.ratio:>8.1f}"
+                f"{row.overlap_mean:>14.3%}{row.overlap_max:>8.2%}{row.outside:>9}"
+            )
+    if arguments.csv:
+        with arguments.csv.open("w", newline="") as file:
+            writer = csv.DictWriter(file, list(asdict(rows[0])))
+            writer.writeheader()
+            writer.writerows(asdict(row) for row in rows)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,26 @@
+"""The comparison with other engines runs, with those that are installed, and measures them alike."""
+
+from __future__ import annotations
+
+import csv
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_the_comparison_runs_and_writes_its_rows(tmp_path: Path) -> None:
+    table = tmp_path / "rows.csv"
+    command = [sys.executable, "-m", "benchmarks", "--particles", "60", "--frames", "3", "--csv", str(table)]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=True)
+    rows = {row["engine"]: row for row in csv.DictReader(table.open())}
+    assert {"pyverlet, 1 thread", "pyverlet, 2 threads", "pyverlet, brute force"} <= set(rows)
+    assert "60 discs settled" in run.stdout
+    for row in rows.values():
+        assert row["engine"] in run.stdout
+        assert float(row["ms_per_frame"]) > 0
+        assert 0 <= float(row["overlap_mean"]) <= float(row["overlap_max"]) < 0.05
+        assert row["outside"] == "0"
+    # One and two threads give the same bits, so the same overlap.
+    assert rows["pyverlet, 1 thread"]["overlap_max"] == rows["pyverlet, 2 threads"]["overlap_max"]
