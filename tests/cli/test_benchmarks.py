@@ -14,7 +14,7 @@ def test_the_comparison_runs_and_writes_its_rows(tmp_path: Path) -> None:
     table = tmp_path / "rows.csv"
     command = [sys.executable, "-m", "benchmarks", "--particles", "60", "--frames", "3", "--csv", str(table)]
     run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=True)
-    rows = {row["engine"]: row for row in csv.DictReader(table.open())}
+    rows = {row["engine"]: row for row in csv.DictReader(table.read_text().splitlines())}
     assert {"pyverlet, 1 thread", "pyverlet, 2 threads", "pyverlet, brute force"} <= set(rows)
     assert "60 discs settled" in run.stdout
     for row in rows.values():
