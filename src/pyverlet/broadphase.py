@@ -29,7 +29,8 @@ Array = NDArray[Any]
 class PairList:
     """Candidate pairs by strip: slots pair_i[k], pair_j[k] for k in first[s] to first[s] + count[s].
 
-    `touching` and `impulse` are where the contact solver notes, by strip too, which of them touch and how hard.
+    `meeting`, `touching` and `impulse` are where the contact solver notes, by strip too, how each stands, which of them touch and
+    how hard.
     """
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
@@ -43,6 +44,7 @@ class PairList:
         """Room for at least this many pairs."""
         self.pair_i = np.empty(pairs, np.uint32)
         self.pair_j = np.empty(pairs, np.uint32)
+        self.meeting = np.empty(pairs, np.uint8)
         self.touching = np.empty(pairs, np.uint32)
         self.impulse = np.empty(pairs, self._dtype)
 

@@ -60,21 +60,24 @@ class ContactSolver:
         pairs, real = self.broad_phase.list, state.real
         moving, bodies = (state.position, state.velocity), (state.radius, state.inverse_mass)
         which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
-        notes = (pairs.touching, pairs.impulse, pairs.touches)
         e = self.settings.restitution
+        push = (real(1 / h), real(LARGEST_PUSH))
+        notes = (pairs.touching, pairs.impulse, pairs.touches)
         if e == 0.0:
-            contacts.project(*moving, *bodies, *which, real(1 / h), real(LARGEST_PUSH), *notes)
+            contacts.project(*moving, *bodies, *which, *push, *notes)
         else:
             rest_speed = REST_ACCELERATIONS * strongest * h
-            settings = (real(h), real(LARGEST_PUSH), real(lag), real(e), real(rest_speed))
-            contacts.bounce(*moving, state.acceleration, *bodies, *which, *settings, *notes)
+            settings = (real(h), real(lag), real(e), real(rest_speed))
+            contacts.impacts(*moving, state.acceleration, *bodies, *which, *settings, state.fed, pairs.meeting, pairs.impulse)
+            state.fed[:] = 0
+            contacts.project_resting(*moving, *bodies, *which, *push, pairs.meeting, state.fed, *notes)
 
     def still(self, state: Slots, h: float) -> None:
         """Take from touching circles the velocity that projection has put in, and rub them."""
         pairs, real = self.broad_phase.list, state.real
         which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
-        mu = self.settings.friction
-        if mu == 0.0:
+        e, mu = self.settings.restitution, self.settings.friction
+        if e == 0.0 and mu == 0.0:
             contacts.still(state.position, state.velocity, state.inverse_mass, *which, pairs.touching, pairs.touches)
         else:
             where = (state.position, state.velocity, state.spin, state.radius, state.inverse_mass)
@@ -83,7 +86,8 @@ class ContactSolver:
     def mark_resting(self, state: Slots) -> None:
         """Set `state.resting` for particles that touch another without bouncing off it."""
         pairs = self.broad_phase.list
-        contacts.mark_touching(pairs.first, pairs.count, pairs.pair_i, pairs.pair_j, pairs.touching, pairs.touches, state.resting)
+        notes = (pairs.touching, pairs.impulse, pairs.touches)
+        contacts.mark_touching(pairs.first, pairs.pair_i, pairs.pair_j, *notes, state.resting)
 
 
 def find_contacts(state: State, method: Fast | BruteForce) -> np.ndarray[Any, np.dtype[np.int64]]:

@@ -44,9 +44,9 @@ ALL_THREADS_FROM: Final = 10_000
 substep; on a busy machine (a browser drawing the world, say) each wait may last a time slice. At 5,000 two threads gain 0.4 ms of
 1.7 ms a frame when nothing else runs, and lost a hundredfold when two other processes did."""
 
-REST_ACCELERATIONS: Final = 16.0
-"""An approach slower than this many |a| h is contact at rest, not an impact: 0.33 m/s under gravity at 480 substeps a second. One
-substep of gravity is 1; the trembling of a pile with e = 0.3 reaches 10, and with 4 here it never came to rest."""
+REST_ACCELERATIONS: Final = 4.0
+"""An approach slower than this many |a| h is contact at rest, not an impact: 0.08 m/s under gravity at 480 substeps a second. One
+substep of gravity is 1, its echo in a pile about 2."""
 
 LARGEST_PUSH: Final = 0.3
 """Overlap pushed out in one substep, as a fraction of the contact distance. Motion alone never comes near it; circles that start

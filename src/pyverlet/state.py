@@ -83,6 +83,7 @@ class Slots:
         position, velocity, acceleration, spin, radius, mass: as in State.
         inverse_mass: (n,) 1/kg; 0 for a pinned particle.
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
+        fed: (n,) 1 where a contact at rest fed the velocity in the last substep: it carries weight. Kept only if circles bounce.
         resting: (n,) 1 where a contact without bounce held the particle in the last substep.
     """
 
@@ -101,6 +102,7 @@ class Slots:
         for name in (*_COLUMNS, "inverse_mass"):
             setattr(self, name, np.zeros(count, self.dtype))
         self.resting = np.zeros(count, np.uint8)
+        self.fed = np.zeros(count, np.uint8)
         self._scratch: list[Array] = []
         self._slot_of: Array | None = None
 
@@ -141,7 +143,7 @@ class Slots:
             motion.take_rows(new, old, order)
             setattr(self, name, new)
             self._scratch[0] = old
-        for name in ("spin", "radius", "mass", "inverse_mass", "particle", "resting"):
+        for name in ("spin", "radius", "mass", "inverse_mass", "particle", "resting", "fed"):
             setattr(self, name, getattr(self, name)[order])
         self._slot_of = None
 

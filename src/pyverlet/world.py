@@ -37,6 +37,7 @@ class Saved:
     frames: int
     h_last: float | None
     order: Array
+    fed: Array
     neighbours: Any
 
 
@@ -363,6 +364,7 @@ class World:
             frames=self.frames,
             h_last=self._h_last,
             order=self._slots.particle.copy(),
+            fed=self._slots.fed.copy(),
             neighbours=self._contacts.broad_phase.save() if self._contacts else None,
         )
 
@@ -380,5 +382,6 @@ class World:
             array[:] = saved.arrays[name]
         self.time, self.frames, self._h_last = saved.time, saved.frames, saved.h_last
         self._slots.restore_order(saved.order, self._state)
+        self._slots.fed[:] = saved.fed
         if self._contacts:
             self._contacts.broad_phase.restore(saved.neighbours, self._slots)

@@ -8,9 +8,12 @@ Position Based Dynamics).
 
 Velocity: what projection feeds in must not become a bounce. A second pass sets the normal velocity of touching pairs
 to 0, and applies Coulomb friction with the normal impulse the projection has found (Mueller et al. 2020, Detailed Rigid Body
-Simulation, section 3.5). A pair that approaches faster than contact at rest explains is an impact when e > 0: it gets the exact
-impulse (1 + e) v_n instead, and the time left after the impact is travelled with the new velocities, so that e = 1 keeps the
-kinetic energy to rounding, in whatever order the pairs come.
+Simulation, section 3.5).
+
+Impact, when e > 0, comes before both, while velocities are still those of the motion: a pair that meets faster than contact at
+rest explains gets the impulse (1 + e) v_n, and the time left since is travelled with the new velocities, so that e = 1 keeps the
+kinetic energy to rounding, in whatever order the pairs come. Two circles that both carried weight a substep ago do not meet, they
+tremble: bouncing them keeps small ones in a pile rattling for ever.
 
 Everything here runs strip by strip as kernels.grid explains: even strips in parallel, then odd ones.
 """
@@ -23,6 +26,9 @@ from pyverlet._jit import kernel, parallel_kernel, prange
 
 # Golden angle, rad: coincident centres part in directions spread evenly over the circle.
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
+
+# How a candidate pair stands at the end of the integration, before contacts have changed a velocity.
+_APART, _RESTING, _PARTING = 0, 1, 2
 
 # m^2 (m where a distance is meant): added to a divisor that is 0 for coincident centres. Below the rounding of any real distance.
 _TINY = 1e-30
@@ -73,12 +79,11 @@ def _project_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rat
 
 
 @kernel
-def _bounce_strip(
-    position, velocity, acceleration, radius, inverse_mass, pair_i, pair_j, h, most, lag, e, rest_speed, touching, impulse
+def _impact_strip(
+    position, velocity, acceleration, radius, inverse_mass, pair_i, pair_j, h, lag, e, rest_speed, fed, meeting, impulse
 ):
     zero = h - h
     two = position.dtype.type(2)
-    count = 0
     for k in range(pair_i.shape[0]):
         i, j = pair_i[k], pair_j[k]
         dx = position[j, 0] - position[i, 0]
@@ -86,45 +91,89 @@ def _bounce_strip(
         reach = radius[i] + radius[j]
         square = dx * dx + dy * dy
         if square >= reach * reach:
+            meeting[k] = _APART
             continue
-        wi, wj = inverse_mass[i], inverse_mass[j]
+        impulse[k] = zero
         distance = np.sqrt(square)
         if distance == zero:
-            ax, ay = _any_normal(i, j)
-            nx, ny = position.dtype.type(ax), position.dtype.type(ay)
-        else:
-            nx, ny = dx / distance, dy / distance
-        depth = min(reach - distance, most * reach)
+            meeting[k] = _RESTING
+            continue
+        nx, ny = dx / distance, dy / distance
         # As at a wall (kernels.bounds): the impact lies in the past, under the relative acceleration an.
         an = (acceleration[j, 0] - acceleration[i, 0]) * nx + (acceleration[j, 1] - acceleration[i, 1]) * ny
         before = (velocity[j, 0] - velocity[i, 0]) * nx + (velocity[j, 1] - velocity[i, 1]) * ny
         vn = before + lag * an
+        depth = reach - distance
         hit = np.sqrt(max(vn * vn + two * an * depth, zero))
-        impact = (vn < zero) & (hit > rest_speed)
-        if impact:
+        if fed[i] & fed[j]:
+            # Both carried weight a substep ago: what speed they have is the trembling of the pile, not an arrival.
+            meeting[k] = _RESTING
+        elif vn > rest_speed:
+            meeting[k] = _PARTING
+        elif vn >= zero or hit <= rest_speed:
+            meeting[k] = _RESTING
+        else:
             time = min(two * depth / (hit - vn), h)
             travelled = e * hit * time + an * time * time / two
-            shift = (depth + max(travelled, zero)) / (wi + wj)
-            kick = (e * hit + an * time - lag * an - before) / (wi + wj)
-        elif vn > rest_speed:
-            # Already parting: make room, but do not throw them apart any faster.
-            kick = zero
-            shift = depth / (wi + wj)
-        else:
-            shift = depth / (wi + wj)
-            kick = shift / h
-        if vn <= rest_speed and not impact:
+            w = inverse_mass[i] + inverse_mass[j]
+            shift = (depth + max(travelled, zero)) / w
+            kick = (e * hit + an * time - lag * an - before) / w
+            meeting[k] = _PARTING
+            impulse[k] = kick
+            _part(position, velocity, inverse_mass, i, j, nx, ny, shift, kick)
+
+
+@kernel
+def _part(position, velocity, inverse_mass, i, j, nx, ny, shift, kick):
+    """Move i and j apart along n by `shift` per inverse mass, and their velocities by `kick`."""
+    wi, wj = inverse_mass[i], inverse_mass[j]
+    position[i, 0] -= shift * wi * nx
+    position[i, 1] -= shift * wi * ny
+    position[j, 0] += shift * wj * nx
+    position[j, 1] += shift * wj * ny
+    velocity[i, 0] -= kick * wi * nx
+    velocity[i, 1] -= kick * wi * ny
+    velocity[j, 0] += kick * wj * nx
+    velocity[j, 1] += kick * wj * ny
+
+
+@kernel
+def _rest_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rate, most, meeting, fed, touching, impulse):
+    zero = rate - rate
+    count = 0
+    for k in range(pair_i.shape[0]):
+        i, j = pair_i[k], pair_j[k]
+        parting = meeting[k] == _PARTING
+        # A pair that has come together only now waits for the next substep, unless one of them carries weight.
+        if meeting[k] == _APART and not (fed[i] | fed[j]):
+            continue
+        dx = position[j, 0] - position[i, 0]
+        dy = position[j, 1] - position[i, 1]
+        reach = radius[i] + radius[j]
+        distance = np.sqrt(dx * dx + dy * dy)
+        if distance < reach:
+            if distance == zero:
+                ax, ay = _any_normal(i, j)
+                nx, ny = position.dtype.type(ax), position.dtype.type(ay)
+            else:
+                nx, ny = dx / distance, dy / distance
+            shift = min(reach - distance, most * reach) / (inverse_mass[i] + inverse_mass[j])
+            # Those already on their way are given room, but are not thrown apart any faster.
+            kick = zero if parting else shift * rate
+            _part(position, velocity, inverse_mass, i, j, nx, ny, shift, kick)
+        elif not parting:
+            continue
+        # At or before k: nothing that is still to be read is overwritten.
+        if not parting:
+            fed[i] = 1
+            fed[j] = 1
             touching[count] = k
             impulse[count] = kick
             count += 1
-        position[i, 0] -= shift * wi * nx
-        position[i, 1] -= shift * wi * ny
-        position[j, 0] += shift * wj * nx
-        position[j, 1] += shift * wj * ny
-        velocity[i, 0] -= kick * wi * nx
-        velocity[i, 1] -= kick * wi * ny
-        velocity[j, 0] += kick * wj * nx
-        velocity[j, 1] += kick * wj * ny
+        elif impulse[k] > zero:
+            touching[count] = k
+            impulse[count] = -impulse[k]
+            count += 1
     return count
 
 
@@ -149,6 +198,7 @@ def _still_strip(position, velocity, inverse_mass, pair_i, pair_j, touching):
 
 @kernel
 def _rub_strip(position, velocity, spin, radius, inverse_mass, pair_i, pair_j, h, mu, touching, impulse):
+    zero = h - h
     two = position.dtype.type(2)
     three = position.dtype.type(3)
     tiny = position.dtype.type(_TINY)
@@ -162,10 +212,11 @@ def _rub_strip(position, velocity, spin, radius, inverse_mass, pair_i, pair_j, h
         nx, ny = dx / distance, dy / distance
         vx = velocity[j, 0] - velocity[i, 0]
         vy = velocity[j, 1] - velocity[i, 1]
-        kick = -(vx * nx + vy * ny) / (wi + wj)
+        bounced = impulse[t] < zero
+        kick = zero if bounced else -(vx * nx + vy * ny) / (wi + wj)
         # Tangent (ny, -nx). A disc has I = m r^2 / 2, so the contact point has the inverse mass w + r^2 / I = 3 w.
         slip = vx * ny - vy * nx + spin[i] * radius[i] + spin[j] * radius[j]
-        most = mu * max(impulse[t] + min(kick, h - h), h - h)
+        most = mu * max(abs(impulse[t]) + min(kick, zero), zero)
         rub = max(min(-slip / (three * (wi + wj)), most), -most)
         px = kick * nx + rub * ny
         py = kick * ny - rub * nx
@@ -175,8 +226,9 @@ def _rub_strip(position, velocity, spin, radius, inverse_mass, pair_i, pair_j, h
         velocity[j, 1] += py * wj
         spin[i] += two * rub * wi / radius[i]
         spin[j] += two * rub * wj / radius[j]
-        # Friction held during the substep too: without this a heap creeps by g h^2 each substep.
-        sx, sy = h * rub * ny, -h * rub * nx
+        # Between circles at rest friction has held during the substep too: without this a heap creeps by g h^2 each substep.
+        held = zero if bounced else h * rub
+        sx, sy = held * ny, -held * nx
         position[i, 0] -= sx * wi
         position[i, 1] -= sy * wi
         position[j, 0] += sx * wj
@@ -196,17 +248,36 @@ def project(position, velocity, radius, inverse_mass, first, count, pair_i, pair
 
 
 @parallel_kernel
-def bounce(
-    position, velocity, acceleration, radius, inverse_mass, first, count, pair_i, pair_j, h, most, lag, e, rest_speed,
-    touching, impulse, touches,
+def impacts(
+    position, velocity, acceleration, radius, inverse_mass, first, count, pair_i, pair_j, h, lag, e, rest_speed,
+    fed, meeting, impulse,
 ):  # fmt: skip
-    """The same for e > 0: impacts bounce, everything slower than rest_speed is treated as `project` does."""
+    """Bounce every pair that meets faster than rest_speed; note in `meeting` how each stands, in `impulse` how hard it hit."""
     for parity in range(2):
         for half in prange((first.shape[0] + 1 - parity) // 2):
             s = 2 * half + parity
             a, b = first[s], first[s] + count[s]
-            touches[s] = _bounce_strip(
-                position, velocity, acceleration, radius, inverse_mass, pair_i[a:b], pair_j[a:b], h, most, lag, e, rest_speed,
+            _impact_strip(
+                position, velocity, acceleration, radius, inverse_mass, pair_i[a:b], pair_j[a:b], h, lag, e, rest_speed,
+                fed, meeting[a:b], impulse[a:b],
+            )  # fmt: skip
+
+
+@parallel_kernel
+def project_resting(
+    position, velocity, radius, inverse_mass, first, count, pair_i, pair_j, rate, most, meeting, fed,
+    touching, impulse, touches,
+):  # fmt: skip
+    """What `project` does, after `impacts`. Those that have bounced are listed too, with their impulse made negative.
+
+    fed[i] is set to 1 for every particle whose velocity is fed.
+    """
+    for parity in range(2):
+        for half in prange((first.shape[0] + 1 - parity) // 2):
+            s = 2 * half + parity
+            a, b = first[s], first[s] + count[s]
+            touches[s] = _rest_strip(
+                position, velocity, radius, inverse_mass, pair_i[a:b], pair_j[a:b], rate, most, meeting[a:b], fed,
                 touching[a:b], impulse[a:b],
             )  # fmt: skip
 
@@ -223,7 +294,10 @@ def still(position, velocity, inverse_mass, first, count, pair_i, pair_j, touchi
 
 @parallel_kernel
 def rub(position, velocity, spin, radius, inverse_mass, first, count, pair_i, pair_j, h, mu, touching, impulse, touches):
-    """The same, with Coulomb friction: at most mu times the normal impulse, and no more than stops the slip."""
+    """The same, but not for pairs that have bounced (impulse < 0); and Coulomb friction for both.
+
+    It is at most mu times the normal impulse, and no more than stops the slip.
+    """
     for parity in range(2):
         for half in prange((first.shape[0] + 1 - parity) // 2):
             s = 2 * half + parity
@@ -235,13 +309,14 @@ def rub(position, velocity, spin, radius, inverse_mass, first, count, pair_i, pa
 
 
 @kernel
-def mark_touching(first, count, pair_i, pair_j, touching, touches, flag):
-    """flag[i] = 1 for every particle of a touching pair."""
+def mark_touching(first, pair_i, pair_j, touching, impulse, touches, flag):
+    """flag[i] = 1 for every particle of a touching pair that has not bounced."""
     for s in range(first.shape[0]):
         a = first[s]
         for t in range(a, a + touches[s]):
-            flag[pair_i[a + touching[t]]] = 1
-            flag[pair_j[a + touching[t]]] = 1
+            if not impulse[t] < 0:
+                flag[pair_i[a + touching[t]]] = 1
+                flag[pair_j[a + touching[t]]] = 1
 
 
 @kernel
