@@ -14,6 +14,8 @@ from pyverlet.constants import (
     CELLS_PER_PARTICLE,
     COLOUR_SLOTS,
     GRID_SPREAD,
+    LIST_OLD,
+    LIST_YOUNG,
     SKIN,
     SKIN_LEAST,
     SKIN_MOST,
@@ -186,23 +188,22 @@ class _SortedCells(BroadPhase):
     def forget(self) -> None:
         self._allowed = -1.0
 
-    def save(self) -> tuple[Array, float, int] | None:
-        return (self.built.copy(), self.skin_diameters, self._age) if self._allowed >= 0 else None
+    def save(self) -> tuple[Array | None, float, int]:
+        return (self.built.copy() if self._allowed >= 0 else None, self.skin_diameters, self._age)
 
-    def restore(self, saved: tuple[Array, float, int] | None, state: Slots) -> None:
+    def restore(self, saved: tuple[Array | None, float, int], state: Slots) -> None:
         self.forget()
-        if saved is None:
-            return
-        # The list is a function of the positions it was built from, and sorting what is sorted changes nothing.
-        state.position[:], self.skin_diameters = saved[0], saved[1]
-        self.rebuild(state)
-        self._age = saved[2]
+        built, self.skin_diameters, age = saved
+        if built is not None:
+            # The list is a function of the positions it was built from, and sorting what is sorted changes nothing.
+            state.position[:] = built
+            self.rebuild(state)
+        self._age = age
 
     def _adapt(self) -> None:
-        # A list that lived less than half a frame was too tight, one that lived for many frames too generous.
-        if self._age <= 4:
+        if self._age <= LIST_YOUNG:
             self.skin_diameters = min(self.skin_diameters * 1.25, SKIN_MOST)
-        elif self._age > 32:
+        elif self._age > LIST_OLD:
             self.skin_diameters = max(self.skin_diameters * 0.9, SKIN_LEAST)
 
     def rebuild(self, state: Slots) -> None:

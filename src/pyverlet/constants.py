@@ -18,6 +18,10 @@ SKIN_LEAST: Final = 0.1
 SKIN_MOST: Final = 0.6
 """Mean diameters between which the skin adapts: below, trembling piles rebuild; above, most pairs are listed for nothing."""
 
+LIST_YOUNG: Final = 4
+LIST_OLD: Final = 32
+"""Substeps: a list outlived sooner than LIST_YOUNG had too small a skin, one that lasted longer than LIST_OLD too large a one."""
+
 GRID_SPREAD: Final = 4.0
 """Standard deviations about the mean that the grid covers when a few outliers would stretch it; those share its rim cells."""
 

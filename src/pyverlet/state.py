@@ -147,10 +147,14 @@ class Slots:
             setattr(self, name, getattr(self, name)[order])
         self._slot_of = None
 
-    def restore_order(self, particle: Array, state: State) -> None:
-        """Take up an earlier order of the particles and gather the state into it."""
-        self._resize(len(particle))
-        self.particle[:] = particle
+    def save(self) -> tuple[Array, Array]:
+        """What outlives a frame here and not in the user's arrays: the order, and who carried weight."""
+        return self.particle.copy(), self.fed.copy()
+
+    def restore(self, saved: tuple[Array, Array], state: State) -> None:
+        """Take up what `save` returned and gather the state into that order."""
+        self._resize(len(saved[0]))
+        self.particle[:], self.fed[:] = saved
         self.gather(state)
 
     def scratch(self, number: int) -> Array:

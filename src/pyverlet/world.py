@@ -36,8 +36,7 @@ class Saved:
     time: float
     frames: int
     h_last: float | None
-    order: Array
-    fed: Array
+    slots: tuple[Array, Array]
     neighbours: Any
 
 
@@ -363,8 +362,7 @@ class World:
             time=self.time,
             frames=self.frames,
             h_last=self._h_last,
-            order=self._slots.particle.copy(),
-            fed=self._slots.fed.copy(),
+            slots=self._slots.save(),
             neighbours=self._contacts.broad_phase.save() if self._contacts else None,
         )
 
@@ -381,7 +379,9 @@ class World:
         for name, array in self._state.arrays():
             array[:] = saved.arrays[name]
         self.time, self.frames, self._h_last = saved.time, saved.frames, saved.h_last
-        self._slots.restore_order(saved.order, self._state)
-        self._slots.fed[:] = saved.fed
+        self._slots.restore(saved.slots, self._state)
         if self._contacts:
-            self._contacts.broad_phase.restore(saved.neighbours, self._slots)
+            # None: collisions were off, or of a kind that remembers nothing.
+            self._contacts.broad_phase.forget()
+            if saved.neighbours is not None:
+                self._contacts.broad_phase.restore(saved.neighbours, self._slots)

@@ -56,9 +56,11 @@ def falling_heap(**options: Any) -> pv.World:
     return world
 
 
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
 @pytest.mark.parametrize("name", pv.integrators.BY_NAME)
-def test_restore_continues_with_the_same_bits(name: str) -> None:
-    world = falling_heap(integrator=pv.integrators.BY_NAME[name]())
+def test_restore_continues_with_the_same_bits(name: str, restitution: float) -> None:
+    collisions = pv.Collisions(restitution=restitution)
+    world = falling_heap(integrator=pv.integrators.BY_NAME[name](), collisions=collisions)
     world.run(seconds=0.7)
     saved = world.save()
     world.run(seconds=0.7)
@@ -67,6 +69,35 @@ def test_restore_continues_with_the_same_bits(name: str) -> None:
     assert world.time == saved.time
     world.run(seconds=0.7)
     assert world.state_hash() == expected
+
+
+def test_restore_goes_back_to_the_very_start() -> None:
+    world = falling_heap(collisions=pv.Collisions(restitution=0.5, friction=0.2))
+    saved = world.save()  # nothing has been stepped yet
+    world.run(seconds=1)
+    expected = world.state_hash()
+    world.restore(saved)
+    assert (world.time, world.frames) == (0.0, 0)
+    world.run(seconds=1)
+    assert world.state_hash() == expected
+
+
+def test_restore_after_the_collisions_were_changed() -> None:
+    for before, after in (
+        (None, pv.Collisions()),
+        (pv.Collisions(method=pv.BruteForce()), pv.Collisions()),
+        (pv.Collisions(), None),
+    ):
+        world = falling_heap(collisions=before)
+        world.run(seconds=0.1)
+        saved = world.save()
+        position = world.position.copy()
+        world.collisions = after
+        world.run(seconds=0.1)
+        world.restore(saved)
+        assert world.position.tolist() == position.tolist()
+        world.run(seconds=0.1)
+        assert np.isfinite(world.position).all()
 
 
 def test_measuring_does_not_change_the_motion() -> None:
