@@ -125,7 +125,8 @@ class Slots:
         motion.take_checking(self.spin, state.spin, self.particle)
         changed = motion.take_checking(self.radius, state.radius, self.particle)
         if motion.take_checking(self.mass, state.mass, self.particle):
-            np.divide(1, self.mass, out=self.inverse_mass)
+            with np.errstate(divide="ignore"):  # a mass of 0 is refused by the world, with a sentence
+                np.divide(1, self.mass, out=self.inverse_mass)
             changed = True
         return bool(resized or changed)
 

@@ -139,9 +139,13 @@ class World:
     def _gather(self) -> None:
         if not self._slots.gather(self._state):
             return
-        checks.positive("radius", self._state.radius)
-        checks.positive("mass", self._state.mass, infinite_is="pinned")
-        self.boundary.check(self._state.radius)
+        try:
+            checks.positive("radius", self._state.radius)
+            checks.positive("mass", self._state.mass, infinite_is="pinned")
+            self.boundary.check(self._state.radius)
+        except InputError:
+            self._slots = Slots(self.dtype)  # so that the next frame sees them as new, and refuses them again
+            raise
         if self._contacts:
             self._contacts.broad_phase.forget()
 

@@ -242,7 +242,18 @@ def test_a_refused_addition_changes_nothing() -> None:
 def test_a_wrong_radius_written_later_is_refused_at_the_next_step() -> None:
     world = two_balls()
     world.radius[1] = -2
-    with pytest.raises(pv.InputError, match=r"radius\[1\] is -2"):
+    for _ in range(2):  # and at every one after it, until it is mended
+        with pytest.raises(pv.InputError, match=r"radius\[1\] is -2"):
+            world.step(1 / 60)
+    world.radius[1] = 0.5
+    world.step(1 / 60)
+    assert world.frames == 1
+
+
+def test_a_wrong_mass_written_later_is_refused_too() -> None:
+    world = two_balls()
+    world.mass[0] = 0
+    with pytest.raises(pv.InputError, match=r"mass\[0\] is 0"):
         world.step(1 / 60)
 
 

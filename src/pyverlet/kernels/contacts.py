@@ -57,9 +57,9 @@ def _project_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rat
             dx, dy, distance = reach * position.dtype.type(nx), reach * position.dtype.type(ny), reach
             depth = most * reach
         else:
-            # No branch on touching: half the candidates do and half do not, and a wrong guess costs 15 ns.
+            # No branch on touching: a third of the candidates do not, in no order, and each wrong guess stalls the processor.
             depth = min(max(reach - distance, zero), most * reach)
-        # One division for all: they do not overlap, and each costs as much as four products.
+        # One division for all: a second one cost 3 ns more a particle.
         scale = depth / (distance * (wi + wj))
         cx, cy = dx * scale, dy * scale
         position[i, 0] = xi - cx * wi
