@@ -9,6 +9,7 @@ import subprocess
 import sys
 import sysconfig
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -53,20 +54,28 @@ def test_compiling_is_announced_on_standard_error(tmp_path: Path) -> None:
     assert json.loads(done.stdout)["compile_s"] > 0
 
 
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """Children take SIGINT even if this process was started to ignore it, as a shell starts its background jobs."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 @pytest.mark.skipif(os.name == "nt", reason="no SIGINT to a child on Windows")
 def test_ctrl_c_ends_a_run_with_130() -> None:
-    process = subprocess.Popen(
-        [*COMMAND, "run", "cage", "--particles", "200", "--seconds", "100000", "--json"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    assert process.stderr is not None
-    first = process.stderr.readline()  # progress: it is running
-    assert "of" in first
-    time.sleep(0.2)
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=30)
+    command = [*COMMAND, "run", "cage", "--particles", "200", "--seconds", "100000", "--json"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stderr is not None
+            first = process.stderr.readline()  # progress: it is running
+            assert "of" in first
+            time.sleep(0.2)
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate(timeout=30)
+        finally:
+            process.kill()
     assert process.returncode == 130
     assert out == ""
     assert err.splitlines()[-1] == "pyverlet: interrupted"
