@@ -51,6 +51,11 @@ class ContactSolver:
         self.settings = settings
         self.broad_phase = settings.method.start(dtype)
 
+    def before(self, state: Slots) -> None:
+        """Note where the substep starts: friction at rest measures from there."""
+        if self.settings.friction > 0.0:
+            state.start[:] = state.position
+
     def find(self, state: Slots) -> None:
         """Broad phase: bring the list of candidate pairs up to date."""
         self.broad_phase.update(state)
@@ -81,7 +86,7 @@ class ContactSolver:
             contacts.still(state.position, state.velocity, state.inverse_mass, *which, pairs.touching, pairs.touches)
         else:
             where = (state.position, state.velocity, state.spin, state.radius, state.inverse_mass)
-            contacts.rub(*where, *which, real(h), real(mu), pairs.touching, pairs.impulse, pairs.touches)
+            contacts.rub(state.start, *where, *which, real(h), real(mu), pairs.touching, pairs.impulse, pairs.touches)
 
     def mark_resting(self, state: Slots) -> None:
         """Set `state.resting` for particles that touch another without bouncing off it."""

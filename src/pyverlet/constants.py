@@ -52,9 +52,17 @@ REST_ACCELERATIONS: Final = 4.0
 """An approach slower than this many |a| h is contact at rest, not an impact: 0.08 m/s under gravity at 480 substeps a second. One
 substep of gravity is 1. Four times as much settled the scene `box` no better."""
 
+PUSHED: Final = 0.6
+FED: Final = 1.6
+"""Parts of an overlap that a substep takes from the positions, and feeds, divided by h, into the velocities. Less than all of
+it keeps neighbours from undoing each other's push, more than all of it is stiffer: it holds the same weight with less overlap.
+docs/design/contacts.md has the comparison."""
+
+HELD: Final = 0.6
+"""Part of the slip of a substep that friction at rest takes back from the positions: the tangential PUSHED."""
+
 LARGEST_PUSH: Final = 0.3
-"""Overlap pushed out in one substep, as a fraction of the contact distance. Settled piles stay below a third of it; circles that
-start on top of each other come apart over several substeps, with half the energy they would get in one."""
+"""Overlap seen by one substep, as a fraction of the contact distance. Settled piles stay far below it."""
 
 FRAME_BUDGET_MS: Final = 5.0
 """Milliseconds of physics a frame may take, of the 16.7 ms at 60 Hz: the rest belongs to drawing and the user's own code."""

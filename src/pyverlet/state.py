@@ -83,6 +83,7 @@ class Slots:
         position, velocity, acceleration, spin, radius, mass: as in State.
         inverse_mass: (n,) 1/kg; 0 for a pinned particle.
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
+        start: (n, 2) positions before the integration of this substep, m. Kept only if circles rub.
         fed: (n,) 1 where a contact at rest fed the velocity in the last substep: it carries weight. Kept only if circles bounce.
         resting: (n,) 1 where a contact without bounce held the particle in the last substep.
     """
@@ -101,6 +102,7 @@ class Slots:
             setattr(self, name, np.zeros((count, 2), self.dtype))
         for name in (*_COLUMNS, "inverse_mass"):
             setattr(self, name, np.zeros(count, self.dtype))
+        self.start = np.zeros((count, 2), self.dtype)
         self.resting = np.zeros(count, np.uint8)
         self.fed = np.zeros(count, np.uint8)
         self._scratch: list[Array] = []
@@ -110,6 +112,7 @@ class Slots:
     velocity: Array
     acceleration: Array
     force: Array
+    start: Array
     spin: Array
     radius: Array
     mass: Array
@@ -144,7 +147,7 @@ class Slots:
             motion.take_rows(new, old, order)
             setattr(self, name, new)
             self._scratch[0] = old
-        for name in ("spin", "radius", "mass", "inverse_mass", "particle", "resting", "fed"):
+        for name in ("spin", "radius", "mass", "inverse_mass", "particle", "resting", "fed", "start"):
             setattr(self, name, getattr(self, name)[order])
         self._slot_of = None
 

@@ -112,6 +112,8 @@ class World:
         done("gather")
         integrator.begin(state, forces, self.time, h, self._h_last)
         for substep in range(self.substeps):
+            if contacts:
+                contacts.before(state)
             integrator.step(state, forces, self.time + substep * h, h)
             strongest = self._strongest_acceleration()
             done("integrate")

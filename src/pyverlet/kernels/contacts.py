@@ -2,9 +2,9 @@
 
 For circles i and j: normal n from i to j, depth = r_i + r_j - |x_j - x_i|, w = 1 / m.
 
-Position: an overlapping pair is moved apart along n, each by its share w / (w_i + w_j). The correction is fed into the
-velocities, divided by h: that is what carries the weight of a pile from one substep to the next (Mueller et al. 2007,
-Position Based Dynamics).
+Position: an overlapping pair is moved apart along n, each by its share w / (w_i + w_j). PUSHED of the depth goes into the
+positions, FED of it, divided by h, into the velocities: that is what carries the weight of a pile from one substep to the next
+(Mueller et al. 2007, Position Based Dynamics, has 1 and 1).
 
 Velocity: what projection feeds in must not become a bounce. A second pass sets the normal velocity of touching pairs
 to 0, and applies Coulomb friction with the normal impulse the projection has found (Mueller et al. 2020, Detailed Rigid Body
@@ -23,6 +23,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet._jit import kernel, parallel_kernel, prange
+from pyverlet.constants import FED, HELD, PUSHED
 
 # Golden angle, rad: coincident centres part in directions spread evenly over the circle.
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
@@ -44,6 +45,7 @@ def _any_normal(i, j):
 @kernel
 def _project_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rate, most, touching, impulse):
     zero = rate - rate
+    pushed, feed = position.dtype.type(PUSHED), position.dtype.type(FED) * rate
     count = 0
     for k in range(pair_i.shape[0]):
         i, j = pair_i[k], pair_j[k]
@@ -61,19 +63,20 @@ def _project_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rat
             depth = min(max(reach - distance, zero), most * reach)
         # One division for all: a second one cost 3 ns more a particle.
         scale = depth / (distance * (wi + wj))
-        cx, cy = dx * scale, dy * scale
+        push = scale * pushed
+        cx, cy = dx * push, dy * push
         position[i, 0] = xi - cx * wi
         position[i, 1] = yi - cy * wi
         position[j, 0] = xj + cx * wj
         position[j, 1] = yj + cy * wj
-        cx *= rate
-        cy *= rate
+        kick = scale * feed
+        cx, cy = dx * kick, dy * kick
         velocity[i, 0] -= cx * wi
         velocity[i, 1] -= cy * wi
         velocity[j, 0] += cx * wj
         velocity[j, 1] += cy * wj
         touching[count] = k
-        impulse[count] = scale * distance * rate
+        impulse[count] = kick * distance
         count += depth > zero
     return count
 
@@ -140,6 +143,7 @@ def _part(position, velocity, inverse_mass, i, j, nx, ny, shift, kick):
 @kernel
 def _rest_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rate, most, meeting, fed, touching, impulse):
     zero = rate - rate
+    pushed, feed = position.dtype.type(PUSHED), position.dtype.type(FED) * rate
     count = 0
     for k in range(pair_i.shape[0]):
         i, j = pair_i[k], pair_j[k]
@@ -159,7 +163,8 @@ def _rest_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rate, 
                 nx, ny = dx / distance, dy / distance
             shift = min(reach - distance, most * reach) / (inverse_mass[i] + inverse_mass[j])
             # Those already on their way are given room, but are not thrown apart any faster.
-            kick = zero if parting else shift * rate
+            kick = zero if parting else shift * feed
+            shift = shift if parting else shift * pushed
             _part(position, velocity, inverse_mass, i, j, nx, ny, shift, kick)
         elif not parting:
             continue
@@ -197,11 +202,12 @@ def _still_strip(position, velocity, inverse_mass, pair_i, pair_j, touching):
 
 
 @kernel
-def _rub_strip(position, velocity, spin, radius, inverse_mass, pair_i, pair_j, h, mu, touching, impulse):
+def _rub_strip(start, position, velocity, spin, radius, inverse_mass, pair_i, pair_j, h, mu, touching, impulse):
     zero = h - h
     two = position.dtype.type(2)
     three = position.dtype.type(3)
     tiny = position.dtype.type(_TINY)
+    part = position.dtype.type(HELD)
     for t in range(touching.shape[0]):
         k = touching[t]
         i, j = pair_i[k], pair_j[k]
@@ -226,8 +232,13 @@ def _rub_strip(position, velocity, spin, radius, inverse_mass, pair_i, pair_j, h
         velocity[j, 1] += py * wj
         spin[i] += two * rub * wi / radius[i]
         spin[j] += two * rub * wj / radius[j]
-        # Between circles at rest friction has held during the substep too: without this a heap creeps by g h^2 each substep.
-        held = zero if bounced else h * rub
+        # Between circles at rest friction has held during the substep too: without this a heap creeps by g h^2 each substep. What
+        # slipped is measured from where the substep started; the velocity would count feeds that have moved nobody yet.
+        sx = (position[j, 0] - start[j, 0]) - (position[i, 0] - start[i, 0])
+        sy = (position[j, 1] - start[j, 1]) - (position[i, 1] - start[i, 1])
+        slipped = sx * ny - sy * nx + h * (spin[i] * radius[i] + spin[j] * radius[j])
+        back = part * max(min(-slipped / (wi + wj), h * most), -h * most)
+        held = zero if bounced else back
         sx, sy = held * ny, -held * nx
         position[i, 0] -= sx * wi
         position[i, 1] -= sy * wi
@@ -293,10 +304,12 @@ def still(position, velocity, inverse_mass, first, count, pair_i, pair_j, touchi
 
 
 @parallel_kernel
-def rub(position, velocity, spin, radius, inverse_mass, first, count, pair_i, pair_j, h, mu, touching, impulse, touches):
+def rub(
+    start, position, velocity, spin, radius, inverse_mass, first, count, pair_i, pair_j, h, mu, touching, impulse, touches
+):  # fmt: skip
     """The same, but not for pairs that have bounced (impulse < 0); and Coulomb friction for both.
 
-    It is at most mu times the normal impulse, and no more than stops the slip.
+    It is at most mu times the normal impulse, and no more than stops the slip. start: positions before the integration.
     """
     for parity in range(2):
         for half in prange((first.shape[0] + 1 - parity) // 2):
@@ -304,8 +317,9 @@ def rub(position, velocity, spin, radius, inverse_mass, first, count, pair_i, pa
             a, b = first[s], first[s] + count[s]
             t = a + touches[s]
             _rub_strip(
-                position, velocity, spin, radius, inverse_mass, pair_i[a:b], pair_j[a:b], h, mu, touching[a:t], impulse[a:t]
-            )
+                start, position, velocity, spin, radius, inverse_mass, pair_i[a:b], pair_j[a:b], h, mu,
+                touching[a:t], impulse[a:t],
+            )  # fmt: skip
 
 
 @kernel
