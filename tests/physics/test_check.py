@@ -22,14 +22,15 @@ BROKEN = {
     "left-alone-rough": "a pile with friction rolls by 2 R in 30 s",
     "masses": "overlap 12 % where heavy circles lie on light ones",
     "radii-masses": "overlap 12 % and trembling where small heavy circles lie on large light ones",
-    "heavy-on-rough-bed": "the heavy circle sinks by 65 % of the bed",
+    "heavy-on-column": "it stays on top, but trembles: 0.09 m g R",
+    "heavy-on-rough-bed": "overlap 10.5 % below the heavy circle",
     "heavy-on-smooth-bed": "overlap 18 % below the heavy circle",
-    "repose": "the angle of repose does not grow from mu 0.5 to 0.8",
-    "energy-scenes": "at 1 to 2 substeps contacts add energy",
+    "repose": "heaps with friction creep, so that their angle hardly depends on it",
+    "energy-scenes": "at 1 and 2 substeps contacts add energy",
     "energy-gas": "at 1 substep an elastic gas under gravity gains energy in a frame",
     "energy-overlapped": "deep overlap explodes",
     "energy-coincident": "deep overlap explodes",
-    "closed-room": "beyond 30 radii a substep a circle is outside",
+    "closed-room": "with e = 1 a circle is outside from a room width a substep on",
 }
 
 
@@ -76,12 +77,12 @@ def test_surface_angle_of_a_drawn_heap(degrees: float) -> None:
     x, y = np.random.default_rng(0).uniform(0, 1, (2, 20_000))
     heap = np.column_stack((10 * (2 * x - 1), 10 * np.tan(np.radians(degrees)) * y))
     heap = heap[heap[:, 1] < (10 - np.abs(heap[:, 0])) * np.tan(np.radians(degrees))]
-    assert friction.surface_angle(heap, 0.4) == pytest.approx(degrees, abs=0.5)
+    assert friction.surface_angle(heap, 10.0) == pytest.approx(degrees, abs=0.5)
 
 
 def test_a_rise_of_energy_is_seen() -> None:
     world = energy.elastic_gas(8)
-    size = energy.scale(world)
+    size = energy.scale(world, 0.5)
 
     class Warming:
         def apply(self, state: Any, t: float) -> None:

@@ -68,7 +68,7 @@ class Check:
         """Measure. A world that turns non-finite is a failure, not an error."""
         start = perf_counter()
         try:
-            result = self.measure(**self.settings, **(self.full if full else {}))
+            result = self.measure(**{**self.settings, **(self.full if full else {})})
         except NonFiniteError as error:
             result = Result(self.summary, str(error), False)
         return Row(self.name, result.asked, result.measured, result.passed, perf_counter() - start, result.values)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -69,7 +69,7 @@ def rebound_substeps() -> Result:
     """The rebound's error falls with more substeps, or is rounding."""
     counts = (1, 2, 4, 8, 16, 32)
     errors = [max(worst_rebound(floor, substeps)[0] for floor in ("box", "cage", "circle")) for substeps in counts]
-    falls = all(after <= max(before, ROUNDING) for before, after in itertools.pairwise(errors))
+    falls = all(after <= max(before, ROUNDING) for before, after in pairwise(errors))
     return Result(
         f"worst rebound improves with substeps, or is rounding (below {ROUNDING:g} of the drop)",
         ", ".join(f"{n}: {error:.1e}" for n, error in zip(counts, errors, strict=True)),

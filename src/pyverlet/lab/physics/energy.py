@@ -24,25 +24,25 @@ Build = Callable[[int], World]
 """A world with that many substeps."""
 
 
-def scale(world: World) -> float:
+def scale(world: World, seconds: float) -> float:
     """Scale of a world's energy, J: what it moves with now, and what a fall through its room would give, m g H.
 
     Without gravity g is 9.81 m/s^2 all the same: circles that start at rest and overlapping would otherwise have the scale 0.
-    Without walls H is the height of what is there, rims included.
+    Without walls H is the depth of a fall that takes all the time there is, g t^2 / 2.
     """
     mass = float(world.mass[np.isfinite(world.mass)].sum(dtype=float))
+    gx, gy = world.gravity if any(world.gravity) else (0.0, G)
     extent = world.boundary.extent()
     if extent is None:
-        rims = world.radius[:, None]
-        extent = (*(world.position - rims).min(axis=0), *(world.position + rims).max(axis=0))
-    width, height = extent[2] - extent[0], extent[3] - extent[1]
-    gx, gy = world.gravity if any(world.gravity) else (0.0, G)
-    return world.energy().kinetic + mass * float(abs(gx) * width + abs(gy) * height)
+        fall = 0.5 * (gx * gx + gy * gy) * seconds**2
+    else:
+        fall = abs(gx) * (extent[2] - extent[0]) + abs(gy) * (extent[3] - extent[1])
+    return world.energy().kinetic + mass * fall
 
 
 def worst_rise(world: World, seconds: float) -> tuple[float, float, float]:
     """(largest rise in one frame over the scale, largest rise above the start over the scale, top speed in m/s)."""
-    size, before = scale(world), world.energy().total
+    size, before = scale(world, seconds), world.energy().total
     start, worst, above, speed = before, 0.0, 0.0, 0.0
     for _ in frames(world, seconds):
         now = world.energy().total

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+from itertools import pairwise
 
 import numpy as np
 
@@ -58,58 +58,58 @@ def slope(mu: float = 0.3, seconds: float = 2.0, within: float = 0.01) -> Result
 
 
 def heap_angle(mu: float, particles: int, seed: int = 0) -> float:
-    """Angle of repose in degrees of a heap poured on a floor of pinned circles: the slope of its free surface.
+    """Angle of repose in degrees of a heap poured on a plate of pinned circles, from whose ends the rest falls off.
 
-    Radii vary by 1:1.5, so that the heap does not crystallise. A few circles at a time are let go above the top.
+    Radii vary by 1:1.5, so that the heap does not crystallise. A few circles at a time are let go a little above the top.
     """
     rng = np.random.default_rng(seed)
-    small, half = 0.1, 0.1 * particles * 0.028 + 4
-    world = World(boundary=Box((-half, -1), (half, 40), friction=mu), collisions=Collisions(friction=mu))
-    floor = np.arange(-half + small, half, 2 * small)
-    world.add(position=np.column_stack((floor, np.zeros(len(floor)))), radius=small, mass=np.inf)
-    top, poured = small, 0
-    while poured < particles:
+    small, half = 0.1, 4.0
+    world = World(boundary=Box((-12, -8), (12, 40), friction=mu), collisions=Collisions(friction=mu))
+    plate = np.arange(-half, half + small, 2 * small)
+    world.add(position=np.column_stack((plate, np.zeros(len(plate)))), radius=small, mass=np.inf)
+    top = 0.0
+    for _ in range(particles // 3):
         x = np.array([-0.5, 0.0, 0.5]) + rng.uniform(-0.1, 0.1, 3)
         world.add(position=np.column_stack((x, np.full(3, top + 0.5))), velocity=(0, -1), radius=small * rng.uniform(0.8, 1.2, 3))
-        poured += 3
         world.run(seconds=0.1)
-        heap = world.position[len(floor) :]
-        settled = np.abs(world.velocity[len(floor) :, 1]) < 0.5
-        top = max(float(heap[settled, 1].max(initial=small)), small)
-    world.run(seconds=4)
-    return surface_angle(world.position[len(floor) :].astype(float), 4 * small)
+        heap = world.position[len(plate) :]
+        top = float(heap[np.abs(world.velocity[len(plate) :, 1]) < 0.5, 1].max(initial=0.0))
+    world.run(seconds=10)
+    heap = world.position[len(plate) :].astype(float)
+    return surface_angle(heap[(heap[:, 1] > 0) & (np.abs(heap[:, 0]) < half)], half)
 
 
-def surface_angle(heap: np.ndarray[tuple[int, int], np.dtype[np.float64]], width: float) -> float:
-    """Degrees: mean slope of straight lines through the highest circles of slices of `width` (m), left and right of the middle.
+def surface_angle(heap: np.ndarray[tuple[int, int], np.dtype[np.float64]], half: float, slices: int = 12) -> float:
+    """Degrees: mean slope of straight lines through the highest circles of each slice, left and right of the middle.
 
-    The top and the foot of a heap are rounded: only slices between 0.15 and 0.8 of its height count, and all of it if none is.
+    heap: (n, 2) centres on a plate from x = -half to half, m. The rounded top and the ends, a tenth of a side each, do not count.
     """
-    middle = float(np.median(heap[:, 0]))
-    slices = np.floor((heap[:, 0] - middle) / width).astype(int)
-    which = np.unique(slices)
-    x = (which + 0.5) * width
-    y = np.array([heap[slices == k, 1].max() for k in which])
-    low, high = y.min(), y.max()
-    counts = (y > low + 0.15 * (high - low)) & (y < low + 0.8 * (high - low))
+    edges = np.linspace(0.1 * half, 0.9 * half, slices + 1)
     slopes = []
-    for side in (x < 0, x > 0):
-        chosen = side & counts
-        if chosen.sum() < 3:
-            chosen = side
-        slopes.append(abs(np.polyfit(x[chosen], y[chosen], 1)[0]))
+    for side in (-1, 1):
+        x, y = side * heap[:, 0], heap[:, 1]
+        highest = [np.flatnonzero((x >= a) & (x < b)) for a, b in pairwise(edges)]
+        surface = np.array([members[y[members].argmax()] for members in highest if len(members)])
+        slopes.append(-np.polyfit(x[surface], y[surface], 1)[0])
     return float(np.degrees(np.arctan(np.mean(slopes))))
 
 
-def repose(particles: int, frictions: tuple[float, ...] = (0.0, 0.2, 0.5, 0.8)) -> Result:
-    """The angle of repose of a poured heap grows with friction."""
-    angles = [float(np.mean([heap_angle(mu, particles, seed) for seed in (0, 1)])) for mu in frictions]
-    grows = all(b > a for a, b in itertools.pairwise(angles))
+def repose(heaps: int, particles: int = 450, frictions: tuple[float, ...] = (0.0, 0.2, 0.5, 0.8)) -> Result:
+    """The angle of repose of a poured heap grows with friction; for discs free to roll it levels off beyond mu = 0.5 or so.
+
+    One heap differs from another by a degree or two, so that angles are compared by their means and standard errors.
+    """
+    angles = np.array([[heap_angle(mu, particles, seed) for seed in range(heaps)] for mu in frictions])
+    mean, error = angles.mean(axis=1), angles.std(axis=1, ddof=1) / np.sqrt(heaps)
+    apart = np.hypot(error[1:], error[:-1])
+    grows = bool((np.diff(mean)[:-1] > apart[:-1]).all() and np.diff(mean)[-1] > -apart[-1])
+    steps = " < ".join(f"{mu:g}" for mu in frictions[:-1])
     return Result(
-        f"the angle of repose of {particles} circles poured on a rough floor grows with friction: {frictions}",
-        ", ".join(f"mu {mu:g}: {angle:.1f}" for mu, angle in zip(frictions, angles, strict=True)) + " degrees",
+        f"the angle of repose of {heaps} heaps of {particles} poured on a rough plate grows with mu: {steps} <= "
+        f"{frictions[-1]:g}, by more than the standard error",
+        ", ".join(f"mu {mu:g}: {a:.1f} +- {s:.1f}" for mu, a, s in zip(frictions, mean, error, strict=True)) + " degrees",
         grows,
-        {f"angle_{mu:g}": angle for mu, angle in zip(frictions, angles, strict=True)},
+        {f"angle_{mu:g}": float(angle) for mu, angle in zip(frictions, mean, strict=True)},
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+from itertools import pairwise
 
 import numpy as np
 
@@ -42,7 +42,7 @@ def substeps(particles: int, seconds: float) -> Result:
         world = scenes.get("cage").world(particles=particles, substeps=count)
         world.run(seconds=seconds)
         found.append((world.overlap(), agitation(world)))
-    falls = all(b.mean < a.mean and b.max < a.max for (a, _), (b, _) in itertools.pairwise(found))
+    falls = all(b.mean < a.mean and b.max < a.max for (a, _), (b, _) in pairwise(found))
     return Result(
         f"cage of {particles:,}: mean and max overlap fall from 8 to 16 to 32 substeps",
         "; ".join(f"{n}: {o.mean:.3%}, {o.max:.2%}, KE {k:.0e}" for n, (o, k) in zip(counts, found, strict=True)),
