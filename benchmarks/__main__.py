@@ -1,4 +1,4 @@
-"""Run the comparison and print it: `python -m benchmarks --particles 2000 20000`."""
+"""Run a comparison and print it: `python -m benchmarks --particles 2000 20000`, or `python -m benchmarks physics`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from time import perf_counter
 import numpy as np
 
 import pyverlet as pv
-from benchmarks.engines import DT, ENGINES, RADIUS, Array, Engine
+from benchmarks import physics
+from benchmarks.engines import CAREFUL, DT, ENGINES, RADIUS, Array, Engine
 from pyverlet import report
 
 SETTLE_SECONDS = 10.0
@@ -120,14 +121,19 @@ def machine() -> str:
 def main() -> None:
     """Print one table for each number of particles; write them all as CSV if asked to."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("--particles", type=int, nargs="+", default=[2_000, 20_000], help="discs in the cage")
+    parser.add_argument("table", nargs="?", choices=("speed", "physics"), default="speed", help="what to compare")
+    parser.add_argument("--particles", type=int, nargs="+", help="discs in the cage: 2000 20000 for speed, 2000 for physics")
     parser.add_argument("--frames", type=int, default=60, help="frames measured for each engine")
     parser.add_argument("--csv", type=Path, help="write the rows to this file too")
     arguments = parser.parse_args()
+    if arguments.table == "physics":
+        print(machine())
+        physics.main([engine for engine in CAREFUL if installed(engine)], (arguments.particles or [2_000])[0])
+        return
     engines = [engine for engine in ENGINES if installed(engine)]
     print(machine())
     rows: list[Row] = []
-    for particles in arguments.particles:
+    for particles in arguments.particles or [2_000, 20_000]:
         position, cage, compile_s = settled_heap(particles)
         print(f"\n{particles:,} discs settled for {SETTLE_SECONDS:g} s; compiling or loading took {compile_s:.1f} s")
         print(f"{'engine':<28}{'settings':<34}{'ms a frame':>11}{'ratio':>8}{'mean overlap':>14}{'max':>8}{'outside':>9}")

@@ -1,7 +1,7 @@
 """The engines compared: each builds the same cage of equal discs and steps it by whole frames of 1/60 s.
 
 Settings are each engine's documented defaults for quality, with sleeping switched off everywhere: a frame then costs what moving
-one would. To add one: a class with `name`, `settings`, `most`, and the three methods; a line in ENGINES.
+one would. To add one: a class with `name`, `settings`, `most`, and the four methods; a line in ENGINES.
 """
 
 from __future__ import annotations
@@ -36,8 +36,16 @@ class Engine(ABC):
     most: ClassVar[int] = 10_000_000
 
     @abstractmethod
-    def __init__(self, position: Array, cage: float) -> None:
-        """Discs of radius 0.5 m and mass 1 kg at (n, 2) positions in a circular cage of this radius, m; no friction, e = 0."""
+    def __init__(
+        self,
+        position: Array,
+        cage: float,
+        *,
+        velocity: Array | None = None,
+        restitution: float = 0.0,
+        gravity: tuple[float, float] = GRAVITY,
+    ) -> None:
+        """Discs of radius 0.5 m and mass 1 kg at (n, 2) positions in a circular cage of this radius, m; no friction."""
 
     @abstractmethod
     def step(self) -> None:
@@ -47,26 +55,41 @@ class Engine(ABC):
     def position(self) -> Array:
         """(n, 2) centres, m."""
 
+    @abstractmethod
+    def velocity(self) -> Array:
+        """(n, 2) m/s."""
+
 
 class _Pyverlet(Engine):
     threads: ClassVar[int] = 1
     method: ClassVar[pv.Fast | pv.BruteForce] = pv.Fast()
 
-    def __init__(self, position: Array, cage: float) -> None:
+    def __init__(
+        self,
+        position: Array,
+        cage: float,
+        *,
+        velocity: Array | None = None,
+        restitution: float = 0.0,
+        gravity: tuple[float, float] = GRAVITY,
+    ) -> None:
         self._world = pv.World(
-            gravity=GRAVITY,
-            boundary=pv.Circle(radius=cage),
-            collisions=pv.Collisions(method=self.method),
+            gravity=gravity,
+            boundary=pv.Circle(radius=cage, restitution=restitution),
+            collisions=pv.Collisions(restitution=restitution, method=self.method),
             substeps=8,
             threads=self.threads,
         )
-        self._world.add(position=position, radius=RADIUS, mass=1.0)
+        self._world.add(position=position, velocity=0.0 if velocity is None else velocity, radius=RADIUS, mass=1.0)
 
     def step(self) -> None:
         self._world.step(DT)
 
     def position(self) -> Array:
         return self._world.position
+
+    def velocity(self) -> Array:
+        return self._world.velocity
 
 
 class PyverletOneThread(_Pyverlet):
@@ -98,30 +121,59 @@ class Pymunk(Engine):
 
     name = "pymunk"
     settings = "10 iterations, spatial hash"
+    steps: ClassVar[int] = 1
+    slop: ClassVar[float] = 0.1
 
-    def __init__(self, position: Array, cage: float) -> None:
+    def __init__(
+        self,
+        position: Array,
+        cage: float,
+        *,
+        velocity: Array | None = None,
+        restitution: float = 0.0,
+        gravity: tuple[float, float] = GRAVITY,
+    ) -> None:
         import pymunk
 
         self._space = pymunk.Space()
-        self._space.gravity = GRAVITY
+        self._space.gravity = gravity
         self._space.iterations = 10
+        self._space.collision_slop = self.slop
         # Cells of a diameter, as its manual advises for many bodies of one size; a tenth faster here than the default tree.
         self._space.use_spatial_hash(2 * RADIUS, 10 * len(position))
         rim = _rim(cage)
         for a, b in zip(rim, np.roll(rim, -1, axis=0), strict=True):
-            self._space.add(pymunk.Segment(self._space.static_body, tuple(a), tuple(b), 0.01))
+            wall = pymunk.Segment(self._space.static_body, tuple(a), tuple(b), 0.01)
+            wall.elasticity = restitution**0.5  # of two shapes it takes the product
+            self._space.add(wall)
         self._bodies = []
-        for x, y in position:
+        for (x, y), (vx, vy) in zip(position, _or_rest(velocity, position), strict=True):
             body = pymunk.Body(1.0, pymunk.moment_for_circle(1.0, 0, RADIUS))
             body.position = float(x), float(y)
-            self._space.add(body, pymunk.Circle(body, RADIUS))
+            body.velocity = float(vx), float(vy)
+            shape = pymunk.Circle(body, RADIUS)
+            shape.elasticity = restitution**0.5
+            self._space.add(body, shape)
             self._bodies.append(body)
 
     def step(self) -> None:
-        self._space.step(DT)
+        for _ in range(self.steps):
+            self._space.step(DT / self.steps)
 
     def position(self) -> Array:
         return np.array([body.position for body in self._bodies])
+
+    def velocity(self) -> Array:
+        return np.array([body.velocity for body in self._bodies])
+
+
+class PymunkCareful(Pymunk):
+    """Smaller steps and less slop, as its manual advises for accuracy."""
+
+    name = "pymunk, careful"
+    settings = "8 steps a frame, slop 0.01"
+    steps = 8
+    slop = 0.01
 
 
 class Box2D(Engine):
@@ -129,29 +181,58 @@ class Box2D(Engine):
 
     name = "Box2D (pyb2d3), 2 threads"
     settings = "4 substeps, sleeping off"
+    substeps: ClassVar[int] = 4
+    threshold: ClassVar[float] = 1.0
 
-    def __init__(self, position: Array, cage: float) -> None:
+    def __init__(
+        self,
+        position: Array,
+        cage: float,
+        *,
+        velocity: Array | None = None,
+        restitution: float = 0.0,
+        gravity: tuple[float, float] = GRAVITY,
+    ) -> None:
         import pyb2d3
 
-        self._world = pyb2d3.World(thread_pool=pyb2d3.ThreadPool(2), gravity=GRAVITY)
+        self._world = pyb2d3.World(thread_pool=pyb2d3.ThreadPool(2), gravity=gravity)
         self._world.sleeping_enabled = False
-        material = pyb2d3.surface_material(friction=0.0, restitution=0.0)
+        self._world.restitution_threshold = self.threshold
+        material = pyb2d3.surface_material(friction=0.0, restitution=restitution)
         ground = self._world.create_static_body()
         # Chains are solid on one side: clockwise, that is the inside.
         ground.create_chain(pyb2d3.chain_def(_rim(cage)[::-1], material=material, is_loop=True))
         shape = pyb2d3.shape_def(density=1.0 / (np.pi * RADIUS**2), material=material)
         disc = pyb2d3.circle(radius=RADIUS)
         self._bodies = pyb2d3.Bodies()
-        for x, y in position:
-            body = self._world.create_dynamic_body(position=(float(x), float(y)), enable_sleep=False)
+        for (x, y), (vx, vy) in zip(position, _or_rest(velocity, position), strict=True):
+            body = self._world.create_dynamic_body(
+                position=(float(x), float(y)), linear_velocity=(float(vx), float(vy)), enable_sleep=False
+            )
             body.create_circle_shape(shape, disc)
             self._bodies.append(body)
 
     def step(self) -> None:
-        self._world.step(DT, 4)
+        self._world.step(DT, self.substeps)
 
     def position(self) -> Array:
         return np.asarray(self._bodies.get_positions())
+
+    def velocity(self) -> Array:
+        return np.asarray(self._bodies.get_linear_velocities())
+
+
+class Box2DCareful(Box2D):
+    """More substeps, and impacts of any speed bounce."""
+
+    name = "Box2D, careful"
+    settings = "16 substeps, restitution threshold 0"
+    substeps = 16
+    threshold = 0.0
+
+
+def _or_rest(velocity: Array | None, position: Array) -> Array:
+    return np.zeros_like(position) if velocity is None else velocity
 
 
 def _rim(cage: float) -> Array:
@@ -160,3 +241,7 @@ def _rim(cage: float) -> Array:
 
 
 ENGINES: tuple[type[Engine], ...] = (PyverletOneThread, PyverletTwoThreads, Pymunk, Box2D, PyverletBruteForce)
+"""Compared for speed."""
+
+CAREFUL: tuple[type[Engine], ...] = (PyverletOneThread, Pymunk, PymunkCareful, Box2D, Box2DCareful)
+"""Compared for physics: the others at their defaults, and at the most careful settings their manuals describe."""

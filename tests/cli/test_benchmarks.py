@@ -24,3 +24,12 @@ def test_the_comparison_runs_and_writes_its_rows(tmp_path: Path) -> None:
         assert row["outside"] == "0"
     # One and two threads give the same bits, so the same overlap.
     assert rows["pyverlet, 1 thread"]["overlap_max"] == rows["pyverlet, 2 threads"]["overlap_max"]
+
+
+def test_the_physics_of_every_engine_is_measured() -> None:
+    command = [sys.executable, "-m", "benchmarks", "physics", "--particles", "40"]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=True)
+    (ours,) = [line for line in run.stdout.splitlines() if line.startswith("pyverlet, 1 thread")]
+    # worst rebound below 1 % of the drop, the gas's energy kept to three digits
+    assert float(ours.split("float32")[1].split("%")[0]) < 1.0
+    assert " 1.000 " in ours

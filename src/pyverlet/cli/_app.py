@@ -1,4 +1,4 @@
-"""The commands: run, bench, list."""
+"""The commands: run, bench, list; and check, which has a file of its own."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from pyverlet import __version__, report, scenes, warm_up
+from pyverlet.cli import _check
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.errors import InputError
@@ -30,6 +31,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+app.add_typer(_check.app, name="check")
 
 
 def _show_version(wanted: bool) -> None:

@@ -1,0 +1,65 @@
+"""`pyverlet check physics`: every promise about the physics, measured on this machine."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from pyverlet.cli import _options as options
+from pyverlet.cli import _print as out
+from pyverlet.lab import physics
+from pyverlet.progress import Progress
+
+FAILED = 1
+
+# Columns of the table, in characters.
+COLUMNS = {"check": 20, "asked": 52, "measured": 42, "": 4, "seconds": 7}
+
+app = typer.Typer(help="Measure what is promised.", rich_markup_mode=None)
+
+
+@app.callback()
+def _check() -> None:
+    """Measure what is promised."""
+
+
+@app.command(name="physics")
+def check_physics(
+    only: Annotated[
+        list[str] | None, typer.Option(help="Only this check; may be repeated.", metavar="NAME", show_default=False)
+    ] = None,
+    full: Annotated[bool, typer.Option("--full", help="At the sizes of the promises: many minutes.")] = False,
+    as_json: options.Json = False,
+) -> None:
+    """Measure the promises about the physics and print a line for each. Exit code 1 if one fails."""
+    chosen = [physics.named(name) for name in only] if only else list(physics.CHECKS)
+    if not as_json:
+        out.write(line(list(COLUMNS)))
+    rows: list[physics.Row] = []
+    with Progress("check") as progress:
+        for check in chosen:
+            progress(len(rows) + 1, len(chosen))
+            rows.append(row := check.run(full=full))
+            if not as_json:
+                out.write(line([row.name, row.asked, row.measured, "pass" if row.passed else "FAIL", f"{row.seconds:7.1f}"]))
+    failed = sum(not row.passed for row in rows)
+    if as_json:
+        out.write_json({"full": full, "passed": len(rows) - failed, "failed": failed, "checks": [row.as_dict() for row in rows]})
+    else:
+        out.write(f"{len(rows) - failed} of {len(rows)} pass")
+    if failed:
+        raise typer.Exit(FAILED)
+
+
+def line(cells: Sequence[str]) -> str:
+    """One row of the table, its cells wrapped into their columns."""
+    wrapped = [textwrap.wrap(cell, width) or [""] for cell, width in zip(cells, COLUMNS.values(), strict=True)]
+    height = max(map(len, wrapped))
+    padded = [
+        [part.ljust(width) for part in column + [""] * (height - len(column))]
+        for column, width in zip(wrapped, COLUMNS.values(), strict=True)
+    ]
+    return "\n".join("  ".join(parts).rstrip() for parts in zip(*padded, strict=True))

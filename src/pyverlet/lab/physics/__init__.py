@@ -1,0 +1,63 @@
+"""The promises of the physics, each measured by one small function: what `pyverlet check physics` prints and the tests assert.
+
+To add one: a function that returns a `Result`, with the equation in its docstring, and a line in CHECKS.
+"""
+
+from __future__ import annotations
+
+import difflib
+
+from pyverlet.errors import InputError
+from pyverlet.lab.physics import bounce, energy, friction, gas, lost, rest, sizes
+from pyverlet.lab.physics._check import Check, Result, Row
+
+__all__ = ["CHECKS", "Check", "Result", "Row", "named"]
+
+CHECKS: tuple[Check, ...] = (
+    Check("rebound-box", bounce.rebound, {"floor": "box"}),
+    Check("rebound-cage", bounce.rebound, {"floor": "cage"}),
+    Check("rebound-circle", bounce.rebound, {"floor": "circle"}),
+    Check("rebound-substeps", bounce.rebound_substeps),
+    Check("ball-in-box", bounce.ball_in_box, {"steps": 100_000}, full={"steps": 1_000_000}),
+    Check("gas-energy", gas.energy, {"particles": 1000, "seconds": 10}, full={"seconds": 60}),
+    Check("gas-angular-momentum", gas.angular_momentum, {"particles": 1000, "seconds": 10}, full={"seconds": 60}),
+    Check("gas-speeds", gas.speeds, {"particles": 1000, "seconds": 10}, full={"seconds": 60}),
+    Check("rest-cage", rest.cage, {"particles": 2000, "seconds": 30}, full={"particles": 20_000}),
+    Check("rest-substeps", rest.substeps, {"particles": 1000, "seconds": 15}, full={"particles": 20_000, "seconds": 30}),
+    Check("rest-column", rest.column, {"particles": 100, "seconds": 20}),
+    Check("left-alone", rest.left_alone, {"particles": 500, "seconds": 30, "friction": 0.0}, full={"seconds": 600}),
+    Check("left-alone-rough", rest.left_alone, {"particles": 500, "seconds": 30, "friction": 0.5}, full={"seconds": 600}),
+    Check("masses", sizes.pile, {"particles": 500, "seconds": 20, "radius_ratio": 1, "mass_ratio": 1000}, full={"seconds": 60}),
+    Check("radii", sizes.pile, {"particles": 500, "seconds": 20, "radius_ratio": 50, "mass_ratio": 1000}, full={"seconds": 60}),
+    Check("radii-masses", sizes.pile,
+          {"particles": 500, "seconds": 20, "radius_ratio": 50, "mass_ratio": 1000, "independent": True}, full={"seconds": 60}),
+    Check("heavy-on-column", sizes.heavy_on_column),
+    Check("heavy-on-rough-bed", sizes.heavy_on_bed, {"friction": 0.5, "particles": 1000}),
+    Check("heavy-on-smooth-bed", sizes.heavy_on_bed, {"friction": 0.0, "particles": 1000}),
+    Check("sliding-disc", friction.sliding_disc),
+    Check("slope", friction.slope),
+    Check("repose", friction.repose, {"heaps": 3}, full={"heaps": 12}),
+    Check("free-spin", friction.free_spin),
+    Check("energy-scenes", energy.in_scenes, {"seconds": 4}, full={"seconds": 30}),
+    Check("energy-gas", energy.in_gas, {"seconds": 4}, full={"seconds": 30}),
+    Check("energy-overlapped", energy.when_overlapped, {"seconds": 4}, full={"seconds": 30}),
+    Check("energy-coincident", energy.when_coincident, {"seconds": 4}, full={"seconds": 30}),
+    Check("coincident", lost.coincident),
+    Check("crowded", lost.crowded),
+    Check("closed-room", lost.leaves_no_room),
+    Check("passing", lost.passing),
+)  # fmt: skip
+
+
+def named(name: str) -> Check:
+    """The check called `name`.
+
+    Raises:
+        InputError: there is none; the message suggests the nearest and names the known ones.
+    """
+    known = {check.name: check for check in CHECKS}
+    if name in known:
+        return known[name]
+    near = difflib.get_close_matches(name.lower(), known, n=1)
+    suggestion = f" (did you mean {near[0]!r}?)" if near else ""
+    raise InputError(f"unknown check {name!r}{suggestion}; known: {', '.join(known)}")

@@ -1,0 +1,148 @@
+"""Never more energy: whatever happens, with e <= 1 and nothing that drives it the total energy of a world does not rise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from pyverlet import scenes
+from pyverlet.bounds import Box, Circle
+from pyverlet.collisions import Collisions
+from pyverlet.forces import Conservative
+from pyverlet.lab.physics._check import Result
+from pyverlet.lab.physics._worlds import RADIUS, G, fastest, frames, in_disc
+from pyverlet.world import World
+
+MOST = 1e-4
+"""Rise in one frame, over the scale."""
+
+SUBSTEPS = (1, 2, 4, 8, 16)
+
+Build = Callable[[int], World]
+"""A world with that many substeps."""
+
+
+def scale(world: World, seconds: float) -> float:
+    """Scale of a world's energy, J: what it moves with now, and what a fall through its room would give, m g H.
+
+    Without gravity g is 9.81 m/s^2 all the same: circles that start at rest and overlapping would otherwise have the scale 0.
+    Without walls H is the depth of a fall that takes all the time there is, g t^2 / 2.
+    """
+    mass = float(world.mass[np.isfinite(world.mass)].sum(dtype=float))
+    gx, gy = world.gravity if any(world.gravity) else (0.0, G)
+    extent = world.boundary.extent()
+    if extent is None:
+        fall = 0.5 * (gx * gx + gy * gy) * seconds**2
+    else:
+        fall = abs(gx) * (extent[2] - extent[0]) + abs(gy) * (extent[3] - extent[1])
+    return world.energy().kinetic + mass * fall
+
+
+def worst_rise(world: World, seconds: float) -> tuple[float, float, float]:
+    """(largest rise in one frame over the scale, largest rise above the start over the scale, top speed in m/s)."""
+    size, before = scale(world, seconds), world.energy().total
+    start, worst, above, speed = before, 0.0, 0.0, 0.0
+    for _ in frames(world, seconds):
+        now = world.energy().total
+        worst, above = max(worst, (now - before) / size), max(above, (now - start) / size)
+        speed, before = max(speed, fastest(world)), now
+    return worst, above, speed
+
+
+def undriven_scenes() -> dict[str, Callable[..., World]]:
+    """The scenes in which energy must not rise: forces have a potential, and the integrator is symplectic."""
+    found: dict[str, Callable[..., World]] = {}
+    for name, scene in scenes.SCENES.items():
+        world = scene.world(particles=min(scene.defaults.particles, 20))
+        if world.integrator.symplectic and all(isinstance(force, Conservative) for force in world.forces):
+            found[name] = partial(scene.world, particles=min(scene.defaults.particles, 400))
+    return found
+
+
+def elastic_gas(substeps: int, particles: int = 300) -> World:
+    """Elastic circles under gravity in a box."""
+    rng = np.random.default_rng(0)
+    world = World(boundary=Box((-20, -20), (20, 20), restitution=1.0), collisions=Collisions(restitution=1.0), substeps=substeps)
+    world.add(position=in_disc(particles, 15, 1.5), velocity=rng.normal(0, 5, (particles, 2)), radius=RADIUS)
+    return world
+
+
+def overlapped(substeps: int, *, gravity: float, restitution: float, friction: float = 0.0, particles: int = 300) -> World:
+    """Circles at random places in a cage of which they cover 60 %: half of them start deep in another."""
+    rng = np.random.default_rng(4)
+    size = RADIUS * np.sqrt(particles / 0.6)
+    angle, out = rng.uniform(0, 2 * np.pi, particles), (size - RADIUS) * np.sqrt(rng.uniform(0, 1, particles))
+    world = World(
+        gravity=(0, -gravity),
+        boundary=Circle(radius=size, restitution=restitution, friction=friction),
+        collisions=Collisions(restitution=restitution, friction=friction),
+        substeps=substeps,
+    )
+    world.add(position=out[:, None] * np.column_stack((np.cos(angle), np.sin(angle))), radius=RADIUS)
+    return world
+
+
+def coincident(substeps: int, *, gravity: float, restitution: float = 0.0, particles: int = 100) -> World:
+    """Circles all at one point of a cage."""
+    world = World(
+        gravity=(0, -gravity),
+        boundary=Circle(radius=20, restitution=restitution),
+        collisions=Collisions(restitution=restitution),
+        substeps=substeps,
+    )
+    world.add(position=np.zeros((particles, 2)), radius=RADIUS)
+    return world
+
+
+def never_rises(worlds: dict[str, Build], seconds: float, counts: tuple[int, ...] = SUBSTEPS) -> Result:
+    """Total energy never rises by more than 1e-4 of its scale in a frame: contacts and walls only take."""
+    runs = [(name, build, count) for name, build in worlds.items() for count in counts]
+    found = [(*worst_rise(build(count), seconds), f"{name}, {count} substeps") for name, build, count in runs]
+    worst, _, _, where = max(found)
+    failing = sum(row[0] > MOST for row in found)
+    above, speed = max(row[1] for row in found), max(row[2] for row in found)
+    return Result(
+        f"total energy rises by <= {MOST:g} of its scale in any frame: {', '.join(worlds)}; 1 to 16 substeps",
+        f"worst {worst:.1e} ({where}); {failing} of {len(found)} runs fail; {above:.1e} above the start, {speed:.0f} m/s",
+        worst <= MOST,
+        {"rise": worst, "above_start": above, "top_speed": speed, "failing": failing},
+    )
+
+
+def in_scenes(seconds: float) -> Result:
+    """Energy in the scenes, as they are, inelastic, bouncing and rubbing."""
+    worlds: dict[str, Build] = {}
+    for name, build in undriven_scenes().items():
+        worlds[name] = lambda n, build=build: build(substeps=n)  # type: ignore[misc]
+        if scenes.get(name).defaults.collisions is not None:
+            worlds[f"{name} e 0.5 mu 0.5"] = lambda n, build=build: build(substeps=n, restitution=0.5, friction=0.5)  # type: ignore[misc]
+            worlds[f"{name} e 1"] = lambda n, build=build: build(substeps=n, restitution=1.0)  # type: ignore[misc]
+    return never_rises(worlds, seconds)
+
+
+def in_gas(seconds: float) -> Result:
+    """Energy of elastic circles under gravity."""
+    return never_rises({"elastic gas under gravity": elastic_gas}, seconds)
+
+
+def when_overlapped(seconds: float) -> Result:
+    """Energy of worlds that start overlapped."""
+    worlds: dict[str, Build] = {
+        "random": partial(overlapped, gravity=G, restitution=0.0),
+        "random e 0.5 mu 0.5": partial(overlapped, gravity=G, restitution=0.5, friction=0.5),
+        "random e 1": partial(overlapped, gravity=G, restitution=1.0),
+        "random g 0": partial(overlapped, gravity=0.0, restitution=0.0),
+    }
+    return never_rises(worlds, seconds)
+
+
+def when_coincident(seconds: float) -> Result:
+    """Energy of worlds that start at one point."""
+    worlds: dict[str, Build] = {
+        "coincident": partial(coincident, gravity=G),
+        "coincident g 0": partial(coincident, gravity=0.0),
+        "coincident e 1": partial(coincident, gravity=G, restitution=1.0),
+    }
+    return never_rises(worlds, seconds)

@@ -1,0 +1,126 @@
+"""Friction and spin: Coulomb's law on a disc with I = m r^2 / 2."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from pyverlet import scenes
+from pyverlet.bounds import Box
+from pyverlet.collisions import Collisions
+from pyverlet.lab.physics._check import Result
+from pyverlet.lab.physics._worlds import RADIUS, G, frames
+from pyverlet.world import World
+
+
+def sliding_disc(within: float = 0.001) -> Result:
+    """A disc set sliding at v0 ends rolling at 2/3 v0, since m v r + I w about the point of contact is kept."""
+    v0 = 5.0
+    world = World(boundary=Box((0, 0), (1000, 10), friction=0.3), collisions=None)
+    disc = world.add(position=(1, RADIUS), velocity=(v0, 0), radius=RADIUS)
+    world.run(seconds=3)  # it slides for v0 / (3 mu g) = 0.57 s
+    speed, rim = float(disc.velocity[0, 0]), -float(disc.spin[0]) * RADIUS
+    error = max(abs(speed / v0 - 2 / 3), abs(rim / v0 - 2 / 3))
+    return Result(
+        f"a disc set sliding at v0 ends rolling at 2/3 v0 within {within:.1%}",
+        f"{speed / v0:.5f} v0, rim {rim / v0:.5f} v0",
+        error <= within,
+        {"speed": speed / v0, "rim": rim / v0},
+    )
+
+
+def slope(mu: float = 0.3, seconds: float = 2.0, within: float = 0.01) -> Result:
+    """A disc on a slope rolls with g sin(a) / 1.5 while tan(a) <= 3 mu, and slides with g (sin a - mu cos a) beyond."""
+    angles = (5, 10, 20, 30, 40, 41, 43, 45, 60, 80)
+    worst, at = 0.0, 0
+    for degrees in angles:
+        a = np.radians(degrees)
+        world = World(
+            gravity=(G * np.sin(a), -G * np.cos(a)),
+            boundary=Box((0, 0), (1000, 9), friction=mu),
+            collisions=None,
+            dtype=np.float64,
+        )
+        disc = world.add(position=(1, RADIUS), radius=RADIUS)
+        world.run(seconds=seconds)
+        rolls = np.tan(a) <= 3 * mu
+        along = G * np.sin(a) / 1.5 if rolls else G * (np.sin(a) - mu * np.cos(a))
+        turning = along if rolls else 2 * mu * G * np.cos(a)  # of the rim: m mu g cos(a) r / I r
+        errors = (abs(disc.velocity[0, 0] / (along * seconds) - 1), abs(-disc.spin[0] * RADIUS / (turning * seconds) - 1))
+        worst, at = max((worst, at), (float(max(errors)), degrees))
+    return Result(
+        f"a disc on a slope rolls with g sin(a) / 1.5 while tan(a) <= 3 mu, slides beyond: within {within:.0%}, 5 to 80 degrees",
+        f"worst {worst:.1e} at {at} degrees (the limit is at {np.degrees(np.arctan(3 * mu)):.1f})",
+        worst <= within,
+        {"error": worst},
+    )
+
+
+def heap_angle(mu: float, particles: int, seed: int = 0) -> float:
+    """Angle of repose in degrees of a heap poured on a plate of pinned circles, from whose ends the rest falls off.
+
+    Radii vary by 1:1.5, so that the heap does not crystallise. A few circles at a time are let go a little above the top.
+    """
+    rng = np.random.default_rng(seed)
+    small, half = 0.1, 4.0
+    world = World(boundary=Box((-12, -8), (12, 40), friction=mu), collisions=Collisions(friction=mu))
+    plate = np.arange(-half, half + small, 2 * small)
+    world.add(position=np.column_stack((plate, np.zeros(len(plate)))), radius=small, mass=np.inf)
+    top = 0.0
+    for _ in range(particles // 3):
+        x = np.array([-0.5, 0.0, 0.5]) + rng.uniform(-0.1, 0.1, 3)
+        world.add(position=np.column_stack((x, np.full(3, top + 0.5))), velocity=(0, -1), radius=small * rng.uniform(0.8, 1.2, 3))
+        world.run(seconds=0.1)
+        heap = world.position[len(plate) :]
+        top = float(heap[np.abs(world.velocity[len(plate) :, 1]) < 0.5, 1].max(initial=0.0))
+    world.run(seconds=10)
+    heap = world.position[len(plate) :].astype(float)
+    return surface_angle(heap[(heap[:, 1] > 0) & (np.abs(heap[:, 0]) < half)], half)
+
+
+def surface_angle(heap: np.ndarray[tuple[int, int], np.dtype[np.float64]], half: float, slices: int = 12) -> float:
+    """Degrees: mean slope of straight lines through the highest circles of each slice, left and right of the middle.
+
+    heap: (n, 2) centres on a plate from x = -half to half, m. The rounded top and the ends, a tenth of a side each, do not count.
+    """
+    edges = np.linspace(0.1 * half, 0.9 * half, slices + 1)
+    slopes = []
+    for side in (-1, 1):
+        x, y = side * heap[:, 0], heap[:, 1]
+        highest = [np.flatnonzero((x >= a) & (x < b)) for a, b in pairwise(edges)]
+        surface = np.array([members[y[members].argmax()] for members in highest if len(members)])
+        slopes.append(-np.polyfit(x[surface], y[surface], 1)[0])
+    return float(np.degrees(np.arctan(np.mean(slopes))))
+
+
+def repose(heaps: int, particles: int = 450, frictions: tuple[float, ...] = (0.0, 0.2, 0.5, 0.8)) -> Result:
+    """The angle of repose of a poured heap grows with friction; for discs free to roll it levels off beyond mu = 0.5 or so.
+
+    One heap differs from another by a degree or two, so that angles are compared by their means and standard errors.
+    """
+    angles = np.array([[heap_angle(mu, particles, seed) for seed in range(heaps)] for mu in frictions])
+    mean, error = angles.mean(axis=1), angles.std(axis=1, ddof=1) / np.sqrt(heaps)
+    apart = np.hypot(error[1:], error[:-1])
+    grows = bool((np.diff(mean)[:-1] > apart[:-1]).all() and np.diff(mean)[-1] > -apart[-1])
+    steps = " < ".join(f"{mu:g}" for mu in frictions[:-1])
+    return Result(
+        f"the angle of repose of {heaps} heaps of {particles} poured on a rough plate grows with mu: {steps} <= "
+        f"{frictions[-1]:g}, by more than the standard error",
+        ", ".join(f"mu {mu:g}: {a:.1f} +- {s:.1f}" for mu, a, s in zip(frictions, mean, error, strict=True)) + " degrees",
+        grows,
+        {f"angle_{mu:g}": float(angle) for mu, angle in zip(frictions, mean, strict=True)},
+    )
+
+
+def free_spin(particles: int = 300, seconds: float = 3.0) -> Result:
+    """Without friction no contact has a torque about a centre: spins keep every bit."""
+    changed = 0
+    for restitution in (0.0, 0.8):
+        world = scenes.get("cage").world(particles=particles, restitution=restitution)
+        spin = np.random.default_rng(0).normal(0, 5, particles).astype(world.dtype)
+        world.spin[:] = spin
+        for _ in frames(world, seconds):
+            pass
+        changed += int((world.spin != spin).sum())
+    return Result("spin is free without friction: no bit of it changes in a pile", f"{changed} spins changed", changed == 0)

@@ -1,0 +1,107 @@
+"""Gas: elastic circles in a cage without gravity keep energy and angular momentum, and their speeds become Maxwell's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.bounds import Circle
+from pyverlet.collisions import Collisions
+from pyverlet.lab.physics._check import Result
+from pyverlet.lab.physics._worlds import RADIUS, frames, in_disc
+from pyverlet.world import World
+
+AREA_FRACTION = 0.3
+SPEED = 5.0
+"""Of every circle at the start, m/s. The mean free path is about 1 m, so that each meets five others in a second."""
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What a gas made of its start.
+
+    Attributes:
+        energy: worst relative change in any frame.
+        turning: worst change of the angular momentum about the centre, over that of such a gas.
+        before, after: (n,) speeds, m/s.
+    """
+
+    energy: float
+    turning: float
+    before: NDArray[Any]
+    after: NDArray[Any]
+
+
+@lru_cache(maxsize=2)
+def observe(particles: int, seconds: float) -> Kept:
+    """Run a gas in which all start equally fast in random directions: as far from Maxwell's distribution as can be."""
+    rng = np.random.default_rng(0)
+    size = RADIUS * np.sqrt(particles / AREA_FRACTION)
+    angle = rng.uniform(0, 2 * np.pi, particles)
+    world = World(gravity=(0, 0), boundary=Circle(radius=size, restitution=1.0), collisions=Collisions(restitution=1.0))
+    gas = world.add(
+        position=in_disc(particles, size, 1.5),
+        velocity=SPEED * np.column_stack((np.cos(angle), np.sin(angle))),
+        radius=RADIUS,
+    )
+    before = np.hypot(*gas.velocity.T)
+    # L is a sum of n terms of either sign and may start near 0, so that a change relative to L itself means nothing. Its scale is
+    # its standard deviation over random directions, sqrt(sum (m |x| |v|)^2 / 2): the L such a gas typically has.
+    scale = float(np.sqrt(0.5 * ((np.hypot(*gas.position.T) * before) ** 2).sum()))
+    energy, turning = world.energy().total, world.angular_momentum()
+    worst_energy = worst_turning = 0.0
+    for _ in frames(world, seconds):
+        worst_energy = max(worst_energy, abs(world.energy().total / energy - 1))
+        worst_turning = max(worst_turning, abs(world.angular_momentum() - turning) / scale)
+    return Kept(worst_energy, worst_turning, before, np.hypot(*gas.velocity.T))
+
+
+def kolmogorov_smirnov(speed: NDArray[Any], mean_square: float) -> tuple[float, float]:
+    """(D, p) of the hypothesis that these speeds follow Maxwell and Boltzmann's law in two dimensions.
+
+    Its distribution function is 1 - exp(-v^2 / <v^2>) (Rayleigh's). <v^2> is what the energy fixes, not a fit. p is Kolmogorov's
+    asymptotic series, good to 1 % from 100 samples on. The samples are the circles at one instant, each counted once.
+    """
+    n = len(speed)
+    law = 1 - np.exp(-(np.sort(speed.astype(float)) ** 2) / mean_square)
+    steps = np.arange(n + 1) / n
+    distance = float(max((steps[1:] - law).max(), (law - steps[:-1]).max()))
+    k = np.arange(1, 101)
+    p = 2 * float(((-1.0) ** (k - 1) * np.exp(-2 * (k * distance) ** 2 * n)).sum())
+    return distance, min(max(p, 0.0), 1.0)
+
+
+def _such(particles: int, seconds: float) -> str:
+    return f"{particles:,} elastic circles, area fraction {AREA_FRACTION:g}, {seconds:g} s"
+
+
+def energy(particles: int, seconds: float, within: float = 1e-4) -> Result:
+    """An elastic gas keeps the sum of m v^2 / 2."""
+    found = observe(particles, seconds).energy
+    asked = f"{_such(particles, seconds)}: energy within {within:g}"
+    return Result(asked, f"{found:.1e}", found <= within, {"error": found})
+
+
+def angular_momentum(particles: int, seconds: float, within: float = 1e-4) -> Result:
+    """An elastic gas in a smooth round cage keeps L = sum m x cross v about the centre: every impulse is central."""
+    found = observe(particles, seconds).turning
+    asked = f"{_such(particles, seconds)}: angular momentum within {within:g} of what such a gas has"
+    return Result(asked, f"{found:.1e}", found <= within, {"error": found})
+
+
+def speeds(particles: int, seconds: float, least: float = 0.01) -> Result:
+    """Equal speeds become Maxwell and Boltzmann's: 1 - exp(-v^2 / <v^2>) of them are below v."""
+    gas = observe(particles, seconds)
+    mean_square = float((gas.before**2).mean())
+    start, _ = kolmogorov_smirnov(gas.before, mean_square)
+    distance, p = kolmogorov_smirnov(gas.after, mean_square)
+    return Result(
+        f"{_such(particles, seconds)}: speeds Maxwell-Boltzmann, Kolmogorov-Smirnov p >= {least:g}",
+        f"p {p:.2f}, D {distance:.3f} (at the start D {start:.3f})",
+        p >= least,
+        {"p": p, "distance": distance, "distance_at_start": start},
+    )
