@@ -19,7 +19,7 @@ LAYERS = (
     {"state", "kernels"},
     {"integrators", "forces", "bounds", "broadphase", "collisions", "energy"},
     {"world", "profile", "clock", "warmup"},
-    {"scenes", "report", "lab"},
+    {"scenes", "report", "lab", "picture"},
     {"viewers"},
     {"cli"},
 )
