@@ -20,7 +20,7 @@ LAYERS = (
     {"integrators", "forces", "bounds", "broadphase", "collisions", "energy"},
     {"world", "profile", "clock", "warmup"},
     {"scenes", "report", "lab", "picture"},
-    {"viewers"},
+    {"viewers", "record"},
     {"cli"},
 )
 # Steps within a layer: module -> what it may use beside it.
@@ -33,6 +33,7 @@ BESIDE = {
     "warmup": {"world"},
     "report": {"scenes"},
     "lab": {"scenes"},
+    "record": {"viewers"},
 }
 
 

@@ -1,4 +1,4 @@
-"""The commands: run, bench, list."""
+"""The commands run, bench and list; record is next door."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def run(
         raise InputError(f"port is {port}; allowed is none, since this run has no live page")
     count = report.frame_count(seconds=seconds, frames=frames, dt=dt, default_seconds=DEFAULT_SECONDS)
     if plot is None:
-        world, compile_s = _build(chosen, settings)
+        world, compile_s = build(chosen, settings)
         result = _measure(world, chosen, count, dt, compile_s)
     else:
         result = _run_and_plot(chosen, settings, count, dt, plot)
@@ -161,7 +161,7 @@ def bench(
     )
     count = report.frame_count(seconds=seconds, frames=frames, dt=dt, default_seconds=DEFAULT_SECONDS)
     warm = report.settle_count(settle, dt)
-    world, compile_s = _build(chosen, settings)
+    world, compile_s = build(chosen, settings)
     with Progress("settling, frame") as progress:
         for done in range(warm):
             world.step(dt)
@@ -178,7 +178,7 @@ def _show(scene: Scene, settings: Settings, *, dt: float, port: int, open_browse
     serve(partial(scene.build, settings), scene_name=scene.name, port=port, open_browser=open_browser, dt=dt)
 
 
-def _build(scene: Scene, settings: Settings) -> tuple[World, float]:
+def build(scene: Scene, settings: Settings) -> tuple[World, float]:
     """The world, and the seconds its kernels took to compile or load."""
     world = scene.build(settings)
     with Progress("compiling kernels, once") as progress:
@@ -197,7 +197,7 @@ def _run_and_plot(scene: Scene, settings: Settings, frames: int, dt: float, path
     if scene.closed_form is None:
         known = ", ".join(other.name for other in scenes.SCENES.values() if other.closed_form)
         raise InputError(f"plot is for scenes with a closed form to compare with ({known}), got {scene.name!r}")
-    world, compile_s = _build(scene, settings)
+    world, compile_s = build(scene, settings)
     recorder = trajectory.HeightRecorder()
     recorder(world)
     with Progress("frame") as progress:

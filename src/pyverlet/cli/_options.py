@@ -11,10 +11,13 @@ import typer
 from pyverlet import integrators
 from pyverlet.broadphase import BruteForce, Fast
 from pyverlet.errors import InputError
+from pyverlet.picture import DARK, LIGHT, ByMass, ByOrigin, BySpeed, Colouring, Theme
 from pyverlet.scenes import Scene, Settings
 
 DType = Literal["float32", "float64"]
 Method = Literal["fast", "brute", "none"]
+ColourName = Literal["origin", "speed", "mass"]
+ThemeName = Literal["dark", "light"]
 
 
 def whole(text: str) -> int:
@@ -23,6 +26,15 @@ def whole(text: str) -> int:
         return int(text)
     except ValueError:
         raise typer.BadParameter(f"{text!r} is not a whole number") from None
+
+
+def pixels(text: str) -> tuple[int, int]:
+    """A size in pixels from 1280x720."""
+    width, _, height = text.lower().partition("x")
+    try:
+        return int(width), int(height)
+    except ValueError:
+        raise InputError(f"size is {text!r}; allowed is a width and a height in pixels, such as 1280x720") from None
 
 
 def real(text: str) -> float:
@@ -62,8 +74,13 @@ Seconds = Annotated[float | None, typer.Option(parser=real, help="Simulated seco
 Frames = Annotated[
     int | None, typer.Option(parser=whole, help="Frames to run, in place of --seconds.", metavar="N", show_default=False)
 ]
+Colour = Annotated[ColourName, typer.Option("--colour", help="What the colours of the circles say.")]
+Look = Annotated[ThemeName, typer.Option("--theme", help="Behind the circles.")]
+Size = Annotated[str, typer.Option(help="Width and height in pixels.", metavar="WxH")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
+COLOURS: dict[ColourName, type[Colouring]] = {"origin": ByOrigin, "speed": BySpeed, "mass": ByMass}
+THEMES: dict[ThemeName, Theme] = {"dark": DARK, "light": LIGHT}
 METHODS: dict[Method, Any] = {"fast": Fast(), "brute": BruteForce(), "none": False}
 
 

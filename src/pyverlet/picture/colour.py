@@ -16,8 +16,8 @@ from pyverlet.state import Group
 if TYPE_CHECKING:
     from pyverlet.world import World
 
-USUAL_SHARE = 0.05
-"""Part of each picture's mean in what counts as usual: the scale follows over twenty pictures and does not flicker."""
+USUAL_S = 1 / 3
+"""Simulated seconds over which the scale follows what is usual: no flicker, and the same for any number of pictures a second."""
 
 USUAL_MULTIPLE = 3.0
 """The end of the palette, in terms of what is usual."""
@@ -48,14 +48,16 @@ class BySpeed(Colouring):
 
     def __init__(self, *, full: float | None = None) -> None:
         self._full = None if full is None else checks.number("full", full, above=0.0)
-        self._usual: float | None = None
+        self._usual, self._time = 0.0, -np.inf
 
     def colours(self, world: World, theme: Theme) -> Packed:
         speed = np.hypot(*world.velocity.T)
         full = self._full
         if full is None:
             mean = float(speed.mean(dtype=np.float64)) if len(speed) else 0.0
-            self._usual = mean if self._usual is None else self._usual + USUAL_SHARE * (mean - self._usual)
+            passed = world.time - self._time
+            self._usual += (mean - self._usual) * (-np.expm1(-passed / USUAL_S) if passed >= 0 else 1.0)
+            self._time = world.time
             full = USUAL_MULTIPLE * self._usual
         return heat(theme.dark)[shade(_steps(speed, 0.0, full))]
 
