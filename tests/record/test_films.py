@@ -301,6 +301,13 @@ def test_to_image_writes_where_it_is_told(tmp_path: Path) -> None:
             record.to_image(heap(), tmp_path / name, size=SIZE)
 
 
+def test_a_world_has_a_door_to_both(tmp_path: Path) -> None:
+    world = heap()
+    assert (world.to_image(size=SIZE) == record.to_image(world, size=SIZE)).all()
+    world.to_video(tmp_path / "a.mp4", seconds=0.1, size=SIZE)
+    assert len(movie_times(tmp_path / "a.mp4")) == 6
+
+
 def test_importing_it_loads_no_encoder() -> None:
     code = "import sys, pyverlet.record; print([m for m in ('av', 'PIL') if m in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
