@@ -71,6 +71,7 @@ def run(
     threads: options.Threads = None,
     dtype: options.Precision = None,
     collisions: options.CollisionMethod = None,
+    picture: options.Picture = None,
     dt: options.Dt = DEFAULT_DT,
     seconds: options.Seconds = None,
     frames: options.Frames = None,
@@ -104,6 +105,7 @@ def run(
         threads=threads,
         dtype=dtype,
         collisions=collisions,
+        picture=picture,
     )
     if not (headless or as_json or plot or seconds is not None or frames is not None):
         _show(chosen, settings, dt=dt, port=DEFAULT_PORT if port is None else port, open_browser=not no_open)
@@ -175,6 +177,8 @@ def bench(
 def _show(scene: Scene, settings: Settings, *, dt: float, port: int, open_browser: bool) -> None:
     from pyverlet.viewers import serve
 
+    if scene.show.colours:
+        out.note(f"the page does not show this picture yet: `pyverlet record {scene.name} {scene.name}.mp4` shows them")
     serve(partial(scene.build, settings), scene_name=scene.name, port=port, open_browser=open_browser, dt=dt)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -74,9 +75,12 @@ Seconds = Annotated[float | None, typer.Option(parser=real, help="Simulated seco
 Frames = Annotated[
     int | None, typer.Option(parser=whole, help="Frames to run, in place of --seconds.", metavar="N", show_default=False)
 ]
-Colour = Annotated[ColourName, typer.Option("--colour", help="What the colours of the circles say.")]
 Look = Annotated[ThemeName, typer.Option("--theme", help="Behind the circles.")]
 Size = Annotated[str, typer.Option(help="Width and height in pixels.", metavar="WxH")]
+Picture = Annotated[
+    Path | None,
+    typer.Option(help="What the circles form (scene image).", metavar="FILE", show_default=False),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 COLOURS: dict[ColourName, type[Colouring]] = {"origin": ByOrigin, "speed": BySpeed, "mass": ByMass}
@@ -111,6 +115,7 @@ def settings(
     threads: int | None,
     dtype: DType | None,
     collisions: Method | None,
+    picture: Path | None = None,
 ) -> Settings:
     """The scene's settings with what the user gave in place of its defaults."""
     return scene.settings(
@@ -124,4 +129,5 @@ def settings(
         threads=threads,
         dtype=None if dtype is None else {"float32": np.float32, "float64": np.float64}[dtype],
         collisions=None if collisions is None else METHODS[collisions],
+        picture=picture,
     )

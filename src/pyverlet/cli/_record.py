@@ -12,6 +12,7 @@ from pyverlet import scenes
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.cli._app import app, build
+from pyverlet.picture import Fixed
 from pyverlet.progress import Progress
 
 DEFAULT_SECONDS = 10.0
@@ -25,13 +26,17 @@ def record(
         Path, typer.Argument(metavar="FILE", help="A name that ends in .mp4, .gif, .webp or .png, or frame-{:04d}.png.")
     ],
     seconds: Annotated[
-        float, typer.Option(parser=options.real, help="Simulated seconds.", metavar="S", show_default="10")
-    ] = DEFAULT_SECONDS,
+        float | None,
+        typer.Option(parser=options.real, help="Simulated seconds.", metavar="S", show_default="10, or the scene's"),
+    ] = None,
     fps: Annotated[
         int | None, typer.Option(parser=options.whole, help="Pictures a second.", metavar="N", show_default="60; .gif: 25")
     ] = None,
     size: options.Size = DEFAULT_SIZE,
-    colour: options.Colour = "origin",
+    colour: Annotated[
+        options.ColourName | None,
+        typer.Option(help="What the colours of the circles say.", show_default="origin, or the scene's"),
+    ] = None,
     theme: options.Look = "dark",
     particles: options.Particles = None,
     substeps: options.Substeps = None,
@@ -43,6 +48,7 @@ def record(
     threads: options.Threads = None,
     dtype: options.Precision = None,
     collisions: options.CollisionMethod = None,
+    picture: options.Picture = None,
 ) -> None:
     """Record a scene as a film (.mp4, .gif, .webp), as numbered pictures (frame-{:04d}.png), or its last moment (.png).
 
@@ -61,10 +67,25 @@ def record(
         threads=threads,
         dtype=dtype,
         collisions=collisions,
+        picture=picture,
     )
+    show = chosen.show
+    if seconds is None:
+        seconds = show.seconds(settings) if show.seconds else DEFAULT_SECONDS
     plan = recording.plan(path, seconds=seconds, fps=fps, size=options.pixels(size))
     world, _ = build(chosen, settings)
+    given = None if colour is None else options.COLOURS[colour]()
+    if given is None and show.colours:
+        with Progress("where each circle ends") as progress:
+            given = Fixed(show.colours(settings, plan.dt, progress))
     with Progress("recording") as progress:
-        done = recording.shoot(world, plan, colour=options.COLOURS[colour](), theme=options.THEMES[theme], progress=progress)
+        done = recording.shoot(
+            world,
+            plan,
+            colour=given,
+            theme=options.THEMES[theme],
+            part=show.view(settings) if show.view else None,
+            progress=progress,
+        )
     length = f", {done.seconds:.4g} s" if done.pictures > 1 else ""
     out.note(f"wrote {path}: {done.pictures} {'picture' if done.pictures == 1 else 'pictures'}{length}")

@@ -24,6 +24,7 @@ from pyverlet.picture import DARK, Colouring, Theme
 from pyverlet.picture.raster import check_size
 from pyverlet.record import _films
 from pyverlet.report import frame_count
+from pyverlet.viewers.frames import Rect
 from pyverlet.viewers.painter import Painter
 
 if TYPE_CHECKING:
@@ -105,6 +106,7 @@ def to_video(
     size: tuple[int, int] = (1280, 720),
     colour: Colouring | None = None,
     theme: Theme = DARK,
+    part: Rect | None = None,
     progress: Progress | None = None,
 ) -> Recorded:
     """Step `world` and record it.
@@ -120,6 +122,7 @@ def to_video(
         size: (width, height) in pixels; even numbers for .mp4.
         colour: what the colours say, such as `pyverlet.picture.BySpeed()`; by default where each circle started.
         theme: `pyverlet.picture.DARK` or `LIGHT`.
+        part: of the plane to show, (x0, y0, x1, y1) in metres; by default the bounds, or where the particles are.
         progress: called as progress(done, total) after every picture.
 
     Raises:
@@ -127,14 +130,20 @@ def to_video(
         Interrupted: Ctrl-C; the file holds what was recorded until then, and plays.
         PyverletError: the disk is full; likewise.
     """
-    return shoot(world, plan(path, seconds=seconds, fps=fps, size=size), colour=colour, theme=theme, progress=progress)
+    return shoot(world, plan(path, seconds=seconds, fps=fps, size=size), colour=colour, theme=theme, part=part, progress=progress)
 
 
 def shoot(
-    world: World, film_plan: FilmPlan, *, colour: Colouring | None = None, theme: Theme = DARK, progress: Progress | None = None
+    world: World,
+    film_plan: FilmPlan,
+    *,
+    colour: Colouring | None = None,
+    theme: Theme = DARK,
+    part: Rect | None = None,
+    progress: Progress | None = None,
 ) -> Recorded:
     """Carry out a plan; see `to_video`."""
-    painter = Painter(world, size=film_plan.size, colour=colour, theme=theme)
+    painter = Painter(world, size=film_plan.size, colour=colour, theme=theme, part=part)
     film = film_plan.film(film_plan.path, film_plan.size, film_plan.fps)
     before, total = film_plan.frames_before, film_plan.frames_before + film_plan.pictures
     with _interruptions() as interrupted:
@@ -171,13 +180,14 @@ def to_image(
     size: tuple[int, int] = (1280, 720),
     colour: Colouring | None = None,
     theme: Theme = DARK,
+    part: Rect | None = None,
 ) -> NDArray[np.uint8]:
     """A picture of `world` as it is now: (height, width, 3) bytes R, G, B, written to `path` as well if there is one.
 
     Args:
         world: only read.
         path: a name that ends in .png, which needs the extra `record`; None writes nothing and needs nothing.
-        size, colour, theme: as for `to_video`.
+        size, colour, theme, part: as for `to_video`.
 
     Raises:
         InputError: an argument is outside what is allowed, or the file cannot be written.
@@ -187,7 +197,7 @@ def to_image(
         if not _is_still(Path(path)):
             raise InputError(f"path is '{path}'; allowed is a name that ends in {_films.PICTURE}")
         film = _films.film_for(Path(path))(Path(path), size, 1)
-    pixels = np.ascontiguousarray(Painter(world, size=size, colour=colour, theme=theme).paint()[..., :3])
+    pixels = np.ascontiguousarray(Painter(world, size=size, colour=colour, theme=theme, part=part).paint()[..., :3])
     if film:
         film.add(pixels)
         if film.error:

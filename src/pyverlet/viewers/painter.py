@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pyverlet.errors import InputError
 from pyverlet.picture import DARK, ByOrigin, Colouring, Raster, Theme, View
-from pyverlet.viewers.frames import Camera, outline
+from pyverlet.viewers.frames import Camera, Rect, outline
 
 if TYPE_CHECKING:
     from pyverlet.world import World
@@ -23,13 +23,20 @@ class Painter:
         size: (width, height) of the picture, pixels.
         colour: what the colours say; by default where each circle started.
         theme: `picture.DARK` or `picture.LIGHT`.
+        part: of the plane to show, (x0, y0, x1, y1) in metres; by default the bounds, or where the particles are.
 
     Attributes:
         view: the part of the plane on the last picture; before the first, that of the world as it is.
     """
 
     def __init__(
-        self, world: World, *, size: tuple[int, int] = (1280, 720), colour: Colouring | None = None, theme: Theme = DARK
+        self,
+        world: World,
+        *,
+        size: tuple[int, int] = (1280, 720),
+        colour: Colouring | None = None,
+        theme: Theme = DARK,
+        part: Rect | None = None,
     ) -> None:
         if colour is not None and not isinstance(colour, Colouring):
             raise InputError(f"colour is {colour!r}; allowed is an object such as pyverlet.picture.BySpeed()")
@@ -39,6 +46,7 @@ class Painter:
         self._raster = Raster(size, theme=theme)
         self._colour = ByOrigin() if colour is None else colour
         self._camera = Camera(world)
+        self._part = part
         self._boundary: Any = None
         self.view = self._look()
 
@@ -52,4 +60,5 @@ class Painter:
         return self._raster.draw(self._world, self.view, outlines=self._outlines, colours=colours)
 
     def _look(self) -> View:
-        return View.fit(self._camera.view(self._world.position), self._raster.size)
+        part = self._camera.view(self._world.position) if self._part is None else self._part
+        return View.fit(part, self._raster.size)
