@@ -66,3 +66,6 @@ LARGEST_PUSH: Final = 0.3
 
 FRAME_BUDGET_MS: Final = 5.0
 """Milliseconds of physics a frame may take, of the 16.7 ms at 60 Hz: the rest belongs to drawing and the user's own code."""
+
+LEAST_DRAWN_RADIUS: Final = 0.35
+"""Pixels: smaller circles are drawn as large, four tenths of a pixel, or a few of them on a large picture could not be seen."""

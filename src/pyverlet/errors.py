@@ -11,6 +11,10 @@ class InputError(PyverletError, ValueError):
     """An argument is outside what is allowed; nothing was changed."""
 
 
+class Interrupted(PyverletError):  # noqa: N818  (like KeyboardInterrupt, it is no error)
+    """A person ended long work early (Ctrl-C); the message says what is kept of it."""
+
+
 class NonFiniteError(PyverletError, ArithmeticError):
     """The state turned NaN or infinite; the world keeps the last good frame readable.
 

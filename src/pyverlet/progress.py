@@ -15,10 +15,14 @@ EVERY_LOGGED_S = 5.0
 """Time between lines where standard error is a file or a pipe."""
 
 
-class Progress:
-    """A line on standard error saying how much of some work is done; used as a context manager.
+BAR = 20
+"""Characters of the bar on a terminal."""
 
-    On a terminal it rewrites itself and disappears at the end. Elsewhere a line is written now and then.
+
+class Progress:
+    """A line on standard error saying how much of some work is done and how long the rest may take; used as a context manager.
+
+    On a terminal it rewrites itself, with a bar, and disappears at the end. Elsewhere a line is written now and then.
     """
 
     def __init__(self, text: str) -> None:
@@ -37,7 +41,9 @@ class Progress:
         if now < self._next:
             return
         self._next = now + (EVERY_S if self._live else EVERY_LOGGED_S)
-        line = f"{self._text}: {done} of {total}"
+        left = (now - self._started) * (total - done) / max(done, 1)
+        bar = f" [{'#' * (BAR * done // max(total, 1)):.<{BAR}}]" if self._live else ""
+        line = f"{self._text}: {done} of {total}{bar}, {_duration(left)} left"
         sys.stderr.write(f"\r{line:<{self._width}}" if self._live else f"{line}\n")
         sys.stderr.flush()
         self._width = max(self._width, len(line))
@@ -46,3 +52,8 @@ class Progress:
         if self._live and self._width:
             sys.stderr.write("\r" + " " * self._width + "\r")
             sys.stderr.flush()
+
+
+def _duration(seconds: float) -> str:
+    whole = round(seconds)
+    return f"{whole} s" if whole < 60 else f"{whole // 60} min {whole % 60} s"

@@ -14,6 +14,7 @@ from pyverlet import _jit, checks
 from pyverlet.bounds import Boundary, Open
 from pyverlet.collisions import Collisions, ContactSolver, Overlap, measure_overlap
 from pyverlet.constants import ALL_THREADS_FROM, ONE_THREAD_BELOW, REST_ACCELERATIONS, STANDARD_GRAVITY
+from pyverlet.doors import Doors
 from pyverlet.energy import Energy, energy
 from pyverlet.errors import InputError, NonFiniteError
 from pyverlet.forces import Force, ForceSum
@@ -40,7 +41,7 @@ class Saved:
     neighbours: Any
 
 
-class World:
+class World(Doors):
     """Particles in a room, and the laws they follow. SI units, y up.
 
     Args:

@@ -185,7 +185,7 @@ def test_figure_has_labels_with_units(run: Any) -> None:
 # ---- what is refused: one sentence, exit code 2 ----
 
 REFUSED = [
-    ("run nowhere", "unknown scene 'nowhere'; known: cage, box, fall"),
+    ("run nowhere", "unknown scene 'nowhere'; known: cage, box, fall, image"),
     ("run cagee --headless", "did you mean 'cage'"),
     ("run --integrator position-verle --headless", "did you mean 'position-verlet'"),
     ("run --integrator zzz --headless", "known: explicit-euler"),

@@ -155,5 +155,5 @@ def test_bad_settings_are_refused(scene: Scene, override: dict[str, object], say
 
 
 def test_unknown_scene_suggests_the_nearest() -> None:
-    with pytest.raises(pv.errors.InputError, match=r"'cagee' \(did you mean 'cage'\?\); known: cage, box, fall"):
+    with pytest.raises(pv.errors.InputError, match=r"'cagee' \(did you mean 'cage'\?\); known: cage, box, fall, image"):
         scenes.get("cagee")

@@ -9,8 +9,9 @@ from collections.abc import Sequence
 
 import typer
 
+from pyverlet.cli import _record  # noqa: F401  (registers its command)
 from pyverlet.cli._app import app
-from pyverlet.errors import InputError, PyverletError
+from pyverlet.errors import InputError, Interrupted, PyverletError
 
 __all__ = ["app", "main"]
 
@@ -32,6 +33,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _complain(error.format_message(), error.exit_code)
     except InputError as error:
         return _complain(str(error), BAD_INPUT)
+    except Interrupted as error:
+        return _complain(str(error), INTERRUPTED)
     except PyverletError as error:
         return _complain(str(error), FAILED)
     except KeyboardInterrupt:

@@ -1,4 +1,4 @@
-"""The commands: run, bench, list; and check, which has a file of its own."""
+"""The commands run, bench and list; check and record have files of their own."""
 
 from __future__ import annotations
 
@@ -73,6 +73,7 @@ def run(
     threads: options.Threads = None,
     dtype: options.Precision = None,
     collisions: options.CollisionMethod = None,
+    picture: options.Picture = None,
     dt: options.Dt = DEFAULT_DT,
     seconds: options.Seconds = None,
     frames: options.Frames = None,
@@ -106,6 +107,7 @@ def run(
         threads=threads,
         dtype=dtype,
         collisions=collisions,
+        picture=picture,
     )
     if not (headless or as_json or plot or seconds is not None or frames is not None):
         _show(chosen, settings, dt=dt, port=DEFAULT_PORT if port is None else port, open_browser=not no_open)
@@ -114,7 +116,7 @@ def run(
         raise InputError(f"port is {port}; allowed is none, since this run has no live page")
     count = report.frame_count(seconds=seconds, frames=frames, dt=dt, default_seconds=DEFAULT_SECONDS)
     if plot is None:
-        world, compile_s = _build(chosen, settings)
+        world, compile_s = build(chosen, settings)
         result = _measure(world, chosen, count, dt, compile_s)
     else:
         result = _run_and_plot(chosen, settings, count, dt, plot)
@@ -163,7 +165,7 @@ def bench(
     )
     count = report.frame_count(seconds=seconds, frames=frames, dt=dt, default_seconds=DEFAULT_SECONDS)
     warm = report.settle_count(settle, dt)
-    world, compile_s = _build(chosen, settings)
+    world, compile_s = build(chosen, settings)
     with Progress("settling, frame") as progress:
         for done in range(warm):
             world.step(dt)
@@ -177,10 +179,12 @@ def bench(
 def _show(scene: Scene, settings: Settings, *, dt: float, port: int, open_browser: bool) -> None:
     from pyverlet.viewers import serve
 
+    if scene.show.colours:
+        out.note(f"the page does not show this picture yet: `pyverlet record {scene.name} {scene.name}.mp4` shows them")
     serve(partial(scene.build, settings), scene_name=scene.name, port=port, open_browser=open_browser, dt=dt)
 
 
-def _build(scene: Scene, settings: Settings) -> tuple[World, float]:
+def build(scene: Scene, settings: Settings) -> tuple[World, float]:
     """The world, and the seconds its kernels took to compile or load."""
     world = scene.build(settings)
     with Progress("compiling kernels, once") as progress:
@@ -199,7 +203,7 @@ def _run_and_plot(scene: Scene, settings: Settings, frames: int, dt: float, path
     if scene.closed_form is None:
         known = ", ".join(other.name for other in scenes.SCENES.values() if other.closed_form)
         raise InputError(f"plot is for scenes with a closed form to compare with ({known}), got {scene.name!r}")
-    world, compile_s = _build(scene, settings)
+    world, compile_s = build(scene, settings)
     recorder = trajectory.HeightRecorder()
     recorder(world)
     with Progress("frame") as progress:

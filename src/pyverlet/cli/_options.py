@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -11,10 +12,13 @@ import typer
 from pyverlet import integrators
 from pyverlet.broadphase import BruteForce, Fast
 from pyverlet.errors import InputError
+from pyverlet.picture import DARK, LIGHT, ByMass, ByOrigin, BySpeed, Colouring, Theme
 from pyverlet.scenes import Scene, Settings
 
 DType = Literal["float32", "float64"]
 Method = Literal["fast", "brute", "none"]
+ColourName = Literal["origin", "speed", "mass"]
+ThemeName = Literal["dark", "light"]
 
 
 def whole(text: str) -> int:
@@ -23,6 +27,15 @@ def whole(text: str) -> int:
         return int(text)
     except ValueError:
         raise typer.BadParameter(f"{text!r} is not a whole number") from None
+
+
+def pixels(text: str) -> tuple[int, int]:
+    """A size in pixels from 1280x720."""
+    width, _, height = text.lower().partition("x")
+    try:
+        return int(width), int(height)
+    except ValueError:
+        raise InputError(f"size is {text!r}; allowed is a width and a height in pixels, such as 1280x720") from None
 
 
 def real(text: str) -> float:
@@ -62,8 +75,16 @@ Seconds = Annotated[float | None, typer.Option(parser=real, help="Simulated seco
 Frames = Annotated[
     int | None, typer.Option(parser=whole, help="Frames to run, in place of --seconds.", metavar="N", show_default=False)
 ]
+Look = Annotated[ThemeName, typer.Option("--theme", help="Behind the circles.")]
+Size = Annotated[str, typer.Option(help="Width and height in pixels.", metavar="WxH")]
+Picture = Annotated[
+    Path | None,
+    typer.Option(help="What the circles form (scene image).", metavar="FILE", show_default=False),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
+COLOURS: dict[ColourName, type[Colouring]] = {"origin": ByOrigin, "speed": BySpeed, "mass": ByMass}
+THEMES: dict[ThemeName, Theme] = {"dark": DARK, "light": LIGHT}
 METHODS: dict[Method, Any] = {"fast": Fast(), "brute": BruteForce(), "none": False}
 
 
@@ -94,6 +115,7 @@ def settings(
     threads: int | None,
     dtype: DType | None,
     collisions: Method | None,
+    picture: Path | None = None,
 ) -> Settings:
     """The scene's settings with what the user gave in place of its defaults."""
     return scene.settings(
@@ -107,4 +129,5 @@ def settings(
         threads=threads,
         dtype=None if dtype is None else {"float32": np.float32, "float64": np.float64}[dtype],
         collisions=None if collisions is None else METHODS[collisions],
+        picture=picture,
     )

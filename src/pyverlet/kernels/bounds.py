@@ -69,6 +69,13 @@ def circle(x0, y0, size, position, velocity, acceleration, spin, radius, inverse
             distance = np.sqrt(square)
             meet(i, dx / distance, dy / distance, distance - room, position, velocity, acceleration, spin, radius, inverse_mass,
                  resting, h, lag, e, mu, rest_speed)  # fmt: skip
+            # Faster than a room width a substep one reflection is not enough: what is still outside waits at the wall.
+            dx = position[i, 0] - x0
+            dy = position[i, 1] - y0
+            distance = np.sqrt(dx * dx + dy * dy)
+            if distance > size:
+                position[i, 0] = x0 + dx * (room / distance)
+                position[i, 1] = y0 + dy * (room / distance)
 
 
 @parallel_kernel
@@ -96,3 +103,8 @@ def box(x0, y0, x1, y1, position, velocity, acceleration, spin, radius, inverse_
             elif up > zero:
                 meet(i, zero, -one, up, position, velocity, acceleration, spin, radius, inverse_mass, resting,
                      h, lag, e, mu, rest_speed)  # fmt: skip
+            # As in the cage: what one reflection has sent beyond the other side waits at that wall.
+            if position[i, 0] < x0 or position[i, 0] > x1:
+                position[i, 0] = min(max(position[i, 0], x0 + r), x1 - r)
+            if position[i, 1] < y0 or position[i, 1] > y1:
+                position[i, 1] = min(max(position[i, 1], y0 + r), y1 - r)

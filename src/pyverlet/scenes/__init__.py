@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 
 from pyverlet.errors import InputError
-from pyverlet.scenes import box, cage, fall
+from pyverlet.scenes import box, cage, fall, image
 from pyverlet.scenes._scene import Scene, Settings
 
 __all__ = ["SCENES", "Scene", "Settings", "get"]
@@ -16,6 +16,7 @@ SCENES: dict[str, Scene] = {
         cage.SCENE,
         box.SCENE,
         fall.SCENE,
+        image.SCENE,
     )
 }
 

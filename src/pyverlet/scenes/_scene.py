@@ -6,6 +6,7 @@ import dataclasses
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -40,6 +41,7 @@ class Settings:
         collisions: how contacts are found; None switches collisions off.
         threads: threads to use; None leaves the choice to the engine.
         gravity: (x, y) in m/s^2.
+        picture: a file for scenes made of one; None takes the scene's own.
     """
 
     particles: int = 5_000
@@ -53,6 +55,7 @@ class Settings:
     collisions: Fast | BruteForce | None = field(default_factory=Fast)
     threads: int | None = None
     gravity: tuple[float, float] = (0.0, -9.81)
+    picture: Path | None = None
 
     def __post_init__(self) -> None:
         """Check what the engine cannot, and what a scene without bounds and collisions would never look at."""
@@ -79,6 +82,22 @@ class Settings:
 
 
 @dataclass(frozen=True)
+class Show:
+    """How a scene asks to be shown where that is not as usual. Viewers that cannot, show it as usual.
+
+    Attributes:
+        colours: of (settings, dt, progress): (n, 3) bytes R, G, B of the circles in a run with frames of dt seconds;
+            progress(done, total) is called while that takes long. A scene that has it takes a picture.
+        view: the part of the plane to show, (x0, y0, x1, y1) in metres.
+        seconds: how long it is worth watching, s.
+    """
+
+    colours: Callable[[Settings, float, Callable[[int, int], None] | None], NDArray[np.uint8]] | None = None
+    view: Callable[[Settings], tuple[float, float, float, float]] | None = None
+    seconds: Callable[[Settings], float] | None = None
+
+
+@dataclass(frozen=True)
 class Scene:
     """A world to run by name: demonstration, test, benchmark and recording are all made from it.
 
@@ -89,6 +108,7 @@ class Scene:
         build: makes the world, ready at time 0.
         closed_form: of (settings, t (m,) in seconds): the exact height y (m, n) in metres of every circle, for scenes
             that have a solution on paper.
+        show: how it asks to be shown.
     """
 
     name: str
@@ -96,6 +116,7 @@ class Scene:
     build: Callable[[Settings], World]
     defaults: Settings = field(default_factory=Settings)
     closed_form: Callable[[Settings, Floats], Floats] | None = None
+    show: Show = Show()
 
     @property
     def description(self) -> str:
@@ -114,6 +135,8 @@ class Scene:
         changes = {name: value for name, value in overrides.items() if value is not None}
         if changes.get("collisions") is False:
             changes["collisions"] = None
+        if "picture" in changes and self.show.colours is None:
+            raise InputError(f"picture is '{changes['picture']}'; allowed is none, since the scene {self.name!r} shows none")
         return dataclasses.replace(self.defaults, **changes)
 
     def world(self, **overrides: Any) -> World:

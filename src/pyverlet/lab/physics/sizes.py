@@ -26,7 +26,8 @@ def pile(particles: int, seconds: float, radius_ratio: float, mass_ratio: float,
     radius = RADIUS * radius_ratio ** (size - 1)
     mass = mass_ratio ** (rng.permutation(size) if independent else size)
     width = np.sqrt(2 * np.pi * float(radius @ radius))
-    start = columns(particles, max(width, 20 * RADIUS), 2.02 * RADIUS)
+    # Shaken: circles exactly above each other have no way past, and a column of them is no pile.
+    start = columns(particles, max(width, 20 * RADIUS), 2.02 * RADIUS) + rng.uniform(-0.01, 0.01, (particles, 2)) * RADIUS
     world = World(boundary=Box((-width, 0), (width, 10 + 2 * start[:, 1].max())))
     world.add(position=start, radius=radius, mass=mass)
     world.run(seconds=seconds)

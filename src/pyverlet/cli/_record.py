@@ -1,0 +1,91 @@
+"""The command `record`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pyverlet import record as recording
+from pyverlet import scenes
+from pyverlet.cli import _options as options
+from pyverlet.cli import _print as out
+from pyverlet.cli._app import app, build
+from pyverlet.picture import Fixed
+from pyverlet.progress import Progress
+
+DEFAULT_SECONDS = 10.0
+DEFAULT_SIZE = "1280x720"
+
+
+@app.command()
+def record(
+    scene: options.SceneName,
+    path: Annotated[
+        Path, typer.Argument(metavar="FILE", help="A name that ends in .mp4, .gif, .webp or .png, or frame-{:04d}.png.")
+    ],
+    seconds: Annotated[
+        float | None,
+        typer.Option(parser=options.real, help="Simulated seconds.", metavar="S", show_default="10, or the scene's"),
+    ] = None,
+    fps: Annotated[
+        int | None, typer.Option(parser=options.whole, help="Pictures a second.", metavar="N", show_default="60; .gif: 25")
+    ] = None,
+    size: options.Size = DEFAULT_SIZE,
+    colour: Annotated[
+        options.ColourName | None,
+        typer.Option(help="What the colours of the circles say.", show_default="origin, or the scene's"),
+    ] = None,
+    theme: options.Look = "dark",
+    particles: options.Particles = None,
+    substeps: options.Substeps = None,
+    integrator: options.IntegratorName = None,
+    restitution: options.Restitution = None,
+    friction: options.Friction = None,
+    radius_spread: options.RadiusSpread = None,
+    seed: options.Seed = None,
+    threads: options.Threads = None,
+    dtype: options.Precision = None,
+    collisions: options.CollisionMethod = None,
+    picture: options.Picture = None,
+) -> None:
+    """Record a scene as a film (.mp4, .gif, .webp), as numbered pictures (frame-{:04d}.png), or its last moment (.png).
+
+    Needs no screen. The same command gives the same pictures. Ctrl-C keeps what was recorded until then.
+    """
+    chosen = scenes.get(scene)
+    settings = options.settings(
+        chosen,
+        particles=particles,
+        substeps=substeps,
+        integrator_name=integrator,
+        restitution=restitution,
+        friction=friction,
+        radius_spread=radius_spread,
+        seed=seed,
+        threads=threads,
+        dtype=dtype,
+        collisions=collisions,
+        picture=picture,
+    )
+    show = chosen.show
+    if seconds is None:
+        seconds = show.seconds(settings) if show.seconds else DEFAULT_SECONDS
+    plan = recording.plan(path, seconds=seconds, fps=fps, size=options.pixels(size))
+    world, _ = build(chosen, settings)
+    given = None if colour is None else options.COLOURS[colour]()
+    if given is None and show.colours:
+        with Progress("where each circle ends") as progress:
+            given = Fixed(show.colours(settings, plan.dt, progress))
+    with Progress("recording") as progress:
+        done = recording.shoot(
+            world,
+            plan,
+            colour=given,
+            theme=options.THEMES[theme],
+            part=show.view(settings) if show.view else None,
+            progress=progress,
+        )
+    length = f", {done.seconds:.4g} s" if done.pictures > 1 else ""
+    out.note(f"wrote {path}: {done.pictures} {'picture' if done.pictures == 1 else 'pictures'}{length}")

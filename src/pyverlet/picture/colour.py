@@ -1,0 +1,120 @@
+"""What a circle's colour says: where it started, how fast or heavy it is, which group it belongs to, or what it was given."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyverlet import checks
+from pyverlet.errors import InputError
+from pyverlet.picture.palette import STEPS, Packed, Theme, heat, hues, packed, shade
+from pyverlet.state import Group
+
+if TYPE_CHECKING:
+    from pyverlet.world import World
+
+USUAL_S = 1 / 3
+"""Simulated seconds over which the scale follows what is usual: no flicker, and the same for any number of pictures a second."""
+
+USUAL_MULTIPLE = 3.0
+"""The end of the palette, in terms of what is usual."""
+
+
+class Colouring(ABC):
+    """Gives every circle of a world a colour, picture after picture."""
+
+    @abstractmethod
+    def colours(self, world: World, theme: Theme) -> Packed:
+        """(n,) colours, R + G << 8 + B << 16, of the world's circles now."""
+
+
+class ByOrigin(Colouring):
+    """Through the hues in the order the circles were added: scenes fill their room from the bottom up."""
+
+    def colours(self, world: World, theme: Theme) -> Packed:
+        n = len(world)
+        return hues(theme.dark)[shade(np.arange(n) * STEPS // max(n, 1))]
+
+
+class BySpeed(Colouring):
+    """From slow to fast.
+
+    Args:
+        full: m/s at the end of the palette; None follows three times the usual speed.
+    """
+
+    def __init__(self, *, full: float | None = None) -> None:
+        self._full = None if full is None else checks.number("full", full, above=0.0)
+        self._usual, self._time = 0.0, -np.inf
+
+    def colours(self, world: World, theme: Theme) -> Packed:
+        speed = np.hypot(*world.velocity.T)
+        full = self._full
+        if full is None:
+            mean = float(speed.mean(dtype=np.float64)) if len(speed) else 0.0
+            passed = world.time - self._time
+            self._usual += (mean - self._usual) * (-np.expm1(-passed / USUAL_S) if passed >= 0 else 1.0)
+            self._time = world.time
+            full = USUAL_MULTIPLE * self._usual
+        return heat(theme.dark)[shade(_steps(speed, 0.0, full))]
+
+
+class ByMass(Colouring):
+    """From light to heavy, over equal ratios; pinned circles stand at the end."""
+
+    def colours(self, world: World, theme: Theme) -> Packed:
+        logarithm = np.log(world.mass.astype(np.float64))
+        finite = logarithm[np.isfinite(logarithm)]
+        low, high = (finite.min(), finite.max()) if len(finite) else (0.0, 0.0)
+        return heat(theme.dark)[shade(_steps(logarithm, low, high))]
+
+
+class Groups(Colouring):
+    """One hue for each of these groups; circles in none of them are grey.
+
+    Args:
+        groups: what `world.add` returned.
+    """
+
+    def __init__(self, *groups: Group) -> None:
+        for k, group in enumerate(groups):
+            if not isinstance(group, Group):
+                raise InputError(f"groups[{k}] is {group!r}; allowed is what world.add returns")
+        self._groups = groups
+
+    def colours(self, world: World, theme: Theme) -> Packed:
+        result = np.full(len(world), 0x9A9A9A, dtype=np.uint32)
+        for k, group in enumerate(self._groups):
+            step = np.full(len(group), k * STEPS // max(len(self._groups), 1))
+            result[group.index] = hues(theme.dark)[shade(step)]
+        return result
+
+
+class Fixed(Colouring):
+    """Colours of the user's own, which stay.
+
+    Args:
+        rgb: (n, 3) from 0 to 255, a row for each circle in the order they were added, or (3,) for all.
+    """
+
+    def __init__(self, rgb: ArrayLike) -> None:
+        array: NDArray[Any] = np.asarray(rgb)
+        if array.ndim not in (1, 2) or array.shape[-1] != 3:
+            raise InputError(f"rgb has shape {array.shape}; allowed is (n, 3), a row R, G, B for each circle, or (3,)")
+        if array.dtype.kind not in "iuf" or not ((array >= 0) & (array <= 255)).all():
+            raise InputError("rgb holds something else than numbers from 0 to 255; allowed are these")
+        self._packed = packed(array)
+
+    def colours(self, world: World, theme: Theme) -> Packed:
+        if self._packed.ndim and len(self._packed) != len(world):
+            raise InputError(f"rgb has {len(self._packed)} rows; allowed are {len(world)}, one for each circle")
+        return np.ascontiguousarray(np.broadcast_to(self._packed, len(world)))
+
+
+def _steps(value: NDArray[Any], low: float, high: float) -> NDArray[np.int64]:
+    """Steps of a palette from `low` to `high`; beyond, its ends. NaN: its start."""
+    share = (value - low) * ((STEPS - 1) / (high - low)) if high > low else np.zeros(len(value))
+    return np.nan_to_num(np.clip(share, 0, STEPS - 1)).astype(np.int64)

@@ -1,0 +1,121 @@
+"""Circles and walls to an array of pixels, on the processor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet import checks
+from pyverlet.errors import InputError
+from pyverlet.kernels import raster
+from pyverlet.picture.palette import DARK, Packed, Theme, swapped
+from pyverlet.picture.view import View
+
+if TYPE_CHECKING:
+    from pyverlet.world import World
+
+Lines = Sequence[Sequence[tuple[float, float]]]
+"""Closed lines, metres."""
+
+WALL_PX = 2.0
+"""Width of a wall's line outside the room."""
+
+SLICES = 8
+"""Lines a row of pixels is cut into where the floor of the room is filled: steps of a thirtieth in lightness, once a view."""
+
+GRID_PX = 60.0
+"""Least distance between the lines of the grid."""
+
+MOST_PIXELS = 1 << 26
+"""8,192 x 8,192: more is almost surely a typing error, and 256 MB."""
+
+
+class Raster:
+    """Draws worlds into one buffer of pixels, over and over.
+
+    Args:
+        size: (width, height) in pixels.
+        theme: DARK or LIGHT.
+    """
+
+    def __init__(self, size: tuple[int, int] = (1280, 720), *, theme: Theme = DARK) -> None:
+        self.size = check_size(size)
+        self.theme = theme
+        width, height = self.size
+        self._pixels: Packed = np.empty((height, width), dtype=np.uint32)
+        self._ground: Packed = np.empty_like(self._pixels)
+        self._ground_is: Any = None
+
+    def draw(self, world: World, view: View, *, outlines: Lines = (), colours: Packed) -> NDArray[np.uint8]:
+        """A picture of `world`.
+
+        Args:
+            world: only read.
+            view: of this raster's size.
+            outlines: closed lines of the bounds, metres.
+            colours: (n,) R + G << 8 + B << 16, from a `Colouring`.
+
+        Returns:
+            (height, width, 4) bytes R, G, B, A: a view on the buffer, good until the next call. A is what part of a pixel circles
+            cover; R, G, B are complete without it.
+        """
+        return self.discs(world.position, world.radius, view, outlines=outlines, colours=colours)
+
+    def discs(
+        self, position: NDArray[Any], radius: NDArray[Any], view: View, *, outlines: Lines = (), colours: Packed
+    ) -> NDArray[np.uint8]:
+        """The same from arrays: centres (n, 2) and radii (n,) in metres. For pictures made in another thread than the physics."""
+        if (view.width, view.height) != self.size:
+            raise InputError(f"view is {view.width} x {view.height} pixels; allowed is this raster's {self.size}")
+        key = (view.left, view.top, view.scale, outlines)
+        if self._ground_is != key:
+            self._lay_ground(view, outlines)
+            self._ground_is = key
+        np.copyto(self._pixels, self._ground)
+        colours = np.ascontiguousarray(colours, dtype=np.uint32)
+        raster.circles(self._pixels, self._ground, position, radius, colours, view.left, view.top, view.scale)
+        return self._pixels.view(np.uint8).reshape(*self._pixels.shape, 4)
+
+    def _lay_ground(self, view: View, outlines: Lines) -> None:
+        """What stays while the view does: the ground, the floor of the room, its walls."""
+        self._ground[:] = swapped(self.theme.ground)
+        if not outlines:
+            self._rule(view)
+            return
+        lines = [np.asarray(outline, dtype=np.float64) for outline in outlines]
+        pixels = [np.column_stack(((x - view.left), (view.top - y))) * view.scale for x, y in (line.T for line in lines)]
+        edges = np.concatenate([np.column_stack((line, np.roll(line, -1, axis=0))) for line in pixels])
+        cover = np.zeros(self._ground.shape, dtype=np.float32)
+        for x0, y0, x1, y1 in edges:
+            raster.stroke(cover, x0, y0, x1, y1, WALL_PX)
+        raster.tint(self._ground, cover, np.uint32(swapped(self.theme.wall)))
+        cover[:] = 0.0
+        raster.fill(cover, edges, SLICES)
+        raster.tint(self._ground, cover, np.uint32(swapped(self.theme.inside)))
+
+    def _rule(self, view: View) -> None:
+        """Without walls: lines at round distances, so that motion can be seen."""
+        apart = 10.0 ** np.floor(np.log10(GRID_PX / view.scale))
+        apart *= next(multiple for multiple in (1, 2, 5, 10) if multiple * apart * view.scale >= GRID_PX)
+        width, height = self.size
+        right, bottom = view.left + width / view.scale, view.top - height / view.scale
+        line = swapped(self.theme.grid)
+        for x in np.arange(np.ceil(view.left / apart), right / apart) * apart:
+            self._ground[:, int((x - view.left) * view.scale)] = line
+        for y in np.arange(np.ceil(bottom / apart), view.top / apart) * apart:
+            self._ground[int((view.top - y) * view.scale), :] = line
+
+
+def check_size(size: tuple[int, int]) -> tuple[int, int]:
+    """(width, height) in pixels, neither absurdly large."""
+    try:
+        width, height = size
+    except (TypeError, ValueError):
+        raise InputError(f"size is {size!r}; allowed are two whole numbers (width, height)") from None
+    result = (checks.whole("width", width), checks.whole("height", height))
+    if result[0] * result[1] > MOST_PIXELS:
+        raise InputError(f"size is {width} x {height}; allowed are at most {MOST_PIXELS:,} pixels")
+    return result

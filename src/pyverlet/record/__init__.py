@@ -1,0 +1,238 @@
+"""Recording a world: films and pictures without a screen, with exact frame times and the same bytes every time.
+
+Importing this loads nothing but the engine; films need the extra `record`.
+"""
+
+from __future__ import annotations
+
+import math
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet import checks
+from pyverlet.errors import InputError, Interrupted, PyverletError
+from pyverlet.picture import DARK, Colouring, Theme
+from pyverlet.picture.raster import check_size
+from pyverlet.record import _films
+from pyverlet.report import frame_count
+from pyverlet.viewers.frames import Rect
+from pyverlet.viewers.painter import Painter
+
+if TYPE_CHECKING:
+    from pyverlet.world import World
+
+__all__ = ["FilmPlan", "Recorded", "plan", "to_image", "to_video"]
+
+LONGEST_DT = 1 / 60
+"""s: pictures further apart than this have several frames of physics between them."""
+
+MOST_FPS = 1000
+"""Pictures a second: WebP counts in thousandths."""
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """What a recording holds: the file, its pictures, and the seconds they span (0 for a single one)."""
+
+    path: Path
+    pictures: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class FilmPlan:
+    """What is recorded, checked before anything long begins.
+
+    Attributes:
+        film: the kind of file.
+        path: where it goes.
+        size: (width, height), pixels.
+        fps: pictures a second.
+        frames_before: frames of physics before the first picture.
+        pictures: how many.
+        frames_between: frames of physics from one picture to the next.
+    """
+
+    film: type[_films._Stream | _films.Frames]
+    path: Path
+    size: tuple[int, int]
+    fps: int
+    frames_before: int
+    pictures: int
+    frames_between: int
+
+    @property
+    def dt(self) -> float:
+        """Seconds of a frame of physics."""
+        return 1.0 / (self.fps * self.frames_between)
+
+
+def plan(path: str | Path, *, seconds: float = 10.0, fps: int | None = None, size: tuple[int, int] = (1280, 720)) -> FilmPlan:
+    """Check everything about a recording. Parameters as for `to_video`; a plain .png shows the last moment."""
+    path = Path(path)
+    film = _films.film_for(path)
+    fps = checks.whole("fps", film.default_fps if fps is None else fps, most=MOST_FPS)
+    size = check_size(size)
+    film.check(size, fps)
+    pictures = frame_count(seconds=seconds, frames=None, dt=1.0 / fps, default_seconds=seconds)
+    between = steps_between(fps)
+    if _is_still(path):
+        return FilmPlan(film, path, size, fps, pictures * between, 1, between)
+    return FilmPlan(film, path, size, fps, 0, pictures, between)
+
+
+def steps_between(fps: int) -> int:
+    """The least number of frames of physics from picture to picture that are no longer than a sixtieth of a second."""
+    return max(1, math.ceil(1.0 / (fps * LONGEST_DT) - 1e-9))
+
+
+def to_video(
+    world: World,
+    path: str | Path,
+    *,
+    seconds: float = 10.0,
+    fps: int | None = None,
+    size: tuple[int, int] = (1280, 720),
+    colour: Colouring | None = None,
+    theme: Theme = DARK,
+    part: Rect | None = None,
+    progress: Progress | None = None,
+) -> Recorded:
+    """Step `world` and record it.
+
+    Picture k shows the world k / fps seconds after now; between two, it is stepped by 1 / fps, or by equal parts of it no longer
+    than a sixtieth of a second. The same world gives the same file, byte for byte.
+
+    Args:
+        world: stepped in place, to the time of the last picture.
+        path: .mp4, .gif or .webp; or .png with a number in it, such as frame-{:04d}.png, for a file a picture.
+        seconds: simulated seconds.
+        fps: pictures a second; 60 unless said, and 25 for .gif.
+        size: (width, height) in pixels; even numbers for .mp4.
+        colour: what the colours say, such as `pyverlet.picture.BySpeed()`; by default where each circle started.
+        theme: `pyverlet.picture.DARK` or `LIGHT`.
+        part: of the plane to show, (x0, y0, x1, y1) in metres; by default the bounds, or where the particles are.
+        progress: called as progress(done, total) after every picture.
+
+    Raises:
+        InputError: an argument is outside what is allowed, the file cannot be written, or the extra `record` is missing.
+        Interrupted: Ctrl-C; the file holds what was recorded until then, and plays.
+        PyverletError: the disk is full; likewise.
+    """
+    return shoot(world, plan(path, seconds=seconds, fps=fps, size=size), colour=colour, theme=theme, part=part, progress=progress)
+
+
+def shoot(
+    world: World,
+    film_plan: FilmPlan,
+    *,
+    colour: Colouring | None = None,
+    theme: Theme = DARK,
+    part: Rect | None = None,
+    progress: Progress | None = None,
+) -> Recorded:
+    """Carry out a plan; see `to_video`."""
+    painter = Painter(world, size=film_plan.size, colour=colour, theme=theme, part=part)
+    film = film_plan.film(film_plan.path, film_plan.size, film_plan.fps)
+    before, total = film_plan.frames_before, film_plan.frames_before + film_plan.pictures
+    with _interruptions() as interrupted:
+        try:
+            for frame in range(before):
+                if interrupted():
+                    break
+                world.step(film_plan.dt)
+                if progress:
+                    progress(frame + 1, total)
+            for picture in range(film_plan.pictures):
+                for _ in range(film_plan.frames_between if picture else 0):
+                    world.step(film_plan.dt)
+                film.add(painter.paint())
+                if progress:
+                    progress(before + picture + 1, total)
+                if film.error or interrupted():
+                    break
+        finally:
+            film.close()
+        cut = interrupted()
+    done = Recorded(film_plan.path, film.kept, film.kept / film_plan.fps if film_plan.pictures > 1 else 0.0)
+    if film.error:
+        raise PyverletError(f"{film.error.strerror or film.error}; {_holds(done, world)}")
+    if cut:
+        raise Interrupted(f"interrupted; {_holds(done, world)}")
+    return done
+
+
+def to_image(
+    world: World,
+    path: str | Path | None = None,
+    *,
+    size: tuple[int, int] = (1280, 720),
+    colour: Colouring | None = None,
+    theme: Theme = DARK,
+    part: Rect | None = None,
+) -> NDArray[np.uint8]:
+    """A picture of `world` as it is now: (height, width, 3) bytes R, G, B, written to `path` as well if there is one.
+
+    Args:
+        world: only read.
+        path: a name that ends in .png, which needs the extra `record`; None writes nothing and needs nothing.
+        size, colour, theme, part: as for `to_video`.
+
+    Raises:
+        InputError: an argument is outside what is allowed, or the file cannot be written.
+    """
+    film: _films.Film | None = None
+    if path is not None:
+        if not _is_still(Path(path)):
+            raise InputError(f"path is '{path}'; allowed is a name that ends in {_films.PICTURE}")
+        film = _films.film_for(Path(path))(Path(path), size, 1)
+    pixels = np.ascontiguousarray(Painter(world, size=size, colour=colour, theme=theme, part=part).paint()[..., :3])
+    if film:
+        film.add(pixels)
+        if film.error:
+            raise InputError(f"path is '{path}', which cannot be written: {film.error.strerror or film.error}")
+    return pixels
+
+
+def _is_still(path: Path) -> bool:
+    return path.suffix.lower() == _films.PICTURE and "{" not in str(path)
+
+
+def _holds(done: Recorded, world: World) -> str:
+    if _is_still(done.path):
+        return f"'{done.path}' shows the world at {world.time:.4g} s" if done.pictures else f"'{done.path}' is not written"
+    if "{" in str(done.path):
+        return f"the first {done.pictures} pictures are written"
+    return f"'{done.path}' holds the first {done.pictures} pictures, {done.seconds:.4g} s, and plays"
+
+
+@contextmanager
+def _interruptions() -> Iterator[Callable[[], bool]]:
+    """Whether Ctrl-C was pressed since: the picture under way is finished first. A second one does not wait."""
+    pressed: list[int] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda: False  # only the main thread may listen to signals
+        return
+    before = signal.getsignal(signal.SIGINT)
+
+    def note(number: int, frame: FrameType | None) -> None:
+        pressed.append(number)
+        signal.signal(signal.SIGINT, before)
+
+    if before is not signal.SIG_IGN and before is not None:
+        signal.signal(signal.SIGINT, note)
+    try:
+        yield lambda: bool(pressed)
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,0 +1,256 @@
+"""Where pictures go, by the suffix of a file: one class each. PyAV carries the encoders, Pillow writes single pictures."""
+
+from __future__ import annotations
+
+import importlib.util
+import struct
+from abc import ABC, abstractmethod
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.errors import InputError
+from pyverlet.record._disk import Disk
+
+Pixels = NDArray[np.uint8]
+"""(height, width, 4) bytes R, G, B and one that is ignored."""
+
+
+class Film(ABC):
+    """Takes pictures one after the other. `error` says why no more are kept, if so; `kept` how many are."""
+
+    needs: ClassVar[str] = "av"
+    default_fps: ClassVar[int] = 60
+    error: OSError | None = None
+    kept: int = 0
+
+    @classmethod
+    def check(cls, size: tuple[int, int], fps: int) -> None:
+        """Raise InputError where this kind of file cannot hold such pictures."""
+
+    @abstractmethod
+    def add(self, pixels: Pixels) -> None:
+        """The next picture."""
+
+    def close(self) -> None:
+        """Finish the file."""
+
+
+class _Stream(Film):
+    """A file that PyAV writes. `movie` names its container, `codec` the encoder with its options."""
+
+    movie: ClassVar[str]
+    codec: ClassVar[str]
+    pixel_format: ClassVar[str]
+    options: ClassVar[dict[str, str]] = {}
+    mend: ClassVar[bytes] = b""
+
+    def __init__(self, path: Path, size: tuple[int, int], fps: int) -> None:
+        import av
+
+        self._av: Any = av
+        self._disk = Disk(path)
+        container: Any = av.open(
+            self._disk, "w", format=self.movie, options={"flush_packets": "1", "fflags": "+bitexact", **self._muxing(fps)}
+        )
+        self._container = container
+        self._stream = container.add_stream(self.codec, rate=fps, options=self.options)
+        self._stream.width, self._stream.height = size
+        self._stream.pix_fmt = self.pixel_format
+        self._stream.codec_context.time_base = Fraction(1, fps)
+        self._set_up(fps)
+        self._pictures = self._muxed = self._end = 0
+
+    def _muxing(self, fps: int) -> dict[str, str]:
+        return {}
+
+    def _set_up(self, fps: int) -> None:
+        """What else the encoder is told before the first picture."""
+
+    @abstractmethod
+    def _frame(self, pixels: Pixels) -> Any:
+        """The picture as PyAV's."""
+
+    def add(self, pixels: Pixels) -> None:
+        frame = self._frame(pixels)
+        frame.pts, frame.time_base = self._pictures, self._stream.codec_context.time_base
+        self._pictures += 1
+        self._write(self._stream.encode(frame))
+
+    def _write(self, packets: list[Any]) -> None:
+        for packet in packets:
+            self._container.mux(packet)
+            self._note(self._muxed)
+            self._muxed += 1
+
+    def _note(self, pictures: int) -> None:
+        """If the file has grown, `pictures` are in it now: containers hold back the last, MP4 all of the fragment under way."""
+        self.error = self._disk.error
+        if self.error is None and self._disk.end > self._end:
+            self._end = self._disk.end
+            self._disk.whole()
+            self.kept = pictures
+
+    def close(self) -> None:
+        self._write(self._stream.encode())
+        self._container.close()
+        self._note(self._muxed)
+        self._disk.close(mend=self.mend)
+
+
+class Mp4(_Stream):
+    """H.264. Written in fragments of a second, so that what is on disk plays at any moment; an ordinary file in the end."""
+
+    movie = "mp4"
+    codec = "libx264"
+    pixel_format = "yuv420p"
+    # No B-frames: pictures then are stored in their order, and the first is at time 0 in every player.
+    options: ClassVar[dict[str, str]] = {"crf": "20", "preset": "veryfast", "bf": "0", "threads": "2"}
+
+    @classmethod
+    def check(cls, size: tuple[int, int], fps: int) -> None:
+        width, height = size
+        if width % 2 or height % 2 or min(size) < 16:
+            even = f"{max(16, width + width % 2)}x{max(16, height + height % 2)}"
+            raise InputError(f"size is {width}x{height}; allowed for .mp4 are even numbers of at least 16, such as {even}")
+
+    def _muxing(self, fps: int) -> dict[str, str]:
+        return {"movflags": "hybrid_fragmented+frag_keyframe"}
+
+    def _set_up(self, fps: int) -> None:
+        context = self._stream.codec_context
+        context.gop_size = fps
+        # ITU-R BT.709, said in the file as well: else players guess by the size of the picture, and colours shift.
+        context.color_primaries = context.color_trc = context.colorspace = 1
+        context.color_range = 1
+
+    def _frame(self, pixels: Pixels) -> Any:
+        frame = self._av.VideoFrame.from_ndarray(pixels, format="rgba")
+        return frame.reformat(format=self.pixel_format, dst_colorspace="ITU709", dst_color_range="MPEG")
+
+
+class Gif(_Stream):
+    """At most 256 colours a picture, times in hundredths of a second; starts over for ever."""
+
+    needs = "PIL"
+    default_fps = 25
+    movie = "gif"
+    codec = "gif"
+    pixel_format = "pal8"
+    mend = b";"
+
+    @classmethod
+    def check(cls, size: tuple[int, int], fps: int) -> None:
+        if fps > 50:
+            raise InputError(f"fps is {fps}; allowed for .gif is at most 50, since browsers slow down what is faster")
+
+    def _frame(self, pixels: Pixels) -> Any:
+        from PIL import Image
+
+        picture = Image.fromarray(np.ascontiguousarray(pixels[..., :3])).quantize(256, dither=Image.Dither.NONE)
+        palette = np.zeros((256, 4), dtype=np.uint8)
+        rgb = np.array(picture.getpalette(), dtype=np.uint8).reshape(-1, 3)
+        palette[:, 0], palette[: len(rgb), 1:] = 255, rgb
+        return self._av.VideoFrame.from_ndarray((np.asarray(picture), palette), format="pal8")
+
+
+class WebP(_Stream):
+    """Times in thousandths of a second; starts over for ever."""
+
+    movie = "webp"
+    codec = "libwebp"
+    pixel_format = "bgra"
+    options: ClassVar[dict[str, str]] = {"quality": "80", "compression_level": "2"}
+
+    def _muxing(self, fps: int) -> dict[str, str]:
+        return {"loop": "0"}
+
+    def _frame(self, pixels: Pixels) -> Any:
+        opaque = pixels.copy()
+        opaque[..., 3] = 255
+        return self._av.VideoFrame.from_ndarray(opaque, format="rgba").reformat(format=self.pixel_format)
+
+    def close(self) -> None:
+        super().close()
+        if self.error is not None:  # the length of the file is said in its head
+            with self._disk.path.open("r+b") as file:
+                length = file.seek(0, 2)
+                file.seek(4)
+                file.write(struct.pack("<I", max(length - 8, 0)))
+
+
+class Frames(Film):
+    """Single pictures. The path may be a template such as frame-{:04d}.png: a file a picture."""
+
+    needs = "PIL"
+
+    def __init__(self, path: Path, size: tuple[int, int], fps: int) -> None:
+        self._template = str(path)
+        first = self._named(0)
+        try:
+            first.open("ab").close()  # tell now, not after a long run, if it cannot be written
+        except OSError as error:
+            raise InputError(f"path is '{first}', which cannot be written: {error.strerror or error}") from None
+
+    def add(self, pixels: Pixels) -> None:
+        try:
+            write_picture(self._named(self.kept), pixels)
+        except OSError as error:
+            self.error = error
+        else:
+            self.kept += 1
+
+    def _named(self, number: int) -> Path:
+        return Path(self._template.format(number) if "{" in self._template else self._template)
+
+
+FILMS: dict[str, type[_Stream]] = {".mp4": Mp4, ".gif": Gif, ".webp": WebP}
+"""Films by suffix. A new kind of file is a class and an entry here."""
+
+PICTURE = ".png"
+"""Suffix of single pictures."""
+
+
+def film_for(path: Path) -> type[_Stream | Frames]:
+    """The kind of film a path asks for.
+
+    Raises:
+        InputError: the suffix is unknown, a template has no number in it, or a library is missing.
+    """
+    suffix = path.suffix.lower()
+    if suffix in FILMS:
+        check_extra("av", FILMS[suffix].needs)
+        return FILMS[suffix]
+    if suffix != PICTURE:
+        known = ", ".join((*FILMS, PICTURE))
+        raise InputError(f"path is '{path}'; allowed is a name that ends in {known}")
+    if "{" in str(path):
+        try:
+            numbered = str(path).format(0) != str(path).format(1)
+        except (IndexError, KeyError, ValueError):
+            numbered = False
+        if not numbered:
+            raise InputError(f"path is '{path}'; allowed for numbered pictures is one number, such as frame-{{:04d}}.png")
+    check_extra("PIL")
+    return Frames
+
+
+def check_extra(*modules: str) -> None:
+    """Raise InputError with the command that installs what is missing."""
+    for module in modules:
+        if importlib.util.find_spec(module) is None:
+            raise InputError(f"recording needs {module!r}, which is not installed: pip install 'pyverlet[record]'")
+
+
+def write_picture(path: Path, pixels: Pixels) -> None:
+    """Write a PNG; nothing is left of one that does not fit on the disk."""
+    from PIL import Image
+
+    try:
+        Image.fromarray(np.ascontiguousarray(pixels[..., :3])).save(path, format="PNG")
+    except OSError:
+        path.unlink(missing_ok=True)
+        raise

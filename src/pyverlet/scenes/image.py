@@ -1,0 +1,146 @@
+"""Circles pour into a box and settle into a picture.
+
+Nothing steers them. A first run, unseen, finds out where each circle ends, and it is given the colour the picture has there. The
+second run, the one on show, starts alike and so ends alike, to the last bit.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.bounds import Box
+from pyverlet.forces import Drag
+from pyverlet.scenes import _picture, _start
+from pyverlet.scenes._scene import Floats, Scene, Settings, Show
+from pyverlet.world import World
+
+RADIUS = 0.5
+"""Root mean square radius of the circles, m."""
+
+PACKING = 0.84
+"""Part of a heap's area that circles cover, for the size of the box: that of discs packed at random."""
+
+JET = 0.25
+"""Width of the jet that pours in, in widths of the box."""
+
+SWAYS = 5.0
+"""How often the jet sways from one side to the other and back."""
+
+PITCH = 1.15
+"""Distance of neighbours in the jet, in largest diameters."""
+
+SHAKE = 0.12
+"""Largest shift of a circle in the jet along each axis, in largest radii: less than half the gap between neighbours."""
+
+FALLING = 45.0
+"""Speed at which the air lets a circle of 1 kg fall in the end, m/s: the jet stays a jet however long it is."""
+
+SETTLING_S = 6.0
+"""Time from the last circle's arrival until the heap is at rest, s."""
+
+HEAPED = 0.995
+"""Part of the circles whose height the picture spans: a few may lie on top."""
+
+MARGIN = 0.02
+"""Around the picture on show, of its longer side."""
+
+
+def build(settings: Settings) -> World:
+    """10,000 circles pour into a box and, with the colours from a first run, form a picture (--picture).
+
+    The box is as wide as the picture's shape asks for if the circles fill it to its height; above it stands the jet they
+    start in, which sways from side to side. Air holds them to 45 m/s. Without a picture there is one of a boat at sunset.
+    """
+    rng = np.random.default_rng(settings.seed)
+    radii = _start.draw_radii(rng, settings.particles, settings.radius_spread, RADIUS)
+    width, height = _shape(settings, radii)
+    centres = _jet(rng, radii, width, height)
+    world = settings.empty_world(
+        Box(
+            (-width / 2, 0), (width / 2, float((centres[:, 1] + radii).max()) + RADIUS),
+            restitution=settings.restitution, friction=settings.friction,
+        )
+    )  # fmt: skip
+    world.forces.append(Drag(linear=float(np.hypot(*settings.gravity)) / FALLING))
+    world.add(position=centres, velocity=0.0, radius=radii, mass=(radii / RADIUS) ** 2)
+    return world
+
+
+def colours(settings: Settings, dt: float, progress: Callable[[int, int], None] | None = None) -> NDArray[np.uint8]:
+    """(n, 3) bytes R, G, B: what the picture shows where each circle ends, found out by running the scene once.
+
+    Args:
+        settings: of the run to be shown.
+        dt: of its frames, s: other frames would end elsewhere.
+        progress: called as progress(done, total) after every frame.
+    """
+    pixels = _pixels(settings)
+    world = build(settings)
+    frames = max(1, round(lasts(settings) / dt))
+    for frame in range(frames):
+        world.step(dt)
+        if progress:
+            progress(frame + 1, frames)
+    x, y = world.position.astype(np.float64).T
+    width, _ = _shape(settings, world.radius)
+    top = float(np.quantile(y + world.radius, HEAPED))
+    rows, columns = pixels.shape[:2]
+    column = np.clip((x / width + 0.5) * columns, 0, columns - 1).astype(int)
+    row = np.clip((1 - y / top) * rows, 0, rows - 1).astype(int)
+    return np.asarray(pixels[row, column])
+
+
+def lasts(settings: Settings) -> float:
+    """Seconds until the picture is there."""
+    world = build(settings)
+    extent = world.boundary.extent()
+    assert extent is not None
+    return extent[3] / FALLING + FALLING / max(float(np.hypot(*settings.gravity)), 1.0) + SETTLING_S
+
+
+def view(settings: Settings) -> tuple[float, float, float, float]:
+    """x0, y0, x1, y1 in metres: the picture, not the jet above it."""
+    rng = np.random.default_rng(settings.seed)
+    width, height = _shape(settings, _start.draw_radii(rng, settings.particles, settings.radius_spread, RADIUS))
+    margin = MARGIN * max(width, height)
+    return (-width / 2 - margin, -margin, width / 2 + margin, height + margin)
+
+
+def _shape(settings: Settings, radii: Floats) -> tuple[float, float]:
+    """Width and height of the heap, m: of the picture's shape, with the circles' area."""
+    rows, columns = _pixels(settings).shape[:2]
+    area = np.pi * float((radii.astype(np.float64) ** 2).sum()) / PACKING
+    width = max(float(np.sqrt(area * columns / rows)), 4.0 * float(radii.max()))
+    return width, area / width
+
+
+def _jet(rng: np.random.Generator, radii: Floats, width: float, height: float) -> Floats:
+    """Centres (n, 2) in metres, row upon row from the foot of the box, each row shifted a little against the one below."""
+    largest = float(radii.max())
+    pitch = 2 * largest * PITCH
+    abreast = max(1, int(JET * width / pitch))
+    row, place = np.divmod(np.arange(len(radii)), abreast)
+    sway = max(0.5 * (width - (abreast - 1) * pitch) - (1 + SHAKE) * largest, 0.0)
+    rows = row[-1] + 1
+    x = (place - 0.5 * (abreast - 1)) * pitch + sway * np.sin(2 * np.pi * SWAYS * row / rows)
+    centres = np.column_stack((x, (1 + SHAKE) * largest + row * pitch))
+    return np.asarray(centres + rng.uniform(-SHAKE * largest, SHAKE * largest, centres.shape))
+
+
+def _pixels(settings: Settings) -> NDArray[np.uint8]:
+    return _boat() if settings.picture is None else _picture.read(settings.picture)
+
+
+_boat = functools.cache(_picture.boat)
+
+SCENE = Scene(
+    "image",
+    "10,000 circles pour in and settle into a picture (--picture photo.png)",
+    build,
+    Settings(particles=10_000, restitution=0.5, radius_spread=1.5),
+    show=Show(colours=colours, view=view, seconds=lasts),
+)

@@ -1,0 +1,64 @@
+"""A world to pixels, everything chosen: what part of the plane, which colours, dark or light. For recordings and windows."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.errors import InputError
+from pyverlet.picture import DARK, ByOrigin, Colouring, Raster, Theme, View
+from pyverlet.viewers.frames import Camera, Rect, outline
+
+if TYPE_CHECKING:
+    from pyverlet.world import World
+
+
+class Painter:
+    """Paints one world, as it is now, whenever asked.
+
+    Args:
+        world: only read.
+        size: (width, height) of the picture, pixels.
+        colour: what the colours say; by default where each circle started.
+        theme: `picture.DARK` or `picture.LIGHT`.
+        part: of the plane to show, (x0, y0, x1, y1) in metres; by default the bounds, or where the particles are.
+
+    Attributes:
+        view: the part of the plane on the last picture; before the first, that of the world as it is.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        *,
+        size: tuple[int, int] = (1280, 720),
+        colour: Colouring | None = None,
+        theme: Theme = DARK,
+        part: Rect | None = None,
+    ) -> None:
+        if colour is not None and not isinstance(colour, Colouring):
+            raise InputError(f"colour is {colour!r}; allowed is an object such as pyverlet.picture.BySpeed()")
+        if not isinstance(theme, Theme):
+            raise InputError(f"theme is {theme!r}; allowed are pyverlet.picture.DARK and LIGHT")
+        self._world = world
+        self._raster = Raster(size, theme=theme)
+        self._colour = ByOrigin() if colour is None else colour
+        self._camera = Camera(world)
+        self._part = part
+        self._boundary: Any = None
+        self.view = self._look()
+
+    def paint(self) -> NDArray[np.uint8]:
+        """(height, width, 4) bytes R, G, B, A: a view on a buffer, good until the next call. A is no transparency; see Raster."""
+        if self._boundary is not self._world.boundary:
+            self._boundary = self._world.boundary
+            self._outlines = outline(self._boundary)
+        self.view = self._look()
+        colours = self._colour.colours(self._world, self._raster.theme)
+        return self._raster.draw(self._world, self.view, outlines=self._outlines, colours=colours)
+
+    def _look(self) -> View:
+        part = self._camera.view(self._world.position) if self._part is None else self._part
+        return View.fit(part, self._raster.size)
