@@ -9,7 +9,7 @@ import numpy as np
 
 from pyverlet import checks
 from pyverlet.broadphase import BruteForce, Fast
-from pyverlet.constants import LARGEST_PUSH, REST_ACCELERATIONS
+from pyverlet.constants import GROWTH, LARGEST_PUSH, REST_ACCELERATIONS, SMALLEST
 from pyverlet.errors import InputError
 from pyverlet.kernels import contacts
 from pyverlet.state import Slots, State
@@ -51,8 +51,25 @@ class ContactSolver:
         self.settings = settings
         self.broad_phase = settings.method.start(dtype)
 
-    def before(self, state: Slots) -> None:
-        """Note where the substep starts: friction at rest measures from there."""
+    def fit(self, state: Slots) -> None:
+        """Let particles that were added on top of others start smaller."""
+        fresh = np.isnan(state.acceleration[:, 0])
+        if fresh.any():
+            self.find(state)
+            fresh = np.isnan(state.acceleration[:, 0])  # in the order of the list
+            pairs = self.broad_phase.list
+            which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
+            contacts.fit(state.position, state.radius, *which, fresh, state.real(SMALLEST), state.grown)
+            state.resize()
+
+    def before(self, state: Slots, h: float) -> None:
+        """Let those that are not full-grown grow; note where the substep starts, for friction at rest measures from there."""
+        if state.size is not state.radius:
+            real = state.real
+            # In proportion at first: a crowd in one point would otherwise double its size in every substep.
+            growth = np.minimum(real(GROWTH), real(10 * GROWTH) * state.grown)
+            np.minimum(state.grown + growth * real(h), 1, out=state.grown)
+            state.resize()
         if self.settings.friction > 0.0:
             state.start[:] = state.position
 
@@ -63,7 +80,7 @@ class ContactSolver:
     def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
         """Move overlapping circles apart, let impacts bounce, and note who touches."""
         pairs, real = self.broad_phase.list, state.real
-        moving, bodies = (state.position, state.velocity), (state.radius, state.inverse_mass)
+        moving, bodies = (state.position, state.velocity), (state.size, state.inverse_mass)
         which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
         e = self.settings.restitution
         push = (real(1 / h), real(LARGEST_PUSH))

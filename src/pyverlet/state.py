@@ -18,7 +18,7 @@ from pyverlet.kernels import motion
 Array = NDArray[Any]
 
 _ROWS = ("position", "velocity", "acceleration")
-_COLUMNS = ("spin", "radius", "mass")
+_COLUMNS = ("spin", "radius", "mass", "grown")
 
 
 class State:
@@ -31,6 +31,7 @@ class State:
         spin: (n,) angular velocity, rad/s, counter-clockwise.
         radius: (n,) m.
         mass: (n,) kg; infinity pins the particle.
+        grown: (n,) part of the radius that other circles feel; less than 1 for those that were added on top of another.
     """
 
     position: Array
@@ -39,6 +40,7 @@ class State:
     spin: Array
     radius: Array
     mass: Array
+    grown: Array
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self.dtype = dtype
@@ -80,7 +82,8 @@ class Slots:
 
     Attributes:
         particle: (n,) the user's index of the particle in each slot.
-        position, velocity, acceleration, spin, radius, mass: as in State.
+        position, velocity, acceleration, spin, radius, mass, grown: as in State.
+        size: (n,) grown * radius, m: what contacts between particles take as the radius.
         inverse_mass: (n,) 1/kg; 0 for a pinned particle.
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
         start: (n, 2) positions before the integration of this substep, m. Kept only if circles rub.
@@ -103,6 +106,7 @@ class Slots:
         for name in (*_COLUMNS, "inverse_mass"):
             setattr(self, name, np.zeros(count, self.dtype))
         self.start = np.zeros((count, 2), self.dtype)
+        self.size = self.radius
         self.resting = np.zeros(count, np.uint8)
         self.fed = np.zeros(count, np.uint8)
         self._scratch: list[Array] = []
@@ -116,6 +120,7 @@ class Slots:
     spin: Array
     radius: Array
     mass: Array
+    grown: Array
     inverse_mass: Array
 
     def gather(self, state: State) -> bool:
@@ -126,18 +131,25 @@ class Slots:
         for name in _ROWS:
             motion.take_rows(getattr(self, name), getattr(state, name), self.particle)
         motion.take_checking(self.spin, state.spin, self.particle)
+        motion.take_checking(self.grown, state.grown, self.particle)
         changed = motion.take_checking(self.radius, state.radius, self.particle)
         if motion.take_checking(self.mass, state.mass, self.particle):
             with np.errstate(divide="ignore"):  # a mass of 0 is refused by the world, with a sentence
                 np.divide(1, self.mass, out=self.inverse_mass)
             changed = True
+        self.resize()
         return bool(resized or changed)
+
+    def resize(self) -> None:
+        """Bring `size` up to date with `grown`."""
+        self.size = self.radius if (self.grown >= 1).all() else self.radius * self.grown
 
     def scatter(self, state: State) -> None:
         """Copy what a frame changes back to the user's arrays."""
         for name in _ROWS:
             motion.put_rows(getattr(state, name), getattr(self, name), self.particle)
         motion.put(state.spin, self.spin, self.particle)
+        motion.put(state.grown, self.grown, self.particle)
 
     def reorder(self, order: Array) -> None:
         """Put the particle of slot order[k] into slot k."""
@@ -147,8 +159,9 @@ class Slots:
             motion.take_rows(new, old, order)
             setattr(self, name, new)
             self._scratch[0] = old
-        for name in ("spin", "radius", "mass", "inverse_mass", "particle", "resting", "fed", "start"):
+        for name in ("spin", "radius", "mass", "inverse_mass", "particle", "resting", "fed", "start", "grown"):
             setattr(self, name, getattr(self, name)[order])
+        self.resize()
         self._slot_of = None
 
     def save(self) -> tuple[Array, Array]:

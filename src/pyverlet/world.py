@@ -114,7 +114,7 @@ class World(Doors):
         integrator.begin(state, forces, self.time, h, self._h_last)
         for substep in range(self.substeps):
             if contacts:
-                contacts.before(state)
+                contacts.before(state, h)
             integrator.step(state, forces, self.time + substep * h, h)
             strongest = self._strongest_acceleration()
             done("integrate")
@@ -151,6 +151,8 @@ class World(Doors):
             raise
         if self._contacts:
             self._contacts.broad_phase.forget()
+            if len(self) > 1:
+                self._contacts.fit(self._slots)
 
     def _strongest_acceleration(self) -> float:
         if not self.forces:
@@ -212,6 +214,7 @@ class World(Doors):
             "spin": checks.column("spin", spin, dtype, count),
             "radius": checks.column("radius", radius, dtype, count),
             "mass": checks.column("mass", mass, dtype, count),
+            "grown": np.ones(count, dtype),
         }
         checks.rows("spin", np.column_stack((values["spin"], values["spin"])), dtype, count)
         checks.positive("radius", values["radius"])

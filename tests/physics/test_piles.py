@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
+from pyverlet.constants import FED, GROWTH
 
 G = 9.81
 RADIUS = 0.5
@@ -84,6 +85,59 @@ def test_coincident_circles_separate_and_stay_inside() -> None:
     assert np.isfinite(balls.position).all()
     assert world.escaped() == 0
     assert world.overlap().max < 0.01
+
+
+@pytest.mark.parametrize("substeps", [1, 8, 16])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_circles_added_on_top_of_each_other_part_slowly(substeps: int, dtype: type) -> None:
+    # They just touch at first and grow by at most GROWTH of their radius a second, so two part no faster than at 2 GROWTH r.
+    # What growth h puts into a substep is fed FED times, and taken out again by the velocity pass.
+    world = pv.World(gravity=(0, 0), substeps=substeps, dtype=dtype)
+    balls = world.add(position=[(0.0, 0.0), (0.3, 0.0)], radius=RADIUS)
+    fastest = 0.0
+    while world.time < 1.2 / GROWTH:
+        world.step(1 / 60)
+        fastest = max(fastest, float(np.hypot(*balls.velocity.T).max()))
+    assert 0 < fastest < FED * GROWTH * RADIUS
+    assert balls.position[1, 0] - balls.position[0, 0] == pytest.approx(2 * RADIUS, rel=2e-3)
+    assert world.momentum() == pytest.approx([0, 0], abs=1e-6)
+
+
+def test_a_crowd_in_one_point_does_not_explode() -> None:
+    # Pushed apart at once, 300 of them left with 7e4 J each.
+    world = pv.World(boundary=pv.Circle(radius=20), gravity=(0, 0))
+    world.add(position=np.zeros((300, 2)), radius=RADIUS)
+    kinetic = []
+    while world.time < 12:
+        world.step(1 / 60)
+        kinetic.append(world.energy().kinetic / 300)
+    assert max(kinetic) < 10.0
+    assert world.overlap().max < 0.01
+
+
+def test_a_pile_does_not_notice_a_circle_added_elsewhere() -> None:
+    world, _ = cage(200)
+    world.run(seconds=5)
+    before = world.overlap().mean
+    world.add(position=(0, world.boundary.extent()[3] - 1), radius=RADIUS)  # type: ignore[index]
+    world.step(1 / 60)
+    assert world.overlap().mean == pytest.approx(before, rel=0.2)
+
+
+def test_half_grown_circles_survive_saving() -> None:
+    def crowd() -> pv.World:
+        world = pv.World(boundary=pv.Circle(radius=10))
+        world.add(position=np.random.default_rng(1).uniform(-2, 2, (100, 2)), radius=RADIUS)
+        world.run(seconds=1)
+        return world
+
+    world = crowd()
+    saved = world.save()
+    world.run(seconds=1)
+    there = world.state_hash()
+    world.restore(saved)
+    world.run(seconds=1)
+    assert world.state_hash() == there
 
 
 def test_mixed_radii_and_masses_settle() -> None:

@@ -334,6 +334,20 @@ def mark_touching(first, pair_i, pair_j, touching, impulse, touches, flag):
 
 
 @kernel
+def fit(position, radius, first, count, pair_i, pair_j, fresh, least, grown):
+    """Shrink fresh particles, and those they overlap, until they just touch: grown = distance / (r_i + r_j), but not below least."""
+    for s in range(first.shape[0]):
+        for k in range(first[s], first[s] + count[s]):
+            i, j = pair_i[k], pair_j[k]
+            if fresh[i] | fresh[j]:
+                dx = position[j, 0] - position[i, 0]
+                dy = position[j, 1] - position[i, 1]
+                part = max(np.sqrt(dx * dx + dy * dy) / (radius[i] + radius[j]), least)
+                grown[i] = min(grown[i], part)
+                grown[j] = min(grown[j], part)
+
+
+@kernel
 def overlaps(position, radius, first, count, pair_i, pair_j):
     """(number of touching pairs, sum and maximum of depth / (r_i + r_j))."""
     number, total, largest = 0, 0.0, 0.0
