@@ -335,7 +335,7 @@ def mark_touching(first, pair_i, pair_j, touching, impulse, touches, flag):
 
 @kernel
 def fit(position, radius, first, count, pair_i, pair_j, fresh, least, grown):
-    """Shrink fresh particles, and those they overlap, until they just touch: grown = distance / (r_i + r_j), but not below least."""
+    """Shrink fresh particles, and those they overlap, until they just touch: grown = distance / (r_i + r_j), at least `least`."""
     for s in range(first.shape[0]):
         for k in range(first[s], first[s] + count[s]):
             i, j = pair_i[k], pair_j[k]
