@@ -21,6 +21,7 @@ from pyverlet.integrators import (
     VelocityVerlet,
     Yoshida4,
 )
+from pyverlet.naive import ClampAndFlip, ProjectOnly
 from pyverlet.state import Group
 from pyverlet.warmup import warm_up
 from pyverlet.world import World
@@ -28,11 +29,10 @@ from pyverlet.world import World
 __version__ = "0.1.0"
 
 __all__ = [
-    "RK4", "Boundary", "Box", "BruteForce", "Circle", "Clock", "Collisions", "Energy", "ExplicitEuler", "Fast", "FrameBudget",
-    "Group", "InputError", "Integrator", "NonFiniteError", "Open", "Overlap", "PositionVerlet", "PyverletError",
-    "SemiImplicitEuler", "TimeCorrectedVerlet", "VelocityVerlet", "World", "Yoshida4", "errors", "forces", "integrators",
-    "scenes", "view",
-    "warm_up",
+    "RK4", "Boundary", "Box", "BruteForce", "Circle", "ClampAndFlip", "Clock", "Collisions", "Energy", "ExplicitEuler",
+    "Fast", "FrameBudget", "Group", "InputError", "Integrator", "NonFiniteError", "Open", "Overlap", "PositionVerlet",
+    "ProjectOnly", "PyverletError", "SemiImplicitEuler", "TimeCorrectedVerlet", "VelocityVerlet", "World", "Yoshida4",
+    "errors", "forces", "integrators", "scenes", "view", "warm_up",
 ]  # fmt: skip
 
 

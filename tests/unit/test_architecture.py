@@ -17,7 +17,7 @@ ROOT = Path(pyverlet.__file__).parent
 LAYERS = (
     {"errors", "constants", "_jit", "checks", "progress"},
     {"state", "kernels"},
-    {"integrators", "forces", "bounds", "broadphase", "collisions", "energy"},
+    {"integrators", "forces", "bounds", "naive", "broadphase", "collisions", "energy"},
     {"world", "profile", "clock", "warmup"},
     {"scenes", "report", "lab"},
     {"viewers"},
@@ -29,6 +29,7 @@ BESIDE = {
     "state": {"kernels"},
     "collisions": {"broadphase"},
     "energy": {"forces"},
+    "naive": {"bounds"},
     "world": {"profile"},
     "warmup": {"world"},
     "report": {"scenes"},
