@@ -18,7 +18,7 @@ LAYERS = (
     {"errors", "constants", "_jit", "checks", "progress"},
     {"state", "kernels"},
     {"integrators", "forces", "bounds", "naive", "broadphase", "collisions", "energy"},
-    {"world", "profile", "clock", "warmup"},
+    {"world", "profile", "clock", "warmup", "panels"},
     {"scenes", "report", "lab"},
     {"viewers"},
     {"cli"},
@@ -32,6 +32,7 @@ BESIDE = {
     "naive": {"bounds"},
     "world": {"profile"},
     "warmup": {"world"},
+    "panels": {"world"},
     "report": {"scenes"},
     "lab": {"scenes"},
 }

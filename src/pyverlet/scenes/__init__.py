@@ -5,10 +5,22 @@ from __future__ import annotations
 import difflib
 
 from pyverlet.errors import InputError
-from pyverlet.scenes import box, cage, fall
-from pyverlet.scenes._scene import Scene, Settings
+from pyverlet.scenes import (
+    bounce_euler,
+    bounce_order,
+    bounce_random,
+    bounce_rest,
+    bounce_verlet,
+    box,
+    cage,
+    cage_brute_force,
+    energy,
+    fall,
+    frame_rate,
+)
+from pyverlet.scenes._scene import Scene, Settings, Variant
 
-__all__ = ["SCENES", "Scene", "Settings", "get"]
+__all__ = ["SCENES", "Scene", "Settings", "Variant", "get"]
 
 SCENES: dict[str, Scene] = {
     scene.name: scene
@@ -16,6 +28,15 @@ SCENES: dict[str, Scene] = {
         cage.SCENE,
         box.SCENE,
         fall.SCENE,
+        bounce_euler.SCENE,
+        bounce_order.SCENE,
+        bounce_rest.SCENE,
+        bounce_random.SCENE,
+        frame_rate.SCENE,
+        bounce_verlet.SCENE,
+        energy.ONE_SUBSTEP,
+        energy.TEN_SUBSTEPS,
+        cage_brute_force.SCENE,
     )
 }
 
