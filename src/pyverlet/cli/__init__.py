@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import typer
 
-from pyverlet.cli._app import app
+from pyverlet.cli._lab import app
 from pyverlet.errors import InputError, PyverletError
 
 __all__ = ["app", "main"]

@@ -195,9 +195,9 @@ def _measure(panel: Panel, scene: Scene, frames: int, dt: float, compile_s: floa
 
 
 def _run_and_plot(scene: Scene, settings: Settings, frames: int, dt: float, path: Path) -> Report:
-    from pyverlet.lab import trajectory
+    from pyverlet.lab import figures, trajectory
 
-    trajectory.check_can_plot(path)
+    figures.check_can_plot(path)
     if scene.closed_form is None:
         known = ", ".join(other.name for other in scenes.SCENES.values() if other.closed_form)
         raise InputError(f"plot is for scenes with a closed form to compare with ({known}), got {scene.name!r}")
