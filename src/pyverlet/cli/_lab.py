@@ -114,3 +114,33 @@ def order(
         expected = "none" if each.method.expected is None else str(each.method.expected)
         rows.append((each.method.label, expected, *fitted, "as expected" if each.as_expected else "NOT AS EXPECTED"))
     out.write(out.columns(head, rows))
+
+
+@app.command()
+def truth(
+    codes: Annotated[list[str] | None, typer.Argument(metavar="[J1 J2 ...]", help="Which; all unless said.")] = None,
+    markdown: Annotated[bool, typer.Option("--markdown", help="Write the page docs/truth.md.")] = False,
+    as_json: options.Json = False,
+) -> None:
+    """Try nine claims about Euler and Verlet: claim, experiment, numbers, verdict.
+
+    The exit code is 1 if some number does not bear out a verdict.
+    """
+    from pyverlet.lab import truth as lab
+
+    wanted = [code.upper() for code in codes] if codes else list(lab.EXPERIMENTS)
+    if unknown := [code for code in wanted if code not in lab.EXPERIMENTS]:
+        raise InputError(f"unknown claim {unknown[0]!r}; known: {', '.join(lab.EXPERIMENTS)}")
+    with Progress("claim") as progress:
+        findings = []
+        for done, code in enumerate(wanted):
+            findings.append(lab.EXPERIMENTS[code].run())
+            progress(done + 1, len(wanted))
+    if as_json:
+        out.write_json([finding.as_dict() for finding in findings])
+    elif markdown:
+        out.write(lab.markdown(findings).rstrip("\n"))
+    else:
+        out.write("\n\n".join(map(lab.text, findings)))
+    if not all(finding.holds for finding in findings):
+        raise typer.Exit(1)
