@@ -21,6 +21,8 @@ from pyverlet.integrators import (
     VelocityVerlet,
     Yoshida4,
 )
+from pyverlet.naive import ClampAndFlip, ProjectOnly
+from pyverlet.panels import Panel, Panels
 from pyverlet.state import Group
 from pyverlet.warmup import warm_up
 from pyverlet.world import World
@@ -28,16 +30,15 @@ from pyverlet.world import World
 __version__ = "0.1.0"
 
 __all__ = [
-    "RK4", "Boundary", "Box", "BruteForce", "Circle", "Clock", "Collisions", "Energy", "ExplicitEuler", "Fast", "FrameBudget",
-    "Group", "InputError", "Integrator", "NonFiniteError", "Open", "Overlap", "PositionVerlet", "PyverletError",
-    "SemiImplicitEuler", "TimeCorrectedVerlet", "VelocityVerlet", "World", "Yoshida4", "errors", "forces", "integrators",
-    "scenes", "view",
-    "warm_up",
+    "RK4", "Boundary", "Box", "BruteForce", "Circle", "ClampAndFlip", "Clock", "Collisions", "Energy", "ExplicitEuler",
+    "Fast", "FrameBudget", "Group", "InputError", "Integrator", "NonFiniteError", "Open", "Overlap", "Panel", "Panels",
+    "PositionVerlet", "ProjectOnly", "PyverletError", "SemiImplicitEuler", "TimeCorrectedVerlet", "VelocityVerlet", "World",
+    "Yoshida4", "errors", "forces", "integrators", "scenes", "view", "warm_up",
 ]  # fmt: skip
 
 
-def view(world: World, **options: Any) -> None:
-    """Show a world on its live page; see `pyverlet.viewers.view` for the options. Returns when the page is ended with Ctrl-C."""
+def view(world: World | Panels, **options: Any) -> None:
+    """Show a world, or several side by side, on a live page until Ctrl-C; see `pyverlet.viewers.view` for the options."""
     from pyverlet.viewers import view as view_page
 
     view_page(world, **options)

@@ -62,6 +62,11 @@ class Integrator(ABC):
         """The name on the command line: PositionVerlet is position-verlet."""
         return re.sub(r"(?<=[a-z])(?=[A-Z])", "-", cls.__name__).lower()
 
+    @property
+    def label(self) -> str:
+        """The name, and what sets this object apart from others of its class."""
+        return self.name()
+
 
 def _drift(state: Slots, h: float) -> None:
     advance(state.position, state.position, state.velocity, h)
@@ -121,6 +126,10 @@ class _Stormer(Integrator):
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({'naive_start=True' if self.naive_start else ''})"
+
+    @property
+    def label(self) -> str:
+        return self.name() + (", naive start" if self.naive_start else "")
 
     def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
         if motion.any_nan(state.acceleration):

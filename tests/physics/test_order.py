@@ -2,87 +2,94 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.special import ellipj
 
 import pyverlet as pv
+from pyverlet.lab import order
+from pyverlet.lab.problems import ECCENTRICITY, PROBLEMS, Problem, jacobi, orbit
 
-GRAVITY = -9.81
-
-Closed = Callable[[float], tuple[float, float]]
-Steps = np.ndarray[Any, np.dtype[np.float64]]
-
-
-def oscillator(t: float) -> tuple[float, float]:
-    # m = 1 kg, k = w^2 with w = 3 rad/s, x(0) = 1, v(0) = 0.5: x = cos(w t) + (0.5 / w) sin(w t)
-    w = 3.0
-    return np.cos(w * t) + 0.5 / w * np.sin(w * t), -w * np.sin(w * t) + 0.5 * np.cos(w * t)
+EVERY_PROBLEM = pytest.mark.parametrize("problem", PROBLEMS.values(), ids=PROBLEMS)
 
 
-def fall_with_drag(t: float) -> tuple[float, float]:
-    # v' = g - c v with c = 1.5 /s, v(0) = 4, y(0) = 0: v = v_t + (v0 - v_t) exp(-c t), v_t = g / c
-    c, v0 = 1.5, 4.0
-    terminal = GRAVITY / c
-    return terminal * t + (v0 - terminal) * (1 - np.exp(-c * t)) / c, terminal + (v0 - terminal) * np.exp(-c * t)
+@EVERY_PROBLEM
+def test_the_solutions_on_paper_solve_the_equations(problem: Problem) -> None:
+    # Against a library's adaptive integration of the very force the world applies.
+    world = problem.world(pv.VelocityVerlet())
+
+    def slope(t: float, y: np.ndarray) -> np.ndarray:
+        world.position[0], world.velocity[0] = y[:2], y[2:]
+        state = world._slots
+        world._gather()
+        world._force_sum(state, t)
+        return np.concatenate((y[2:], state.acceleration[0]))
+
+    start = np.concatenate(problem.exact(0.0))
+    solution = solve_ivp(slope, (0, 3.0), start, method="DOP853", rtol=1e-12, atol=1e-13, t_eval=[0.4, 1.0, 3.0])
+    for t, y in zip(solution.t, solution.y.T, strict=True):
+        assert np.concatenate(problem.exact(t)) == pytest.approx(y, abs=1e-9)
 
 
-def largest_error(integrator: pv.Integrator, problem: Closed, dts: Steps) -> float:
-    """Largest distance from the closed form, over position and velocity and over the whole second."""
-    world = pv.World(
-        gravity=(0, 0 if problem is oscillator else GRAVITY),
-        integrator=integrator,
-        collisions=None,
-        substeps=1,
-        dtype=np.float64,
-    )
-    y0, v0 = problem(0.0)
-    ball = world.add(position=(0, y0), velocity=(0, v0))
-    world.forces.append(pv.forces.PointSpring(stiffness=9.0) if problem is oscillator else pv.forces.Drag(linear=1.5))
-    worst = 0.0
-    for dt in dts:
-        world.step(dt)
-        y, v = problem(world.time)
-        worst = max(worst, float(np.hypot(ball.position[0, 1] - y, ball.velocity[0, 1] - v)))
-    return worst
+@pytest.mark.parametrize("k", [0.1, 0.5, 0.84, 0.999])
+def test_jacobi_functions(k: float) -> None:
+    for u in (0.0, 0.3, 1.0, 2.7, 11.0):
+        assert jacobi(u, k) == pytest.approx(ellipj(u, k * k)[:3], abs=1e-12)
 
 
-def steps(frames: int, jitter: float = 0.0) -> Steps:
-    """One second in so many frames, each longer or shorter by up to `jitter` of itself."""
-    dts = 1 + jitter * np.random.default_rng(frames).uniform(-1, 1, frames)
-    return np.asarray(dts / dts.sum())
+def test_the_orbit_is_an_ellipse() -> None:
+    # x^2 + y^2 = (1 - e x - e^2)^2 about the focus: r = a (1 - e^2) / (1 + e cos phi).
+    for t in np.linspace(0, 2 * np.pi, 13):
+        (x, y), _ = orbit(t)
+        assert np.hypot(x, y) == pytest.approx(1 - ECCENTRICITY**2 - ECCENTRICITY * x, rel=1e-12)
+    assert np.concatenate(orbit(2 * np.pi)) == pytest.approx(np.concatenate(orbit(0.0)), abs=1e-12)
 
 
-def fitted_order(integrator: pv.Integrator, problem: Closed, jitter: float = 0.0) -> float:
-    frames = np.array([80, 160, 320, 640])
-    errors = [largest_error(integrator, problem, steps(n, jitter)) for n in frames]
-    return float(-np.polyfit(np.log(frames), np.log(errors), 1)[0])
-
-
-@pytest.mark.parametrize("problem", [oscillator, fall_with_drag])
+@EVERY_PROBLEM
 @pytest.mark.parametrize("name", pv.integrators.BY_NAME)
-def test_declared_order_is_measured(name: str, problem: Closed) -> None:
+def test_declared_order_is_measured(name: str, problem: Problem) -> None:
     cls = pv.integrators.BY_NAME[name]
-    assert fitted_order(cls(), problem) == pytest.approx(cls.order, abs=0.1)
+    assert order.measure(cls(), problem).order == pytest.approx(cls.order, abs=order.WITHIN)
 
 
-def test_naive_start_of_verlet_drops_the_order_to_one() -> None:
+@EVERY_PROBLEM
+def test_naive_start_of_verlet_drops_the_order_to_one(problem: Problem) -> None:
     # x_prev = x - v h errs by a h^2 / 2 at once, which travels on as a velocity error a h / 2: global order 1.
-    assert fitted_order(pv.PositionVerlet(naive_start=True), oscillator) == pytest.approx(1.0, abs=0.1)
-    assert fitted_order(pv.PositionVerlet(), oscillator) == pytest.approx(2.0, abs=0.1)
+    assert order.measure(pv.PositionVerlet(naive_start=True), problem).order == pytest.approx(1.0, abs=order.WITHIN)
 
 
-def test_time_correction_keeps_order_two_under_a_jittering_step() -> None:
-    assert fitted_order(pv.TimeCorrectedVerlet(), oscillator, jitter=0.3) == pytest.approx(2.0, abs=0.1)
-    assert fitted_order(pv.TimeCorrectedVerlet(), fall_with_drag, jitter=0.3) == pytest.approx(2.0, abs=0.1)
+@EVERY_PROBLEM
+def test_time_correction_keeps_order_two_under_a_jittering_step(problem: Problem) -> None:
+    found = order.measure(pv.TimeCorrectedVerlet(), problem, jitter=order.JITTER)
+    assert found.order == pytest.approx(2.0, abs=order.WITHIN)
 
 
-def test_plain_verlet_breaks_under_a_jittering_step() -> None:
+@EVERY_PROBLEM
+def test_plain_verlet_breaks_under_a_jittering_step(problem: Problem) -> None:
     # x - x_prev of a long step is walked again in a short one: the error hardly shrinks with the step, its order is below 1/2.
-    assert fitted_order(pv.PositionVerlet(), oscillator, jitter=0.3) < 0.5
-    assert largest_error(pv.PositionVerlet(), oscillator, steps(640, 0.3)) > 0.01
+    found = order.measure(pv.PositionVerlet(), problem, jitter=order.JITTER)
+    assert found.order is not None
+    assert found.order < 0.5
+    assert found.error[-1] > 0.01
+
+
+def test_a_wrong_order_is_told() -> None:
+    class Boaster(pv.SemiImplicitEuler):
+        order = 2
+
+    (found,) = order.table(order.methods([Boaster()]), [PROBLEMS["oscillator"]])
+    assert not found.as_expected
+    assert found.as_dict()["problems"]["oscillator"]["order"] == pytest.approx(1.0, abs=order.WITHIN)
+
+
+def test_errors_at_rounding_are_no_order() -> None:
+    # Ballistic flight is exact for order 2 and more: nothing to fit.
+    def parabola(t: float) -> tuple[np.ndarray, np.ndarray]:
+        return np.array([0, t - 9.81 / 2 * t * t]), np.array([0, 1 - 9.81 * t])
+
+    ballistic = Problem("ballistic", "v' = g", pv.forces.Drag, parabola, gravity=(0.0, -9.81))
+    assert order.measure(pv.RK4(), ballistic, frames=(4, 8)).order is None
 
 
 @pytest.mark.parametrize("name", pv.integrators.BY_NAME)

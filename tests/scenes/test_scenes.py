@@ -11,6 +11,10 @@ from pyverlet import scenes
 from pyverlet.scenes import Scene
 
 EVERY = pytest.mark.parametrize("scene", scenes.SCENES.values(), ids=scenes.SCENES)
+NOTHING_RANDOM = {
+    "fall", "bounce-euler", "bounce-order", "bounce-rest", "frame-rate", "bounce-verlet", "energy-1-substep",
+    "energy-10-substeps",
+}  # fmt: skip
 COUNTS = [*range(1, 40), 57, 100, 199, 200, 333, 1000, 5000]
 
 
@@ -66,7 +70,8 @@ def test_steps_and_keeps_everything_inside(scene: Scene) -> None:
     assert world.escaped() == 0
     assert np.isfinite(world.position).all()
     assert np.isfinite(world.velocity).all()
-    assert world.overlap().max < 0.1
+    if world.collisions is not None:
+        assert world.overlap().max < 0.1
 
 
 @EVERY
@@ -77,8 +82,7 @@ def test_same_seed_same_bits(scene: Scene) -> None:
         return world.state_hash()
 
     assert hash_after(1) == hash_after(1)
-    if scene.closed_form is None:  # a fall has nothing random in it
-        assert hash_after(1) != hash_after(2)
+    assert (hash_after(1) == hash_after(2)) is (scene.name in NOTHING_RANDOM)
 
 
 @pytest.mark.parametrize("name", ["cage", "box"])
@@ -155,5 +159,5 @@ def test_bad_settings_are_refused(scene: Scene, override: dict[str, object], say
 
 
 def test_unknown_scene_suggests_the_nearest() -> None:
-    with pytest.raises(pv.errors.InputError, match=r"'cagee' \(did you mean 'cage'\?\); known: cage, box, fall, image"):
+    with pytest.raises(pv.errors.InputError, match=r"'cagee' \(did you mean 'cage'\?\); known: cage, box, fall,"):
         scenes.get("cagee")

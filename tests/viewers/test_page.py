@@ -35,7 +35,7 @@ import sys
 from pyverlet.scenes import get
 from pyverlet.viewers import serve
 scene = get(sys.argv[1])
-serve(lambda: scene.world(particles=int(sys.argv[2])), scene_name=scene.name, port=0, open_browser=False)
+serve(lambda: scene.panels(particles=int(sys.argv[2])), scene_name=scene.name, port=0, open_browser=False)
 """
 
 
@@ -278,6 +278,27 @@ def test_without_bounds_the_view_follows_the_fall(page: Page, program: Serve) ->
     assert 0 < place["left"] < 1280
     assert 0 < place["top"] < 800
     assert circles_missing(page) == 0
+
+
+def test_worlds_side_by_side_have_names_energies_and_curves(page: Page, program: Serve) -> None:
+    visit(page, program("bounce-order", 1).address)
+    assert page.locator("#panels h2").all_inner_texts() == ["position first", "velocity first"]
+    assert comes_true(page, lambda: number(page, "time") > 6)
+
+    def change(panel: int) -> str:
+        return page.get_by_test_id("panel-energy").nth(panel).inner_text()
+
+    assert "(+" in change(0)
+    assert "(\N{MINUS SIGN}" in change(1)
+    assert page.locator("#energy-chart").is_hidden()
+    pause(page)
+    assert circles_missing(page) == 0
+    left, right = (where(page, k) for k in range(2))
+    assert right["left"] - left["left"] > 100
+    # Something is drawn in each panel's chart besides the background.
+    drawn = """() => [...document.querySelectorAll("#panels canvas")].map((canvas) => canvas.getContext("2d")
+        .getImageData(0, 0, canvas.width, canvas.height).data.filter((_, i) => i % 4 == 3).some(Boolean))"""
+    assert page.evaluate(drawn) == [True, True]
 
 
 def test_the_end_of_the_server_is_told(page: Page, program: Serve) -> None:

@@ -120,6 +120,7 @@ def tab(server: Server) -> Iterator[Tab]:
         ("/page.js", "text/javascript", b"WebSocket"),
         ("/draw.js", "text/javascript", b"UNMASKED_RENDERER_WEBGL"),
         ("/chart.js", "text/javascript", b"class Chart"),
+        ("/panels.js", "text/javascript", b"class Panels"),
         ("/page.css", "text/css", b"prefers-color-scheme"),
     ],
 )

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import typer
 
-from pyverlet.cli import _record  # noqa: F401  (registers its command)
+from pyverlet.cli import _lab, _record  # noqa: F401  (they register their commands)
 from pyverlet.cli._app import app
 from pyverlet.errors import InputError, Interrupted, PyverletError
 

@@ -9,11 +9,13 @@ from typing import Annotated
 
 import typer
 
-from pyverlet import __version__, report, scenes, warm_up
+from pyverlet import __version__, report, scenes, viewers, warm_up
 from pyverlet.cli import _check
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
+from pyverlet.cli._integrators import integrators
 from pyverlet.errors import InputError
+from pyverlet.panels import Panel, Panels
 from pyverlet.progress import Progress
 from pyverlet.report import Report
 from pyverlet.scenes import Scene, Settings
@@ -95,11 +97,9 @@ def run(
     --seconds, --frames, --json and --plot ask for a run that ends, and imply --headless.
     """
     chosen = scenes.get(scene)
-    settings = options.settings(
-        chosen,
+    overrides = options.overrides(
         particles=particles,
         substeps=substeps,
-        integrator_name=integrator,
         restitution=restitution,
         friction=friction,
         radius_spread=radius_spread,
@@ -109,18 +109,27 @@ def run(
         collisions=collisions,
         picture=picture,
     )
+    methods = integrators(integrator)
+    chosen.settings(**overrides)  # refuse what is wrong before anything starts
     if not (headless or as_json or plot or seconds is not None or frames is not None):
-        _show(chosen, settings, dt=dt, port=DEFAULT_PORT if port is None else port, open_browser=not no_open)
+        if chosen.show.colours:
+            out.note(f"the page does not show this picture yet: `pyverlet record {chosen.name} {chosen.name}.mp4` shows them")
+        build = partial(chosen.panels, integrators=methods, **overrides)
+        open_port = DEFAULT_PORT if port is None else port
+        viewers.serve(build, scene_name=chosen.name, port=open_port, open_browser=not no_open, dt=dt)
         return
     if port is not None:
         raise InputError(f"port is {port}; allowed is none, since this run has no live page")
     count = report.frame_count(seconds=seconds, frames=frames, dt=dt, default_seconds=DEFAULT_SECONDS)
     if plot is None:
-        world, compile_s = build(chosen, settings)
-        result = _measure(world, chosen, count, dt, compile_s)
-    else:
-        result = _run_and_plot(chosen, settings, count, dt, plot)
-    _tell(result, as_json)
+        panels = chosen.panels(integrators=methods, **overrides)
+        results = [_measure(panel, chosen, count, dt, compile_kernels(panel.world)) for panel in panels]
+        _tell_all(chosen, panels, results, as_json)
+        return
+    if len(methods) > 1:
+        raise InputError(f"integrators is {integrator!r}; allowed is one for plot (several: pyverlet compare)")
+    settings = chosen.settings(**overrides, integrator=methods[0] if methods else None)
+    _tell(_run_and_plot(chosen, settings, count, dt, plot), as_json)
 
 
 @app.command()
@@ -150,11 +159,9 @@ def bench(
     can be compared.
     """
     chosen = scenes.get(scene)
-    settings = options.settings(
-        chosen,
+    overrides = options.overrides(
         particles=particles,
         substeps=substeps,
-        integrator_name=integrator,
         restitution=restitution,
         friction=friction,
         radius_spread=radius_spread,
@@ -165,45 +172,43 @@ def bench(
     )
     count = report.frame_count(seconds=seconds, frames=frames, dt=dt, default_seconds=DEFAULT_SECONDS)
     warm = report.settle_count(settle, dt)
-    world, compile_s = build(chosen, settings)
+    methods = integrators(integrator)
+    if len(methods) > 1:
+        raise InputError(f"integrators is {integrator!r}; allowed is one")
+    world = chosen.world(**overrides, integrator=methods[0] if methods else None)
+    compile_s = compile_kernels(world)
     with Progress("settling, frame") as progress:
         for done in range(warm):
             world.step(dt)
             progress(done + 1, warm)
     triad = report.triad()
-    result = _measure(world, chosen, count, dt, compile_s)
+    result = _measure(Panel("", world), chosen, count, dt, compile_s)
     ratio = result.ns_per_particle_substep / triad["ns_per_element"]
     _tell(replace(result, extra={"settle_seconds": settle, "triad": triad, "ratio_to_triad": ratio}), as_json)
 
 
-def _show(scene: Scene, settings: Settings, *, dt: float, port: int, open_browser: bool) -> None:
-    from pyverlet.viewers import serve
-
-    if scene.show.colours:
-        out.note(f"the page does not show this picture yet: `pyverlet record {scene.name} {scene.name}.mp4` shows them")
-    serve(partial(scene.build, settings), scene_name=scene.name, port=port, open_browser=open_browser, dt=dt)
-
-
-def build(scene: Scene, settings: Settings) -> tuple[World, float]:
-    """The world, and the seconds its kernels took to compile or load."""
-    world = scene.build(settings)
+def compile_kernels(world: World) -> float:
+    """The seconds its kernels took to compile or load."""
     with Progress("compiling kernels, once") as progress:
-        return world, warm_up(world, progress)
+        return warm_up(world, progress)
 
 
-def _measure(world: World, scene: Scene, frames: int, dt: float, compile_s: float) -> Report:
+def _measure(panel: Panel, scene: Scene, frames: int, dt: float, compile_s: float) -> Report:
     with Progress("frame") as progress:
-        return report.run(world, scene=scene.name, frames=frames, dt=dt, compile_s=compile_s, progress=progress)
+        return report.run(
+            panel.world, scene=scene.name, frames=frames, dt=dt, compile_s=compile_s, progress=progress, step=panel.step
+        )
 
 
 def _run_and_plot(scene: Scene, settings: Settings, frames: int, dt: float, path: Path) -> Report:
-    from pyverlet.lab import trajectory
+    from pyverlet.lab import figures, trajectory
 
-    trajectory.check_can_plot(path)
+    figures.check_can_plot(path)
     if scene.closed_form is None:
         known = ", ".join(other.name for other in scenes.SCENES.values() if other.closed_form)
         raise InputError(f"plot is for scenes with a closed form to compare with ({known}), got {scene.name!r}")
-    world, compile_s = build(scene, settings)
+    world = scene.build(settings)
+    compile_s = compile_kernels(world)
     recorder = trajectory.HeightRecorder()
     recorder(world)
     with Progress("frame") as progress:
@@ -231,3 +236,15 @@ def _tell(result: Report, as_json: bool) -> None:
         out.write_json(values)
     else:
         out.write(out.report(values))
+
+
+def _tell_all(scene: Scene, panels: Panels, results: list[Report], as_json: bool) -> None:
+    """One report, or those of several panels under their names and one hash of all."""
+    if len(results) == 1:
+        _tell(results[0], as_json)
+        return
+    named = [{"panel": panel.name, **result.as_dict()} for panel, result in zip(panels, results, strict=True)]
+    if as_json:
+        out.write_json({"scene": scene.name, "panels": named, "state_hash": panels.state_hash()})
+    else:
+        out.write("\n\n".join(f"{values['panel']}\n\n{out.report(values)}" for values in named))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -13,7 +12,6 @@ from pyverlet import integrators
 from pyverlet.broadphase import BruteForce, Fast
 from pyverlet.errors import InputError
 from pyverlet.picture import DARK, LIGHT, ByMass, ByOrigin, BySpeed, Colouring, Theme
-from pyverlet.scenes import Scene, Settings
 
 DType = Literal["float32", "float64"]
 Method = Literal["fast", "brute", "none"]
@@ -52,7 +50,13 @@ Particles = Annotated[int | None, typer.Option(parser=whole, help="Number of cir
 Substeps = Annotated[int | None, typer.Option(parser=whole, help="Substeps a frame.", metavar="N", show_default=False)]
 IntegratorName = Annotated[
     str | None,
-    typer.Option("--integrator", help=", ".join(integrators.BY_NAME) + ".", metavar="NAME", show_default=False),
+    typer.Option(
+        "--integrator",
+        "--integrators",
+        help=", ".join(integrators.BY_NAME) + ", or your own as module:Class. Several, with commas, run side by side.",
+        metavar="NAME",
+        show_default=False,
+    ),
 ]
 Restitution = Annotated[
     float | None, typer.Option(parser=real, help="Of circles and bounds, 0 to 1.", metavar="E", show_default=False)
@@ -88,26 +92,10 @@ THEMES: dict[ThemeName, Theme] = {"dark": DARK, "light": LIGHT}
 METHODS: dict[Method, Any] = {"fast": Fast(), "brute": BruteForce(), "none": False}
 
 
-def integrator(name: str) -> integrators.Integrator:
-    """The integrator called `name`.
-
-    Raises:
-        InputError: there is none; the message suggests the nearest and names the known ones.
-    """
-    known = integrators.BY_NAME
-    if name in known:
-        return known[name]()
-    near = difflib.get_close_matches(name.lower().replace("_", "-"), known, n=1, cutoff=0.5)
-    suggestion = f" (did you mean {near[0]!r}?)" if near else ""
-    raise InputError(f"unknown integrator {name!r}{suggestion}; known: {', '.join(known)}")
-
-
-def settings(
-    scene: Scene,
+def overrides(
     *,
     particles: int | None,
     substeps: int | None,
-    integrator_name: str | None,
     restitution: float | None,
     friction: float | None,
     radius_spread: float | None,
@@ -116,18 +104,17 @@ def settings(
     dtype: DType | None,
     collisions: Method | None,
     picture: Path | None = None,
-) -> Settings:
-    """The scene's settings with what the user gave in place of its defaults."""
-    return scene.settings(
-        particles=particles,
-        substeps=substeps,
-        integrator=None if integrator_name is None else integrator(integrator_name),
-        restitution=restitution,
-        friction=friction,
-        radius_spread=radius_spread,
-        seed=seed,
-        threads=threads,
-        dtype=None if dtype is None else {"float32": np.float32, "float64": np.float64}[dtype],
-        collisions=None if collisions is None else METHODS[collisions],
-        picture=picture,
-    )
+) -> dict[str, Any]:
+    """What the user gave in place of a scene's defaults, as `Scene.settings` takes it; None where nothing was given."""
+    return {
+        "particles": particles,
+        "substeps": substeps,
+        "restitution": restitution,
+        "friction": friction,
+        "radius_spread": radius_spread,
+        "seed": seed,
+        "threads": threads,
+        "dtype": None if dtype is None else {"float32": np.float32, "float64": np.float64}[dtype],
+        "collisions": None if collisions is None else METHODS[collisions],
+        "picture": picture,
+    }

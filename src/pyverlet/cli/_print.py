@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 
@@ -29,6 +29,18 @@ def table(rows: Iterable[tuple[str, str]]) -> str:
     lines = list(rows)
     width = max(len(name) for name, _ in lines)
     return "\n".join(f"{name:<{width}}  {value}".rstrip() for name, value in lines)
+
+
+def columns(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Rows under headings: text to the left, numbers to the right."""
+    cells = [list(head), *map(list, rows)]
+    widths = [max(len(row[k]) for row in cells) for k in range(len(head))]
+    numeric = [all(not row[k] or row[k][0] in "+-.0123456789" for row in rows) for k in range(len(head))]
+    aligned = (
+        "  ".join(f"{cell:{'>' if number else '<'}{width}}" for cell, width, number in zip(row, widths, numeric, strict=True))
+        for row in cells
+    )
+    return "\n".join(line.rstrip() for line in aligned)
 
 
 def report(values: Mapping[str, Any]) -> str:

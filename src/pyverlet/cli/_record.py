@@ -11,7 +11,9 @@ from pyverlet import record as recording
 from pyverlet import scenes
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
-from pyverlet.cli._app import app, build
+from pyverlet.cli._app import app, compile_kernels
+from pyverlet.cli._integrators import integrators
+from pyverlet.errors import InputError
 from pyverlet.picture import Fixed
 from pyverlet.progress import Progress
 
@@ -55,11 +57,12 @@ def record(
     Needs no screen. The same command gives the same pictures. Ctrl-C keeps what was recorded until then.
     """
     chosen = scenes.get(scene)
-    settings = options.settings(
-        chosen,
+    methods = integrators(integrator)
+    if len(methods) > 1:
+        raise InputError(f"integrator is {integrator!r}; allowed is one")
+    overrides = options.overrides(
         particles=particles,
         substeps=substeps,
-        integrator_name=integrator,
         restitution=restitution,
         friction=friction,
         radius_spread=radius_spread,
@@ -69,11 +72,13 @@ def record(
         collisions=collisions,
         picture=picture,
     )
+    settings = chosen.settings(**overrides, integrator=methods[0] if methods else None)
     show = chosen.show
     if seconds is None:
         seconds = show.seconds(settings) if show.seconds else DEFAULT_SECONDS
     plan = recording.plan(path, seconds=seconds, fps=fps, size=options.pixels(size))
-    world, _ = build(chosen, settings)
+    world = chosen.build(settings)
+    compile_kernels(world)
     given = None if colour is None else options.COLOURS[colour]()
     if given is None and show.colours:
         with Progress("where each circle ends") as progress:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pyverlet.errors import InputError
+from pyverlet.lab import figures
 from pyverlet.scenes import Scene, Settings
 from pyverlet.scenes._scene import Floats
 from pyverlet.world import World
@@ -65,23 +65,6 @@ class HeightRecorder:
         return Heights(time, np.array(self._height), scene.closed_form(settings, time))
 
 
-def check_can_plot(path: Path) -> None:
-    """Refuse before a long run what would fail after it.
-
-    Raises:
-        InputError: matplotlib is missing, the folder does not exist, or the suffix is not one of a picture.
-    """
-    if importlib.util.find_spec("matplotlib") is None:
-        raise InputError("plot needs matplotlib, which is not installed: pip install 'pyverlet[plot]'")
-    if not path.parent.is_dir():
-        raise InputError(f"plot is '{path}'; allowed is a file in a folder that exists")
-    if path.is_dir():
-        raise InputError(f"plot is '{path}', a folder; allowed is the name of a file")
-    known = (".pdf", ".png", ".svg")
-    if path.suffix.lower() not in known:
-        raise InputError(f"plot is '{path}'; allowed is a name that ends in {', '.join(known)}")
-
-
 def figure(heights: Heights, title: str) -> Figure:
     """A figure of two panels: y(t) with the closed form on top, the error below. Needs the extra `plot`."""
     from matplotlib.figure import Figure
@@ -109,19 +92,10 @@ def figure(heights: Heights, title: str) -> Figure:
     bottom.set(xlabel="time t (s)", ylabel="error in y (m)")
     bottom.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3))
     for axes in (top, bottom):
-        axes.grid(alpha=0.3)
-        axes.spines[["top", "right"]].set_visible(False)
+        figures.tidy(axes)
     return picture
 
 
 def plot(heights: Heights, path: Path, title: str) -> None:
-    """Write `figure` to `path`.
-
-    Raises:
-        InputError: as `check_can_plot`, or the file cannot be written.
-    """
-    check_can_plot(path)
-    try:
-        figure(heights, title).savefig(path)
-    except OSError as error:
-        raise InputError(f"plot is '{path}', which cannot be written: {error.strerror or error}") from None
+    """Write `figure` to `path`; raises InputError as `figures.save`."""
+    figures.save(figure(heights, title), path)

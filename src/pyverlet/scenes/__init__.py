@@ -5,10 +5,23 @@ from __future__ import annotations
 import difflib
 
 from pyverlet.errors import InputError
-from pyverlet.scenes import box, cage, fall, image
-from pyverlet.scenes._scene import Scene, Settings
+from pyverlet.scenes import (
+    bounce_euler,
+    bounce_order,
+    bounce_random,
+    bounce_rest,
+    bounce_verlet,
+    box,
+    cage,
+    cage_brute_force,
+    energy,
+    fall,
+    frame_rate,
+    image,
+)
+from pyverlet.scenes._scene import Scene, Settings, Variant
 
-__all__ = ["SCENES", "Scene", "Settings", "get"]
+__all__ = ["SCENES", "Scene", "Settings", "Variant", "get"]
 
 SCENES: dict[str, Scene] = {
     scene.name: scene
@@ -17,6 +30,15 @@ SCENES: dict[str, Scene] = {
         box.SCENE,
         fall.SCENE,
         image.SCENE,
+        bounce_euler.SCENE,
+        bounce_order.SCENE,
+        bounce_rest.SCENE,
+        bounce_random.SCENE,
+        frame_rate.SCENE,
+        bounce_verlet.SCENE,
+        energy.ONE_SUBSTEP,
+        energy.TEN_SUBSTEPS,
+        cage_brute_force.SCENE,
     )
 }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from pyverlet.broadphase import BruteForce, Fast
 from pyverlet.collisions import Collisions
 from pyverlet.errors import InputError
 from pyverlet.integrators import Integrator, PositionVerlet
+from pyverlet.panels import Pace, Panel, Panels, every_frame
 from pyverlet.world import World
 
 Floats = NDArray[np.float64]
@@ -98,6 +99,23 @@ class Show:
 
 
 @dataclass(frozen=True)
+class Variant:
+    """One of the worlds that a scene shows side by side.
+
+    Attributes:
+        name: shown above it.
+        changes: settings in which it differs from the scene's.
+        build: makes its world, where settings alone cannot.
+        pace: how it follows the frames of the screen.
+    """
+
+    name: str
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    build: Callable[[Settings], World] | None = None
+    pace: Pace = every_frame
+
+
+@dataclass(frozen=True)
 class Scene:
     """A world to run by name: demonstration, test, benchmark and recording are all made from it.
 
@@ -109,6 +127,8 @@ class Scene:
         closed_form: of (settings, t (m,) in seconds): the exact height y (m, n) in metres of every circle, for scenes
             that have a solution on paper.
         show: how it asks to be shown.
+        variants: the worlds it shows side by side; empty for one world.
+        line: height in metres of a line drawn across the scene.
     """
 
     name: str
@@ -117,6 +137,8 @@ class Scene:
     defaults: Settings = field(default_factory=Settings)
     closed_form: Callable[[Settings, Floats], Floats] | None = None
     show: Show = Show()
+    variants: tuple[Variant, ...] = ()
+    line: float | None = None
 
     @property
     def description(self) -> str:
@@ -140,5 +162,28 @@ class Scene:
         return dataclasses.replace(self.defaults, **changes)
 
     def world(self, **overrides: Any) -> World:
-        """Build the scene's world at time 0; `overrides` as for `settings`."""
+        """Build the scene's world at time 0, a single one without variants; `overrides` as for `settings`."""
         return self.build(self.settings(**overrides))
+
+    def panels(self, *, integrators: Sequence[Integrator] = (), **overrides: Any) -> Panels:
+        """Build what the scene shows: its variants side by side, or its one world; `overrides` as for `settings`.
+
+        Args:
+            integrators: several of them are shown side by side in place of the variants, one is an override.
+            overrides: one that names what the variants differ in leaves a single world with that setting.
+        """
+        variants = self.variants
+        if len(integrators) > 1:
+            variants = tuple(Variant(integrator.label, {"integrator": integrator}) for integrator in integrators)
+        elif integrators:
+            overrides["integrator"] = integrators[0]
+        given = {name for name, value in overrides.items() if value is not None}
+        if any(given & variant.changes.keys() for variant in variants):
+            variants = ()
+        if not variants:
+            return Panels([Panel(self.name, self.world(**overrides))], line=self.line)
+        panels = []
+        for variant in variants:
+            settings = self.settings(**{**overrides, **variant.changes})
+            panels.append(Panel(variant.name, (variant.build or self.build)(settings), variant.pace))
+        return Panels(panels, line=self.line)

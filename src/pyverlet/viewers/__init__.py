@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from pyverlet.panels import Panels
     from pyverlet.world import World
 
 __all__ = ["serve", "view"]
@@ -14,7 +15,7 @@ DEFAULT_PORT = 8000
 
 
 def view(
-    world: World,
+    world: World | Panels,
     *,
     port: int = DEFAULT_PORT,
     open_browser: bool = True,
@@ -26,7 +27,7 @@ def view(
     The page's reset goes back to the state the world has now. Where there is no screen the address is printed instead.
 
     Args:
-        world: the world to step and show; nobody else may touch it until this returns.
+        world: the world, or the panels, to step and show; nobody else may touch it until this returns.
         port: TCP port on this machine, 1 to 65535; 0 takes any free one.
         open_browser: open a tab when there is a screen to open it on.
         title: heading of the page.
@@ -41,7 +42,7 @@ def view(
 
 
 def serve(
-    build: Callable[[], World],
+    build: Callable[[], World | Panels],
     *,
     scene_name: str,
     host: str = "127.0.0.1",
@@ -54,7 +55,7 @@ def serve(
     The port is taken before the world is built, so that a taken one is told at once.
 
     Args:
-        build: makes the world.
+        build: makes the world or the panels.
         scene_name: heading of the page.
         host: address to listen on; anything but this machine's own lets the whole network in.
         port: TCP port, 1 to 65535; 0 takes any free one.

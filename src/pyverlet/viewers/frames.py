@@ -37,6 +37,20 @@ OUTLINE_POINTS = 240
 
 
 @dataclass(frozen=True)
+class PanelShape:
+    """One of several worlds in a picture."""
+
+    name: str
+    first: int
+    """Its first particle among all on show, and how many it has."""
+    count: int
+    energy: float
+    """Total at the start, J."""
+    strip: Rect
+    """(left, top, width, height) of the strip for its name and curve, as fractions of the view from its upper left corner."""
+
+
+@dataclass(frozen=True)
 class Shape:
     """What stays the same from frame to frame: sent once to each viewer, again when it changes."""
 
@@ -46,6 +60,12 @@ class Shape:
     bounded: bool
     outlines: tuple[tuple[tuple[float, float], ...], ...]
     """Closed lines of the bounds, metres."""
+    lines: tuple[tuple[tuple[float, float], tuple[float, float]], ...]
+    """Ends of dashed lines, metres."""
+    panels: tuple[PanelShape, ...]
+    """Several worlds side by side; empty for a single one."""
+    substeps_differ: bool
+    """The panels differ in their substeps, which then stay as they are."""
     radius: NDArray[np.float32]
     """(n,) metres, read-only."""
 
@@ -63,6 +83,8 @@ class Status:
     physics_p95_ms: float
     kinetic: float
     energy: float
+    energies: tuple[float, ...]
+    """Total energy of each panel, J; `kinetic` and `energy` are their sums."""
     gravity: tuple[float, float]
     substeps: int
     paused: bool
@@ -122,18 +144,23 @@ def _(boundary: Circle) -> tuple[tuple[tuple[float, float], ...], ...]:
 
 
 class Camera:
-    """Chooses the part of the plane on show: the bounds with a margin or, without bounds, where the particles are."""
+    """Chooses the part of the plane on show: the bounds with a margin or, without bounds, where the particles are.
 
-    def __init__(self, world: World) -> None:
-        extent = world.boundary.extent()
+    Of several worlds it shows the same part: all of the largest bounds, or all the particles.
+    """
+
+    def __init__(self, *worlds: World) -> None:
+        extents = [extent for world in worlds if (extent := world.boundary.extent()) is not None]
         self._fixed: Rect | None = None
-        if extent is not None:
-            x0, y0, x1, y1 = (float(value) for value in extent)
+        if extents:
+            lowest, highest = np.min(extents, axis=0), np.max(extents, axis=0)
+            x0, y0, x1, y1 = (float(value) for value in (*lowest[:2], *highest[2:]))
             margin = VIEW_MARGIN * max(x1 - x0, y1 - y0)
             self._fixed = (x0 - margin, y0 - margin, x1 + margin, y1 + margin)
             return
-        _, _, reach = _middle_and_reach(world.position)
-        self._half = ROOM * max(reach, 12.0 * float(np.max(world.radius, initial=0.0))) or 1.0
+        _, _, reach = _middle_and_reach(np.concatenate([world.position for world in worlds]))
+        largest = max(float(np.max(world.radius, initial=0.0)) for world in worlds)
+        self._half = ROOM * max(reach, 12.0 * largest) or 1.0
         self._largest_half = OPEN_GROWTH * self._half
         self._centre = (0.0, 0.0)
 

@@ -9,6 +9,9 @@ import numpy as np
 from pyverlet.forces import Grip, Push
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pyverlet.viewers.layout import Layout
     from pyverlet.world import World
 
 GRIP_FREQUENCY = 4.0
@@ -91,3 +94,44 @@ class Hands:
         self._held[hand] = force
         if force is not None:
             self._world.forces.append(force)
+
+
+class HandsOnPanels:
+    """Hands over a picture of one or more worlds: each works in the panel it first came down on, until it lets go.
+
+    Points are given in the picture's coordinates, metres. Called on the physics thread only.
+    """
+
+    def __init__(self, worlds: Sequence[World]) -> None:
+        self._hands = [Hands(world) for world in worlds]
+        self._panel: dict[int, int] = {}
+
+    def drag(self, hand: int, x: float, y: float, reach: float, layout: Layout) -> None:
+        """As `Hands.drag`."""
+        panel, x, y = self._take(hand, x, y, layout)
+        self._hands[panel].drag(hand, x, y, reach)
+
+    def poke(self, hand: int, x: float, y: float, view_size: float, layout: Layout) -> None:
+        """As `Hands.poke`."""
+        panel, x, y = self._take(hand, x, y, layout)
+        self._hands[panel].poke(hand, x, y, view_size)
+
+    def _take(self, hand: int, x: float, y: float, layout: Layout) -> tuple[int, float, float]:
+        panel = self._panel.setdefault(hand, layout.at(x, y))
+        dx, dy = layout.offset(panel)
+        return panel, x - dx, y - dy
+
+    def release(self, hand: int) -> None:
+        """Let go."""
+        self._hands[self._panel.pop(hand, 0)].release(hand)
+
+    def release_all(self) -> None:
+        """Every hand lets go."""
+        self._panel.clear()
+        for hands in self._hands:
+            hands.release_all()
+
+    def move(self, view_size: float) -> None:
+        """As `Hands.move`, before every frame."""
+        for hands in self._hands:
+            hands.move(view_size)

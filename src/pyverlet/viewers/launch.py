@@ -26,13 +26,14 @@ from pyverlet.viewers.session import Session
 from pyverlet.viewers.web import LOOPBACK_NAMES, make_app
 
 if TYPE_CHECKING:
+    from pyverlet.panels import Panels
     from pyverlet.world import World
 
 GOODBYE_S = 1
 """Whole seconds open tabs get to hang up."""
 
 
-def serve(build: Callable[[], World], *, title: str, host: str, port: int, open_browser: bool, dt: float) -> None:
+def serve(build: Callable[[], World | Panels], *, title: str, host: str, port: int, open_browser: bool, dt: float) -> None:
     """Show the world that `build` makes until Ctrl-C. See `pyverlet.viewers.serve`."""
     _refuse_running_loop()
     with contextlib.suppress(KeyboardInterrupt), _take_port(host, port) as listener:
@@ -172,11 +173,12 @@ def _why_not(error: OSError, host: str, port: int) -> str:
     return f"host is {host!r}, which cannot be listened on ({error.strerror}); allowed is an address of this machine"
 
 
-def _compile(world: World) -> None:
-    from pyverlet import warm_up
+def _compile(world: World | Panels) -> None:
+    from pyverlet import Panels, warm_up
 
     with Progress("compiling kernels, once") as progress:
-        warm_up(world, progress)
+        for each in Panels.of(world).worlds:
+            warm_up(each, progress)
 
 
 def _address(host: str, listener: socket.socket) -> str:

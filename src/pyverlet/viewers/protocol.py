@@ -78,6 +78,9 @@ def encode_shape(shape: Shape) -> bytes:
         "budgetMs": shape.budget_ms,
         "bounded": shape.bounded,
         "outlines": shape.outlines,
+        "lines": shape.lines,
+        "panels": [dataclasses.asdict(panel) for panel in shape.panels],
+        "substepsDiffer": shape.substeps_differ,
         "maxSubsteps": MAX_SUBSTEPS,
         "pokeRadius": POKE_RADIUS,
     }
@@ -101,6 +104,8 @@ def _finite(value: Any) -> Any:
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
         return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(entry) for entry in value]
     return value
 
 

@@ -16,14 +16,17 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pyverlet import checks
 from pyverlet.clock import Clock, FrameBudget
 from pyverlet.constants import FRAME_BUDGET_MS
 from pyverlet.errors import PyverletError
+from pyverlet.panels import Panels
 from pyverlet.viewers.commands import Command, Drag, Pause, Poke, Release, Reset, SetGravity, SetSubsteps, Step
-from pyverlet.viewers.frames import Camera, Frame, Shape, Status, outline
-from pyverlet.viewers.hands import Hands
+from pyverlet.viewers.frames import Camera, Frame, PanelShape, Shape, Status, outline
+from pyverlet.viewers.hands import HandsOnPanels
+from pyverlet.viewers.layout import Layout
 
 if TYPE_CHECKING:
     from pyverlet.world import World
@@ -46,8 +49,10 @@ STOP_TIMEOUT_S = 10.0
 class Session:
     """Runs one world in real time: in the calling thread with `run`, or in one of its own as a context manager.
 
+    Several worlds side by side run as one: every command is for all of them, but a hand works in the one it touches.
+
     Args:
-        world: stepped by this session only, while it runs. Reset goes back to its present state.
+        world: a world or panels, stepped by this session only, while it runs. Reset goes back to the present state.
         title: what the viewer calls it.
         dt: simulated seconds per frame, also the pace: 1/dt frames a second.
         budget_ms: milliseconds of physics a frame may take, for the figures on show.
@@ -56,12 +61,16 @@ class Session:
         InputError: dt or budget_ms is not a positive finite number.
     """
 
-    def __init__(self, world: World, *, title: str = "pyverlet", dt: float = 1 / 60, budget_ms: float = FRAME_BUDGET_MS) -> None:
-        self._world = world
+    def __init__(
+        self, world: World | Panels, *, title: str = "pyverlet", dt: float = 1 / 60, budget_ms: float = FRAME_BUDGET_MS
+    ) -> None:
+        self._panels = Panels.of(world)
+        self._worlds = self._panels.worlds
         self._title = title
         self._dt = checks.number("dt", dt, above=0.0)
         self._budget_ms = checks.number("budget_ms", budget_ms, above=0.0)
-        self._saved = world.save()
+        self._saved = self._panels.save()
+        self._start_energies = [float(each.energy().total) for each in self._worlds]
         self._commands: queue.SimpleQueue[Command | None] = queue.SimpleQueue()
         self._listeners: tuple[Callable[[], None], ...] = ()
         self._listeners_lock = threading.Lock()
@@ -69,7 +78,8 @@ class Session:
         self._stopping = threading.Event()
         self._paused = False
         self._error: str | None = None
-        self._hands = Hands(world)
+        self._hands = HandsOnPanels(self._worlds)
+        self._substeps_differ = len({each.substeps for each in self._worlds}) > 1
         self._seq = 0
         self._fresh_start()
         self._shape = self._make_shape()
@@ -157,11 +167,11 @@ class Session:
         self._hands.move(self._view_size())
         began = time.perf_counter()
         try:
-            self._world.step(self._dt)
+            self._panels.step(self._dt)
         except PyverletError as error:
             self._error = str(error)
         except Exception as error:  # a user's own force may raise anything
-            _log.exception("the world stopped at %.6g s", self._world.time)
+            _log.exception("the world stopped at %.6g s", self._panels.time)
             self._error = f"{type(error).__name__}: {error}"
         else:
             self._budget.record(1000.0 * (time.perf_counter() - began))
@@ -195,17 +205,19 @@ class Session:
                     if self._error is None and not self._stopping.is_set():
                         self._advance()
             case Reset():
-                self._world.restore(self._saved)
+                self._panels.restore(self._saved)
                 self._hands.release_all()
                 self._fresh_start()
             case SetGravity(x, y):
-                self._world.gravity = (x, y)
+                for world in self._worlds:
+                    world.gravity = (x, y)
             case SetSubsteps(value):
-                self._world.substeps = value
+                for world in () if self._substeps_differ else self._worlds:
+                    world.substeps = value
             case Drag(hand, x, y, reach):
-                self._hands.drag(hand, x, y, reach)
+                self._hands.drag(hand, x, y, reach, self._layout)
             case Poke(hand, x, y):
-                self._hands.poke(hand, x, y, self._view_size())
+                self._hands.poke(hand, x, y, self._view_size(), self._layout)
             case Release(hand):
                 self._hands.release(hand)
 
@@ -213,14 +225,23 @@ class Session:
         self._error = None
         self._clock = Clock(dt=self._dt, max_catch_up=MAX_CATCH_UP)
         self._budget = FrameBudget(limit_ms=self._budget_ms)
-        self._camera = Camera(self._world)
+        self._camera = Camera(*self._worlds)
+        self._look()
         self._slow_status_due = 0.0
 
     # -- frames -------------------------------------------------------------------------------------------------------
 
     def _view_size(self) -> float:
-        x0, y0, x1, y1 = self.latest.view
+        x0, y0, x1, y1 = self._layout.room
         return max(x1 - x0, y1 - y0)
+
+    def _look(self) -> list[NDArray[np.float32]]:
+        """Point the camera at where everybody is now; returns each world's positions."""
+        positions = [np.array(world.position, dtype=np.float32) for world in self._worlds]
+        bounded = any(world.boundary.extent() is not None for world in self._worlds)
+        together = positions[0] if len(positions) == 1 else np.concatenate(positions)
+        self._layout = Layout(self._camera.view(together), len(positions), bounded)
+        return positions
 
     def _publish(self) -> None:
         self._seq += 1
@@ -229,31 +250,34 @@ class Session:
             listener()
 
     def _picture(self) -> Frame:
-        world = self._world
-        if len(world) != len(self._shape.radius):
+        positions = self._look()
+        if sum(map(len, positions)) != len(self._shape.radius):
             self._shape = self._make_shape()
-        position = np.array(world.position, dtype=np.float32)
+        placed = [self._layout.place(k, position) for k, position in enumerate(positions)]
+        position = placed[0] if len(placed) == 1 else np.concatenate(placed)
         position.flags.writeable = False
-        return Frame(self._seq, self._shape, self._camera.view(position), self._status(), position)
+        return Frame(self._seq, self._shape, self._layout.view, self._status(), position)
 
     def _status(self) -> Status:
-        world, budget = self._world, self._budget
+        world, budget = self._worlds[0], self._budget
         now = time.perf_counter()
         if now >= self._slow_status_due or self._held():
             self._slow_status_due = now + SLOW_STATUS_S
-            energy = world.energy()
-            self._energies = (float(energy.kinetic), float(energy.total))
+            energies = [each.energy() for each in self._worlds]
+            self._kinetic = sum(float(energy.kinetic) for energy in energies)
+            self._energies = tuple(float(energy.total) for energy in energies)
             self._percentiles = (float(budget.median_ms), float(budget.p95_ms))
         return Status(
-            time=float(world.time),
-            frames=int(world.frames),
-            particles=len(world),
+            time=float(self._panels.time),
+            frames=int(self._panels.frames),
+            particles=sum(map(len, self._worlds)),
             dropped=int(self._clock.dropped),
             physics_ms=float(budget.last_ms),
             physics_median_ms=self._percentiles[0],
             physics_p95_ms=self._percentiles[1],
-            kinetic=self._energies[0],
-            energy=self._energies[1],
+            kinetic=self._kinetic,
+            energy=sum(self._energies),
+            energies=self._energies,
             gravity=(float(world.gravity[0]), float(world.gravity[1])),
             substeps=int(world.substeps),
             paused=self._paused,
@@ -261,14 +285,29 @@ class Session:
         )
 
     def _make_shape(self) -> Shape:
-        radius = np.array(self._world.radius, dtype=np.float32)
+        radius = np.concatenate([world.radius for world in self._worlds], dtype=np.float32)
         radius.flags.writeable = False
-        boundary = self._world.boundary
+        bounded = any(world.boundary.extent() is not None for world in self._worlds)
+        outlines: list[tuple[tuple[float, float], ...]] = []
+        lines: list[tuple[tuple[float, float], tuple[float, float]]] = []
+        panels: list[PanelShape] = []
+        first = 0
+        for k, (panel, world) in enumerate(zip(self._panels, self._worlds, strict=True)):
+            dx, dy = self._layout.offset(k)
+            outlines += [tuple((x + dx, y + dy) for x, y in line) for line in outline(world.boundary)]
+            if self._panels.line is not None and (extent := world.boundary.extent()):
+                lines.append(((extent[0] + dx, self._panels.line + dy), (extent[2] + dx, self._panels.line + dy)))
+            if len(self._panels) > 1:
+                panels.append(PanelShape(panel.name, first, len(world), self._start_energies[k], self._layout.strip(k)))
+            first += len(world)
         return Shape(
             title=self._title,
             dt=self._dt,
             budget_ms=self._budget_ms,
-            bounded=boundary.extent() is not None,
-            outlines=outline(boundary),
+            bounded=bounded,
+            outlines=tuple(outlines),
+            lines=tuple(lines),
+            panels=tuple(panels),
+            substeps_differ=self._substeps_differ,
             radius=radius,
         )

@@ -9,6 +9,8 @@ export class Chart {
     this.lines = lines;
     this.zero = zero;
     this.limit = null;
+    this.mark = null; // a dashed line that does not change the scale
+    this.range = null; // the scale, where others share it
     this.clear();
   }
 
@@ -32,12 +34,14 @@ export class Chart {
     if (!sorted.length) return;
     // With a limit, the rare spike leaves the picture rather than flattening all the rest.
     const top = this.limit === null ? sorted.at(-1) : Math.max(1.25 * this.limit, 1.1 * sorted[Math.floor(0.97 * (sorted.length - 1))]);
-    const low = this.zero ? 0 : sorted[0], high = Math.max(top, low);
+    const [low, high] = this.range ?? [this.zero ? 0 : sorted[0], Math.max(top, this.zero ? 0 : sorted[0])];
     // A thousandth of the value is the finest thing on show: rounding noise is a flat line.
     const room = Math.max(0.05 * (high - low), 0.001 * Math.abs(high), 1e-12);
     const y = (value) => height - ((value - low + room) / (high - low + 2 * room)) * height;
     context.lineJoin = "round";
-    if (this.limit !== null) this.#line(context, style.getPropertyValue("--soft"), [[0, y(this.limit)], [width, y(this.limit)]], ratio, [3 * ratio, 3 * ratio]);
+    for (const level of [this.limit, this.mark].filter((value) => value !== null)) {
+      this.#line(context, style.getPropertyValue("--soft"), [[0, y(level)], [width, y(level)]], ratio, [3 * ratio, 3 * ratio]);
+    }
     this.lines.forEach((colour, k) => {
       const points = this.samples.flatMap((values, i) => (values[k] === null ? [] : [[(i / (LENGTH - 1)) * width, y(values[k])]]));
       this.#line(context, style.getPropertyValue(colour), points, 1.4 * ratio, []);

@@ -1,6 +1,7 @@
 // The page: receives frames, draws the newest at the screen's pace, acknowledges what it drew, sends commands.
 
 import { Chart } from "./chart.js";
+import { Panels } from "./panels.js";
 import { makeRenderer, palette, shade, STEPS } from "./draw.js";
 
 const $ = (id) => document.getElementById(id);
@@ -8,6 +9,7 @@ const show = (name) => document.querySelector(`[data-testid="${name}"]`);
 const GRID_MAX = 65535;
 const NUMBERS_EVERY_MS = 120; // nobody reads faster
 const RETRY_MS = 1000;
+const HEADER_PX = 62;
 const REACH_PX = 9; // a near miss of the mouse still takes the circle
 
 const backdrop = $("backdrop"), stage = $("stage");
@@ -15,6 +17,7 @@ const renderer = makeRenderer(stage, new URLSearchParams(location.search).get("r
 const darkness = matchMedia("(prefers-color-scheme: dark)");
 const physicsChart = new Chart($("physics-chart"), ["--accent"], { zero: true });
 const energyChart = new Chart($("energy-chart"), ["--accent"]);
+const panels = new Panels($("panels"));
 document.documentElement.dataset.renderer = renderer.name;
 
 let socket = null;
@@ -63,6 +66,8 @@ function newShape(head) {
   $("budget").textContent = head.budgetMs;
   physicsChart.limit = head.budgetMs;
   $("substeps").max = Math.min(32, head.maxSubsteps);
+  $("substeps-slider").hidden = head.substepsDiffer;
+  panels.build(head.panels);
   colours = new Uint8Array(head.radius.length);
   paint();
   layout();
@@ -108,10 +113,11 @@ function layout() {
   const [x0, y0, x1, y1] = view;
   const panel = document.querySelector("aside").getBoundingClientRect();
   const below = panel.left <= 0; // a narrow window has the panel at its foot
-  const free = { width: below ? innerWidth : panel.left, height: below ? panel.top : innerHeight };
+  const above = shape.panels.length ? HEADER_PX : 0; // names of panels stay clear of the title
+  const free = { width: below ? innerWidth : panel.left, height: (below ? panel.top : innerHeight) - above };
   const scale = Math.max(Math.min(free.width / (x1 - x0), free.height / (y1 - y0)), 1e-9);
   const width = (x1 - x0) * scale, height = (y1 - y0) * scale;
-  place = { left: (free.width - width) / 2, top: (free.height - height) / 2, width, height, scale, view };
+  place = { left: (free.width - width) / 2, top: above + (free.height - height) / 2, width, height, scale, view };
   const ratio = Math.min(window.devicePixelRatio || 1, 2);
   const [pixelWidth, pixelHeight] = [Math.max(1, Math.round(width * ratio)), Math.max(1, Math.round(height * ratio))];
   if (stage.width !== pixelWidth || stage.height !== pixelHeight || !stage.style.width) {
@@ -120,6 +126,7 @@ function layout() {
   }
   Object.assign(stage.style, { left: `${place.left}px`, top: `${place.top}px`, width: `${width}px`, height: `${height}px` });
   radiusPx = shape.radius.map((metres) => metres * scale * (pixelWidth / width));
+  panels.layout(place);
   drawBackdrop(ratio);
 }
 
@@ -146,6 +153,15 @@ function drawBackdrop(ratio) {
     context.stroke();
     context.fill();
   }
+  context.strokeStyle = colour("--soft");
+  context.lineWidth = 1;
+  context.setLineDash([5, 5]);
+  context.beginPath();
+  for (const [from, to] of shape.lines) {
+    context.moveTo(...toScreen(...from));
+    context.lineTo(...toScreen(...to));
+  }
+  context.stroke();
 }
 
 /** Lines every 1, 2 or 5 times a power of ten metres: without bounds nothing else shows that the view moves. */
@@ -182,7 +198,10 @@ let usualSpeed = 0;
 function paint() {
   lut = palette(colourBy(), darkness.matches);
   const n = colours.length;
-  for (let i = 0; i < n; i++) colours[i] = shade(colourBy() === "origin" ? Math.floor((i * STEPS) / n) : 0, i);
+  for (let i = 0; i < n; i++) {
+    const [own, count] = panels.within(i, n);
+    colours[i] = shade(colourBy() === "origin" ? Math.floor((own * STEPS) / count) : 0, own);
+  }
   backdropKey = "";
 }
 
@@ -222,6 +241,8 @@ function numbers(now) {
   energyChart.push(status.energy);
   energyChart.draw();
   physicsChart.draw();
+  panels.push(status.energies);
+  panels.draw();
 
   $("pause").textContent = status.paused ? "Resume" : "Pause";
   if (socket.readyState === WebSocket.OPEN) link(status.error ? "lost" : status.paused ? "held" : "live", status.error ? "stopped" : status.paused ? "paused" : "live");
@@ -245,6 +266,7 @@ function write(name, text) {
 function startOver() {
   energyChart.clear();
   physicsChart.clear();
+  panels.clear();
 }
 
 // -- controls ---------------------------------------------------------------------------------------------------------

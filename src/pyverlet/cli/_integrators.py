@@ -1,0 +1,72 @@
+"""Integrators by name or by import path: `rk4`, or `mymodule:MyIntegrator` for one of the user's own."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import inspect
+import sys
+from pathlib import Path
+
+from pyverlet.errors import InputError
+from pyverlet.integrators import BY_NAME, Integrator
+
+
+def integrators(names: str | None) -> tuple[Integrator, ...]:
+    """The integrators in a list with commas; none for None.
+
+    Raises:
+        InputError: one is unknown, or given twice.
+    """
+    if names is None:
+        return ()
+    found = tuple(integrator(name.strip()) for name in names.split(","))
+    labels = [each.label for each in found]
+    if twice := [label for label in labels if labels.count(label) > 1]:
+        raise InputError(f"integrators names {twice[0]!r} twice; allowed is each once")
+    return found
+
+
+def integrator(name: str) -> Integrator:
+    """The integrator called `name`, or the one at the import path `module:Class`; the working folder is searched too.
+
+    Raises:
+        InputError: there is none; the message suggests the nearest and names the known ones, or says what the path lacks.
+    """
+    if ":" in name:
+        return _imported(name)
+    if name in BY_NAME:
+        return BY_NAME[name]()
+    near = difflib.get_close_matches(name.lower().replace("_", "-"), BY_NAME, n=1, cutoff=0.5)
+    suggestion = f" (did you mean {near[0]!r}?)" if near else ""
+    raise InputError(f"unknown integrator {name!r}{suggestion}; known: {', '.join(BY_NAME)}, or your own as module:Class")
+
+
+def _imported(path: str) -> Integrator:
+    module_name, _, attribute = path.partition(":")
+    allowed = "allowed is module:Class, a class deriving from pyverlet.Integrator"
+    if not all(part.isidentifier() for part in (*module_name.split("."), attribute)):
+        raise InputError(f"integrator is {path!r}; {allowed}")
+    here = str(Path.cwd())
+    if here not in sys.path:
+        sys.path.insert(0, here)
+    try:
+        module = importlib.import_module(module_name)
+    except Exception as error:  # whatever is wrong with the user's module
+        raise InputError(f"integrator is {path!r}, whose module cannot be imported ({_what(error)}); {allowed}") from error
+    found = getattr(module, attribute, None)
+    if found is None:
+        raise InputError(f"integrator is {path!r}, but {module_name} has no {attribute}; {allowed}")
+    try:
+        made = found() if isinstance(found, type) else found
+    except Exception as error:
+        raise InputError(f"integrator is {path!r}, which cannot be made without arguments ({_what(error)}); {allowed}") from error
+    if not isinstance(made, Integrator):
+        raise InputError(f"integrator is {path!r}, which is no Integrator; {allowed}")
+    if lacks := [name for name in ("order", "symplectic") if inspect.getattr_static(type(made), name, None) is None]:
+        raise InputError(f"integrator is {path!r}, which does not state {lacks[0]!r}; {allowed}, with order and symplectic")
+    return made
+
+
+def _what(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"

@@ -1,0 +1,146 @@
+"""The commands of the laboratory: compare, order, truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pyverlet import checks, report, scenes
+from pyverlet.cli import _options as options
+from pyverlet.cli import _print as out
+from pyverlet.cli._app import DEFAULT_DT, app
+from pyverlet.cli._integrators import integrators
+from pyverlet.errors import InputError
+from pyverlet.integrators import BY_NAME
+from pyverlet.progress import Progress
+
+__all__ = ["app"]
+
+USUAL = "explicit-euler,semi-implicit-euler,position-verlet,velocity-verlet,rk4,yoshida4"
+"""What `compare` compares unless said: the time-corrected Verlet is position Verlet where the step is constant."""
+
+EVERY = ",".join(BY_NAME)
+
+Names = Annotated[
+    str, typer.Option("--integrators", help="Names with commas, or your own as module:Class.", metavar="A,B", show_default=False)
+]
+Plot = Annotated[Path | None, typer.Option(help="Write a figure (.png, .pdf or .svg).", metavar="FILE", show_default=False)]
+
+
+def _counts(text: str) -> list[int]:
+    """Whole numbers from a list with commas."""
+    counts = [checks.whole("substeps", options.whole(part.strip())) for part in text.split(",")]
+    if twice := [count for count in counts if counts.count(count) > 1]:
+        raise InputError(f"substeps names {twice[0]} twice; allowed is each once")
+    return counts
+
+
+@app.command()
+def compare(
+    scene: options.SceneName = "bounce-euler",
+    names: Names = USUAL,
+    substeps: Annotated[str, typer.Option(help="Numbers with commas.", metavar="N,M")] = "1,2,10",
+    seconds: Annotated[
+        float, typer.Option(parser=options.real, help="Simulated seconds.", metavar="S", show_default="60")
+    ] = 60.0,
+    dt: options.Dt = DEFAULT_DT,
+    plot: Plot = None,
+    as_json: options.Json = False,
+) -> None:
+    """Run a scene under several integrators and compare energy, heights and cost.
+
+    Energies are relative to that of the start, in float64: the drift from start to end, the slope of the line fitted to it,
+    and the amplitude about that line.
+    """
+    from pyverlet.lab import compare as lab
+    from pyverlet.lab import figures
+
+    chosen, methods, counts = scenes.get(scene), integrators(names), _counts(substeps)
+    frames = report.frame_count(seconds=seconds, frames=None, dt=dt, default_seconds=seconds)
+    if plot is not None:
+        figures.check_can_plot(plot)
+    with Progress("frame") as progress:
+        runs = lab.compare(chosen, methods, counts, frames=frames, dt=dt, progress=progress)
+    if plot is not None:
+        from pyverlet.lab.comparison_figure import figure
+
+        title = f"{chosen.name}: {frames * dt:.4g} s in frames of {1e3 * dt:.3g} ms"
+        figures.save(figure(runs, title, chosen.line), plot)
+        out.note(f"wrote {plot}")
+    if as_json:
+        out.write_json({"scene": chosen.name, "seconds": frames * dt, "dt": dt, "runs": [run.as_dict() for run in runs]})
+        return
+    head = ("substeps", "integrator", "drift", "slope (1/s)", "amplitude", "first top (m)", "last top (m)", "ms a frame")
+    rows = []
+    for run in runs:
+        tops = run.apexes[1]
+        first, last = (f"{tops[0]:.4f}", f"{tops[-1]:.4f}") if len(tops) else ("", "")
+        numbers = (f"{run.drift:+.3e}", f"{run.slope:+.3e}", f"{run.amplitude:.3e}")
+        rows.append((str(run.substeps), run.integrator, *numbers, first, last, f"{run.ms_per_frame:.3f}"))
+    out.write(f"{chosen.name}, {frames * dt:.4g} s: energy relative to {runs[0].energy[0]:.6g} J at the start\n")
+    out.write(out.columns(head, rows))
+
+
+@app.command()
+def order(
+    names: Names = EVERY,
+    plot: Plot = None,
+    as_json: options.Json = False,
+) -> None:
+    """Measure the order of integrators on four problems with a solution on paper, beside the order they declare."""
+    from pyverlet.lab import figures
+    from pyverlet.lab import order as lab
+
+    methods = lab.methods(integrators(names))
+    if plot is not None:
+        figures.check_can_plot(plot)
+    with Progress("method") as progress:
+        orders = []
+        for done, method in enumerate(methods):
+            orders += lab.table([method])
+            progress(done + 1, len(methods))
+    if plot is not None:
+        figures.save(lab.figure(orders), plot)
+        out.note(f"wrote {plot}")
+    if as_json:
+        out.write_json({"within": lab.WITHIN, "methods": [each.as_dict() for each in orders]})
+        return
+    head = ("method", "expected", *orders[0].convergence, "")
+    rows = []
+    for each in orders:
+        fitted = ["rounding" if found.order is None else f"{found.order:.2f}" for found in each.convergence.values()]
+        expected = "none" if each.method.expected is None else str(each.method.expected)
+        rows.append((each.method.label, expected, *fitted, "as expected" if each.as_expected else "NOT AS EXPECTED"))
+    out.write(out.columns(head, rows))
+
+
+@app.command()
+def truth(
+    codes: Annotated[list[str] | None, typer.Argument(metavar="[J1 J2 ...]", help="Which; all unless said.")] = None,
+    markdown: Annotated[bool, typer.Option("--markdown", help="Write the page docs/truth.md.")] = False,
+    as_json: options.Json = False,
+) -> None:
+    """Try nine claims about Euler and Verlet: claim, experiment, numbers, verdict.
+
+    The exit code is 1 if some number does not bear out a verdict.
+    """
+    from pyverlet.lab import truth as lab
+
+    wanted = [code.upper() for code in codes] if codes else list(lab.EXPERIMENTS)
+    if unknown := [code for code in wanted if code not in lab.EXPERIMENTS]:
+        raise InputError(f"unknown claim {unknown[0]!r}; known: {', '.join(lab.EXPERIMENTS)}")
+    with Progress("claim") as progress:
+        findings = []
+        for done, code in enumerate(wanted):
+            findings.append(lab.EXPERIMENTS[code].run())
+            progress(done + 1, len(wanted))
+    if as_json:
+        out.write_json([finding.as_dict() for finding in findings])
+    elif markdown:
+        out.write(lab.markdown(findings).rstrip("\n"))
+    else:
+        out.write("\n\n".join(map(lab.text, findings)))
+    if not all(finding.holds for finding in findings):
+        raise typer.Exit(1)

@@ -1,0 +1,148 @@
+"""One scene under several integrators and substeps: what becomes of its energy and of its heights, and what it costs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from pyverlet.errors import InputError
+from pyverlet.integrators import Integrator
+from pyverlet.lab.problems import Floats
+from pyverlet.scenes import Scene
+from pyverlet.warmup import warm_up
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Run:
+    """What one integrator made of the scene, frame by frame; the first entry of each array is the start.
+
+    Attributes:
+        integrator: its label.
+        substeps: steps a frame.
+        time: (m,) s.
+        energy: (m,) total, J.
+        height: (m,) of the first particle, m.
+        exact: (m,) the same on paper; None where the scene has no closed form.
+        ms_per_frame: median wall time of a frame.
+    """
+
+    integrator: str
+    substeps: int
+    time: Floats
+    energy: Floats
+    height: Floats
+    exact: Floats | None
+    ms_per_frame: float
+
+    @property
+    def relative(self) -> Floats:
+        """(m,) change of the energy, relative to its magnitude at the start."""
+        return np.asarray((self.energy - self.energy[0]) / abs(self.energy[0]))
+
+    @property
+    def drift(self) -> float:
+        """Relative change of the energy from start to end."""
+        return float(self.relative[-1])
+
+    @property
+    def slope(self) -> float:
+        """Secular slope: of the straight line fitted to the relative change, 1/s."""
+        return float(np.polyfit(self.time, self.relative, 1)[0])
+
+    @property
+    def amplitude(self) -> float:
+        """Half the spread of the relative change about that line."""
+        rest = self.relative - np.polyval(np.polyfit(self.time, self.relative, 1), self.time)
+        return float(np.ptp(rest) / 2)
+
+    @property
+    def apexes(self) -> tuple[Floats, Floats]:
+        """Times (s) and heights (m) of the tops of the first particle's path, by the parabola through three frames."""
+        before, here, after = self.height[:-2], self.height[1:-1], self.height[2:]
+        top = np.flatnonzero((here > before) & (here >= after))
+        before, here, after = before[top], here[top], after[top]
+        bend, tilt = before - 2 * here + after, (after - before) / 2
+        shift = -tilt / bend
+        return self.time[top + 1] + shift * (self.time[1] - self.time[0]), here + tilt * shift / 2
+
+    @property
+    def largest_error(self) -> float | None:
+        """Largest distance of the height from the closed form, m."""
+        return None if self.exact is None else float(np.abs(self.height - self.exact).max())
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain numbers, ready for JSON."""
+        values: dict[str, Any] = {
+            "integrator": self.integrator,
+            "substeps": self.substeps,
+            "energy": {"start": float(self.energy[0]), "end": float(self.energy[-1])},
+            "drift": self.drift,
+            "slope_per_s": self.slope,
+            "amplitude": self.amplitude,
+            "apex_heights": self.apexes[1].tolist(),
+            "ms_per_frame": self.ms_per_frame,
+        }
+        return values if self.exact is None else values | {"largest_error_m": self.largest_error}
+
+
+def compare(
+    scene: Scene,
+    integrators: Sequence[Integrator],
+    substeps: Sequence[int],
+    *,
+    frames: int,
+    dt: float,
+    progress: Progress | None = None,
+    **overrides: Any,
+) -> list[Run]:
+    """Run `scene`, as one world in float64, under every integrator with every number of substeps.
+
+    Args:
+        scene: its variants are left aside.
+        integrators: one or more.
+        substeps: one or more.
+        frames: how long.
+        dt: length of a frame, s.
+        progress: called as progress(frames done, frames in all).
+        overrides: settings of the scene.
+
+    Raises:
+        InputError: the scene starts without energy, so that nothing can be relative to it.
+    """
+    every = [(integrator, count) for count in substeps for integrator in integrators]
+    runs = []
+    for done, (integrator, count) in enumerate(every):
+
+        def tell(frame: int, before: int = done) -> None:
+            if progress:
+                progress(before * frames + frame, len(every) * frames)
+
+        runs.append(_run(scene, integrator, count, frames, dt, tell, {"dtype": np.float64, **overrides}))
+    return runs
+
+
+def _run(
+    scene: Scene, integrator: Integrator, substeps: int, frames: int, dt: float, tell: Callable[[int], None], overrides: Any
+) -> Run:
+    settings = scene.settings(**{**overrides, "integrator": integrator, "substeps": substeps})
+    world = scene.build(settings)
+    start = world.energy().total
+    if start == 0.0:
+        raise InputError(f"scene is {scene.name!r}, which starts with an energy of 0 J; allowed is one whose drift has a measure")
+    warm_up(world)
+    time, energy, height, ms = np.zeros(frames + 1), np.zeros(frames + 1), np.zeros(frames + 1), np.zeros(frames)
+    energy[0], height[0] = start, world.position[0, 1]
+    for frame in range(1, frames + 1):
+        began = perf_counter()
+        world.step(dt)
+        ms[frame - 1] = 1e3 * (perf_counter() - began)
+        time[frame], energy[frame], height[frame] = world.time, world.energy().total, world.position[0, 1]
+        tell(frame)
+    exact = scene.closed_form(settings, time)[:, 0] if scene.closed_form else None
+    return Run(integrator.label, substeps, time, energy, height, exact, float(np.median(ms)))

@@ -1,0 +1,179 @@
+"""The order of an integrator, measured: error = C h^p, so p is the slope of log(error) against log(h), in float64."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pyverlet.integrators import Integrator, PositionVerlet, TimeCorrectedVerlet
+from pyverlet.lab import figures
+from pyverlet.lab.problems import PROBLEMS, Floats, Problem
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FRAMES = (80, 160, 320, 640)
+"""Steps in which the same second is made."""
+
+ROUNDING = 1e-13
+"""Errors below it are rounding, not method: they are left out of the fit."""
+
+JITTER = 0.3
+"""By how much a jittering step is longer or shorter than the mean, at most."""
+
+WITHIN = 0.1
+"""How close a measured order must be to the declared one."""
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """The errors of one method on one problem.
+
+    Attributes:
+        h: (k,) mean length of a step, s.
+        error: (k,) largest distance from the solution in phase space, over the whole time.
+        order: fitted; None if rounding left fewer than two errors to fit.
+    """
+
+    h: Floats
+    error: Floats
+    order: float | None
+
+
+@dataclass(frozen=True)
+class Method:
+    """A row of the table.
+
+    Attributes:
+        label: name and circumstances.
+        integrator: the method.
+        expected: order it must show; None where it has none.
+        jitter: by how much its steps vary.
+    """
+
+    label: str
+    integrator: Integrator
+    expected: int | None
+    jitter: float = 0.0
+
+
+@dataclass(frozen=True)
+class Orders:
+    """A method, and its convergence by name of problem."""
+
+    method: Method
+    convergence: dict[str, Convergence] = field(default_factory=dict)
+
+    @property
+    def as_expected(self) -> bool:
+        """Whether every problem shows the expected order; a method without one must show less than 1 on all."""
+        orders = [each.order for each in self.convergence.values()]
+        if self.method.expected is None:
+            return all(order is not None and order < 1.0 - WITHIN for order in orders)
+        return all(order is None or abs(order - self.method.expected) <= WITHIN for order in orders)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain numbers, ready for JSON."""
+        return {
+            "method": self.method.label,
+            "declared": self.method.integrator.order,
+            "expected": self.method.expected,
+            "jitter": self.method.jitter,
+            "as_expected": self.as_expected,
+            "problems": {
+                name: {"order": each.order, "h": each.h.tolist(), "error": each.error.tolist()}
+                for name, each in self.convergence.items()
+            },
+        }
+
+
+def steps(frames: int, seconds: float = 1.0, jitter: float = 0.0) -> Floats:
+    """(frames,) lengths that add up to `seconds`, each longer or shorter by up to `jitter` of itself; always the same ones."""
+    dts = 1 + jitter * np.random.default_rng(frames).uniform(-1, 1, frames)
+    return np.asarray(dts * (seconds / dts.sum()))
+
+
+def largest_error(integrator: Integrator, problem: Problem, dts: Floats) -> float:
+    """Largest distance from the solution, over position and velocity and over all steps."""
+    world = problem.world(integrator)
+    worst = 0.0
+    for dt in dts:
+        world.step(dt)
+        position, velocity = problem.exact(world.time)
+        worst = max(worst, float(np.hypot(*np.hypot(world.position[0] - position, world.velocity[0] - velocity))))
+    return worst
+
+
+def measure(integrator: Integrator, problem: Problem, *, jitter: float = 0.0, frames: Sequence[int] = FRAMES) -> Convergence:
+    """Make the same time in more and more steps and fit the order."""
+    errors = np.array([largest_error(integrator, problem, steps(n, problem.seconds, jitter)) for n in frames])
+    h = problem.seconds / np.array(frames, dtype=np.float64)
+    known = errors > ROUNDING
+    order = float(np.polyfit(np.log(h[known]), np.log(errors[known]), 1)[0]) if np.count_nonzero(known) > 1 else None
+    return Convergence(h, errors, order)
+
+
+def methods(integrators: Sequence[Integrator]) -> list[Method]:
+    """The rows for these integrators: each, the naive start of Verlet, and a varying step where a method has an opinion on it."""
+    rows = [Method(each.label, each, each.order) for each in integrators]
+    for each in integrators:
+        if type(each) is PositionVerlet and not each.naive_start:
+            naive = PositionVerlet(naive_start=True)
+            rows.append(Method(naive.label, naive, 1))
+    # A formula for constant steps only has no order under a varying one; the corrected formula keeps its own.
+    for each in integrators:
+        if isinstance(each, PositionVerlet | TimeCorrectedVerlet):
+            expected = each.order if isinstance(each, TimeCorrectedVerlet) else None
+            rows.append(Method(f"{each.label}, jittering step", each, expected, JITTER))
+    return rows
+
+
+def table(rows: Sequence[Method], problems: Sequence[Problem] = tuple(PROBLEMS.values())) -> list[Orders]:
+    """Measure every method on every problem."""
+    return [
+        Orders(row, {problem.name: measure(row.integrator, problem, jitter=row.jitter) for problem in problems}) for row in rows
+    ]
+
+
+def figure(orders: Sequence[Orders]) -> Figure:
+    """One log-log panel a problem: error against step, and how steep order 1, 2 and 4 are. Needs the extra `plot`."""
+    from matplotlib.figure import Figure
+
+    names = list(orders[0].convergence)
+    picture = Figure(figsize=(11.0, 8.0), dpi=150, layout="constrained")
+    panels = np.ravel(picture.subplots(2, -(-len(names) // 2), sharex=True))
+    for axes, name in zip(panels, names, strict=True):
+        for number, each in enumerate(orders):
+            found = each.convergence[name]
+            dashes = ":" if each.method.jitter else "--" if "," in each.method.label else "-"
+            axes.loglog(found.h, found.error, ls=dashes, lw=1.4, ms=5, label=each.method.label, **figures.style(number))
+        axes.set(title=f"{name}:  {PROBLEMS[name].law}", ylabel="largest error (SI units)")
+        axes.set_xticks(found.h, [f"1/{round(1 / h)}" for h in found.h])
+        axes.set_xticks([], minor=True)
+        axes.margins(x=0.14)
+        figures.tidy(axes)
+        _write_slopes(axes, [each.convergence[name] for each in orders])
+    for axes in panels[-2:]:
+        axes.set_xlabel("length of a step h (s)")
+    handles, labels = panels[0].get_legend_handles_labels()
+    picture.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
+    picture.suptitle("Error against step; the number beside a curve is its slope, the measured order")
+    return picture
+
+
+def _write_slopes(axes: Axes, found: Sequence[Convergence]) -> None:
+    """The measured orders at the right end of the curves, pushed apart where curves are close."""
+    low, high = np.log(axes.get_ylim())
+    least, last = 0.036 * (high - low), -np.inf
+    for number in np.argsort([each.error[0] for each in found]):
+        each = found[number]
+        last = max(float(np.log(each.error[0])), last + least)
+        text = "rounding" if each.order is None else f"{each.order:.2f}"
+        axes.annotate(
+            text, (float(each.h[0]), float(np.exp(last))), (8, 0), textcoords="offset points", fontsize=8,
+            color=figures.style(int(number))["color"], va="center",
+        )  # fmt: skip

@@ -1,0 +1,167 @@
+"""Four motions with a solution on paper, to measure integrators against. Units are SI, the mass is 1 kg."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.forces import Drag, PointSpring
+from pyverlet.integrators import Integrator
+from pyverlet.state import Slots, State
+from pyverlet.world import World
+
+Floats = NDArray[np.float64]
+Phase = tuple[Floats, Floats]
+"""Position (2,) in m and velocity (2,) in m/s."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One particle, its force, and where it is at any time.
+
+    Attributes:
+        name: as in tables.
+        law: its equation of motion.
+        force: on the particle; made anew for each world.
+        exact: of t in s: position and velocity.
+        gravity: (x, y), m/s^2.
+        seconds: how long errors are measured.
+    """
+
+    name: str
+    law: str
+    force: Callable[[], Any]
+    exact: Callable[[float], Phase]
+    gravity: tuple[float, float] = (0.0, 0.0)
+    seconds: float = 1.0
+
+    def world(self, integrator: Integrator) -> World:
+        """The particle at time 0, one substep a frame, in float64."""
+        world = World(gravity=self.gravity, integrator=integrator, collisions=None, substeps=1, dtype=np.float64)
+        position, velocity = self.exact(0.0)
+        world.add(position=position, velocity=velocity, mass=1.0)
+        world.forces.append(self.force())
+        return world
+
+
+def _upright(y: float, v: float) -> Phase:
+    return np.array([0.0, y]), np.array([0.0, v])
+
+
+# ---- oscillator: y'' = -w^2 y ----
+
+FREQUENCY = 3.0
+"""w, rad/s."""
+
+
+def oscillation(t: float) -> Phase:
+    """y = cos w t + (v0 / w) sin w t with v0 = 0.5 m/s."""
+    w, v0 = FREQUENCY, 0.5
+    return _upright(np.cos(w * t) + v0 / w * np.sin(w * t), -w * np.sin(w * t) + v0 * np.cos(w * t))
+
+
+# ---- free fall with linear drag: v' = g - c v ----
+
+G = -9.81
+DRAG = 1.5
+"""c, 1/s."""
+
+
+def fall_with_drag(t: float) -> Phase:
+    """v = v_t + (v0 - v_t) exp(-c t) with the terminal speed v_t = g / c and v0 = 4 m/s."""
+    terminal, v0 = G / DRAG, 4.0
+    decay = np.exp(-DRAG * t)
+    return _upright(terminal * t + (v0 - terminal) * (1 - decay) / DRAG, terminal + (v0 - terminal) * decay)
+
+
+# ---- pendulum: theta'' = -(g / L) sin theta; the coordinate y is the angle in radians ----
+
+SWING = 2.0
+"""Largest angle, rad: far from where sin theta is theta."""
+
+LENGTH = 1.0
+"""L, m."""
+
+
+class Pendulum:
+    """F = -m (g / L) sin y on the coordinate y, which is an angle."""
+
+    velocity_dependent = False
+
+    def apply(self, state: Slots, t: float) -> None:
+        """Add the force."""
+        state.force[:, 1] += state.mass * (G / LENGTH) * np.sin(state.position[:, 1])
+
+    def potential(self, state: State) -> float:
+        """m (g / L) (1 - cos y) for every particle, J."""
+        return float(np.sum(state.mass * (-G / LENGTH) * (1 - np.cos(state.position[:, 1].astype(np.float64)))))
+
+
+def jacobi(u: float, k: float) -> tuple[float, float, float]:
+    """Jacobi's elliptic functions sn, cn, dn of modulus k, by the arithmetic-geometric mean (Abramowitz, Stegun 16.4)."""
+    a, b, c = [1.0], [float(np.sqrt(1 - k * k))], [k]
+    while c[-1] > 1e-16:
+        a, b, c = [*a, (a[-1] + b[-1]) / 2], [*b, float(np.sqrt(a[-1] * b[-1]))], [*c, (a[-1] - b[-1]) / 2]
+    phi = 2.0 ** (len(a) - 1) * a[-1] * u
+    for n in range(len(a) - 1, 0, -1):
+        phi = (phi + float(np.arcsin(c[n] / a[n] * np.sin(phi)))) / 2
+    sn = float(np.sin(phi))
+    return sn, float(np.cos(phi)), float(np.sqrt(1 - (k * sn) ** 2))
+
+
+def swing(t: float) -> Phase:
+    """sin(theta / 2) = k cn / dn of w t, k = sin(theta_0 / 2), w^2 = g / L, let go at rest."""
+    k, w = float(np.sin(SWING / 2)), float(np.sqrt(-G / LENGTH))
+    sn, cn, dn = jacobi(w * t, k)
+    return _upright(2 * np.arcsin(k * cn / dn), -2 * k * w * np.sqrt(1 - k * k) * sn / dn)
+
+
+# ---- Kepler's orbit: x'' = -x / |x|^3, semi-major axis 1, period 2 pi ----
+
+ECCENTRICITY = 0.3
+
+
+class Sun:
+    """F = -m x / |x|^3 on every particle: an attraction to the origin with G M = 1 m^3/s^2."""
+
+    velocity_dependent = False
+
+    def apply(self, state: Slots, t: float) -> None:
+        """Add the force."""
+        x = state.position
+        square = x[:, 0] * x[:, 0] + x[:, 1] * x[:, 1]
+        state.force -= (state.mass / (square * np.sqrt(square)))[:, None] * x
+
+    def potential(self, state: State) -> float:
+        """-m / |x| for every particle, J."""
+        return -float(np.sum(state.mass / np.hypot(*state.position.astype(np.float64).T)))
+
+
+def orbit(t: float) -> Phase:
+    """From the perihelion: x = (cos E - e, sqrt(1 - e^2) sin E) with Kepler's E - e sin E = t, solved by Newton's method."""
+    e, anomaly = ECCENTRICITY, t
+    for _ in range(50):
+        step = (anomaly - e * np.sin(anomaly) - t) / (1 - e * np.cos(anomaly))
+        anomaly -= step
+        if abs(step) < 1e-15 * max(1.0, abs(t)):
+            break
+    across, speed = np.sqrt(1 - e * e), 1 / (1 - e * np.cos(anomaly))
+    return (
+        np.array([np.cos(anomaly) - e, across * np.sin(anomaly)]),
+        np.array([-np.sin(anomaly) * speed, across * np.cos(anomaly) * speed]),
+    )
+
+
+PROBLEMS: dict[str, Problem] = {
+    problem.name: problem
+    for problem in (
+        Problem("oscillator", "y'' = -ω² y", lambda: PointSpring(stiffness=FREQUENCY**2), oscillation),
+        Problem("pendulum", "θ'' = -(g/L) sin θ", Pendulum, swing),
+        Problem("kepler orbit", "x'' = -x / |x|³", Sun, orbit),
+        Problem("fall with drag", "v' = g - c v", lambda: Drag(linear=DRAG), fall_with_drag, gravity=(0.0, G)),
+    )
+}

@@ -1,0 +1,123 @@
+"""An experiment on a claim: what is said, what is true, how it is tried, the numbers that come out, and the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Number:
+    """One measured number, and what it must be for the verdict to hold.
+
+    Attributes:
+        what: was measured.
+        value: as measured.
+        unit: SI, empty for a pure number.
+        expected: the same on paper, where there is one.
+        within: how close to `expected` it must come, relative to it.
+        below: the value must be smaller; it is rounding, and printed as "below ..." since it differs from machine to machine.
+        above: the value must be larger.
+        digits: significant ones that are printed.
+    """
+
+    what: str
+    value: float
+    unit: str = ""
+    expected: float | None = None
+    within: float = 1e-9
+    below: float | None = None
+    above: float | None = None
+    digits: int = 4
+
+    @property
+    def holds(self) -> bool:
+        """Whether the number is what the verdict needs it to be."""
+        return (
+            (self.expected is None or abs(self.value - self.expected) <= self.within * abs(self.expected))
+            and (self.below is None or abs(self.value) < self.below)
+            and (self.above is None or self.value > self.above)
+        )
+
+    @property
+    def text(self) -> str:
+        """The number as printed, the same on every machine as long as it holds."""
+        unit = f" {self.unit}" if self.unit else ""
+        if self.below is not None and self.holds:
+            return f"below {self.below:g}{unit}"
+        if isinstance(self.value, int):
+            return f"{self.value}{unit}"
+        measured = f"{self.value:#.{self.digits}g}{unit}"
+        return measured if self.expected is None else f"{measured} (on paper {self.expected:#.{self.digits}g}{unit})"
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A claim of the articles and the experiment on it.
+
+    Attributes:
+        code: J1 to J9.
+        claim: what is said.
+        mathematics: what is true, in two or three lines.
+        setting: what is tried.
+        verdict: on the claim, as long as the numbers hold.
+        measure: makes the numbers.
+    """
+
+    code: str
+    claim: str
+    mathematics: str
+    setting: str
+    verdict: str
+    measure: Callable[[], Sequence[Number]]
+
+    def run(self) -> Finding:
+        """Make the numbers."""
+        return Finding(self, tuple(self.measure()))
+
+
+@dataclass(frozen=True)
+class Finding:
+    """An experiment and its numbers."""
+
+    experiment: Experiment
+    numbers: tuple[Number, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether all numbers are what the verdict says."""
+        return all(number.holds for number in self.numbers)
+
+    @property
+    def verdict(self) -> str:
+        """The verdict, or that this run does not bear it out."""
+        return self.experiment.verdict if self.holds else "not borne out by these numbers"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, ready for JSON."""
+        numbers = [
+            {"what": n.what, "value": n.value, "unit": n.unit, "expected": n.expected, "below": n.below, "holds": n.holds}
+            for n in self.numbers
+        ]
+        about = {name: getattr(self.experiment, name) for name in ("code", "claim", "mathematics", "setting")}
+        return {**about, "numbers": numbers, "verdict": self.verdict, "holds": self.holds}
+
+
+EXPERIMENTS: dict[str, Experiment] = {}
+"""By code, in the order they were declared; `pyverlet.lab.truth.EXPERIMENTS` has them in that of their codes."""
+
+
+def experiment(
+    code: str, *, claim: str, mathematics: str, setting: str, verdict: str
+) -> Callable[[Callable[[], Sequence[Number]]], Callable[[], Sequence[Number]]]:
+    """Register a function that makes the numbers as the experiment on a claim. Line breaks in the texts do not count."""
+
+    def flow(text: str) -> str:
+        return " ".join(text.split())
+
+    def register(measure: Callable[[], Sequence[Number]]) -> Callable[[], Sequence[Number]]:
+        EXPERIMENTS[code] = Experiment(code, flow(claim), flow(mathematics), flow(setting), flow(verdict), measure)
+        return measure
+
+    return register

@@ -1,0 +1,64 @@
+// Several worlds side by side: above each its name, its energy, and the energy's curve, all on one scale.
+
+import { Chart } from "./chart.js";
+
+export class Panels {
+  constructor(container) {
+    this.container = container;
+    this.panels = [];
+  }
+
+  /** A new shape: one section for each of its panels; none for a single world. */
+  build(panels) {
+    this.panels = panels.map(({ name, strip, first, count, energy: start }) => {
+      const section = document.createElement("section"), canvas = document.createElement("canvas");
+      const title = Object.assign(document.createElement("h2"), { textContent: name });
+      const energy = document.createElement("p");
+      energy.dataset.testid = "panel-energy";
+      Object.assign(canvas, { role: "img", ariaLabel: `Energy of ${name} over time` });
+      section.append(title, energy, canvas);
+      const chart = new Chart(canvas, ["--accent"]);
+      chart.mark = start; // a dashed line where it started
+      return { section, energy, strip, first, count, chart, start };
+    });
+    this.container.replaceChildren(...this.panels.map(({ section }) => section));
+    document.body.classList.toggle("side-by-side", this.panels.length > 1);
+  }
+
+  /** Put each strip where the picture has it; `place` is the picture on screen, CSS pixels. */
+  layout(place) {
+    for (const { section, strip: [left, top, width, height] } of this.panels) {
+      const box = { left: place.left + left * place.width, top: place.top + top * place.height, width: width * place.width, height: height * place.height };
+      for (const [side, value] of Object.entries(box)) section.style[side] = `${value}px`;
+    }
+  }
+
+  /** The particle's number within its own panel and how many that has: alike particles of all panels get one colour. */
+  within(i, total) {
+    const panel = this.panels.findLast(({ first }) => first <= i);
+    return panel ? [i - panel.first, panel.count] : [i, total];
+  }
+
+  push(energies) {
+    this.panels.forEach((panel, k) => {
+      panel.chart.push(energies[k]);
+      const change = energies[k] - panel.start;
+      const percent = Math.abs(change) < 10 * Math.abs(panel.start) ? ` (${change < 0 ? "−" : "+"}${Math.abs((100 * change) / Math.abs(panel.start)).toFixed(1)} %)` : "";
+      panel.energy.textContent = energies[k] === null ? "–" : `${energies[k].toFixed(Math.abs(energies[k]) < 1000 ? 2 : 0)} J${percent}`;
+    });
+  }
+
+  draw() {
+    // One scale for all: curves beside each other can be compared.
+    const values = this.panels.flatMap(({ chart }) => [...chart.samples.flat(), chart.mark]).filter(Number.isFinite);
+    const range = values.length ? [Math.min(...values), Math.max(...values)] : null;
+    for (const { chart } of this.panels) {
+      chart.range = range;
+      chart.draw();
+    }
+  }
+
+  clear() {
+    for (const { chart } of this.panels) chart.clear();
+  }
+}

@@ -1,0 +1,207 @@
+"""The laboratory's commands: what they print, draw and refuse."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet import scenes
+from pyverlet.cli import main
+from pyverlet.lab.compare import Run, compare
+
+MINE = """
+import pyverlet as pv
+
+
+class Midpoint(pv.Integrator):
+    order = 2
+    symplectic = False
+
+    def step(self, state, forces, t, h):
+        x, v = state.position.copy(), state.velocity.copy()
+        forces(state, t)
+        state.position[:] = x + h / 2 * v
+        state.velocity[:] = v + h / 2 * state.acceleration
+        forces(state, t + h / 2)
+        state.position[:] = x + h * state.velocity
+        state.velocity[:] = v + h * state.acceleration
+"""
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Any:
+    """Run a command line: (exit code, standard output, standard error)."""
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        code = main(list(arguments))
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return run
+
+
+# ---- compare ----
+
+
+def test_compare_in_numbers(run: Any) -> None:
+    methods = "explicit-euler,velocity-verlet"
+    code, out, err = run("compare", "fall", "--integrators", methods, "--substeps", "1,4", "--seconds", "1", "--json")
+    assert code == 0, err
+    report = json.loads(out)
+    assert (report["scene"], report["seconds"]) == ("fall", pytest.approx(1.0))
+    assert [(each["substeps"], each["integrator"]) for each in report["runs"]] == [
+        (n, name) for n in (1, 4) for name in methods.split(",")
+    ]
+    for each in report["runs"]:
+        h, start = 1 / 60 / each["substeps"], 10 * 9.81
+        # Explicit Euler gains g^2 h / 2 a second and kilogram, in a straight line, and is late by g t h / 2; order 2 is exact.
+        exact = 0.0 if each["integrator"] == "velocity-verlet" else 9.81**2 * h / 2 / start
+        assert each["energy"]["start"] == pytest.approx(start)
+        assert each["drift"] == pytest.approx(exact, abs=1e-12)
+        assert each["slope_per_s"] == pytest.approx(exact, abs=1e-12)
+        assert each["amplitude"] == pytest.approx(0.0, abs=1e-11)
+        assert each["largest_error_m"] == pytest.approx(9.81 * h / 2 if exact else 0.0, abs=1e-11)
+        assert each["apex_heights"] == []
+        assert each["ms_per_frame"] > 0
+
+
+def test_apexes_are_those_of_parabolas() -> None:
+    # Thrown up at 3 m/s from 0.7 m and back every second: the top lies between frames, a parabola through three hits it.
+    t = np.arange(181) / 60
+    y = 0.7 + 3 * (t % 1) - 9.81 / 2 * (t % 1) ** 2
+    run = Run("", 1, t, np.ones(181), y, None, 1.0)
+    times, heights = run.apexes
+    assert times == pytest.approx(np.array([0, 1, 2]) + 3 / 9.81, abs=1e-9)
+    assert heights == pytest.approx(0.7 + 3**2 / (2 * 9.81), abs=1e-12)
+
+
+def test_drift_slope_and_amplitude() -> None:
+    t = np.linspace(0, 100, 100_001)
+    energy = -2.0 * (1 + 1e-3 * t + 0.05 * np.sin(2 * np.pi * t))
+    run = Run("", 1, t, energy, t, None, 1.0)
+    assert run.drift == pytest.approx(-0.1, rel=1e-6)  # of |E|: the energy is negative and sinks
+    assert run.slope == pytest.approx(-1e-3, rel=1e-2)
+    assert run.amplitude == pytest.approx(0.05, rel=1e-2)
+
+
+def test_compare_as_a_table(run: Any) -> None:
+    code, out, err = run("compare", "bounce-verlet", "--seconds", "2", "--substeps", "3", "--integrators", "rk4,yoshida4")
+    assert code == 0, err
+    title, _, head, *rows = out.splitlines()
+    assert title == "bounce-verlet, 2 s: energy relative to 29.43 J at the start"
+    assert head.split("  ")[0] == "substeps"
+    assert [row.split()[:2] for row in rows] == [["3", "rk4"], ["3", "yoshida4"]]
+
+
+@pytest.mark.parametrize("scene", ["fall", "bounce-order", "box"])
+def test_compare_draws(run: Any, tmp_path: Path, scene: str) -> None:
+    pytest.importorskip("matplotlib")
+    picture = tmp_path / "out.png"
+    options = ["--integrators", "rk4,explicit-euler", "--substeps", "1,2", "--seconds", "1.5", "--plot", str(picture)]
+    code, out, err = run("compare", scene, *options, "--json")
+    assert code == 0, err
+    assert json.loads(out)["scene"] == scene
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert f"wrote {picture}" in err
+
+
+def test_the_figure_of_a_comparison_has_units(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    from pyverlet.lab.comparison_figure import figure
+
+    runs = compare(scenes.get("bounce-order"), [pv.RK4(), pv.Yoshida4()], [1, 2, 4], frames=150, dt=1 / 60)
+    picture = figure(runs, "title", 3.0)
+    axes = picture.axes
+    assert len(axes) == 2 * 3 + 2
+    assert "(E - E₀) / |E₀|" in axes[0].get_ylabel()
+    assert "tops of the path (m)" in axes[3].get_ylabel()
+    assert axes[3].get_xlabel() == "time t (s)"
+    assert axes[-1].get_ylabel() == "cost (ms a frame, median)"
+    # Two curves with the colours of Okabe and Ito, and the line of conserved energy.
+    assert len(axes[0].lines) == 3
+    assert axes[0].lines[0].get_color() == "#0072B2"
+
+
+def test_a_scene_without_energy_is_refused(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    flat = dataclasses.replace(scenes.get("fall"), name="flat", defaults=scenes.get("fall").settings(gravity=(0.0, 0.0)))
+    monkeypatch.setitem(scenes.SCENES, "flat", flat)
+    code, out, err = run("compare", "flat", "--seconds", "1")
+    assert (code, out) == (2, "")
+    assert "'flat', which starts with an energy of 0 J" in err
+
+
+# ---- order ----
+
+
+def test_order_in_numbers(run: Any) -> None:
+    code, out, err = run("order", "--integrators", "semi-implicit-euler,position-verlet", "--json")
+    assert code == 0, err
+    methods = json.loads(out)["methods"]
+    assert [(each["method"], each["declared"], each["expected"]) for each in methods] == [
+        ("semi-implicit-euler", 1, 1),
+        ("position-verlet", 2, 2),
+        ("position-verlet, naive start", 2, 1),
+        ("position-verlet, jittering step", 2, None),
+    ]
+    for each in methods:
+        assert each["as_expected"]
+        assert set(each["problems"]) == {"oscillator", "pendulum", "kepler orbit", "fall with drag"}
+        for found in each["problems"].values():
+            assert len(found["h"]) == len(found["error"]) == 4
+            if each["expected"]:
+                assert found["order"] == pytest.approx(each["expected"], abs=0.1)
+
+
+def test_order_as_table_and_figure(run: Any, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    picture = tmp_path / "order.png"
+    code, out, err = run("order", "--integrators", "rk4", "--plot", str(picture))
+    assert code == 0, err
+    head, row = out.splitlines()
+    assert head.split("  ")[0] == "method"
+    assert row.split()[:2] == ["rk4", "4"]
+    assert row.endswith("as expected")
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("command", [["order"], ["compare", "fall", "--substeps", "2", "--seconds", "0.5"]])
+def test_an_integrator_of_the_users_own(run: Any, command: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "my_lab_methods.py").write_text(MINE)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    code, out, err = run(*command, "--integrators", "rk4,my_lab_methods:Midpoint")
+    assert code == 0, err
+    assert "midpoint" in out
+    assert "NOT AS EXPECTED" not in out
+
+
+REFUSED = [
+    ("compare nowhere", "unknown scene 'nowhere'"),
+    ("compare fall --integrators verlet", "unknown integrator 'verlet'"),
+    ("compare fall --integrators rk5", "did you mean 'rk4'"),
+    ("compare fall --integrators no.such:Thing", "cannot be imported"),
+    ("compare fall --seconds 0", "seconds is 0; allowed is a finite number greater than 0"),
+    ("compare fall --seconds nan", "seconds is nan"),
+    ("compare fall --substeps 0", "substeps is 0"),
+    ("compare fall --substeps 1,x", "'x' is not a whole number"),
+    ("compare fall --substeps 2,2", "substeps names 2 twice"),
+    ("compare fall --dt 0", "dt is 0"),
+    ("compare fall --plot y.doc", ".png"),
+    ("order --integrators rk5", "did you mean 'rk4'"),
+    ("order --plot no-such-folder/y.png", "folder that exists"),
+]
+
+
+@pytest.mark.parametrize(("line", "says"), REFUSED, ids=[line for line, _ in REFUSED])
+def test_bad_input_is_one_sentence(run: Any, line: str, says: str) -> None:
+    code, out, err = run(*line.split())
+    assert (code, out) == (2, "")
+    assert says in err
+    assert err.startswith("pyverlet: ")
+    assert err.count("\n") == 1
