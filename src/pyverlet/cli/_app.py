@@ -80,6 +80,7 @@ def run(
         bool, typer.Option("--headless", help=f"Run without the page, {DEFAULT_SECONDS:g} s unless said, and report.")
     ] = False,
     no_open: Annotated[bool, typer.Option("--no-open", help="Do not open a browser tab.")] = False,
+    window: Annotated[bool, typer.Option("--window", help="Show it in a window of its own, not on the page.")] = False,
     port: Annotated[
         int | None, typer.Option(parser=options.whole, help="Port of the live page.", metavar="N", show_default=str(DEFAULT_PORT))
     ] = None,
@@ -107,7 +108,13 @@ def run(
         collisions=collisions,
         picture=picture,
     )
-    if not (headless or as_json or plot or seconds is not None or frames is not None):
+    ends = headless or as_json or plot or seconds is not None or frames is not None
+    if window and (ends or port is not None or no_open):
+        raise InputError("window is asked for together with a run that ends or with options of the page; allowed is one of them")
+    if window:
+        _open_window(chosen, settings, dt=dt)
+        return
+    if not ends:
         _show(chosen, settings, dt=dt, port=DEFAULT_PORT if port is None else port, open_browser=not no_open)
         return
     if port is not None:
@@ -178,8 +185,23 @@ def _show(scene: Scene, settings: Settings, *, dt: float, port: int, open_browse
     from pyverlet.viewers import serve
 
     if scene.show.colours:
-        out.note(f"the page does not show this picture yet: `pyverlet record {scene.name} {scene.name}.mp4` shows them")
+        out.note("the page does not show this picture yet; with --window, or recorded by `pyverlet record`, it can be seen")
     serve(partial(scene.build, settings), scene_name=scene.name, port=port, open_browser=open_browser, dt=dt)
+
+
+def _open_window(scene: Scene, settings: Settings, *, dt: float) -> None:
+    from pyverlet.picture import Fixed
+    from pyverlet.viewers import window
+
+    window.check_extra()
+    show = scene.show
+    colour = None
+    if show.colours:
+        with Progress("where each circle ends") as progress:
+            colour = Fixed(show.colours(settings, dt, progress))
+    out.note(window.KEYS)
+    part = show.view(settings) if show.view else None
+    window.show(partial(scene.build, settings), title=scene.name, dt=dt, colour=colour, part=part)
 
 
 def build(scene: Scene, settings: Settings) -> tuple[World, float]:
