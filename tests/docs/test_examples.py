@@ -11,6 +11,7 @@ import pytest
 
 import pyverlet
 import pyverlet.viewers
+import pyverlet.viewers.window
 from pyverlet.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -42,6 +43,7 @@ def shown(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Any]:
 
     monkeypatch.setattr(pyverlet, "view", lambda world, **options: shown.append((world, options)))
     monkeypatch.setattr(pyverlet.viewers, "serve", serve)
+    monkeypatch.setattr(pyverlet.viewers.window, "show", serve)
     monkeypatch.chdir(tmp_path)
     return shown
 

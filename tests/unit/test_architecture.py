@@ -20,7 +20,7 @@ LAYERS = (
     {"integrators", "forces", "bounds", "naive", "broadphase", "collisions", "energy"},
     {"world", "doors", "profile", "clock", "warmup", "panels"},
     {"scenes", "report", "lab", "picture"},
-    {"viewers", "record"},
+    {"viewers", "record", "draw"},
     {"cli"},
 )
 # Steps within a layer: module -> what it may use beside it.
@@ -37,6 +37,7 @@ BESIDE = {
     "report": {"scenes"},
     "lab": {"scenes"},
     "record": {"viewers"},
+    "draw": {"viewers"},
 }
 # Doors up the house, for convenience: methods of one line that load what they name only when called.
 DOORS = {"doors": {"record"}}

@@ -9,10 +9,11 @@ from typing import Annotated
 
 import typer
 
-from pyverlet import __version__, report, scenes, viewers, warm_up
+from pyverlet import __version__, report, scenes, warm_up
 from pyverlet.cli import _check
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
+from pyverlet.cli import _show as show
 from pyverlet.cli._integrators import integrators
 from pyverlet.errors import InputError
 from pyverlet.panels import Panel, Panels
@@ -84,6 +85,7 @@ def run(
         bool, typer.Option("--headless", help=f"Run without the page, {DEFAULT_SECONDS:g} s unless said, and report.")
     ] = False,
     no_open: Annotated[bool, typer.Option("--no-open", help="Do not open a browser tab.")] = False,
+    window: Annotated[bool, typer.Option("--window", help="Show it in a window of its own, not on the page.")] = False,
     port: Annotated[
         int | None, typer.Option(parser=options.whole, help="Port of the live page.", metavar="N", show_default=str(DEFAULT_PORT))
     ] = None,
@@ -111,12 +113,17 @@ def run(
     )
     methods = integrators(integrator)
     chosen.settings(**overrides)  # refuse what is wrong before anything starts
-    if not (headless or as_json or plot or seconds is not None or frames is not None):
-        if chosen.show.colours:
-            out.note(f"the page does not show this picture yet: `pyverlet record {chosen.name} {chosen.name}.mp4` shows them")
+    ends = headless or as_json or plot or seconds is not None or frames is not None
+    if window and (ends or port is not None or no_open):
+        raise InputError("window is asked for together with a run that ends or with options of the page; allowed is one of them")
+    if window:
+        if len(methods) > 1:
+            raise InputError(f"integrators is {integrator!r}; allowed is one in a window, which shows a single world")
+        show.window(chosen, chosen.settings(**overrides, integrator=methods[0] if methods else None), dt=dt)
+        return
+    if not ends:
         build = partial(chosen.panels, integrators=methods, **overrides)
-        open_port = DEFAULT_PORT if port is None else port
-        viewers.serve(build, scene_name=chosen.name, port=open_port, open_browser=not no_open, dt=dt)
+        show.page(chosen, build, dt=dt, port=DEFAULT_PORT if port is None else port, open_browser=not no_open)
         return
     if port is not None:
         raise InputError(f"port is {port}; allowed is none, since this run has no live page")

@@ -50,12 +50,21 @@ class Painter:
         self._boundary: Any = None
         self.view = self._look()
 
-    def paint(self) -> NDArray[np.uint8]:
-        """(height, width, 4) bytes R, G, B, A: a view on a buffer, good until the next call. A is no transparency; see Raster."""
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height), pixels."""
+        return self._raster.size
+
+    def paint(self, view: View | None = None) -> NDArray[np.uint8]:
+        """(height, width, 4) bytes R, G, B, A: a view on a buffer, good until the next call. A is no transparency; see Raster.
+
+        Args:
+            view: what to show; None leaves the choice to the painter.
+        """
         if self._boundary is not self._world.boundary:
             self._boundary = self._world.boundary
             self._outlines = outline(self._boundary)
-        self.view = self._look()
+        self.view = self._look() if view is None else view
         colours = self._colour.colours(self._world, self._raster.theme)
         return self._raster.draw(self._world, self.view, outlines=self._outlines, colours=colours)
 

@@ -1,0 +1,27 @@
+"""Worlds in game loops of your own: `pyverlet.draw.pygame`, `.pyglet` and `.arcade`. Importing one loads its library.
+
+`fit` makes the view that maps metres to pixels; `View` has the rest: `to_screen`, `to_world`, `zoomed`, `moved`, `pick`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pyverlet.picture import View
+from pyverlet.viewers.frames import Camera
+
+if TYPE_CHECKING:
+    from pyverlet.world import World
+
+__all__ = ["View", "fit"]
+
+
+def fit(world: World, size: tuple[int, int], *, y_up: bool = False) -> View:
+    """The view that shows the whole of a world's bounds or, in the open, where its particles are now.
+
+    Args:
+        world: only read.
+        size: (width, height) of the window, pixels.
+        y_up: True where pixels count upward: pyglet and arcade.
+    """
+    return View.fit(Camera(world).view(world.position), size, y_up=y_up)

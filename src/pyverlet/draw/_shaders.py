@@ -1,0 +1,70 @@
+"""What a graphics card is told: one point a circle, its position straight from the world's array, in metres."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.picture import ByOrigin, Colouring, Theme, View
+
+if TYPE_CHECKING:
+    from pyverlet.world import World
+
+VERTEX = """#version 330
+in vec2 place;
+in float radius;
+in vec4 tint;
+uniform vec4 window;  // metres at its left and top; from metres to its half widths, its half heights
+uniform float scale;  // pixels a metre
+out vec3 colour;
+out float reach;
+void main() {
+    gl_Position = vec4((place - window.xy) * window.zw + vec2(-1.0, 1.0), 0.0, 1.0);
+    reach = max(radius * scale, 0.5);
+    gl_PointSize = 2.0 * reach + 2.0;
+    colour = tint.rgb;
+}
+"""
+
+FRAGMENT = """#version 330
+in vec3 colour;
+in float reach;
+out vec4 pixel;
+void main() {
+    float distance = length(gl_PointCoord - 0.5) * (2.0 * reach + 2.0);
+    float cover = clamp(reach + 0.5 - distance, 0.0, 1.0);
+    if (cover <= 0.0) discard;
+    pixel = vec4(colour, cover);
+}
+"""
+
+
+def window(view: View) -> tuple[float, float, float, float]:
+    """The uniform `window`."""
+    return (view.left, view.top, 2.0 * view.scale / view.width, 2.0 * view.scale / view.height)
+
+
+class Arrays:
+    """The arrays of a world as the shaders want them: float32, and four bytes a colour. float32 worlds are not copied.
+
+    Args:
+        world: only read.
+        colour: what the colours say; by default where each circle started.
+        theme: whether the colours are for a dark or a light background.
+    """
+
+    def __init__(self, world: World, colour: Colouring | None, theme: Theme) -> None:
+        self._world = world
+        self._colour = ByOrigin() if colour is None else colour
+        self._theme = theme
+
+    def now(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+        """Positions (n, 2), radii (n,), colours (n,): contiguous, and writable, as ctypes asks of memory it is to look at."""
+        world = self._world
+        return (
+            np.ascontiguousarray(world.position, dtype=np.float32),
+            np.ascontiguousarray(world.radius, dtype=np.float32),
+            np.require(self._colour.colours(world, self._theme), requirements=["C", "W"]),
+        )

@@ -1,0 +1,72 @@
+"""A world on a pygame surface, over whatever the game has drawn there. Circles go straight into the surface's own pixels."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pygame
+
+from pyverlet.errors import InputError
+from pyverlet.kernels import raster
+from pyverlet.picture import DARK, ByOrigin, Colouring, Theme, View
+from pyverlet.picture.palette import Packed
+from pyverlet.viewers.frames import outline
+
+if TYPE_CHECKING:
+    from pyverlet.world import World
+
+__all__ = ["draw"]
+
+WALL = (128, 140, 152)
+"""R, G, B."""
+
+
+def draw(
+    surface: pygame.Surface,
+    world: World,
+    view: View,
+    *,
+    colour: Colouring | None = None,
+    theme: Theme = DARK,
+    walls: bool = True,
+) -> None:
+    """Draw `world` on `surface`, each circle with smooth rims, and the lines of its bounds.
+
+    Args:
+        surface: of 32 bits a pixel, as displays are; its alpha, if it has any, ends up 255 under circles.
+        world: only read.
+        view: with `y_up=False`, of the surface's size; see `pyverlet.draw.fit`.
+        colour: what the colours say; by default where each circle started.
+        theme: whether the colours are for a dark or a light background.
+        walls: draw the bounds too.
+
+    Raises:
+        InputError: the surface has another depth, or the view another size.
+    """
+    if surface.get_bitsize() != 32:
+        raise InputError(f"surface has {surface.get_bitsize()} bits a pixel; allowed are 32, as surface.convert_alpha() has")
+    if (view.width, view.height) != surface.get_size() or view.y_up:
+        raise InputError(f"view is {view}; allowed is one of the surface's size, {surface.get_size()}, with y_up=False")
+    if walls:
+        for line in outline(world.boundary):
+            pygame.draw.aalines(surface, WALL, True, view.to_screen(line).tolist())
+    colours = (ByOrigin() if colour is None else colour).colours(world, theme)
+    shifts = surface.get_shifts()
+    if shifts[:3] == (16, 8, 0):
+        colours = _red_and_blue_swapped(colours)
+    elif shifts[:3] != (0, 8, 16):
+        raise InputError(f"surface has its red, green and blue at bits {shifts[:3]}; allowed are (0, 8, 16) and (16, 8, 0)")
+    own = pygame.surfarray.pixels2d(surface).T  # a view on the surface's memory
+    alpha = own & np.uint32(0xFF000000)
+    pixels = np.bitwise_and(own, np.uint32(0x00FFFFFF), dtype=np.uint32)  # the raster keeps count of coverage up there
+    ground = pixels.copy()
+    raster.circles(pixels, ground, world.position, world.radius, colours, view.left, view.top, view.scale)
+    if surface.get_masks()[3]:
+        np.maximum(pixels, alpha | (pixels & np.uint32(0x00FFFFFF)), out=pixels)
+    own[:] = pixels
+
+
+def _red_and_blue_swapped(colours: Packed) -> Packed:
+    low, high = np.uint32(0xFF), np.uint32(16)
+    return np.asarray(((colours & low) << high) | (colours & np.uint32(0xFF00)) | (colours >> high) & low, dtype=np.uint32)

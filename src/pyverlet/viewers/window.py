@@ -1,0 +1,235 @@
+"""A window of one's own in place of the page: pygame shows the library's pictures. Needs the extra `window`."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from pyverlet import checks
+from pyverlet.clock import Clock, FrameBudget
+from pyverlet.errors import InputError, PyverletError
+from pyverlet.picture import DARK, Colouring, Theme, View
+from pyverlet.picture.raster import check_size
+from pyverlet.viewers.frames import Rect
+from pyverlet.viewers.hands import Hands
+from pyverlet.viewers.painter import Painter
+
+if TYPE_CHECKING:
+    from pyverlet.world import World
+
+HAND = 0
+"""There is one mouse."""
+
+REACH_PX = 9.0
+"""A near miss of the mouse still takes the circle; as on the page."""
+
+ZOOM = 1.15
+"""A notch of the wheel."""
+
+CAPTION_S = 0.25
+"""Time between updates of the numbers in the title bar; nobody reads faster."""
+
+KEYS = "space pause, . step, r reset, f fit, q quit; drag a circle, shift-drag pokes, wheel zooms, right button moves"
+
+
+class Window:
+    """Steps a world in real time and shows it, in the calling thread.
+
+    Args:
+        world: nobody else may step it meanwhile. Reset goes back to its present state.
+        title: in the title bar.
+        dt: simulated seconds a frame, and the pace.
+        size: (width, height) at the start, pixels.
+        colour, theme, part: as for `pyverlet.record.to_video`.
+
+    Raises:
+        InputError: an argument is outside what is allowed, or the extra `window` is missing.
+        PyverletError: there is no screen.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        *,
+        title: str = "pyverlet",
+        dt: float = 1 / 60,
+        size: tuple[int, int] = (1280, 720),
+        colour: Colouring | None = None,
+        theme: Theme = DARK,
+        part: Rect | None = None,
+    ) -> None:
+        check_extra()
+        self._world, self._title, self._dt = world, title, checks.number("dt", dt, above=0.0)
+        self._new_painter: Callable[[tuple[int, int]], Painter] = partial(_painter, world, colour, theme, part)
+        self._painter = self._new_painter(check_size(size))
+        self._saved = world.save()
+        self._hands = Hands(world)
+        self._clock, self._budget = Clock(dt=self._dt), FrameBudget()
+        self._last = time.perf_counter()
+        self._caption_due = self._pictures_since = 0.0
+        self._pictures = 0
+        self.view: View | None = None
+        """What the user has zoomed to; None shows the painter's own."""
+        self.paused = False
+        self.ended = False
+        self.error: str | None = None
+        """Why the world stands still, if it had to stop; reset starts over."""
+        self._open(size)
+
+    def _open(self, size: tuple[int, int]) -> None:
+        os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+        import pygame
+
+        self._pygame: Any = pygame
+        try:
+            pygame.display.init()
+            pygame.display.set_mode(size, pygame.RESIZABLE)
+        except pygame.error as error:
+            pygame.display.quit()
+            raise PyverletError(
+                f"no window can be opened ({error}): the page needs no screen here, nor does `pyverlet record`"
+            ) from None
+        self._do = {
+            pygame.K_SPACE: self._pause,
+            pygame.K_PERIOD: self._step_once,
+            pygame.K_r: self._reset,
+            pygame.K_f: self._fit,
+            pygame.K_q: self._end,
+            pygame.K_ESCAPE: self._end,
+        }
+
+    def run(self) -> None:
+        """Until the window is closed."""
+        try:
+            while not self.ended:
+                self.turn()
+        finally:
+            self._hands.release_all()
+            self._pygame.display.quit()
+
+    def turn(self) -> None:
+        """Obey what the user did, make the frames that are due, show one picture."""
+        for event in self._pygame.event.get():
+            self._obey(event)
+        now = time.perf_counter()
+        due = self._clock.advance(now - self._last)
+        self._last = now
+        for _ in range(0 if self.paused else due):
+            self._advance()
+        self._show()
+        rest = (1.0 - self._clock.alpha) * self._dt - (time.perf_counter() - now)
+        if rest > 0:
+            time.sleep(rest)
+
+    def _advance(self) -> None:
+        if self.error is not None:
+            return
+        x0, y0, x1, y1 = self._rect()
+        self._hands.move(max(x1 - x0, y1 - y0))
+        try:
+            self._world.step(self._dt)
+        except PyverletError as error:
+            self.error = str(error)
+        self._budget.record(self._world.profile.frame_ms)
+
+    def _show(self) -> None:
+        pygame, screen = self._pygame, self._pygame.display.get_surface()
+        pixels = self._painter.paint(self.view)
+        # The surface has no pixels of its own: it looks at the raster's.
+        screen.blit(pygame.image.frombuffer(pixels, self._painter.size, "RGBX"), (0, 0))
+        pygame.display.flip()
+        self._pictures += 1
+        now = time.perf_counter()
+        if now >= self._caption_due:
+            rate = self._pictures / max(now - self._pictures_since, 1e-9)
+            self._pictures, self._pictures_since, self._caption_due = 0, now, now + CAPTION_S
+            pygame.display.set_caption(self._caption(rate))
+
+    def _caption(self, rate: float) -> str:
+        state = self.error or ("paused" if self.paused else f"{rate:.0f} frames/s")
+        numbers = f"{len(self._world):,} circles, {self._world.time:.2f} s, physics {self._budget.median_ms:.1f} ms"
+        return f"{self._title}: {state}, {numbers}"
+
+    # -- what the user does -------------------------------------------------------------------------------------------
+
+    def _obey(self, event: Any) -> None:
+        pygame = self._pygame
+        if event.type == pygame.QUIT:
+            self._end()
+        elif event.type == pygame.KEYDOWN and event.key in self._do:
+            self._do[event.key]()
+        elif event.type == pygame.VIDEORESIZE:
+            self._painter, self.view = self._new_painter((max(event.w, 1), max(event.h, 1))), None
+        elif event.type == pygame.MOUSEWHEEL:
+            self.view = self._seen().zoomed(ZOOM**event.y, pygame.mouse.get_pos())
+        elif event.type == pygame.MOUSEBUTTONUP and event.button == 1:
+            self._hands.release(HAND)
+        elif event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
+            self._poking = bool(pygame.key.get_mods() & pygame.KMOD_SHIFT)
+            self._hand_at(event.pos)
+        elif event.type == pygame.MOUSEMOTION and event.buttons[0]:
+            self._hand_at(event.pos)
+        elif event.type == pygame.MOUSEMOTION and event.buttons[2]:
+            self.view = self._seen().moved(event.rel)
+
+    _poking = False
+
+    def _hand_at(self, pixel: tuple[int, int]) -> None:
+        view = self._seen()
+        x, y = (float(value) for value in view.to_world(pixel))
+        if self._poking:
+            x0, y0, x1, y1 = self._rect()
+            self._hands.poke(HAND, x, y, max(x1 - x0, y1 - y0))
+        else:
+            self._hands.drag(HAND, x, y, REACH_PX / view.scale)
+
+    def _pause(self) -> None:
+        self.paused = not self.paused
+
+    def _step_once(self) -> None:
+        self.paused = True
+        self._advance()
+
+    def _reset(self) -> None:
+        self._hands.release_all()
+        self._world.restore(self._saved)
+        self._clock, self.error = Clock(dt=self._dt), None
+
+    def _fit(self) -> None:
+        self.view = None
+
+    def _end(self) -> None:
+        self.ended = True
+
+    def _seen(self) -> View:
+        return self._painter.view if self.view is None else self.view
+
+    def _rect(self) -> Rect:
+        view = self._seen()
+        return (view.left, view.top - view.height / view.scale, view.left + view.width / view.scale, view.top)
+
+
+def _painter(world: World, colour: Colouring | None, theme: Theme, part: Rect | None, size: tuple[int, int]) -> Painter:
+    return Painter(world, size=size, colour=colour, theme=theme, part=part)
+
+
+def check_extra() -> None:
+    """Raise InputError with the command that installs what is missing."""
+    if importlib.util.find_spec("pygame") is None:
+        raise InputError("a window needs 'pygame', which is not installed: pip install 'pyverlet[window]'")
+
+
+def show(build: Callable[[], World], **options: Any) -> None:
+    """Build a world, compile what it needs and show it until the window is closed. Options as for `Window`."""
+    from pyverlet import warm_up
+    from pyverlet.progress import Progress
+
+    check_extra()
+    world = build()
+    with Progress("compiling kernels, once") as progress:
+        warm_up(world, progress)
+    Window(world, **options).run()

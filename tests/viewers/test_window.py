@@ -1,0 +1,190 @@
+"""The window, under SDL's dummy driver: every key and the mouse, and their effect in the world and in the pixels."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet.cli import main
+from pyverlet.viewers import window as windows
+from pyverlet.viewers.window import Window
+
+os.environ["SDL_VIDEODRIVER"] = "dummy"
+os.environ["PYGAME_HIDE_SUPPORT_PROMPT"] = "1"
+pygame: Any = pytest.importorskip("pygame")
+
+Shown = Callable[..., Window]
+
+
+@pytest.fixture
+def shown(world: pv.World) -> Iterator[Window]:
+    """The nine circles in a window, 20 pixels a metre and a little; paused."""
+    window = Window(world, size=(424, 424))
+    window.paused = True
+    yield window
+    pygame.display.quit()
+
+
+def press(window: Window, key: int) -> None:
+    pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=key, mod=0, unicode="", scancode=0))
+    window.turn()
+
+
+def mouse(window: Window, kind: int, pixel: Any, **values: Any) -> None:
+    pos = tuple(round(float(value)) for value in pixel)
+    pygame.event.post(pygame.event.Event(kind, pos=pos, **values))
+    window.turn()
+
+
+def test_the_screen_shows_the_painters_pixels(shown: Window, world: pv.World) -> None:
+    shown.turn()
+    screen = pygame.surfarray.array3d(pygame.display.get_surface()).swapaxes(0, 1)
+    assert (screen == world.to_image(size=(424, 424))).all()
+
+
+def test_it_runs_in_real_time(shown: Window, world: pv.World) -> None:
+    shown.paused = False
+    for _ in range(5):
+        shown.turn()
+    assert world.frames >= 4  # each turn waits for the next frame to be due
+
+
+def test_space_pauses_and_resumes(shown: Window, world: pv.World) -> None:
+    shown.turn()
+    assert world.frames == 0
+    press(shown, pygame.K_SPACE)
+    assert not shown.paused
+    for _ in range(3):
+        shown.turn()
+    assert world.frames > 0
+    press(shown, pygame.K_SPACE)
+    frames = world.frames
+    shown.turn()
+    assert world.frames == frames
+
+
+def test_period_steps_once_and_r_resets(shown: Window, world: pv.World) -> None:
+    before = world.state_hash()
+    world.velocity[0] = (0, 5)
+    window = shown
+    press(window, pygame.K_PERIOD)
+    press(window, pygame.K_PERIOD)
+    assert world.frames == 2
+    press(window, pygame.K_r)
+    assert world.state_hash() == before
+
+
+@pytest.mark.parametrize("key", ["K_q", "K_ESCAPE"])
+def test_quitting_by_key(shown: Window, key: str) -> None:
+    press(shown, getattr(pygame, key))
+    assert shown.ended
+
+
+def test_closing_ends_run_and_lets_go(shown: Window, world: pv.World) -> None:
+    mouse(shown, pygame.MOUSEBUTTONDOWN, shown._seen().to_screen(world.position[4]), button=1)
+    assert len(world.forces) == 1
+    pygame.event.post(pygame.event.Event(pygame.QUIT))
+    shown.run()
+    assert not world.forces
+    assert not pygame.display.get_init()
+
+
+def test_a_drag_lifts_the_circle(shown: Window, world: pv.World) -> None:
+    shown.turn()
+    start = shown._seen().to_screen(world.position[4])
+    mouse(shown, pygame.MOUSEBUTTONDOWN, start, button=1)
+    mouse(shown, pygame.MOUSEMOTION, start - (0, 100), rel=(0, -100), buttons=(1, 0, 0))
+    for _ in range(60):
+        shown._advance()
+    assert world.position[4, 1] > 2.0
+    assert np.delete(world.position[:, 1], 4).max() < 0.6
+    mouse(shown, pygame.MOUSEBUTTONUP, start, button=1)
+    assert not world.forces
+
+
+def test_a_poke_pushes_away(shown: Window, world: pv.World, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pygame.key, "get_mods", lambda: pygame.KMOD_LSHIFT)
+    shown.turn()
+    mouse(shown, pygame.MOUSEBUTTONDOWN, shown._seen().to_screen((0.3, 0.5)), button=1)
+    for _ in range(3):
+        shown._advance()
+    assert world.velocity[4, 0] < -0.1
+
+
+def test_the_wheel_zooms_the_right_button_moves_and_f_fits(shown: Window) -> None:
+    shown.turn()
+    whole = shown._seen()
+    pygame.event.post(pygame.event.Event(pygame.MOUSEWHEEL, x=0, y=2, flipped=False))
+    shown.turn()
+    assert shown._seen().scale == pytest.approx(1.15**2 * whole.scale)
+    left = shown._seen().left
+    mouse(shown, pygame.MOUSEMOTION, (9, 9), rel=(30, 0), buttons=(0, 0, 1))
+    assert shown._seen().left == pytest.approx(left - 30 / shown._seen().scale)
+    press(shown, pygame.K_f)
+    assert shown._seen() == whole
+
+
+def test_another_size_is_filled(shown: Window, world: pv.World) -> None:
+    pygame.display.set_mode((200, 100), pygame.RESIZABLE)
+    pygame.event.post(pygame.event.Event(pygame.VIDEORESIZE, w=200, h=100, size=(200, 100)))
+    shown.turn()
+    screen = pygame.surfarray.array3d(pygame.display.get_surface()).swapaxes(0, 1)
+    assert (screen == world.to_image(size=(200, 100))).all()
+
+
+def test_the_title_bar_tells_the_numbers(shown: Window) -> None:
+    shown.turn()
+    assert pygame.display.get_caption()[0] == "pyverlet: paused, 9 circles, 0.00 s, physics 0.0 ms"
+
+
+def test_an_error_stops_the_world_not_the_window(shown: Window, world: pv.World) -> None:
+    world.velocity[2] = np.nan
+    press(shown, pygame.K_PERIOD)
+    assert "particle 2 turned non-finite" in str(shown.error)
+    shown._caption_due = 0.0
+    shown.turn()
+    assert "particle 2" in pygame.display.get_caption()[0]
+    press(shown, pygame.K_r)
+    assert str(shown.error) == "None"
+    press(shown, pygame.K_PERIOD)
+    assert world.frames == 1
+
+
+def test_on_the_command_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    asked: list[Any] = []
+    monkeypatch.setattr(windows, "show", lambda build, **options: asked.append((build(), options)))
+    assert main(["run", "box", "--window", "--particles", "20", "--dt", "1/100"]) == 0
+    ((world, options),) = asked
+    assert (len(world), options["title"], options["dt"]) == (20, "box", 0.01)
+    assert "space pause" in capsys.readouterr().err
+    assert main(["run", "image", "--window", "--particles", "30"]) == 0
+    _, options = asked[1]
+    assert len(options["colour"].colours(asked[1][0], None)) == 30
+    assert main(["run", "--window", "--json"]) == 2
+    assert main(["run", "--window", "--port", "80"]) == 2
+
+
+def test_show_builds_and_runs(world: pv.World, monkeypatch: pytest.MonkeyPatch) -> None:
+    ran: list[Window] = []
+    monkeypatch.setattr(Window, "run", lambda window: ran.append(window))
+    windows.show(lambda: world, title="nine", size=(64, 64))
+    assert ran[0]._title == "nine"
+    pygame.display.quit()
+
+
+def test_without_a_screen_there_is_one_sentence(world: pv.World, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "nonesuch")
+    with pytest.raises(pv.PyverletError, match="no window can be opened"):
+        Window(world)
+
+
+def test_a_missing_extra_names_the_command(world: pv.World, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda module: None)
+    with pytest.raises(pv.InputError, match=r"pip install 'pyverlet\[window\]'"):
+        Window(world)
