@@ -27,9 +27,9 @@ class Progress:
 
     def __init__(self, text: str) -> None:
         self._text = text
-        self._started = monotonic()
         self._live = sys.stderr.isatty()
-        self._next = self._started + QUIET_S
+        self._next = monotonic() + QUIET_S
+        self._first: tuple[float, int] | None = None
         self._width = 0
 
     def __enter__(self) -> Progress:
@@ -38,12 +38,14 @@ class Progress:
     def __call__(self, done: int, total: int) -> None:
         """Say that `done` of `total` are done."""
         now = monotonic()
+        # Measured from the first call: what came before it, such as compiling, says nothing about the rest.
+        then, before = self._first = self._first or (now, done)
         if now < self._next:
             return
         self._next = now + (EVERY_S if self._live else EVERY_LOGGED_S)
-        left = (now - self._started) * (total - done) / max(done, 1)
+        left = f", {_duration((now - then) * (total - done) / (done - before))} left" if done > before else ""
         bar = f" [{'#' * (BAR * done // max(total, 1)):.<{BAR}}]" if self._live else ""
-        line = f"{self._text}: {done} of {total}{bar}, {_duration(left)} left"
+        line = f"{self._text}: {done} of {total}{bar}{left}"
         sys.stderr.write(f"\r{line:<{self._width}}" if self._live else f"{line}\n")
         sys.stderr.flush()
         self._width = max(self._width, len(line))
