@@ -70,10 +70,7 @@ class _Walls(Boundary):
 
     def _confine(self, kernel: Any, shape: Sequence[float], state: Slots, h: float, lag: float, rest_speed: float) -> None:
         real = state.real
-        kernel(
-            *map(real, shape), state.position, state.velocity, state.acceleration, state.spin, state.radius,
-            state.inverse_mass, state.resting, *map(real, (h, lag, self.restitution, self.friction, rest_speed)),
-        )  # fmt: skip
+        kernel(*map(real, shape), state.bodies(), *map(real, (h, lag, self.restitution, self.friction, rest_speed)))
 
 
 class Circle(_Walls):

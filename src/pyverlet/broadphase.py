@@ -32,7 +32,7 @@ class PairList:
     """Candidate pairs by strip: slots pair_i[k], pair_j[k] for k in first[s] to first[s] + count[s].
 
     `meeting`, `touching` and `impulse` are where the contact solver notes, by strip too, how each stands, which of them touch and
-    how hard.
+    how hard; `spent` (strips, 2) what energy impacts and friction have taken, J.
     """
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
@@ -40,6 +40,7 @@ class PairList:
         self.first = np.zeros(0, np.int64)
         self.count = np.zeros(0, np.int64)
         self.touches = np.zeros(0, np.int64)
+        self.spent = np.zeros((0, 2))
         self.make_room(0)
 
     def make_room(self, pairs: int) -> None:
@@ -53,6 +54,9 @@ class PairList:
     def set_strips(self, strips: int) -> None:
         """Begin a new list of this many strips."""
         self.first, self.count, self.touches = (np.zeros(strips, np.int64) for _ in range(3))
+        spent = self.spent.sum(axis=0)
+        self.spent = np.zeros((strips, 2))
+        self.spent[0] = spent
 
     def pairs(self) -> Array:
         """(k, 2) slots of all candidate pairs; a copy, for tests and measurements."""
@@ -106,7 +110,11 @@ class _AllPairs(BroadPhase):
 
     def _fill(self, state: Slots) -> int:
         pairs = self.list
-        found = int(grid.list_all_pairs(state.position, state.radius, state.inverse_mass, pairs.pair_i, pairs.pair_j))
+        found = int(
+            grid.list_all_pairs(
+                state.position, state.radius, state.inverse_mass, state.category, state.mask, pairs.pair_i, pairs.pair_j
+            )
+        )
         pairs.set_strips(1)
         pairs.count[0] = found
         return found
@@ -239,9 +247,9 @@ class _SortedCells(BroadPhase):
             self._reserve(len(state))
         while True:
             grid.list_pairs(
-                state.position, state.radius, state.inverse_mass, start, layout.columns, layout.rows, strip_row, skin,
-                self._room, COLOUR_SLOTS, self._raw_i, self._raw_j, self._colour, pairs.pair_i, pairs.pair_j,
-                pairs.first, pairs.count,
+                state.position, state.radius, state.inverse_mass, state.category, state.mask, start, layout.columns,
+                layout.rows, strip_row, skin, self._room, COLOUR_SLOTS, self._raw_i, self._raw_j, self._colour,
+                pairs.pair_i, pairs.pair_j, pairs.first, pairs.count,
             )  # fmt: skip
             held = np.diff(start[strip_row * layout.columns])
             if (pairs.count <= held * self._room).all():

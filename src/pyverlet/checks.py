@@ -110,6 +110,34 @@ def positive(name: str, array: NDArray[Any], *, infinite_is: str = "") -> None:
         raise InputError(f"{name}[{first}] is {array[first]:g}; allowed is {allowed}")
 
 
+def within(name: str, array: NDArray[Any], least: float, most: float) -> None:
+    """Refuse values outside [least, most], NaN and infinity."""
+    wrong = ~((array >= least) & (array <= most) & np.isfinite(array))
+    if wrong.any():
+        first = int(np.flatnonzero(wrong)[0])
+        allowed = f"a number from {least:g} to {most:g}" if math.isfinite(most) else f"a finite number of at least {least:g}"
+        raise InputError(f"{name}[{first}] is {array[first]:g}; allowed is {allowed}")
+
+
+def at_most(name: str, array: NDArray[Any], most: float) -> None:
+    """Refuse values above `most`, and NaN."""
+    wrong = ~(array <= most)
+    if wrong.any():
+        first = int(np.flatnonzero(wrong)[0])
+        raise InputError(f"{name}[{first}] is {array[first]:g}; allowed is a number up to {most:g}")
+
+
+def bits(name: str, value: ArrayLike, count: int) -> NDArray[np.uint32]:
+    """A (n,) array of 32 bits each, from whole numbers of 0 to 2^32 - 1: `count` of them or one for all."""
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        raise InputError(f"{name} is not an array of numbers; allowed are whole numbers of 32 bits, 0 to 4294967295") from None
+    if array.dtype.kind not in "iu" or (array.size and not (int(array.min()) >= 0 and int(array.max()) < 2**32)):
+        raise InputError(f"{name} is {value!r}; allowed are whole numbers of 32 bits, 0 to 4294967295")
+    return column(name, array, np.dtype(np.uint32), count)
+
+
 def _array(name: str, value: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
     try:
         return np.asarray(value, dtype=dtype)

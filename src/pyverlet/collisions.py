@@ -11,7 +11,7 @@ from pyverlet import checks
 from pyverlet.broadphase import BruteForce, Fast
 from pyverlet.constants import GROWTH, LARGEST_PUSH, REST_ACCELERATIONS, SMALLEST
 from pyverlet.errors import InputError
-from pyverlet.kernels import contacts
+from pyverlet.kernels import contacts, impacts
 from pyverlet.state import Slots, State
 
 
@@ -70,7 +70,7 @@ class ContactSolver:
             growth = np.minimum(real(GROWTH), real(10 * GROWTH) * state.grown)
             np.minimum(state.grown + growth * real(h), 1, out=state.grown)
             state.resize()
-        if self.settings.friction > 0.0:
+        if self._rubs(state):
             state.start[:] = state.position
 
     def find(self, state: Slots) -> None:
@@ -82,28 +82,35 @@ class ContactSolver:
         pairs, real = self.broad_phase.list, state.real
         moving, bodies = (state.position, state.velocity), (state.size, state.inverse_mass)
         which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
-        e = self.settings.restitution
         push = (real(1 / h), real(LARGEST_PUSH))
         notes = (pairs.touching, pairs.impulse, pairs.touches)
-        if e == 0.0:
+        if not self._bounces(state):
             contacts.project(*moving, *bodies, *which, *push, *notes)
         else:
             rest_speed = REST_ACCELERATIONS * strongest * h
-            settings = (real(h), real(lag), real(e), real(rest_speed))
-            contacts.impacts(*moving, state.acceleration, *bodies, *which, *settings, state.fed, pairs.meeting, pairs.impulse)
+            settings = (real(h), real(lag), real(self.settings.restitution), real(rest_speed))
+            found = (state.fed, pairs.meeting, pairs.impulse, pairs.spent)
+            impacts.impacts(*moving, state.acceleration, *bodies, state.restitution, *which, *settings, *found)
             state.fed[:] = 0
-            contacts.project_resting(*moving, *bodies, *which, *push, pairs.meeting, state.fed, *notes)
+            slow = real(1 / h if strongest > 0 else 0.0)
+            contacts.project_resting(*moving, *bodies, *which, *push, slow, pairs.meeting, state.fed, *notes)
 
     def still(self, state: Slots, h: float) -> None:
         """Take from touching circles the velocity that projection has put in, and rub them."""
         pairs, real = self.broad_phase.list, state.real
         which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
-        e, mu = self.settings.restitution, self.settings.friction
-        if e == 0.0 and mu == 0.0:
+        if not self._bounces(state) and not self._rubs(state):
             contacts.still(state.position, state.velocity, state.inverse_mass, *which, pairs.touching, pairs.touches)
         else:
             where = (state.position, state.velocity, state.spin, state.radius, state.inverse_mass)
-            contacts.rub(state.start, *where, *which, real(h), real(mu), pairs.touching, pairs.impulse, pairs.touches)
+            notes = (pairs.touching, pairs.impulse, pairs.touches, pairs.spent)
+            contacts.rub(state.start, *where, state.friction, *which, real(h), real(self.settings.friction), *notes)
+
+    def _bounces(self, state: Slots) -> bool:
+        return self.settings.restitution > 0.0 or state.most_restitution > 0.0
+
+    def _rubs(self, state: Slots) -> bool:
+        return self.settings.friction > 0.0 or state.most_friction > 0.0
 
     def mark_resting(self, state: Slots) -> None:
         """Set `state.resting` for particles that touch another without bouncing off it."""

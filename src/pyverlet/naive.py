@@ -18,7 +18,7 @@ from pyverlet.state import Slots
 Array = NDArray[Any]
 
 
-class _Naive(Boundary):
+class Naive(Boundary):
     """A room of another boundary's shape.
 
     Args:
@@ -62,7 +62,7 @@ class _Naive(Boundary):
         return f"{type(self).__name__}({self.room!r})"
 
 
-class ClampAndFlip(_Naive):
+class ClampAndFlip(Naive):
     """Put the circle back on the wall and turn the normal velocity round, times e. For demonstration.
 
     Under gravity g even e = 1 does not keep the energy. A method whose velocity belongs to the time of the position gains m g d
@@ -76,7 +76,7 @@ class ClampAndFlip(_Naive):
     _flip = True
 
 
-class ProjectOnly(_Naive):
+class ProjectOnly(Naive):
     """Put the circle back on the wall and nothing else, as if x - x_prev were all a particle knows. For demonstration.
 
     The shift d enters the velocity as d / h. An arriving circle ends at rest on the wall, whatever its speed: its restitution

@@ -14,11 +14,18 @@ from numpy.typing import NDArray
 
 from pyverlet.constants import SERIAL_BELOW
 from pyverlet.kernels import motion
+from pyverlet.kernels.bounds import Bodies
 
 Array = NDArray[Any]
 
 _ROWS = ("position", "velocity", "acceleration")
-_COLUMNS = ("spin", "radius", "mass", "grown")
+_COLUMNS = ("spin", "radius", "mass", "grown", "restitution", "friction")
+_MARKS = ("category", "mask")
+
+EVERYONE = 0xFFFFFFFF
+"""A mask of 32 bits that takes every category."""
+
+_DEFAULTS: dict[str, Any] = {"grown": 1, "restitution": -1, "friction": -1, "category": 1, "mask": EVERYONE}
 
 
 class State:
@@ -32,6 +39,8 @@ class State:
         radius: (n,) m.
         mass: (n,) kg; infinity pins the particle.
         grown: (n,) part of the radius that other circles feel; less than 1 for those that were added on top of another.
+        restitution, friction: (n,) of circles that have values of their own; negative: as `Collisions` and the bounds say.
+        category, mask: (n,) 32 bits each; two circles collide if each has a bit of its category in the other's mask.
     """
 
     position: Array
@@ -41,11 +50,16 @@ class State:
     radius: Array
     mass: Array
     grown: Array
+    restitution: Array
+    friction: Array
+    category: Array
+    mask: Array
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self.dtype = dtype
         self._store: dict[str, Array] = {name: np.empty((0, 2), dtype) for name in _ROWS}
         self._store |= {name: np.empty(0, dtype) for name in _COLUMNS}
+        self._store |= {name: np.empty(0, np.uint32) for name in _MARKS}
         self._show(0)
 
     def __len__(self) -> int:
@@ -57,7 +71,7 @@ class State:
             yield name, getattr(self, name)
 
     def append(self, values: dict[str, Array]) -> slice:
-        """Add particles; `values` holds an array for each name. Returns where they stand."""
+        """Add particles; `values` holds an array for each name, but for those that have a default. Returns where they stand."""
         start = len(self)
         stop = start + len(values["radius"])
         capacity = len(self._store["radius"])
@@ -65,10 +79,10 @@ class State:
             # Doubling: adding one by one costs O(1) each on average.
             capacity = max(stop, 2 * capacity)
             for name, old in self._store.items():
-                self._store[name] = np.empty((capacity, *old.shape[1:]), self.dtype)
+                self._store[name] = np.empty((capacity, *old.shape[1:]), old.dtype)
                 self._store[name][:start] = old[:start]
         self._show(stop)
-        for name, value in values.items():
+        for name, value in (_DEFAULTS | values).items():
             getattr(self, name)[start:stop] = value
         return slice(start, stop)
 
@@ -82,13 +96,17 @@ class Slots:
 
     Attributes:
         particle: (n,) the user's index of the particle in each slot.
-        position, velocity, acceleration, spin, radius, mass, grown: as in State.
+        position, velocity, acceleration, spin, radius, mass, grown, restitution, friction: as in State.
+        category, mask: as in State, or empty while every circle collides with every other.
+        most_restitution, most_friction: the largest of their columns; negative if no circle has values of its own.
         size: (n,) grown * radius, m: what contacts between particles take as the radius.
         inverse_mass: (n,) 1/kg; 0 for a pinned particle.
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
         start: (n, 2) positions before the integration of this substep, m. Kept only if circles rub.
         fed: (n,) 1 where a contact at rest fed the velocity in the last substep: it carries weight. Kept only if circles bounce.
         resting: (n,) 1 where a contact without bounce held the particle in the last substep.
+        hits: (n,) largest speed with which the circle met a wall in this frame, m/s; negative: none.
+        spent: (n, 2) energy that impacts on walls, and friction there, have taken in this frame, J, negative.
     """
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
@@ -109,6 +127,10 @@ class Slots:
         self.size = self.radius
         self.resting = np.zeros(count, np.uint8)
         self.fed = np.zeros(count, np.uint8)
+        self.hits = np.full(count, -1, self.dtype)
+        self.spent = np.zeros((count, 2))
+        self.category = self.mask = np.empty(0, np.uint32)
+        self.most_restitution = self.most_friction = -1.0
         self._scratch: list[Array] = []
         self._slot_of: Array | None = None
 
@@ -121,6 +143,8 @@ class Slots:
     radius: Array
     mass: Array
     grown: Array
+    restitution: Array
+    friction: Array
     inverse_mass: Array
 
     def gather(self, state: State) -> bool:
@@ -137,8 +161,21 @@ class Slots:
             with np.errstate(divide="ignore"):  # a mass of 0 is refused by the world, with a sentence
                 np.divide(1, self.mass, out=self.inverse_mass)
             changed = True
+        for name in ("restitution", "friction"):
+            motion.take_checking(getattr(self, name), getattr(state, name), self.particle)
+            setattr(self, f"most_{name}", float(getattr(self, name).max(initial=-1.0)))
+        changed |= self._take_marks(state)
         self.resize()
         return bool(resized or changed)
+
+    def _take_marks(self, state: State) -> bool:
+        if (state.category == 1).all() and (state.mask == EVERYONE).all():
+            changed = len(self.category) > 0
+            self.category = self.mask = np.empty(0, np.uint32)
+            return changed
+        before = (self.category, self.mask)
+        self.category, self.mask = state.category[self.particle], state.mask[self.particle]
+        return not (np.array_equal(before[0], self.category) and np.array_equal(before[1], self.mask))
 
     def resize(self) -> None:
         """Bring `size` up to date with `grown`."""
@@ -159,8 +196,10 @@ class Slots:
             motion.take_rows(new, old, order)
             setattr(self, name, new)
             self._scratch[0] = old
-        for name in ("spin", "radius", "mass", "inverse_mass", "particle", "resting", "fed", "start", "grown"):
+        for name in (*_COLUMNS, "inverse_mass", "particle", "resting", "fed", "start", "hits", "spent"):
             setattr(self, name, getattr(self, name)[order])
+        if len(self.category):
+            self.category, self.mask = self.category[order], self.mask[order]
         self.resize()
         self._slot_of = None
 
@@ -179,6 +218,10 @@ class Slots:
         while len(self._scratch) <= number:
             self._scratch.append(np.empty_like(self.position))
         return self._scratch[number]
+
+    def bodies(self) -> Bodies:
+        """What walls need of the particles."""
+        return Bodies(*(getattr(self, name) for name in Bodies._fields))
 
     def slot_of(self, particle: int) -> int:
         """The slot that holds the user's particle."""
@@ -203,6 +246,22 @@ def farthest(position: Array, reference: Array) -> float:
     return float(np.sqrt(motion.farthest_parallel(position, reference)))
 
 
+class Column:
+    """A property of a group, or of the whole world: a view on its part of one of the state's arrays. Setting it copies."""
+
+    def __init__(self, doc: str) -> None:
+        self.__doc__ = doc
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, group: Any, owner: type) -> Array:
+        return getattr(group._state, self._name)[group._where]  # type: ignore[no-any-return]
+
+    def __set__(self, group: Any, value: Any) -> None:
+        getattr(group._state, self._name)[group._where] = value
+
+
 class Group:
     """A handle on particles that were added together; valid whatever order the engine keeps inside.
 
@@ -225,47 +284,12 @@ class Group:
         """(n,) indices of these particles among all of the world's."""
         return np.arange(self._where.start, self._where.stop)
 
-    @property
-    def position(self) -> Array:
-        """(n, 2) centres, m."""
-        return self._state.position[self._where]
-
-    @position.setter
-    def position(self, value: Any) -> None:
-        self._state.position[self._where] = value
-
-    @property
-    def velocity(self) -> Array:
-        """(n, 2) m/s."""
-        return self._state.velocity[self._where]
-
-    @velocity.setter
-    def velocity(self, value: Any) -> None:
-        self._state.velocity[self._where] = value
-
-    @property
-    def spin(self) -> Array:
-        """(n,) angular velocity, rad/s, counter-clockwise."""
-        return self._state.spin[self._where]
-
-    @spin.setter
-    def spin(self, value: Any) -> None:
-        self._state.spin[self._where] = value
-
-    @property
-    def radius(self) -> Array:
-        """(n,) m."""
-        return self._state.radius[self._where]
-
-    @radius.setter
-    def radius(self, value: Any) -> None:
-        self._state.radius[self._where] = value
-
-    @property
-    def mass(self) -> Array:
-        """(n,) kg; infinity pins a particle."""
-        return self._state.mass[self._where]
-
-    @mass.setter
-    def mass(self, value: Any) -> None:
-        self._state.mass[self._where] = value
+    position = Column("(n, 2) centres, m.")
+    velocity = Column("(n, 2) m/s.")
+    spin = Column("(n,) angular velocity, rad/s, counter-clockwise.")
+    radius = Column("(n,) m.")
+    mass = Column("(n,) kg; infinity pins a particle.")
+    restitution = Column("(n,) e of these circles; negative: as the world's `Collisions` and bounds say.")
+    friction = Column("(n,) mu of these circles; negative: as the world's `Collisions` and bounds say.")
+    category = Column("(n,) uint32, the bits of what these circles are.")
+    mask = Column("(n,) uint32, the bits of the categories they collide with.")

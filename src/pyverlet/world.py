@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike, NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from pyverlet import _jit, checks
 from pyverlet.bounds import Boundary, Open
@@ -20,8 +20,9 @@ from pyverlet.errors import InputError, NonFiniteError
 from pyverlet.forces import Force, ForceSum
 from pyverlet.integrators import Integrator, PositionVerlet
 from pyverlet.kernels import measure, motion
+from pyverlet.particles import Particles
 from pyverlet.profile import Profile
-from pyverlet.state import Group, Slots, State
+from pyverlet.state import Slots, State
 
 Array = NDArray[Any]
 
@@ -41,7 +42,7 @@ class Saved:
     neighbours: Any
 
 
-class World(Doors):
+class World(Particles, Doors):
     """Particles in a room, and the laws they follow. SI units, y up.
 
     Args:
@@ -140,7 +141,12 @@ class World(Doors):
             self.step(dt)
 
     def _gather(self) -> None:
-        if not self._slots.gather(self._state):
+        changed = self._slots.gather(self._state)
+        if not self._slots.most_restitution <= 1.0:
+            checks.at_most("restitution", self._state.restitution, 1.0)
+        if not self._slots.most_friction < np.inf:
+            checks.at_most("friction", self._state.friction, float(np.finfo(self.dtype).max))
+        if not changed:
             return
         try:
             checks.positive("radius", self._state.radius)
@@ -177,78 +183,6 @@ class World(Doors):
         if self._contacts:
             self._contacts.broad_phase.forget()
         self._frame(h, look)
-
-    # ---- particles -----------------------------------------------------------------------------------------------------
-
-    def add(
-        self,
-        *,
-        position: ArrayLike,
-        velocity: ArrayLike = 0.0,
-        radius: ArrayLike = 0.5,
-        mass: ArrayLike = 1.0,
-        spin: ArrayLike = 0.0,
-    ) -> Group:
-        """Add particles.
-
-        Args:
-            position: (n, 2) or (2,), centres, m.
-            velocity: (n, 2), (2,) or 0, m/s.
-            radius: (n,) or one for all, m, greater than 0.
-            mass: (n,) or one for all, kg, greater than 0; infinity pins the particle.
-            spin: (n,) or one for all, rad/s, counter-clockwise.
-
-        Returns:
-            A handle whose arrays are views on these particles, in the order given.
-
-        Raises:
-            InputError: shapes disagree, a value is not finite, or a circle does not fit into the boundary; nothing is added.
-        """
-        dtype = self._state.dtype
-        where = checks.rows("position", position, dtype)
-        count = len(where)
-        values = {
-            "position": where,
-            "velocity": checks.rows("velocity", velocity, dtype, count),
-            "acceleration": np.full((count, 2), np.nan, dtype),
-            "spin": checks.column("spin", spin, dtype, count),
-            "radius": checks.column("radius", radius, dtype, count),
-            "mass": checks.column("mass", mass, dtype, count),
-            "grown": np.ones(count, dtype),
-        }
-        checks.rows("spin", np.column_stack((values["spin"], values["spin"])), dtype, count)
-        checks.positive("radius", values["radius"])
-        checks.positive("mass", values["mass"], infinite_is="pinned")
-        self.boundary.check(values["radius"])
-        return Group(self._state, self._state.append(values))
-
-    def __len__(self) -> int:
-        return len(self._state)
-
-    @property
-    def position(self) -> Array:
-        """(n, 2) centres of all particles in the order they were added, m; a view."""
-        return self._state.position
-
-    @property
-    def velocity(self) -> Array:
-        """(n, 2) m/s; a view."""
-        return self._state.velocity
-
-    @property
-    def spin(self) -> Array:
-        """(n,) angular velocity, rad/s, counter-clockwise; a view."""
-        return self._state.spin
-
-    @property
-    def radius(self) -> Array:
-        """(n,) m; a view."""
-        return self._state.radius
-
-    @property
-    def mass(self) -> Array:
-        """(n,) kg, infinite where pinned; a view."""
-        return self._state.mass
 
     # ---- laws ----------------------------------------------------------------------------------------------------------
 

@@ -16,8 +16,6 @@ from pyverlet.lab.physics import energy, friction, gas, lost
 
 # Promises that do not hold yet. Strict: the first run in which one holds fails until its line here is removed.
 BROKEN = {
-    "gas-angular-momentum": "impacts move a pair along the normal of the end of the substep, not back to the impact",
-    "rest-cage": "a frictionless pile in a round cage swings as a whole: 1.4e-4 m g R",
     "rest-column": "a column of 100 breathes for some 30 s before it rests: 7e-3 m g R after 10 s",
     "left-alone": "a frictionless pile creeps by 0.4 R in 30 s",
     "left-alone-rough": "single circles of a pile with friction roll by 1.4 R in 30 s",
@@ -27,7 +25,6 @@ BROKEN = {
     "heavy-on-smooth-bed": "overlap 11 % below the heavy circle",
     "repose": "heaps with friction creep, so that their angle hardly depends on it",
     "energy-scenes": "at 1 and 2 substeps contacts add energy",
-    "energy-gas": "at 1 substep an elastic gas under gravity gains energy in a frame",
     "energy-overlapped": "4e-3 of the scale in the frame of a crash",
     "energy-coincident": "6e-3 of the scale in the frame of a crash",
 }

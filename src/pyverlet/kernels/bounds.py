@@ -8,18 +8,45 @@ with e = 1 keeps its energy to rounding. Slower than `rest_speed`, or without ti
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from pyverlet._jit import kernel, parallel_kernel, prange
 
 
+class Bodies(NamedTuple):
+    """What walls need to know of the circles, and note about them; as in `pyverlet.state.Slots`."""
+
+    position: Any
+    velocity: Any
+    acceleration: Any
+    spin: Any
+    radius: Any
+    inverse_mass: Any
+    restitution: Any
+    friction: Any
+    resting: Any
+    hits: Any
+    spent: Any
+
+
 @kernel
-def meet(i, nx, ny, depth, position, velocity, acceleration, spin, radius, inverse_mass, resting, h, lag, e, mu, rest_speed):
-    """Circle i is `depth` > 0 beyond a wall of normal (nx, ny): bounce it or hold it, with friction mu."""
+def meet(i, nx, ny, depth, bodies, h, lag, e, mu, rest_speed):
+    """Circle i is `depth` > 0 beyond a wall of normal (nx, ny): bounce it or hold it, with friction mu.
+
+    A circle with a restitution or friction of its own (not negative) changes the wall's: the larger e, the geometric mean of mu.
+    bodies.hits[i] becomes the largest speed it hit with; bodies.spent[i] gains the energy that impact and friction took, J.
+    """
+    position, velocity, spin, radius = bodies.position, bodies.velocity, bodies.spin, bodies.radius
     zero = h - h
     two = position.dtype.type(2)
     three = position.dtype.type(3)
-    an = acceleration[i, 0] * nx + acceleration[i, 1] * ny
+    e = max(e, bodies.restitution[i])
+    if bodies.friction[i] >= zero:
+        mu = np.sqrt(mu * bodies.friction[i])
+    mass = 1.0 / np.float64(bodies.inverse_mass[i])
+    an = bodies.acceleration[i, 0] * nx + bodies.acceleration[i, 1] * ny
     # The velocity at the time of the position; integrators of Stormer's kind carry one that lags behind.
     vn = velocity[i, 0] * nx + velocity[i, 1] * ny + lag * an
     before = vn - lag * an
@@ -27,16 +54,18 @@ def meet(i, nx, ny, depth, position, velocity, acceleration, spin, radius, inver
     hit = np.sqrt(max(square, zero))
     after = zero
     shift = depth
+    bodies.hits[i] = max(bodies.hits[i], hit if vn < zero else zero)
     if e * hit > rest_speed and vn < zero:
         time = min(two * depth / (hit - vn), h)
         leaving = e * hit
         travelled = leaving * time + an * time * time / two
-        if travelled > zero:
+        if travelled >= zero:
             after = leaving + an * time - lag * an
             shift = depth + travelled
+            bodies.spent[i, 0] -= 0.5 * mass * (hit * hit - leaving * leaving)
     held = after == zero
     if held:
-        resting[i] = 1
+        bodies.resting[i] = 1
         after = max(before, zero)
     position[i, 0] += shift * nx
     position[i, 1] += shift * ny
@@ -50,61 +79,105 @@ def meet(i, nx, ny, depth, position, velocity, acceleration, spin, radius, inver
         velocity[i, 0] += rub * ny
         velocity[i, 1] -= rub * nx
         spin[i] += two * rub / radius[i]
+        bodies.spent[i, 1] += mass * rub * (slip + 1.5 * rub)
         if held:
             position[i, 0] += h * rub * ny
             position[i, 1] -= h * rub * nx
 
 
-@parallel_kernel
-def circle(x0, y0, size, position, velocity, acceleration, spin, radius, inverse_mass, resting, h, lag, e, mu, rest_speed):
-    """A cage: everything stays inside the circle of radius `size` about (x0, y0)."""
+@kernel
+def impact_time(dx, dy, vx, vy, ax, ay, reach, h):
+    """Seconds ago, 0 to h, at which the distance |d - v t + a t^2 / 2| was `reach`, for a path that has just crossed it."""
     zero = h - h
-    for i in prange(position.shape[0]):
-        resting[i] = 0
-        dx = x0 - position[i, 0]
-        dy = y0 - position[i, 1]
-        room = size - radius[i]
-        square = dx * dx + dy * dy
-        if square > room * room and inverse_mass[i] > zero:
-            distance = np.sqrt(square)
-            meet(i, dx / distance, dy / distance, distance - room, position, velocity, acceleration, spin, radius, inverse_mass,
-                 resting, h, lag, e, mu, rest_speed)  # fmt: skip
-            # Faster than a room width a substep one reflection is not enough: what is still outside waits at the wall.
-            dx = position[i, 0] - x0
-            dy = position[i, 1] - y0
-            distance = np.sqrt(dx * dx + dy * dy)
-            if distance > size:
-                position[i, 0] = x0 + dx * (room / distance)
-                position[i, 1] = y0 + dy * (room / distance)
+    half = h / (h + h)
+    gap = reach * reach - dx * dx - dy * dy
+    along = dx * vx + dy * vy
+    # On a straight path it is a quadratic equation, |v|^2 t^2 - 2 (d . v) t = gap, in the form that does not cancel.
+    time = abs(gap) / (abs(along) + np.sqrt(max(along * along + (vx * vx + vy * vy) * gap, zero)))
+    # Newton's method for the bend of the path: what is left of it after two steps is far below a rounding error.
+    for _ in range(2):
+        px = dx - time * (vx - half * time * ax)
+        py = dy - time * (vy - half * time * ay)
+        slope = px * (ax * time - vx) + py * (ay * time - vy)
+        if slope != zero:
+            time += half * (reach * reach - px * px - py * py) / slope
+    return min(max(time, zero), h)
 
 
-@parallel_kernel
-def box(x0, y0, x1, y1, position, velocity, acceleration, spin, radius, inverse_mass, resting, h, lag, e, mu, rest_speed):
-    """Four walls; in a corner both axes act, one after the other."""
+@kernel
+def _in_circle(i, x0, y0, size, bodies, h, lag, e, mu, rest_speed):
+    position, velocity, acceleration, radius = bodies.position, bodies.velocity, bodies.acceleration, bodies.radius
+    zero = h - h
+    half = h / (h + h)
+    bodies.resting[i] = 0
+    dx = position[i, 0] - x0
+    dy = position[i, 1] - y0
+    room = size - radius[i]
+    square = dx * dx + dy * dy
+    if square <= room * room or bodies.inverse_mass[i] <= zero:
+        return
+    distance = np.sqrt(square)
+    nx, ny, depth = -dx / distance, -dy / distance, distance - room
+    ax, ay = acceleration[i, 0], acceleration[i, 1]
+    vx, vy = velocity[i, 0] + lag * ax, velocity[i, 1] + lag * ay
+    if -(vx * nx + vy * ny) > rest_speed and room > zero:
+        # The wall it hit is the tangent where it hit, not where it would be now: that keeps the angular momentum.
+        time = impact_time(dx, dy, vx, vy, ax, ay, room, h)
+        px = dx - time * (vx - half * time * ax)
+        py = dy - time * (vy - half * time * ay)
+        reached = np.sqrt(px * px + py * py)
+        nx, ny = -px / reached, -py / reached
+        depth = max((px - dx) * nx + (py - dy) * ny, zero)
+    meet(i, nx, ny, depth, bodies, h, lag, e, mu, rest_speed)
+    # Faster than a room width a substep one reflection is not enough: what is still outside waits at the wall.
+    dx = position[i, 0] - x0
+    dy = position[i, 1] - y0
+    distance = np.sqrt(dx * dx + dy * dy)
+    if distance > size:
+        position[i, 0] = x0 + dx * (room / distance)
+        position[i, 1] = y0 + dy * (room / distance)
+
+
+@kernel
+def _in_box(i, x0, y0, x1, y1, bodies, h, lag, e, mu, rest_speed):
+    position = bodies.position
     zero = h - h
     one = h / h
-    for i in prange(position.shape[0]):
-        resting[i] = 0
-        r = radius[i]
-        if inverse_mass[i] > zero:
-            left = x0 + r - position[i, 0]
-            right = position[i, 0] - (x1 - r)
-            if left > zero:
-                meet(i, one, zero, left, position, velocity, acceleration, spin, radius, inverse_mass, resting,
-                     h, lag, e, mu, rest_speed)  # fmt: skip
-            elif right > zero:
-                meet(i, -one, zero, right, position, velocity, acceleration, spin, radius, inverse_mass, resting,
-                     h, lag, e, mu, rest_speed)  # fmt: skip
-            down = y0 + r - position[i, 1]
-            up = position[i, 1] - (y1 - r)
-            if down > zero:
-                meet(i, zero, one, down, position, velocity, acceleration, spin, radius, inverse_mass, resting,
-                     h, lag, e, mu, rest_speed)  # fmt: skip
-            elif up > zero:
-                meet(i, zero, -one, up, position, velocity, acceleration, spin, radius, inverse_mass, resting,
-                     h, lag, e, mu, rest_speed)  # fmt: skip
-            # As in the cage: what one reflection has sent beyond the other side waits at that wall.
-            if position[i, 0] < x0 or position[i, 0] > x1:
-                position[i, 0] = min(max(position[i, 0], x0 + r), x1 - r)
-            if position[i, 1] < y0 or position[i, 1] > y1:
-                position[i, 1] = min(max(position[i, 1], y0 + r), y1 - r)
+    bodies.resting[i] = 0
+    r = bodies.radius[i]
+    if bodies.inverse_mass[i] <= zero:
+        return
+    left = x0 + r - position[i, 0]
+    right = position[i, 0] - (x1 - r)
+    if left > zero:
+        meet(i, one, zero, left, bodies, h, lag, e, mu, rest_speed)
+    elif right > zero:
+        meet(i, -one, zero, right, bodies, h, lag, e, mu, rest_speed)
+    down = y0 + r - position[i, 1]
+    up = position[i, 1] - (y1 - r)
+    if down > zero:
+        meet(i, zero, one, down, bodies, h, lag, e, mu, rest_speed)
+    elif up > zero:
+        meet(i, zero, -one, up, bodies, h, lag, e, mu, rest_speed)
+    # As in the cage: what one reflection has sent beyond the other side waits at that wall.
+    if position[i, 0] < x0 or position[i, 0] > x1:
+        position[i, 0] = min(max(position[i, 0], x0 + r), x1 - r)
+    if position[i, 1] < y0 or position[i, 1] > y1:
+        position[i, 1] = min(max(position[i, 1], y0 + r), y1 - r)
+
+
+# The loops below only call: a store into an array of a tuple that stands in a parallel loop itself Numba drops, as dead code.
+
+
+@parallel_kernel
+def circle(x0, y0, size, bodies, h, lag, e, mu, rest_speed):
+    """A cage: everything stays inside the circle of radius `size` about (x0, y0)."""
+    for i in prange(bodies.position.shape[0]):
+        _in_circle(i, x0, y0, size, bodies, h, lag, e, mu, rest_speed)
+
+
+@parallel_kernel
+def box(x0, y0, x1, y1, bodies, h, lag, e, mu, rest_speed):
+    """Four walls; in a corner both axes act, one after the other."""
+    for i in prange(bodies.position.shape[0]):
+        _in_box(i, x0, y0, x1, y1, bodies, h, lag, e, mu, rest_speed)

@@ -10,10 +10,7 @@ Velocity: what projection feeds in must not become a bounce. A second pass sets 
 to 0, and applies Coulomb friction with the normal impulse the projection has found (Mueller et al. 2020, Detailed Rigid Body
 Simulation, section 3.5).
 
-Impact, when e > 0, comes before both, while velocities are still those of the motion: a pair that meets faster than contact at
-rest explains gets the impulse (1 + e) v_n, and the time left since is travelled with the new velocities, so that e = 1 keeps the
-kinetic energy to rounding, in whatever order the pairs come. Two circles that both carried weight a substep ago do not meet, they
-tremble: bouncing them keeps small ones in a pile rattling for ever.
+Impacts, when e > 0, come before both: kernels.impacts.
 
 Everything here runs strip by strip as kernels.grid explains: even strips in parallel, then odd ones.
 """
@@ -24,12 +21,10 @@ import numpy as np
 
 from pyverlet._jit import kernel, parallel_kernel, prange
 from pyverlet.constants import FED, HELD, PUSHED
+from pyverlet.kernels.impacts import APART, PARTING, part
 
 # Golden angle, rad: coincident centres part in directions spread evenly over the circle.
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
-
-# How a candidate pair stands at the end of the integration, before contacts have changed a velocity.
-_APART, _RESTING, _PARTING = 0, 1, 2
 
 # m^2 (m where a distance is meant): added to a divisor that is 0 for coincident centres. Below the rounding of any real distance.
 _TINY = 1e-30
@@ -82,74 +77,41 @@ def _project_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rat
 
 
 @kernel
-def _impact_strip(
-    position, velocity, acceleration, radius, inverse_mass, pair_i, pair_j, h, lag, e, rest_speed, fed, meeting, impulse
-):
-    zero = h - h
-    two = position.dtype.type(2)
-    for k in range(pair_i.shape[0]):
-        i, j = pair_i[k], pair_j[k]
-        dx = position[j, 0] - position[i, 0]
-        dy = position[j, 1] - position[i, 1]
-        reach = radius[i] + radius[j]
-        square = dx * dx + dy * dy
-        if square >= reach * reach:
-            meeting[k] = _APART
-            continue
-        impulse[k] = zero
-        distance = np.sqrt(square)
-        if distance == zero:
-            meeting[k] = _RESTING
-            continue
+def _make_room(position, velocity, radius, inverse_mass, i, j, slow, most, weight):
+    """Move i and j, on their way apart, to where they no longer overlap, without throwing them apart any faster.
+
+    Those without weight that will part by themselves, faster than `slow` times the gap, are left alone: moving them changes their
+    angular momentum.
+    """
+    zero = most - most
+    dx, dy = position[j, 0] - position[i, 0], position[j, 1] - position[i, 1]
+    reach = radius[i] + radius[j]
+    distance = np.sqrt(dx * dx + dy * dy)
+    if zero < distance < reach:
         nx, ny = dx / distance, dy / distance
-        # As at a wall (kernels.bounds): the impact lies in the past, under the relative acceleration an.
-        an = (acceleration[j, 0] - acceleration[i, 0]) * nx + (acceleration[j, 1] - acceleration[i, 1]) * ny
-        before = (velocity[j, 0] - velocity[i, 0]) * nx + (velocity[j, 1] - velocity[i, 1]) * ny
-        vn = before + lag * an
-        depth = reach - distance
-        hit = np.sqrt(max(vn * vn + two * an * depth, zero))
-        if fed[i] & fed[j]:
-            # Both carried weight a substep ago: what speed they have is the trembling of the pile, not an arrival.
-            meeting[k] = _RESTING
-        elif vn > rest_speed:
-            meeting[k] = _PARTING
-        elif vn >= zero or hit <= rest_speed:
-            meeting[k] = _RESTING
-        else:
-            time = min(two * depth / (hit - vn), h)
-            travelled = e * hit * time + an * time * time / two
-            w = inverse_mass[i] + inverse_mass[j]
-            shift = (depth + max(travelled, zero)) / w
-            kick = (e * hit + an * time - lag * an - before) / w
-            meeting[k] = _PARTING
-            impulse[k] = kick
-            _part(position, velocity, inverse_mass, i, j, nx, ny, shift, kick)
+        leaving = (velocity[j, 0] - velocity[i, 0]) * nx + (velocity[j, 1] - velocity[i, 1]) * ny
+        if weight or (slow > zero and leaving < (reach - distance) * slow):
+            shift = min(reach - distance, most * reach) / (inverse_mass[i] + inverse_mass[j])
+            part(position, velocity, inverse_mass, i, j, nx, ny, shift, zero)
 
 
 @kernel
-def _part(position, velocity, inverse_mass, i, j, nx, ny, shift, kick):
-    """Move i and j apart along n by `shift` per inverse mass, and their velocities by `kick`."""
-    wi, wj = inverse_mass[i], inverse_mass[j]
-    position[i, 0] -= shift * wi * nx
-    position[i, 1] -= shift * wi * ny
-    position[j, 0] += shift * wj * nx
-    position[j, 1] += shift * wj * ny
-    velocity[i, 0] -= kick * wi * nx
-    velocity[i, 1] -= kick * wi * ny
-    velocity[j, 0] += kick * wj * nx
-    velocity[j, 1] += kick * wj * ny
-
-
-@kernel
-def _rest_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rate, most, meeting, fed, touching, impulse):
+def _rest_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rate, most, slow, meeting, fed, touching, impulse):
     zero = rate - rate
     pushed, feed = position.dtype.type(PUSHED), position.dtype.type(FED) * rate
     count = 0
     for k in range(pair_i.shape[0]):
         i, j = pair_i[k], pair_j[k]
-        parting = meeting[k] == _PARTING
+        if meeting[k] == PARTING:
+            _make_room(position, velocity, radius, inverse_mass, i, j, slow, most, fed[i] | fed[j])
+            # At or before k: nothing that is still to be read is overwritten.
+            if impulse[k] > zero:
+                touching[count] = k
+                impulse[count] = -impulse[k]
+                count += 1
+            continue
         # A pair that has come together only now waits for the next substep, unless one of them carries weight.
-        if meeting[k] == _APART and not (fed[i] | fed[j]):
+        if meeting[k] == APART and not (fed[i] | fed[j]):
             continue
         dx = position[j, 0] - position[i, 0]
         dy = position[j, 1] - position[i, 1]
@@ -162,22 +124,12 @@ def _rest_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rate, 
             else:
                 nx, ny = dx / distance, dy / distance
             shift = min(reach - distance, most * reach) / (inverse_mass[i] + inverse_mass[j])
-            # Those already on their way are given room, but are not thrown apart any faster.
-            kick = zero if parting else shift * feed
-            shift = shift if parting else shift * pushed
-            _part(position, velocity, inverse_mass, i, j, nx, ny, shift, kick)
-        elif not parting:
-            continue
-        # At or before k: nothing that is still to be read is overwritten.
-        if not parting:
+            kick = shift * feed
+            part(position, velocity, inverse_mass, i, j, nx, ny, shift * pushed, kick)
             fed[i] = 1
             fed[j] = 1
             touching[count] = k
             impulse[count] = kick
-            count += 1
-        elif impulse[k] > zero:
-            touching[count] = k
-            impulse[count] = -impulse[k]
             count += 1
     return count
 
@@ -202,7 +154,16 @@ def _still_strip(position, velocity, inverse_mass, pair_i, pair_j, touching):
 
 
 @kernel
-def _rub_strip(start, position, velocity, spin, radius, inverse_mass, pair_i, pair_j, h, mu, touching, impulse):
+def _pair_friction(a, b, mu):
+    """The geometric mean of two circles' friction; mu, that of all, stands for one that is negative: not given."""
+    zero = mu - mu
+    if a < zero and b < zero:
+        return mu
+    return np.sqrt((a if a >= zero else mu) * (b if b >= zero else mu))
+
+
+@kernel
+def _rub_strip(start, position, velocity, spin, radius, inverse_mass, friction, pair_i, pair_j, h, mu, touching, impulse, spent):
     zero = h - h
     two = position.dtype.type(2)
     three = position.dtype.type(3)
@@ -222,8 +183,9 @@ def _rub_strip(start, position, velocity, spin, radius, inverse_mass, pair_i, pa
         kick = zero if bounced else -(vx * nx + vy * ny) / (wi + wj)
         # Tangent (ny, -nx). A disc has I = m r^2 / 2, so the contact point has the inverse mass w + r^2 / I = 3 w.
         slip = vx * ny - vy * nx + spin[i] * radius[i] + spin[j] * radius[j]
-        most = mu * max(abs(impulse[t]) + min(kick, zero), zero)
+        most = _pair_friction(friction[i], friction[j], mu) * max(abs(impulse[t]) + min(kick, zero), zero)
         rub = max(min(-slip / (three * (wi + wj)), most), -most)
+        spent[1] += np.float64(rub) * (slip + 1.5 * (wi + wj) * rub)
         px = kick * nx + rub * ny
         py = kick * ny - rub * nx
         velocity[i, 0] -= px * wi
@@ -259,28 +221,13 @@ def project(position, velocity, radius, inverse_mass, first, count, pair_i, pair
 
 
 @parallel_kernel
-def impacts(
-    position, velocity, acceleration, radius, inverse_mass, first, count, pair_i, pair_j, h, lag, e, rest_speed,
-    fed, meeting, impulse,
-):  # fmt: skip
-    """Bounce every pair that meets faster than rest_speed; note in `meeting` how each stands, in `impulse` how hard it hit."""
-    for parity in range(2):
-        for half in prange((first.shape[0] + 1 - parity) // 2):
-            s = 2 * half + parity
-            a, b = first[s], first[s] + count[s]
-            _impact_strip(
-                position, velocity, acceleration, radius, inverse_mass, pair_i[a:b], pair_j[a:b], h, lag, e, rest_speed,
-                fed, meeting[a:b], impulse[a:b],
-            )  # fmt: skip
-
-
-@parallel_kernel
 def project_resting(
-    position, velocity, radius, inverse_mass, first, count, pair_i, pair_j, rate, most, meeting, fed,
+    position, velocity, radius, inverse_mass, first, count, pair_i, pair_j, rate, most, slow, meeting, fed,
     touching, impulse, touches,
 ):  # fmt: skip
     """What `project` does, after `impacts`. Those that have bounced are listed too, with their impulse made negative.
 
+    slow: 1/s, as for _make_room; rate where accelerations could stop a pair that parts, 0 where nothing can.
     fed[i] is set to 1 for every particle whose velocity is fed.
     """
     for parity in range(2):
@@ -288,7 +235,7 @@ def project_resting(
             s = 2 * half + parity
             a, b = first[s], first[s] + count[s]
             touches[s] = _rest_strip(
-                position, velocity, radius, inverse_mass, pair_i[a:b], pair_j[a:b], rate, most, meeting[a:b], fed,
+                position, velocity, radius, inverse_mass, pair_i[a:b], pair_j[a:b], rate, most, slow, meeting[a:b], fed,
                 touching[a:b], impulse[a:b],
             )  # fmt: skip
 
@@ -305,11 +252,13 @@ def still(position, velocity, inverse_mass, first, count, pair_i, pair_j, touchi
 
 @parallel_kernel
 def rub(
-    start, position, velocity, spin, radius, inverse_mass, first, count, pair_i, pair_j, h, mu, touching, impulse, touches
+    start, position, velocity, spin, radius, inverse_mass, friction, first, count, pair_i, pair_j, h, mu,
+    touching, impulse, touches, spent,
 ):  # fmt: skip
     """The same, but not for pairs that have bounced (impulse < 0); and Coulomb friction for both.
 
     It is at most mu times the normal impulse, and no more than stops the slip. start: positions before the integration.
+    spent[s, 1] gains the energy that friction in strip s has taken, J, negative.
     """
     for parity in range(2):
         for half in prange((first.shape[0] + 1 - parity) // 2):
@@ -317,8 +266,8 @@ def rub(
             a, b = first[s], first[s] + count[s]
             t = a + touches[s]
             _rub_strip(
-                start, position, velocity, spin, radius, inverse_mass, pair_i[a:b], pair_j[a:b], h, mu,
-                touching[a:t], impulse[a:t],
+                start, position, velocity, spin, radius, inverse_mass, friction, pair_i[a:b], pair_j[a:b], h, mu,
+                touching[a:t], impulse[a:t], spent[s],
             )  # fmt: skip
 
 

@@ -82,9 +82,18 @@ def cut_strips(start, columns, rows, least, strip_row):
 
 
 @kernel
-def _list_strip(position, radius, inverse_mass, start, columns, rows, row0, row1, skin, raw_i, raw_j, colour, room, slots):
+def _accept(category, mask, a, b):
+    """Whether each of a and b takes the other's category."""
+    return (category[a] & mask[b] != 0) & (category[b] & mask[a] != 0)
+
+
+@kernel
+def _list_strip(
+    position, radius, inverse_mass, category, mask, start, columns, rows, row0, row1, skin, raw_i, raw_j, colour, room, slots
+):  # fmt: skip
     """Candidate pairs of the rows row0 to row1, unsorted, with their colours; returns how many there are, also beyond `room`."""
     zero = skin - skin
+    filtered = category.shape[0] > 0
     found = 0
     for row in range(row0, row1):
         for column in range(columns):
@@ -118,6 +127,8 @@ def _list_strip(position, radius, inverse_mass, start, columns, rows, row0, row1
                             raw_j[found] = b
                             colour[found] = min(number, slots - 1) * 6 + cell_colour
                         near = (dx * dx + dy * dy < reach * reach) & (w + inverse_mass[b] > zero)
+                        if filtered:
+                            near &= _accept(category, mask, a, b)
                         found += near
                         number += near
     return found
@@ -139,20 +150,20 @@ def _sort_by_colour(raw_i, raw_j, colour, found, colours, pair_i, pair_j):
 
 @parallel_kernel
 def list_pairs(
-    position, radius, inverse_mass, start, columns, rows, strip_row, skin, room, slots,
+    position, radius, inverse_mass, category, mask, start, columns, rows, strip_row, skin, room, slots,
     raw_i, raw_j, colour, pair_i, pair_j, first, count,
 ):  # fmt: skip
     """Fill the pair list of every strip: pair_i, pair_j[first[s] : first[s] + count[s]].
 
     `room` pairs are kept free for each particle. A strip that needs more reports its full count and lists nothing:
-    the caller makes room and calls again, so that no pair is ever dropped.
+    the caller makes room and calls again, so that no pair is ever dropped. Empty `category` and `mask`: everyone collides.
     """
     for s in prange(strip_row.shape[0] - 1):
         low = start[strip_row[s] * columns]
         high = start[strip_row[s + 1] * columns]
         a, b = low * room, high * room
         found = _list_strip(
-            position, radius, inverse_mass, start, columns, rows, strip_row[s], strip_row[s + 1], skin,
+            position, radius, inverse_mass, category, mask, start, columns, rows, strip_row[s], strip_row[s + 1], skin,
             raw_i[a:b], raw_j[a:b], colour[a:b], b - a, slots,
         )  # fmt: skip
         first[s] = a
@@ -162,7 +173,7 @@ def list_pairs(
 
 
 @kernel
-def list_all_pairs(position, radius, inverse_mass, pair_i, pair_j):
+def list_all_pairs(position, radius, inverse_mass, category, mask, pair_i, pair_j):
     """The readable reference, O(n^2): every overlapping pair, in natural order. Returns how many, also beyond the room."""
     found = 0
     for i in range(position.shape[0]):
@@ -170,7 +181,8 @@ def list_all_pairs(position, radius, inverse_mass, pair_i, pair_j):
             dx = position[j, 0] - position[i, 0]
             dy = position[j, 1] - position[i, 1]
             reach = radius[i] + radius[j]
-            if dx * dx + dy * dy < reach * reach and inverse_mass[i] + inverse_mass[j] > 0:
+            wanted = category.shape[0] == 0 or _accept(category, mask, i, j)
+            if wanted and dx * dx + dy * dy < reach * reach and inverse_mass[i] + inverse_mass[j] > 0:
                 if found < pair_i.shape[0]:
                     pair_i[found] = i
                     pair_j[found] = j
