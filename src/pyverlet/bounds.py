@@ -70,7 +70,7 @@ class _Walls(Boundary):
 
     def _confine(self, kernel: Any, shape: Sequence[float], state: Slots, h: float, lag: float, rest_speed: float) -> None:
         real = state.real
-        kernel(*map(real, shape), state.bodies(), *map(real, (h, lag, self.restitution, self.friction, rest_speed)))
+        kernel(*map(real, shape), *state.bodies(), *map(real, (h, lag, self.restitution, self.friction, rest_speed)))
 
 
 class Circle(_Walls):

@@ -2,7 +2,8 @@
 
 `state` is the engine's working copy (`pyverlet.state.Slots`): arrays in the engine's order, `state.particle` naming the user's
 index in each slot. A force that looks at the velocity says so by `velocity_dependent = True`, so that integrators
-keep their order. A conservative force adds `potential(state)` in joules, and the world's energy includes it.
+keep their order. A conservative force adds `potential(state)` in joules, and the world's energy includes it. The work of any
+other is on the world's ledger, under `forces` or the name in the force's `account`.
 
 To add one: a class with `apply`, and a test against its closed form.
 """
@@ -31,7 +32,7 @@ class Force(Protocol):
 class Conservative(Protocol):
     """A force with a potential."""
 
-    def potential(self, state: State) -> float:
+    def potential(self, state: State | Slots) -> float:
         """Potential energy of all particles, J."""
 
 
@@ -44,6 +45,7 @@ class Drag:
     """
 
     velocity_dependent = True
+    account = "drag"
 
     def __init__(self, *, linear: float = 0.0, quadratic: float = 0.0) -> None:
         self.linear = checks.number("linear", linear, least=0.0)
@@ -76,7 +78,7 @@ class PointSpring:
     def apply(self, state: Slots, t: float) -> None:
         state.force -= self.stiffness * (state.position - np.asarray(self.center, state.dtype))
 
-    def potential(self, state: State) -> float:
+    def potential(self, state: State | Slots) -> float:
         offset = state.position.astype(np.float64) - self.center
         return float(0.5 * self.stiffness * np.sum(offset * offset))
 

@@ -43,6 +43,7 @@ class Report:
     ns_per_particle_substep: float
     stages: dict[str, float]
     energy: dict[str, float]
+    ledger: dict[str, float] | None
     overlap: dict[str, float]
     contacts: int
     escaped: int
@@ -139,6 +140,7 @@ def run(
         # A stage that did not run in a frame (a rebuild that was not needed) took 0 ms of it: mean, so that they add up.
         stages={stage: sum(ms) / frames for stage, ms in stage_ms.items()},
         energy={name: float(getattr(energy, name)) for name in ("kinetic", "potential", "links", "total")},
+        ledger=world.ledger.as_dict() if world.keeps_ledger else None,
         overlap={"mean": float(overlap.mean), "max": float(overlap.max)},
         contacts=int(overlap.contacts),
         escaped=int(world.escaped()),

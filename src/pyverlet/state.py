@@ -177,6 +177,11 @@ class Slots:
         self.category, self.mask = state.category[self.particle], state.mask[self.particle]
         return not (np.array_equal(before[0], self.category) and np.array_equal(before[1], self.mask))
 
+    def clear_notes(self) -> None:
+        """Forget what walls have noted in the last frame."""
+        self.hits[:] = -1
+        self.spent[:] = 0
+
     def resize(self) -> None:
         """Bring `size` up to date with `grown`."""
         self.size = self.radius if (self.grown >= 1).all() else self.radius * self.grown

@@ -20,6 +20,7 @@ from pyverlet.errors import InputError, NonFiniteError
 from pyverlet.forces import Force, ForceSum
 from pyverlet.integrators import Integrator, PositionVerlet
 from pyverlet.kernels import measure, motion
+from pyverlet.ledger import Bookkeeper, Ledger
 from pyverlet.particles import Particles
 from pyverlet.profile import Profile
 from pyverlet.state import Slots, State
@@ -40,6 +41,7 @@ class Saved:
     h_last: float | None
     slots: tuple[Array, Array]
     neighbours: Any
+    books: Bookkeeper | None
 
 
 class World(Particles, Doors):
@@ -52,6 +54,7 @@ class World(Particles, Doors):
         collisions: how particles collide; None lets them pass through each other.
         substeps: steps of length h = dt / substeps in one call of `step`.
         dtype: float32 or float64, of all arrays.
+        ledger: keep account of where the energy goes, in `ledger`.
         threads: at most this many for the parallel stages; None is as many as pay off. Never changes the result.
 
     Raises:
@@ -68,6 +71,7 @@ class World(Particles, Doors):
         substeps: int = 8,
         dtype: DTypeLike = np.float32,
         threads: int | None = None,
+        ledger: bool = False,
     ) -> None:
         self._state = State(checks.floating("dtype", dtype))
         self._h_last: float | None = None  # substep of the frame before; None: the integrator starts anew
@@ -82,6 +86,7 @@ class World(Particles, Doors):
         self.time = 0.0
         self.frames = 0
         self.profile = Profile()
+        self._books = Bookkeeper() if ledger else None
 
     # ---- one frame -----------------------------------------------------------------------------------------------------
 
@@ -95,10 +100,14 @@ class World(Particles, Doors):
         h = checks.number("dt", dt, above=0.0) / self.substeps
         _jit.use_threads(self.threads)
         self.profile.begin()
-        self._frame(h, self.profile.mark)
+        lag, done = self.integrator.velocity_lag * h, self.profile.mark
+        books = self._books and self._books.frame(self._slots, self._force_sum, self.time, h, lag, done)
+        self._frame(h, books or done)
         if self._first_non_finite() >= 0:
             self._explain_non_finite(h)
         self._slots.scatter(self._state)
+        if books:
+            books.close(self._spent())
         self.profile.mark("scatter")
         self.time += dt
         self.frames += 1
@@ -111,6 +120,7 @@ class World(Particles, Doors):
         contacts = self._contacts if len(self) > 1 else None
         lag = integrator.velocity_lag * h
         self._gather()
+        self._clear_notes()
         done("gather")
         integrator.begin(state, forces, self.time, h, self._h_last)
         for substep in range(self.substeps):
@@ -128,11 +138,11 @@ class World(Particles, Doors):
             done("bounds")
             if contacts:
                 contacts.still(state, h)
-                done("velocities")
+            done("velocities")
         if contacts:
             contacts.mark_resting(state)
         integrator.end(state, h)
-        done("integrate")
+        done("finish")
 
     def run(self, *, seconds: float, dt: float = 1 / 60) -> None:
         """Advance by as many frames of dt as come nearest to `seconds`."""
@@ -159,6 +169,12 @@ class World(Particles, Doors):
             self._contacts.broad_phase.forget()
             if len(self) > 1:
                 self._contacts.fit(self._slots)
+
+    def _clear_notes(self) -> None:
+        """What walls and contacts note about a frame starts anew."""
+        self._slots.clear_notes()
+        if self._contacts:
+            self._contacts.broad_phase.list.spent[:] = 0
 
     def _strongest_acceleration(self) -> float:
         if not self.forces:
@@ -265,6 +281,29 @@ class World(Particles, Doors):
         """Kinetic (motion and spin), potential, links and total energy, J."""
         return energy(self._state, self.gravity, self.forces)
 
+    @property
+    def keeps_ledger(self) -> bool:
+        """Whether `ledger` is there to be read."""
+        return self._books is not None
+
+    @property
+    def ledger(self) -> Ledger:
+        """Where the energy has gone since the world was built, as of the last frame.
+
+        Raises:
+            InputError: the world keeps none.
+        """
+        if self._books is None:
+            raise InputError("ledger is off in this world; allowed is a world built with World(ledger=True)")
+        return self._books.ledger
+
+    def _spent(self) -> tuple[float, float]:
+        """What impacts and friction have taken in this frame, J, as the kernels of contacts and walls have noted."""
+        spent = self._slots.spent.sum(axis=0)
+        if self._contacts:
+            spent += self._contacts.broad_phase.list.spent.sum(axis=0)
+        return float(spent[0]), float(spent[1])
+
     def momentum(self) -> Array:
         """(2,) sum of m v over all free particles, kg m/s."""
         return np.array(self._momenta()[:2])
@@ -308,6 +347,7 @@ class World(Particles, Doors):
             h_last=self._h_last,
             slots=self._slots.save(),
             neighbours=self._contacts.broad_phase.save() if self._contacts else None,
+            books=self._books and self._books.copy(),
         )
 
     def restore(self, saved: Saved) -> None:
@@ -324,6 +364,7 @@ class World(Particles, Doors):
             array[:] = saved.arrays[name]
         self.time, self.frames, self._h_last = saved.time, saved.frames, saved.h_last
         self._slots.restore(saved.slots, self._state)
+        self._books = saved.books and saved.books.copy()
         if self._contacts:
             # None: collisions were off, or of a kind that remembers nothing.
             self._contacts.broad_phase.forget()

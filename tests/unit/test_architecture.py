@@ -17,7 +17,7 @@ ROOT = Path(pyverlet.__file__).parent
 LAYERS = (
     {"errors", "constants", "_jit", "checks", "progress"},
     {"state", "kernels"},
-    {"integrators", "forces", "bounds", "naive", "broadphase", "collisions", "energy"},
+    {"integrators", "forces", "bounds", "naive", "broadphase", "collisions", "energy", "ledger"},
     {"world", "particles", "doors", "profile", "clock", "warmup", "panels"},
     {"scenes", "report", "lab", "picture"},
     {"viewers", "record", "draw"},
@@ -28,6 +28,7 @@ BESIDE = {
     "checks": {"errors"},
     "state": {"kernels"},
     "collisions": {"broadphase"},
+    "ledger": {"forces"},
     "energy": {"forces"},
     "naive": {"bounds"},
     "world": {"profile", "particles", "doors"},

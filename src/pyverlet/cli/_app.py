@@ -129,7 +129,7 @@ def run(
         raise InputError(f"port is {port}; allowed is none, since this run has no live page")
     count = report.frame_count(seconds=seconds, frames=frames, dt=dt, default_seconds=DEFAULT_SECONDS)
     if plot is None:
-        panels = chosen.panels(integrators=methods, **overrides)
+        panels = chosen.panels(integrators=methods, **overrides, ledger=True)
         results = [_measure(panel, chosen, count, dt, compile_kernels(panel.world)) for panel in panels]
         _tell_all(chosen, panels, results, as_json)
         return

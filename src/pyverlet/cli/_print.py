@@ -68,6 +68,9 @@ def report(values: Mapping[str, Any]) -> str:
     rows += [(f"  {name}", f"{ms:8.3f} ms a frame") for name, ms in values["stages"].items()]
     rows.append(("", ""))
     rows.append(("energy", ", ".join(f"{name} {joules:.6g}" for name, joules in energy.items()) + " J"))
+    if values["ledger"]:
+        booked = ", ".join(f"{account} {joules:.4g}" for account, joules in values["ledger"].items() if joules)
+        rows.append(("ledger", f"{booked} J"))
     rows.append(("overlap", f"{100 * overlap['mean']:.3f} % mean, {100 * overlap['max']:.2f} % largest"))
     rows.append(("contacts", f"{values['contacts']:,}"))
     rows.append(("escaped", f"{values['escaped']:,}"))

@@ -105,18 +105,15 @@ def impact_time(dx, dy, vx, vy, ax, ay, reach, h):
 
 
 @kernel
-def _in_circle(i, x0, y0, size, bodies, h, lag, e, mu, rest_speed):
-    position, velocity, acceleration, radius = bodies.position, bodies.velocity, bodies.acceleration, bodies.radius
+def _at_cage(i, x0, y0, size, bodies, h, lag, e, mu, rest_speed):
+    """Circle i is beyond the wall of the cage."""
+    position, velocity, acceleration = bodies.position, bodies.velocity, bodies.acceleration
     zero = h - h
     half = h / (h + h)
-    bodies.resting[i] = 0
     dx = position[i, 0] - x0
     dy = position[i, 1] - y0
-    room = size - radius[i]
-    square = dx * dx + dy * dy
-    if square <= room * room or bodies.inverse_mass[i] <= zero:
-        return
-    distance = np.sqrt(square)
+    room = size - bodies.radius[i]
+    distance = np.sqrt(dx * dx + dy * dy)
     nx, ny, depth = -dx / distance, -dy / distance, distance - room
     ax, ay = acceleration[i, 0], acceleration[i, 1]
     vx, vy = velocity[i, 0] + lag * ax, velocity[i, 1] + lag * ay
@@ -139,45 +136,63 @@ def _in_circle(i, x0, y0, size, bodies, h, lag, e, mu, rest_speed):
 
 
 @kernel
-def _in_box(i, x0, y0, x1, y1, bodies, h, lag, e, mu, rest_speed):
-    position = bodies.position
+def _at_box(i, left, right, down, up, bodies, h, lag, e, mu, rest_speed):
+    """Circle i is beyond at least one wall of the box, by left, right, down or up > 0."""
     zero = h - h
     one = h / h
-    bodies.resting[i] = 0
-    r = bodies.radius[i]
-    if bodies.inverse_mass[i] <= zero:
-        return
-    left = x0 + r - position[i, 0]
-    right = position[i, 0] - (x1 - r)
     if left > zero:
         meet(i, one, zero, left, bodies, h, lag, e, mu, rest_speed)
     elif right > zero:
         meet(i, -one, zero, right, bodies, h, lag, e, mu, rest_speed)
-    down = y0 + r - position[i, 1]
-    up = position[i, 1] - (y1 - r)
     if down > zero:
         meet(i, zero, one, down, bodies, h, lag, e, mu, rest_speed)
     elif up > zero:
         meet(i, zero, -one, up, bodies, h, lag, e, mu, rest_speed)
-    # As in the cage: what one reflection has sent beyond the other side waits at that wall.
-    if position[i, 0] < x0 or position[i, 0] > x1:
-        position[i, 0] = min(max(position[i, 0], x0 + r), x1 - r)
-    if position[i, 1] < y0 or position[i, 1] > y1:
-        position[i, 1] = min(max(position[i, 1], y0 + r), y1 - r)
 
 
-# The loops below only call: a store into an array of a tuple that stands in a parallel loop itself Numba drops, as dead code.
+# The loops make the tuple themselves, and only for circles at a wall: from Python it is slow to hand over.
 
 
 @parallel_kernel
-def circle(x0, y0, size, bodies, h, lag, e, mu, rest_speed):
-    """A cage: everything stays inside the circle of radius `size` about (x0, y0)."""
-    for i in prange(bodies.position.shape[0]):
-        _in_circle(i, x0, y0, size, bodies, h, lag, e, mu, rest_speed)
+def circle(
+    x0, y0, size, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent,
+    h, lag, e, mu, rest_speed,
+):  # fmt: skip
+    """A cage: all circles stay inside that of radius `size` about (x0, y0). position to spent: the fields of Bodies."""
+    zero = h - h
+    for i in prange(position.shape[0]):
+        resting[i] = 0
+        dx = position[i, 0] - x0
+        dy = position[i, 1] - y0
+        room = size - radius[i]
+        if dx * dx + dy * dy > room * room and inverse_mass[i] > zero:
+            bodies = Bodies(
+                position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent
+            )
+            _at_cage(i, x0, y0, size, bodies, h, lag, e, mu, rest_speed)
 
 
 @parallel_kernel
-def box(x0, y0, x1, y1, bodies, h, lag, e, mu, rest_speed):
-    """Four walls; in a corner both axes act, one after the other."""
-    for i in prange(bodies.position.shape[0]):
-        _in_box(i, x0, y0, x1, y1, bodies, h, lag, e, mu, rest_speed)
+def box(
+    x0, y0, x1, y1, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent,
+    h, lag, e, mu, rest_speed,
+):  # fmt: skip
+    """Four walls; in a corner both axes act, one after the other. position to spent: the fields of Bodies."""
+    zero = h - h
+    for i in prange(position.shape[0]):
+        resting[i] = 0
+        r = radius[i]
+        left = x0 + r - position[i, 0]
+        right = position[i, 0] - (x1 - r)
+        down = y0 + r - position[i, 1]
+        up = position[i, 1] - (y1 - r)
+        if max(left, right, down, up) > zero and inverse_mass[i] > zero:
+            bodies = Bodies(
+                position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent
+            )
+            _at_box(i, left, right, down, up, bodies, h, lag, e, mu, rest_speed)
+            # As in the cage: what one reflection has sent beyond the other side waits at that wall.
+            if position[i, 0] < x0 or position[i, 0] > x1:
+                position[i, 0] = min(max(position[i, 0], x0 + r), x1 - r)
+            if position[i, 1] < y0 or position[i, 1] > y1:
+                position[i, 1] = min(max(position[i, 1], y0 + r), y1 - r)

@@ -43,6 +43,7 @@ class Settings:
         threads: threads to use; None leaves the choice to the engine.
         gravity: (x, y) in m/s^2.
         picture: a file for scenes made of one; None takes the scene's own.
+        ledger: keep account of where the energy goes.
     """
 
     particles: int = 5_000
@@ -57,6 +58,7 @@ class Settings:
     threads: int | None = None
     gravity: tuple[float, float] = (0.0, -9.81)
     picture: Path | None = None
+    ledger: bool = False
 
     def __post_init__(self) -> None:
         """Check what the engine cannot, and what a scene without bounds and collisions would never look at."""
@@ -79,6 +81,7 @@ class Settings:
             substeps=self.substeps,
             dtype=self.dtype,
             threads=self.threads,
+            ledger=self.ledger,
         )
 
 
