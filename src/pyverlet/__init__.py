@@ -11,6 +11,7 @@ from pyverlet.clock import Clock, FrameBudget
 from pyverlet.collisions import Collisions, Overlap
 from pyverlet.energy import Energy
 from pyverlet.errors import InputError, NonFiniteError, PyverletError
+from pyverlet.forces import Attractor, ConstantForce, Drag, Gravitation, PointSpring, Wind, force
 from pyverlet.integrators import (
     RK4,
     ExplicitEuler,
@@ -30,10 +31,11 @@ from pyverlet.world import World
 __version__ = "0.1.0"
 
 __all__ = [
-    "RK4", "Boundary", "Box", "BruteForce", "Circle", "ClampAndFlip", "Clock", "Collisions", "Energy", "ExplicitEuler",
-    "Fast", "FrameBudget", "Group", "InputError", "Integrator", "NonFiniteError", "Open", "Overlap", "Panel", "Panels",
-    "PositionVerlet", "ProjectOnly", "PyverletError", "SemiImplicitEuler", "TimeCorrectedVerlet", "VelocityVerlet", "World",
-    "Yoshida4", "errors", "forces", "integrators", "scenes", "view", "warm_up",
+    "RK4", "Attractor", "Boundary", "Box", "BruteForce", "Circle", "ClampAndFlip", "Clock", "Collisions", "ConstantForce",
+    "Drag", "Energy", "ExplicitEuler", "Fast", "FrameBudget", "Gravitation", "Group", "InputError", "Integrator",
+    "NonFiniteError", "Open", "Overlap", "Panel", "Panels", "PointSpring", "PositionVerlet", "ProjectOnly", "PyverletError",
+    "SemiImplicitEuler", "TimeCorrectedVerlet", "VelocityVerlet", "Wind", "World", "Yoshida4", "errors", "force", "forces",
+    "integrators", "scenes", "view", "warm_up",
 ]  # fmt: skip
 
 

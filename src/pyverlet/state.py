@@ -187,6 +187,12 @@ class Slots:
             self._slot_of[self.particle] = np.arange(len(self), dtype=self.particle.dtype)
         return int(self._slot_of[particle])
 
+    def slots_of(self, particles: Array) -> Array:
+        """(k,) slots that hold these of the user's particles."""
+        if len(particles):
+            self.slot_of(0)
+        return np.zeros(0, np.int32) if self._slot_of is None else self._slot_of[particles]
+
 
 def advance(out: Array, base: Array, slope: Array, h: float) -> None:
     """out = base + h * slope on (n, 2) arrays; the move every integrator is made of. out may be base."""
