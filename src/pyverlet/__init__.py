@@ -23,6 +23,7 @@ from pyverlet.integrators import (
     Yoshida4,
 )
 from pyverlet.naive import ClampAndFlip, ProjectOnly
+from pyverlet.obstacles import Capsule, Chain, Disc, Obstacle, Polygon, Segment
 from pyverlet.panels import Panel, Panels
 from pyverlet.state import Group
 from pyverlet.warmup import warm_up
@@ -31,11 +32,11 @@ from pyverlet.world import World
 __version__ = "0.1.0"
 
 __all__ = [
-    "RK4", "Attractor", "Boundary", "Box", "BruteForce", "Circle", "ClampAndFlip", "Clock", "Collisions", "ConstantForce",
-    "Drag", "Energy", "ExplicitEuler", "Fast", "FrameBudget", "Gravitation", "Group", "InputError", "Integrator",
-    "NonFiniteError", "Open", "Overlap", "Panel", "Panels", "PointSpring", "PositionVerlet", "ProjectOnly", "PyverletError",
-    "SemiImplicitEuler", "TimeCorrectedVerlet", "VelocityVerlet", "Wind", "World", "Yoshida4", "errors", "force", "forces",
-    "integrators", "scenes", "view", "warm_up",
+    "RK4", "Attractor", "Boundary", "Box", "BruteForce", "Capsule", "Chain", "Circle", "ClampAndFlip", "Clock", "Collisions",
+    "ConstantForce", "Disc", "Drag", "Energy", "ExplicitEuler", "Fast", "FrameBudget", "Gravitation", "Group", "InputError",
+    "Integrator", "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel", "Panels", "PointSpring", "Polygon",
+    "PositionVerlet", "ProjectOnly", "PyverletError", "Segment", "SemiImplicitEuler", "TimeCorrectedVerlet", "VelocityVerlet",
+    "Wind", "World", "Yoshida4", "errors", "force", "forces", "integrators", "scenes", "view", "warm_up",
 ]  # fmt: skip
 
 

@@ -20,6 +20,8 @@ from pyverlet.errors import InputError, NonFiniteError
 from pyverlet.forces import Force, ForceSum
 from pyverlet.integrators import Integrator, PositionVerlet
 from pyverlet.kernels import measure, motion
+from pyverlet.obstacles import Course, Obstacles
+from pyverlet.particles import Particles
 from pyverlet.profile import Profile
 from pyverlet.state import Group, Slots, State
 
@@ -39,9 +41,10 @@ class Saved:
     h_last: float | None
     slots: tuple[Array, Array]
     neighbours: Any
+    obstacles: Any
 
 
-class World(Doors):
+class World(Particles, Doors):
     """Particles in a room, and the laws they follow. SI units, y up.
 
     Args:
@@ -73,6 +76,8 @@ class World(Doors):
         self._slots = Slots(self._state.dtype)
         self.forces: list[Force] = []
         self._force_sum = ForceSum(checks.vector("gravity", gravity), self.forces)
+        self.obstacles = Obstacles()
+        self._course = Course(self.obstacles)
         self.integrator = PositionVerlet() if integrator is None else integrator
         self.boundary = Open() if boundary is None else boundary
         self.collisions = collisions
@@ -98,6 +103,7 @@ class World(Doors):
         if self._first_non_finite() >= 0:
             self._explain_non_finite(h)
         self._slots.scatter(self._state)
+        self._course.end(dt)
         self.profile.mark("scatter")
         self.time += dt
         self.frames += 1
@@ -107,14 +113,17 @@ class World(Doors):
     def _frame(self, h: float, done: Callable[[str], None]) -> None:
         """The table of contents of the engine. `done` is told the name of each stage as it ends."""
         state, forces, integrator = self._slots, self._force_sum, self.integrator
-        contacts = self._contacts if len(self) > 1 else None
+        contacts, course = self._contacts if len(self) > 1 else None, self._course
         lag = integrator.velocity_lag * h
         self._gather()
+        course.begin()
         done("gather")
         integrator.begin(state, forces, self.time, h, self._h_last)
         for substep in range(self.substeps):
             if contacts:
                 contacts.before(state, h)
+            if course:
+                course.before(state)
             integrator.step(state, forces, self.time + substep * h, h)
             strongest = self._strongest_acceleration()
             done("integrate")
@@ -125,6 +134,9 @@ class World(Doors):
                 done("contacts")
             self.boundary.confine(state, h, lag, REST_ACCELERATIONS * strongest * h)
             done("bounds")
+            if course:
+                course.collide(state, substep * h, h, lag, REST_ACCELERATIONS * strongest * h)
+                done("obstacles")
             if contacts:
                 contacts.still(state, h)
                 done("velocities")
@@ -221,34 +233,6 @@ class World(Doors):
         checks.positive("mass", values["mass"], infinite_is="pinned")
         self.boundary.check(values["radius"])
         return Group(self._state, self._state.append(values))
-
-    def __len__(self) -> int:
-        return len(self._state)
-
-    @property
-    def position(self) -> Array:
-        """(n, 2) centres of all particles in the order they were added, m; a view."""
-        return self._state.position
-
-    @property
-    def velocity(self) -> Array:
-        """(n, 2) m/s; a view."""
-        return self._state.velocity
-
-    @property
-    def spin(self) -> Array:
-        """(n,) angular velocity, rad/s, counter-clockwise; a view."""
-        return self._state.spin
-
-    @property
-    def radius(self) -> Array:
-        """(n,) m; a view."""
-        return self._state.radius
-
-    @property
-    def mass(self) -> Array:
-        """(n,) kg, infinite where pinned; a view."""
-        return self._state.mass
 
     # ---- laws ----------------------------------------------------------------------------------------------------------
 
@@ -374,6 +358,7 @@ class World(Doors):
             h_last=self._h_last,
             slots=self._slots.save(),
             neighbours=self._contacts.broad_phase.save() if self._contacts else None,
+            obstacles=self.obstacles.save(),
         )
 
     def restore(self, saved: Saved) -> None:
@@ -388,6 +373,7 @@ class World(Doors):
             )
         for name, array in self._state.arrays():
             array[:] = saved.arrays[name]
+        self.obstacles.restore(saved.obstacles)
         self.time, self.frames, self._h_last = saved.time, saved.frames, saved.h_last
         self._slots.restore(saved.slots, self._state)
         if self._contacts:

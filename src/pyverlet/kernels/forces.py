@@ -83,8 +83,8 @@ def gravitational_potential(position, mass, softening):
 def call_serial(function, force, position, velocity, mass, t):
     """Add what the user's `function(x, y, vx, vy, mass, t)` returns; for how many particles that is not finite.
 
-    `function` is a pointer of a fixed type: another one costs no compiling here. Handing it on to an inner function that both loops
-    could share made each call five times as slow.
+    `function` is a pointer of a fixed type: another one costs no compiling here. Handing it on to an inner function that both
+    loops share made each call five times as slow.
     """
     wrong = 0
     for i in range(mass.shape[0]):
