@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -104,6 +104,8 @@ class Obstacle(ABC):
         self.pivot = points.mean(axis=0) if pivot is None else pivot
         self.angle = 0.0
         self._local: Points = points - np.asarray(self.pivot)
+        self._drawn_at: Any = None
+        self._drawn: list[Outline] = []
 
     @property
     def points(self) -> Points:
@@ -128,6 +130,13 @@ class Obstacle(ABC):
         """Put it where its own motion has taken it: unlike setting pivot and angle, no news to the world that did so."""
         self.__dict__.update(pivot=pivot, angle=angle)
 
+    def drawn(self) -> list[Outline]:
+        """As `outlines`; the same list as long as it has not moved."""
+        where = (self.pivot, self.angle)
+        if where != self._drawn_at:
+            self._drawn_at, self._drawn = where, self.outlines()
+        return self._drawn
+
     def __repr__(self) -> str:
         x, y = self.pivot
         return f"{type(self).__name__} at ({x:g}, {y:g}) m"
@@ -136,9 +145,18 @@ class Obstacle(ABC):
 class Obstacles(list[Obstacle]):
     """The obstacles of a world: a list."""
 
+    def __init__(self, obstacles: Iterable[Obstacle] = ()) -> None:
+        super().__init__(obstacles)
+        self._drawn: list[list[Outline]] = []
+        self._outlines: list[Outline] = []
+
     def outlines(self) -> list[Outline]:
-        """Lines that draw all of them where they are now, metres."""
-        return [outline for obstacle in self for outline in obstacle.outlines()]
+        """Lines that draw all of them where they are now, metres; the same list as long as nothing has moved."""
+        drawn = [obstacle.drawn() for obstacle in self]
+        if len(drawn) != len(self._drawn) or any(a is not b for a, b in zip(drawn, self._drawn, strict=True)):
+            self._drawn = drawn
+            self._outlines = [outline for outlines in drawn for outline in outlines]
+        return self._outlines
 
     def save(self) -> list[tuple[Obstacle, tuple[float, float], float]]:
         """Which there are, and where."""
