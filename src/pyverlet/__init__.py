@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from pyverlet import errors, forces, integrators, scenes
+from pyverlet.actors import Actor, Emitter, Sink
 from pyverlet.bounds import Boundary, Box, Circle, Open
 from pyverlet.broadphase import BruteForce, Fast
 from pyverlet.clock import Clock, FrameBudget
@@ -32,11 +33,11 @@ from pyverlet.world import World
 __version__ = "0.1.0"
 
 __all__ = [
-    "RK4", "Attractor", "Boundary", "Box", "BruteForce", "Capsule", "Chain", "Circle", "ClampAndFlip", "Clock", "Collisions",
-    "ConstantForce", "Disc", "Drag", "Energy", "ExplicitEuler", "Fast", "FrameBudget", "Gravitation", "Group", "InputError",
-    "Integrator", "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel", "Panels", "PointSpring", "Polygon",
-    "PositionVerlet", "ProjectOnly", "PyverletError", "Segment", "SemiImplicitEuler", "TimeCorrectedVerlet", "VelocityVerlet",
-    "Wind", "World", "Yoshida4", "errors", "force", "forces", "integrators", "scenes", "view", "warm_up",
+    "RK4", "Actor", "Attractor", "Boundary", "Box", "BruteForce", "Capsule", "Chain", "Circle", "ClampAndFlip", "Clock",
+    "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy", "ExplicitEuler", "Fast", "FrameBudget", "Gravitation",
+    "Group", "InputError", "Integrator", "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel", "Panels", "PointSpring",
+    "Polygon", "PositionVerlet", "ProjectOnly", "PyverletError", "Segment", "SemiImplicitEuler", "Sink", "TimeCorrectedVerlet",
+    "VelocityVerlet", "Wind", "World", "Yoshida4", "errors", "force", "forces", "integrators", "scenes", "view", "warm_up",
 ]  # fmt: skip
 
 

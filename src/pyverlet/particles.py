@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from numpy.typing import NDArray
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.state import State
+from pyverlet import checks
+from pyverlet.forces import Force, Numbered
+from pyverlet.state import Group, Slots, State
 
 Array = NDArray[Any]
 
@@ -15,6 +18,34 @@ class Particles:
     """What a world shows of its particles: views, so that reading copies nothing and writing changes the world."""
 
     _state: State
+    _slots: Slots
+    forces: list[Force]
+
+    def remove(self, which: Group | ArrayLike) -> None:
+        """Remove particles. Groups keep the others, whose indices close ranks.
+
+        Args:
+            which: a group, an index, several, or (n,) bool. Many at once cost as much as one.
+
+        Raises:
+            InputError: there is no such particle; nothing is removed.
+        """
+        if isinstance(which, Group):
+            which = which.index
+        gone = checks.indices("which", which, len(self))
+        if not len(gone):
+            return
+        kept = np.ones(len(self), bool)
+        kept[gone] = False
+        now = self._state.remove(kept)
+        self._slots.forget(now)
+        self._renumber(now)
+
+    def _renumber(self, now: Array) -> None:
+        """Tell those who hold a particle by its index where it is now, or that it is no more (-1)."""
+        for force in self.forces:
+            if isinstance(force, Numbered):
+                force.renumber(now)
 
     def __len__(self) -> int:
         return len(self._state)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from pyverlet import _jit, checks
+from pyverlet.actors import Actor
 from pyverlet.bounds import Boundary, Open
 from pyverlet.collisions import Collisions, ContactSolver, Overlap, measure_overlap
 from pyverlet.constants import ALL_THREADS_FROM, ONE_THREAD_BELOW, REST_ACCELERATIONS, STANDARD_GRAVITY
@@ -35,6 +36,7 @@ _DEFAULT_COLLISIONS = Collisions()
 class Saved:
     """What `World.save` keeps: enough to continue with the same bits. Opaque."""
 
+    world: State
     arrays: dict[str, Array]
     time: float
     frames: int
@@ -42,6 +44,7 @@ class Saved:
     slots: tuple[Array, Array]
     neighbours: Any
     obstacles: Any
+    actors: list[tuple[Actor, Any]]
 
 
 class World(Particles, Doors):
@@ -76,6 +79,7 @@ class World(Particles, Doors):
         self._slots = Slots(self._state.dtype)
         self.forces: list[Force] = []
         self._force_sum = ForceSum(checks.vector("gravity", gravity), self.forces)
+        self.actors: list[Actor] = []
         self.obstacles = Obstacles()
         self._course = Course(self.obstacles)
         self.integrator = PositionVerlet() if integrator is None else integrator
@@ -97,6 +101,8 @@ class World(Particles, Doors):
             NonFiniteError: a particle turned NaN or infinite; the world still holds the frame before.
         """
         h = checks.number("dt", dt, above=0.0) / self.substeps
+        for actor in self.actors:
+            actor.act(self, dt)
         _jit.use_threads(self.threads)
         self.profile.begin()
         self._frame(h, self.profile.mark)
@@ -232,7 +238,7 @@ class World(Particles, Doors):
         checks.positive("radius", values["radius"])
         checks.positive("mass", values["mass"], infinite_is="pinned")
         self.boundary.check(values["radius"])
-        return Group(self._state, self._state.append(values))
+        return Group(self._state, self._state.append(values), self.remove)
 
     # ---- laws ----------------------------------------------------------------------------------------------------------
 
@@ -352,6 +358,7 @@ class World(Particles, Doors):
     def save(self) -> Saved:
         """A copy of everything that moves; `restore` continues from it with the same bits."""
         return Saved(
+            world=self._state,
             arrays={name: array.copy() for name, array in self._state.arrays()},
             time=self.time,
             frames=self.frames,
@@ -359,21 +366,26 @@ class World(Particles, Doors):
             slots=self._slots.save(),
             neighbours=self._contacts.broad_phase.save() if self._contacts else None,
             obstacles=self.obstacles.save(),
+            actors=[(actor, actor.save()) for actor in self.actors],
         )
 
     def restore(self, saved: Saved) -> None:
-        """Go back to what `save` returned; particles must not have been added since.
+        """Go back to what `save` returned, with the particles of then: groups added since are dead, removed ones live again.
 
         Raises:
-            InputError: the number of particles has changed.
+            InputError: it is another world's.
         """
-        if len(saved.arrays["radius"]) != len(self):
-            raise InputError(
-                f"saved holds {len(saved.arrays['radius'])} particles; allowed is a state of this world's {len(self)} particles"
-            )
-        for name, array in self._state.arrays():
-            array[:] = saved.arrays[name]
+        if saved.world is not self._state:
+            raise InputError("saved is the state of another world; allowed is what save() of this one returned")
+        numbers = self._state.number.copy()
+        self._state.restore(saved.arrays)
+        if not np.array_equal(numbers, self._state.number):
+            where = np.searchsorted(self._state.number, numbers).clip(max=max(len(self) - 1, 0))
+            self._renumber(np.where(self._state.number[where] == numbers, where, -1) if len(self) else np.full(len(numbers), -1))
         self.obstacles.restore(saved.obstacles)
+        self.actors[:] = [actor for actor, _ in saved.actors]
+        for actor, memory in saved.actors:
+            actor.restore(memory)
         self.time, self.frames, self._h_last = saved.time, saved.frames, saved.h_last
         self._slots.restore(saved.slots, self._state)
         if self._contacts:

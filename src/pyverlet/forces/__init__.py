@@ -9,7 +9,7 @@ To add one: a class with `apply`, and a test against its closed form. Or no clas
 
 from __future__ import annotations
 
-from pyverlet.forces._base import Conservative, Force, ForceSum
+from pyverlet.forces._base import Conservative, Force, ForceSum, Numbered
 from pyverlet.forces.attraction import Attractor, Gravitation
 from pyverlet.forces.constant import ConstantForce
 from pyverlet.forces.drag import Drag, Wind
@@ -18,6 +18,6 @@ from pyverlet.forces.mouse import Grip, Push
 from pyverlet.forces.spring import PointSpring
 
 __all__ = [
-    "Attractor", "Conservative", "ConstantForce", "Drag", "Force", "ForceSum", "FunctionForce", "Gravitation", "Grip",
+    "Attractor", "Conservative", "ConstantForce", "Drag", "Force", "ForceSum", "FunctionForce", "Gravitation", "Grip", "Numbered",
     "PointSpring", "Push", "Wind", "force",
 ]  # fmt: skip

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Protocol, runtime_checkable
 
+from numpy.typing import NDArray
+
 from pyverlet.kernels import motion
 from pyverlet.state import Slots, State
 
@@ -22,6 +24,14 @@ class Conservative(Protocol):
 
     def potential(self, state: State) -> float:
         """Potential energy of all particles, J."""
+
+
+@runtime_checkable
+class Numbered(Protocol):
+    """Something that holds particles by their index."""
+
+    def renumber(self, now: NDArray[Any]) -> None:
+        """Particles were removed: the one that was at k is at now[k], or is no more if that is -1."""
 
 
 class ForceSum:

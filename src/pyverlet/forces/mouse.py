@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pyverlet import checks
 from pyverlet.state import Slots
@@ -27,6 +29,8 @@ class Grip:
         self.frequency = checks.number("frequency", frequency, above=0.0)
 
     def apply(self, state: Slots, t: float) -> None:
+        if self.particle < 0:
+            return
         slot = state.slot_of(self.particle)
         mass = state.mass[slot]
         if not np.isfinite(mass):
@@ -34,6 +38,11 @@ class Grip:
         w = 2.0 * np.pi * self.frequency
         pull = (np.asarray(self.target, state.dtype) - state.position[slot]) * w**2 - 2.0 * w * state.velocity[slot]
         state.force[slot] += mass * pull
+
+    def renumber(self, now: NDArray[Any]) -> None:
+        """Particles were removed: hold the same one, or none if it is among them (`particle` is -1)."""
+        if self.particle >= 0:
+            self.particle = int(now[self.particle])
 
 
 class Push:
