@@ -24,6 +24,7 @@ from pyverlet.kernels import measure, motion
 from pyverlet.obstacles import Course, Obstacles
 from pyverlet.particles import Particles
 from pyverlet.profile import Profile
+from pyverlet.queries import Queries
 from pyverlet.state import Group, Slots, State
 
 Array = NDArray[Any]
@@ -47,7 +48,7 @@ class Saved:
     actors: list[tuple[Actor, Any]]
 
 
-class World(Particles, Doors):
+class World(Particles, Queries, Doors):
     """Particles in a room, and the laws they follow. SI units, y up.
 
     Args:
