@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet import checks
 from pyverlet.errors import InputError
-from pyverlet.kernels import grid, queries
+from pyverlet.kernels import grid, motion, queries
 from pyverlet.state import State
 
 _ask: Any = queries
@@ -150,21 +150,23 @@ class Queries:
 
 def _cells(state: State, questions: int) -> tuple[Any, ...]:
     """Cells over all centres with about one particle in each, as the kernels take them; one for all where that is cheaper."""
-    good = np.isfinite(state.position).all(axis=1)
-    member = np.flatnonzero(good)
-    position = state.position[member].astype(np.float64)
-    low = position.min(axis=0) if len(member) else np.zeros(2)
-    sides = position.max(axis=0) - low if len(member) else np.zeros(2)
+    position, member = state.position, np.arange(len(state))
+    if motion.first_non_finite(position) >= 0:
+        member = np.flatnonzero(np.isfinite(position).all(axis=1))
+        position = position[member]
+    x0, y0, x1, y1 = map(float, grid.extent(position))
+    width, height = x1 - x0, y1 - y0
     if questions <= FEW:
-        return (*map(float, low), float(sides.max()) or 1.0, 1, 1, np.array([0, len(member)]), member)
+        return x0, y0, max(width, height) or 1.0, 1, 1, np.array([0, len(member)]), member
     count = max(len(member), 1)
-    cell = float(max(np.sqrt(sides.prod() / count), sides.max() / count)) or 1.0
-    columns, rows = (int(side / cell) + 1 for side in sides)
+    cell = max(np.sqrt(width * height / count), max(width, height) / count) or 1.0
+    columns, rows = int(width / cell) + 1, int(height / cell) + 1
     number, start = np.empty(len(member), np.int32), np.empty(columns * rows + 1, np.int64)
-    _grid.count_cells(position, *map(float, low), 1 / cell, columns, rows, number, start)
+    # In float64, as the questions are: rounded another way, a particle might not be found in its cell.
+    _grid.count_cells(position.astype(np.float64), x0, y0, 1 / cell, columns, rows, number, start)
     order = np.empty(len(member), np.int32)
     _grid.sort_by_cell(number, start, order)
-    return (*map(float, low), cell, columns, rows, start, member[order])
+    return x0, y0, cell, columns, rows, start, member[order]
 
 
 def _alike(first: str, a: Floats, second: str, b: Floats) -> tuple[Floats, Floats]:

@@ -1,6 +1,7 @@
 """Questions about circles in cells: `cell`, `columns`, `rows`, `start` as in kernels.grid, `member` the particle in each slot.
 
-A circle is in the cell of its centre; the layout covers all centres, so that nothing is clamped. All answers are float64.
+A circle is in the cell of its centre; the layout covers all centres, so that nothing is clamped. Cells are found by a product with
+1 / cell, as when the particles were sorted: rounded alike, nobody is missed at the edge of one. All answers are float64.
 """
 
 from __future__ import annotations
@@ -20,13 +21,14 @@ def _clamped(value, cells):
 @kernel
 def at_points(points, reach, x0, y0, cell, columns, rows, start, member, position, radius, found):
     """For each point (q, 2) the circle that covers it, the one of nearest centre; -1 for none. `reach`: the largest radius."""
+    per = 1.0 / cell
     for q in range(points.shape[0]):
         x, y = points[q, 0], points[q, 1]
         found[q] = -1
         best = np.inf
-        for row in range(_clamped((y - reach - y0) / cell, rows), _clamped((y + reach - y0) / cell, rows) + 1):
-            low = start[row * columns + _clamped((x - reach - x0) / cell, columns)]
-            high = start[row * columns + _clamped((x + reach - x0) / cell, columns) + 1]
+        for row in range(_clamped((y - reach - y0) * per, rows), _clamped((y + reach - y0) * per, rows) + 1):
+            low = start[row * columns + _clamped((x - reach - x0) * per, columns)]
+            high = start[row * columns + _clamped((x + reach - x0) * per, columns) + 1]
             for k in range(low, high):
                 i = member[k]
                 dx, dy = position[i, 0] - x, position[i, 1] - y
@@ -43,10 +45,11 @@ def in_regions(lower, upper, center, size, x0, y0, cell, columns, rows, start, m
     Writes pairs (query, particle); returns how many there are, also beyond the room.
     """
     found = 0
+    per = 1.0 / cell
     for q in range(lower.shape[0]):
-        for row in range(_clamped((lower[q, 1] - y0) / cell, rows), _clamped((upper[q, 1] - y0) / cell, rows) + 1):
-            low = start[row * columns + _clamped((lower[q, 0] - x0) / cell, columns)]
-            high = start[row * columns + _clamped((upper[q, 0] - x0) / cell, columns) + 1]
+        for row in range(_clamped((lower[q, 1] - y0) * per, rows), _clamped((upper[q, 1] - y0) * per, rows) + 1):
+            low = start[row * columns + _clamped((lower[q, 0] - x0) * per, columns)]
+            high = start[row * columns + _clamped((upper[q, 0] - x0) * per, columns) + 1]
             for k in range(low, high):
                 i = member[k]
                 x, y = np.float64(position[i, 0]), np.float64(position[i, 1])
@@ -78,6 +81,7 @@ def rays(origin, direction, length, reach, x0, y0, cell, columns, rows, start, m
     The ray is walked in steps of a cell. At each the cells within `reach`, the largest radius, of the piece are looked at, until
     no later one can be nearer.
     """
+    per = 1.0 / cell
     for q in range(origin.shape[0]):
         x, y, dx, dy = origin[q, 0], origin[q, 1], direction[q, 0], direction[q, 1]
         index[q], distance[q] = -1, np.inf
@@ -94,10 +98,10 @@ def rays(origin, direction, length, reach, x0, y0, cell, columns, rows, start, m
         s = begin
         while s <= end and s <= distance[q]:
             ax, ay, bx, by = x + s * dx, y + s * dy, x + (s + cell) * dx, y + (s + cell) * dy
-            left = _clamped((min(ax, bx) - reach - x0) / cell, columns)
-            right = _clamped((max(ax, bx) + reach - x0) / cell, columns)
+            left = _clamped((min(ax, bx) - reach - x0) * per, columns)
+            right = _clamped((max(ax, bx) + reach - x0) * per, columns)
             for row in range(
-                _clamped((min(ay, by) - reach - y0) / cell, rows), _clamped((max(ay, by) + reach - y0) / cell, rows) + 1
+                _clamped((min(ay, by) - reach - y0) * per, rows), _clamped((max(ay, by) + reach - y0) * per, rows) + 1
             ):
                 for k in range(start[row * columns + left], start[row * columns + right + 1]):
                     i = member[k]
@@ -127,13 +131,14 @@ def nearest(points, x0, y0, cell, columns, rows, start, member, position, index,
 
     Cells are looked at in square rings about the point's own, until the ring is farther away than what was found.
     """
+    per = 1.0 / cell
     for q in range(points.shape[0]):
         x, y = points[q, 0], points[q, 1]
         # Outside of the grid the rings begin at the nearest cell, and all distances only grow by that.
-        column, row = _clamped((x - x0) / cell, columns), _clamped((y - y0) / cell, rows)
+        column, row = _clamped((x - x0) * per, columns), _clamped((y - y0) * per, rows)
         count = 0
         for ring in range(max(columns, rows)):
-            gap = cell * (ring - 1)  # the point is somewhere in its cell, at least this far from the ring
+            gap = cell * (ring - 1) * (1.0 - 1e-12)  # the point is somewhere in its cell, at least this far from the ring
             if ring > 0 and count == index.shape[1] and gap > 0.0 and gap * gap > square[q, count - 1]:
                 break
             for r in range(max(row - ring, 0), min(row + ring, rows - 1) + 1):
