@@ -126,7 +126,10 @@ class _Frame:
         s, forces = self._state, self._forces
         kept = [force for force in forces.forces if isinstance(force, Conservative)]
         moving = (s.position, s.velocity, s.acceleration, lag, s.spin, s.radius, s.mass)
-        energy = measure.mechanical(*moving, *forces.gravity) + sum(force.potential(s) for force in kept)
+        energy = measure.mechanical(*moving, *forces.gravity)
+        if kept:
+            state = s.in_users_order()
+            energy += sum(force.potential(state) for force in kept)
         others = [force for force in forces.forces if not isinstance(force, Conservative)]
         return _Instant(float(energy), self._power(others, lag) if others else {})
 

@@ -1,19 +1,27 @@
-"""What a world holds: its particles, how they are added, and their arrays."""
+"""What a world holds: its particles, how they are added and removed, and their arrays."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from pyverlet import checks
 from pyverlet.bounds import Boundary
-from pyverlet.state import EVERYONE, Column, Group, State
+from pyverlet.forces import Force, Numbered
+from pyverlet.group import Column, Group
+from pyverlet.state import EVERYONE, Slots, State
+
+Array = NDArray[Any]
 
 
 class Particles:
     """The particles of a world. Its arrays are views, in the order the particles were added."""
 
     _state: State
+    _slots: Slots
+    forces: list[Force]
     _where = slice(None)
     boundary: Boundary
 
@@ -73,7 +81,33 @@ class Particles:
         checks.positive("radius", values["radius"])
         checks.positive("mass", values["mass"], infinite_is="pinned")
         self.boundary.check(values["radius"])
-        return Group(self._state, self._state.append(values))
+        return Group(self._state, self._state.append(values), self.remove)
+
+    def remove(self, which: Group | ArrayLike) -> None:
+        """Remove particles. Groups keep the others, whose indices close ranks.
+
+        Args:
+            which: a group, an index, several, or (n,) bool. Many at once cost as much as one.
+
+        Raises:
+            InputError: there is no such particle; nothing is removed.
+        """
+        if isinstance(which, Group):
+            which = which.index
+        gone = checks.indices("which", which, len(self))
+        if not len(gone):
+            return
+        kept = np.ones(len(self), bool)
+        kept[gone] = False
+        now = self._state.remove(kept)
+        self._slots.forget(now)
+        self._renumber(now)
+
+    def _renumber(self, now: Array) -> None:
+        """Tell those who hold a particle by its index where it is now, or that it is no more (-1)."""
+        for force in self.forces:
+            if isinstance(force, Numbered):
+                force.renumber(now)
 
     def __len__(self) -> int:
         return len(self._state)

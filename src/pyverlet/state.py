@@ -21,6 +21,7 @@ Array = NDArray[Any]
 _ROWS = ("position", "velocity", "acceleration")
 _COLUMNS = ("spin", "radius", "mass", "grown", "restitution", "friction")
 _MARKS = ("category", "mask")
+_NUMBERS = ("number",)
 
 EVERYONE = 0xFFFFFFFF
 """A mask of 32 bits that takes every category."""
@@ -41,6 +42,8 @@ class State:
         grown: (n,) part of the radius that other circles feel; less than 1 for those that were added on top of another.
         restitution, friction: (n,) of circles that have values of their own; negative: as `Collisions` and the bounds say.
         category, mask: (n,) 32 bits each; two circles collide if each has a bit of its category in the other's mask.
+        number: (n,) of each particle, in ascending order; no two particles of a world ever have the same.
+        version: how often particles were added or removed.
     """
 
     position: Array
@@ -54,12 +57,16 @@ class State:
     friction: Array
     category: Array
     mask: Array
+    number: Array
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self.dtype = dtype
         self._store: dict[str, Array] = {name: np.empty((0, 2), dtype) for name in _ROWS}
         self._store |= {name: np.empty(0, dtype) for name in _COLUMNS}
         self._store |= {name: np.empty(0, np.uint32) for name in _MARKS}
+        self._store |= {name: np.empty(0, np.int64) for name in _NUMBERS}
+        self._numbers = 0
+        self.version = 0
         self._show(0)
 
     def __len__(self) -> int:
@@ -84,7 +91,36 @@ class State:
         self._show(stop)
         for name, value in (_DEFAULTS | values).items():
             getattr(self, name)[start:stop] = value
+        self.number[start:] = np.arange(self._numbers, self._numbers + stop - start)
+        self._numbers += stop - start
+        self.version += 1
         return slice(start, stop)
+
+    def remove(self, kept: Array) -> Array:
+        """Keep the particles marked in `kept` (n,) bool, in their order. Returns (n,) where each of the old is now, or -1."""
+        now = np.where(kept, np.cumsum(kept) - 1, -1)
+        first = int(np.argmin(kept)) if not kept.all() else len(kept)
+        left = int(np.count_nonzero(kept))
+        for array in self._store.values():
+            array[first:left] = array[first : len(kept)][kept[first:]]
+        self._show(left)
+        self.version += 1
+        return now
+
+    def restore(self, arrays: dict[str, Array]) -> None:
+        """Take up what `arrays` gave once, however many particles that were."""
+        count = len(arrays["number"])
+        if count > len(self._store["number"]):
+            self._store = {name: np.empty((count, *old.shape[1:]), old.dtype) for name, old in self._store.items()}
+        self._show(count)
+        for name in self._store:
+            getattr(self, name)[:] = arrays[name]
+        self.version += 1
+
+    def find(self, first: int, stop: int) -> slice:
+        """Where the particles with numbers from `first` up to, not including, `stop` are."""
+        a, b = np.searchsorted(self.number, (first, stop))
+        return slice(int(a), int(b))
 
     def _show(self, count: int) -> None:
         for name, array in self._store.items():
@@ -112,13 +148,16 @@ class Slots:
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self.dtype = dtype
         self.real = dtype.type
+        self._order = np.zeros(0, np.int32), np.zeros(0, np.uint8)
         self._resize(0)
 
     def __len__(self) -> int:
         return len(self.radius)
 
     def _resize(self, count: int) -> None:
-        self.particle = np.arange(count, dtype=np.int32)
+        """Room for `count` particles: those of `_order`, as they stood, and behind them the new ones."""
+        order, fed = self._order
+        self.particle = np.concatenate((order, np.arange(len(order), count, dtype=np.int32)))
         for name in (*_ROWS, "force"):
             setattr(self, name, np.zeros((count, 2), self.dtype))
         for name in (*_COLUMNS, "inverse_mass"):
@@ -126,7 +165,9 @@ class Slots:
         self.start = np.zeros((count, 2), self.dtype)
         self.size = self.radius
         self.resting = np.zeros(count, np.uint8)
-        self.fed = np.zeros(count, np.uint8)
+        self.fed = np.concatenate((fed, np.zeros(count - len(fed), np.uint8)))
+        self._order = np.zeros(0, np.int32), np.zeros(0, np.uint8)
+        self._changed = True
         self.hits = np.full(count, -1, self.dtype)
         self.spent = np.zeros((count, 2))
         self.category = self.mask = np.empty(0, np.uint32)
@@ -149,9 +190,10 @@ class Slots:
 
     def gather(self, state: State) -> bool:
         """Copy the user's arrays in. True if particles, radii or masses are not what they were: no list survives that."""
-        resized = len(state) != len(self)
-        if resized:
+        if len(state) != len(self):
+            self._order = self.particle, self.fed
             self._resize(len(state))
+        resized, self._changed = self._changed, False
         for name in _ROWS:
             motion.take_rows(getattr(self, name), getattr(state, name), self.particle)
         motion.take_checking(self.spin, state.spin, self.particle)
@@ -182,6 +224,13 @@ class Slots:
         self.hits[:] = -1
         self.spent[:] = 0
 
+    def forget(self, now: Array) -> None:
+        """The user's particles are now at `now` (n,), or no more (-1): let those go, keep the order of the others."""
+        order = now[self.particle].astype(np.int32)
+        kept = order >= 0
+        self._order = order[kept], self.fed[kept]
+        self._resize(int(np.count_nonzero(kept)))
+
     def resize(self) -> None:
         """Bring `size` up to date with `grown`."""
         self.size = self.radius if (self.grown >= 1).all() else self.radius * self.grown
@@ -192,6 +241,15 @@ class Slots:
             motion.put_rows(getattr(state, name), getattr(self, name), self.particle)
         motion.put(state.spin, self.spin, self.particle)
         motion.put(state.grown, self.grown, self.particle)
+
+    def in_users_order(self) -> State:
+        """A state with the positions, velocities, spins, radii and masses of now."""
+        state = State(self.dtype)
+        values = {name: np.empty_like(getattr(self, name)) for name in (*_ROWS, "spin", "radius", "mass")}
+        for name, array in values.items():
+            array[self.particle] = getattr(self, name)
+        state.append(values)
+        return state
 
     def reorder(self, order: Array) -> None:
         """Put the particle of slot order[k] into slot k."""
@@ -214,8 +272,8 @@ class Slots:
 
     def restore(self, saved: tuple[Array, Array], state: State) -> None:
         """Take up what `save` returned and gather the state into that order."""
+        self._order = saved[0].copy(), saved[1].copy()
         self._resize(len(saved[0]))
-        self.particle[:], self.fed[:] = saved
         self.gather(state)
 
     def scratch(self, number: int) -> Array:
@@ -235,6 +293,12 @@ class Slots:
             self._slot_of[self.particle] = np.arange(len(self), dtype=self.particle.dtype)
         return int(self._slot_of[particle])
 
+    def slots_of(self, particles: Array) -> Array:
+        """(k,) slots that hold these of the user's particles."""
+        if len(particles):
+            self.slot_of(0)
+        return np.zeros(0, np.int32) if self._slot_of is None else self._slot_of[particles]
+
 
 def advance(out: Array, base: Array, slope: Array, h: float) -> None:
     """out = base + h * slope on (n, 2) arrays; the move every integrator is made of. out may be base."""
@@ -249,52 +313,3 @@ def farthest(position: Array, reference: Array) -> float:
     if len(position) < SERIAL_BELOW:
         return float(np.sqrt(motion.farthest_serial(position, reference)))
     return float(np.sqrt(motion.farthest_parallel(position, reference)))
-
-
-class Column:
-    """A property of a group, or of the whole world: a view on its part of one of the state's arrays. Setting it copies."""
-
-    def __init__(self, doc: str) -> None:
-        self.__doc__ = doc
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self._name = name
-
-    def __get__(self, group: Any, owner: type) -> Array:
-        return getattr(group._state, self._name)[group._where]  # type: ignore[no-any-return]
-
-    def __set__(self, group: Any, value: Any) -> None:
-        getattr(group._state, self._name)[group._where] = value
-
-
-class Group:
-    """A handle on particles that were added together; valid whatever order the engine keeps inside.
-
-    Its arrays are views on the world's, in the order the particles were added: reading copies nothing, and writing into them
-    (`group.velocity[0] = 1, 0`) changes the world. Fetch them anew after adding particles: the world may have moved its arrays.
-    """
-
-    def __init__(self, state: State, where: slice) -> None:
-        self._state = state
-        self._where = where
-
-    def __len__(self) -> int:
-        return int(self._where.stop - self._where.start)
-
-    def __repr__(self) -> str:
-        return f"Group of {len(self)} particles, {self._where.start} to {self._where.stop - 1}"
-
-    @property
-    def index(self) -> NDArray[np.int64]:
-        """(n,) indices of these particles among all of the world's."""
-        return np.arange(self._where.start, self._where.stop)
-
-    position = Column("(n, 2) centres, m.")
-    velocity = Column("(n, 2) m/s.")
-    spin = Column("(n,) angular velocity, rad/s, counter-clockwise.")
-    radius = Column("(n,) m.")
-    mass = Column("(n,) kg; infinity pins a particle.")
-    restitution = Column("(n,) e of these circles; negative: as the world's `Collisions` and bounds say.")
-    friction = Column("(n,) mu of these circles; negative: as the world's `Collisions` and bounds say.")
-    category = Column("(n,) uint32, the bits of what these circles are.")
-    mask = Column("(n,) uint32, the bits of the categories they collide with.")

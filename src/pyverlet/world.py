@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from pyverlet import _jit, checks
+from pyverlet.actors import Actor
 from pyverlet.bounds import Boundary, Open
 from pyverlet.collisions import Collisions, ContactSolver, Overlap, measure_overlap
 from pyverlet.constants import ALL_THREADS_FROM, ONE_THREAD_BELOW, REST_ACCELERATIONS, STANDARD_GRAVITY
@@ -21,8 +22,10 @@ from pyverlet.forces import Force, ForceSum
 from pyverlet.integrators import Integrator, PositionVerlet
 from pyverlet.kernels import measure, motion
 from pyverlet.ledger import Bookkeeper, Ledger
+from pyverlet.obstacles import Course, Obstacles
 from pyverlet.particles import Particles
 from pyverlet.profile import Profile
+from pyverlet.queries import Queries
 from pyverlet.state import Slots, State
 
 Array = NDArray[Any]
@@ -35,6 +38,7 @@ _DEFAULT_COLLISIONS = Collisions()
 class Saved:
     """What `World.save` keeps: enough to continue with the same bits. Opaque."""
 
+    world: State
     arrays: dict[str, Array]
     time: float
     frames: int
@@ -42,9 +46,11 @@ class Saved:
     slots: tuple[Array, Array]
     neighbours: Any
     books: Bookkeeper | None
+    obstacles: Any
+    actors: list[tuple[Actor, Any]]
 
 
-class World(Particles, Doors):
+class World(Particles, Queries, Doors):
     """Particles in a room, and the laws they follow. SI units, y up.
 
     Args:
@@ -78,6 +84,9 @@ class World(Particles, Doors):
         self._slots = Slots(self._state.dtype)
         self.forces: list[Force] = []
         self._force_sum = ForceSum(checks.vector("gravity", gravity), self.forces)
+        self.actors: list[Actor] = []
+        self.obstacles = Obstacles()
+        self._course = Course(self.obstacles)
         self.integrator = PositionVerlet() if integrator is None else integrator
         self.boundary = Open() if boundary is None else boundary
         self.collisions = collisions
@@ -98,16 +107,18 @@ class World(Particles, Doors):
             NonFiniteError: a particle turned NaN or infinite; the world still holds the frame before.
         """
         h = checks.number("dt", dt, above=0.0) / self.substeps
+        for actor in self.actors:
+            actor.act(self, dt)
         _jit.use_threads(self.threads)
         self.profile.begin()
-        lag, done = self.integrator.velocity_lag * h, self.profile.mark
-        books = self._books and self._books.frame(self._slots, self._force_sum, self.time, h, lag, done)
-        self._frame(h, books or done)
+        books = self._open_books(h)
+        self._frame(h, books or self.profile.mark)
         if self._first_non_finite() >= 0:
             self._explain_non_finite(h)
         self._slots.scatter(self._state)
         if books:
             books.close(self._spent())
+        self._course.end(dt)
         self.profile.mark("scatter")
         self.time += dt
         self.frames += 1
@@ -117,15 +128,16 @@ class World(Particles, Doors):
     def _frame(self, h: float, done: Callable[[str], None]) -> None:
         """The table of contents of the engine. `done` is told the name of each stage as it ends."""
         state, forces, integrator = self._slots, self._force_sum, self.integrator
-        contacts = self._contacts if len(self) > 1 else None
+        contacts, course = self._contacts if len(self) > 1 else None, self._course
         lag = integrator.velocity_lag * h
         self._gather()
-        self._clear_notes()
         done("gather")
         integrator.begin(state, forces, self.time, h, self._h_last)
         for substep in range(self.substeps):
             if contacts:
                 contacts.before(state, h)
+            if course:
+                course.before(state)
             integrator.step(state, forces, self.time + substep * h, h)
             strongest = self._strongest_acceleration()
             done("integrate")
@@ -136,6 +148,9 @@ class World(Particles, Doors):
                 done("contacts")
             self.boundary.confine(state, h, lag, REST_ACCELERATIONS * strongest * h)
             done("bounds")
+            if course:
+                course.collide(state, substep * h, h, lag, REST_ACCELERATIONS * strongest * h)
+                done("obstacles")
             if contacts:
                 contacts.still(state, h)
             done("velocities")
@@ -152,6 +167,8 @@ class World(Particles, Doors):
 
     def _gather(self) -> None:
         changed = self._slots.gather(self._state)
+        self._course.begin()
+        self._clear_notes()
         if not self._slots.most_restitution <= 1.0:
             checks.at_most("restitution", self._state.restitution, 1.0)
         if not self._slots.most_friction < np.inf:
@@ -169,6 +186,10 @@ class World(Particles, Doors):
             self._contacts.broad_phase.forget()
             if len(self) > 1:
                 self._contacts.fit(self._slots)
+
+    def _open_books(self, h: float) -> Any:
+        lag = self.integrator.velocity_lag * h
+        return self._books and self._books.frame(self._slots, self._force_sum, self.time, h, lag, self.profile.mark)
 
     def _clear_notes(self) -> None:
         """What walls and contacts note about a frame starts anew."""
@@ -341,6 +362,7 @@ class World(Particles, Doors):
     def save(self) -> Saved:
         """A copy of everything that moves; `restore` continues from it with the same bits."""
         return Saved(
+            world=self._state,
             arrays={name: array.copy() for name, array in self._state.arrays()},
             time=self.time,
             frames=self.frames,
@@ -348,20 +370,27 @@ class World(Particles, Doors):
             slots=self._slots.save(),
             neighbours=self._contacts.broad_phase.save() if self._contacts else None,
             books=self._books and self._books.copy(),
+            obstacles=self.obstacles.save(),
+            actors=[(actor, actor.save()) for actor in self.actors],
         )
 
     def restore(self, saved: Saved) -> None:
-        """Go back to what `save` returned; particles must not have been added since.
+        """Go back to what `save` returned, with the particles of then: groups added since are dead, removed ones live again.
 
         Raises:
-            InputError: the number of particles has changed.
+            InputError: it is another world's.
         """
-        if len(saved.arrays["radius"]) != len(self):
-            raise InputError(
-                f"saved holds {len(saved.arrays['radius'])} particles; allowed is a state of this world's {len(self)} particles"
-            )
-        for name, array in self._state.arrays():
-            array[:] = saved.arrays[name]
+        if saved.world is not self._state:
+            raise InputError("saved is the state of another world; allowed is what save() of this one returned")
+        numbers = self._state.number.copy()
+        self._state.restore(saved.arrays)
+        if not np.array_equal(numbers, self._state.number):
+            where = np.searchsorted(self._state.number, numbers).clip(max=max(len(self) - 1, 0))
+            self._renumber(np.where(self._state.number[where] == numbers, where, -1) if len(self) else np.full(len(numbers), -1))
+        self.obstacles.restore(saved.obstacles)
+        self.actors[:] = [actor for actor, _ in saved.actors]
+        for actor, memory in saved.actors:
+            actor.restore(memory)
         self.time, self.frames, self._h_last = saved.time, saved.frames, saved.h_last
         self._slots.restore(saved.slots, self._state)
         self._books = saved.books and saved.books.copy()

@@ -16,9 +16,9 @@ ROOT = Path(pyverlet.__file__).parent
 # From the ground up. A module may import from its own layer only within its own package (the first part of its name).
 LAYERS = (
     {"errors", "constants", "_jit", "checks", "progress"},
-    {"state", "kernels"},
-    {"integrators", "forces", "bounds", "naive", "broadphase", "collisions", "energy", "ledger"},
-    {"world", "particles", "doors", "profile", "clock", "warmup", "panels"},
+    {"state", "group", "kernels"},
+    {"integrators", "forces", "bounds", "obstacles", "naive", "broadphase", "collisions", "energy", "ledger"},
+    {"world", "actors", "particles", "queries", "doors", "profile", "clock", "warmup", "panels"},
     {"scenes", "report", "lab", "picture"},
     {"viewers", "record", "draw"},
     {"cli"},
@@ -27,11 +27,13 @@ LAYERS = (
 BESIDE = {
     "checks": {"errors"},
     "state": {"kernels"},
+    "group": {"state"},
     "collisions": {"broadphase"},
     "ledger": {"forces"},
     "energy": {"forces"},
     "naive": {"bounds"},
-    "world": {"profile", "particles", "doors"},
+    "world": {"profile", "doors", "particles", "actors", "queries"},
+    "actors": {"world"},
     "doors": {"world"},
     "warmup": {"world"},
     "panels": {"world"},

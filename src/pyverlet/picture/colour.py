@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet import checks
 from pyverlet.errors import InputError
+from pyverlet.group import Group
 from pyverlet.picture.palette import STEPS, Packed, Theme, heat, hues, packed, shade
-from pyverlet.state import Group
 
 if TYPE_CHECKING:
     from pyverlet.world import World

@@ -73,7 +73,7 @@ class Hands:
         for hand, force in self._held.items():
             if isinstance(force, Push):
                 force.center = self._aim[hand]
-            elif isinstance(force, Grip):
+            elif isinstance(force, Grip) and force.particle >= 0:
                 force.target = self._leashed(force.particle, self._aim[hand], LEASH * view_size)
 
     def _leashed(self, particle: int, aim: tuple[float, float], leash: float) -> tuple[float, float]:

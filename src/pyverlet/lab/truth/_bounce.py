@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet.bounds import Boundary, Box, Open
+from pyverlet.group import Group
 from pyverlet.integrators import Integrator
 from pyverlet.lab.problems import Floats
 from pyverlet.naive import ClampAndFlip
-from pyverlet.state import Group
 from pyverlet.world import World
 
 G = 9.81
