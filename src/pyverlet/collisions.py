@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from pyverlet import checks
-from pyverlet.broadphase import BruteForce, Fast
+from pyverlet.broadphase import BruteForce, Fast, PairList
 from pyverlet.constants import GROWTH, LARGEST_PUSH, REST_ACCELERATIONS, SMALLEST
 from pyverlet.errors import InputError
 from pyverlet.kernels import contacts
@@ -47,9 +48,11 @@ class Overlap(NamedTuple):
 class ContactSolver:
     """The contact stages of a substep, in the order `World.step` calls them."""
 
-    def __init__(self, settings: Collisions, dtype: np.dtype[Any]) -> None:
+    def __init__(self, settings: Collisions, dtype: np.dtype[Any], unlist: Callable[[PairList, Any], None]) -> None:
         self.settings = settings
         self.broad_phase = settings.method.start(dtype)
+        self._unlist = unlist  # takes pairs that are no contacts, since a link says so, from a new list
+        self._seen = 0
 
     def fit(self, state: Slots) -> None:
         """Let particles that were added on top of others start smaller."""
@@ -76,6 +79,9 @@ class ContactSolver:
     def find(self, state: Slots) -> None:
         """Broad phase: bring the list of candidate pairs up to date."""
         self.broad_phase.update(state)
+        if self._seen != self.broad_phase.rebuilds:
+            self._seen = self.broad_phase.rebuilds
+            self._unlist(self.broad_phase.list, state.particle)
 
     def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
         """Move overlapping circles apart, let impacts bounce, and note who touches."""

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.constants import SERIAL_BELOW
+from pyverlet.errors import InputError
 from pyverlet.kernels import motion
 
 Array = NDArray[Any]
@@ -269,3 +270,17 @@ class Group:
     @mass.setter
     def mass(self, value: Any) -> None:
         self._state.mass[self._where] = value
+
+    def pin(self, index: Any = slice(None)) -> None:
+        """Make particles immovable where they are: mass infinite, no velocity. Give them a mass again to let go.
+
+        Args:
+            index: in this group, or several, or a slice; all of them unless said.
+
+        Raises:
+            InputError: there is no such particle.
+        """
+        try:
+            self.mass[index], self.velocity[index], self.spin[index] = np.inf, 0.0, 0.0
+        except IndexError:
+            raise InputError(f"index is {index!r}; allowed are indices of this group's {len(self)} particles") from None

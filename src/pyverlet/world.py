@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,25 +19,15 @@ from pyverlet.errors import InputError, NonFiniteError
 from pyverlet.forces import Force, ForceSum
 from pyverlet.integrators import Integrator, PositionVerlet
 from pyverlet.kernels import measure, motion
+from pyverlet.links import Links
 from pyverlet.profile import Profile
+from pyverlet.saved import Saved
 from pyverlet.state import Group, Slots, State
 
 Array = NDArray[Any]
 
 # For scenes whose collisions argument is left alone: a fresh default each time, while None means no collisions.
 _DEFAULT_COLLISIONS = Collisions()
-
-
-@dataclass(frozen=True)
-class Saved:
-    """What `World.save` keeps: enough to continue with the same bits. Opaque."""
-
-    arrays: dict[str, Array]
-    time: float
-    frames: int
-    h_last: float | None
-    slots: tuple[Array, Array]
-    neighbours: Any
 
 
 class World(Doors):
@@ -71,6 +60,7 @@ class World(Doors):
         self._state = State(checks.floating("dtype", dtype))
         self._h_last: float | None = None  # substep of the frame before; None: the integrator starts anew
         self._slots = Slots(self._state.dtype)
+        self.links = Links(self._state)
         self.forces: list[Force] = []
         self._force_sum = ForceSum(checks.vector("gravity", gravity), self.forces)
         self.integrator = PositionVerlet() if integrator is None else integrator
@@ -98,6 +88,7 @@ class World(Doors):
         if self._first_non_finite() >= 0:
             self._explain_non_finite(h)
         self._slots.scatter(self._state)
+        self.links.scatter()
         self.profile.mark("scatter")
         self.time += dt
         self.frames += 1
@@ -108,6 +99,7 @@ class World(Doors):
         """The table of contents of the engine. `done` is told the name of each stage as it ends."""
         state, forces, integrator = self._slots, self._force_sum, self.integrator
         contacts = self._contacts if len(self) > 1 else None
+        links = self.links if self.links else None
         lag = integrator.velocity_lag * h
         self._gather()
         done("gather")
@@ -115,6 +107,8 @@ class World(Doors):
         for substep in range(self.substeps):
             if contacts:
                 contacts.before(state, h)
+            if links:
+                links.before(state, h)
             integrator.step(state, forces, self.time + substep * h, h)
             strongest = self._strongest_acceleration()
             done("integrate")
@@ -123,11 +117,16 @@ class World(Doors):
                 done("broad phase")
                 contacts.project(state, h, lag, strongest)
                 done("contacts")
+            if links:
+                links.solve(state, h)
+                done("links")
             self.boundary.confine(state, h, lag, REST_ACCELERATIONS * strongest * h)
             done("bounds")
             if contacts:
                 contacts.still(state, h)
                 done("velocities")
+            if links:
+                links.after(state)
         if contacts:
             contacts.mark_resting(state)
         integrator.end(state, h)
@@ -140,6 +139,8 @@ class World(Doors):
             self.step(dt)
 
     def _gather(self) -> None:
+        if self.links.begin() and self._contacts:
+            self._contacts.broad_phase.forget()
         if not self._slots.gather(self._state):
             return
         try:
@@ -311,7 +312,7 @@ class World(Doors):
         if value is not None and not isinstance(value, Collisions):
             raise InputError(f"collisions is {value!r}; allowed are pyverlet.Collisions(...) and None")
         self._collisions = value
-        self._contacts = None if value is None else ContactSolver(value, self._state.dtype)
+        self._contacts = None if value is None else ContactSolver(value, self._state.dtype, self.links.unlist)
 
     @property
     def threads(self) -> int:
@@ -329,7 +330,7 @@ class World(Doors):
 
     def energy(self) -> Energy:
         """Kinetic (motion and spin), potential, links and total energy, J."""
-        return energy(self._state, self.gravity, self.forces)
+        return energy(self._state, self.gravity, self.forces, self.links.energy())
 
     def momentum(self) -> Array:
         """(2,) sum of m v over all free particles, kg m/s."""
@@ -374,6 +375,7 @@ class World(Doors):
             h_last=self._h_last,
             slots=self._slots.save(),
             neighbours=self._contacts.broad_phase.save() if self._contacts else None,
+            links=self.links.save(),
         )
 
     def restore(self, saved: Saved) -> None:
@@ -386,6 +388,7 @@ class World(Doors):
             raise InputError(
                 f"saved holds {len(saved.arrays['radius'])} particles; allowed is a state of this world's {len(self)} particles"
             )
+        self.links.restore(saved.links)
         for name, array in self._state.arrays():
             array[:] = saved.arrays[name]
         self.time, self.frames, self._h_last = saved.time, saved.frames, saved.h_last
