@@ -21,7 +21,7 @@ from pyverlet.integrators import (
     VelocityVerlet,
     Yoshida4,
 )
-from pyverlet.links import Pin, Rope, Spring, Stick
+from pyverlet.links import Angle, Area, Pin, Rope, Spring, Stick
 from pyverlet.naive import ClampAndFlip, ProjectOnly
 from pyverlet.panels import Panel, Panels
 from pyverlet.state import Group
@@ -31,10 +31,46 @@ from pyverlet.world import World
 __version__ = "0.1.0"
 
 __all__ = [
-    "RK4", "Boundary", "Box", "BruteForce", "Circle", "ClampAndFlip", "Clock", "Collisions", "Energy", "ExplicitEuler",
-    "Fast", "FrameBudget", "Group", "InputError", "Integrator", "NonFiniteError", "Open", "Overlap", "Panel", "Panels",
-    "Pin", "PositionVerlet", "ProjectOnly", "PyverletError", "Rope", "SemiImplicitEuler", "Spring", "Stick",
-    "TimeCorrectedVerlet", "VelocityVerlet", "World", "Yoshida4", "errors", "forces", "integrators", "scenes", "view", "warm_up",
+    "RK4",
+    "Angle",
+    "Area",
+    "Boundary",
+    "Box",
+    "BruteForce",
+    "Circle",
+    "ClampAndFlip",
+    "Clock",
+    "Collisions",
+    "Energy",
+    "ExplicitEuler",
+    "Fast",
+    "FrameBudget",
+    "Group",
+    "InputError",
+    "Integrator",
+    "NonFiniteError",
+    "Open",
+    "Overlap",
+    "Panel",
+    "Panels",
+    "Pin",
+    "PositionVerlet",
+    "ProjectOnly",
+    "PyverletError",
+    "Rope",
+    "SemiImplicitEuler",
+    "Spring",
+    "Stick",
+    "TimeCorrectedVerlet",
+    "VelocityVerlet",
+    "World",
+    "Yoshida4",
+    "errors",
+    "forces",
+    "integrators",
+    "scenes",
+    "view",
+    "warm_up",
 ]  # fmt: skip
 
 

@@ -210,3 +210,66 @@ def test_momentum_is_kept_by_free_chains() -> None:
     world.run(seconds=2.0)
     assert world.momentum() == pytest.approx(momentum, rel=1e-7)
     assert world.angular_momentum() == pytest.approx(turning, rel=2e-3)
+
+
+def test_angle_swings_like_a_torsion_spring() -> None:
+    # Two arms held at their joint: I = m L^2 for the free arm, w = sqrt(1 / (compliance I)).
+    length, mass, compliance = 0.5, 0.4, 0.2
+    world = pv.World(collisions=None, gravity=(0, 0), dtype=np.float64)
+    group = world.add(position=[(-0.5, 0), (0, 0), (length, 0)], radius=0.05, mass=mass)
+    group.pin([0, 1])
+    world.links.append(pv.Stick(group, 1, 2))
+    angle = world.links.append(pv.Angle(group, 0, 1, 2, compliance=compliance))
+    assert abs(angle.angle[0]) == pytest.approx(np.pi)
+    group.velocity[2] = (0.0, 0.2)
+    start = world.energy().total
+    y = []
+    for _ in range(600):
+        world.step(DT)
+        y.append(float(group.position[2, 1]))
+        assert world.energy().total == pytest.approx(start, rel=0.01)
+    period = 2 * np.pi * np.sqrt(compliance * mass * length**2)
+    crossings = downward_crossings(DT * np.arange(1, 601), np.array(y))
+    assert np.diff(crossings).mean() == pytest.approx(period, rel=2e-3)
+
+
+@pytest.mark.parametrize("substeps", [4, 8, 32])
+def test_beam_bends_as_far_at_any_substeps(substeps: int) -> None:
+    # A cantilever of rigid links, nearly straight: joint k turns by compliance times the torque of all weights beyond it, and
+    # takes the end down by that times its arm.
+    links, length, compliance, mass, g = 8, 0.1, 0.2, 0.02, 0.2
+    world = pv.World(collisions=None, gravity=(0, -g), substeps=substeps, dtype=np.float64)
+    group, _ = chain(world, np.column_stack((np.arange(-1, links + 1) * length, np.zeros(links + 2))), mass)
+    group.pin([0, 1])
+    k = np.arange(links)
+    world.links.append(pv.Angle(group, k, k + 1, k + 2, compliance=compliance))
+    world.links.iterations = 4
+    world.forces.append(pv.forces.Drag(linear=0.05))
+    world.run(seconds=8.0)
+    x = length * np.arange(links + 1)
+    torque = np.array([mass * g * np.sum(x[n + 1 :] - x[n]) for n in range(links)])
+    assert -group.position[-1, 1] == pytest.approx(float(np.sum(compliance * torque * (x[-1] - x[:-1]))), rel=0.05)
+
+
+@pytest.mark.parametrize("substeps", [4, 8, 32])
+def test_area_is_kept_under_load_and_pressure_is_compliance(substeps: int) -> None:
+    # Pumped up to 1.2 times its area, a ring of springs with stiffness k has the pressure p with p ds = tension dphi: T = p R.
+    count, radius, k, compliance = 24, 1.0, 200.0, 1e-3
+    phi = 2 * np.pi * np.arange(count) / count
+    world = pv.World(collisions=None, gravity=(0, 0), substeps=substeps, dtype=np.float64)
+    group = world.add(position=radius * np.column_stack((np.cos(phi), np.sin(phi))), radius=0.05, mass=0.1)
+    n = np.arange(count)
+    spring = world.links.append(pv.Spring(group, n, (n + 1) % count, stiffness=k))
+    area = world.links.append(pv.Area(group, compliance=compliance))
+    area.area = 1.2 * area.area
+    world.forces.append(pv.forces.Drag(linear=1.0))
+    world.run(seconds=4.0)
+    x, y = group.position.T
+    now = 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+    pressure = (float(area.area[0]) - now) / compliance
+    side = np.hypot(*(np.roll(group.position, -1, axis=0) - group.position).T)
+    # On a polygon the pressure pushes each corner with p side cos(pi / n); both its sides pull with 2 T sin(pi / n).
+    tension = pressure * side.mean() / (2 * np.tan(np.pi / count))
+    assert spring.force == pytest.approx(np.full(count, tension), rel=0.05)
+    assert k * (side - spring.length) == pytest.approx(np.full(count, tension), rel=0.05)
+    assert area.force[0] == pytest.approx(-pressure, rel=0.05)

@@ -44,11 +44,13 @@ def blend(stiffness, damping, ww, h):
 
 @parallel_kernel
 def prepare(
-    first, particle, weight, stiffness, damping, upper, h, start, earlier, gradient, bend, force, give, offset, turn, bow
+    first, particle, weight, stiffness, damping, upper, h, start, earlier, gradient, bend, force, last, give, offset,
+    turn, bow, lam,
 ):  # fmt: skip
     """From C0 `start`, C- `earlier` and the last force: row r is to satisfy C+ + offset + give lam = 0.
 
     Its force acts along a direction that is the part `turn` of the way from the old gradient to the new; bow: see kernels.chains.
+    lam starts from the `last` pull, N, as far as the substep follows the motion.
     """
     for r in prange(stiffness.shape[0]):
         ww = total = 0.0
@@ -56,7 +58,7 @@ def prepare(
             total += weight[particle[e]]
             ww += weight[particle[e]] * (gradient[e, 0] * gradient[e, 0] + gradient[e, 1] * gradient[e, 1])
         give[r] = LINK_GIVE * ww
-        offset[r] = 0.0
+        offset[r] = lam[r] = 0.0
         swing = h * h * abs(force[r]) * bend[r] * total  # (frequency of swinging sideways * h)^2
         turn[r] = share_settled(swing)
         bow[r] = turn[r] * h * h * max(force[r], 0.0) * bend[r]
@@ -67,6 +69,20 @@ def prepare(
                 c0, cm = max(c0, 0.0), max(cm, 0.0)
             give[r] += 1.0 / (h * h * max(kp, 1e-300))
             offset[r] = (k0 * c0 + km * cm) / max(kp, 1e-300)
+            if upper[r] == np.inf:
+                lam[r] = -(1.0 - share_settled(h * h * stiffness[r] * ww)) * last[r] * h * h
+
+
+@parallel_kernel
+def begin_rows(begin, end, position, first, particle, weight, intact, along, lam):
+    """Move the particles of the rows `begin` to `end`, which share none, by the lam they start from."""
+    for r in prange(begin, end):
+        if intact[r] and lam[r] != 0.0:
+            for e in range(first[r], first[r + 1]):
+                w = weight[particle[e]] * lam[r]
+                if w != 0.0:
+                    position[particle[e], 0] += w * along[e, 0]
+                    position[particle[e], 1] += w * along[e, 1]
 
 
 @parallel_kernel
@@ -99,11 +115,12 @@ def solve_rows(begin, end, position, first, particle, weight, upper, intact, val
 
 
 @kernel
-def note_force(force, lam, h):
-    """Let the noted pull, N, follow -lam / h^2, which is noise within a single substep."""
+def note_force(force, last, lam, h):
+    """last = -lam / h^2, the pull in N, which for rigid links is noisy; let `force` follow it."""
     part = h / (h + LINK_MEMORY_S)
     for r in range(force.shape[0]):
-        force[r] += part * (-lam[r] / (h * h) - force[r])
+        last[r] = -lam[r] / (h * h)
+        force[r] += part * (last[r] - force[r])
 
 
 @kernel

@@ -62,7 +62,7 @@ class Distance(Link):
         return shapes.distance
 
     def _new_pool(self) -> Pool:
-        return ChainPool(shapes.distance, turn=3)
+        return ChainPool(shapes.distance, turn=0)
 
     def _columns(self) -> dict[str, Any]:
         return {

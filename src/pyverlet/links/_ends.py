@@ -47,6 +47,16 @@ def parse(kind: str, ends: tuple[Any, ...], names: tuple[str, ...]) -> tuple[Sta
     return state, joined
 
 
+def parse_ring(kind: str, group: Any, ring: Any) -> tuple[State, Indices]:
+    """The group's particles and (p,) indices among them of a ring of at least three different ones; all of them for None."""
+    particles = _column(kind, "ring", group, np.arange(len(group)) if ring is None and isinstance(group, Group) else ring)
+    if len(particles) < 3:
+        raise InputError(f"{kind}: ring has {len(particles)} particles; allowed are at least 3")
+    if len(np.unique(particles)) < len(particles):
+        raise InputError(f"{kind}: ring has a particle twice; allowed are different ones, in order along the ring")
+    return group._state, particles
+
+
 def _brief(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= 40 else f"{text[:37]}..."
@@ -62,7 +72,7 @@ def _column(kind: str, name: str, group: Any, index: Any) -> Indices:
     if len(wrong):
         where = f"{name}[{wrong[0]}]" if np.ndim(index) else name
         raise InputError(
-            f"{kind}: {where} is {array[wrong[0]]}; allowed is 0 to {len(group) - 1}, for a group of {len(group)} particles"
+            f"{kind}: {where} is {array[wrong[0]]}; allowed is 0 to {len(group) - 1} for a group of {len(group)} particles"
         )
     numbers: Indices = group.index[array]
     return numbers

@@ -11,6 +11,9 @@ from pyverlet.links._link import Array
 from pyverlet.links._table import Table
 from pyverlet.links._work import Work
 
+MOVING = ("intact", "force", "last")
+"""Columns that a frame changes."""
+
 
 class Pool(ABC):
     """The links of one family. The tables hold the truth between frames, as `State` does for particles.
@@ -18,10 +21,11 @@ class Pool(ABC):
     Attributes:
         rows: a row for each link, in the order added.
         entries: `particle`, the user's indices of the particles, row after row.
-        turn: pools are solved in this order; who comes last holds best.
+        turn: pools are solved in this order and then back; who comes first holds best.
         drawn: whether its rows are lines between their particles.
         stale: rows have come or gone since `pack`.
         changed: numbers of rows have changed since `begin`.
+        parts: what is solved one after the other, once packed; any values that `solve` knows.
     """
 
     drawn = True
@@ -30,9 +34,10 @@ class Pool(ABC):
         self.turn = turn
         self.rows = Table(
             owner=np.int64, arity=np.int64, stiffness=np.float64, damping=np.float64, strength=np.float64, intact=np.uint8,
-            collide=np.uint8, force=np.float64, **columns,
+            collide=np.uint8, force=np.float64, last=np.float64, **columns,
         )  # fmt: skip
         self.entries = Table(particle=np.int64)
+        self.parts: list[tuple[int, int]] = []
         self.stale = self.changed = True
 
     def append(self, owner: int, particles: Array, columns: dict[str, Any]) -> slice:
@@ -40,7 +45,7 @@ class Pool(ABC):
         self.stale = True
         count, arity = particles.shape
         self.entries.append(particles.size, particle=particles.ravel())
-        return self.rows.append(count, owner=owner, arity=arity, intact=1, force=0.0, **columns)
+        return self.rows.append(count, owner=owner, arity=arity, intact=1, force=0.0, last=0.0, **columns)
 
     def keep(self, mask: Array) -> None:
         """Remove all other rows."""
@@ -68,9 +73,12 @@ class Pool(ABC):
     def tie(self, work: Work, h: float) -> None:
         """After the integrator, before any pool is solved: what concerns single particles."""
 
+    def ahead(self, work: Work) -> None:
+        """Then: move the particles as far as the pull of the substep before is a good guess."""
+
     @abstractmethod
-    def solve(self, work: Work) -> None:
-        """One pass over all rows."""
+    def solve(self, work: Work, part: tuple[int, int]) -> None:
+        """Solve one of the parts."""
 
     @abstractmethod
     def snap(self, work: Work, h: float) -> Array:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from pyverlet.constants import LINK_COLOURS
 from pyverlet.kernels import chains, links, runs
 from pyverlet.links._link import Array
-from pyverlet.links._pool import Pool
+from pyverlet.links._pool import MOVING, Pool
 from pyverlet.links._work import Work
 
 Measure = Callable[..., None]
@@ -50,6 +50,7 @@ class RowPool(Pool):
         starts = np.flatnonzero(np.diff(run_of[self._order], prepend=-1))
         self._run = np.append(starts, count)
         self._colour = np.searchsorted(colour[run_of[self._order[starts]]], np.arange(LINK_COLOURS + 1))
+        self.parts = list(self._together())
         self._row: dict[str, Array] = {name: np.zeros(count) for name in _SCRATCH}
         self._gradient, self._along = np.zeros((2, len(entry), 2))
         self.stale, self.changed = False, True
@@ -61,7 +62,7 @@ class RowPool(Pool):
             row |= {name: self.rows[name][self._order] for name in _GIVEN}
             self._soft = bool(np.isfinite(row["stiffness"]).any())
             self._brittle = bool(np.isfinite(row["strength"]).any())
-        row["intact"], row["force"] = self.rows["intact"][self._order], self.rows["force"][self._order]
+        row |= {name: self.rows[name][self._order] for name in MOVING}
 
     def before(self, work: Work, h: float) -> None:
         row, which = self._row, (self._first, self._particle, self._row["rest"], 0, len(self._order))
@@ -70,22 +71,33 @@ class RowPool(Pool):
         self.measure(work.start, *which, row["start"], self._along, row["bend"])
         links.prepare(
             self._first, self._particle, work.weight, row["stiffness"], row["damping"], row["upper"], h, row["start"],
-            row["earlier"], self._along, row["bend"], row["force"], row["give"], row["offset"], row["turn"], row["bow"],
+            row["earlier"], self._along, row["bend"], row["force"], row["last"], row["give"],
+            row["offset"], row["turn"], row["bow"], row["lam"],
         )  # fmt: skip
-        row["lam"][:] = 0.0
 
-    def solve(self, work: Work) -> None:
-        for colour, begin in enumerate(self._colour[:-1]):
-            end = self._colour[colour + 1]
+    def ahead(self, work: Work) -> None:
+        if not self._soft:
+            return
+        which = (self._first, self._particle, work.weight, self._row["intact"], self._along, self._row["lam"])
+        for a, b in self.parts:
+            links.begin_rows(int(self._run[a]), int(self._run[b]), work.position, *which)
+
+    def _together(self) -> Iterator[tuple[int, int]]:
+        """Runs a to b that may be solved beside each other; those of the last colour may share particles and stand alone."""
+        for colour, begin in enumerate(map(int, self._colour[:-1])):
+            end = int(self._colour[colour + 1])
             if begin == end:
                 return
-            # Runs of the last colour may share particles: one after the other.
-            several = colour < LINK_COLOURS - 1
-            for a, b in [(begin, end)] if several else zip(range(begin, end), range(begin + 1, end + 1), strict=True):
-                rows = (int(self._run[a]), int(self._run[b]))
-                which = (self._first, self._particle, self._row["rest"], *rows)
-                self.measure(work.position, *which, self._row["value"], self._gradient, self._row["bend"])
-                self._solve(work, a, b)
+            if colour < LINK_COLOURS - 1:
+                yield begin, end
+            else:
+                yield from zip(range(begin, end), range(begin + 1, end + 1), strict=True)
+
+    def solve(self, work: Work, part: tuple[int, int]) -> None:
+        a, b = part
+        which = (self._first, self._particle, self._row["rest"], int(self._run[a]), int(self._run[b]))
+        self.measure(work.position, *which, self._row["value"], self._gradient, self._row["bend"])
+        self._solve(work, a, b)
 
     def _solve(self, work: Work, begin: int, end: int) -> None:
         """Solve the runs begin to end, measured just now."""
@@ -97,7 +109,7 @@ class RowPool(Pool):
 
     def snap(self, work: Work, h: float) -> Array:
         row = self._row
-        links.note_force(row["force"], row["lam"], h)
+        links.note_force(row["force"], row["last"], row["lam"], h)
         if not self._brittle:
             return np.empty(0, np.int64)
         before = row["intact"].copy()
@@ -110,8 +122,8 @@ class RowPool(Pool):
         return result
 
     def end(self) -> None:
-        self.rows["intact"][self._order] = self._row["intact"]
-        self.rows["force"][self._order] = np.where(self._row["intact"], self._row["force"], 0.0)
+        for name in MOVING:
+            self.rows[name][self._order] = np.where(self._row["intact"], self._row[name], 0)
 
     def energy(self, position: Array) -> float:
         rows, first, particle = self.rows, self.first, self.entries["particle"]

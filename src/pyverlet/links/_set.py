@@ -14,7 +14,7 @@ from pyverlet.errors import InputError
 from pyverlet.kernels import links as kernels
 from pyverlet.kernels import runs
 from pyverlet.links._link import Array, Link
-from pyverlet.links._pool import Pool
+from pyverlet.links._pool import MOVING, Pool
 from pyverlet.links._work import Work
 from pyverlet.state import Slots, State
 
@@ -116,7 +116,7 @@ class Links:
 
     @property
     def iterations(self) -> int:
-        """Passes over all links in a substep; 1 unless set. Chains are exact in one, nets get stiffer with more."""
+        """Passes over all links in a substep, there and back; 1 unless set. Chains that share no particle are exact in one."""
         return self._iterations
 
     @iterations.setter
@@ -161,9 +161,13 @@ class Links:
         work.take(state)
         for pool in self._order:
             pool.tie(work, h)
-        for _ in range(self._iterations):
-            for pool in self._order:
-                pool.solve(work)
+        for pool in self._order:
+            pool.ahead(work)
+        # There and back: one way only, the links about a common particle throw it in a circle, faster and faster.
+        parts = [(pool, part) for pool in self._order for part in pool.parts]
+        for _ in range(self._iterations if len(parts) > 1 else 1):
+            for pool, part in (*parts, *parts[-2::-1]):
+                pool.solve(work, part)
         for pool in self._order:
             snapped = pool.snap(work, h)
             if len(snapped):
@@ -219,7 +223,7 @@ class Links:
 
     def save(self) -> Any:
         """What moves: who is intact, and what each pulled with."""
-        return [(pool.rows["intact"].copy(), pool.rows["force"].copy()) for pool in self._order], self.broken
+        return [{name: pool.rows[name].copy() for name in MOVING} for pool in self._order], self.broken
 
     def restore(self, saved: Any) -> None:
         """Go back to what `save` returned.
@@ -228,8 +232,9 @@ class Links:
             InputError: links have been added or removed since.
         """
         pools, broken = saved
-        if [len(intact) for intact, _ in pools] != [len(pool.rows) for pool in self._order]:
+        if [len(columns["intact"]) for columns in pools] != [len(pool.rows) for pool in self._order]:
             raise InputError("saved holds other links; allowed is a state of this world with the links it has now")
-        for pool, (intact, force) in zip(self._order, pools, strict=True):
-            pool.rows["intact"][:], pool.rows["force"][:] = intact, force
+        for pool, columns in zip(self._order, pools, strict=True):
+            for name, column in columns.items():
+                pool.rows[name][:] = column
         self.broken = broken

@@ -86,7 +86,7 @@ class _PinPool(Pool):
     def pack(self, work: Work) -> None:
         self.stale, self.changed = False, True
         self._particle = work.compact[self.entries["particle"]]
-        self._give, self._lam = np.zeros((2, len(self.rows)))
+        self._give, self._lam, self._last = np.zeros((3, len(self.rows)))
         self._offset = np.zeros((len(self.rows), 2))
 
     def begin(self) -> None:
@@ -104,14 +104,14 @@ class _PinPool(Pool):
             rows["damping"], self._intact, h, self._give, self._offset,
         )  # fmt: skip
 
-    def solve(self, work: Work) -> None:
+    def solve(self, work: Work, part: tuple[int, int]) -> None:
         pass
 
     def snap(self, work: Work, h: float) -> Array:
         before = self._intact.copy()
         pulled = (self._intact, self._give, self._offset, self._lam)
         ties.pull_of_ties(work.position, self._particle, self.rows["point"], *pulled)
-        links.note_force(self._force, self._lam, h)
+        links.note_force(self._force, self._last, self._lam, h)
         links.snap(self._force, self.rows["strength"], self._intact)
         return np.flatnonzero(before != self._intact)
 
