@@ -209,6 +209,7 @@ def test_runs_and_colours_share_nothing(count: int) -> None:
     angle = 2 * np.pi * arm / count
     ring = np.column_stack((np.cos(angle), np.sin(angle)))
     group = world.add(position=np.concatenate((np.zeros((1, 2)), ring, 2 * ring)), radius=0.01)
+    group.mass[0] = count
     world.links.append(pv.Stick(group, pairs[:, 0], pairs[:, 1]))
     group.velocity[1:] = 3 * np.concatenate((ring, 2 * ring)) @ np.array([[0, 1], [-1, 0]])
     world.run(seconds=1.0)
