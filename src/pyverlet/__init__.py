@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from pyverlet import errors, forces, integrators, scenes
+from pyverlet import builders, errors, forces, integrators, scenes
 from pyverlet.bounds import Boundary, Box, Circle, Open
 from pyverlet.broadphase import BruteForce, Fast
+from pyverlet.builders import bridge, chain, cloth, net, rope, soft_body
 from pyverlet.clock import Clock, FrameBudget
 from pyverlet.collisions import Collisions, Overlap
 from pyverlet.energy import Energy
@@ -31,46 +32,11 @@ from pyverlet.world import World
 __version__ = "0.1.0"
 
 __all__ = [
-    "RK4",
-    "Angle",
-    "Area",
-    "Boundary",
-    "Box",
-    "BruteForce",
-    "Circle",
-    "ClampAndFlip",
-    "Clock",
-    "Collisions",
-    "Energy",
-    "ExplicitEuler",
-    "Fast",
-    "FrameBudget",
-    "Group",
-    "InputError",
-    "Integrator",
-    "NonFiniteError",
-    "Open",
-    "Overlap",
-    "Panel",
-    "Panels",
-    "Pin",
-    "PositionVerlet",
-    "ProjectOnly",
-    "PyverletError",
-    "Rope",
-    "SemiImplicitEuler",
-    "Spring",
-    "Stick",
-    "TimeCorrectedVerlet",
-    "VelocityVerlet",
-    "World",
-    "Yoshida4",
-    "errors",
-    "forces",
-    "integrators",
-    "scenes",
-    "view",
-    "warm_up",
+    "RK4", "Angle", "Area", "Boundary", "Box", "BruteForce", "Circle", "ClampAndFlip", "Clock", "Collisions", "Energy",
+    "ExplicitEuler", "Fast", "FrameBudget", "Group", "InputError", "Integrator", "NonFiniteError", "Open", "Overlap", "Panel",
+    "Panels", "Pin", "PositionVerlet", "ProjectOnly", "PyverletError", "Rope", "SemiImplicitEuler", "Spring", "Stick",
+    "TimeCorrectedVerlet", "VelocityVerlet", "World", "Yoshida4", "bridge", "builders", "chain", "cloth", "errors", "forces",
+    "integrators", "net", "rope", "scenes", "soft_body", "view", "warm_up",
 ]  # fmt: skip
 
 

@@ -15,6 +15,9 @@ from pyverlet.errors import InputError
 from pyverlet.kernels import contacts
 from pyverlet.state import Slots, State
 
+Unlist = Callable[[PairList, Any], None]
+"""Takes pairs that are no contacts, since a link says so, from a list; the second argument is the user's index in each slot."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Collisions:
@@ -48,10 +51,10 @@ class Overlap(NamedTuple):
 class ContactSolver:
     """The contact stages of a substep, in the order `World.step` calls them."""
 
-    def __init__(self, settings: Collisions, dtype: np.dtype[Any], unlist: Callable[[PairList, Any], None]) -> None:
+    def __init__(self, settings: Collisions, dtype: np.dtype[Any], unlist: Unlist) -> None:
         self.settings = settings
         self.broad_phase = settings.method.start(dtype)
-        self._unlist = unlist  # takes pairs that are no contacts, since a link says so, from a new list
+        self._unlist = unlist
         self._seen = 0
 
     def fit(self, state: Slots) -> None:
@@ -129,12 +132,13 @@ def find_contacts(state: State, method: Fast | BruteForce) -> np.ndarray[Any, np
     return named[np.lexsort(named.T[::-1])]
 
 
-def measure_overlap(state: State) -> Overlap:
-    """Overlap of all touching pairs of a state; leaves the state alone."""
+def measure_overlap(state: State, unlist: Unlist) -> Overlap:
+    """Overlap of all touching pairs of a state, but for those that `unlist` takes from a list; leaves the state alone."""
     if len(state) < 2:
         return Overlap(0.0, 0.0, 0)
     slots, phase = _listed(state, Fast(skin=0.0))
     pairs = phase.list
+    unlist(pairs, slots.particle)
     number, total, largest = contacts.overlaps(slots.position, slots.radius, pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
     return Overlap(total / number if number else 0.0, largest, number)
 

@@ -346,7 +346,7 @@ class World(Doors):
 
     def overlap(self) -> Overlap:
         """Mean and largest overlap of the touching pairs, as fractions of their contact distance, and how many there are."""
-        return measure_overlap(self._state)
+        return measure_overlap(self._state, self.links.unlist)
 
     def escaped(self) -> int:
         """Particles whose centre is outside the boundary."""

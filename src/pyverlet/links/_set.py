@@ -39,7 +39,7 @@ class Links:
         self._next_owner = 0
         self._work = Work(np.empty(0, np.int64), 0)
         self._iterations = 1
-        self._apart = np.empty((0, 2), np.int64)
+        self._apart, self._apart_stale = np.empty((0, 2), np.int64), False
         self._broken = self.broken = np.empty(0, BROKEN)
 
     # ---- a list --------------------------------------------------------------------------------------------------------
@@ -64,6 +64,7 @@ class Links:
         link._id = self._next_owner
         link._where = link._pool.append(link._id, link.particles, link._columns())
         self._next_owner += 1
+        self._apart_stale = True
         self._links.append(link)
         return link
 
@@ -97,6 +98,7 @@ class Links:
 
     def _find_rows(self, pool: Pool) -> None:
         """Rows have gone: tell those that stay where theirs are now. Owners stand in the order appended."""
+        self._apart_stale = True
         owner = pool.rows["owner"]
         for link in self._links:
             if link._pool is pool:
@@ -135,14 +137,18 @@ class Links:
         for pool in self._order:
             pool.begin()
         self._broken = np.empty(0, BROKEN)
-        apart = self.apart()
-        if np.array_equal(apart, self._apart):
+        return self._know_apart()
+
+    def _know_apart(self) -> bool:
+        """Bring the pairs that are no contacts up to date; True if they are others than before."""
+        if not self._apart_stale:
             return False
-        self._apart = apart
-        return True
+        before, self._apart, self._apart_stale = self._apart, self.apart(), False
+        return not np.array_equal(before, self._apart)
 
     def unlist(self, pairs: PairList, particle: Array) -> None:
         """Take the pairs of `apart` from a list of candidates; particle: the user's index in each slot."""
+        self._know_apart()
         if len(self._apart):
             both = np.concatenate((self._apart, self._apart[:, ::-1]))
             both = both[np.lexsort(both.T[::-1])]
@@ -183,6 +189,7 @@ class Links:
         for pool in self._order:
             pool.end()
         self.broken = self._broken
+        self._apart_stale |= bool(len(self.broken))
 
     def _note(self, pool: Pool, snapped: Array) -> Array:
         """The BROKEN entries of these rows of a pool."""
@@ -238,3 +245,4 @@ class Links:
             for name, column in columns.items():
                 pool.rows[name][:] = column
         self.broken = broken
+        self._apart_stale = True
