@@ -182,7 +182,8 @@ def test_links_are_drawn_in_the_colour_of_their_pull() -> None:
     view = View.fit((-2, -4, 2, 1), (200, 250))
 
     def between(x: float) -> Any:
-        picture = Raster((200, 250)).draw(world, view, colours=ByOrigin().colours(world, DARK))
+        colours = ByOrigin().colours(world, DARK)
+        picture = Raster((200, 250)).draw(world, view, outlines=outline(world.boundary), colours=colours)
         column, row = (int(value) for value in view.to_screen((x, -1.0)))
         return picture[row, column - 3 : column + 4, :3].astype(int).max(axis=0)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pyverlet import checks
 from pyverlet.builders._built import Point, Sheet, weight
@@ -48,8 +49,15 @@ def cloth(
         Stick(group, a, b, compliance=compliance, breaking_force=breaking_force, collide=False) for a, b in threads(grid)
     ]
     if k > 0.0:
-        for a, b in ((grid[:-1, :-1], grid[1:, 1:]), (grid[:-1, 1:], grid[1:, :-1])):
-            spring = Spring(group, a.ravel(), b.ravel(), stiffness=k, breaking_force=breaking_force, collide=False)
-            links.append(spring)
+        for square in (grid, grid[:, ::-1]):
+            a, b = diagonals(square)
+            links.append(Spring(group, a, b, stiffness=k, breaking_force=breaking_force, collide=False))
     world.links.extend(links)
     return Sheet(group, tuple(links), grid)
+
+
+def diagonals(grid: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Ends of the links from each to the next on the right below, diagonal after diagonal: each is solved at once."""
+    row, column = np.indices((grid.shape[0] - 1, grid.shape[1] - 1)).reshape(2, -1)
+    order = np.lexsort((row, column - row))
+    return grid[row[order], column[order]], grid[row[order] + 1, column[order] + 1]

@@ -18,7 +18,8 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet.constants import LINK_ROUNDS, LINK_TAUT, LINK_TURN
+from pyverlet.constants import LINK_COLOURS, LINK_ROUNDS, LINK_TAUT, LINK_TURN
+from pyverlet.kernels.shapes import measure_distance
 
 _SWEEPS = 4
 
@@ -123,12 +124,33 @@ def _sweep(a, b, position, first, particle, weight, rest, upper, intact, offset,
 
 
 @kernel
+def _solve_one(r, position, first, particle, weight, upper, along, gradient, give, active, right, lam):
+    """A run of a single link: one equation."""
+    if not active[r]:
+        return
+    e = first[r]
+    i, j = particle[e], particle[e + 1]
+    dx, dy = along[e + 1, 0], along[e + 1, 1]
+    ww = (weight[i] + weight[j]) * (gradient[e + 1, 0] * dx + gradient[e + 1, 1] * dy)
+    step = min(right[r] / (ww + give[r]), upper[r] - lam[r])
+    lam[r] += step
+    dx, dy = dx * step, dy * step
+    if weight[i] > 0.0:
+        position[i, 0] -= weight[i] * dx
+        position[i, 1] -= weight[i] * dy
+    if weight[j] > 0.0:
+        position[j, 0] += weight[j] * dx
+        position[j, 1] += weight[j] * dy
+
+
+@kernel
 def _solve_run(
     a, b, node, position, first, particle, weight, rest, upper, intact, value, gradient, along, turn, bend, bow, give, offset,
     active, right, inverse, carried, move, step, lam,
 ):  # fmt: skip
     one_sided = False
     for r in range(a, b):
+        measure_distance(r, first[r], position, particle, rest, value, gradient, bend)
         e = first[r] + 1
         nx, ny = gradient[e, 0], gradient[e, 1]
         along[e, 0] += turn[r] * (nx - along[e, 0])
@@ -140,6 +162,9 @@ def _solve_run(
         if upper[r] < np.inf:
             one_sided = True
             active[r] &= right[r] < LINK_TAUT * rest[r]
+    if b - a == 1:
+        _solve_one(a, position, first, particle, weight, upper, along, gradient, give, active, right, lam)
+        return
     for _ in range(LINK_ROUNDS):
         _eliminate(a, b, node, first, particle, weight, gradient, along, active, give, bow, right, inverse, carried, move, step)
         if not one_sided or not _slack_changes(a, b, node, first, gradient, upper, intact, active, right, move, step, lam):
@@ -162,16 +187,27 @@ def _solve_run(
 
 
 @parallel_kernel
-def solve_runs(
-    begin, end, run, position, first, particle, weight, rest, upper, intact, value, gradient, along, turn, bend, bow, give,
-    offset, active, right, inverse, carried, move, step, lam,
+def sweep(
+    back, skip, colour, run, position, first, particle, weight, rest, upper, intact, value, gradient, along, turn, bend, bow,
+    give, offset, active, right, inverse, carried, move, step, lam,
 ):  # fmt: skip
-    """Move the particles of the runs `begin` to `end`, rows run[k] to run[k + 1], which share none; add to lam what it took.
+    """Solve all runs, colour by colour or `back` from the last one, without the first colour on the way if `skip`.
 
-    active to step: room for the solver, of a row or of a node; those of run k begin at node run[k] + k.
+    Run k is rows run[k] to run[k + 1], colour c runs colour[c] to colour[c + 1]; those of a colour share no particle, but for the
+    last one's. active to step: room for the solver, of a row or of a node; the nodes of run k begin at run[k] + k.
     """
-    for k in prange(begin, end):
-        _solve_run(
-            run[k], run[k + 1], run[k] + k, position, first, particle, weight, rest, upper, intact, value, gradient, along, turn,
-            bend, bow, give, offset, active, right, inverse, carried, move, step, lam,
-        )  # fmt: skip
+    colours = colour.shape[0] - 1
+    for n in range(1 if skip else 0, colours):
+        c = colours - 1 - n if back else n
+        if c < LINK_COLOURS - 1:
+            for k in prange(colour[c], colour[c + 1]):
+                _solve_run(
+                    run[k], run[k + 1], run[k] + k, position, first, particle, weight, rest, upper, intact, value, gradient,
+                    along, turn, bend, bow, give, offset, active, right, inverse, carried, move, step, lam,
+                )  # fmt: skip
+        else:
+            for k in range(colour[c], colour[c + 1]):
+                _solve_run(
+                    run[k], run[k + 1], run[k] + k, position, first, particle, weight, rest, upper, intact, value, gradient,
+                    along, turn, bend, bow, give, offset, active, right, inverse, carried, move, step, lam,
+                )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Straight lines to pixels, with smooth rims and round ends. Pixels as in kernels.raster; their A, which counts circles, stays."""
+"""Straight lines to pixels, with smooth rims and round ends. Pixels as in kernels.raster, whose A stays as it is."""
 
 from __future__ import annotations
 
@@ -31,12 +31,8 @@ def lines(pixels, ends, colour, left, top, scale, half):
     for k in range(ends.shape[0]):
         x0, y0 = (ends[k, 0, 0] - left) * scale, (top - ends[k, 0, 1]) * scale
         x1, y1 = (ends[k, 1, 0] - left) * scale, (top - ends[k, 1, 1]) * scale
-        if not (
-            max(x0, x1) + reach > 0.0
-            and min(x0, x1) - reach < width
-            and max(y0, y1) + reach > 0.0
-            and min(y0, y1) - reach < height
-        ):
+        across = max(x0, x1) + reach > 0.0 and min(x0, x1) - reach < width
+        if not (across and max(y0, y1) + reach > 0.0 and min(y0, y1) - reach < height):
             continue  # outside, or NaN
         dx, dy = x1 - x0, y1 - y0
         length2 = max(dx * dx + dy * dy, 1e-12)

@@ -11,28 +11,33 @@ import math
 
 import numpy as np
 
-from pyverlet._jit import parallel_kernel, prange
+from pyverlet._jit import kernel, parallel_kernel, prange
+
+
+@kernel
+def measure_distance(r, e, position, particle, rest, value, gradient, bend):
+    """One row of `distance`."""
+    i, j = particle[e], particle[e + 1]
+    dx = position[j, 0] - position[i, 0]
+    dy = position[j, 1] - position[i, 1]
+    length = math.sqrt(dx * dx + dy * dy)
+    if length > 0.0:
+        nx, ny = dx / length, dy / length
+    else:  # any direction is as good
+        nx, ny = 1.0, 0.0
+    value[r] = length - rest[r]
+    bend[r] = 1.0 / max(length, 1e-12)
+    gradient[e, 0] = -nx
+    gradient[e, 1] = -ny
+    gradient[e + 1, 0] = nx
+    gradient[e + 1, 1] = ny
 
 
 @parallel_kernel
 def distance(position, first, particle, rest, begin, end, value, gradient, bend):
     """C = |x_j - x_i| - rest, m."""
     for r in prange(begin, end):
-        e = first[r]
-        i, j = particle[e], particle[e + 1]
-        dx = position[j, 0] - position[i, 0]
-        dy = position[j, 1] - position[i, 1]
-        length = math.sqrt(dx * dx + dy * dy)
-        if length > 0.0:
-            nx, ny = dx / length, dy / length
-        else:  # any direction is as good
-            nx, ny = 1.0, 0.0
-        value[r] = length - rest[r]
-        bend[r] = 1.0 / max(length, 1e-12)
-        gradient[e, 0] = -nx
-        gradient[e, 1] = -ny
-        gradient[e + 1, 0] = nx
-        gradient[e + 1, 1] = ny
+        measure_distance(r, first[r], position, particle, rest, value, gradient, bend)
 
 
 @parallel_kernel

@@ -25,7 +25,7 @@ class Pool(ABC):
         drawn: whether its rows are lines between their particles.
         stale: rows have come or gone since `pack`.
         changed: numbers of rows have changed since `begin`.
-        parts: what is solved one after the other, once packed; any values that `solve` knows.
+        colours: how many parts are solved one after the other, once packed.
     """
 
     drawn = True
@@ -37,7 +37,7 @@ class Pool(ABC):
             collide=np.uint8, force=np.float64, last=np.float64, **columns,
         )  # fmt: skip
         self.entries = Table(particle=np.int64)
-        self.parts: list[tuple[int, int]] = []
+        self.colours = 0
         self.stale = self.changed = True
 
     def append(self, owner: int, particles: Array, columns: dict[str, Any]) -> slice:
@@ -77,8 +77,8 @@ class Pool(ABC):
         """Then: move the particles as far as the pull of the substep before is a good guess."""
 
     @abstractmethod
-    def solve(self, work: Work, part: tuple[int, int]) -> None:
-        """Solve one of the parts."""
+    def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
+        """Solve one colour after the other, or back from the last; without the first on the way if `skip`."""
 
     @abstractmethod
     def snap(self, work: Work, h: float) -> Array:

@@ -51,6 +51,7 @@ class RowPool(Pool):
         self._run = np.append(starts, count)
         self._colour = np.searchsorted(colour[run_of[self._order[starts]]], np.arange(LINK_COLOURS + 1))
         self.parts = list(self._together())
+        self.colours = int(np.count_nonzero(np.diff(self._colour)))
         self._row: dict[str, Array] = {name: np.zeros(count) for name in _SCRATCH}
         self._gradient, self._along = np.zeros((2, len(entry), 2))
         self.stale, self.changed = False, True
@@ -93,19 +94,17 @@ class RowPool(Pool):
             else:
                 yield from zip(range(begin, end), range(begin + 1, end + 1), strict=True)
 
-    def solve(self, work: Work, part: tuple[int, int]) -> None:
-        a, b = part
-        which = (self._first, self._particle, self._row["rest"], int(self._run[a]), int(self._run[b]))
-        self.measure(work.position, *which, self._row["value"], self._gradient, self._row["bend"])
-        self._solve(work, a, b)
-
-    def _solve(self, work: Work, begin: int, end: int) -> None:
-        """Solve the runs begin to end, measured just now."""
+    def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
         row = self._row
-        links.solve_rows(
-            begin, end, work.position, self._first, self._particle, work.weight, row["upper"], row["intact"], row["value"],
-            self._gradient, self._along, row["turn"], row["give"], row["offset"], row["lam"],
-        )  # fmt: skip
+        parts = self.parts[::-1] if back else self.parts
+        for a, b in parts[1:] if skip else parts:
+            begin, end = int(self._run[a]), int(self._run[b])
+            which = (self._first, self._particle, row["rest"], begin, end)
+            self.measure(work.position, *which, row["value"], self._gradient, row["bend"])
+            links.solve_rows(
+                begin, end, work.position, self._first, self._particle, work.weight, row["upper"], row["intact"], row["value"],
+                self._gradient, self._along, row["turn"], row["give"], row["offset"], row["lam"],
+            )  # fmt: skip
 
     def snap(self, work: Work, h: float) -> Array:
         row = self._row
@@ -150,10 +149,11 @@ class ChainPool(RowPool):
         self._carried, self._move = np.zeros((2, nodes, 2))
         self._right, self._step = np.zeros((2, count))
 
-    def _solve(self, work: Work, begin: int, end: int) -> None:
+    def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
         row = self._row
-        chains.solve_runs(
-            begin, end, self._run, work.position, self._first, self._particle, work.weight, row["rest"], row["upper"],
-            row["intact"], row["value"], self._gradient, self._along, row["turn"], row["bend"], row["bow"], row["give"],
-            row["offset"], self._active, self._right, self._inverse, self._carried, self._move, self._step, row["lam"],
+        chains.sweep(
+            back, skip, self._colour[: self.colours + 1], self._run, work.position, self._first, self._particle, work.weight,
+            row["rest"], row["upper"], row["intact"], row["value"], self._gradient, self._along, row["turn"], row["bend"],
+            row["bow"], row["give"], row["offset"], self._active, self._right, self._inverse, self._carried, self._move,
+            self._step, row["lam"],
         )  # fmt: skip

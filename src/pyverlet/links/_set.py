@@ -40,6 +40,7 @@ class Links:
         self._work = Work(np.empty(0, np.int64), 0)
         self._iterations = 1
         self._apart, self._apart_stale = np.empty((0, 2), np.int64), False
+        self._partners = np.zeros(1, np.int64), np.empty(0, np.int64)
         self._broken = self.broken = np.empty(0, BROKEN)
 
     # ---- a list --------------------------------------------------------------------------------------------------------
@@ -141,19 +142,19 @@ class Links:
 
     def _know_apart(self) -> bool:
         """Bring the pairs that are no contacts up to date; True if they are others than before."""
-        if not self._apart_stale:
+        if not self._apart_stale and len(self._partners[0]) == len(self._state) + 1:
             return False
         before, self._apart, self._apart_stale = self._apart, self.apart(), False
+        both = np.concatenate((self._apart, self._apart[:, ::-1]))
+        both = both[np.lexsort(both.T[::-1])]
+        self._partners = np.searchsorted(both[:, 0], np.arange(len(self._state) + 1)), both[:, 1].copy()
         return not np.array_equal(before, self._apart)
 
     def unlist(self, pairs: PairList, particle: Array) -> None:
         """Take the pairs of `apart` from a list of candidates; particle: the user's index in each slot."""
         self._know_apart()
         if len(self._apart):
-            both = np.concatenate((self._apart, self._apart[:, ::-1]))
-            both = both[np.lexsort(both.T[::-1])]
-            begin = np.searchsorted(both[:, 0], np.arange(len(self._state) + 1))
-            runs.drop_pairs(pairs.first, pairs.count, pairs.pair_i, pairs.pair_j, particle, begin, both[:, 1].copy())
+            runs.drop_pairs(pairs.first, pairs.count, pairs.pair_i, pairs.pair_j, particle, *self._partners)
 
     def before(self, state: Slots, h: float) -> None:
         """Before the integrator: remember where the substep starts."""
@@ -170,10 +171,13 @@ class Links:
         for pool in self._order:
             pool.ahead(work)
         # There and back: one way only, the links about a common particle throw it in a circle, faster and faster.
-        parts = [(pool, part) for pool in self._order for part in pool.parts]
-        for _ in range(self._iterations if len(parts) > 1 else 1):
-            for pool, part in (*parts, *parts[-2::-1]):
-                pool.solve(work, part)
+        pools = [pool for pool in self._order if pool.colours]
+        several = sum(pool.colours for pool in pools) > 1
+        for _ in range(self._iterations if several else 1):
+            for pool in pools:
+                pool.sweep(work, back=False, skip=False)
+            for pool in reversed(pools) if several else ():
+                pool.sweep(work, back=True, skip=pool is pools[-1])  # its last colour has just been solved
         for pool in self._order:
             snapped = pool.snap(work, h)
             if len(snapped):

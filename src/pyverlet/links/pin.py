@@ -104,7 +104,7 @@ class _PinPool(Pool):
             rows["damping"], self._intact, h, self._give, self._offset,
         )  # fmt: skip
 
-    def solve(self, work: Work, part: tuple[int, int]) -> None:
+    def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
         pass
 
     def snap(self, work: Work, h: float) -> Array:
