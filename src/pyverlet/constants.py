@@ -79,6 +79,9 @@ LINK_TURN: Final = 0.25
 LINK_ROUNDS: Final = 8
 """Times the rows of a rope are asked anew who pulls. Three have been enough for chains of 100; what is left is clamped."""
 
+LINKS_ONE_THREAD_BELOW: Final = 4096
+"""Worlds with fewer linked particles solve links on one thread: each colour is a meeting of the threads."""
+
 LINK_COLOURS: Final = 64
 """Colours of links at most, bits of a number; the last one, for particles with more links than that, is solved on one thread."""
 

@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 import pyverlet as pv
+from pyverlet import scenes
 
 G = 9.81
 DT = 1 / 60
@@ -273,3 +274,25 @@ def test_area_is_kept_under_load_and_pressure_is_compliance(substeps: int) -> No
     assert spring.force == pytest.approx(np.full(count, tension), rel=0.05)
     assert k * (side - spring.length) == pytest.approx(np.full(count, tension), rel=0.05)
     assert area.force[0] == pytest.approx(-pressure, rel=0.05)
+
+
+def test_newtons_cradle_passes_its_momentum_to_the_last_ball() -> None:
+    # Equal masses and e = 1 exchange velocities: the middle balls stay, the last rises as high as the first was drawn aside.
+    world = scenes.get("newton-cradle").world()
+    balls = world.position[5:]
+    lift = 4.0 * (1 - np.cos(0.9))
+    start = world.energy().total
+    highest = np.zeros(5)
+    for _ in range(150):  # down, through, and up on the other side: half a period of the large swing, 2.1 s, and a little
+        world.step(DT)
+        highest = np.maximum(highest, balls[:, 1])
+        assert world.energy().total == pytest.approx(start, rel=2e-3)
+    assert highest[0] == pytest.approx(lift, rel=0.01)
+    assert highest[4] == pytest.approx(lift, rel=0.01)
+    assert highest[1:4].max() < 1e-3 * lift
+    world = scenes.get("newton-cradle").world()
+    while world.velocity[9, 0] < 1.0:
+        world.step(DT / 4)
+    before = np.sqrt(2 * G * lift)
+    assert world.velocity[9, 0] == pytest.approx(before, rel=0.01)
+    assert np.abs(world.velocity[5:9]).max() < 0.01 * before

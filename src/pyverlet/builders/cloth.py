@@ -1,4 +1,4 @@
-"""A cloth: threads crosswise that neither stretch nor crumple, and hold their square shape a little."""
+"""A cloth: threads crosswise that do not stretch, and hold their square shape a little."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pyverlet import checks
 from pyverlet.builders._built import Point, Sheet, weight
 from pyverlet.builders.net import lay_grid, threads
-from pyverlet.links import Link, Spring, Stick
+from pyverlet.links import Link, Rope, Spring
 
 if TYPE_CHECKING:
     from pyverlet.world import World
@@ -26,11 +26,12 @@ def cloth(
     rows: int = 20,
     mass: float = 1.0,
     radius: float | None = None,
+    slack: float = 0.0,
     compliance: float = 0.0,
     shear: float | None = None,
     breaking_force: float = np.inf,
 ) -> Sheet:
-    """A sheet of particles joined by sticks, with springs across. `cloth.group.pin(cloth.grid[0])` hangs it by its upper edge.
+    """A sheet of particles joined by threads, with springs across. `cloth.group.pin(cloth.grid[0])` hangs it by its upper edge.
 
     Args:
         world: gets the particles and the links.
@@ -39,14 +40,18 @@ def cloth(
         columns, rows: of particles, at least 2.
         mass: of all particles together, kg.
         radius: of each, m; by default neighbours all but touch.
-        compliance: of each stick, m/N.
+        slack: part by which the threads along the rows are longer than the way: the cloth hangs in folds.
+        compliance: of each piece of thread, m/N.
         shear: N/m of the springs across; 0 for none. None takes five times the weight over the height.
-        breaking_force: at which a stick or a spring breaks, N.
+        breaking_force: at which a piece of thread or a spring breaks, N.
     """
     k = 5.0 * weight(world, mass) / height if shear is None else checks.number("shear", shear, least=0.0)
     group, grid = lay_grid(world, top_left, width, height, columns, rows, mass, radius)
+    along = (1.0 + checks.number("slack", slack, least=0.0)) * width / (grid.shape[1] - 1)
+    (a, b), (c, d) = threads(grid)
     links: list[Link] = [
-        Stick(group, a, b, compliance=compliance, breaking_force=breaking_force, collide=False) for a, b in threads(grid)
+        Rope(group, a, b, length=along, compliance=compliance, breaking_force=breaking_force, collide=False),
+        Rope(group, c, d, compliance=compliance, breaking_force=breaking_force, collide=False),
     ]
     if k > 0.0:
         for square in (grid, grid[:, ::-1]):

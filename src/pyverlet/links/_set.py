@@ -8,8 +8,9 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet import checks
+from pyverlet import _jit, checks
 from pyverlet.broadphase import PairList
+from pyverlet.constants import LINKS_ONE_THREAD_BELOW
 from pyverlet.errors import InputError
 from pyverlet.kernels import links as kernels
 from pyverlet.kernels import runs
@@ -37,6 +38,7 @@ class Links:
         self._pools: dict[Any, Pool] = {}
         self._order: list[Pool] = []
         self._next_owner = 0
+        self._few = True
         self._work = Work(np.empty(0, np.int64), 0)
         self._iterations = 1
         self._apart, self._apart_stale = np.empty((0, 2), np.int64), False
@@ -135,6 +137,7 @@ class Links:
             self._work = Work(np.unique(np.concatenate(linked)), len(self._state))
             for pool in self._order:
                 pool.pack(self._work)
+            self._few = len(self._work) < LINKS_ONE_THREAD_BELOW
         for pool in self._order:
             pool.begin()
         self._broken = np.empty(0, BROKEN)
@@ -158,12 +161,17 @@ class Links:
 
     def before(self, state: Slots, h: float) -> None:
         """Before the integrator: remember where the substep starts."""
-        self._work.look(state, h)
-        for pool in self._order:
-            pool.before(self._work, h)
+        with _jit.one_thread(self._few):
+            self._work.look(state, h)
+            for pool in self._order:
+                pool.before(self._work, h)
 
     def solve(self, state: Slots, h: float) -> None:
         """Move the linked particles to where their links allow, and break those that pull too hard."""
+        with _jit.one_thread(self._few):
+            self._solve(state, h)
+
+    def _solve(self, state: Slots, h: float) -> None:
         work = self._work
         work.take(state)
         for pool in self._order:
@@ -186,7 +194,8 @@ class Links:
 
     def after(self, state: Slots) -> None:
         """After the contacts: what the links did is part of the acceleration, for integrators that remember it."""
-        kernels.add_rows(state.acceleration, self._work.slots(state), self._work.pull)
+        with _jit.one_thread(self._few):
+            kernels.add_rows(state.acceleration, self._work.slots(state), self._work.pull)
 
     def scatter(self) -> None:
         """The frame is good: what it did to the links holds."""
