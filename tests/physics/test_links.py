@@ -296,3 +296,22 @@ def test_newtons_cradle_passes_its_momentum_to_the_last_ball() -> None:
     before = np.sqrt(2 * G * lift)
     assert world.velocity[9, 0] == pytest.approx(before, rel=0.01)
     assert np.abs(world.velocity[5:9]).max() < 0.01 * before
+
+
+@pytest.mark.parametrize("name", pv.integrators.BY_NAME)
+def test_links_hold_under_every_integrator(name: str) -> None:
+    # Projection along the old direction makes every method Stormer's as far as the link goes: the same period to (w h)^2 / 24.
+    world = pv.World(collisions=None, dtype=np.float64, integrator=pv.integrators.BY_NAME[name]())
+    group, _ = chain(world, np.array([[0, 0], [np.sin(1.0), -np.cos(1.0)]]), 1.0)
+    group.pin(0)
+    start = world.energy().total
+    period = 4 * np.sqrt(1 / G) * ellipk(np.sin(0.5) ** 2)
+    x = []
+    for _ in range(int(3.5 * period / DT)):
+        world.step(DT)
+        x.append(float(group.position[1, 0]))
+        # First order methods show a velocity half a substep away: g v h / 2 of energy.
+        assert world.energy().total == pytest.approx(start, abs=G * 3.0 * DT / 8 / 2 * 1.5)
+    crossings = downward_crossings(DT * np.arange(1, len(x) + 1), np.array(x))
+    assert np.diff(crossings).mean() == pytest.approx(period, rel=5e-5)
+    assert np.hypot(*group.position[1]) == pytest.approx(1.0, abs=1e-9)

@@ -22,7 +22,7 @@ def sheet(columns: int, rows: int, **options: Any) -> tuple[pv.World, pv.Group, 
     group = world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.2, mass=0.1)
     n = np.arange(columns * rows).reshape(rows, columns)
     world.links.append(pv.Stick(group, n[:, :-1].ravel(), n[:, 1:].ravel(), collide=False))
-    world.links.append(pv.Rope(group, n[:-1].T.ravel(), n[1:].T.ravel(), breaking_force=40.0))
+    world.links.append(pv.Rope(group, n[:-1].T.ravel(), n[1:].T.ravel(), breaking_force=40.0, collide=False))
     world.links.append(pv.Spring(group, n[:-1, :-1].ravel(), n[1:, 1:].ravel(), stiffness=50.0, damping=0.1))
     world.links.append(pv.Angle(group, n[1:-1, 0], n[1:-1, 1], n[1:-1, 2], compliance=0.1))
     world.links.append(pv.Area(group, [n[0, 0], n[1, 0], n[1, 1], n[0, 1]], compliance=0.1))

@@ -43,6 +43,7 @@ class Links:
         self._iterations = 1
         self._apart, self._apart_stale = np.empty((0, 2), np.int64), False
         self._partners = np.zeros(1, np.int64), np.empty(0, np.int64)
+        self._apart_changed = False
         self._broken = self.broken = np.empty(0, BROKEN)
 
     # ---- a list --------------------------------------------------------------------------------------------------------
@@ -132,6 +133,8 @@ class Links:
 
     def begin(self) -> bool:
         """A frame begins. True if other pairs than before are no contacts (`unlist`)."""
+        if not self._order:
+            return False
         if any(pool.stale for pool in self._order) or len(self._work.compact) != len(self._state):
             linked = [np.empty(0, np.int64)] + [pool.entries["particle"] for pool in self._order]
             self._work = Work(np.unique(np.concatenate(linked)), len(self._state))
@@ -141,17 +144,19 @@ class Links:
         for pool in self._order:
             pool.begin()
         self._broken = np.empty(0, BROKEN)
-        return self._know_apart()
+        self._know_apart()
+        changed, self._apart_changed = self._apart_changed, False
+        return changed
 
-    def _know_apart(self) -> bool:
-        """Bring the pairs that are no contacts up to date; True if they are others than before."""
+    def _know_apart(self) -> None:
+        """Bring the pairs that are no contacts up to date, and note if they are others than before."""
         if not self._apart_stale and len(self._partners[0]) == len(self._state) + 1:
-            return False
+            return
         before, self._apart, self._apart_stale = self._apart, self.apart(), False
         both = np.concatenate((self._apart, self._apart[:, ::-1]))
         both = both[np.lexsort(both.T[::-1])]
         self._partners = np.searchsorted(both[:, 0], np.arange(len(self._state) + 1)), both[:, 1].copy()
-        return not np.array_equal(before, self._apart)
+        self._apart_changed |= not np.array_equal(before, self._apart)
 
     def unlist(self, pairs: PairList, particle: Array) -> None:
         """Take the pairs of `apart` from a list of candidates; particle: the user's index in each slot."""
@@ -243,7 +248,7 @@ class Links:
 
     def save(self) -> Any:
         """What moves: who is intact, and what each pulled with."""
-        return [{name: pool.rows[name].copy() for name in MOVING} for pool in self._order], self.broken
+        return [{name: pool.rows[name].copy() for name in MOVING} for pool in self._order], self.broken, self._apart_changed
 
     def restore(self, saved: Any) -> None:
         """Go back to what `save` returned.
@@ -251,7 +256,7 @@ class Links:
         Raises:
             InputError: links have been added or removed since.
         """
-        pools, broken = saved
+        pools, broken, apart_changed = saved
         if [len(columns["intact"]) for columns in pools] != [len(pool.rows) for pool in self._order]:
             raise InputError("saved holds other links; allowed is a state of this world with the links it has now")
         for pool, columns in zip(self._order, pools, strict=True):
@@ -259,3 +264,5 @@ class Links:
                 pool.rows[name][:] = column
         self.broken = broken
         self._apart_stale = True
+        self._know_apart()
+        self._apart_changed = apart_changed
