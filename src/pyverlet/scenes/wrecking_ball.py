@@ -15,12 +15,13 @@ BRICK, BALL = 0.25, 1.2
 """Radii, m."""
 
 LENGTH, LINKS = 9.0, 24
-"""Of the chain, m, and how many links it has."""
+"""Of the chain, m, and how many links it has; fewer with few particles."""
 
 COLUMNS = 12
 """Of the tower."""
 
-LEAST = LINKS + 2 + COLUMNS
+LEAST = 8
+"""Particles: two links, a ball and a few bricks."""
 
 
 def build(settings: Settings) -> World:
@@ -30,14 +31,15 @@ def build(settings: Settings) -> World:
     """
     if settings.particles < LEAST:
         raise InputError(f"particles is {settings.particles}; allowed is at least {LEAST} in the scene 'wrecking-ball'")
-    bricks = settings.particles - LINKS - 2
+    links = min(LINKS, settings.particles // 2 - 2)
+    bricks = settings.particles - links - 2
     rows = -(-bricks // COLUMNS)
     height = max(BRICK * (2 + 1.75 * rows), LENGTH + BALL) + 3.0
     peg = (-BALL - 0.3, LENGTH + 1.5 * BALL)
     world = settings.empty_world(
         Box((-LENGTH - 3 * BALL, 0.0), (16.0, height), restitution=settings.restitution, friction=settings.friction)
     )
-    chain = builders.chain(world, peg, (peg[0] - LENGTH + BALL, peg[1]), links=LINKS, mass=0.5, radius=0.1)
+    chain = builders.chain(world, peg, (peg[0] - LENGTH + BALL, peg[1]), links=links, mass=0.5, radius=0.1)
     chain.group.pin(0)
     ball = world.add(position=(peg[0] - LENGTH, peg[1]), radius=BALL - 0.11, mass=200.0)
     world.links.append(Stick((chain.group, -1), (ball, 0), collide=False))
