@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from pyverlet import errors, forces, integrators, scenes
+from pyverlet import builders, errors, forces, integrators, scenes
 from pyverlet.actors import Actor, Emitter, Sink
 from pyverlet.bounds import Boundary, Box, Circle, Open
 from pyverlet.broadphase import BruteForce, Fast
+from pyverlet.builders import bridge, chain, cloth, net, rope, soft_body
 from pyverlet.clock import Clock, FrameBudget
 from pyverlet.collisions import Collisions, Overlap
 from pyverlet.energy import Energy
@@ -25,6 +26,7 @@ from pyverlet.integrators import (
     Yoshida4,
 )
 from pyverlet.ledger import Ledger
+from pyverlet.links import Angle, Area, Pin, Rope, Spring, Stick
 from pyverlet.naive import ClampAndFlip, ProjectOnly
 from pyverlet.obstacles import Capsule, Chain, Disc, Obstacle, Polygon, Segment
 from pyverlet.panels import Panel, Panels
@@ -34,11 +36,12 @@ from pyverlet.world import World
 __version__ = "0.1.0"
 
 __all__ = [
-    "RK4", "Actor", "Attractor", "Boundary", "Box", "BruteForce", "Capsule", "Chain", "Circle", "ClampAndFlip", "Clock",
-    "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy", "ExplicitEuler", "Fast", "FrameBudget", "Gravitation",
-    "Group", "InputError", "Integrator", "Ledger", "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel", "Panels",
-    "PointSpring", "Polygon", "PositionVerlet", "ProjectOnly", "PyverletError", "Segment", "SemiImplicitEuler", "Sink",
-    "TimeCorrectedVerlet", "VelocityVerlet", "Wind", "World", "Yoshida4", "errors", "force", "forces", "integrators", "scenes",
+    "RK4", "Actor", "Angle", "Area", "Attractor", "Boundary", "Box", "BruteForce", "Capsule", "Chain", "Circle", "ClampAndFlip",
+    "Clock", "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy", "ExplicitEuler", "Fast", "FrameBudget",
+    "Gravitation", "Group", "InputError", "Integrator", "Ledger", "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel",
+    "Panels", "Pin", "PointSpring", "Polygon", "PositionVerlet", "ProjectOnly", "PyverletError", "Rope", "Segment",
+    "SemiImplicitEuler", "Sink", "Spring", "Stick", "TimeCorrectedVerlet", "VelocityVerlet", "Wind", "World", "Yoshida4",
+    "bridge", "builders", "chain", "cloth", "errors", "force", "forces", "integrators", "net", "rope", "scenes", "soft_body",
     "view", "warm_up",
 ]  # fmt: skip
 

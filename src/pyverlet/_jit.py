@@ -119,6 +119,17 @@ def use_threads(count: int) -> None:
     numba.set_num_threads(count)
 
 
+@contextlib.contextmanager
+def one_thread(only_if: bool = True) -> Iterator[None]:
+    """Parallel kernels called inside use one thread: work that is too little to be worth a meeting."""
+    before = numba.get_num_threads()
+    numba.set_num_threads(1 if only_if else before)
+    try:
+        yield
+    finally:
+        numba.set_num_threads(before)
+
+
 class _CompileListener(numba_event.Listener):  # type: ignore[misc]
     def __init__(self, ours: set[Any], started: Callable[[], None]) -> None:
         self._ours = ours

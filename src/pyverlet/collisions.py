@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from pyverlet import checks
-from pyverlet.broadphase import BruteForce, Fast
+from pyverlet.broadphase import BruteForce, Fast, PairList
 from pyverlet.constants import GROWTH, LARGEST_PUSH, REST_ACCELERATIONS, SMALLEST
 from pyverlet.errors import InputError
 from pyverlet.kernels import contacts, impacts
 from pyverlet.state import Slots, State
+
+Unlist = Callable[[PairList, Any], None]
+"""Takes pairs that are no contacts, since a link says so, from a list; the second argument is the user's index in each slot."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,9 +51,11 @@ class Overlap(NamedTuple):
 class ContactSolver:
     """The contact stages of a substep, in the order `World.step` calls them."""
 
-    def __init__(self, settings: Collisions, dtype: np.dtype[Any]) -> None:
+    def __init__(self, settings: Collisions, dtype: np.dtype[Any], unlist: Unlist) -> None:
         self.settings = settings
         self.broad_phase = settings.method.start(dtype)
+        self._unlist = unlist
+        self._seen = 0
 
     def fit(self, state: Slots) -> None:
         """Let particles that were added on top of others start smaller."""
@@ -76,6 +82,9 @@ class ContactSolver:
     def find(self, state: Slots) -> None:
         """Broad phase: bring the list of candidate pairs up to date."""
         self.broad_phase.update(state)
+        if self._seen != self.broad_phase.rebuilds:
+            self._seen = self.broad_phase.rebuilds
+            self._unlist(self.broad_phase.list, state.particle)
 
     def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
         """Move overlapping circles apart, let impacts bounce, and note who touches."""
@@ -130,12 +139,13 @@ def find_contacts(state: State, method: Fast | BruteForce) -> np.ndarray[Any, np
     return named[np.lexsort(named.T[::-1])]
 
 
-def measure_overlap(state: State) -> Overlap:
-    """Overlap of all touching pairs of a state; leaves the state alone."""
+def measure_overlap(state: State, unlist: Unlist) -> Overlap:
+    """Overlap of all touching pairs of a state, but for those that `unlist` takes from a list; leaves the state alone."""
     if len(state) < 2:
         return Overlap(0.0, 0.0, 0)
     slots, phase = _listed(state, Fast(skin=0.0))
     pairs = phase.list
+    unlist(pairs, slots.particle)
     number, total, largest = contacts.overlaps(slots.position, slots.radius, pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
     return Overlap(total / number if number else 0.0, largest, number)
 

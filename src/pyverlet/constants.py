@@ -61,6 +61,30 @@ docs/design/contacts.md has the comparison."""
 HELD: Final = 0.6
 """Part of the slip of a substep that friction at rest takes back from the positions: the tangential PUSHED."""
 
+LINK_GIVE: Final = 1e-7
+"""What a rigid link gives way, as a part of what its particles do: a straight chain between two walls has no rigid solution."""
+
+LINK_RESOLVED: Final = 0.2
+"""(natural frequency * h)^2 of a spring that is treated half as motion to follow, half as stiffness to settle."""
+
+LINK_TAUT: Final = 0.01
+"""Part of its length a rope may be short of taut and still be tried as taut, since others may stretch it in the same substep."""
+
+LINK_MEMORY_S: Final = 1 / 120
+"""s over which the pull of a link is averaged. In float32 a rigid link's own is noise: 1e-7 of a coordinate, times m / h^2."""
+
+LINK_TURN: Final = 0.25
+"""rad: a chain whose solution turns a link by more is solved link by link instead; a straight step cannot be trusted so far."""
+
+LINK_ROUNDS: Final = 8
+"""Times the rows of a rope are asked anew who pulls. Three have been enough for chains of 100; what is left is clamped."""
+
+LINKS_ONE_THREAD_BELOW: Final = 4096
+"""Worlds with fewer linked particles solve links on one thread: each colour is a meeting of the threads."""
+
+LINK_COLOURS: Final = 64
+"""Colours of links at most, bits of a number; the last one, for particles with more links than that, is solved on one thread."""
+
 GROWTH: Final = 0.2
 """1/s: circles added on top of each other count as smaller at first, so that they just touch, and grow by this part of their
 radius a second. That bounds the speed they part with: pushed out in a frame they flew apart at hundreds of metres a second."""

@@ -23,8 +23,8 @@ class Energy(NamedTuple):
         return self.kinetic + self.potential + self.links
 
 
-def energy(state: State, gravity: tuple[float, float], forces: list[Any]) -> Energy:
+def energy(state: State, gravity: tuple[float, float], forces: list[Any], links: float) -> Energy:
     """Energy of a state under gravity and those forces that have a potential."""
     motion, spin, potential = measure.energies(state.position, state.velocity, state.spin, state.radius, state.mass, *gravity)
     potential += sum(force.potential(state) for force in forces if isinstance(force, Conservative))
-    return Energy(kinetic=motion + spin, spin=spin, potential=potential, links=0.0)
+    return Energy(kinetic=motion + spin, spin=spin, potential=potential, links=links)

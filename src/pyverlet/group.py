@@ -98,3 +98,17 @@ class Group:
     friction = Column("(n,) mu of these circles; negative: as the world's `Collisions` and bounds say.")
     category = Column("(n,) uint32, the bits of what these circles are.")
     mask = Column("(n,) uint32, the bits of the categories they collide with.")
+
+    def pin(self, index: Any = slice(None)) -> None:
+        """Make particles immovable where they are: mass infinite, no velocity. Give them a mass again to let go.
+
+        Args:
+            index: in this group, or several, or a slice; all of them unless said.
+
+        Raises:
+            InputError: there is no such particle.
+        """
+        try:
+            self.mass[index], self.velocity[index], self.spin[index] = np.inf, 0.0, 0.0
+        except IndexError:
+            raise InputError(f"index is {index!r}; allowed are indices of this group's {len(self)} particles") from None

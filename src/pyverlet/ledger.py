@@ -10,6 +10,7 @@ import numpy as np
 
 from pyverlet.forces import Conservative, ForceSum
 from pyverlet.kernels import measure
+from pyverlet.links import Links
 from pyverlet.state import Slots
 
 
@@ -24,6 +25,7 @@ class Ledger:
         friction: taken by Coulomb friction.
         drag: work of forces whose `account` is "drag".
         forces: work of all other forces without a potential, such as a user's own and the mouse.
+        links: taken by links: damping, and what stiff ones do not give back.
         projection: put in by moving overlapping circles apart, where contacts together gained more than they took in a frame.
         outside: brought by what was done between frames: particles added, removed or written to, gravity changed.
         residual: what is left over: the error of the integrator and, with forces that have no potential, of the trapezoidal rule
@@ -34,6 +36,7 @@ class Ledger:
     friction: float = 0.0
     drag: float = 0.0
     forces: float = 0.0
+    links: float = 0.0
     projection: float = 0.0
     outside: float = 0.0
     residual: float = 0.0
@@ -73,16 +76,19 @@ class Bookkeeper:
         other.ledger, other._energy = replace(self.ledger), self._energy
         return other
 
-    def frame(self, state: Slots, forces: ForceSum, t: float, h: float, lag: float, done: Callable[[str], None]) -> _Frame:
+    def frame(
+        self, state: Slots, forces: ForceSum, links: Links, t: float, h: float, lag: float, done: Callable[[str], None]
+    ) -> _Frame:
         """The books of one frame, to be told of each stage; it passes on what it is told to `done`."""
-        return _Frame(self, state, forces, t, h, lag, done)
+        return _Frame(self, state, forces, links, t, h, lag, done)
 
 
 class _Frame:
     def __init__(
-        self, books: Bookkeeper, state: Slots, forces: ForceSum, t: float, h: float, lag: float, done: Callable[[str], None]
-    ) -> None:
-        self._books, self._state, self._forces, self._done = books, state, forces, done
+        self, books: Bookkeeper, state: Slots, forces: ForceSum, links: Links, t: float, h: float, lag: float,
+        done: Callable[[str], None],
+    ) -> None:  # fmt: skip
+        self._books, self._state, self._forces, self._links, self._done = books, state, forces, links, done
         self._t, self._h, self._lag = t, h, lag
         self._open = replace(books.ledger)
         self._contacts = 0.0
@@ -102,7 +108,10 @@ class _Frame:
                 setattr(self._open, account, getattr(self._open, account) + work)
                 gained -= work
             self._open.residual += gained
-        elif stage == "velocities":
+        elif stage == "links":
+            before, self._now = self._now, self._look(self._lag)
+            self._open.links += self._now.energy - before.energy
+        elif stage == "velocities" or (stage == "contacts" and self._links):
             before, self._now = self._now, self._look(self._lag)
             self._contacts += self._now.energy - before.energy
         elif stage == "finish":
@@ -127,9 +136,9 @@ class _Frame:
         kept = [force for force in forces.forces if isinstance(force, Conservative)]
         moving = (s.position, s.velocity, s.acceleration, lag, s.spin, s.radius, s.mass)
         energy = measure.mechanical(*moving, *forces.gravity)
-        if kept:
+        if kept or self._links:
             state = s.in_users_order()
-            energy += sum(force.potential(state) for force in kept)
+            energy += sum(force.potential(state) for force in kept) + self._links.energy(state)
         others = [force for force in forces.forces if not isinstance(force, Conservative)]
         return _Instant(float(energy), self._power(others, lag) if others else {})
 

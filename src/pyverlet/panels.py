@@ -6,7 +6,8 @@ import hashlib
 from collections.abc import Callable, Iterator, Sequence
 
 from pyverlet.errors import InputError
-from pyverlet.world import Saved, World
+from pyverlet.saved import Saved
+from pyverlet.world import World
 
 Pace = Callable[[World, int, float], None]
 """How a world follows the frames of a screen: called with the world, the number of the frame (from 1) and its length dt in s."""

@@ -11,6 +11,7 @@ from pyverlet import checks
 from pyverlet.bounds import Boundary
 from pyverlet.forces import Force, Numbered
 from pyverlet.group import Column, Group
+from pyverlet.links import Links
 from pyverlet.state import EVERYONE, Slots, State
 
 Array = NDArray[Any]
@@ -22,6 +23,7 @@ class Particles:
     _state: State
     _slots: Slots
     forces: list[Force]
+    links: Links
     _where = slice(None)
     boundary: Boundary
 
@@ -105,9 +107,9 @@ class Particles:
 
     def _renumber(self, now: Array) -> None:
         """Tell those who hold a particle by its index where it is now, or that it is no more (-1)."""
-        for force in self.forces:
-            if isinstance(force, Numbered):
-                force.renumber(now)
+        for holder in (self.links, *self.forces):
+            if isinstance(holder, Numbered):
+                holder.renumber(now)
 
     def __len__(self) -> int:
         return len(self._state)

@@ -15,6 +15,8 @@ from pyverlet.broadphase import BruteForce
 from pyverlet.collisions import Collisions
 from pyverlet.constants import SERIAL_BELOW
 from pyverlet.forces import Drag
+from pyverlet.group import Group
+from pyverlet.links import Angle, Area, Pin, Spring, Stick
 from pyverlet.state import Slots
 from pyverlet.world import World
 
@@ -65,6 +67,8 @@ def _rehearse(world: World) -> None:
         world.collisions,
     )
     small.integrator = world.integrator
+    if world.links:
+        _link(small)
     _use(small)
     if len(world):  # one circle in the world's own room: a boundary of another kind has kernels of its own
         alone = World(boundary=world.boundary, collisions=None, substeps=1, dtype=world.dtype)
@@ -90,7 +94,18 @@ def _compile_all(dtype: np.dtype[Any]) -> None:
         small = _lattice(count, dtype, boundary, 0.5, collisions)
         small.step(1e-3)
         small.forces.append(Drag(linear=0.1))
+        _link(small)
         _use(small)
+
+
+def _link(world: World) -> None:
+    """One link of every kind."""
+    group = Group(world._state, slice(0, 4), world.remove)
+    world.links.append(Stick(group, [0, 1], [1, 2], collide=False, breaking_force=1e9))
+    world.links.append(Spring(group, 0, 2, stiffness=1.0))
+    world.links.append(Angle(group, 0, 1, 2, compliance=1.0))
+    world.links.append(Area(group, [0, 1, 2], area=1.0, compliance=1.0))
+    world.links.append(Pin(group, 3))
 
 
 def _use(world: World) -> None:

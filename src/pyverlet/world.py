@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,19 +11,20 @@ from numpy.typing import DTypeLike, NDArray
 from pyverlet import _jit, checks
 from pyverlet.actors import Actor
 from pyverlet.bounds import Boundary, Open
-from pyverlet.collisions import Collisions, ContactSolver, Overlap, measure_overlap
+from pyverlet.collisions import Collisions, ContactSolver
 from pyverlet.constants import ALL_THREADS_FROM, ONE_THREAD_BELOW, REST_ACCELERATIONS, STANDARD_GRAVITY
 from pyverlet.doors import Doors
-from pyverlet.energy import Energy, energy
 from pyverlet.errors import InputError, NonFiniteError
 from pyverlet.forces import Force, ForceSum
 from pyverlet.integrators import Integrator, PositionVerlet
-from pyverlet.kernels import measure, motion
-from pyverlet.ledger import Bookkeeper, Ledger
+from pyverlet.kernels import motion
+from pyverlet.ledger import Bookkeeper
+from pyverlet.links import Links
+from pyverlet.measures import Measures
 from pyverlet.obstacles import Course, Obstacles
-from pyverlet.particles import Particles
 from pyverlet.profile import Profile
 from pyverlet.queries import Queries
+from pyverlet.saved import Saved
 from pyverlet.state import Slots, State
 
 Array = NDArray[Any]
@@ -34,23 +33,7 @@ Array = NDArray[Any]
 _DEFAULT_COLLISIONS = Collisions()
 
 
-@dataclass(frozen=True)
-class Saved:
-    """What `World.save` keeps: enough to continue with the same bits. Opaque."""
-
-    world: State
-    arrays: dict[str, Array]
-    time: float
-    frames: int
-    h_last: float | None
-    slots: tuple[Array, Array]
-    neighbours: Any
-    books: Bookkeeper | None
-    obstacles: Any
-    actors: list[tuple[Actor, Any]]
-
-
-class World(Particles, Queries, Doors):
+class World(Measures, Queries, Doors):
     """Particles in a room, and the laws they follow. SI units, y up.
 
     Args:
@@ -82,6 +65,7 @@ class World(Particles, Queries, Doors):
         self._state = State(checks.floating("dtype", dtype))
         self._h_last: float | None = None  # substep of the frame before; None: the integrator starts anew
         self._slots = Slots(self._state.dtype)
+        self.links = Links(self._state)
         self.forces: list[Force] = []
         self._force_sum = ForceSum(checks.vector("gravity", gravity), self.forces)
         self.actors: list[Actor] = []
@@ -115,29 +99,22 @@ class World(Particles, Queries, Doors):
         self._frame(h, books or self.profile.mark)
         if self._first_non_finite() >= 0:
             self._explain_non_finite(h)
-        self._slots.scatter(self._state)
-        if books:
-            books.close(self._spent())
-        self._course.end(dt)
-        self.profile.mark("scatter")
-        self.time += dt
-        self.frames += 1
-        self._h_last = h
+        self._accept(dt, h, books)
         self.profile.end()
 
     def _frame(self, h: float, done: Callable[[str], None]) -> None:
         """The table of contents of the engine. `done` is told the name of each stage as it ends."""
         state, forces, integrator = self._slots, self._force_sum, self.integrator
         contacts, course = self._contacts if len(self) > 1 else None, self._course
+        links = self.links
+        parts: list[Any] = [part for part in (contacts, links, course) if part]
         lag = integrator.velocity_lag * h
         self._gather()
         done("gather")
         integrator.begin(state, forces, self.time, h, self._h_last)
         for substep in range(self.substeps):
-            if contacts:
-                contacts.before(state, h)
-            if course:
-                course.before(state)
+            for part in parts:
+                part.before(state, h)
             integrator.step(state, forces, self.time + substep * h, h)
             strongest = self._strongest_acceleration()
             done("integrate")
@@ -146,6 +123,9 @@ class World(Particles, Queries, Doors):
                 done("broad phase")
                 contacts.project(state, h, lag, strongest)
                 done("contacts")
+            if links:
+                links.solve(state, h)
+                done("links")
             self.boundary.confine(state, h, lag, REST_ACCELERATIONS * strongest * h)
             done("bounds")
             if course:
@@ -154,6 +134,9 @@ class World(Particles, Queries, Doors):
             if contacts:
                 contacts.still(state, h)
             done("velocities")
+            if links:
+                links.after(state)
+                done("links")
         if contacts:
             contacts.mark_resting(state)
         integrator.end(state, h)
@@ -166,6 +149,8 @@ class World(Particles, Queries, Doors):
             self.step(dt)
 
     def _gather(self) -> None:
+        if self.links.begin() and self._contacts:
+            self._contacts.broad_phase.forget()
         changed = self._slots.gather(self._state)
         self._course.begin()
         self._clear_notes()
@@ -187,9 +172,21 @@ class World(Particles, Queries, Doors):
             if len(self) > 1:
                 self._contacts.fit(self._slots)
 
+    def _accept(self, dt: float, h: float, books: Any) -> None:
+        """The frame has gone well: what it made of the state is the truth now."""
+        self._slots.scatter(self._state)
+        if books:
+            books.close(self._spent())
+        self._course.end(dt)
+        self.links.scatter()
+        self.profile.mark("scatter")
+        self.time += dt
+        self.frames += 1
+        self._h_last = h
+
     def _open_books(self, h: float) -> Any:
         lag = self.integrator.velocity_lag * h
-        return self._books and self._books.frame(self._slots, self._force_sum, self.time, h, lag, self.profile.mark)
+        return self._books and self._books.frame(self._slots, self._force_sum, self.links, self.time, h, lag, self.profile.mark)
 
     def _clear_notes(self) -> None:
         """What walls and contacts note about a frame starts anew."""
@@ -282,7 +279,7 @@ class World(Particles, Queries, Doors):
         if value is not None and not isinstance(value, Collisions):
             raise InputError(f"collisions is {value!r}; allowed are pyverlet.Collisions(...) and None")
         self._collisions = value
-        self._contacts = None if value is None else ContactSolver(value, self._state.dtype)
+        self._contacts = None if value is None else ContactSolver(value, self._state.dtype, self.links.unlist)
 
     @property
     def threads(self) -> int:
@@ -295,67 +292,6 @@ class World(Particles, Queries, Doors):
     def threads(self, value: int | None) -> None:
         most = _jit.max_threads()
         self._threads = None if value is None else checks.whole("threads", value, most=most, most_is=" (the cores here)")
-
-    # ---- numbers -------------------------------------------------------------------------------------------------------
-
-    def energy(self) -> Energy:
-        """Kinetic (motion and spin), potential, links and total energy, J."""
-        return energy(self._state, self.gravity, self.forces)
-
-    @property
-    def keeps_ledger(self) -> bool:
-        """Whether `ledger` is there to be read."""
-        return self._books is not None
-
-    @property
-    def ledger(self) -> Ledger:
-        """Where the energy has gone since the world was built, as of the last frame.
-
-        Raises:
-            InputError: the world keeps none.
-        """
-        if self._books is None:
-            raise InputError("ledger is off in this world; allowed is a world built with World(ledger=True)")
-        return self._books.ledger
-
-    def _spent(self) -> tuple[float, float]:
-        """What impacts and friction have taken in this frame, J, as the kernels of contacts and walls have noted."""
-        spent = self._slots.spent.sum(axis=0)
-        if self._contacts:
-            spent += self._contacts.broad_phase.list.spent.sum(axis=0)
-        return float(spent[0]), float(spent[1])
-
-    def momentum(self) -> Array:
-        """(2,) sum of m v over all free particles, kg m/s."""
-        return np.array(self._momenta()[:2])
-
-    def angular_momentum(self) -> float:
-        """Sum of m (x v_y - y v_x) + I spin about the origin, kg m^2/s."""
-        return float(self._momenta()[2])
-
-    def _momenta(self) -> tuple[float, float, float]:
-        s = self._state
-        return measure.momenta(s.position, s.velocity, s.spin, s.radius, s.mass)  # type: ignore[no-any-return]
-
-    def overlap(self) -> Overlap:
-        """Mean and largest overlap of the touching pairs, as fractions of their contact distance, and how many there are."""
-        return measure_overlap(self._state)
-
-    def escaped(self) -> int:
-        """Particles whose centre is outside the boundary."""
-        return int(np.count_nonzero(self.boundary.outside(self.position)))
-
-    def state_hash(self) -> str:
-        """16 hex digits of time and every particle's position, velocity, spin, radius and mass: equal bits, equal hash."""
-        digest = hashlib.blake2b(np.float64(self.time).tobytes(), digest_size=8)
-        for array in (self.position, self.velocity, self.spin, self.radius, self.mass):
-            digest.update(array.tobytes())
-        return digest.hexdigest()
-
-    @property
-    def rebuilds(self) -> int:
-        """How often the neighbour list has been built."""
-        return self._contacts.broad_phase.rebuilds if self._contacts else 0
 
     # ---- save and restore ----------------------------------------------------------------------------------------------
 
@@ -372,6 +308,7 @@ class World(Particles, Queries, Doors):
             books=self._books and self._books.copy(),
             obstacles=self.obstacles.save(),
             actors=[(actor, actor.save()) for actor in self.actors],
+            links=self.links.save(),
         )
 
     def restore(self, saved: Saved) -> None:
@@ -382,6 +319,7 @@ class World(Particles, Queries, Doors):
         """
         if saved.world is not self._state:
             raise InputError("saved is the state of another world; allowed is what save() of this one returned")
+        self.links.restore(saved.links)
         numbers = self._state.number.copy()
         self._state.restore(saved.arrays)
         if not np.array_equal(numbers, self._state.number):

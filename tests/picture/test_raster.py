@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import pyverlet as pv
-from pyverlet.kernels import raster
+from pyverlet.kernels import lines, raster
 from pyverlet.picture import DARK, LIGHT, ByOrigin, BySpeed, Raster, View
 from pyverlet.picture.palette import swapped
 from pyverlet.viewers.frames import outline
@@ -180,3 +180,42 @@ def test_obstacles_cover_the_area_they_have() -> None:
     length = np.hypot(2, 6)
     assert red[:, 260:].sum() / 400 == pytest.approx(2 * 0.5 * length + np.pi / 16, rel=2e-2)
     assert (canvas.draw(bare, view, outlines=room, colours=none) == before).all()
+
+
+def test_lines_cover_their_width() -> None:
+    # A line of width 2 and length L covers 2 L + pi; with rims a pixel soft, each pixel is right to a few hundredths.
+    for ends in (
+        [(20.3, 30.2), (70.1, 44.9)],
+        [(20.5, 60.0), (20.5, 10.0)],
+        [(10.0, 40.25), (80.0, 40.25)],
+        [(50, 50), (50, 50)],
+    ):
+        pixels = np.zeros((80, 100), dtype=np.uint32)
+        lines.lines(pixels, np.array([ends], dtype=np.float32), np.full(1, WHITE, dtype=np.uint32), 0.0, 80.0, 1.0, 1.0)
+        length = float(np.hypot(*np.subtract(*np.array(ends))))
+        assert (pixels & 0xFF).sum() / 255 == pytest.approx(2 * length + np.pi, abs=0.02 * length + 0.3)
+        assert not (pixels >> 24).any()
+    lines.lines(pixels, np.full((1, 2, 2), np.nan), np.full(1, WHITE, dtype=np.uint32), 0.0, 80.0, 1.0, 1.0)
+
+
+def test_links_are_drawn_in_the_colour_of_their_pull() -> None:
+    world = pv.World(boundary=pv.Box((-2, -4), (2, 1)), dtype=np.float64)
+    group = world.add(position=[(-1, 0), (-1, -2), (1, 0), (1, -2)], radius=0.1, mass=(1.0, 9.0, 1.0, 1.0))
+    group.pin([0, 2])
+    links = world.links.append(pv.Stick(group, [0, 2], [1, 3], breaking_force=[200.0, 5.0]))
+    view = View.fit((-2, -4, 2, 1), (200, 250))
+
+    def between(x: float) -> Any:
+        colours = ByOrigin().colours(world, DARK)
+        picture = Raster((200, 250)).draw(world, view, outlines=outline(world.boundary), colours=colours)
+        column, row = (int(value) for value in view.to_screen((x, -1.0)))
+        return picture[row, column - 3 : column + 4, :3].astype(int).max(axis=0)
+
+    bare = between(0.0)
+    calm = between(1.0)
+    assert (between(-1.0) == calm).all()  # nothing pulls yet
+    assert (calm != bare).any()
+    world.run(seconds=0.5)
+    assert links.intact.tolist() == [True, False]
+    assert (between(1.0) == bare).all()
+    assert (between(-1.0) != bare).any()

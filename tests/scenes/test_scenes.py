@@ -13,7 +13,7 @@ from pyverlet.scenes import Scene
 EVERY = pytest.mark.parametrize("scene", scenes.SCENES.values(), ids=scenes.SCENES)
 NOTHING_RANDOM = {
     "fall", "bounce-euler", "bounce-order", "bounce-rest", "frame-rate", "bounce-verlet", "energy-1-substep",
-    "energy-10-substeps",
+    "energy-10-substeps", "cloth", "newton-cradle", "wrecking-ball",
 }  # fmt: skip
 COUNTS = [*range(1, 40), 57, 100, 199, 200, 333, 1000, 5000]
 

@@ -8,9 +8,11 @@ import numpy as np
 import pygame
 
 from pyverlet.errors import InputError
-from pyverlet.kernels import raster
+from pyverlet.kernels import lines, raster
 from pyverlet.picture import DARK, ByOrigin, Colouring, Theme, View
+from pyverlet.picture.colour import by_force
 from pyverlet.picture.palette import Packed
+from pyverlet.picture.raster import LINK_PX
 from pyverlet.viewers.frames import outline
 
 if TYPE_CHECKING:
@@ -62,6 +64,11 @@ def draw(
     pixels = np.bitwise_and(own, np.uint32(0x00FFFFFF), dtype=np.uint32)  # the raster keeps count of coverage up there
     ground = pixels.copy()
     raster.circles(pixels, ground, world.position, world.radius, colours, view.left, view.top, view.scale)
+    if len(world.links):
+        ends, force = world.links.segments()
+        pulls = by_force(force, theme)
+        pulls = _red_and_blue_swapped(pulls) if shifts[:3] == (16, 8, 0) else pulls
+        lines.lines(pixels, ends, pulls, view.left, view.top, view.scale, LINK_PX / 2)
     if surface.get_masks()[3]:
         np.maximum(pixels, alpha | (pixels & np.uint32(0x00FFFFFF)), out=pixels)
     own[:] = pixels

@@ -47,7 +47,7 @@ class Course:
             self._moving = [k for k, obstacle in enumerate(self._seen) if obstacle.moves]
             self._binned_for = -1.0
 
-    def before(self, state: Slots) -> None:
+    def before(self, state: Slots, h: float) -> None:
         """Before a substep: note where everybody comes from."""
         state.start[:] = state.position
 

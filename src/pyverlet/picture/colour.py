@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyverlet import checks
 from pyverlet.errors import InputError
 from pyverlet.group import Group
-from pyverlet.picture.palette import STEPS, Packed, Theme, heat, hues, packed, shade
+from pyverlet.picture.palette import STEPS, TONES, Packed, Theme, heat, hues, packed, shade
 
 if TYPE_CHECKING:
     from pyverlet.world import World
@@ -112,6 +112,13 @@ class Fixed(Colouring):
         if self._packed.ndim and len(self._packed) != len(world):
             raise InputError(f"rgb has {len(self._packed)} rows; allowed are {len(world)}, one for each circle")
         return np.ascontiguousarray(np.broadcast_to(self._packed, len(world)))
+
+
+def by_force(force: NDArray[Any], theme: Theme) -> Packed:
+    """(m,) colours of links by how hard they pull or push, N: from slack to three times the usual."""
+    load = np.abs(force)
+    usual = float(load.mean()) if len(load) else 0.0
+    return heat(theme.dark)[_steps(load, 0.0, USUAL_MULTIPLE * usual) * TONES]
 
 
 def _steps(value: NDArray[Any], low: float, high: float) -> NDArray[np.int64]:

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from pyverlet import checks
 from pyverlet.errors import InputError
-from pyverlet.kernels import raster
+from pyverlet.kernels import lines, raster
 from pyverlet.obstacles import Outline
+from pyverlet.picture.colour import by_force
 from pyverlet.picture.palette import DARK, Packed, Theme, swapped
 from pyverlet.picture.view import View
 
@@ -22,11 +23,16 @@ if TYPE_CHECKING:
 Lines = Sequence[Sequence[tuple[float, float]]]
 """Closed lines, metres."""
 
+Links = tuple[NDArray[Any], NDArray[Any]]
+"""Ends (m, 2, 2) in metres, and what each link pulls with (m,) in N."""
+
 WALL_PX = 2.0
 """Width of a wall's line outside the room."""
 
 LINE_PX = 4.0
 """Width of the line of an obstacle that has no thickness."""
+LINK_PX = 1.6
+"""Width of a link's line."""
 
 SLICES = 8
 """Lines a row of pixels is cut into where the floor of the room is filled: steps of a thirtieth in lightness, once a view."""
@@ -70,13 +76,19 @@ class Raster:
             cover; R, G, B are complete without it.
         """
         obstacles = world.obstacles.outlines()
-        return self.discs(world.position, world.radius, view, outlines=outlines, obstacles=obstacles, colours=colours)
+        links = world.links.segments() if len(world.links) else None
+        return self.discs(
+            world.position, world.radius, view, outlines=outlines, obstacles=obstacles, colours=colours, links=links
+        )
 
     def discs(
         self, position: NDArray[Any], radius: NDArray[Any], view: View, *,
-        outlines: Lines = (), obstacles: Sequence[Outline] = (), colours: Packed,
+        outlines: Lines = (), obstacles: Sequence[Outline] = (), colours: Packed, links: Links | None = None,
     ) -> NDArray[np.uint8]:  # fmt: skip
-        """The same from arrays: centres (n, 2) and radii (n,) in metres. For pictures made in another thread than the physics."""
+        """The same from arrays: centres (n, 2) and radii (n,) in metres, links as `world.links.segments` has them.
+
+        For pictures made in another thread than the physics.
+        """
         if (view.width, view.height) != self.size:
             raise InputError(f"view is {view.width} x {view.height} pixels; allowed is this raster's {self.size}")
         key = (view.left, view.top, view.scale, outlines)
@@ -90,6 +102,9 @@ class Raster:
         np.copyto(self._pixels, self._ground)
         colours = np.ascontiguousarray(colours, dtype=np.uint32)
         raster.circles(self._pixels, self._ground, position, radius, colours, view.left, view.top, view.scale)
+        if links is not None:
+            ends, force = links
+            lines.lines(self._pixels, ends, by_force(force, self.theme), view.left, view.top, view.scale, LINK_PX / 2)
         return self._pixels.view(np.uint8).reshape(*self._pixels.shape, 4)
 
     def _lay_floor(self, view: View, outlines: Lines) -> None:
@@ -118,7 +133,7 @@ class Raster:
         line = swapped(self.theme.grid)
         for x in np.arange(np.ceil(view.left / apart), right / apart) * apart:
             self._floor[:, int((x - view.left) * view.scale)] = line
-        for y in np.arange(np.ceil(bottom / apart), view.top / apart) * apart:
+        for y in np.arange(np.floor(bottom / apart) + 1, np.floor(view.top / apart) + 1) * apart:
             self._floor[int((view.top - y) * view.scale), :] = line
 
     def _place(self, obstacles: Sequence[Outline], view: View) -> None:

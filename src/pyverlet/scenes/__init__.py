@@ -14,10 +14,15 @@ from pyverlet.scenes import (
     box,
     cage,
     cage_brute_force,
+    cloth,
     energy,
     fall,
     frame_rate,
     image,
+    newton_cradle,
+    rope_bridge,
+    soft_bodies,
+    wrecking_ball,
 )
 from pyverlet.scenes._scene import Scene, Settings, Variant
 
@@ -39,6 +44,11 @@ SCENES: dict[str, Scene] = {
         energy.ONE_SUBSTEP,
         energy.TEN_SUBSTEPS,
         cage_brute_force.SCENE,
+        cloth.SCENE,
+        rope_bridge.SCENE,
+        soft_bodies.SCENE,
+        newton_cradle.SCENE,
+        wrecking_ball.SCENE,
     )
 }
 

@@ -1,0 +1,47 @@
+"""Columns of numbers that grow at the end."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+Array = NDArray[Any]
+
+
+class Table:
+    """Named columns of equal length. `table["name"]` is a view, good until rows are added or removed.
+
+    Args:
+        columns: names and what they hold: a dtype, or (dtype, shape of an entry).
+    """
+
+    def __init__(self, **columns: DTypeLike | tuple[DTypeLike, tuple[int, ...]]) -> None:
+        self._length = 0
+        self._store: dict[str, Array] = {}
+        for name, kind in columns.items():
+            dtype, shape = kind if isinstance(kind, tuple) else (kind, ())
+            self._store[name] = np.empty((0, *shape), dtype)
+
+    def __len__(self) -> int:
+        return self._length
+
+    def __getitem__(self, name: str) -> Array:
+        return self._store[name][: self._length]
+
+    def append(self, count: int, **values: Any) -> slice:
+        """Add `count` rows; a value is an entry for each, or one for all. Returns where they stand."""
+        where = slice(self._length, self._length + count)
+        for name, old in self._store.items():
+            if where.stop > len(old):  # doubling: adding one by one costs O(1) each on average
+                self._store[name] = np.empty((max(where.stop, 2 * len(old)), *old.shape[1:]), old.dtype)
+                self._store[name][: where.start] = old[: where.start]
+            self._store[name][where] = values[name]
+        self._length = where.stop
+        return where
+
+    def keep(self, mask: Array) -> None:
+        """Remove all other rows."""
+        self._store = {name: self[name][mask] for name in self._store}
+        self._length = int(np.count_nonzero(mask))

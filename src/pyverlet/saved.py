@@ -1,0 +1,31 @@
+"""A world at a moment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from numpy.typing import NDArray
+
+from pyverlet.actors import Actor
+from pyverlet.ledger import Bookkeeper
+from pyverlet.state import State
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Saved:
+    """What `World.save` keeps: enough to continue with the same bits. Opaque."""
+
+    world: State
+    arrays: dict[str, Array]
+    time: float
+    frames: int
+    h_last: float | None
+    slots: tuple[Array, Array]
+    neighbours: Any
+    books: Bookkeeper | None
+    obstacles: Any
+    actors: list[tuple[Actor, Any]]
+    links: Any

@@ -1,0 +1,72 @@
+"""A cloth on a line of pegs, under a load of balls: it tears where it is pulled too hard, by the mouse say."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pyverlet import builders
+from pyverlet.bounds import Box
+from pyverlet.errors import InputError
+from pyverlet.scenes._scene import Scene, Settings
+from pyverlet.world import World
+
+SPACING = 0.25
+"""Between the threads, m."""
+
+ASPECT = 1.6
+"""Columns / rows."""
+
+SLACK = 0.12
+"""Part by which the threads across are too long: the cloth hangs in folds between its pegs."""
+
+SHEAR = 0.2
+"""N/m a kilogram: little, so that the folds show."""
+
+PEGS = 9
+"""The cloth hangs from."""
+
+STRENGTH = 60.0
+"""Weights of a column of the cloth that a thread carries before it breaks."""
+
+LEAST = 12
+"""Particles that make a cloth."""
+
+
+def build(settings: Settings) -> World:
+    """A cloth hangs from nine pegs.
+
+    Each thread breaks beyond a force, so that whoever drags hard enough tears it; colours in a window or a film show the pull. Of
+    the particles those that do not fill a row lie on the floor.
+    """
+    if settings.particles < LEAST:
+        raise InputError(f"particles is {settings.particles}; allowed is at least {LEAST} in the scene 'cloth'")
+    columns = max(3, round(np.sqrt(ASPECT * settings.particles)))
+    rows = settings.particles // columns
+    width, height = SPACING * (columns - 1), SPACING * (rows - 1)
+    world = settings.empty_world(
+        Box(
+            (-0.8 * width, -0.7 * height),
+            (0.8 * width, 1.15 * height),
+            restitution=settings.restitution,
+            friction=settings.friction,
+        )
+    )
+    mass = 0.05 * columns * rows
+    cloth = builders.cloth(
+        world, (-width / 2, height), width=width, height=height, columns=columns, rows=rows, mass=mass, radius=0.4 * SPACING,
+        slack=SLACK, shear=SHEAR * mass, breaking_force=STRENGTH * mass / columns * 9.81,
+    )  # fmt: skip
+    cloth.group.pin(np.unique(np.linspace(0, columns - 1, PEGS).astype(int)))
+    loose = settings.particles - columns * rows
+    if loose:
+        x = SPACING * (np.arange(loose) - (loose - 1) / 2)
+        world.add(position=np.column_stack((x, np.full(loose, -0.6 * height))), radius=0.4 * SPACING, mass=0.05)
+    return world
+
+
+SCENE = Scene(
+    "cloth",
+    "a cloth hangs from pegs; drag it hard enough and it tears",
+    build,
+    Settings(particles=1_500, friction=0.2),
+)

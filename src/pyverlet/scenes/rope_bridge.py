@@ -1,0 +1,55 @@
+"""Boulders fall onto a bridge that hangs between two cliffs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pyverlet import builders
+from pyverlet.bounds import Box
+from pyverlet.errors import InputError
+from pyverlet.scenes import _start
+from pyverlet.scenes._scene import Scene, Settings
+from pyverlet.world import World
+
+PLANKS = 40
+"""Of the bridge; fewer with few particles."""
+
+LEAST = 8
+"""Particles: a few planks between two that are fixed, and a boulder."""
+
+SPAN = 24.0
+"""Between the cliffs, m."""
+
+ROCK = 0.3
+"""Root mean square radius of the boulders, m."""
+
+
+def build(settings: Settings) -> World:
+    """A deck of planks, immovable at both ends, catches boulders of mixed sizes; what it cannot hold rolls off over its edges.
+
+    The deck is a rope and is solved as a whole: it does not stretch, however much lies on it. Colours in a window or a film show
+    its pull.
+    """
+    if settings.particles < LEAST:
+        raise InputError(f"particles is {settings.particles}; allowed is at least {LEAST} in the scene 'rope-bridge'")
+    rng = np.random.default_rng(settings.seed)
+    planks = min(PLANKS, settings.particles // 2)
+    rocks = settings.particles - planks - 2
+    radii = _start.draw_radii(rng, rocks, settings.radius_spread, ROCK)
+    width, height = 0.7 * SPAN, 1.0
+    while (centres := _start.in_box(rng, radii, width, height)) is None:
+        height *= 1.2
+    world = settings.empty_world(
+        Box((-0.6 * SPAN, -8.0), (0.6 * SPAN, height + 3.0), restitution=settings.restitution, friction=settings.friction)
+    )
+    builders.bridge(world, (-SPAN / 2, 0.0), (SPAN / 2, 0.0), planks=planks, mass=2.0 * planks, slack=0.05)
+    world.add(position=centres + np.array([0.0, 2.0]), radius=radii, mass=(radii / ROCK) ** 2)
+    return world
+
+
+SCENE = Scene(
+    "rope-bridge",
+    "boulders fall onto a bridge that hangs between two cliffs",
+    build,
+    Settings(particles=400, restitution=0.2, friction=0.5, radius_spread=2.0),
+)

@@ -1,0 +1,317 @@
+"""Links against what is on paper: pendulums, the catenary, springs, and a light rope with a heavy ball."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.special import ellipk
+
+import pyverlet as pv
+from pyverlet import scenes
+
+G = 9.81
+DT = 1 / 60
+Array = NDArray[Any]
+
+
+def chain(world: pv.World, points: Array, mass: Any, kind: type[pv.Stick] | type[pv.Rope] = pv.Stick) -> Any:
+    group = world.add(position=points, radius=0.02, mass=mass)
+    k = np.arange(len(points) - 1)
+    return group, world.links.append(kind(group, k, k + 1))
+
+
+def downward_crossings(t: Array, x: Array) -> Array:
+    """Times at which x falls through 0, between the samples by a straight line."""
+    k = np.flatnonzero((x[:-1] > 0) & (x[1:] <= 0))
+    return np.asarray(t[k] + x[k] / (x[k] - x[k + 1]) * (t[1] - t[0]))
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("amplitude", [0.05, 1.0, 2.0, 3.0])
+def test_pendulum_keeps_the_period_of_the_elliptic_integral(amplitude: float, dtype: Any) -> None:
+    # T = 4 sqrt(L / g) K(sin^2(amplitude / 2)). The method's own error is (w h)^2 / 24 = 2e-6; crossings between frames add 1e-5,
+    # and near the top, at 3 rad, rounding in float32 moves the start by 1e-7 of an unstable position.
+    length = 1.3
+    world = pv.World(collisions=None, dtype=dtype)
+    group, _ = chain(world, length * np.array([[0, 0], [np.sin(amplitude), -np.cos(amplitude)]]), 0.7)
+    group.pin(0)
+    start = world.energy().total
+    period = 4 * np.sqrt(length / G) * ellipk(np.sin(amplitude / 2) ** 2)
+    x, energy = [], []
+    for _ in range(int(4.5 * period / DT)):
+        world.step(DT)
+        x.append(float(group.position[1, 0]))
+        energy.append(world.energy().total)
+    crossings = downward_crossings(DT * np.arange(1, len(x) + 1), np.array(x))
+    assert np.diff(crossings).mean() == pytest.approx(period, rel=2e-4 if amplitude == 3.0 else 5e-5)
+    assert np.hypot(*(group.position[1] - group.position[0])) == pytest.approx(length, rel=1e-6)
+    # Of m g L: the velocity shown is good to h^2; nothing accumulates.
+    assert np.abs(np.array(energy) - start).max() < 1e-3 * 0.7 * G * length
+    assert np.mean(energy[-10:]) == pytest.approx(np.mean(energy[:10]), abs=1e-3 * 0.7 * G * length)
+
+
+def test_double_pendulum_keeps_its_energy() -> None:
+    # Chaotic, so energy is all there is to compare: within a hundredth of its range for a minute, with no trend.
+    world = pv.World(collisions=None, dtype=np.float64)
+    group, _ = chain(world, np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]), 1.0)
+    group.pin(0)
+    start, scale = world.energy().total, 2 * G * 2.0
+    energy = []
+    for _ in range(3600):
+        world.step(DT)
+        energy.append(world.energy().total)
+    assert np.abs(np.array(energy) - start).max() < 0.01 * scale
+    assert np.mean(energy[1800:]) == pytest.approx(np.mean(energy[:1800]), abs=1e-3 * scale)
+
+
+@pytest.mark.parametrize("kind", [pv.Stick, pv.Rope])
+def test_hanging_chain_is_a_catenary(kind: type[pv.Stick] | type[pv.Rope]) -> None:
+    # y = a cosh(x / a) + c through both ends, its arc 2 a sinh(w / 2a) the length of the chain. 40 straight links cut the corners
+    # of the curve: h^2 / 24 of its curvature, 1e-3 m here.
+    links, width, length = 40, 3.0, 4.0
+    a = brentq(lambda a: 2 * a * np.sinh(width / (2 * a)) - length, 0.1, 100)
+    s = np.linspace(-length / 2, length / 2, links + 1)
+    x = a * np.arcsinh(s / a)
+    catenary = np.column_stack((x, a * np.cosh(x / a) - a * np.cosh(width / (2 * a))))
+    away = np.linspace(-width / 2, width / 2, links + 1)
+    zigzag = np.sqrt((length / links) ** 2 - (width / links) ** 2) * (np.arange(links + 1) % 2)
+    world = pv.World(collisions=None)
+    world.forces.append(pv.forces.Drag(linear=0.1))
+    group, _ = chain(world, np.column_stack((away, zigzag)), 0.02, kind)
+    group.pin([0, -1])
+    world.run(seconds=8.0)
+    assert np.hypot(*world.velocity.T).max() < 2e-3
+    assert np.abs(group.position - catenary).max() < 4e-3
+
+
+@pytest.mark.parametrize("substeps", [4, 8, 32])
+@pytest.mark.parametrize("kind", [pv.Stick, pv.Rope])
+def test_light_rope_holds_a_hundred_times_its_weight(kind: type[pv.Stick] | type[pv.Rope], substeps: int) -> None:
+    world = pv.World(collisions=None, substeps=substeps)
+    mass = np.full(21, 0.05)
+    mass[-1] = 100 * mass[1:-1].sum()
+    group, rope = chain(world, np.column_stack((np.zeros(21), -0.25 * np.arange(21))), mass, kind)
+    group.pin(0)
+
+    def stretch() -> float:
+        return float(np.hypot(*np.diff(group.position, axis=0).T).sum() / 5.0 - 1)
+
+    for _ in range(60):
+        world.step(DT)
+        assert abs(stretch()) < 1e-4
+    # The top link carries everything, the lowest the ball: within the rounding of a float32 coordinate, 2e-7 m, times m / h^2.
+    noise = 2.5e-7 * mass[-1] * (60 * substeps) ** 2
+    assert rope.force[0] == pytest.approx(G * mass[1:].sum(), abs=noise + 1)
+    assert rope.force[-1] == pytest.approx(G * mass[-1], abs=noise + 1)
+    group.velocity[-1] = (3.0, 0.0)
+    for _ in range(240):
+        world.step(DT)
+        assert abs(stretch()) < 1e-3
+    assert world.energy().total < -G * mass[-1] * 5.0 + 0.5 * mass[-1] * 9.0 * 1.1
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.1, 0.5])
+@pytest.mark.parametrize("substeps", [4, 8, 32])
+def test_spring_has_its_period_and_damping_ratio(substeps: int, ratio: float) -> None:
+    # m x'' + c x' + k x = 0: x = A exp(-z w t) cos(sqrt(1 - z^2) w t + phase), z = c / (2 sqrt(k m)).
+    m, k = 2.0, 80.0
+    w = np.sqrt(k / m)
+    world = pv.World(collisions=None, gravity=(0, 0), substeps=substeps, dtype=np.float64)
+    group = world.add(position=[(0, 0), (1.2, 0)], radius=0.1, mass=m)
+    group.pin(0)
+    world.links.append(pv.Spring(group, 0, 1, stiffness=k, damping=2 * ratio * np.sqrt(k * m), length=1.0))
+    x = []
+    for _ in range(300):
+        world.step(DT)
+        x.append(float(group.position[1, 0]) - 1)
+    t = DT * np.arange(1, 301)
+    damped = w * np.sqrt(1 - ratio**2)
+    exact = 0.2 * np.exp(-ratio * w * t) * (np.cos(damped * t) + ratio * w / damped * np.sin(damped * t))
+    crossings = downward_crossings(t, np.array(x))[:3]
+    assert np.diff(crossings).mean() == pytest.approx(2 * np.pi / damped, rel=1e-3)
+    # The start takes the whole of the first pull, a phase of w h / 2: a second order method begun in first order.
+    assert np.abs(np.array(x) - exact).max() < 0.2 * w * DT / substeps
+
+
+@pytest.mark.parametrize("stiffness", [50.0, 5e3, 5e5, 5e7])
+@pytest.mark.parametrize("substeps", [4, 8, 32])
+def test_stiffness_is_that_of_the_argument_at_any_substeps(substeps: int, stiffness: float) -> None:
+    # At rest k s = m g for the spring; the stick with compliance 1 / k gives way by as much. From soft to far beyond what a
+    # substep resolves: w h = 0.015 to 15.
+    world = pv.World(collisions=None, substeps=substeps, dtype=np.float64)
+    group = world.add(position=[(0, 0), (0, -1), (1, 0), (1, -1)], radius=0.1, mass=1.0)
+    group.pin([0, 2])
+    world.links.append(pv.Spring(group, 0, 1, stiffness=stiffness))
+    world.links.append(pv.Stick(group, 2, 3, compliance=1 / stiffness))
+    world.forces.append(pv.forces.Drag(linear=4.0))
+    world.run(seconds=4.0)
+    assert -1 - group.position[[1, 3], 1] == pytest.approx(G / stiffness, rel=0.01)
+
+
+def test_net_of_springs_is_as_stiff_at_any_substeps() -> None:
+    # A chain of n springs has stiffness k / n: solved at once. Crosswise ones make it a net, solved colour by colour.
+    sag = []
+    for substeps in (4, 8, 32):
+        world = pv.World(collisions=None, substeps=substeps, dtype=np.float64)
+        x, y = np.meshgrid(np.arange(4.0), -np.arange(8.0))
+        group = world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.1, mass=0.1)
+        group.pin(slice(0, 4))
+        n = np.arange(32).reshape(8, 4)
+        world.links.append(pv.Spring(group, n[:-1].ravel(), n[1:].ravel(), stiffness=200.0))
+        world.links.append(pv.Spring(group, n[:, :-1].ravel(), n[:, 1:].ravel(), stiffness=200.0))
+        world.links.append(pv.Spring(group, n[:-1, :-1].ravel(), n[1:, 1:].ravel(), stiffness=200.0))
+        world.links.append(pv.Spring(group, n[:-1, 1:].ravel(), n[1:, :-1].ravel(), stiffness=200.0))
+        world.forces.append(pv.forces.Drag(linear=0.5))
+        world.run(seconds=6.0)
+        sag.append(-7 - group.position[-4:, 1].mean())
+    assert sag[0] > 0.01
+    assert sag == pytest.approx([sag[-1]] * 3, rel=0.05)
+
+
+def test_rope_is_slack_until_it_is_taut() -> None:
+    world = pv.World(collisions=None, dtype=np.float64)
+    group = world.add(position=[(0, 0), (0, -0.5)], radius=0.1, mass=1.0)
+    group.pin(0)
+    rope = world.links.append(pv.Rope(group, 0, 1, length=1.0))
+    world.run(seconds=0.3)
+    assert group.position[1, 1] == pytest.approx(-0.5 - G / 2 * world.time**2, abs=1e-9)  # free fall
+    assert rope.force[0] == 0.0
+    world.run(seconds=1.0)
+    assert group.position[1, 1] == pytest.approx(-1.0, abs=1e-5)
+    assert rope.force[0] == pytest.approx(G, rel=0.01)
+
+
+@pytest.mark.parametrize("compliance", [0.0, 1e-3])
+def test_pin_holds_a_heavy_rope_by_a_light_particle(compliance: float) -> None:
+    world = pv.World(collisions=None, dtype=np.float64)
+    mass = np.full(11, 0.01)
+    mass[-1] = 50.0
+    group, _ = chain(world, np.column_stack((np.zeros(11), -0.1 * np.arange(11))), mass)
+    pin = world.links.append(pv.Pin(group, 0, compliance=compliance, damping=400.0 if compliance else 0.0))
+    world.run(seconds=4.0)
+    weight = G * mass.sum()
+    assert pin.force[0] == pytest.approx(weight, rel=0.01)
+    assert -group.position[0, 1] == pytest.approx(compliance * weight, rel=0.01, abs=1e-5)
+    pin.point = (0.0, 1.0)
+    world.run(seconds=3.0)
+    assert group.position[0, 1] == pytest.approx(1.0 - compliance * weight, abs=0.02)
+
+
+def test_momentum_is_kept_by_free_chains() -> None:
+    rng = np.random.default_rng(1)
+    world = pv.World(collisions=None, gravity=(0, 0), dtype=np.float64)
+    mass = rng.uniform(0.1, 10.0, 12)
+    group, _ = chain(world, np.column_stack((np.arange(12) * 0.3, np.zeros(12))), mass)
+    group.velocity[:] = rng.normal(0.0, 3.0, (12, 2))
+    momentum, turning = world.momentum(), world.angular_momentum()
+    world.run(seconds=2.0)
+    assert world.momentum() == pytest.approx(momentum, rel=1e-7)
+    assert world.angular_momentum() == pytest.approx(turning, rel=2e-3)
+
+
+def test_angle_swings_like_a_torsion_spring() -> None:
+    # Two arms held at their joint: I = m L^2 for the free arm, w = sqrt(1 / (compliance I)).
+    length, mass, compliance = 0.5, 0.4, 0.2
+    world = pv.World(collisions=None, gravity=(0, 0), dtype=np.float64)
+    group = world.add(position=[(-0.5, 0), (0, 0), (length, 0)], radius=0.05, mass=mass)
+    group.pin([0, 1])
+    world.links.append(pv.Stick(group, 1, 2))
+    angle = world.links.append(pv.Angle(group, 0, 1, 2, compliance=compliance))
+    assert abs(angle.angle[0]) == pytest.approx(np.pi)
+    group.velocity[2] = (0.0, 0.2)
+    start = world.energy().total
+    y = []
+    for _ in range(600):
+        world.step(DT)
+        y.append(float(group.position[2, 1]))
+        assert world.energy().total == pytest.approx(start, rel=0.01)
+    period = 2 * np.pi * np.sqrt(compliance * mass * length**2)
+    crossings = downward_crossings(DT * np.arange(1, 601), np.array(y))
+    assert np.diff(crossings).mean() == pytest.approx(period, rel=2e-3)
+
+
+@pytest.mark.parametrize("substeps", [4, 8, 32])
+def test_beam_bends_as_far_at_any_substeps(substeps: int) -> None:
+    # A cantilever of rigid links, nearly straight: joint k turns by compliance times the torque of all weights beyond it, and
+    # takes the end down by that times its arm.
+    links, length, compliance, mass, g = 8, 0.1, 0.2, 0.02, 0.2
+    world = pv.World(collisions=None, gravity=(0, -g), substeps=substeps, dtype=np.float64)
+    group, _ = chain(world, np.column_stack((np.arange(-1, links + 1) * length, np.zeros(links + 2))), mass)
+    group.pin([0, 1])
+    k = np.arange(links)
+    world.links.append(pv.Angle(group, k, k + 1, k + 2, compliance=compliance))
+    world.links.iterations = 4
+    world.forces.append(pv.forces.Drag(linear=0.05))
+    world.run(seconds=8.0)
+    x = length * np.arange(links + 1)
+    torque = np.array([mass * g * np.sum(x[n + 1 :] - x[n]) for n in range(links)])
+    assert -group.position[-1, 1] == pytest.approx(float(np.sum(compliance * torque * (x[-1] - x[:-1]))), rel=0.05)
+
+
+@pytest.mark.parametrize("substeps", [4, 8, 32])
+def test_area_is_kept_under_load_and_pressure_is_compliance(substeps: int) -> None:
+    # Pumped up to 1.2 times its area, a ring of springs with stiffness k has the pressure p with p ds = tension dphi: T = p R.
+    count, radius, k, compliance = 24, 1.0, 200.0, 1e-3
+    phi = 2 * np.pi * np.arange(count) / count
+    world = pv.World(collisions=None, gravity=(0, 0), substeps=substeps, dtype=np.float64)
+    group = world.add(position=radius * np.column_stack((np.cos(phi), np.sin(phi))), radius=0.05, mass=0.1)
+    n = np.arange(count)
+    spring = world.links.append(pv.Spring(group, n, (n + 1) % count, stiffness=k))
+    area = world.links.append(pv.Area(group, compliance=compliance))
+    area.area = 1.2 * area.area
+    world.forces.append(pv.forces.Drag(linear=1.0))
+    world.run(seconds=4.0)
+    x, y = group.position.T
+    now = 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+    pressure = (float(area.area[0]) - now) / compliance
+    side = np.hypot(*(np.roll(group.position, -1, axis=0) - group.position).T)
+    # On a polygon the pressure pushes each corner with p side cos(pi / n); both its sides pull with 2 T sin(pi / n).
+    tension = pressure * side.mean() / (2 * np.tan(np.pi / count))
+    assert spring.force == pytest.approx(np.full(count, tension), rel=0.05)
+    assert k * (side - spring.length) == pytest.approx(np.full(count, tension), rel=0.05)
+    assert area.force[0] == pytest.approx(-pressure, rel=0.05)
+
+
+def test_newtons_cradle_passes_its_momentum_to_the_last_ball() -> None:
+    # Equal masses and e = 1 exchange velocities: the middle balls stay, the last rises as high as the first was drawn aside.
+    world = scenes.get("newton-cradle").world()
+    balls = world.position[5:]
+    lift = 4.0 * (1 - np.cos(0.9))
+    start = world.energy().total
+    highest = np.zeros(5)
+    for _ in range(150):  # down, through, and up on the other side: half a period of the large swing, 2.1 s, and a little
+        world.step(DT)
+        highest = np.maximum(highest, balls[:, 1])
+        assert world.energy().total == pytest.approx(start, rel=2e-3)
+    assert highest[0] == pytest.approx(lift, rel=0.01)
+    assert highest[4] == pytest.approx(lift, rel=0.01)
+    assert highest[1:4].max() < 1e-3 * lift
+    world = scenes.get("newton-cradle").world()
+    while world.velocity[9, 0] < 1.0:
+        world.step(DT / 4)
+    before = np.sqrt(2 * G * lift)
+    assert world.velocity[9, 0] == pytest.approx(before, rel=0.01)
+    assert np.abs(world.velocity[5:9]).max() < 0.01 * before
+
+
+@pytest.mark.parametrize("name", pv.integrators.BY_NAME)
+def test_links_hold_under_every_integrator(name: str) -> None:
+    # Projection along the old direction makes every method Stormer's as far as the link goes: the same period to (w h)^2 / 24.
+    world = pv.World(collisions=None, dtype=np.float64, integrator=pv.integrators.BY_NAME[name]())
+    group, _ = chain(world, np.array([[0, 0], [np.sin(1.0), -np.cos(1.0)]]), 1.0)
+    group.pin(0)
+    start = world.energy().total
+    period = 4 * np.sqrt(1 / G) * ellipk(np.sin(0.5) ** 2)
+    x = []
+    for _ in range(int(3.5 * period / DT)):
+        world.step(DT)
+        x.append(float(group.position[1, 0]))
+        # First order methods show a velocity half a substep away: g v h / 2 of energy.
+        assert world.energy().total == pytest.approx(start, abs=G * 3.0 * DT / 8 / 2 * 1.5)
+    crossings = downward_crossings(DT * np.arange(1, len(x) + 1), np.array(x))
+    assert np.diff(crossings).mean() == pytest.approx(period, rel=5e-5)
+    assert np.hypot(*group.position[1]) == pytest.approx(1.0, abs=1e-9)

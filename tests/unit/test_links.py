@@ -1,0 +1,307 @@
+"""Links in a world: the list, equal bits, saving, breaking, contacts of neighbours, the mouse, and what is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet.kernels import runs
+from pyverlet.viewers.hands import Hands
+
+DT = 1 / 60
+
+
+def sheet(columns: int, rows: int, **options: Any) -> tuple[pv.World, pv.Group, Any]:
+    """A net of sticks, springs across, pinned at two corners, over a floor of loose grains."""
+    world = pv.World(boundary=pv.Box((-1, -8), (columns, 2)), **options)
+    x, y = np.meshgrid(np.arange(columns) * 0.5, -np.arange(rows) * 0.5)
+    group = world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.2, mass=0.1)
+    n = np.arange(columns * rows).reshape(rows, columns)
+    world.links.append(pv.Stick(group, n[:, :-1].ravel(), n[:, 1:].ravel(), collide=False))
+    world.links.append(pv.Rope(group, n[:-1].T.ravel(), n[1:].T.ravel(), breaking_force=40.0, collide=False))
+    world.links.append(pv.Spring(group, n[:-1, :-1].ravel(), n[1:, 1:].ravel(), stiffness=50.0, damping=0.1))
+    world.links.append(pv.Angle(group, n[1:-1, 0], n[1:-1, 1], n[1:-1, 2], compliance=0.1))
+    world.links.append(pv.Area(group, [n[0, 0], n[1, 0], n[1, 1], n[0, 1]], compliance=0.1))
+    world.links.append(pv.Pin(group, n[0, [0, -1]], compliance=1e-4))
+    x, y = np.meshgrid(np.arange(columns) * 0.5, [-7.5, -7.0])
+    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.15, mass=0.1)
+    return world, group, n
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_any_number_of_threads_gives_the_same_bits(dtype: Any) -> None:
+    hashes = []
+    for threads in (1, 2):
+        world, _, _ = sheet(40, 60, dtype=dtype, threads=threads)  # large enough to be spread over threads
+        assert len(world) > 2048
+        assert world.threads == threads
+        world.run(seconds=0.5)
+        hashes.append((world.state_hash(), world.links[1].force.tobytes()))
+    assert hashes[0] == hashes[1]
+
+
+def test_saving_continues_with_the_same_bits() -> None:
+    world, group, _ = sheet(8, 6)
+    world.run(seconds=0.5)
+    group.velocity[20] = (0.0, -60.0)
+    world.run(seconds=0.1)
+    saved = world.save()
+    ends = []
+    for _ in range(2):
+        world.restore(saved)
+        world.run(seconds=0.5)
+        ends.append((world.state_hash(), [link.force.tobytes() for link in world.links], world.links[1].intact.tolist()))
+    assert ends[0] == ends[1]
+    assert not world.links[1].intact.all()
+    world.links.remove(world.links[0])
+    with pytest.raises(pv.InputError, match="saved holds other links"):
+        world.restore(saved)
+
+
+def test_worlds_without_links_have_no_stage_for_them() -> None:
+    world = pv.World()
+    world.add(position=[(0, 0), (3, 0)], radius=0.5)
+    world.step(DT)
+    assert "links" not in world.profile.stages
+    world.links.append(pv.Stick(pv.Group(world._state, slice(0, 2), world.remove), 0, 1))
+    world.step(DT)
+    assert "links" in world.profile.stages
+
+
+def test_the_energy_includes_what_links_store() -> None:
+    world = pv.World(collisions=None, gravity=(0, 0), dtype=np.float64)
+    group = world.add(position=[(0, 0), (1.5, 0), (3, 0), (3, 1)], radius=0.1, mass=2.0)
+    world.links.append(pv.Spring(group, 0, 1, stiffness=8.0, length=1.0))  # 8 * 0.5^2 / 2 = 1
+    world.links.append(pv.Rope(group, 1, 2, length=2.0, compliance=0.5))  # slack: 0
+    world.links.append(pv.Rope(group, 2, 3, length=0.5, compliance=0.5))  # 0.5^2 / (2 * 0.5) = 0.25
+    world.links.append(pv.Pin(group, 3, point=(3, 3), compliance=2.0))  # 2^2 / (2 * 2) = 1
+    assert world.energy().links == pytest.approx(2.25)
+    assert world.energy().total == pytest.approx(2.25)
+
+
+# ---- breaking ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("substeps", [4, 8, 32])
+def test_a_link_breaks_at_its_force_and_says_so(substeps: int) -> None:
+    for breaking_force, breaks in ((9.0, True), (10.6, False)):  # the weight is 9.81 N
+        world = pv.World(collisions=None, substeps=substeps)
+        group = world.add(position=[(0, 0), (0, -1), (0, -2)], radius=0.1, mass=(1.0, 0.5, 0.5))
+        group.pin(0)
+        world.links.append(pv.Stick(group, 1, 2))
+        stick = world.links.append(pv.Stick(group, 0, 1, breaking_force=breaking_force))
+        records = []
+        for _ in range(60):
+            world.step(DT)
+            records += world.links.broken.tolist()
+        assert stick.intact.tolist() == [not breaks]
+        if breaks:
+            [(link, row, i, j, force)] = records
+            assert (link, row, i, j) == (1, 0, 0, 1)
+            assert force == pytest.approx(9.0, rel=0.1)
+            assert group.position[1, 1] < -3
+            assert stick.force[0] == 0.0
+            assert len(world.links.segments()[1]) == 1
+        else:
+            assert records == []
+
+
+def test_pins_break_too() -> None:
+    world = pv.World(collisions=None)
+    group = world.add(position=[(0, 0), (2, 0)], radius=0.1, mass=(1.0, 3.0))
+    pin = world.links.append(pv.Pin(group, [0, 1], breaking_force=20.0))
+    world.run(seconds=0.5)
+    assert pin.intact.tolist() == [True, False]
+    assert group.position[0] == pytest.approx((0, 0), abs=1e-4)
+    assert group.position[1, 1] < -0.3
+
+
+# ---- contacts ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", [pv.Fast(), pv.BruteForce()])
+def test_linked_neighbours_need_not_collide(method: Any) -> None:
+    for collide in (False, True):
+        world = pv.World(gravity=(0, 0), collisions=pv.Collisions(method=method))
+        group = world.add(position=[(0, 0), (0.5, 0), (1.55, 0)], radius=0.5, mass=1.0)
+        world._state.grown[:] = 1.0  # as if they had always been there
+        stick = world.links.append(pv.Stick(group, 0, 1, length=0.5, collide=collide))
+        world._state.acceleration[:] = 0.0
+        world.run(seconds=0.5)
+        assert np.hypot(*(group.position[1] - group.position[0])) == pytest.approx(0.5, abs=1e-3)
+        if not collide:
+            assert np.abs(group.velocity).max() < 1e-6
+            assert world.links.apart().tolist() == [[0, 1]]
+            world.links.remove(stick)
+            assert world.links.apart().tolist() == []
+            world.run(seconds=0.5)
+            assert np.hypot(*(group.position[1] - group.position[0])) > 0.95
+
+
+# ---- the list ------------------------------------------------------------------------------------------------------------
+
+
+def test_links_are_a_list() -> None:
+    world = pv.World(collisions=None, gravity=(0, 0))
+    group = world.add(position=np.column_stack((np.arange(6), np.zeros(6))), radius=0.1)
+    a, b, c = pv.Stick(group, 0, 1), pv.Rope(group, [1, 2], [2, 3]), pv.Stick((group, 4), (group, -1), length=2.0)
+    world.links.extend((a, b, c))
+    assert list(world.links) == [a, b, c]
+    assert c.particles.tolist() == [[4, 5]]
+    world.links.remove(a)
+    assert list(world.links) == [b, c]
+    world.run(seconds=0.5)
+    assert group.position[5, 0] - group.position[4, 0] == pytest.approx(2.0, abs=1e-5)
+    c.length = 1.5
+    world.run(seconds=0.5)
+    assert group.position[5, 0] - group.position[4, 0] == pytest.approx(1.5, abs=1e-5)
+    assert b.force.shape == (2,)
+    ends, force = world.links.segments()
+    assert ends.shape == (3, 2, 2)
+    assert force.shape == (3,)
+
+
+def test_particles_that_go_take_their_links_along() -> None:
+    world = pv.World(collisions=None)
+    group = world.add(position=np.column_stack((np.arange(5), np.zeros(5))), radius=0.1)
+    chain = world.links.append(pv.Stick(group, [0, 1, 2, 3], [1, 2, 3, 4]))
+    gone = world.links.append(pv.Rope(group, 1, 2))
+    pin = world.links.append(pv.Pin(group, [0, 2, 4]))
+    world.step(DT)
+    world.links.renumber(np.array([0, 1, -1, 2, 3]))  # particle 2 is removed
+    assert list(world.links) == [chain, pin]
+    assert len(gone) == 0
+    assert chain.particles.tolist() == [[0, 1], [2, 3]]
+    assert pin.particles.tolist() == [[0], [3]]
+    assert chain.force.shape == (2,)
+
+
+def test_groups_pin() -> None:
+    world = pv.World()
+    group = world.add(position=[(0, 0), (3, 0), (6, 0)], velocity=(1, 2), radius=0.5)
+    group.pin(0)
+    group.pin([2])
+    assert np.isinf(group.mass).tolist() == [True, False, True]
+    world.run(seconds=0.5)
+    assert group.position[[0, 2]].tolist() == [[0, 0], [6, 0]]
+    with pytest.raises(pv.InputError, match="index is 3; allowed are indices of this group's 3 particles"):
+        group.pin(3)
+
+
+@pytest.mark.parametrize("count", [3, 70, 200])
+def test_runs_and_colours_share_nothing(count: int) -> None:
+    # A star with `count` arms of two links: more arms than there are colours share the hub.
+    arm = np.arange(count)
+    pairs = np.concatenate((np.column_stack((np.zeros(count, int), 1 + arm)), np.column_stack((1 + arm, 1 + count + arm))))
+    first, entry = 2 * np.arange(2 * count + 1), pairs.ravel().copy()
+    run_of, colour = np.empty(2 * count, np.int64), np.zeros(2 * count, np.int64)
+    found = runs.find_runs(first, entry, np.ones(2 * count, np.uint8), 1 + 2 * count, run_of)
+    runs.colour_runs(first, entry, run_of, 1 + 2 * count, 64, colour)
+    assert found == run_of.max() + 1
+    for c in range(63):  # the last one is solved one after the other
+        members = [set(entry.reshape(-1, 2)[run_of == run].ravel()) for run in range(found) if colour[run] == c]
+        assert sum(map(len, members)) == len(set().union(*members)) if members else True
+    world = pv.World(collisions=None, gravity=(0, 0))
+    angle = 2 * np.pi * arm / count
+    ring = np.column_stack((np.cos(angle), np.sin(angle)))
+    group = world.add(position=np.concatenate((np.zeros((1, 2)), ring, 2 * ring)), radius=0.01)
+    group.mass[0] = count
+    world.links.append(pv.Stick(group, pairs[:, 0], pairs[:, 1]))
+    group.velocity[1:] = 3 * np.concatenate((ring, 2 * ring)) @ np.array([[0, 1], [-1, 0]])
+    world.run(seconds=1.0)
+    ends, _ = world.links.segments()
+    assert np.hypot(*(ends[:, 1] - ends[:, 0]).T) == pytest.approx(np.ones(2 * count), abs=0.02)
+
+
+def test_chains_are_found_whichever_way_their_links_are_given() -> None:
+    for pairs in ([(0, 1), (1, 2), (2, 3)], [(1, 0), (2, 1), (3, 2)], [(1, 0), (1, 2), (3, 2)], [(0, 1), (2, 1), (2, 3)]):
+        run_of = np.empty(3, np.int64)
+        assert runs.find_runs(2 * np.arange(4), np.array(pairs).ravel(), np.ones(3, np.uint8), 4, run_of) == 1
+    run_of = np.empty(4, np.int64)  # a ring ends where it began: its last link stands alone
+    ring = np.array([(0, 1), (1, 2), (2, 3), (3, 0)]).ravel()
+    assert runs.find_runs(2 * np.arange(5), ring, np.ones(4, np.uint8), 4, run_of) == 2
+
+
+# ---- the mouse -----------------------------------------------------------------------------------------------------------
+
+
+def test_the_mouse_pulls_what_is_linked() -> None:
+    world = pv.World()
+    group = world.add(position=np.column_stack((np.zeros(10), -0.5 * np.arange(10))), radius=0.2, mass=1.0)
+    group.pin(0)
+    world.links.append(pv.Stick(group, np.arange(9), np.arange(1, 10), collide=False))
+    hands = Hands(world)
+    for _ in range(180):
+        hands.drag(1, 3.0, -2.5, 1.0) if hands._held else hands.drag(1, 0.0, -4.5, 1.0)
+        hands.move(20.0)
+        world.step(DT)
+    assert group.position[-1, 0] > 1.5
+    assert np.hypot(*np.diff(group.position, axis=0).T) == pytest.approx(np.full(9, 0.5), abs=1e-4)
+    hands.release(1)
+    world.run(seconds=0.5)
+    assert np.isfinite(world.position).all()
+
+
+# ---- what is refused -----------------------------------------------------------------------------------------------------
+
+NO: Any = "no"
+REFUSED: list[tuple[Callable[[pv.Group], Any], str]] = [
+    (lambda g: pv.Stick(g, 0, 9), r"Stick: j is 9; allowed is 0 to 4 for a group of 5 particles"),
+    (lambda g: pv.Stick(g, [0, 7], [1, 2]), r"Stick: i\[1\] is 7; allowed is 0 to 4"),
+    (lambda g: pv.Rope(g, 2, 2), r"Rope: i\[0\] and j\[0\] are the same particle, 2"),
+    (lambda g: pv.Rope(g, 0.5, 2), r"Rope: i is 0.5; allowed is an index in the group"),
+    (lambda g: pv.Stick(g, [0, 1, 2], [1, 2]), r"Stick: i has 3 and j has 2 indices; allowed are equally many"),
+    (lambda g: pv.Stick(g, 0), r"Stick was given \(.*\); allowed are \(group, i, j\) or \(\(group_a, i\), \(group_b, j\)\)"),
+    (lambda g: pv.Stick(0, 1, 2), r"Stick was given \(0, 1, 2\)"),
+    (lambda g: pv.Stick((g, 0), (3, 1)), r"Stick: the group of j is 3; allowed is what world.add returns"),
+    (lambda g: pv.Stick(g, 0, 1, compliance=-1.0), r"Stick: compliance is -1; allowed is a finite number of at least 0"),
+    (lambda g: pv.Stick(g, 0, 1, compliance=np.nan), r"Stick: compliance is nan"),
+    (lambda g: pv.Spring(g, 0, 1, stiffness=-5.0), r"Spring: stiffness is -5; allowed is a finite number of at least 0"),
+    (lambda g: pv.Spring(g, 0, 1, stiffness=np.inf), r"Spring: stiffness is inf"),
+    (lambda g: pv.Spring(g, 0, 1, stiffness=1.0, damping=-1.0), r"Spring: damping is -1"),
+    (lambda g: pv.Rope(g, [0, 1], [1, 2], length=[1.0, -1.0]), r"Rope: length\[1\] is -1; allowed is a finite number"),
+    (lambda g: pv.Rope(g, 0, 1, length="long"), r"Rope: length is not an array of numbers"),
+    (lambda g: pv.Rope(g, [0, 1], [1, 2], length=[1.0, 1.0, 1.0]), r"Rope: length has shape \(3,\)"),
+    (lambda g: pv.Stick(g, 0, 1, breaking_force=0.0), r"Stick: breaking_force is 0; allowed is a number greater than 0"),
+    (lambda g: pv.Stick(g, 0, 1, collide=NO), r"Stick: collide is 'no'; allowed are True and False"),
+    (lambda g: pv.Pin(g, 8), r"Pin: i is 8; allowed is 0 to 4"),
+    (lambda g: pv.Pin(g, 0, point=(0, np.nan)), r"Pin: point\[0\] is \(0.0, nan\); allowed are finite numbers"),
+    (lambda g: pv.Angle(g, 0, 1, 0), r"Angle: i\[0\] and k\[0\] are the same particle, 0"),
+    (lambda g: pv.Angle(g, 0, 1, 2, angle=np.inf), r"Angle: angle is inf; allowed is a finite number of radians"),
+    (lambda g: pv.Area(g, [0, 1]), r"Area: ring has 2 particles; allowed are at least 3"),
+    (lambda g: pv.Area(g, [0, 1, 1]), r"Area: ring has a particle twice"),
+    (lambda g: pv.Area(g, [0, 2, 1, 3]), r"Area: the ring crosses itself, its sides 0 and 2 meet; allowed is a simple polygon"),
+    (lambda g: pv.Area(g, [0, 1, 2, 3], area=-1.0), r"Area: area is -1"),
+]
+
+
+@pytest.mark.parametrize(("make", "says"), REFUSED)
+def test_bad_links_are_refused(make: Callable[[pv.Group], Any], says: str) -> None:
+    world = pv.World()
+    group = world.add(position=[(0, 0), (2, 0), (2, 2), (0, 2), (5, 5)], radius=0.5)
+    with pytest.raises(pv.InputError, match=says) as caught:
+        make(group)
+    assert "\n" not in str(caught.value)
+
+
+def test_links_belong_to_one_world() -> None:
+    worlds = [pv.World() for _ in range(2)]
+    a, b = (world.add(position=[(0, 0), (2, 0)], radius=0.5) for world in worlds)
+    with pytest.raises(pv.InputError, match="Stick joins groups of different worlds"):
+        pv.Stick((a, 0), (b, 1))
+    stick = pv.Stick(a, 0, 1)
+    with pytest.raises(pv.InputError, match="Stick x 1 joins particles of another world"):
+        worlds[1].links.append(stick)
+    with pytest.raises(pv.InputError, match="is not among this world's links"):
+        worlds[0].links.remove(stick)
+    worlds[0].links.append(stick)
+    with pytest.raises(pv.InputError, match="is in a world already"):
+        worlds[0].links.append(stick)
+    with pytest.raises(pv.InputError, match="link is 3; allowed is an object such as"):
+        worlds[0].links.append(3)  # type: ignore[type-var]
+    with pytest.raises(pv.InputError, match="iterations is 0"):
+        worlds[0].links.iterations = 0
