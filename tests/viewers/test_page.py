@@ -34,8 +34,9 @@ SERVE = """
 import sys
 from pyverlet.scenes import get
 from pyverlet.viewers import serve
-scene = get(sys.argv[1])
-serve(lambda: scene.panels(particles=int(sys.argv[2])), scene_name=scene.name, port=0, open_browser=False)
+from pyverlet.viewers.exhibit import Repertoire
+repertoire = Repertoire(get(sys.argv[1]), dt=1 / 60, overrides={"particles": int(sys.argv[2])})
+serve(repertoire.open, scene_name=sys.argv[1], repertoire=repertoire, port=0, open_browser=False)
 """
 
 
@@ -147,7 +148,7 @@ def pause(page: Page) -> None:
 
 def test_fifty_frames_a_second_at_5000_circles(page: Page, program: Serve) -> None:
     visit(page, program("cage", 5000).address)
-    assert page.evaluate("document.documentElement.dataset.renderer") == "canvas"  # imitated hardware does not count
+    assert page.evaluate("document.querySelector('#pyverlet').dataset.renderer") == "canvas"  # imitated hardware does not count
     assert number(page, "particles") == 5000
 
     def rate() -> float:
@@ -196,10 +197,10 @@ def test_sliders_of_gravity_and_substeps(page: Page, program: Serve) -> None:
     expect(page.get_by_test_id("gravity")).to_have_value("9.81")
     expect(page.get_by_test_id("substeps")).to_have_value("8")
 
-    gravity = page.get_by_test_id("gravity").bounding_box()
-    assert gravity is not None
-    page.mouse.click(gravity["x"] + 3, gravity["y"] + gravity["height"] / 2)  # all the way to the left: upward
-    expect(page.locator("#gravity-arrow")).to_have_text("↑")
+    angle = page.get_by_test_id("angle").bounding_box()
+    assert angle is not None
+    page.mouse.click(angle["x"] + 3, angle["y"] + angle["height"] / 2)  # all the way to the left: upward
+    expect(page.locator("#angle-value")).to_have_text("-180")
     assert comes_true(page, lambda: where(page, 499)["y"] > 8)  # the cage's radius is 14.4 m
     assert comes_true(page, lambda: number(page, "kinetic") < 1000 and number(page, "energy") < 0)
 
@@ -328,7 +329,7 @@ def test_webgl_points_draw_the_same_circles(playwright: Playwright, program: Ser
     browser = playwright.chromium.launch(executable_path=chromium(), args=[*FLAGS, "--enable-unsafe-swiftshader"])
     page = browser.new_page(viewport={"width": 1280, "height": 800})
     visit(page, program("box", 60).address + "?renderer=webgl2")
-    assert page.evaluate("document.documentElement.dataset.renderer") == "webgl2"
+    assert page.evaluate("document.querySelector('#pyverlet').dataset.renderer") == "webgl2"
     pause(page)
     assert circles_missing(page) == 0
     browser.close()

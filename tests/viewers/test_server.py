@@ -117,11 +117,12 @@ def tab(server: Server) -> Iterator[Tab]:
     ("path", "media_type", "holds"),
     [
         ("/", "text/html", b'data-testid="physics-ms"'),
-        ("/page.js", "text/javascript", b"WebSocket"),
+        ("/main.js", "text/javascript", b"WebSocket"),
+        ("/page.js", "text/javascript", b"export function mount"),
         ("/draw.js", "text/javascript", b"UNMASKED_RENDERER_WEBGL"),
         ("/chart.js", "text/javascript", b"class Chart"),
         ("/panels.js", "text/javascript", b"class Panels"),
-        ("/page.css", "text/css", b"prefers-color-scheme"),
+        ("/page.css", "text/css", b"@container"),
     ],
 )
 def test_the_page_is_served_and_fetches_nothing_from_elsewhere(server: Server, path: str, media_type: str, holds: bytes) -> None:

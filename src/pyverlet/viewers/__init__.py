@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from pyverlet.panels import Panels
+    from pyverlet.viewers.exhibit import Exhibit, Repertoire
     from pyverlet.world import World
 
 __all__ = ["serve", "view"]
@@ -42,9 +43,10 @@ def view(
 
 
 def serve(
-    build: Callable[[], World | Panels],
+    build: Callable[[], World | Panels | Exhibit],
     *,
     scene_name: str,
+    repertoire: Repertoire | None = None,
     host: str = "127.0.0.1",
     port: int = DEFAULT_PORT,
     open_browser: bool = True,
@@ -55,8 +57,9 @@ def serve(
     The port is taken before the world is built, so that a taken one is told at once.
 
     Args:
-        build: makes the world or the panels.
+        build: makes the world, the panels or the exhibit.
         scene_name: heading of the page.
+        repertoire: scenes to pick from on the page; None: none.
         host: address to listen on; anything but this machine's own lets the whole network in.
         port: TCP port, 1 to 65535; 0 takes any free one.
         open_browser: open a tab when there is a screen to open it on.
@@ -67,4 +70,4 @@ def serve(
     """
     from pyverlet.viewers import launch
 
-    launch.serve(build, title=scene_name, host=host, port=port, open_browser=open_browser, dt=dt)
+    launch.serve(build, title=scene_name, host=host, port=port, open_browser=open_browser, dt=dt, repertoire=repertoire)
