@@ -33,7 +33,7 @@ __all__ = [
     "RK4", "Boundary", "Box", "BruteForce", "Circle", "ClampAndFlip", "Clock", "Collisions", "Energy", "ExplicitEuler",
     "Fast", "FrameBudget", "Group", "InputError", "Integrator", "NonFiniteError", "Open", "Overlap", "Panel", "Panels",
     "PositionVerlet", "ProjectOnly", "PyverletError", "SemiImplicitEuler", "TimeCorrectedVerlet", "VelocityVerlet", "World",
-    "Yoshida4", "errors", "forces", "integrators", "scenes", "view", "warm_up",
+    "Yoshida4", "errors", "forces", "integrators", "scenes", "view", "warm_up", "widget",
 ]  # fmt: skip
 
 
@@ -42,3 +42,10 @@ def view(world: World | Panels, **options: Any) -> None:
     from pyverlet.viewers import view as view_page
 
     view_page(world, **options)
+
+
+def widget(world: World | Panels, **options: Any) -> Any:
+    """Show a world in a cell of a notebook; see `pyverlet.viewers.widget` for the options."""
+    from pyverlet.viewers import widget as make
+
+    return make(world, **options)

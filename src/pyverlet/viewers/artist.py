@@ -25,8 +25,17 @@ QUALITY = 85
 ADVICE = "a world of this size is shown faster as pictures: pip install 'pyverlet[page]'"
 
 
-def can_draw() -> bool:
-    """Whether JPEGs can be made here."""
+def draws_here(shape: Shape) -> bool:
+    """Whether pages are sent pictures of this world, rather than its circles."""
+    return len(shape.radius) >= PICTURES_FROM and _can_draw()
+
+
+def advice(shape: Shape) -> str | None:
+    """What to tell a page that could be sent pictures, were Pillow there."""
+    return ADVICE if len(shape.radius) >= PICTURES_FROM and not _can_draw() else None
+
+
+def _can_draw() -> bool:
     return importlib.util.find_spec("PIL") is not None
 
 

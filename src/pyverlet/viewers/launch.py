@@ -217,4 +217,5 @@ def _refuse_running_loop() -> None:
         asyncio.get_running_loop()
     except RuntimeError:
         return
-    raise InputError("view() was called inside a running event loop, which it would block; allowed is a plain script")
+    allowed = "a plain script (in a notebook: pyverlet.widget)"
+    raise InputError(f"view() was called inside a running event loop, which it would block; allowed is {allowed}")

@@ -21,7 +21,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from pyverlet.errors import InputError
-from pyverlet.viewers.artist import ADVICE, PICTURES_FROM, Artist, can_draw
+from pyverlet.viewers.artist import Artist, advice, draws_here
 from pyverlet.viewers.commands import Release
 from pyverlet.viewers.frames import Frame, Rect, Shape
 from pyverlet.viewers.looks import Look
@@ -124,14 +124,9 @@ class _Encoder:
 
     def shape(self, shape: Shape) -> bytes:
         if shape is not self._shape:
-            note = ADVICE if len(shape.radius) >= PICTURES_FROM and not can_draw() else None
-            self._shape, self._shape_bytes = shape, encode_shape(shape, drawn_here=draws_here(shape), note=note)
+            self._shape = shape
+            self._shape_bytes = encode_shape(shape, drawn_here=draws_here(shape), note=advice(shape))
         return self._shape_bytes
-
-
-def draws_here(shape: Shape) -> bool:
-    """Whether pages are sent pictures of this world, rather than its circles."""
-    return len(shape.radius) >= PICTURES_FROM and can_draw()
 
 
 class Tab:

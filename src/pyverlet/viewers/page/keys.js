@@ -33,9 +33,9 @@ export function listen(target, root, act) {
     root.classList.toggle("shift", event.shiftKey);
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const field = event.composedPath()[0];
-    if (field.matches?.("input:not([type=radio]):not([type=checkbox]), select, textarea, [contenteditable]")) return;
+    if (field.matches?.("[type=number], select, textarea, [contenteditable]")) return;
     if (field.matches?.("button, summary, [type=checkbox]") && (event.key === " " || event.key === "Enter")) return;
-    if (field.matches?.("[type=radio]") && event.key.startsWith("Arrow")) return;
+    if (field.matches?.("[type=radio], [type=range]") && event.key.startsWith("Arrow")) return;
     const found = SHORTCUTS.find(([keys]) => keys.includes(event.key.length === 1 ? event.key.toLowerCase() : event.key));
     if (!found) return;
     const [, , name, repeats] = found;

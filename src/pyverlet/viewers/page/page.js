@@ -33,10 +33,11 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
 
   let shape = null; // the last shape message
   let frame = null; // the frame on screen
+  let last = null; // its numbers, or those of the frame before while there is none
   let pending = null; // a newer one, not drawn yet
   let radiusPx = new Float32Array(0), radiusFor = 0; // radii in pixels of the stage, at how many pixels a metre
   let lookSent = "", stale = true, numbersDue = 0, numbersStale = false;
-  let open = false, begun = false, linking = false;
+  let open = false, begun = false, linking = false, stopped = false;
 
   // -- the connection -------------------------------------------------------------------------------------------------
 
@@ -104,11 +105,13 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   const size = () => ({ width: root.clientWidth, height: root.clientHeight });
 
   function tick(now) {
+    if (stopped) return;
     requestAnimationFrame(tick);
     if (pending && shape) {
       const before = frame;
       frame = pending;
       pending = null;
+      last = frame.status;
       camera.room = frame.room;
       if (!begun) arrive();
       if (before && frame.status.time < before.status.time) startOver();
@@ -222,7 +225,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     panels.clear();
   }
 
-  const settings = () => written(shape, frame.status, { colour: $("colour").value, theme: $("theme").value });
+  const settings = () => written(shape, last, { colour: $("colour").value, theme: $("theme").value });
 
   /** The first frame: bring the world to what the address asks for. */
   function arrive() {
@@ -242,7 +245,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   let before = null; // gravity before it was switched off
 
   const act = {
-    pause: () => send("pause", { on: !frame?.status.paused }),
+    pause: () => send("pause", { on: !last?.paused }),
     step: () => send("step"),
     reset: () => send("reset"),
     slower: () => controls.next("speed"),
@@ -308,7 +311,8 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     panelSize: () => panels.cell(camera.room),
   });
 
-  new ResizeObserver(() => (stale = true)).observe(root);
+  const resized = new ResizeObserver(() => (stale = true));
+  resized.observe(root);
   darkness.addEventListener("change", paint);
   paint();
   requestAnimationFrame(tick);
@@ -321,10 +325,16 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
       const [left, top] = camera.toScreen(x, y), box = root.getBoundingClientRect();
       return { x, y, left: left + box.left, top: top + box.top };
     },
-    status: () => frame?.status ?? null,
+    status: () => last,
     mass: (i) => shape.mass[i],
     ink: (i) => inks.ink[i],
     overlay,
     camera,
+    /** The element is gone. */
+    stop() {
+      stopped = true;
+      resized.disconnect();
+      darkness.removeEventListener("change", paint);
+    },
   };
 }
