@@ -13,7 +13,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import pytest
@@ -33,6 +33,9 @@ import sys
 from pyverlet.scenes import get
 from pyverlet.viewers import serve
 from pyverlet.viewers.exhibit import Repertoire
+if len(sys.argv) > 3:
+    from pyverlet.viewers import artist
+    artist.PICTURES_FROM = int(sys.argv[3])
 repertoire = Repertoire(get(sys.argv[1]), dt=1 / 60, overrides={"particles": int(sys.argv[2])})
 serve(repertoire.open, scene_name=sys.argv[1], repertoire=repertoire, port=0, open_browser=False)
 """
@@ -53,8 +56,8 @@ def chromium() -> str:
 class Program:
     """A scene served by a process of its own, as the command line does it."""
 
-    def __init__(self, scene: str, particles: int) -> None:
-        command = [sys.executable, "-W", "error", "-c", SERVE, scene, str(particles)]
+    def __init__(self, scene: str, particles: int, *settings: int) -> None:
+        command = [sys.executable, "-W", "error", "-c", SERVE, scene, str(particles), *map(str, settings)]
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         assert self.process.stdout is not None
         found = re.search(r"http://\S+", self.process.stdout.readline())
@@ -68,7 +71,11 @@ class Program:
         return self.process.returncode, err
 
 
-Serve = Callable[[str, int], Program]
+class Serve(Protocol):
+    """Starts programs: a scene, its circles and, if given, from how many on the server draws."""
+
+    def __call__(self, scene: str, particles: int, *settings: int) -> Program:
+        """Start one."""
 
 
 def number(page: Page, name: str) -> float:

@@ -69,8 +69,8 @@ def paused(session: Session, wait_until: WaitUntil) -> Session:
 def program() -> Iterator[Serve]:
     running: list[Program] = []
 
-    def start(scene: str, particles: int) -> Program:
-        running.append(Program(scene, particles))
+    def start(scene: str, particles: int, *settings: int) -> Program:
+        running.append(Program(scene, particles, *settings))
         return running[-1]
 
     yield start

@@ -360,3 +360,36 @@ def test_a_phone_has_a_drawer_and_fingers(playwright: Playwright, program: Serve
     assert comes_true(page, lambda: where(page, 100)["top"] < place["top"] - 30)
     touch("touchEnd")
     browser.close()
+
+
+def test_large_worlds_are_drawn_by_the_server(page: Page, program: Serve) -> None:
+    """Chosen by itself and shown; zoom, theme and colours reach the picture, and the mouse its circles."""
+    page.emulate_media(color_scheme="dark")
+    visit(page, program("cage", 300, 300).address)
+    expect(page.get_by_test_id("drawing")).to_have_text("pictures (JPEG)")
+    expect(page.get_by_test_id("velocities")).to_be_disabled()
+    assert comes_true(page, lambda: number(page, "time") > 2)
+    pause(page)
+    page.wait_for_timeout(300)
+
+    def seen() -> NDArray[np.float32]:
+        # The heap, at the cage's foot: the middle of what is left of the controls.
+        return picture(page)[500:780, 300:700]
+
+    before = seen()
+    assert (np.ptp(before, axis=2) > 0.15).mean() > 0.5
+    page.mouse.move(500, 700)
+    page.mouse.wheel(0, -600)
+    assert comes_true(page, lambda: bool(np.abs(seen() - before).mean() > 0.05))
+    page.get_by_test_id("fit").click()
+    assert comes_true(page, lambda: bool(np.abs(seen() - before).mean() < 0.01))
+    page.get_by_test_id("colour").select_option("mass")  # all alike: one colour instead of many
+    hues = np.ptp(before.reshape(-1, 3), axis=0).sum()
+    assert comes_true(page, lambda: bool(np.abs(seen() - before).mean() > 0.05))
+    assert hues > 1
+    page.get_by_test_id("theme").select_option("light")
+    assert comes_true(page, lambda: bool(seen().mean() > before.mean() + 0.15))
+    page.get_by_test_id("count").fill("200")
+    page.get_by_test_id("count").press("Enter")
+    assert reads(page, "particles", 200)
+    expect(page.get_by_test_id("drawing")).to_have_text("Canvas2D")  # few enough again

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from pyverlet import checks, integrators, scenes
@@ -23,11 +22,14 @@ MAX_PARTICLES = 1_000_000
 MAX_STEPS = 600
 """Frames one Step may ask for: ten seconds at 60 a second."""
 
+FARTHEST = 1e9
+"""m. Hands further out than this would leave what float32 can tell."""
+
 SLOWEST = 1 / 64
 """Least speed: a second takes a minute."""
 
 
-def _finite(name: str, value: float, limit: float = math.inf) -> None:
+def _finite(name: str, value: float, limit: float) -> None:
     checks.number(name, value)
     if abs(value) > limit:
         raise InputError(f"{name} is {value:g}; allowed is a number from {-limit:g} to {limit:g}")
@@ -146,8 +148,8 @@ class _AtPoint:
     y: float
 
     def __post_init__(self) -> None:
-        _finite("x", self.x)
-        _finite("y", self.y)
+        _finite("x", self.x, FARTHEST)
+        _finite("y", self.y, FARTHEST)
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +160,7 @@ class _Picking(_AtPoint):
 
     def __post_init__(self) -> None:
         _AtPoint.__post_init__(self)
-        _finite("reach", self.reach)
+        _between("reach", self.reach, 0.0, FARTHEST)
 
 
 @dataclass(frozen=True, slots=True)

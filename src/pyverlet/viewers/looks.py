@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from pyverlet import checks
 from pyverlet.errors import InputError
+from pyverlet.viewers.commands import FARTHEST
 from pyverlet.viewers.frames import Rect
 
 COLOURINGS = ("order", "speed", "mass", "energy", "picture")
@@ -16,9 +17,6 @@ LARGEST_SIDE = 4096
 
 MOST_PIXELS = 2_560 * 1_600
 """Of a picture that the server draws."""
-
-FARTHEST = 1e9
-"""m: positions further out are not told apart by the float32 they travel through."""
 
 CLOSEST = 1e-6
 """Least width and height of the part, m."""

@@ -242,6 +242,9 @@ class Session:
             self._do(command)
         except PyverletError as error:  # the world did not take it
             self._error = str(error)
+        except Exception as error:  # nothing a viewer says may end the physics thread
+            _log.exception("a viewer asked for %r", command)
+            self._error = f"{type(error).__name__}: {error}"
 
     def _do(self, command: Command | None) -> None:
         stage = self._stage
