@@ -5,12 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 from pyverlet import errors, forces, integrators, scenes
+from pyverlet.actors import Actor, Emitter, Sink
 from pyverlet.bounds import Boundary, Box, Circle, Open
 from pyverlet.broadphase import BruteForce, Fast
 from pyverlet.clock import Clock, FrameBudget
 from pyverlet.collisions import Collisions, Overlap
 from pyverlet.energy import Energy
 from pyverlet.errors import InputError, NonFiniteError, PyverletError
+from pyverlet.forces import Attractor, ConstantForce, Drag, Gravitation, PointSpring, Wind, force
 from pyverlet.integrators import (
     RK4,
     ExplicitEuler,
@@ -22,6 +24,7 @@ from pyverlet.integrators import (
     Yoshida4,
 )
 from pyverlet.naive import ClampAndFlip, ProjectOnly
+from pyverlet.obstacles import Capsule, Chain, Disc, Obstacle, Polygon, Segment
 from pyverlet.panels import Panel, Panels
 from pyverlet.state import Group
 from pyverlet.warmup import warm_up
@@ -30,10 +33,12 @@ from pyverlet.world import World
 __version__ = "0.1.0"
 
 __all__ = [
-    "RK4", "Boundary", "Box", "BruteForce", "Circle", "ClampAndFlip", "Clock", "Collisions", "Energy", "ExplicitEuler",
-    "Fast", "FrameBudget", "Group", "InputError", "Integrator", "NonFiniteError", "Open", "Overlap", "Panel", "Panels",
-    "PositionVerlet", "ProjectOnly", "PyverletError", "SemiImplicitEuler", "TimeCorrectedVerlet", "VelocityVerlet", "World",
-    "Yoshida4", "errors", "forces", "integrators", "scenes", "view", "warm_up", "widget",
+    "RK4", "Actor", "Attractor", "Boundary", "Box", "BruteForce", "Capsule", "Chain", "Circle", "ClampAndFlip", "Clock",
+    "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy", "ExplicitEuler", "Fast", "FrameBudget", "Gravitation",
+    "Group", "InputError", "Integrator", "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel", "Panels", "PointSpring",
+    "Polygon", "PositionVerlet", "ProjectOnly", "PyverletError", "Segment", "SemiImplicitEuler", "Sink", "TimeCorrectedVerlet",
+    "VelocityVerlet", "Wind", "World", "Yoshida4", "errors", "force", "forces", "integrators", "scenes", "view", "warm_up",
+    "widget",
 ]  # fmt: skip
 
 

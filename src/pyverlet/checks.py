@@ -110,6 +110,23 @@ def positive(name: str, array: NDArray[Any], *, infinite_is: str = "") -> None:
         raise InputError(f"{name}[{first}] is {array[first]:g}; allowed is {allowed}")
 
 
+def indices(name: str, value: ArrayLike, count: int) -> NDArray[np.int64]:
+    """Sorted indices without repetition from an index, several, or a mask of `count` bools."""
+    allowed = f"are whole numbers from 0 to {count - 1}, or {count} bools"
+    try:
+        array = np.atleast_1d(np.asarray(value))
+    except ValueError:
+        raise InputError(f"{name} is {value!r}; allowed {allowed}") from None
+    if array.dtype == bool and array.shape == (count,):
+        return np.flatnonzero(array)
+    if array.ndim != 1 or (array.size and array.dtype.kind not in "iu"):
+        raise InputError(f"{name} is {value!r}; allowed {allowed}")
+    wrong = (array < 0) | (array >= count)
+    if wrong.any():
+        raise InputError(f"{name} has {array[wrong][0]}; allowed {allowed}")
+    return np.unique(array).astype(np.int64)
+
+
 def _array(name: str, value: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
     try:
         return np.asarray(value, dtype=dtype)

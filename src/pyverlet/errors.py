@@ -23,11 +23,12 @@ class NonFiniteError(PyverletError, ArithmeticError):
         stage: name of the stage after which it first showed.
     """
 
-    def __init__(self, particle: int, stage: str, time: float) -> None:
+    def __init__(self, particle: int, stage: str, time: float, message: str | None = None) -> None:
         self.particle = particle
         self.stage = stage
         super().__init__(
-            f"particle {particle} turned non-finite in stage '{stage}' at time {time:.6g} s; "
+            message
+            or f"particle {particle} turned non-finite in stage '{stage}' at time {time:.6g} s; "
             "the world holds the last good frame (use more substeps, a smaller dt or weaker forces)"
         )
 

@@ -15,6 +15,7 @@ from pyverlet.broadphase import BruteForce
 from pyverlet.collisions import Collisions
 from pyverlet.constants import SERIAL_BELOW
 from pyverlet.forces import Drag
+from pyverlet.state import Slots
 from pyverlet.world import World
 
 Progress = Callable[[int, int], None]
@@ -48,6 +49,7 @@ def warm_up(world: World, progress: Progress | None = None) -> float:
             _compile_all(world.dtype)
             _remember_compiled(world.dtype)
         _rehearse(world)
+        _rehearse_forces(world)
     if done and progress:
         progress(total, total)
     return perf_counter() - start
@@ -68,6 +70,15 @@ def _rehearse(world: World) -> None:
         alone = World(boundary=world.boundary, collisions=None, substeps=1, dtype=world.dtype)
         alone.add(position=world.position[0], radius=world.radius[0])
         alone.step(1e-3)
+
+
+def _rehearse_forces(world: World) -> None:
+    """Evaluate our own kinds of force once, on a copy of the particles; others may count how often they are asked."""
+    slots = Slots(world.dtype)
+    slots.gather(world._state)
+    for force in world.forces:
+        if type(force).__module__.startswith("pyverlet."):
+            force.apply(slots, world.time)
 
 
 def _compile_all(dtype: np.dtype[Any]) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from pyverlet import _jit, checks
+from pyverlet.actors import Actor
 from pyverlet.bounds import Boundary, Open
 from pyverlet.collisions import Collisions, ContactSolver, Overlap, measure_overlap
 from pyverlet.constants import ALL_THREADS_FROM, ONE_THREAD_BELOW, REST_ACCELERATIONS, STANDARD_GRAVITY
@@ -20,7 +21,10 @@ from pyverlet.errors import InputError, NonFiniteError
 from pyverlet.forces import Force, ForceSum
 from pyverlet.integrators import Integrator, PositionVerlet
 from pyverlet.kernels import measure, motion
+from pyverlet.obstacles import Course, Obstacles
+from pyverlet.particles import Particles
 from pyverlet.profile import Profile
+from pyverlet.queries import Queries
 from pyverlet.state import Group, Slots, State
 
 Array = NDArray[Any]
@@ -33,15 +37,18 @@ _DEFAULT_COLLISIONS = Collisions()
 class Saved:
     """What `World.save` keeps: enough to continue with the same bits. Opaque."""
 
+    world: State
     arrays: dict[str, Array]
     time: float
     frames: int
     h_last: float | None
     slots: tuple[Array, Array]
     neighbours: Any
+    obstacles: Any
+    actors: list[tuple[Actor, Any]]
 
 
-class World(Doors):
+class World(Particles, Queries, Doors):
     """Particles in a room, and the laws they follow. SI units, y up.
 
     Args:
@@ -73,6 +80,9 @@ class World(Doors):
         self._slots = Slots(self._state.dtype)
         self.forces: list[Force] = []
         self._force_sum = ForceSum(checks.vector("gravity", gravity), self.forces)
+        self.actors: list[Actor] = []
+        self.obstacles = Obstacles()
+        self._course = Course(self.obstacles)
         self.integrator = PositionVerlet() if integrator is None else integrator
         self.boundary = Open() if boundary is None else boundary
         self.collisions = collisions
@@ -92,12 +102,15 @@ class World(Doors):
             NonFiniteError: a particle turned NaN or infinite; the world still holds the frame before.
         """
         h = checks.number("dt", dt, above=0.0) / self.substeps
+        for actor in self.actors:
+            actor.act(self, dt)
         _jit.use_threads(self.threads)
         self.profile.begin()
         self._frame(h, self.profile.mark)
         if self._first_non_finite() >= 0:
             self._explain_non_finite(h)
         self._slots.scatter(self._state)
+        self._course.end(dt)
         self.profile.mark("scatter")
         self.time += dt
         self.frames += 1
@@ -107,14 +120,17 @@ class World(Doors):
     def _frame(self, h: float, done: Callable[[str], None]) -> None:
         """The table of contents of the engine. `done` is told the name of each stage as it ends."""
         state, forces, integrator = self._slots, self._force_sum, self.integrator
-        contacts = self._contacts if len(self) > 1 else None
+        contacts, course = self._contacts if len(self) > 1 else None, self._course
         lag = integrator.velocity_lag * h
         self._gather()
+        course.begin()
         done("gather")
         integrator.begin(state, forces, self.time, h, self._h_last)
         for substep in range(self.substeps):
             if contacts:
                 contacts.before(state, h)
+            if course:
+                course.before(state)
             integrator.step(state, forces, self.time + substep * h, h)
             strongest = self._strongest_acceleration()
             done("integrate")
@@ -125,6 +141,9 @@ class World(Doors):
                 done("contacts")
             self.boundary.confine(state, h, lag, REST_ACCELERATIONS * strongest * h)
             done("bounds")
+            if course:
+                course.collide(state, substep * h, h, lag, REST_ACCELERATIONS * strongest * h)
+                done("obstacles")
             if contacts:
                 contacts.still(state, h)
                 done("velocities")
@@ -220,35 +239,7 @@ class World(Doors):
         checks.positive("radius", values["radius"])
         checks.positive("mass", values["mass"], infinite_is="pinned")
         self.boundary.check(values["radius"])
-        return Group(self._state, self._state.append(values))
-
-    def __len__(self) -> int:
-        return len(self._state)
-
-    @property
-    def position(self) -> Array:
-        """(n, 2) centres of all particles in the order they were added, m; a view."""
-        return self._state.position
-
-    @property
-    def velocity(self) -> Array:
-        """(n, 2) m/s; a view."""
-        return self._state.velocity
-
-    @property
-    def spin(self) -> Array:
-        """(n,) angular velocity, rad/s, counter-clockwise; a view."""
-        return self._state.spin
-
-    @property
-    def radius(self) -> Array:
-        """(n,) m; a view."""
-        return self._state.radius
-
-    @property
-    def mass(self) -> Array:
-        """(n,) kg, infinite where pinned; a view."""
-        return self._state.mass
+        return Group(self._state, self._state.append(values), self.remove)
 
     # ---- laws ----------------------------------------------------------------------------------------------------------
 
@@ -368,26 +359,34 @@ class World(Doors):
     def save(self) -> Saved:
         """A copy of everything that moves; `restore` continues from it with the same bits."""
         return Saved(
+            world=self._state,
             arrays={name: array.copy() for name, array in self._state.arrays()},
             time=self.time,
             frames=self.frames,
             h_last=self._h_last,
             slots=self._slots.save(),
             neighbours=self._contacts.broad_phase.save() if self._contacts else None,
+            obstacles=self.obstacles.save(),
+            actors=[(actor, actor.save()) for actor in self.actors],
         )
 
     def restore(self, saved: Saved) -> None:
-        """Go back to what `save` returned; particles must not have been added since.
+        """Go back to what `save` returned, with the particles of then: groups added since are dead, removed ones live again.
 
         Raises:
-            InputError: the number of particles has changed.
+            InputError: it is another world's.
         """
-        if len(saved.arrays["radius"]) != len(self):
-            raise InputError(
-                f"saved holds {len(saved.arrays['radius'])} particles; allowed is a state of this world's {len(self)} particles"
-            )
-        for name, array in self._state.arrays():
-            array[:] = saved.arrays[name]
+        if saved.world is not self._state:
+            raise InputError("saved is the state of another world; allowed is what save() of this one returned")
+        numbers = self._state.number.copy()
+        self._state.restore(saved.arrays)
+        if not np.array_equal(numbers, self._state.number):
+            where = np.searchsorted(self._state.number, numbers).clip(max=max(len(self) - 1, 0))
+            self._renumber(np.where(self._state.number[where] == numbers, where, -1) if len(self) else np.full(len(numbers), -1))
+        self.obstacles.restore(saved.obstacles)
+        self.actors[:] = [actor for actor, _ in saved.actors]
+        for actor, memory in saved.actors:
+            actor.restore(memory)
         self.time, self.frames, self._h_last = saved.time, saved.frames, saved.h_last
         self._slots.restore(saved.slots, self._state)
         if self._contacts:

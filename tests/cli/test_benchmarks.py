@@ -33,3 +33,10 @@ def test_the_physics_of_every_engine_is_measured() -> None:
     # worst rebound below 1 % of the drop, the gas's energy kept to three digits
     assert float(ours.split("float32")[1].split("%")[0]) < 1.0
     assert " 1.000 " in ours
+
+
+def test_the_cost_of_a_force_of_ones_own_is_measured() -> None:
+    command = [sys.executable, "-m", "benchmarks.forces", "--particles", "60", "--frames", "3"]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=True)
+    assert "60 circles" in run.stdout
+    assert float(run.stdout.split("ratio")[1]) > 0

@@ -156,3 +156,27 @@ def test_a_view_of_another_size_is_refused() -> None:
     world = pv.World()
     with pytest.raises(pv.InputError, match=r"100 x 80 pixels; allowed is this raster's \(64, 48\)"):
         Raster((64, 48)).draw(world, View(0, 0, 1, 100, 80), colours=ByOrigin().colours(world, DARK))
+
+
+def test_obstacles_cover_the_area_they_have() -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (20, 10)))
+    world.obstacles += [
+        pv.Disc((4, 5), 2.0),
+        pv.Polygon([(8, 2), (12, 3), (9, 8)]),
+        pv.Chain([(14, 2), (16, 8), (18, 2)], radius=0.25),
+    ]
+    view = View.fit((0, 0, 20, 10), (400, 200))
+    canvas = Raster((400, 200))
+    bare = pv.World(boundary=world.boundary)
+    none = np.zeros(0, np.uint32)
+    room = [((0, 0), (20, 0), (20, 10), (0, 10))]
+    before = canvas.draw(bare, view, outlines=room, colours=none).copy()
+    after = canvas.draw(world, view, outlines=room, colours=none).astype(float)
+    red = (after - before)[..., 0] / ((canvas.theme.obstacle >> 16) - (canvas.theme.inside >> 16))
+    # In pixels of 1/400 m^2: a disc drawn with 46 sides, a triangle, two bars that share one round end and cross there.
+    # The rim is right on average except at corners: a pixel for each.
+    assert red[:, :140].sum() / 400 == pytest.approx(np.pi * 4, rel=5e-3)
+    assert red[:, 140:260].sum() / 400 == pytest.approx(0.5 * abs(4 * 6 - 1 * 1), rel=5e-3)
+    length = np.hypot(2, 6)
+    assert red[:, 260:].sum() / 400 == pytest.approx(2 * 0.5 * length + np.pi / 16, rel=2e-2)
+    assert (canvas.draw(bare, view, outlines=room, colours=none) == before).all()

@@ -257,14 +257,6 @@ def test_a_wrong_mass_written_later_is_refused_too() -> None:
         world.step(1 / 60)
 
 
-def test_saved_states_belong_to_their_world() -> None:
-    world = two_balls()
-    saved = world.save()
-    world.add(position=(5, 5))
-    with pytest.raises(pv.InputError, match=r"2 particles.*3 particles"):
-        world.restore(saved)
-
-
 class Explode:
     """A force that turns NaN at a given time, for one particle."""
 

@@ -14,6 +14,8 @@ from pyverlet import scenes
 from pyverlet.viewers import levers
 from pyverlet.viewers.commands import (
     Build,
+    Delete,
+    Drag,
     Pause,
     Pin,
     Reset,
@@ -26,7 +28,7 @@ from pyverlet.viewers.commands import (
     Spawn,
     Step,
 )
-from pyverlet.viewers.exhibit import Repertoire
+from pyverlet.viewers.exhibit import Exhibit, Repertoire
 from pyverlet.viewers.session import Session
 
 WaitUntil = Callable[[Callable[[], bool]], None]
@@ -119,11 +121,76 @@ def test_a_spawned_circle_is_like_the_others_and_none_comes_outside(
     assert np.abs(world.velocity).max() < 15.0
 
 
-def test_a_world_of_ones_own_that_grew_says_that_it_cannot_go_back(paused: Session, wait_until: WaitUntil) -> None:
+def test_reset_takes_back_what_came_and_brings_back_what_went(paused: Session, world: pv.World, wait_until: WaitUntil) -> None:
+    start = world.position.copy()  # they lie still: the start of the session is where they are
     paused.submit(Spawn(1, 0.0, 10.0))
+    paused.submit(Delete(1, -8.0, 0.5, 0.1))
+    paused.submit(Pin(1, 8.0, 0.5, 0.1))
+    wait_until(lambda: paused.latest.shape.number.tolist() == list(range(1, 10)))
+    paused.submit(Step(5))
     paused.submit(Reset())
-    wait_until(lambda: paused.latest.status.error is not None)
-    assert "start" in str(paused.latest.status.error)
+    wait_until(lambda: paused.latest.shape.number.tolist() == list(range(9)))
+    np.testing.assert_array_equal(world.position, start)
+    assert paused.latest.shape.mass.tolist() == [1.0] * 9
+
+
+def test_a_deleted_circle_leaves_the_others_alone(paused: Session, world: pv.World, wait_until: WaitUntil) -> None:
+    paused.submit(Delete(1, 0.0, 5.0, 0.1))  # nobody there
+    paused.submit(Pin(1, 8.0, 0.5, 0.1))
+    paused.submit(Drag(2, 6.0, 0.5, 0.1))
+    paused.submit(Delete(1, 0.0, 0.5, 0.1))
+    wait_until(lambda: paused.latest.status.particles == 8)
+    assert 0.0 not in world.position[:, 0]
+    paused.submit(Pin(1, 8.0, 0.5, 0.1))  # by another index now, and yet it weighs what it did
+    paused.submit(Drag(2, 6.0, 5.0))
+    paused.submit(Pause(False))
+    wait_until(lambda: bool(world.position[6, 1] > 2.0))
+    assert world.mass.tolist() == [1.0] * 8
+
+
+def test_the_dragged_circle_may_be_deleted(session: Session, world: pv.World, wait_until: WaitUntil) -> None:
+    session.submit(Drag(2, 0.0, 0.5, 0.1))
+    wait_until(lambda: len(world.forces) == 1)
+    session.submit(Delete(1, 0.0, 0.5, 0.3))
+    wait_until(lambda: session.latest.status.particles == 8)
+    frames = session.latest.status.frames
+    wait_until(lambda: session.latest.status.frames > frames + 5)
+    assert session.latest.status.error is None
+
+
+def test_colours_belong_to_their_circles(wait_until: WaitUntil, world: pv.World) -> None:
+    colours = np.arange(27, dtype=np.uint8).reshape(9, 3)
+    with Session(Exhibit("nine", pv.Panels.of(world), colours=colours)) as session:
+        for command in (Pause(True), Delete(1, -8.0, 0.5, 0.2), Spawn(1, 0.0, 10.0)):
+            session.submit(command)
+        wait_until(lambda: session.latest.shape.number.tolist() == list(range(1, 10)))
+        seen = session.latest.shape.colours
+        assert seen is not None
+        assert seen[:8].tolist() == colours[1:].tolist()
+        assert len(set(seen[8].tolist())) == 1  # grey
+
+
+def test_obstacles_are_on_show_and_those_that_move_move(wait_until: WaitUntil, world: pv.World) -> None:
+    world.obstacles.append(pv.Disc(center=(0, 10), radius=1))
+    world.obstacles.append(pv.Segment((-5, 8), (-3, 8), velocity=(1, 0)))
+    world.step(1 / 60)  # compiles what obstacles need
+    with Session(world) as session:
+        session.submit(Pause(True))
+        wait_until(lambda: session.latest.status.paused)
+        frame = session.latest
+        ((disc, solid),) = frame.shape.obstacles.lines
+        assert solid
+        assert np.hypot(*(np.array(disc) - (0, 10)).T) == pytest.approx(1.0, abs=0.01)
+        before = np.array(frame.obstacles.lines[0][0])
+        session.submit(Step(30))
+        wait_until(lambda: session.latest.status.frames >= frame.status.frames + 30)
+        assert session.latest.shape is frame.shape
+        after = np.array(session.latest.obstacles.lines[0][0])
+        assert after - before == pytest.approx(np.broadcast_to((0.5, 0), before.shape), abs=1e-4)
+        world.obstacles.pop(0)
+        session.submit(Step(1))
+        wait_until(lambda: session.latest.shape is not frame.shape)
+        assert session.latest.shape.obstacles.lines == []
 
 
 def test_a_scene_that_grew_is_built_anew(wait_until: WaitUntil) -> None:

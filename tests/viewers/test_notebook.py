@@ -59,7 +59,7 @@ def comm(monkeypatch: pytest.MonkeyPatch, world: pv.World) -> Comm:
 
 def test_the_first_question_is_answered_with_shape_and_frame(comm: Comm) -> None:
     (shape, radii), (frame, grid) = comm.say(LOOK)
-    assert (shape["kind"], shape["title"], shape["count"], len(radii)) == ("shape", "nine", 9, 72)
+    assert (shape["kind"], shape["title"], shape["count"], len(radii)) == ("shape", "nine", 9, 108)
     assert (frame["kind"], len(grid)) == ("frame", 36)
 
 

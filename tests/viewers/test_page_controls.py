@@ -171,6 +171,22 @@ def test_circles_are_added_one_by_one_and_poured(page: Page, program: Serve) -> 
     assert reads(page, "particles", 100)
 
 
+def test_circles_are_erased_and_come_back(page: Page, program: Serve) -> None:
+    visit(page, program("cage", 100).address)
+    pause(page)
+    place = where(page, 99)
+    page.keyboard.press("5")
+    page.mouse.click(place["left"], place["top"])
+    assert reads(page, "particles", 99)
+    page.mouse.move(300, 400)
+    page.mouse.down()
+    page.mouse.move(700, 400, steps=30)
+    page.mouse.up()
+    assert comes_true(page, lambda: status(page)["particles"] < 96)
+    page.keyboard.press("r")
+    assert reads(page, "particles", 100)
+
+
 def test_zoom_move_and_fit(page: Page, program: Serve) -> None:
     visit(page, program("cage", 400).address)
     pause(page)

@@ -47,6 +47,7 @@ def unpack(data: bytes) -> tuple[dict[str, Any], bytes]:
         ('{"type": "integrator", "value": "rk4"}', commands.SetIntegrator("rk4")),
         ('{"type": "pin", "x": 1, "y": 2, "reach": 0.5}', commands.Pin(7, 1.0, 2.0, 0.5)),
         ('{"type": "spawn", "x": 1, "y": 2}', commands.Spawn(7, 1.0, 2.0)),
+        ('{"type": "delete", "x": 1, "y": 2, "reach": 0}', commands.Delete(7, 1.0, 2.0, 0.0)),
         (LOOK % "[0, 0, 4, 3]", Look((0.0, 0.0, 4.0, 3.0), 800, 600, "speed", False, True)),
         (LOOK % "null", Look(None, 800, 600, "speed", False, True)),
         ('{"type": "release", "hand": 3}', commands.Release(7)),  # a tab has its own hand and no other
@@ -132,7 +133,8 @@ def test_a_shape_in_bytes(world: pv.World) -> None:
     head, body = unpack(encode_shape(Session(world, title="nine").latest.shape))
     assert (head["kind"], head["title"], head["bounded"]) == ("shape", "nine", True)
     assert head["outlines"] == [[[-10, 0], [10, 0], [10, 20], [-10, 20]]]
-    radius, mass = np.frombuffer(body, dtype="<f4").reshape(2, -1)
+    radius, mass = np.frombuffer(body[:72], dtype="<f4").reshape(2, -1)
+    assert np.frombuffer(body[72:], dtype="<u4").tolist() == list(range(9))
     assert radius.tolist() == [0.5] * 9
     assert mass.tolist() == [1.0] * 9
 
@@ -142,7 +144,7 @@ def test_own_colours_follow_in_the_shape(world: pv.World) -> None:
     shape = Session(Exhibit("nine", pv.Panels.of(world), colours=colours)).latest.shape
     head, body = unpack(encode_shape(shape))
     assert head["coloured"]
-    assert body[72:] == bytes(range(27))
+    assert body[108:] == bytes(range(27))
 
 
 def test_velocities_travel_if_wanted(world: pv.World) -> None:

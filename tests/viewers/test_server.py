@@ -268,35 +268,28 @@ def test_frames_travel_uncompressed(tab: Tab) -> None:
 LOOK = {"type": "look", "part": None, "width": 320, "height": 240, "colour": "order", "dark": True, "velocity": False}
 
 
+SENSE: dict[str, tuple[Any, ...]] = {
+    "seq": (0, 1, 50), "on": (True, False), "x": (-8.0, 0, 3.5, 1e9), "y": (-9.81, 0.5, 10, -1e9), "reach": (0, 0.5, 1e9),
+    "value": (1, 0.5, 8, "rk4"), "scene": (None, "box"), "particles": (None, 5), "part": (None, [0, 0, 1e-6, 1e9]),
+    "width": (320,), "height": (240,), "colour": ("order", "energy"), "dark": (True,), "velocity": (True, False),
+}  # fmt: skip
+NONSENSE: tuple[Any, ...] = (
+    None, True, -1, 2**70, 1e308, -1e308, 1e-300, float("nan"), float("inf"), "", "x" * 500, [], {}, [1, 1, 0, 0], [[]],
+)  # fmt: skip
+KINDS = ("ack", "look", "pause", "step", "reset", "speed", "build", "gravity", "substeps", "restitution", "friction",
+         "integrator", "drag", "poke", "pin", "spawn", "delete", "release", "", None)  # fmt: skip
+
+
 def nonsense(rng: random.Random) -> str | bytes:
-    """A message as no page sends it: words of the protocol with fields missing, of other types, far out, or cut off."""
-    kinds = ("ack", "look", "pause", "step", "reset", "speed", "build", "gravity", "substeps", "restitution", "friction",
-             "integrator", "drag", "poke", "pin", "spawn", "release", "", None, 7)  # fmt: skip
-    values: tuple[Any, ...] = (
-        None, True, False, 0, -1, 1, 2**70, 1e308, -1e308, 1e-300, float("nan"), float("inf"), "", "rk4", "cage", "x" * 500,
-        [], {}, [0, 0, 1, 1], [1, 1, 0, 0], [[]],
-    )  # fmt: skip
-    names = (
-        "seq",
-        "on",
-        "x",
-        "y",
-        "reach",
-        "value",
-        "scene",
-        "particles",
-        "part",
-        "width",
-        "height",
-        "colour",
-        "dark",
-        "velocity",
-    )
-    message = {"type": rng.choice(kinds)} | {name: rng.choice(values) for name in names if rng.random() < 0.6}
+    """A message as hardly a page sends it: words of the protocol in any order, values far out, wrong, missing or cut off."""
+    message: dict[str, Any] = {"type": rng.choice(KINDS)}
+    for name, values in SENSE.items():
+        if rng.random() < 0.95:
+            message[name] = rng.choice(NONSENSE if rng.random() < 0.1 else values)
     text = json.dumps(message)
-    if rng.random() < 0.2:
+    if rng.random() < 0.1:
         text = text[: rng.randrange(len(text))]
-    return text.encode() if rng.random() < 0.1 else text
+    return text.encode() if rng.random() < 0.05 else text
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -315,9 +308,10 @@ def test_nonsense_is_refused_and_the_world_goes_on(
         other.send(type="speed", value=1)
         other.send(type="pause", on=False)
         other.send(type="reset")
-        wait_until(lambda: not server.session.latest.status.paused and server.session.latest.status.error is None)
-        frames = server.session.latest.status.frames
-        wait_until(lambda: server.session.latest.status.frames > frames + 5)
+        seen = server.session.latest.seq
+        wait_until(lambda: server.session.latest.seq > seen + 20)
+        assert not server.session.latest.status.paused
+        assert server.session.latest.status.error is None
         other.ack(other.frame())
 
 
@@ -365,7 +359,7 @@ def test_pictures_are_of_the_size_and_the_part_that_were_asked_for(monkeypatch: 
         connection.send(json.dumps({"type": "pause", "on": True}))
         wanted = None
         while wanted is None:
-            data = connection.recv(5.0)
+            data = connection.recv(60.0)  # the raster may have to be compiled
             assert isinstance(data, bytes)
             (length,) = struct.unpack_from("<I", data)
             head = json.loads(data[4 : 4 + length])

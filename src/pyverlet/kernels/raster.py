@@ -183,6 +183,76 @@ def fill(cover, edges, slices):
 
 
 @kernel
+def mixed(pixel, colour, amount):
+    """The pixel with `colour`, uint32, mixed in by `amount`, from 0 to 1; its A stays."""
+    result = pixel & np.uint32(0xFF000000)
+    for shift in (0, 8, 16):
+        old = np.float64((pixel >> np.uint32(shift)) & np.uint32(255))
+        new = np.float64((colour >> np.uint32(shift)) & np.uint32(255))
+        result |= np.uint32(int(old + min(amount, 1.0) * (new - old) + 0.5)) << np.uint32(shift)
+    return result
+
+
+@kernel
+def _edges(points, first, last):
+    """(nx, ny, c) of the edges of a polygon: nx x + ny y - c is the distance of (x, y) in front of an edge."""
+    edges = np.zeros((last - first, 3))
+    edges[:, 2] = np.inf  # an edge without length has all in its back
+    for k in range(first, last):
+        x0, y0 = points[k]
+        x1, y1 = points[k + 1 if k + 1 < last else first]
+        length = math.hypot(x1 - x0, y1 - y0)
+        if length > 0.0:
+            nx, ny = (y0 - y1) / length, (x1 - x0) / length
+            edges[k - first, 0], edges[k - first, 1], edges[k - first, 2] = nx, ny, nx * x0 + ny * y0
+    return edges
+
+
+@kernel
+def _spanned(edges, y, margin):
+    """(low, high) in x where a row of pixels at height y is at most `margin` in front of all edges."""
+    low, high = -np.inf, np.inf
+    for k in range(edges.shape[0]):
+        rest = margin + edges[k, 2] - edges[k, 1] * y
+        if edges[k, 0] > 1e-9:
+            high = min(high, rest / edges[k, 0])
+        elif edges[k, 0] < -1e-9:
+            low = max(low, rest / edges[k, 0])
+        elif rest < 0.0:
+            high = -np.inf
+    return low, high
+
+
+@kernel
+def convex(pixels, points, first, colour):
+    """Fill convex polygons in `colour`, uint32: corners first[k] to first[k + 1] of `points` (n, 2), counter-clockwise with y up.
+
+    Points are pixels, y down. A pixel on the rim is covered by its distance from the nearest edge.
+    """
+    height, width = pixels.shape
+    for polygon in range(first.shape[0] - 1):
+        a, b = first[polygon], first[polygon + 1]
+        top, bottom = points[a:b, 1].min() - 0.5, points[a:b, 1].max() + 0.5
+        if not (bottom > 0.0 and top < height):
+            continue  # outside, or NaN
+        edges = _edges(points, a, b)
+        for row in range(max(int(top), 0), min(int(bottom) + 1, height)):
+            y = row + 0.5
+            low, high = _spanned(edges, y, 0.5)
+            core_low, core_high = _spanned(edges, y, -0.5)
+            for column in range(int(max(low - 0.5, 0.0)), int(min(high + 0.5, float(width)))):
+                x = column + 0.5
+                amount = 1.0
+                if not core_low <= x <= core_high:
+                    front = -np.inf
+                    for k in range(edges.shape[0]):
+                        front = max(front, edges[k, 0] * x + edges[k, 1] * y - edges[k, 2])
+                    amount = min(max(0.5 - front, 0.0), 1.0)
+                if amount > 0.0:
+                    pixels[row, column] = mixed(pixels[row, column], colour, amount)
+
+
+@kernel
 def tint(pixels, cover, colour):
     """Mix `colour`, uint32, into `pixels` by `cover`; their A stays."""
     height, width = pixels.shape
@@ -190,10 +260,4 @@ def tint(pixels, cover, colour):
         for column in range(width):
             amount = cover[row, column]
             if amount > 0.0:
-                pixel = pixels[row, column]
-                result = pixel & np.uint32(0xFF000000)
-                for shift in (0, 8, 16):
-                    old = np.float64((pixel >> np.uint32(shift)) & np.uint32(255))
-                    new = np.float64((colour >> np.uint32(shift)) & np.uint32(255))
-                    result |= np.uint32(int(old + min(amount, 1.0) * (new - old) + 0.5)) << np.uint32(shift)
-                pixels[row, column] = result
+                pixels[row, column] = mixed(pixels[row, column], colour, amount)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from pyverlet import checks
 from pyverlet.errors import InputError
 from pyverlet.kernels import raster
+from pyverlet.obstacles import Outline
 from pyverlet.picture.palette import DARK, Packed, Theme, swapped
 from pyverlet.picture.view import View
 
@@ -22,6 +24,9 @@ Lines = Sequence[Sequence[tuple[float, float]]]
 
 WALL_PX = 2.0
 """Width of a wall's line outside the room."""
+
+LINE_PX = 4.0
+"""Width of the line of an obstacle that has no thickness."""
 
 SLICES = 8
 """Lines a row of pixels is cut into where the floor of the room is filled: steps of a thirtieth in lightness, once a view."""
@@ -46,8 +51,10 @@ class Raster:
         self.theme = theme
         width, height = self.size
         self._pixels: Packed = np.empty((height, width), dtype=np.uint32)
+        self._floor: Packed = np.empty_like(self._pixels)
+        self._floor_is: Any = None
         self._ground: Packed = np.empty_like(self._pixels)
-        self._ground_is: Any = None
+        self._obstacles: Any = None
 
     def draw(self, world: World, view: View, *, outlines: Lines = (), colours: Packed) -> NDArray[np.uint8]:
         """A picture of `world`.
@@ -62,39 +69,45 @@ class Raster:
             (height, width, 4) bytes R, G, B, A: a view on the buffer, good until the next call. A is what part of a pixel circles
             cover; R, G, B are complete without it.
         """
-        return self.discs(world.position, world.radius, view, outlines=outlines, colours=colours)
+        obstacles = world.obstacles.outlines()
+        return self.discs(world.position, world.radius, view, outlines=outlines, obstacles=obstacles, colours=colours)
 
     def discs(
-        self, position: NDArray[Any], radius: NDArray[Any], view: View, *, outlines: Lines = (), colours: Packed
-    ) -> NDArray[np.uint8]:
+        self, position: NDArray[Any], radius: NDArray[Any], view: View, *,
+        outlines: Lines = (), obstacles: Sequence[Outline] = (), colours: Packed,
+    ) -> NDArray[np.uint8]:  # fmt: skip
         """The same from arrays: centres (n, 2) and radii (n,) in metres. For pictures made in another thread than the physics."""
         if (view.width, view.height) != self.size:
             raise InputError(f"view is {view.width} x {view.height} pixels; allowed is this raster's {self.size}")
         key = (view.left, view.top, view.scale, outlines)
-        if self._ground_is != key:
-            self._lay_ground(view, outlines)
-            self._ground_is = key
+        if self._floor_is != key:
+            self._lay_floor(view, outlines)
+            self._floor_is, self._obstacles = key, None
+        if self._obstacles is not obstacles:
+            np.copyto(self._ground, self._floor)
+            self._place(obstacles, view)
+            self._obstacles = obstacles
         np.copyto(self._pixels, self._ground)
         colours = np.ascontiguousarray(colours, dtype=np.uint32)
         raster.circles(self._pixels, self._ground, position, radius, colours, view.left, view.top, view.scale)
         return self._pixels.view(np.uint8).reshape(*self._pixels.shape, 4)
 
-    def _lay_ground(self, view: View, outlines: Lines) -> None:
+    def _lay_floor(self, view: View, outlines: Lines) -> None:
         """What stays while the view does: the ground, the floor of the room, its walls."""
-        self._ground[:] = swapped(self.theme.ground)
+        self._floor[:] = swapped(self.theme.ground)
         if not outlines:
             self._rule(view)
             return
         lines = [np.asarray(outline, dtype=np.float64) for outline in outlines]
         pixels = [np.column_stack(((x - view.left), (view.top - y))) * view.scale for x, y in (line.T for line in lines)]
         edges = np.concatenate([np.column_stack((line, np.roll(line, -1, axis=0))) for line in pixels])
-        cover = np.zeros(self._ground.shape, dtype=np.float32)
+        cover = np.zeros(self._floor.shape, dtype=np.float32)
         for x0, y0, x1, y1 in edges:
             raster.stroke(cover, x0, y0, x1, y1, WALL_PX)
-        raster.tint(self._ground, cover, np.uint32(swapped(self.theme.wall)))
+        raster.tint(self._floor, cover, np.uint32(swapped(self.theme.wall)))
         cover[:] = 0.0
         raster.fill(cover, edges, SLICES)
-        raster.tint(self._ground, cover, np.uint32(swapped(self.theme.inside)))
+        raster.tint(self._floor, cover, np.uint32(swapped(self.theme.inside)))
 
     def _rule(self, view: View) -> None:
         """Without walls: lines at round distances, so that motion can be seen."""
@@ -104,9 +117,29 @@ class Raster:
         right, bottom = view.left + width / view.scale, view.top - height / view.scale
         line = swapped(self.theme.grid)
         for x in np.arange(np.ceil(view.left / apart), right / apart) * apart:
-            self._ground[:, int((x - view.left) * view.scale)] = line
+            self._floor[:, int((x - view.left) * view.scale)] = line
         for y in np.arange(np.ceil(bottom / apart), view.top / apart) * apart:
-            self._ground[int((view.top - y) * view.scale), :] = line
+            self._floor[int((view.top - y) * view.scale), :] = line
+
+    def _place(self, obstacles: Sequence[Outline], view: View) -> None:
+        """Draw the obstacles onto the ground, under the circles."""
+        shapes = [shape for outline in obstacles for shape in _convex(outline, 0.5 * LINE_PX / view.scale)]
+        if shapes:
+            points = (np.concatenate(shapes) - (view.left, view.top)) * (view.scale, -view.scale)
+            first = np.concatenate(([0], np.cumsum([len(shape) for shape in shapes])))
+            raster.convex(self._ground, points, first, np.uint32(swapped(self.theme.obstacle)))
+
+
+def _convex(outline: Outline, half: float) -> list[NDArray[np.float64]]:
+    """The convex polygons that draw an outline: itself, or a bar for each part of a line `2 half` metres wide."""
+    if outline.filled:
+        return [outline.points]
+    bars = []
+    for a, b in pairwise(outline.points):
+        along = (b - a) * (half / max(float(np.hypot(*(b - a))), 1e-30))
+        across = np.array([-along[1], along[0]])
+        bars.append(np.array([a - along - across, b + along - across, b + along + across, a - along + across]))
+    return bars
 
 
 def check_size(size: tuple[int, int]) -> tuple[int, int]:

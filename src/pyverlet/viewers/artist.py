@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import io
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -11,10 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.obstacles import Outline
 from pyverlet.picture import DARK, LIGHT, ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Fixed, Raster, Theme, View
 from pyverlet.picture.palette import Packed
 from pyverlet.viewers.frames import Frame, Shape
 from pyverlet.viewers.looks import MOST_PIXELS, Look
+from pyverlet.viewers.sketch import NOTHING, Sketch
 
 PICTURES_FROM = 150_000
 """Circles. A browser takes 40 to 60 ms to receive a message of 2 MB, and as long again to draw so many; a picture is smaller."""
@@ -63,6 +66,7 @@ class Artist:
         self._colouring: Colouring = ByOrigin()
         self._colouring_of: tuple[str, Shape | None] = ("", None)
         self._still: tuple[Any, Packed] | None = None
+        self._sketched: tuple[Sketch, Sketch, tuple[Outline, ...]] = (NOTHING, NOTHING, ())
         self._done: dict[Look, bytes] = {}
         self._frame: Frame | None = None
 
@@ -82,7 +86,21 @@ class Artist:
             self._raster = Raster(size, theme=theme)
         colours = self._colours(frame, look.colour, theme)
         view = View(part[0], part[3], size[0] / (part[2] - part[0]), *size)
-        return self._raster.discs(frame.position, frame.shape.radius, view, outlines=frame.shape.outlines, colours=colours)
+        return self._raster.discs(
+            frame.position,
+            frame.shape.radius,
+            view,
+            outlines=frame.shape.outlines,
+            obstacles=self._obstacles(frame),
+            colours=colours,
+        )
+
+    def _obstacles(self, frame: Frame) -> Sequence[Outline]:
+        """All of them; the same object as long as none has moved, which the raster then need not draw again."""
+        standing, moving = frame.shape.obstacles, frame.obstacles
+        if self._sketched[0] is not standing or self._sketched[1] is not moving:
+            self._sketched = (standing, moving, standing.outlines + moving.outlines)
+        return self._sketched[2]
 
     def _colours(self, frame: Frame, name: str, theme: Theme) -> Packed:
         shape = frame.shape

@@ -176,6 +176,11 @@ class Pin(_Picking):
 
 
 @dataclass(frozen=True, slots=True)
+class Delete(_Picking):
+    """Take a particle out of the world, until reset."""
+
+
+@dataclass(frozen=True, slots=True)
 class Poke(_AtPoint):
     """Push everything near (x, y) away from it until the hand is released."""
 
@@ -193,4 +198,4 @@ class Release:
 
 
 Setting = SetGravity | SetSubsteps | SetRestitution | SetFriction | SetIntegrator
-Command = Pause | Step | Reset | SetSpeed | Build | Setting | Drag | Poke | Pin | Spawn | Release
+Command = Pause | Step | Reset | SetSpeed | Build | Setting | Drag | Poke | Pin | Spawn | Delete | Release

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.bounds import Circle
+from pyverlet.viewers.sketch import NOTHING, Sketch
 
 if TYPE_CHECKING:
     from pyverlet.world import World
@@ -71,6 +72,8 @@ class Shape:
     """Several worlds side by side; empty for a single one."""
     differing: tuple[str, ...]
     """Settings in which the panels differ, and which therefore stay as they are."""
+    obstacles: Sketch
+    """Those that stand still."""
     scene: str
     """Name of the scene, or "" for worlds of the user's own."""
     scenes: tuple[tuple[str, str], ...]
@@ -79,6 +82,8 @@ class Shape:
     """(n,) metres, read-only."""
     mass: NDArray[np.float32]
     """(n,) kg, infinite where pinned; read-only."""
+    number: NDArray[np.uint32]
+    """(n,) what each circle is called as long as it lives; read-only."""
     colours: NDArray[np.uint8] | None
     """(n, 3) bytes R, G, B, the circles' own, if they have any; read-only."""
 
@@ -131,6 +136,8 @@ class Frame:
 
     velocity: NDArray[np.float32]
     """(n, 2) m/s, likewise."""
+    obstacles: Sketch = NOTHING
+    """Those that move."""
 
     @cached_property
     def grid(self) -> NDArray[np.uint16]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from pyverlet.forces import Grip, Push
 from pyverlet.picture.view import nearest
-from pyverlet.viewers.tools import Pins, spawn
+from pyverlet.viewers.tools import Pins, delete, spawn
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -75,7 +75,7 @@ class Hands:
         for hand, force in self._held.items():
             if isinstance(force, Push):
                 force.center = self._aim[hand]
-            elif isinstance(force, Grip):
+            elif isinstance(force, Grip) and force.particle >= 0:
                 force.target = self._leashed(force.particle, self._aim[hand], LEASH * view_size)
 
     def _leashed(self, particle: int, aim: tuple[float, float], leash: float) -> tuple[float, float]:
@@ -121,6 +121,11 @@ class HandsOnPanels:
         """Add a circle; see `tools.spawn`."""
         panel, x, y = _within(x, y, layout)
         spawn(self._worlds[panel], x, y)
+
+    def delete(self, x: float, y: float, reach: float, layout: Layout) -> None:
+        """Remove a circle; see `tools.delete`."""
+        panel, x, y = _within(x, y, layout)
+        delete(self._worlds[panel], x, y, reach)
 
     def _take(self, hand: int, x: float, y: float, layout: Layout) -> tuple[int, float, float]:
         panel = self._panel.setdefault(hand, layout.at(x, y))

@@ -21,7 +21,9 @@ import uvicorn
 from pyverlet import checks
 from pyverlet.errors import InputError
 from pyverlet.progress import Progress
+from pyverlet.viewers.artist import Artist, draws_here
 from pyverlet.viewers.exhibit import Exhibit, Repertoire
+from pyverlet.viewers.looks import Look
 from pyverlet.viewers.protocol import MAX_MESSAGE
 from pyverlet.viewers.session import Session
 from pyverlet.viewers.web import LOOPBACK_NAMES, make_app
@@ -51,6 +53,8 @@ def serve(
             exhibit = Exhibit.of(build(), title)
             _compile(exhibit)
         session = Session(exhibit, dt=dt, repertoire=repertoire)
+        if draws_here(session.latest.shape):
+            Artist().jpeg(session.latest, Look())  # compiles what it needs: no tab shall wait for that
         with _on_air(session, listener, only_loopback=host in LOOPBACK_NAMES), _ended_by_signals(session):
             address = _address(host, listener)
             _announce(title, address, host, open_browser)

@@ -2,9 +2,9 @@
 
 - 4 bytes: length of the head, little-endian, a multiple of 4.
 - head: JSON padded with spaces, {"kind": "shape" | "frame" | "picture" | "refused", ...}.
-- body, little-endian: of a shape n float32 radii, n float32 masses and, if "coloured", n times three bytes R, G, B; of a frame n
-  pairs of uint16 on the grid over "view" and, if the tab looks at velocities, n pairs of int16 in units of "unit" m/s; of a
-  picture a JPEG.
+- body, little-endian: of a shape n float32 radii, n float32 masses, n uint32 numbers and, if "coloured", n times three bytes R,
+  G, B; of a frame n pairs of uint16 on the grid over "view" and, if the tab looks at velocities, n pairs of int16 in units of
+  "unit" m/s; of a picture a JPEG.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from pyverlet.viewers.commands import (
     MAX_SUBSTEPS,
     Build,
     Command,
+    Delete,
     Drag,
     Pause,
     Pin,
@@ -105,6 +106,7 @@ def _head(kind: str, frame: Frame, part: Rect | None) -> dict[str, Any]:
         "seq": frame.seq,
         "view": frame.view if part is None else part,
         "room": frame.view,
+        "obstacles": frame.obstacles.lines,
         "status": dataclasses.asdict(frame.status),
     }
 
@@ -129,6 +131,7 @@ def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = N
         "lines": shape.lines,
         "panels": [dataclasses.asdict(panel) for panel in shape.panels],
         "differing": shape.differing,
+        "obstacles": shape.obstacles.lines,
         "scene": shape.scene,
         "scenes": shape.scenes,
         "integrators": list(integrators.BY_NAME),
@@ -143,7 +146,7 @@ def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = N
     if drawn_here:
         return _join(head, b"")
     colours = b"" if shape.colours is None else shape.colours.tobytes()
-    return _join(head, shape.radius.tobytes() + shape.mass.tobytes() + colours)
+    return _join(head, shape.radius.tobytes() + shape.mass.tobytes() + shape.number.tobytes() + colours)
 
 
 def encode_refusal(reason: str) -> bytes:
@@ -242,5 +245,6 @@ _MAKERS: dict[str, Callable[[Mapping[str, Any], int], Request]] = {
     "poke": lambda m, hand: Poke(hand, _real(m, "x"), _real(m, "y")),
     "pin": lambda m, hand: Pin(hand, _real(m, "x"), _real(m, "y"), _real(m, "reach")),
     "spawn": lambda m, hand: Spawn(hand, _real(m, "x"), _real(m, "y")),
+    "delete": lambda m, hand: Delete(hand, _real(m, "x"), _real(m, "y"), _real(m, "reach")),
     "release": lambda m, hand: Release(hand),
 }

@@ -26,6 +26,7 @@ from pyverlet.viewers import levers
 from pyverlet.viewers.commands import (
     Build,
     Command,
+    Delete,
     Drag,
     Pause,
     Pin,
@@ -263,7 +264,8 @@ class Session:
                 self._speed = value
                 self._before = None
             case Reset():
-                self._reset()
+                stage.reset()
+                self._fresh_start()
             case Build(scene, particles):
                 self._build(scene, particles)
             case SetGravity() | SetSubsteps() | SetRestitution() | SetFriction() | SetIntegrator():
@@ -273,9 +275,11 @@ class Session:
             case Poke(hand, x, y):
                 stage.hands.poke(hand, x, y, stage.view_size, stage.layout)
             case Pin(_, x, y, reach):
-                self._shape_stale |= stage.hands.pin(x, y, reach, stage.layout)
+                stage.pin(x, y, reach)
             case Spawn(_, x, y):
                 stage.hands.spawn(x, y, stage.layout)
+            case Delete(_, x, y, reach):
+                stage.hands.delete(x, y, reach, stage.layout)
             case Release(hand):
                 stage.hands.release(hand)
 
@@ -290,17 +294,7 @@ class Session:
         self._before = None
         self._clock = Clock(dt=self._dt, max_catch_up=MAX_CATCH_UP)
         self._gauges = Gauges(FrameBudget(limit_ms=self._budget_ms))
-        self._shape_stale = True
-
-    def _reset(self) -> None:
-        stage = self._stage
-        if stage.began_with == list(map(len, stage.worlds)):
-            stage.reset()
-            self._fresh_start()
-        elif stage.exhibit.scene and self._repertoire:
-            self._build(None, stage.began_with[0])
-        else:
-            self._error = "this world has gained or lost circles, and its start cannot be had back"
+        self._shape_of: object = None
 
     def _build(self, scene: str | None, particles: int | None) -> None:
         """Put another scene on, or the same with another number of circles, whose settings then stay as the sliders say."""
@@ -346,11 +340,10 @@ class Session:
     def _picture(self) -> Frame:
         stage = self._stage
         positions, velocity = stage.look()
-        count = sum(map(len, positions))
-        if self._shape_stale or count != len(self._shape.radius):
+        if self._shape_of != stage.version:
+            self._shape_of = stage.version
             scenes = tuple(self._repertoire.summaries.items()) if self._repertoire else ()
             self._shape = stage.shape(dt=self._dt, budget_ms=self._budget_ms, scenes=scenes)
-            self._shape_stale = False
         position = stage.place(self._between(positions))
         position.flags.writeable = velocity.flags.writeable = False
         status = self._gauges.read(
@@ -362,7 +355,7 @@ class Session:
             error=self._error,
             at_once=self._held(),
         )
-        return Frame(self._seq, self._shape, stage.layout.view, status, position, velocity)
+        return Frame(self._seq, self._shape, stage.layout.view, status, position, velocity, stage.moving())
 
     def _between(self, now: list[NDArray[np.float32]]) -> list[NDArray[np.float32]]:
         """In slow motion, where the circles are between the last two frames: one frame behind, and smooth."""

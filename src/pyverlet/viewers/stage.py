@@ -13,6 +13,7 @@ from pyverlet.viewers.exhibit import Exhibit
 from pyverlet.viewers.frames import Camera, PanelShape, Shape, outline
 from pyverlet.viewers.hands import HandsOnPanels
 from pyverlet.viewers.layout import Layout
+from pyverlet.viewers.sketch import Sketch, Sketcher
 
 GREY = 0x9A
 """R, G and B of circles that joined a picture later."""
@@ -30,8 +31,11 @@ class Stage:
         self.panels = exhibit.panels
         self.worlds = self.panels.worlds
         self.hands = HandsOnPanels(self.worlds)
+        self._pinned = 0
         self.differing = levers.differing(self.worlds)
         self._saved = self.panels.save()
+        self._coloured = [np.array(world.number) for world in self.worlds]
+        self._standing, self._moving = (Sketcher(self.worlds, moving=moving) for moving in (False, True))
         self._start_energies = [float(each.energy().total) for each in self.worlds]
         self.look_anew()
 
@@ -72,14 +76,23 @@ class Stage:
                 levers.pull(world, command)
 
     @property
-    def began_with(self) -> list[int]:
-        """How many circles each world had at the start; `reset` can go back while they are as many."""
-        return [len(state.arrays["radius"]) for _, state in self._saved]
+    def version(self) -> tuple[Any, ...]:
+        """What the shape depends on: it is out of date as soon as this changes."""
+        return (*(world.version for world in self.worlds), id(self._standing.draw(self.layout)), self._pinned)
+
+    def moving(self) -> Sketch:
+        """The obstacles that move, where they are now."""
+        return self._moving.draw(self.layout)
+
+    def pin(self, x: float, y: float, reach: float) -> None:
+        """Pin the nearest circle, or let go of it."""
+        self._pinned += self.hands.pin(x, y, reach, self.layout)
 
     def reset(self) -> None:
         """Back to the start; settings stay."""
         self.hands.release_all()
         self.panels.restore(self._saved)
+        self._pinned += 1  # masses are what they were
         self.look_anew()
 
     def shape(self, *, dt: float, budget_ms: float, scenes: tuple[tuple[str, str], ...]) -> Shape:
@@ -106,24 +119,26 @@ class Stage:
             lines=tuple(lines),
             panels=tuple(panels),
             differing=self.differing,
+            obstacles=self._standing.draw(self.layout),
             scene=self.exhibit.scene,
             scenes=scenes,
             radius=_kept(np.concatenate([world.radius for world in self.worlds], dtype=np.float32)),
             mass=_kept(np.concatenate([world.mass for world in self.worlds], dtype=np.float32)),
-            colours=self._colours(first),
+            number=_kept(np.concatenate([world.number for world in self.worlds], dtype=np.uint32, casting="unsafe")),
+            colours=self._colours(),
         )
 
     def _bounded(self) -> bool:
         return any(world.boundary.extent() is not None for world in self.worlds)
 
-    def _colours(self, count: int) -> NDArray[np.uint8] | None:
+    def _colours(self) -> NDArray[np.uint8] | None:
+        """Everybody's own, grey for those that came later."""
         given = self.exhibit.colours
-        if given is None or len(given) == count:
-            return given
-        colours = np.full((count, 3), GREY, dtype=np.uint8)
-        kept = min(count, len(given))
-        colours[:kept] = given[:kept]
-        return _kept(colours)
+        if given is None:
+            return None
+        (world,), (first,) = self.worlds, self._coloured
+        row = np.searchsorted(first, world.number).clip(max=len(first) - 1)
+        return _kept(np.where((first[row] == world.number)[:, None], given[row], np.uint8(GREY)))
 
 
 def _joined(arrays: list[NDArray[np.float32]]) -> NDArray[np.float32]:

@@ -16,7 +16,7 @@ SPAWNED_RADIUS = 0.5
 
 
 class Pins:
-    """Circles of one world that were pinned by hand, and what they weighed before."""
+    """Circles of one world that were pinned by hand, by their numbers, and what they weighed before."""
 
     def __init__(self) -> None:
         self._mass: dict[int, float] = {}
@@ -29,11 +29,12 @@ class Pins:
         i = nearest(world, np.array([x, y]), reach)
         if i is None:
             return False
+        number = int(world.number[i])
         if np.isfinite(world.mass[i]):
-            self._mass[i] = float(world.mass[i])
+            self._mass[number] = float(world.mass[i])
             world.mass[i] = np.inf
         else:
-            world.mass[i] = self._mass.pop(i, None) or usual_density(world) * float(world.radius[i]) ** 2
+            world.mass[i] = self._mass.pop(number, None) or usual_density(world) * float(world.radius[i]) ** 2
         world.velocity[i] = 0.0
         world.spin[i] = 0.0
         return True
@@ -48,6 +49,13 @@ def spawn(world: World, x: float, y: float) -> None:
         return
     radius = float(np.median(world.radius)) if len(world) else SPAWNED_RADIUS
     world.add(position=(x, y), velocity=0.0, radius=radius, mass=usual_density(world) * radius**2)
+
+
+def delete(world: World, x: float, y: float, reach: float) -> None:
+    """Remove the circle whose rim is nearest to (x, y), if within `reach`, metres."""
+    i = nearest(world, np.array([x, y]), reach)
+    if i is not None:
+        world.remove(i)
 
 
 def usual_density(world: World) -> float:

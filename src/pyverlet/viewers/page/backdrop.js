@@ -1,6 +1,7 @@
 // What is behind the circles: the ground, the room and its walls, or a grid where there are none.
 
 const WALL_PX = 4; // the circles cover its inner half
+const LINE_PX = 3; // of an obstacle that has no thickness
 const GRID_PX = 90; // least distance of grid lines
 
 /** The canvas behind everything; drawn anew only when something about it has changed. */
@@ -34,6 +35,20 @@ export class Backdrop {
       context.stroke();
       context.fill();
     }
+    drawObstacles(context, shape.obstacles, camera, colour);
+  }
+}
+
+/** Solid shapes and lines, see sketch.py. */
+export function drawObstacles(context, obstacles, camera, colour) {
+  context.fillStyle = context.strokeStyle = colour("--obstacle");
+  context.lineWidth = LINE_PX;
+  context.lineCap = context.lineJoin = "round";
+  for (const [points, solid] of obstacles) {
+    context.beginPath();
+    for (const [x, y] of points) context.lineTo(...camera.toScreen(x, y));
+    if (solid) context.fill();
+    else context.stroke();
   }
 }
 

@@ -36,7 +36,7 @@ export class Inks {
     this.ink = new Uint32Array(0);
   }
 
-  /** Colours that stay: after a new shape, another colouring or another theme. `within(i)` is [number in its panel, how many there]. */
+  /** Colours that stay: after a new shape, another colouring or another theme. `within(i)`: [its number among those alike, how many these are]. */
   begin(colouring, shape, within, dark) {
     const { radius, mass, rgb } = shape, n = radius.length;
     this.colouring = colouring === "picture" && !rgb ? "order" : colouring;

@@ -8,7 +8,7 @@ const SHORTCUTS = [
   [["s"], "slow motion, slower, real time", "slower"],
   [["ArrowLeft", "ArrowRight"], "turn gravity", "turn", "repeats"],
   [["0"], "no gravity, gravity again", "weightless"],
-  [["1", "2", "3", "4", "5"], "drag, poke, pin, add, move", "tool"],
+  [["1", "2", "3", "4", "5", "6"], "drag, poke, pin, add, erase, move", "tool"],
   [["c"], "next colouring", "colour"],
   [["v"], "velocities", "velocities"],
   [["t"], "contacts", "contacts"],
@@ -19,7 +19,7 @@ const SHORTCUTS = [
   [["?", "h"], "this sheet", "help"],
 ];
 const GESTURES = [
-  ["drag", "what the tool says: pull a circle, poke, pin, add"],
+  ["drag", "what the tool says: pull a circle, poke, pin, add, erase"],
   ["shift drag", "push circles away"],
   ["right button, alt drag, two fingers", "move the view"],
   ["wheel, pinch", "zoom"],

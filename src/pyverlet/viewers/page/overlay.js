@@ -1,6 +1,6 @@
-// What is drawn over the circles: lines of the scene, pins, velocities, contacts.
+// What is drawn over the circles: lines of the scene, what moves in it, pins, velocities, contacts.
 
-import { resizeCanvas } from "./backdrop.js";
+import { drawObstacles, resizeCanvas } from "./backdrop.js";
 import { touching } from "./contacts.js";
 import { GRID_MAX } from "./draw.js";
 
@@ -19,7 +19,7 @@ export class Overlay {
   /** `wants`: {velocities, contacts}; `colour(name)` is that of a custom property. */
   draw(shape, frame, camera, size, ratio, wants, colour) {
     const pinned = frame.grid ? pins(shape.mass) : [];
-    const busy = shape.lines.length || pinned.length || wants.velocities || wants.contacts;
+    const busy = shape.lines.length || frame.obstacles.length || pinned.length || wants.velocities || wants.contacts;
     this.contacts = this.arrows = 0;
     if (!busy && this.clean) return;
     this.clean = !busy;
@@ -28,6 +28,7 @@ export class Overlay {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, size.width, size.height);
     dashes(context, shape.lines, camera, colour("--soft"));
+    drawObstacles(context, frame.obstacles, camera, colour);
     if (!frame.grid) return;
     const place = camera.place(frame.view), sx = place.width / GRID_MAX, sy = place.height / GRID_MAX;
     const { grid } = frame, seen = (i) => grid[2 * i] && grid[2 * i + 1] && grid[2 * i] !== GRID_MAX && grid[2 * i + 1] !== GRID_MAX;

@@ -197,7 +197,8 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   function paint() {
     root.dataset.theme = dark() ? "dark" : "light";
     if (!shape) return;
-    inks.begin($("colour").value, shape, (i) => panels.within(i, shape.radius.length), dark());
+    const { number } = shape, ever = (number.at(-1) ?? 0) + 1; // circles keep their colours when others come and go
+    inks.begin($("colour").value, shape, shape.panels.length ? (i) => panels.within(i) : (i) => [number[i], ever], dark());
     if (!frame) return;
     if (frame.grid) inks.follow(frame.velocity, frame.unit, frame.status.time);
     if (frame.grid) drawCircles();

@@ -35,9 +35,9 @@ export class Panels {
   }
 
   /** The particle's number within its own panel and how many that has: alike particles of all panels get one colour. */
-  within(i, total) {
+  within(i) {
     const panel = this.panels.findLast(({ first }) => first <= i);
-    return panel ? [i - panel.first, panel.count] : [i, total];
+    return [i - panel.first, panel.count];
   }
 
   /** The longer side of what is shown of one panel, metres; `room` is the whole picture. */

@@ -12,7 +12,7 @@ export class Pointer {
     this.surface = surface;
     this.page = page;
     this.fingers = new Map(); // pointers that are down, with where they are
-    this.hand = null; // "drag", "poke", "spawn" or "move" while one is down
+    this.hand = null; // "drag", "poke", "spawn", "delete" or "move" while one is down
     this.ring = root.querySelector("#poke");
     surface.addEventListener("pointerdown", (event) => this.#down(event));
     surface.addEventListener("pointermove", (event) => this.#move(event));
@@ -79,6 +79,8 @@ export class Pointer {
       this.last = [x, y];
       send("spawn", { x, y });
     }
+    if (this.hand === "delete") send("delete", { x, y, reach: this.last ? 0 : this.#reach(event) }); // moved on, it takes what it meets
+    if (this.hand === "delete") this.last = [x, y];
     if (this.hand !== "poke") return;
     send("poke", { x, y });
     const [x0, y0, x1, y1] = camera.room, panels = shape().panels, size = panels.length ? this.page.panelSize() : Math.max(x1 - x0, y1 - y0);

@@ -7,9 +7,10 @@ export function unpack(data) {
   if (head.kind === "shape" && !head.drawnHere) {
     head.radius = new Float32Array(data, start, head.count);
     head.mass = new Float32Array(data, start + 4 * head.count, head.count);
-    head.rgb = head.coloured ? new Uint8Array(data, start + 8 * head.count, 3 * head.count) : null;
+    head.number = new Uint32Array(data, start + 8 * head.count, head.count);
+    head.rgb = head.coloured ? new Uint8Array(data, start + 12 * head.count, 3 * head.count) : null;
   } else if (head.kind === "shape") {
-    Object.assign(head, { radius: new Float32Array(0), mass: new Float32Array(0), rgb: null });
+    Object.assign(head, { radius: new Float32Array(0), mass: new Float32Array(0), number: new Uint32Array(0), rgb: null });
   } else if (head.kind === "frame") {
     const pairs = (data.byteLength - start) / (head.unit ? 8 : 4);
     head.grid = new Uint16Array(data, start, 2 * pairs);

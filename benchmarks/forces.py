@@ -1,0 +1,49 @@
+"""What a force of the user's own costs: two worlds from one start, stepped in turn, one with it and one without.
+
+`python -m benchmarks.forces`
+"""
+
+from __future__ import annotations
+
+import argparse
+from statistics import median
+from time import perf_counter
+
+import pyverlet as pv
+
+DT = 1 / 60
+
+
+@pv.force
+def swirl(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tuple[float, float]:
+    """A weak whirl about the origin, newtons."""
+    return -1e-3 * y, 1e-3 * x
+
+
+def ratio(particles: int, frames: int) -> tuple[float, float, float]:
+    """Median milliseconds of a frame without and with the force, and the median of the ratios of neighbouring frames."""
+    worlds = [pv.scenes.get("cage").world(particles=particles) for _ in range(2)]
+    worlds[1].forces.append(swirl)
+    times: list[list[float]] = [[], []]
+    for frame in range(-10, frames):
+        for k in (0, 1) if frame % 2 else (1, 0):
+            start = perf_counter()
+            worlds[k].step(DT)
+            if frame >= 0:
+                times[k].append(1e3 * (perf_counter() - start))
+    return median(times[0]), median(times[1]), median(b / a for a, b in zip(*times, strict=True))
+
+
+def main() -> None:
+    """Print one line for each number of particles."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.forces", description=__doc__)
+    parser.add_argument("--particles", type=int, nargs="+", default=[10_000, 100_000])
+    parser.add_argument("--frames", type=int, default=60, help="frames measured of each world")
+    arguments = parser.parse_args()
+    for particles in arguments.particles:
+        without, with_force, costs = ratio(particles, arguments.frames)
+        print(f"{particles:>9,} circles: {without:.2f} ms a frame without, {with_force:.2f} ms with, ratio {costs:.2f}")
+
+
+if __name__ == "__main__":
+    main()

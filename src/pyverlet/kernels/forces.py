@@ -1,0 +1,126 @@
+"""Forces on all particles at once: each kernel adds newtons to `force` (n, 2).
+
+Pinned particles are left out: no force moves them, and one that grows with mass would be infinite.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pyverlet._jit import kernel, parallel_kernel, prange
+
+
+@kernel
+def drag(force, velocity, wind, linear, quadratic):
+    """F = -(linear + quadratic |u|) u with u = v - wind; `wind` has a row for each particle, or one for all."""
+    many = wind.shape[0] > 1
+    for i in range(velocity.shape[0]):
+        k = i if many else 0
+        ux = velocity[i, 0] - wind[k, 0]
+        uy = velocity[i, 1] - wind[k, 1]
+        c = linear + quadratic * np.sqrt(ux * ux + uy * uy)
+        force[i, 0] -= c * ux
+        force[i, 1] -= c * uy
+
+
+@kernel
+def attract(force, position, inverse_mass, x, y, strength, softening):
+    """F = m strength d / (|d|^2 + softening^2)^(3/2), d from the particle to (x, y); none on a particle at that very point."""
+    zero = strength - strength
+    one = force.dtype.type(1)
+    for i in range(position.shape[0]):
+        dx = x - position[i, 0]
+        dy = y - position[i, 1]
+        square = dx * dx + dy * dy + softening * softening
+        if square > zero and inverse_mass[i] > zero:
+            pull = strength / (square * np.sqrt(square)) * (one / inverse_mass[i])
+            force[i, 0] += pull * dx
+            force[i, 1] += pull * dy
+
+
+@parallel_kernel
+def gravitate(force, position, mass, slot, strength, softening):
+    """Every pair of the particles in these slots attracts: F = strength m_i m_j d / (|d|^2 + softening^2)^(3/2).
+
+    Each particle sums over all others in the order of `slot`, in float64: one writer each, so the same bits on any threads.
+    """
+    square_of_softening = np.float64(softening) * np.float64(softening)
+    for k in prange(slot.shape[0]):
+        i = slot[k]
+        m = np.float64(mass[i])
+        if m < np.inf:
+            x = np.float64(position[i, 0])
+            y = np.float64(position[i, 1])
+            fx = fy = 0.0
+            for other in range(slot.shape[0]):
+                j = slot[other]
+                dx = np.float64(position[j, 0]) - x
+                dy = np.float64(position[j, 1]) - y
+                square = dx * dx + dy * dy + square_of_softening
+                if square > 0.0 and mass[j] < np.inf:
+                    pull = np.float64(mass[j]) / (square * np.sqrt(square))
+                    fx += pull * dx
+                    fy += pull * dy
+            force[i, 0] += strength * m * fx
+            force[i, 1] += strength * m * fy
+
+
+@kernel
+def gravitational_potential(position, mass, softening):
+    """Sum over pairs of -m_i m_j / sqrt(|d|^2 + softening^2), in float64; to be multiplied by the strength."""
+    total = 0.0
+    for i in range(mass.shape[0]):
+        for j in range(i):
+            dx = position[j, 0] - position[i, 0]
+            dy = position[j, 1] - position[i, 1]
+            square = dx * dx + dy * dy + softening * softening
+            if square > 0.0 and mass[i] < np.inf and mass[j] < np.inf:
+                total -= mass[i] * mass[j] / np.sqrt(square)
+    return total
+
+
+@kernel
+def call_serial(function, force, position, velocity, mass, t):
+    """Add what the user's `function(x, y, vx, vy, mass, t)` returns; for how many particles that is not finite.
+
+    `function` is a pointer of a fixed type: another one costs no compiling here. Handing it on to an inner function that both
+    loops share made each call five times as slow.
+    """
+    wrong = 0
+    for i in range(mass.shape[0]):
+        m = np.float64(mass[i])
+        if m < np.inf:
+            x, y = np.float64(position[i, 0]), np.float64(position[i, 1])
+            vx, vy = np.float64(velocity[i, 0]), np.float64(velocity[i, 1])
+            fx, fy = function(x, y, vx, vy, m, t)
+            force[i, 0] += fx
+            force[i, 1] += fy
+            wrong += int(not np.isfinite(fx + fy) and np.isfinite(x + y + vx + vy))
+    return wrong
+
+
+@parallel_kernel
+def call_parallel(function, force, position, velocity, mass, t):
+    """The same on many threads: each element has one writer, and a sum of whole numbers does not depend on its order."""
+    wrong = 0
+    for i in prange(mass.shape[0]):
+        m = np.float64(mass[i])
+        if m < np.inf:
+            x, y = np.float64(position[i, 0]), np.float64(position[i, 1])
+            vx, vy = np.float64(velocity[i, 0]), np.float64(velocity[i, 1])
+            fx, fy = function(x, y, vx, vy, m, t)
+            force[i, 0] += fx
+            force[i, 1] += fy
+            wrong += int(not np.isfinite(fx + fy) and np.isfinite(x + y + vx + vy))
+    return wrong
+
+
+@kernel
+def call_potential(function, position, mass):
+    """Sum of the user's `function(x, y, mass)` over all free particles, J."""
+    total = 0.0
+    for i in range(mass.shape[0]):
+        m = np.float64(mass[i])
+        if m < np.inf:
+            total += function(np.float64(position[i, 0]), np.float64(position[i, 1]), m)
+    return total

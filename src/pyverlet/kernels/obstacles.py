@@ -1,0 +1,309 @@
+"""Obstacles: every shape is made of rounded segments, which circles meet on their way through a substep.
+
+In the frame of a segment, its start is the origin and its end (length, 0). A circle's centre travels from where the substep
+began, seen from the segment of then, to where it ended, seen from the segment of now. It meets the segment where that way comes
+within reach = rounding + radius: over its face, or about an end. Whoever travels from one side of a line to the other crosses it,
+however fast: nobody is seen for the first time behind it.
+
+Where segments join, an end belongs to the neighbour as long as the centre stands over the neighbour's face: a circle that rolls
+over the joint of a floor does not feel it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pyverlet._jit import kernel, parallel_kernel, prange
+from pyverlet.kernels.bounds import meet
+
+BODY = np.dtype([(name, np.float64) for name in ("x", "y", "angle", "vx", "vy", "spin")])
+"""Where an obstacle's pivot is at the beginning of a frame, m and rad, and how it moves, m/s and rad/s."""
+
+SEGMENT = np.dtype(
+    [
+        ("body", np.int64),
+        ("first", np.int64), ("faces", np.int64),  # the faces of its polygon; none if it is no part of one
+        ("around", np.int64),  # 1: its surface runs counter-clockwise around it; 0: along it, on both sides
+        ("lx", np.float64), ("ly", np.float64), ("lc", np.float64), ("ls", np.float64),  # start and direction, as built
+        ("length", np.float64), ("rounding", np.float64), ("inner", np.float64),  # inner: who is inside is as near as this, m
+        ("before_x", np.float64), ("before_y", np.float64),  # from its start to the neighbour's start, in its own frame; or 0
+        ("after_x", np.float64), ("after_y", np.float64),  # from its end to the neighbour's end
+        ("restitution", np.float64), ("friction", np.float64), ("belt", np.float64),
+        ("ax", np.float64), ("ay", np.float64), ("c", np.float64), ("s", np.float64),  # start and direction, beginning of substep
+        ("bx", np.float64), ("by", np.float64), ("bc", np.float64), ("bs", np.float64),  # the same at its end
+        ("sweep", np.float64),  # what any of its points travels in the substep at most, m
+    ]
+)  # fmt: skip
+"""A rounded segment of an obstacle. Metres."""
+
+NEVER = 2.0
+"""A time on the way, from 0 to 1, that means no meeting."""
+
+MEETINGS = 4
+"""Times one circle may meet segments in a substep; who has still not come through waits where it last met one."""
+
+SETTLED = 1e-5
+"""Part of the radius: a second look within a substep takes less depth than this for rounding."""
+
+
+@kernel
+def place(segments, bodies, time, h):
+    """Where the segments stand `time` seconds into the frame, and h later."""
+    for k in range(segments.shape[0]):
+        segment, body = segments[k], bodies[segments[k].body]
+        for late in range(2):
+            t = time + h * late
+            turned = body.angle + body.spin * t
+            c, s = np.cos(turned), np.sin(turned)
+            x = body.x + body.vx * t + c * segment.lx - s * segment.ly
+            y = body.y + body.vy * t + s * segment.lx + c * segment.ly
+            along, across = c * segment.lc - s * segment.ls, s * segment.lc + c * segment.ls
+            if late == 0:
+                segment.ax, segment.ay, segment.c, segment.s = x, y, along, across
+            else:
+                segment.bx, segment.by, segment.bc, segment.bs = x, y, along, across
+        arm = np.hypot(segment.lx, segment.ly) + segment.length
+        segment.sweep = h * (np.hypot(body.vx, body.vy) + abs(body.spin) * arm)
+
+
+@kernel
+def bin_segments(segments, reach, x0, y0, cell, columns, rows, start, entries):
+    """List in every cell the segments that may be met from it; returns how many entries there are, also beyond the room."""
+    start[:] = 0
+    for fill in range(2):
+        for k in range(segments.shape[0]):
+            segment = segments[k]
+            far = reach + segment.rounding + segment.inner + segment.sweep
+            x, y = segment.bx, segment.by
+            dx, dy = segment.bc * segment.length, segment.bs * segment.length
+            low = max(int(np.floor((min(y, y + dy) - far - y0) / cell)), 0)
+            high = min(int(np.floor((max(y, y + dy) + far - y0) / cell)), rows - 1)
+            for row in range(low, high + 1):
+                # The part of the segment that is within reach of the row.
+                s0, s1 = 0.0, 1.0
+                if dy != 0.0:
+                    a, b = (y0 + row * cell - far - y) / dy, (y0 + (row + 1) * cell + far - y) / dy
+                    s0, s1 = max(min(a, b), 0.0), min(max(a, b), 1.0)
+                xa, xb = x + s0 * dx, x + s1 * dx
+                left = max(int(np.floor((min(xa, xb) - far - x0) / cell)), 0)
+                right = min(int(np.floor((max(xa, xb) + far - x0) / cell)), columns - 1)
+                for column in range(left, right + 1):
+                    c = row * columns + column
+                    if fill:
+                        start[c] -= 1
+                        entries[start[c]] = k
+                    else:
+                        start[c] += 1
+        if fill == 0:
+            for c in range(columns * rows):
+                start[c + 1] += start[c]
+            if start[columns * rows] > entries.shape[0]:
+                return start[columns * rows]
+    return start[columns * rows]
+
+
+@kernel
+def _round_end(x0, y0, dx, dy, reach):
+    """When the way (x0, y0) + s (dx, dy) comes within reach of the origin."""
+    a = dx * dx + dy * dy
+    b = x0 * dx + y0 * dy
+    c = x0 * x0 + y0 * y0 - reach * reach
+    root = b * b - a * c
+    if b >= 0.0 or root < 0.0 or a == 0.0:
+        return NEVER
+    s = (-b - np.sqrt(root)) / a
+    return s if 0.0 <= s <= 1.0 else NEVER
+
+
+@kernel
+def _on_the_way(segment, x0, y0, x1, y1, reach):
+    """(time, normal x, normal y, point x) of the first meeting of a way with a segment, in its frame; the time may be NEVER."""
+    length = segment.length
+    side = 1.0 if y0 >= 0.0 else -1.0
+    near = min(max(x0, 0.0), length)
+    gap = np.hypot(x0 - near, y0)
+    # Before the start and beyond the end: does the neighbour have that end?
+    left = x0 < 0.0 and x0 * segment.before_x + y0 * segment.before_y > 0.0
+    right = x0 > length and (x0 - length) * segment.after_x + y0 * segment.after_y > 0.0
+    if gap < reach and not (left or right):
+        if near == x0 and length > 0.0:
+            return 0.0, 0.0, side, near
+        if gap > 0.0:
+            return 0.0, (x0 - near) / gap, y0 / gap, near
+        return 0.0, 0.0, 1.0, near
+    dx, dy = x1 - x0, y1 - y0
+    time, nx, ny, point = NEVER, 0.0, side, 0.0
+    if side * dy < 0.0 and length > 0.0:
+        s = max((reach - side * y0) / (side * dy), 0.0)
+        x = x0 + s * dx
+        if s <= 1.0 and 0.0 <= x <= length:
+            time, point = s, x
+        else:
+            s = -y0 / dy  # crosses the line itself, having come in sideways
+            x = x0 + s * dx
+            if s <= 1.0 and 0.0 <= x <= length:
+                time, point = s, x
+    for end in range(2):
+        at = length * end
+        s = _round_end(x0 - at, y0, dx, dy, reach)
+        if s < time:
+            x, y = x0 + s * dx - at, y0 + s * dy
+            beyond = x <= 0.0 if end == 0 else x >= 0.0
+            if end == 0:
+                owned = x * segment.before_x + y * segment.before_y > 0.0
+            else:
+                owned = x * segment.after_x + y * segment.after_y > 0.0
+            if (beyond or length == 0.0) and not owned:
+                time, nx, ny, point = s, x / reach, y / reach, at
+    return time, nx, ny, point
+
+
+@kernel
+def _inside(segments, segment, x, y):
+    """Whether (x, y), at the beginning of the substep, is inside this face's polygon, whose faces run counter-clockwise."""
+    for k in range(segment.first, segment.first + segment.faces):
+        face = segments[k]
+        if face.c * (y - face.ay) - face.s * (x - face.ax) <= 0.0:
+            return False
+    return True
+
+
+@kernel
+def _first_meeting(
+    segments, entries, low, high, fresh, px, py, qx, qy, radius, best, best_gap, best_depth, best_nx, best_ny, best_k
+):
+    """The earliest meeting of the way from p to q with the segments of one cell, or what was the best before.
+
+    `fresh`: p belongs to the beginning of the substep; otherwise to its end, as after a first meeting.
+    Returns (time, distance, depth, world normal x, y, segment). A time below 0 says that p is inside a polygon.
+    """
+    travel = np.hypot(qx - px, qy - py)
+    for entry in range(low, high):
+        k = entries[entry]
+        segment = segments[k]
+        ox, oy = qx - segment.bx, qy - segment.by
+        x1, y1 = segment.bc * ox + segment.bs * oy, segment.bc * oy - segment.bs * ox
+        reach = segment.rounding + radius
+        past = x1 - min(max(x1, 0.0), segment.length)
+        far = reach + travel + segment.sweep + segment.inner
+        if past * past + y1 * y1 > far * far:
+            continue
+        c, s = (segment.c, segment.s) if fresh else (segment.bc, segment.bs)
+        ox, oy = (px - segment.ax, py - segment.ay) if fresh else (px - segment.bx, py - segment.by)
+        x0, y0 = c * ox + s * oy, c * oy - s * ox
+        if fresh and segment.faces > 0 and y0 > 0.0 and _inside(segments, segment, px, py):
+            # The nearest face lets it out.
+            time, nx, ny, gap = -1.0, 0.0, -1.0, y0
+            depth = reach + y1
+        else:
+            time, nx, ny, point = _on_the_way(segment, x0, y0, x1, y1, reach)
+            depth = reach - (x1 - point) * nx - y1 * ny
+            gap = np.hypot(x0 - point, y0)
+        least = 0.0 if fresh else SETTLED * radius
+        if time < NEVER and depth > least and (time < best or (time == best and gap < best_gap)):
+            best, best_gap, best_depth, best_k = time, gap, depth, k
+            best_nx, best_ny = segment.bc * nx - segment.bs * ny, segment.bs * nx + segment.bc * ny
+    return best, best_gap, best_depth, best_nx, best_ny, best_k
+
+
+@kernel
+def _search(segments, x0, y0, cell, columns, rows, start, entries, fresh, px, py, qx, qy, radius):
+    """The earliest meeting of the way from p to q with any segment; as `_first_meeting`."""
+    best, gap, depth, nx, ny, k = NEVER, 0.0, 0.0, 0.0, 0.0, -1
+    dx, dy = qx - px, qy - py
+    # The part of the way that is over the grid, in pieces no longer than a cell; the middle of a piece stands for it.
+    s0, s1 = 0.0, 1.0
+    for axis in range(2):
+        p, d = (px - x0, dx) if axis == 0 else (py - y0, dy)
+        size = cell * (columns if axis == 0 else rows)
+        if d != 0.0:
+            a, b = -p / d, (size - p) / d
+            s0, s1 = max(s0, min(a, b)), min(s1, max(a, b))
+        elif not 0.0 <= p <= size:
+            return best, gap, depth, nx, ny, k
+    if not s0 <= s1:
+        return best, gap, depth, nx, ny, k
+    pieces = int((s1 - s0) * np.hypot(dx, dy) / cell) + 1
+    for piece in range(pieces):
+        s = s0 + (piece + 0.5) / pieces * (s1 - s0)
+        column = min(max(int((px + s * dx - x0) / cell), 0), columns - 1)
+        row = min(max(int((py + s * dy - y0) / cell), 0), rows - 1)
+        c = row * columns + column
+        best, gap, depth, nx, ny, k = _first_meeting(
+            segments, entries, start[c], start[c + 1], fresh, px, py, qx, qy, radius, best, gap, depth, nx, ny, k
+        )
+    return best, gap, depth, nx, ny, k
+
+
+@kernel
+def _travel(
+    i, segments, bodies, until, x0, y0, cell, columns, rows, start, entries, before,
+    position, velocity, acceleration, spin, radius, inverse_mass, resting, h, lag, rest_speed,
+):  # fmt: skip
+    """Circle i goes its way through a substep and meets what there is to meet."""
+    real = position.dtype.type
+    px, py = np.float64(before[i, 0]), np.float64(before[i, 1])
+    r = np.float64(radius[i])
+    for number in range(MEETINGS + 1):
+        qx, qy = np.float64(position[i, 0]), np.float64(position[i, 1])
+        if not np.isfinite(px + py + qx + qy):
+            return
+        time, _, depth, nx, ny, k = _search(segments, x0, y0, cell, columns, rows, start, entries, number == 0, px, py, qx, qy, r)
+        if k < 0:
+            return
+        if number == MEETINGS:
+            position[i, 0], position[i, 1] = real(px), real(py)
+            return
+        segment, body = segments[k], bodies[segments[k].body]
+        # What the surface does where they touch.
+        touch_x, touch_y = qx - (r - depth) * nx - body.x - until * body.vx, qy - (r - depth) * ny - body.y - until * body.vy
+        belt_x, belt_y = -ny * segment.belt, nx * segment.belt
+        if segment.around == 0 and nx * segment.bs - ny * segment.bc < 0.0:
+            belt_x, belt_y = -belt_x, -belt_y
+        wx, wy = real(body.vx - body.spin * touch_y + belt_x), real(body.vy + body.spin * touch_x + belt_y)
+        velocity[i, 0] -= wx
+        velocity[i, 1] -= wy
+        meet(i, real(nx), real(ny), real(depth), position, velocity, acceleration, spin, radius, inverse_mass, resting,
+             h, lag, real(segment.restitution), real(segment.friction), rest_speed)  # fmt: skip
+        velocity[i, 0] += wx
+        velocity[i, 1] += wy
+        if time < 0.0:  # it was inside: the way so far does not count
+            px, py = np.float64(position[i, 0]), np.float64(position[i, 1])
+        elif number == 0:
+            # The place of the meeting, taken along to where the segment is at the end of the substep.
+            ax, ay = px - segment.ax, py - segment.ay
+            bx, by = qx - segment.bx, qy - segment.by
+            along, across = segment.c * ax + segment.s * ay, segment.c * ay - segment.s * ax
+            along += time * (segment.bc * bx + segment.bs * by - along)
+            across += time * (segment.bc * by - segment.bs * bx - across)
+            px = segment.bx + segment.bc * along - segment.bs * across
+            py = segment.by + segment.bs * along + segment.bc * across
+        else:
+            px, py = px + time * (qx - px), py + time * (qy - py)
+
+
+@kernel
+def _alone(px, py, qx, qy, x0, y0, cell, columns, rows, start):
+    """Whether the way is short and there is nothing near its middle: true for most circles, most of the time."""
+    if not abs(qx - px) + abs(qy - py) < cell:
+        return False
+    column = (0.5 * (px + qx) - x0) / cell
+    row = (0.5 * (py + qy) - y0) / cell
+    if not (0.0 <= column < columns and 0.0 <= row < rows):
+        return True
+    c = int(row) * columns + int(column)
+    return start[c] == start[c + 1]
+
+
+@parallel_kernel
+def collide(
+    segments, bodies, until, x0, y0, cell, columns, rows, start, entries, before,
+    position, velocity, acceleration, spin, radius, inverse_mass, resting, h, lag, rest_speed,
+):  # fmt: skip
+    """All circles, from their places `before` the substep (n, 2) to `position`; `until`: seconds into the frame at its end."""
+    for i in prange(position.shape[0]):
+        if inverse_mass[i] > 0 and not _alone(
+            before[i, 0], before[i, 1], position[i, 0], position[i, 1], x0, y0, cell, columns, rows, start
+        ):
+            _travel(i, segments, bodies, until, x0, y0, cell, columns, rows, start, entries, before, position, velocity,
+                    acceleration, spin, radius, inverse_mass, resting, h, lag, rest_speed)  # fmt: skip

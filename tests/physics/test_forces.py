@@ -1,0 +1,229 @@
+"""Every force against its closed form, and every potential against its force."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet.state import Slots, State
+
+DT, SUBSTEPS = 1 / 60, 8
+H = DT / SUBSTEPS
+
+
+def lone_world(force: Any, *, gravity: tuple[float, float] = (0, 0), **options: Any) -> pv.World:
+    world = pv.World(gravity=gravity, collisions=None, dtype=np.float64, substeps=SUBSTEPS, **options)
+    world.forces.append(force)
+    return world
+
+
+@pytest.mark.parametrize(
+    ("drag", "terminal"),
+    [
+        (pv.Drag(linear=0.5), 2.0 * 9.81 / 0.5),  # m g = k v
+        (pv.Drag(quadratic=0.5), np.sqrt(2.0 * 9.81 / 0.5)),  # m g = c v^2
+        (pv.Drag(linear=1.0, quadratic=0.5), -1 + np.sqrt(1 + 2 * 2.0 * 9.81 / 0.5 * 0.5)),  # c v^2 + k v - m g = 0
+    ],
+)
+def test_terminal_velocity(drag: pv.Drag, terminal: float) -> None:
+    world = lone_world(drag, gravity=(0, -9.81))
+    ball = world.add(position=(0, 0), mass=2.0)
+    world.run(seconds=120, dt=DT)
+    assert ball.velocity[0] == pytest.approx([0, -terminal], rel=1e-9)
+
+
+def test_linear_drag_slows_exponentially() -> None:
+    # v = v0 exp(-k t / m); the method's order is 2, so the error stays below (k h / m)^2 of v0.
+    world = lone_world(pv.Drag(linear=3.0))
+    ball = world.add(position=(0, 0), velocity=(4, -3), mass=1.5)
+    world.run(seconds=1, dt=DT)
+    assert ball.velocity[0] == pytest.approx(np.array([4, -3]) * np.exp(-2.0), abs=5 * (2 * H) ** 2)
+
+
+def test_quadratic_drag_slows_as_one_over_t() -> None:
+    # v = v0 / (1 + c v0 t / m)
+    world = lone_world(pv.Drag(quadratic=0.3))
+    ball = world.add(position=(0, 0), velocity=(5, 0), mass=1.5)
+    world.run(seconds=1, dt=DT)
+    assert ball.velocity[0] == pytest.approx([5 / (1 + 0.3 * 5 / 1.5), 0], abs=5 * (H * 1.0) ** 2)
+
+
+def test_the_wind_takes_everything_along() -> None:
+    world = lone_world(pv.Wind((3, -1), linear=2.0, quadratic=0.5))
+    balls = world.add(position=[(0, 0), (5, 5)], velocity=[(0, 0), (-9, 2)], mass=[1.0, 2.0])
+    world.run(seconds=30, dt=DT)
+    assert balls.velocity == pytest.approx(np.array([(3, -1), (3, -1)]), rel=1e-9)
+
+
+def test_a_field_of_wind_has_a_velocity_at_each_place() -> None:
+    # A shear flow, u = (y, 0): what drifts with it at its own height moves at that speed.
+    world = lone_world(pv.Wind(lambda x, y, t: (y, 0.0), linear=50.0))
+    balls = world.add(position=[(0, 0), (0, 1), (0, 2)], radius=0.1)
+    world.run(seconds=1, dt=DT)
+    assert balls.velocity[:, 0] == pytest.approx([0, 1, 2], abs=1e-6)
+    late = lone_world(pv.Wind(lambda x, y, t: (np.where(t >= 0.5, 1.0, 0.0), 0.0), linear=50.0))
+    ball = late.add(position=(0, 0))
+    late.run(seconds=0.4, dt=DT)
+    assert ball.velocity[0, 0] == 0
+    late.run(seconds=0.4, dt=DT)
+    assert ball.velocity[0, 0] == pytest.approx(1, abs=1e-6)
+
+
+@pytest.mark.parametrize("axis", [1.0, 2.0, 4.0])
+def test_keplers_third_law(axis: float) -> None:
+    # T^2 = 4 pi^2 a^3 / (G M), for a = 1, 2, 4 and an eccentricity of 0.3. Yoshida's order 4 leaves (2 pi h / T)^4.
+    strength, e = 10.0, 0.3
+    world = lone_world(pv.Attractor(center=(1, 2), strength=strength), integrator=pv.Yoshida4())
+    apart, speed = axis * (1 + e), np.sqrt(strength / axis * (1 - e) / (1 + e))
+    planet = world.add(position=(1 + apart, 2), velocity=(0, speed), mass=3.0)
+    before = world.energy().total
+    assert before == pytest.approx(-3.0 * strength / (2 * axis))  # E = -G M m / 2a
+    period = 2 * np.pi * np.sqrt(axis**3 / strength)
+    frames = 200
+    world.run(seconds=period, dt=period / frames)
+    assert planet.position[0] == pytest.approx([1 + apart, 2], abs=1e-5 * apart)
+    assert world.energy().total == pytest.approx(before, rel=1e-7)
+
+
+def test_two_bodies_circle_their_common_centre() -> None:
+    # T = 2 pi sqrt(d^3 / G (m1 + m2)) for the distance d.
+    strength, masses, d = 2.0, np.array([3.0, 1.0]), 4.0
+    period = 2 * np.pi * np.sqrt(d**3 / (strength * masses.sum()))
+    x = d * np.array([-masses[1], masses[0]]) / masses.sum()
+    world = pv.World(gravity=(0, 0), collisions=None, dtype=np.float64, integrator=pv.Yoshida4())
+    stars = world.add(
+        position=np.column_stack((x, 0 * x)), velocity=np.column_stack((0 * x, 2 * np.pi / period * x)), mass=masses
+    )
+    world.forces.append(pv.Gravitation(stars, strength=strength))
+    start, energy = stars.position.copy(), world.energy().total
+    assert energy == pytest.approx(-strength * masses.prod() / (2 * d))
+    world.run(seconds=period, dt=period / 200)
+    assert stars.position == pytest.approx(start, abs=1e-6)
+    assert world.energy().total == pytest.approx(energy, rel=1e-9)
+
+
+def cluster() -> pv.World:
+    rng = np.random.default_rng(3)
+    world = pv.World(gravity=(0, 0), collisions=None, dtype=np.float64, integrator=pv.VelocityVerlet())
+    world.add(position=rng.normal(0, 5, (30, 2)))  # they do not belong to it
+    group = world.add(position=rng.normal(0, 5, (40, 2)), velocity=rng.normal(0, 1, (40, 2)), mass=rng.uniform(0.5, 2, 40))
+    world.forces.append(pv.Gravitation(group, strength=0.5, softening=0.2))
+    return world
+
+
+def test_gravitation_conserves_momentum_angular_momentum_and_energy() -> None:
+    world = cluster()
+    momentum, turning, energy = world.momentum(), world.angular_momentum(), world.energy().total
+    strangers = world.position[:30].copy()
+    world.run(seconds=2, dt=DT)
+    assert world.momentum() == pytest.approx(momentum, abs=1e-12)
+    assert world.angular_momentum() == pytest.approx(turning, abs=1e-11 * abs(turning) + 1e-11)
+    assert world.energy().total == pytest.approx(energy, rel=1e-5)  # order 2: (w h)^2 with w^2 = G m / s^3
+    assert world.position[:30].tolist() == strangers.tolist()
+
+
+THREADS = """
+import json, sys
+sys.path.insert(0, sys.argv[1])
+import numpy as np, pyverlet as pv
+hashes = []
+for threads in (1, 2, 4, 8):
+    rng = np.random.default_rng(3)
+    world = pv.World(gravity=(0, 0), threads=threads)
+    world.add(position=rng.uniform(-100, 100, (2500, 2)), radius=0.3)
+    world.forces.append(pv.Gravitation(strength=0.01, softening=0.5))
+    world.run(seconds=0.2, dt=1 / 60)
+    hashes.append(world.state_hash())
+json.dump(hashes, sys.stdout)
+"""
+
+
+def test_gravitation_has_the_same_bits_on_any_number_of_threads() -> None:
+    run = subprocess.run(
+        [sys.executable, "-c", THREADS, os.path.dirname(os.path.dirname(pv.__file__))],  # noqa: PTH120
+        env={**os.environ, "NUMBA_NUM_THREADS": "8"}, capture_output=True, text=True, check=True, timeout=300,
+    )  # fmt: skip
+    hashes = json.loads(run.stdout)
+    assert len(hashes) == 4
+    assert len(set(hashes)) == 1
+
+
+def test_a_constant_force_on_a_group() -> None:
+    world = pv.World(gravity=(0, 0), collisions=None, dtype=np.float64)
+    world.add(position=(0, 9))
+    pushed = world.add(position=(0, 0), mass=2.0)
+    world.forces.append(pv.ConstantForce((6, -2), group=pushed))
+    world.run(seconds=1, dt=DT)
+    # x = F t^2 / 2 m
+    assert world.position == pytest.approx(np.array([(0, 9), (1.5, -0.5)]), abs=1e-12)
+    assert world.energy().total == pytest.approx(0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        pv.Attractor(center=(0.3, -0.2), strength=2.0),
+        pv.Attractor(center=(0.3, -0.2), strength=-2.0, softening=0.7),
+        pv.PointSpring(center=(0.3, -0.2), stiffness=1.5),
+        pv.ConstantForce((1, -2)),
+        pv.Gravitation(strength=0.7, softening=0.1),
+    ],
+    ids=lambda law: type(law).__name__,
+)
+def test_a_force_is_minus_the_gradient_of_its_potential(law: Any) -> None:
+    rng = np.random.default_rng(0)
+    world = lone_world(law)
+    world.add(position=rng.normal(0, 1, (5, 2)), mass=[1, 2, 3, 4, np.inf])
+    slots = Slots(np.dtype(float))
+    slots.gather(world._state)
+    law.apply(slots, 0.0)
+    step = 1e-6
+    for particle in range(4):
+        for axis in range(2):
+            values = []
+            for sign in (-1, 1):
+                world.position[particle, axis] += sign * step
+                values.append(world.energy().potential)
+                world.position[particle, axis] -= sign * step
+            # A central difference is off by step^2 f''' / 6, and by rounding / step.
+            assert slots.force[particle, axis] == pytest.approx((values[0] - values[1]) / (2 * step), abs=1e-7)
+
+
+def test_who_is_at_the_centre_or_pinned_feels_nothing() -> None:
+    for law in (pv.Attractor(strength=1.0), pv.Gravitation(strength=1.0)):
+        world = lone_world(law)
+        balls = world.add(position=[(0, 0), (0, 0), (1, 0)], mass=[1.0, np.inf, np.inf])
+        world.run(seconds=0.5, dt=DT)
+        assert balls.position.tolist() == [[0, 0], [0, 0], [1, 0]]
+        assert np.isfinite(world.energy().total)
+        assert isinstance(world._state, State)
+
+
+BAD: dict[str, tuple[Any, str]] = {
+    "drag": (lambda: pv.Drag(linear=-1), r"linear is -1; allowed is a finite number of at least 0"),
+    "wind": (lambda: pv.Wind((1, np.nan)), r"velocity is \(1.0, nan\)"),
+    "attractor": (lambda: pv.Attractor(strength=np.inf), r"strength is inf"),
+    "softening": (lambda: pv.Gravitation(strength=1, softening=-1), r"softening is -1"),
+    "constant": (lambda: pv.ConstantForce(3), r"newtons is 3; allowed are two numbers"),  # type: ignore[arg-type]
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_gets_one_sentence(case: str) -> None:
+    act, says = BAD[case]
+    with pytest.raises(pv.InputError, match=says):
+        act()
+
+
+def test_a_wind_of_the_wrong_shape_says_so() -> None:
+    world = lone_world(pv.Wind(lambda x, y, t: np.zeros(3), linear=1.0))
+    world.add(position=[(0, 0), (1, 1)])
+    with pytest.raises(pv.InputError, match=r"velocity of the wind .* two components, each a number or an array of shape \(2,\)"):
+        world.step(DT)

@@ -1,0 +1,352 @@
+"""Obstacles: exact bounces, no leaks at any speed, belts and moving walls, against closed forms."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import pyverlet as pv
+
+DT, SUBSTEPS = 1 / 60, 8
+H = DT / SUBSTEPS
+R = 0.25
+
+
+def world_with(*obstacles: pv.Obstacle, gravity: tuple[float, float] = (0, -9.81), **options: Any) -> pv.World:
+    world = pv.World(gravity=gravity, substeps=SUBSTEPS, **{"dtype": np.float64, **options})
+    world.obstacles.extend(obstacles)
+    return world
+
+
+FLOORS: dict[str, Callable[[float], pv.Obstacle]] = {
+    "segment": lambda e: pv.Segment((-1, 0), (1, 0), restitution=e),
+    "segment from below": lambda e: pv.Segment((1, 0), (-1, 0), restitution=e),
+    "chain": lambda e: pv.Chain([(-1, 2), (-1, 0), (1, 0), (1, 2)], restitution=e),
+    "joint": lambda e: pv.Chain([(-1, 0), (0, 0), (1, 0)], restitution=e),
+    "capsule": lambda e: pv.Capsule((-1, -0.2), (1, -0.2), radius=0.2, restitution=e),
+    "disc": lambda e: pv.Disc((0, -0.7), 0.7, restitution=e),
+    "polygon": lambda e: pv.Polygon([(-1, -1), (1, -1), (1, 0), (-1, 0)], restitution=e),
+    "clockwise polygon": lambda e: pv.Polygon([(-1, 0), (1, 0), (0, -0.1)], restitution=e),
+    "corner": lambda e: pv.Polygon([(-1, -1), (1, -1), (0, 0)], restitution=e),
+    "end": lambda e: pv.Segment((0, -3), (0, 0), restitution=e),
+}
+
+
+@pytest.mark.parametrize("shape", FLOORS)
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+def test_the_rebound_is_e_squared_of_the_drop(shape: str, e: float) -> None:
+    drop = 1.3
+    world = world_with(FLOORS[shape](e))
+    ball = world.add(position=(0, R + drop), radius=R)
+    # On paper: down in t0 = sqrt(2 H / g), up again in e t0. Then it is at e^2 H.
+    down = np.sqrt(2 * drop / 9.81)
+    apex, previous = 0.0, 0.0
+    for _ in range(round((1 + e) * down / DT) + 3):
+        world.step(DT)
+        y = float(ball.position[0, 1]) - R
+        if world.time > down + DT:
+            apex = max(apex, y)
+        previous = y
+    assert ball.position[0, 0] == pytest.approx(0, abs=1e-12)
+    # A frame may miss the top by g (dt / 2)^2 / 2.
+    assert apex == pytest.approx(e * e * drop, abs=9.81 * DT**2 / 8 + 1e-9)
+    if e == 1.0:
+        assert world.energy().total == pytest.approx(9.81 * (R + drop), rel=1e-12)
+    if e == 0.0:
+        assert previous == pytest.approx(0, abs=1e-12)
+
+
+def test_a_disc_reflects_by_the_angle_of_its_surface() -> None:
+    # Elastic, off centre: the normal is the line of centres at the moment of impact, sin(a) = b / (R + r).
+    b, reach = 0.3, 1.0 + R
+    world = world_with(pv.Disc((0, 0), 1.0, restitution=1.0), gravity=(0, 0))
+    ball = world.add(position=(-5, b), velocity=(7, 0), radius=R)
+    world.run(seconds=1.2, dt=DT)
+    turned = np.pi - 2 * np.arcsin(b / reach)
+    assert ball.velocity[0] == pytest.approx(7 * np.array([np.cos(turned), np.sin(turned)]), abs=1e-9)
+
+
+def test_joints_of_a_floor_are_not_felt() -> None:
+    x = np.linspace(-1, 30, 100)
+    world = world_with(pv.Chain(np.column_stack((x, 0 * x)), restitution=0.5))
+    ball = world.add(position=(0, R), velocity=(9, 0), radius=R)
+    for _ in range(150):
+        world.step(DT)
+        assert ball.position[0, 1] == pytest.approx(R, abs=1e-12)
+    assert ball.velocity[0] == pytest.approx([9, 0], abs=1e-12)
+    assert ball.position[0, 0] == pytest.approx(9 * 2.5)
+
+
+def test_rolling_down_a_slope() -> None:
+    # a = g sin / (1 + I / m r^2) = 2/3 g sin for a disc that rolls; it does up to tan <= 3 mu.
+    angle = 0.3
+    along = np.array([np.cos(angle), -np.sin(angle)])
+    world = world_with(pv.Chain([-along, 20 * along, 90 * along], friction=0.5))
+    ball = world.add(position=R * np.array([np.sin(angle), np.cos(angle)]), radius=R)
+    world.run(seconds=2, dt=DT)
+    speed = 2 / 3 * 9.81 * np.sin(angle) * 2
+    assert ball.velocity[0] == pytest.approx(speed * along, rel=2 * H)
+    assert ball.spin[0] == pytest.approx(-speed / R, rel=2 * H)
+
+
+# ---- nobody leaks ---------------------------------------------------------------------------------------------------------
+
+
+def inside(points: Any, position: Any) -> Any:
+    """Even-odd rule, in NumPy."""
+    a, b = points, np.roll(points, -1, axis=0)
+    x, y = position[:, 0, None], position[:, 1, None]
+    crosses = ((a[:, 1] <= y) != (b[:, 1] <= y)) & (
+        x < a[:, 0] + (y - a[:, 1]) / (b[:, 1] - a[:, 1] + 1e-300) * (b[:, 0] - a[:, 0])
+    )
+    return crosses.sum(axis=1) % 2 == 1
+
+
+@pytest.mark.parametrize("e", [0.0, 1.0])
+@pytest.mark.parametrize("radii_a_substep", [0.3, 5, 100])
+def test_a_closed_chain_is_a_closed_room(radii_a_substep: float, e: float) -> None:
+    # A star with points as sharp as 30 degrees, pinned at no side by a boundary: whoever leaves is gone.
+    rng = np.random.default_rng(1)
+    angle = np.arange(14) * np.pi / 7
+    size = np.where(np.arange(14) % 2, 4.0, 9.0)
+    room = np.column_stack((size * np.cos(angle), size * np.sin(angle)))
+    world = world_with(pv.Chain(room, closed=True, restitution=e, friction=0.2), dtype=np.float32)
+    heading = rng.uniform(0, 2 * np.pi, 60)
+    speed = radii_a_substep * 0.1 / H
+    centres = np.column_stack([g.ravel() for g in np.meshgrid(np.linspace(-2, 2, 10), np.linspace(-1.5, 1.5, 6))])
+    grains = world.add(position=centres, radius=0.1, velocity=speed * np.column_stack((np.cos(heading), np.sin(heading))))
+    for _ in range(60):
+        world.step(DT)
+        assert inside(room, grains.position).all()
+    assert np.isfinite(world.energy().total)
+
+
+def test_a_heap_does_not_leak_through_the_joints_of_a_hopper() -> None:
+    # Thin walls of many short segments carry a pile of small grains with heavy ones on top.
+    t = np.linspace(-1, 1, 41)
+    wall = np.concatenate(([(-6, 40)], np.column_stack((6 * t, 5 * t * t)), [(6, 40)]))
+    world = world_with(pv.Chain(wall), dtype=np.float32)
+    x, y = np.meshgrid(np.arange(-4, 4, 0.42), np.arange(4.5, 9, 0.42))
+    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.2, mass=0.1)
+    world.add(position=[(-2, 11), (2, 11)], radius=1.0, mass=20.0)
+    world.run(seconds=6, dt=DT)
+    assert (np.abs(world.position[:, 0]) < 6).all()
+    assert (world.position[:, 1] > 5 * (world.position[:, 0] / 6) ** 2).all()
+    assert world.energy().kinetic < 1e-2 * len(world)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    x=st.floats(-3, 3), slope=st.floats(-0.5, 0.5), speed=st.floats(0.1, 300), across=st.floats(-30, 30),
+    radius=st.floats(0.05, 0.6),
+)  # fmt: skip
+def test_a_single_wall_stops_whoever_comes(x: float, slope: float, speed: float, across: float, radius: float) -> None:
+    world = world_with(pv.Segment((-9, -9 * slope), (9, 9 * slope), restitution=0.3), gravity=(0, 0), collisions=None)
+    ball = world.add(position=(x, slope * x + 1.5), velocity=(across, -speed), radius=radius)
+    for _ in range(12):
+        world.step(DT)
+        x, y = ball.position[0]
+        if abs(x) > 9:
+            break
+        # The distance from the line is never less than the radius.
+        assert (y - slope * x) / np.hypot(1, slope) > radius * (1 - 1e-6)
+
+
+def test_who_is_inside_a_polygon_is_let_out_by_the_nearest_face() -> None:
+    block = pv.Polygon([(-10, 0), (10, 0), (10, 8), (-10, 8)])
+    world = world_with(block, gravity=(0, 0))
+    balls = world.add(position=[(0, 5), (9, 4), (-2, 1)], radius=R)
+    world.step(DT)
+    assert balls.position == pytest.approx(np.array([(0, 8 + R), (10 + R, 4), (-2, -R)]), abs=1e-9)
+    assert np.hypot(*balls.velocity.T).max() < 1e-9
+
+
+def test_thin_planks_do_not_pull() -> None:
+    # Thinner than the ball: the lower face is within reach too, but the ball is not inside.
+    world = world_with(pv.Polygon([(-5, -0.1), (5, -0.1), (5, 0), (-5, 0)]))
+    ball = world.add(position=(0, 0.8), radius=0.5)
+    world.run(seconds=2, dt=DT)
+    assert ball.position[0] == pytest.approx([0, 0.5], abs=1e-9)
+
+
+# ---- moving ones -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("speed", [1.0, 30.0, 400.0])
+def test_an_elastic_wall_that_moves_gives_twice_its_speed(speed: float) -> None:
+    # v' = 2 u - v, also when the wall passes 3 radii in a substep.
+    world = world_with(pv.Segment((-10, -3), (-10, 3), restitution=1.0, velocity=(speed, 0)), gravity=(0, 0))
+    ball = world.add(position=(0, 0), velocity=(-2, 0), radius=R)
+    while ball.velocity[0, 0] < 0:
+        world.step(DT)
+        assert world.time < 10
+    assert ball.velocity[0] == pytest.approx([2 * speed + 2, 0], rel=1e-9)
+    assert world.obstacles[0].points[0] == pytest.approx([-10 + speed * world.time, -3])
+
+
+def test_a_turning_arm_hits_with_the_speed_of_its_point() -> None:
+    arm = pv.Capsule((0, 0), (4, 0), radius=0.1, pivot=(0, 0), angular_velocity=3.0, restitution=1.0)
+    world = world_with(arm, gravity=(0, 0))
+    ball = world.add(position=(2, 1), radius=R)
+    world.run(seconds=0.5, dt=DT)
+    assert arm.angle == pytest.approx(1.5)
+    # It is hit sqrt(5 - reach^2) along the arm, whose surface moves with w times that; elastic: the ball leaves twice as fast.
+    along = np.sqrt(5 - (R + 0.1) ** 2)
+    assert np.hypot(*ball.velocity[0]) == pytest.approx(2 * 3.0 * along, rel=1e-2)
+    assert world.energy().kinetic > 0
+
+
+def test_a_belt_takes_along() -> None:
+    # A disc laid on a belt of speed u ends rolling at u / 3: m v = J and I w = J r share the impulse, v + w r = u, I = m r^2 / 2.
+    for belt in (
+        pv.Segment((-50, 0), (50, 0), surface_speed=3.0, friction=0.4),
+        pv.Capsule((-50, -1), (50, -1), radius=1.0, surface_speed=-3.0, friction=0.4),  # clockwise: to the right on top
+        pv.Polygon([(-50, -1), (50, -1), (50, 0), (-50, 0)], surface_speed=-3.0, friction=0.4),
+    ):
+        world = world_with(belt)
+        ball = world.add(position=(0, R), radius=R)
+        world.step(DT)
+        assert ball.velocity[0, 0] == pytest.approx(0.4 * 9.81 * DT, abs=0.4 * 9.81 * H)  # slipping: a = mu g
+        world.run(seconds=3, dt=DT)
+        assert ball.velocity[0] == pytest.approx([1, 0], abs=1e-9)
+
+
+def test_a_lift_carries_a_pile() -> None:
+    floor = pv.Polygon([(-3, -1), (3, -1), (3, 0), (-3, 0)])
+    world = world_with(floor, boundary=pv.Box((-3, -5), (3, 60)))
+    x, y = np.meshgrid(np.arange(-2.5, 3, 1.0), np.arange(0.5, 5, 1.0))
+    grains = world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.49)
+    world.run(seconds=1, dt=DT)
+    floor.velocity = (0, 2)
+    world.run(seconds=5, dt=DT)
+    assert grains.position[:, 1].min() > 10
+    assert grains.velocity[:, 1] == pytest.approx(np.full(len(grains), 2.0), abs=0.05)
+    floor.velocity = (0, 0)
+    floor.pivot = (0, 20)  # put elsewhere: they fall
+    world.run(seconds=1, dt=DT)
+    assert grains.position[:, 1].min() < 10
+
+
+# ---- the world around ------------------------------------------------------------------------------------------------------
+
+RUN_WITH_THREADS = """
+import json, sys
+sys.path.insert(0, sys.argv[1])
+import numpy as np
+import pyverlet as pv
+hashes = []
+for threads in (1, 2, 4, 8):
+    world = pv.World(boundary=pv.Box((0, 0), (60, 60), friction=0.3), collisions=pv.Collisions(restitution=0.3, friction=0.3),
+                     threads=threads)
+    for k in range(12):
+        world.obstacles.append(pv.Polygon([(5 * k, 9), (5 * k + 2, 9), (5 * k + 1, 11)], angular_velocity=k - 5, friction=0.2))
+        world.obstacles.append(pv.Disc((5 * k, 3), 1.0, restitution=0.5))
+    x, y = np.meshgrid(np.arange(1, 59, 1.05), np.arange(14, 59, 1.05))
+    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.5)
+    world.run(seconds=1.5)
+    hashes.append(world.state_hash())
+json.dump(hashes, sys.stdout)
+"""
+
+
+def test_threads_do_not_change_a_bit() -> None:
+    run = subprocess.run(
+        [sys.executable, "-c", RUN_WITH_THREADS, os.path.dirname(os.path.dirname(pv.__file__))],  # noqa: PTH120
+        env={**os.environ, "NUMBA_NUM_THREADS": "8"}, capture_output=True, text=True, check=True, timeout=300,
+    )  # fmt: skip
+    hashes = json.loads(run.stdout)
+    assert len(hashes) == 4
+    assert len(set(hashes)) == 1
+
+
+def test_restore_brings_moving_obstacles_back() -> None:
+    wheel = pv.Polygon([(-2, -0.2), (2, -0.2), (2, 0.2), (-2, 0.2)], angular_velocity=4, velocity=(0.5, 0), friction=0.3)
+    world = world_with(wheel, boundary=pv.Box((-5, -5), (5, 5)))
+    world.add(position=[(x, 3) for x in np.arange(-3, 3.5, 0.6)], radius=0.25)
+    world.run(seconds=0.5)
+    saved = world.save()
+    world.run(seconds=0.5)
+    expected, angle = world.state_hash(), wheel.angle
+    world.obstacles.clear()
+    world.restore(saved)
+    world.run(seconds=0.5)
+    assert (world.state_hash(), wheel.angle) == (expected, angle)
+    assert angle == pytest.approx(4.0)
+
+
+def test_a_world_without_obstacles_has_no_such_stage() -> None:
+    world = world_with()
+    world.add(position=(0, 0))
+    world.step(DT)
+    assert "obstacles" not in world.profile.stages
+    world.obstacles.append(pv.Segment((-1, -2), (1, -2)))
+    world.step(DT)
+    assert "obstacles" in world.profile.stages
+    world.obstacles.clear()
+    world.run(seconds=1)
+    assert world.position[0, 1] < -3
+
+
+def test_changes_are_noticed() -> None:
+    floor = pv.Segment((-5, 0), (5, 0))
+    world = world_with(floor)
+    ball = world.add(position=(0, 1), radius=R)
+    world.run(seconds=1)
+    assert ball.velocity[0, 1] == pytest.approx(0)
+    ball.position = (0, 1)
+    floor.restitution = 1.0
+    world.run(seconds=1)
+    assert world.energy().total == pytest.approx(9.81, abs=(9.81 * H) ** 2)  # it lay there with up to g h
+    ball.radius = 0.5  # a larger one has a larger reach
+    world.run(seconds=5)
+    assert ball.position[0, 1] >= 0.5 - 1e-9
+
+
+def test_outlines() -> None:
+    world = world_with(pv.Segment((0, 0), (1, 0)), pv.Disc((3, 3), 2.0), pv.Polygon([(0, 0), (2, 0), (0, 2)], radius=0.5))
+    line, disc, rounded = world.obstacles.outlines()
+    assert line.points.tolist() == [[0, 0], [1, 0]]
+    assert not line.filled
+    assert disc.filled
+    assert np.hypot(*(disc.points - (3, 3)).T) == pytest.approx(np.full(len(disc.points), 2.0))
+    assert rounded.points.min(axis=0) == pytest.approx([-0.5, -0.5])
+
+
+TRIANGLE = [(0, 0), (1, 0), (0, 1)]
+BAD: dict[str, tuple[Callable[[], Any], str]] = {
+    "crossing": (
+        lambda: pv.Polygon([(0, 0), (1, 1), (1, 0), (0, 1)]),
+        r"points of the polygon are \(0, 0\), .*allowed are .*convex",
+    ),
+    "star": (
+        lambda: pv.Polygon([(np.sin(k * 0.8 * np.pi), np.cos(k * 0.8 * np.pi)) for k in range(5)]),
+        r"points of the polygon are .* sides do not cross",
+    ),
+    "dent": (lambda: pv.Polygon([(0, 0), (2, 0), (1, 0.5), (0, 2)]), r"convex polygon"),
+    "flat": (lambda: pv.Polygon([(0, 0), (1, 0), (2, 0)]), r"convex polygon"),
+    "two corners": (lambda: pv.Polygon([(0, 0), (1, 0)]), r"points has 2 rows; allowed are at least 3 points"),
+    "no segment": (lambda: pv.Segment((1, 1), (1, 1)), r"points\[0\] and points\[1\] are both \(1.0, 1.0\)"),
+    "nan": (lambda: pv.Chain([(0, 0), (np.nan, 1)]), r"points\[1\] is \(nan, 1.0\)"),
+    "disc": (lambda: pv.Disc((0, 0), 0), r"radius is 0; allowed is a finite number greater than 0"),
+    "capsule": (lambda: pv.Capsule((0, 0), (1, 0), radius=-1), r"radius is -1"),
+    "restitution": (lambda: pv.Polygon(TRIANGLE, restitution=2), r"restitution is 2; allowed is a number from 0 to 1"),
+    "friction": (lambda: setattr(pv.Polygon(TRIANGLE), "friction", -1), r"friction is -1"),
+    "velocity": (lambda: setattr(pv.Polygon(TRIANGLE), "velocity", 3), r"velocity is 3; allowed are two numbers"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_gets_one_sentence(case: str) -> None:
+    act, says = BAD[case]
+    with pytest.raises(pv.InputError, match=says) as caught:
+        act()
+    assert "\n" not in str(caught.value)

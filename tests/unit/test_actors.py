@@ -1,0 +1,92 @@
+"""Emitters and sinks: how many, where, and the same again after a restore."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+
+MOUTH = pv.Box((-5, 8), (5, 10))
+
+
+def test_an_emitter_keeps_its_rate() -> None:
+    world = pv.World()
+    emitter = pv.Emitter(MOUTH, rate=100.0, radius=(0.05, 0.1), velocity=(0, -20), mass=2.0)
+    world.actors.append(emitter)
+    for frame in range(1, 121):
+        world.step(1 / 60)
+        assert len(world) == emitter.emitted == int(frame * 100 / 60 + 1e-9)
+    assert (world.mass == 2.0).all()
+    assert 0.05 <= world.radius.min() < world.radius.max() <= 0.1
+    assert (np.abs(world.position[:, 0]) < 5).all()
+    assert world.overlap().max < 0.02
+
+
+def test_an_emitter_waits_while_there_is_no_room() -> None:
+    world = pv.World(gravity=(0, 0))
+    world.actors.append(pv.Emitter(pv.Circle(center=(3, 3), radius=2.0), rate=6000, radius=0.25))
+    world.run(seconds=1)
+    count = len(world)
+    assert 15 < count < 64  # circles of 0.25 m cover 4/64 of it each, and random places leave gaps
+    assert world.overlap().contacts == 0
+    assert (np.hypot(*(world.position - 3).T) + 0.25 <= 2.0 + 1e-6).all()
+    world.remove(np.arange(count))
+    world.step(1 / 60)
+    assert len(world) <= 101  # no burst: a frame's worth
+
+
+def test_an_emitter_ends_at_most() -> None:
+    world = pv.World()
+    world.actors.append(pv.Emitter(MOUTH, rate=1000, radius=0.05, velocity=(0, -30), most=37))
+    world.run(seconds=0.5)
+    assert len(world) == 37
+
+
+def test_a_sink_takes_those_inside_or_outside() -> None:
+    world = pv.World(gravity=(0, 0))
+    kept = world.add(position=[(0, 0), (2, 2)], radius=0.1)
+    world.add(position=[(8, 8), (9, 9)], radius=0.1)
+    sink = pv.Sink(pv.Box((7, 7), (10, 10)))
+    world.actors.append(sink)
+    world.step(1 / 60)
+    assert (len(world), sink.removed) == (2, 2)
+    world.actors.append(pv.Sink(pv.Circle(center=(0, 0), radius=1.0), outside=True))
+    world.step(1 / 60)
+    assert len(kept) == len(world) == 1
+
+
+def test_a_stream_is_the_same_again_after_a_restore() -> None:
+    world = pv.World(collisions=pv.Collisions(restitution=0.4))
+    world.obstacles.append(pv.Segment((-6, 2), (6, 0), restitution=0.5, friction=0.2))
+    world.actors += [pv.Emitter(MOUTH, rate=400, radius=0.12, seed=5), pv.Sink(pv.Box((-50, -50), (50, -1)))]
+    world.run(seconds=1.5)
+    saved, emitted = world.save(), world.actors[0].emitted  # type: ignore[attr-defined]
+    world.run(seconds=0.7)
+    expected = world.state_hash()
+    assert world.actors[1].removed > 0  # type: ignore[attr-defined]
+    world.restore(saved)
+    assert world.actors[0].emitted == emitted  # type: ignore[attr-defined]
+    world.run(seconds=0.7)
+    assert world.state_hash() == expected
+
+
+BAD: dict[str, tuple[Callable[[], Any], str]] = {
+    "region": (lambda: pv.Emitter(pv.Open(), rate=1), r"region is Open\(\); allowed is a pyverlet.Box or a pyverlet.Circle"),  # type: ignore[arg-type]
+    "rate": (lambda: pv.Emitter(MOUTH, rate=-1), r"rate is -1"),
+    "radius": (lambda: pv.Emitter(MOUTH, rate=1, radius=0), r"radius is 0; allowed is a finite number greater than 0"),
+    "radii": (lambda: pv.Emitter(MOUTH, rate=1, radius=(2, 1)), r"radius is 1; allowed is a finite number of at least 2"),
+    "too large": (lambda: pv.Emitter(MOUTH, rate=1, radius=3), r"radius\[0\] is 3 m; allowed is at most .* 1 m"),
+    "most": (lambda: pv.Emitter(MOUTH, rate=1, most=-1), r"most is -1"),
+    "sink": (lambda: pv.Sink((0, 1)), r"region is \(0, 1\); allowed is an object such as"),  # type: ignore[arg-type]
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_gets_one_sentence(case: str) -> None:
+    act, says = BAD[case]
+    with pytest.raises(pv.InputError, match=says):
+        act()

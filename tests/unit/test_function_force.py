@@ -1,0 +1,196 @@
+"""`@pv.force`: compiled on first use without compiling the engine, and one sentence where the user's code is wrong."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet import _jit
+from pyverlet.kernels import forces as kernels
+
+
+@pv.force
+def swirl(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tuple[float, float]:
+    return -0.5 * y, 0.5 * x
+
+
+def world_with(*forces: Any, **options: Any) -> pv.World:
+    world = pv.World(gravity=(0, 0), collisions=None, dtype=np.float64, **options)
+    world.forces.extend(forces)
+    return world
+
+
+def test_a_function_is_a_force() -> None:
+    # m a = k (-y, x): the complex position z obeys m z'' = i k z, so z = exp(s t) with s^2 = i k / m, released from 1 at speed s.
+    s = np.sqrt(0.5j / 2.0)
+    world = world_with(swirl, integrator=pv.RK4())
+    ball = world.add(position=(1, 0), velocity=(s.real, s.imag), mass=2.0)
+    world.run(seconds=1, dt=1 / 60)
+    z = np.exp(s)
+    assert ball.position[0] == pytest.approx([z.real, z.imag], abs=1e-10)
+    assert swirl(1.0, 2.0, 0.0, 0.0, 1.0, 0.0) == (-1.0, 0.5)
+
+
+def test_all_arguments_arrive() -> None:
+    seen = pv.force(lambda x, y, vx, vy, mass, t: (mass * (x + 10 * y), mass * (vx + 10 * vy + 100 * t)))
+    world = world_with(seen, integrator=pv.ExplicitEuler(), substeps=1)
+    ball = world.add(position=(1, 2), velocity=(3, 4), mass=5.0)
+    world.step(0.5)
+    assert ball.velocity[0].tolist() == [3 + 0.5 * 21, 4 + 0.5 * 43]
+    world.step(0.5)  # from (2.5, 4), with t = 0.5
+    assert ball.velocity[0, 1] == 25.5 + 0.5 * (13.5 + 255 + 50)
+
+
+def sine(k: float) -> Any:
+    return pv.force(lambda x, y, vx, vy, mass, t: (k * math.sin(x), -vy))
+
+
+def test_another_force_compiles_none_of_the_engine() -> None:
+    world = world_with(swirl)
+    world.add(position=(1, 0))
+    world.step(1 / 60)
+    before = len(kernels.call_serial.overloads)  # type: ignore[attr-defined]
+    compiled: list[int] = []
+    with _jit.watch_compiling(lambda: compiled.append(1)):
+        for k in (1.0, 2.0, 3.0):
+            world.forces[:] = [sine(k)]
+            world.step(1 / 60)
+    assert compiled == []
+    assert len(kernels.call_serial.overloads) == before  # type: ignore[attr-defined]
+
+
+def test_a_potential_enters_the_energy() -> None:
+    @pv.force(potential=lambda x, y, mass: 0.5 * mass * (x * x + 4 * y * y))
+    def well(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tuple[float, float]:
+        return -mass * x, -4 * mass * y
+
+    assert not well.velocity_dependent
+    world = world_with(well)
+    world.add(position=[(1, 2), (0, 1), (5, 5)], mass=[3.0, 1.0, np.inf])
+    start = world.energy()
+    assert start.potential == pytest.approx(0.5 * 3 * (1 + 16) + 0.5 * 4)
+    world.run(seconds=3, dt=1 / 60)
+    # Verlet's energy swings by (w h)^2 / 4 of it, w = 2.
+    assert world.energy().total == pytest.approx(start.total, rel=(2 / 480) ** 2)
+
+
+def test_options() -> None:
+    assert not swirl.velocity_dependent  # it does not name vx or vy
+    assert pv.force(lambda x, y, u, v, mass, t: (-u, 0.0)).velocity_dependent
+    assert pv.force(velocity_dependent=True)(lambda x, y, vx, vy, mass, t: (x, y)).velocity_dependent
+    assert repr(swirl).startswith("force 'swirl' (")
+    assert swirl.__name__ == "swirl"  # type: ignore[attr-defined]
+
+
+def test_pinned_particles_are_not_asked() -> None:
+    world = world_with(pv.force(lambda x, y, vx, vy, mass, t: (9.81 * mass - mass, 0.0)))
+    balls = world.add(position=[(0, 0), (1, 0)], mass=[1.0, np.inf])
+    world.run(seconds=0.1)
+    assert balls.position[1].tolist() == [1, 0]
+
+
+def test_float32_worlds_take_them_too() -> None:
+    world = pv.World(gravity=(0, 0))
+    ball = world.add(position=(1, 0))
+    world.forces.append(swirl)
+    world.step(1 / 60)
+    assert ball.velocity[0, 1] == pytest.approx(0.5 / 60, rel=1e-3)
+
+
+def test_many_particles_give_the_same_bits_on_all_threads() -> None:
+    rng = np.random.default_rng(0)
+    position = rng.normal(0, 100, (40_000, 2))
+    worlds = [world_with(swirl, threads=threads) for threads in (1, None)]
+    for world in worlds:
+        world.add(position=position, radius=0.01)
+        world.step(1 / 60)
+    assert worlds[0].state_hash() == worlds[1].state_hash()
+    assert worlds[0].velocity[:, 0] == pytest.approx(-0.5 / 60 * position[:, 1], abs=1e-3)
+
+
+# ---- what is wrong with a function is said in one sentence with its name, file and line --------------------------------------
+
+
+def undefined(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
+    return nowhere * x, y  # type: ignore[name-defined]  # noqa: F821
+
+
+def text(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
+    return "a" + x, y
+
+
+def one_number(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
+    return x
+
+
+def three_numbers(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
+    return x, y, 0.0
+
+
+def sometimes(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
+    if x > 0:
+        return x, y
+    return None
+
+
+def array(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
+    return np.array([x, y])
+
+
+def imaginary(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
+    return 1j * x, y
+
+
+def pole(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
+    return x / (x - 2), y
+
+
+def raising(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
+    if x > 1:
+        raise ValueError("too far")
+    return x, y
+
+
+WRONG: dict[Callable[..., Any], tuple[type[pv.PyverletError], str]] = {
+    undefined: (pv.InputError, "does not compile: NameError: name 'nowhere' is not defined"),
+    text: (pv.InputError, "does not compile: No implementation of function"),
+    one_number: (pv.InputError, "returns one number, float64; allowed is numeric code that returns two numbers (fx, fy)"),
+    three_numbers: (pv.InputError, "returns a tuple of 3"),
+    sometimes: (pv.InputError, "returns None on some of its ways"),
+    array: (pv.InputError, "returns array(float64"),
+    imaginary: (pv.InputError, "returns a tuple of 2, "),
+    pole: (pv.NonFiniteError, "returned (inf, 0.0) for particle 1 at x = 2, y = 0, t = 0; allowed are two finite numbers"),
+    raising: (pv.NonFiniteError, "raised ValueError (too far) for particle 1"),
+}
+
+
+@pytest.mark.parametrize("function", WRONG, ids=lambda function: function.__name__)
+def test_a_wrong_function_is_named_with_its_file_and_line(function: Callable[..., Any]) -> None:
+    kind, says = WRONG[function]
+    world = world_with(pv.force(function))
+    world.add(position=[(0, 0), (2, 0)])
+    with pytest.raises(kind) as caught:
+        world.step(1 / 60)
+    message = str(caught.value)
+    assert f"force {function.__name__!r} ({__file__}, line {function.__code__.co_firstlineno})" in message
+    assert says in message
+    assert "\n" not in message
+    assert world.position.tolist() == [[0, 0], [2, 0]]  # the last good frame
+    world.forces.clear()
+    world.step(1 / 60)
+
+
+def test_other_arguments_are_refused_at_once() -> None:
+    with pytest.raises(
+        pv.InputError, match=r"force '<lambda>' \(.*, line \d+\) takes \(x, y\); allowed are the arguments \(x, y, vx"
+    ):
+        pv.force(lambda x, y: (x, y))  # type: ignore[arg-type, misc]
+    with pytest.raises(pv.InputError, match="force is 3; allowed is a function of"):
+        pv.force(3)  # type: ignore[call-overload]
+    with pytest.raises(pv.InputError, match=r"potential '<lambda>' .* takes \(x, y\); allowed are the arguments \(x, y, mass\)"):
+        pv.force(potential=lambda x, y: x)(one_number)  # type: ignore[misc, arg-type]

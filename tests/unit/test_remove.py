@@ -1,0 +1,196 @@
+"""Removing particles: groups keep theirs, the dead say so, the others go on; save and restore bring them back."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import pyverlet as pv
+
+
+def grid_world(count: int = 30, **options: Any) -> tuple[pv.World, list[pv.Group]]:
+    world = pv.World(**{"boundary": pv.Box((0, 0), (40, 40)), "dtype": np.float64, **options})
+    groups = [world.add(position=np.column_stack((1.0 + np.arange(count), np.full(count, 1.0 + 3 * k)))) for k in range(3)]
+    return world, groups
+
+
+def test_groups_keep_the_particles_that_are_left() -> None:
+    world, (a, b, c) = grid_world()
+    b.remove([0, 5, 29])
+    a.remove(3)
+    assert (len(a), len(b), len(c), len(world)) == (29, 27, 30, 86)
+    assert a.position[:, 0].tolist() == [1 + k for k in range(30) if k != 3]
+    assert b.position[:, 0].tolist() == [1 + k for k in range(30) if k not in (0, 5, 29)]
+    assert c.position[:, 0].tolist() == [1 + k for k in range(30)]
+    assert (c.position[:, 1] == 7).all()
+    assert c.index.tolist() == list(range(56, 86))
+    assert np.shares_memory(c.position, world.position)
+    world.remove(world.position[:, 0] > 15)
+    assert (len(a), len(b), len(c)) == (14, 13, 15)
+    d = world.add(position=(20, 20))
+    assert d.position[0].tolist() == [20, 20]
+    assert repr(c) == "Group of 15 particles, 27 to 41"
+
+
+def test_a_dead_group_says_so() -> None:
+    world, (a, b, _) = grid_world()
+    a.remove()
+    world.remove(b)
+    assert (len(a), len(b), len(world)) == (0, 0, 30)
+    assert repr(a) == "Group of 30 particles, all removed"
+    for act in (lambda: a.position, lambda: b.index, lambda: a.remove(), lambda: world.remove(a), lambda: setattr(b, "mass", 2)):
+        with pytest.raises(pv.InputError, match="group is one of 30 particles that were all removed"):
+            act()
+    assert len(world.add(position=np.zeros((0, 2))).position) == 0  # one that never had any is another matter
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.one_of(st.integers(1, 9), st.lists(st.integers(0, 60), min_size=1, max_size=9)), min_size=1, max_size=12))
+def test_any_order_of_adding_and_removing(acts: list[Any]) -> None:
+    # The model: a list of names for each group. The radius is the name.
+    world = pv.World()
+    groups: list[tuple[pv.Group, list[int]]] = []
+    name = 0
+    for act in acts:
+        if isinstance(act, int):
+            names = list(range(name + 1, name + act + 1))
+            name += act
+            groups.append((world.add(position=np.zeros((act, 2)), radius=names), names))
+        else:
+            gone = sorted({k for k in act if k < len(world)})
+            dead = set(world.radius[gone].tolist())
+            world.remove(np.array(gone, int))
+            groups = [(group, [n for n in names if n not in dead]) for group, names in groups]
+        assert world.radius.tolist() == [n for _, names in groups for n in names]
+        for group, names in groups:
+            assert len(group) == len(names)
+            if names:
+                assert group.radius.tolist() == names
+
+
+def test_those_who_stay_move_on_as_if_nothing_had_happened() -> None:
+    # Without contacts nobody feels the others: the paths are the same, to the bit.
+    def run(remove: bool, integrator: pv.Integrator) -> Any:
+        world = pv.World(collisions=None, dtype=np.float64, integrator=integrator)
+        world.forces.append(pv.Drag(linear=0.1))
+        rng = np.random.default_rng(0)
+        balls = world.add(position=rng.uniform(0, 9, (20, 2)), velocity=rng.normal(0, 3, (20, 2)))
+        world.run(seconds=0.5)
+        if remove:
+            balls.remove(np.arange(20) % 3 == 1)
+        world.run(seconds=0.5)
+        return world.position if remove else world.position[np.arange(20) % 3 != 1]
+
+    for integrator in (pv.PositionVerlet(), pv.VelocityVerlet(), pv.RK4()):
+        assert run(True, integrator).tolist() == run(False, integrator).tolist()
+
+
+def test_a_pile_falls_into_the_hole() -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (10, 30)), collisions=pv.Collisions(restitution=0.3, friction=0.2))
+    x, y = np.meshgrid(np.arange(0.5, 10), np.arange(0.5, 10))
+    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.5)
+    world.run(seconds=1)
+    world.remove(world.position[:, 1] < 4)
+    left = len(world)
+    world.run(seconds=2)
+    assert world.position[:, 1].min() < 0.6
+    assert len(world) == left
+    assert world.overlap().max < 0.03
+    world.remove(np.arange(left))
+    world.run(seconds=0.1)
+    assert len(world) == 0
+
+
+def test_as_many_added_as_removed_is_noticed() -> None:
+    world, (a, _, _) = grid_world()
+    world.run(seconds=0.2)
+    a.remove([0])
+    ball = world.add(position=(35, 30), radius=1.0, mass=2.0)
+    world.step(1 / 60)
+    assert ball.position[0] == pytest.approx([35, 30 - 9.81 / 2 / 3600])
+
+
+def test_a_grip_follows_its_particle_or_lets_go() -> None:
+    world, (a, b, _) = grid_world(gravity=(0, 0), collisions=None)
+    grip = pv.forces.Grip(int(b.index[4]), target=(5, 20))
+    world.forces.append(grip)
+    a.remove([1, 2])
+    assert grip.particle == b.index[4]
+    world.run(seconds=2)
+    assert b.position[4] == pytest.approx([5, 20], abs=1e-3)
+    b.remove(4)
+    assert grip.particle == -1
+    world.run(seconds=0.1)
+
+
+def test_save_and_restore_across_adding_and_removing() -> None:
+    world, (a, b, c) = grid_world()
+    grip = pv.forces.Grip(int(c.index[2]), target=(5, 20))
+    world.run(seconds=0.3)
+    saved = world.save()
+    world.run(seconds=0.3)
+    expected = world.state_hash()
+    b.remove([1, 2, 3])
+    late = world.add(position=np.random.default_rng(0).uniform(10, 30, (50, 2)), radius=0.2)
+    a.remove()
+    world.run(seconds=0.3)
+    world.forces.append(grip)
+    grip.particle = int(late.index[7])
+    world.restore(saved)
+    assert (len(world), len(a), len(b), len(late)) == (90, 30, 30, 0)
+    assert grip.particle == -1
+    world.forces.clear()
+    world.run(seconds=0.3)
+    assert world.state_hash() == expected
+    with pytest.raises(pv.InputError, match="all removed"):
+        _ = late.position
+    # Who comes next is nobody's namesake.
+    world.add(position=np.full((50, 2), 20.0), radius=0.1)
+    assert len(late) == 0
+
+
+def test_ten_thousand_a_second() -> None:
+    # 167 in and out in every frame: only the neighbour list is built anew, once a frame at least.
+    world = pv.World(boundary=pv.Box((0, 0), (60, 60)), threads=1)
+    rng = np.random.default_rng(0)
+    x, y = np.meshgrid(np.arange(0.5, 60, 0.7), np.arange(0.5, 50, 0.7))
+    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.3)
+    before = len(world)
+    for _ in range(20):
+        world.remove(rng.choice(len(world), 167, replace=False))
+        world.add(position=np.column_stack((rng.uniform(1, 59, 167), rng.uniform(52, 59, 167))), radius=0.05)
+        world.step(1 / 60)
+    assert len(world) == before
+    assert np.isfinite(world.position).all()
+    assert world.escaped() == 0
+
+
+BAD = {
+    "too high": (lambda world, group: group.remove(30), r"which has 30; allowed are whole numbers from 0 to 29, or 30 bools"),
+    "negative": (lambda world, group: world.remove(-1), r"which has -1; allowed are whole numbers from 0 to 89"),
+    "float": (lambda world, group: world.remove(0.5), r"which is 0.5; allowed are whole numbers"),
+    "mask": (
+        lambda world, group: world.remove(np.ones(7, bool)),
+        r"which is .*; allowed are whole numbers from 0 to 89, or 90 bools",
+    ),
+    "text": (lambda world, group: group.remove("first"), r"which is 'first'; allowed"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_gets_one_sentence(case: str) -> None:
+    act, says = BAD[case]
+    world, groups = grid_world()
+    with pytest.raises(pv.InputError, match=says):
+        act(world, groups[1])  # type: ignore[no-untyped-call]
+    assert len(world) == 90
+
+
+def test_a_saved_state_belongs_to_its_world() -> None:
+    one, other = grid_world()[0], grid_world()[0]
+    with pytest.raises(pv.InputError, match="saved is the state of another world"):
+        one.restore(other.save())
