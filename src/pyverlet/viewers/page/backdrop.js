@@ -11,10 +11,10 @@ export class Backdrop {
     this.key = "";
   }
 
-  /** `colour(name)` is that of a custom property; `size` the page's in CSS pixels. */
-  draw(shape, camera, size, ratio, colour) {
+  /** `colour(name)` is that of a custom property, which the `theme` decides; `size` the page's in CSS pixels. */
+  draw(shape, camera, size, ratio, theme, colour) {
     const now = camera.now, free = camera.free;
-    const key = [now.x, now.y, now.scale, free.left, free.top, free.width, free.height, size.width, size.height, ratio, colour("--ground")].join();
+    const key = [now.x, now.y, now.scale, free.left, free.top, free.width, free.height, size.width, size.height, ratio, theme].join();
     if (key === this.key && shape === this.shape) return;
     this.key = key;
     this.shape = shape;

@@ -36,7 +36,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   let last = null; // its numbers, or those of the frame before while there is none
   let pending = null; // a newer one, not drawn yet
   let radiusPx = new Float32Array(0), radiusFor = 0; // radii in pixels of the stage, at how many pixels a metre
-  let lookSent = "", stale = true, numbersDue = 0, numbersStale = false;
+  let lookSent = "", placed = "", stale = true, numbersDue = 0, numbersStale = false;
   let open = false, begun = false, linking = false, stopped = false;
 
   // -- the connection -------------------------------------------------------------------------------------------------
@@ -159,9 +159,12 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   function drawRest() {
     stale = false;
     measure();
-    const place = camera.place(frame.view);
-    for (const canvas of [stage, photo]) for (const [side, value] of Object.entries(place)) canvas.style[side] = `${value}px`;
-    backdrop.draw(shape, camera, size(), ratio(), colour);
+    const place = camera.place(frame.view), there = Object.values(place).join();
+    if (there !== placed) {
+      placed = there; // what did not change costs nothing: this runs with every frame
+      for (const canvas of [stage, photo]) for (const [side, value] of Object.entries(place)) canvas.style[side] = `${value}px`;
+    }
+    backdrop.draw(shape, camera, size(), ratio(), root.dataset.theme, colour);
     overlay.draw(shape, frame, camera, size(), ratio(), { velocities: $("velocities").checked, contacts: $("contacts").checked }, colour);
     panels.layout(camera.place(camera.room));
   }
