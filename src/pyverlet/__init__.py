@@ -42,7 +42,7 @@ __all__ = [
     "Panels", "Pin", "PointSpring", "Polygon", "PositionVerlet", "ProjectOnly", "PyverletError", "Rope", "Segment",
     "SemiImplicitEuler", "Sink", "Spring", "Stick", "TimeCorrectedVerlet", "VelocityVerlet", "Wind", "World", "Yoshida4",
     "bridge", "builders", "chain", "cloth", "errors", "force", "forces", "integrators", "net", "rope", "scenes", "soft_body",
-    "view", "warm_up",
+    "view", "warm_up", "widget",
 ]  # fmt: skip
 
 
@@ -51,3 +51,10 @@ def view(world: World | Panels, **options: Any) -> None:
     from pyverlet.viewers import view as view_page
 
     view_page(world, **options)
+
+
+def widget(world: World | Panels, **options: Any) -> Any:
+    """Show a world in a cell of a notebook; see `pyverlet.viewers.widget` for the options."""
+    from pyverlet.viewers import widget as make
+
+    return make(world, **options)

@@ -142,6 +142,9 @@ class _Stormer(Integrator):
             else:
                 forces(state, t)
             state.acceleration[~fresh] = known[~fresh]
+        pinned = state.inverse_mass == 0
+        if pinned.any():
+            state.acceleration[pinned] = 0  # pinned since the frame before: what is left of its fall would move it for ever
         advance(state.velocity, state.velocity, state.acceleration, -0.5 * (h if h_last is None else h_last))
 
     def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:

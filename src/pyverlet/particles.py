@@ -123,3 +123,13 @@ class Particles:
     friction = Column("(n,) mu of circles that have their own, negative where `Collisions` and the bounds decide; a view.")
     category = Column("(n,) uint32, the bits of what each circle is; a view.")
     mask = Column("(n,) uint32, the bits of the categories it collides with; a view.")
+
+    @property
+    def number(self) -> Array:
+        """(n,) a number for each particle, ascending, that it keeps while others come and go; a view, not to be written."""
+        return self._state.number
+
+    @property
+    def version(self) -> int:
+        """How often particles were added or removed."""
+        return self._state.version

@@ -148,10 +148,10 @@ def test_run_without_more_opens_the_page(run: Any, served: list[dict[str, Any]])
     code, _, err = run("run", "box", "--particles", "30", "--port", "8123", "--no-open", "--dt", "0.02")
     assert code == 0, err
     (asked,) = served
-    assert [len(world) for world in asked["world"].worlds] == [30]
+    assert [len(world) for world in asked["world"].panels.worlds] == [30]
     assert (asked["scene_name"], asked["port"], asked["open_browser"], asked["dt"]) == ("box", 8123, False, 0.02)
     run("run")
-    assert [len(world) for world in served[1]["world"].worlds] == [5_000]
+    assert [len(world) for world in served[1]["world"].panels.worlds] == [5_000]
     assert (served[1]["scene_name"], served[1]["port"], served[1]["open_browser"]) == ("cage", 8000, True)
 
 

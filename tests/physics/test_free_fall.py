@@ -104,3 +104,16 @@ def test_pinned_particles_stay() -> None:
     assert balls.position[0] == pytest.approx([0, 0], abs=0)
     assert balls.position[1, 1] < -2  # it hit the pinned one off centre, slid down its side and fell on
     assert np.isfinite(world.energy().total)
+
+
+@pytest.mark.parametrize("name", sorted(pv.integrators.BY_NAME))
+def test_a_circle_pinned_in_its_fall_stays_to_the_last_bit(name: str) -> None:
+    """Held from now on: no memory of the fall may move it, in whatever form a method keeps that memory."""
+    world = pv.World(integrator=pv.integrators.BY_NAME[name]())
+    world.add(position=[(0.0, 0.0), (3.0, 0.0)], radius=0.5)
+    world.run(seconds=0.5)
+    world.mass[0], world.velocity[0] = np.inf, 0.0
+    held = world.position[0].tolist()
+    world.run(seconds=1.0)
+    assert world.position[0].tolist() == held
+    assert world.position[1, 1] < -10.0

@@ -1,4 +1,4 @@
-"""What the tests of the viewer share: worlds and sessions."""
+"""What the tests of the viewer share: worlds, sessions, and pages in a browser."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
+from playwright.sync_api import Browser, Page, Playwright, sync_playwright
 
 import pyverlet as pv
 from pyverlet.viewers.commands import Pause
 from pyverlet.viewers.session import Session
+
+from .browser import FLAGS, Program, Serve, chromium
 
 WaitUntil = Callable[[Callable[[], bool]], None]
 
@@ -60,3 +63,43 @@ def paused(session: Session, wait_until: WaitUntil) -> Session:
     session.submit(Pause(True))
     wait_until(lambda: session.latest.status.paused)
     return session
+
+
+@pytest.fixture
+def program() -> Iterator[Serve]:
+    running: list[Program] = []
+
+    def start(scene: str, particles: int, *settings: int) -> Program:
+        running.append(Program(scene, particles, *settings))
+        return running[-1]
+
+    yield start
+    for each in running:
+        if each.process.poll() is None:
+            code, err = each.end()
+            assert code in (0, 130)
+            assert "Traceback" not in err
+
+
+@pytest.fixture(scope="module")
+def playwright() -> Iterator[Playwright]:
+    with sync_playwright() as running:
+        yield running
+
+
+@pytest.fixture(scope="module", params=[[], ["--disable-3d-apis"]], ids=["webgl", "no-webgl"])
+def browser(playwright: Playwright, request: pytest.FixtureRequest) -> Iterator[Browser]:
+    browser = playwright.chromium.launch(executable_path=chromium(), args=[*FLAGS, *request.param])
+    yield browser
+    browser.close()
+
+
+@pytest.fixture
+def page(browser: Browser, program: Serve) -> Iterator[Page]:  # closed before its server ends, whose end is an error to it
+    page = browser.new_page(viewport={"width": 1280, "height": 800})
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+    yield page
+    page.close()
+    assert errors == []

@@ -1,153 +1,24 @@
-"""The page in a real Chromium, as a stranger meets it: 5,000 circles fall into a cage; click, slide, drag, poke, read.
+"""The page in a real Chromium, as a stranger meets it: 5,000 circles fall into a cage; click, drag, poke, read.
 
-With and without WebGL. The browser is the one PYVERLET_CHROMIUM names, or else an installed one; without any, these tests
-are skipped on somebody's machine and fail where CI is set.
+With and without WebGL. The controls have a file of their own.
 """
 
 from __future__ import annotations
 
-import os
-import re
-import shutil
-import signal
 import statistics
-import subprocess
-import sys
-from collections.abc import Callable, Iterator
 from io import BytesIO
 
 import numpy as np
 import pytest
 from matplotlib import image
-from numpy.typing import NDArray
-from playwright.sync_api import Browser, Page, Playwright, expect, sync_playwright
+from playwright.sync_api import Browser, Page, Playwright, expect
 
-NOTHING = "\N{EN DASH}"
-"""What the page shows where there is no number."""
-
-FLAGS = [
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync",
-]  # fmt: skip
-
-SERVE = """
-import sys
-from pyverlet.scenes import get
-from pyverlet.viewers import serve
-scene = get(sys.argv[1])
-serve(lambda: scene.panels(particles=int(sys.argv[2])), scene_name=scene.name, port=0, open_browser=False)
-"""
-
-
-def chromium() -> str:
-    named = os.environ.get("PYVERLET_CHROMIUM")
-    found = named or shutil.which("chromium") or shutil.which("google-chrome") or shutil.which("chromium-browser")
-    if found is None:
-        reason = "no Chromium found; set PYVERLET_CHROMIUM to one"
-        if os.environ.get("CI"):
-            pytest.fail(reason)
-        pytest.skip(reason)
-    return found
-
-
-class Program:
-    """A scene served by a process of its own, as the command line does it."""
-
-    def __init__(self, scene: str, particles: int) -> None:
-        command = [sys.executable, "-W", "error", "-c", SERVE, scene, str(particles)]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        assert self.process.stdout is not None
-        found = re.search(r"http://\S+", self.process.stdout.readline())
-        assert found, self.process.stderr.read() if self.process.stderr else ""
-        self.address = found[0]
-
-    def end(self) -> tuple[int, str]:
-        """Ctrl-C; the exit code and what it wrote to standard error."""
-        self.process.send_signal(signal.SIGINT)
-        _, err = self.process.communicate(timeout=20)
-        return self.process.returncode, err
-
-
-Serve = Callable[[str, int], Program]
-
-
-@pytest.fixture
-def program() -> Iterator[Serve]:
-    running: list[Program] = []
-
-    def start(scene: str, particles: int) -> Program:
-        running.append(Program(scene, particles))
-        return running[-1]
-
-    yield start
-    for each in running:
-        if each.process.poll() is None:
-            code, err = each.end()
-            assert code in (0, 130)
-            assert "Traceback" not in err
-
-
-@pytest.fixture(scope="module")
-def playwright() -> Iterator[Playwright]:
-    with sync_playwright() as running:
-        yield running
-
-
-@pytest.fixture(scope="module", params=[[], ["--disable-3d-apis"]], ids=["webgl", "no-webgl"])
-def browser(playwright: Playwright, request: pytest.FixtureRequest) -> Iterator[Browser]:
-    browser = playwright.chromium.launch(executable_path=chromium(), args=[*FLAGS, *request.param])
-    yield browser
-    browser.close()
-
-
-@pytest.fixture
-def page(browser: Browser) -> Iterator[Page]:
-    page = browser.new_page(viewport={"width": 1280, "height": 800})
-    errors: list[str] = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
-    yield page
-    page.close()
-    assert errors == []
-
-
-def number(page: Page, name: str) -> float:
-    return float(page.get_by_test_id(name).inner_text())
-
-
-def comes_true(page: Page, condition: Callable[[], bool]) -> bool:
-    """Whether a condition comes true within ten seconds."""
-    for _ in range(200):
-        if condition():
-            return True
-        page.wait_for_timeout(50)
-    return False
-
-
-def visit(page: Page, address: str) -> None:
-    page.goto(address)
-    expect(page.get_by_test_id("particles")).not_to_have_text(NOTHING)
-
-
-def where(page: Page, particle: int) -> dict[str, float]:
-    found: dict[str, float] = page.evaluate("(i) => window.pyverlet.where(i)", particle)
-    return found
-
-
-def everywhere(page: Page, count: int) -> NDArray[np.float64]:
-    """(count, 4) of x, y in metres and left, top in CSS pixels."""
-    script = "(n) => Array.from({length: n}, (_, i) => Object.values(window.pyverlet.where(i)))"
-    return np.array(page.evaluate(script, count), dtype=np.float64)
-
-
-def pause(page: Page) -> None:
-    page.get_by_test_id("pause").click()
-    expect(page.get_by_test_id("pause")).to_have_text("Resume")
+from .browser import FLAGS, NOTHING, Serve, chromium, comes_true, everywhere, number, pause, visit, where
 
 
 def test_fifty_frames_a_second_at_5000_circles(page: Page, program: Serve) -> None:
     visit(page, program("cage", 5000).address)
-    assert page.evaluate("document.documentElement.dataset.renderer") == "canvas"  # imitated hardware does not count
+    assert page.evaluate("document.querySelector('#pyverlet').dataset.renderer") == "canvas"  # imitated hardware does not count
     assert number(page, "particles") == 5000
 
     def rate() -> float:
@@ -196,10 +67,10 @@ def test_sliders_of_gravity_and_substeps(page: Page, program: Serve) -> None:
     expect(page.get_by_test_id("gravity")).to_have_value("9.81")
     expect(page.get_by_test_id("substeps")).to_have_value("8")
 
-    gravity = page.get_by_test_id("gravity").bounding_box()
-    assert gravity is not None
-    page.mouse.click(gravity["x"] + 3, gravity["y"] + gravity["height"] / 2)  # all the way to the left: upward
-    expect(page.locator("#gravity-arrow")).to_have_text("↑")
+    angle = page.get_by_test_id("angle").bounding_box()
+    assert angle is not None
+    page.mouse.click(angle["x"] + 3, angle["y"] + angle["height"] / 2)  # all the way to the left: upward
+    expect(page.locator("#angle-value")).to_have_text("-180")
     assert comes_true(page, lambda: where(page, 499)["y"] > 8)  # the cage's radius is 14.4 m
     assert comes_true(page, lambda: number(page, "kinetic") < 1000 and number(page, "energy") < 0)
 
@@ -328,7 +199,7 @@ def test_webgl_points_draw_the_same_circles(playwright: Playwright, program: Ser
     browser = playwright.chromium.launch(executable_path=chromium(), args=[*FLAGS, "--enable-unsafe-swiftshader"])
     page = browser.new_page(viewport={"width": 1280, "height": 800})
     visit(page, program("box", 60).address + "?renderer=webgl2")
-    assert page.evaluate("document.documentElement.dataset.renderer") == "webgl2"
+    assert page.evaluate("document.querySelector('#pyverlet').dataset.renderer") == "webgl2"
     pause(page)
     assert circles_missing(page) == 0
     browser.close()

@@ -104,7 +104,7 @@ def test_commands_reach_every_world(wait_until: WaitUntil) -> None:
 def test_substeps_that_make_the_difference_stay(wait_until: WaitUntil) -> None:
     panels = pv.Panels([pv.Panel("1", room(1)), pv.Panel("2", room(2))])
     with Session(panels) as session:
-        assert session.latest.shape.substeps_differ
+        assert session.latest.shape.differing == ("substeps",)
         session.submit(SetSubsteps(7))
         session.submit(Pause(True))
         wait_until(lambda: session.latest.status.paused)

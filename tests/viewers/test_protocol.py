@@ -13,8 +13,12 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.viewers import commands
+from pyverlet.viewers.exhibit import Exhibit
+from pyverlet.viewers.looks import Look
 from pyverlet.viewers.protocol import MAX_MESSAGE, Ack, decode, encode_frame, encode_refusal, encode_shape
 from pyverlet.viewers.session import Session
+
+LOOK = '{"type": "look", "part": %s, "width": 800, "height": 600, "colour": "speed", "dark": false, "velocity": true}'
 
 
 def unpack(data: bytes) -> tuple[dict[str, Any], bytes]:
@@ -35,6 +39,17 @@ def unpack(data: bytes) -> tuple[dict[str, Any], bytes]:
         ('{"type": "substeps", "value": 8}', commands.SetSubsteps(8)),
         ('{"type": "drag", "x": 1, "y": 2, "reach": 0.5}', commands.Drag(7, 1.0, 2.0, 0.5)),
         ('{"type": "poke", "x": 1, "y": 2}', commands.Poke(7, 1.0, 2.0)),
+        ('{"type": "speed", "value": 0.25}', commands.SetSpeed(0.25)),
+        ('{"type": "build", "scene": "box"}', commands.Build("box", None)),
+        ('{"type": "build", "scene": null, "particles": 70}', commands.Build(None, 70)),
+        ('{"type": "restitution", "value": 0.5}', commands.SetRestitution(0.5)),
+        ('{"type": "friction", "value": 1}', commands.SetFriction(1.0)),
+        ('{"type": "integrator", "value": "rk4"}', commands.SetIntegrator("rk4")),
+        ('{"type": "pin", "x": 1, "y": 2, "reach": 0.5}', commands.Pin(7, 1.0, 2.0, 0.5)),
+        ('{"type": "spawn", "x": 1, "y": 2}', commands.Spawn(7, 1.0, 2.0)),
+        ('{"type": "delete", "x": 1, "y": 2, "reach": 0}', commands.Delete(7, 1.0, 2.0, 0.0)),
+        (LOOK % "[0, 0, 4, 3]", Look((0.0, 0.0, 4.0, 3.0), 800, 600, "speed", False, True)),
+        (LOOK % "null", Look(None, 800, 600, "speed", False, True)),
         ('{"type": "release", "hand": 3}', commands.Release(7)),  # a tab has its own hand and no other
     ],
 )
@@ -70,6 +85,27 @@ def test_understood(text: str, expected: object) -> None:
         ('{"type": "substeps", "value": 2.0}', "value"),
         ('{"type": "drag", "x": 1e999, "y": 0, "reach": 1}', "x"),
         ('{"type": "poke", "x": 0}', "y"),
+        ('{"type": "speed", "value": 0}', "speed"),
+        ('{"type": "build", "scene": "nowhere"}', "scene"),
+        ('{"type": "build", "scene": 3}', "scene"),
+        ('{"type": "build", "particles": 100000000}', "particles"),
+        ('{"type": "restitution", "value": 1.5}', "restitution"),
+        ('{"type": "friction", "value": -1}', "friction"),
+        ('{"type": "integrator", "value": "magic"}', "integrator"),
+        ('{"type": "integrator"}', "value"),
+        ('{"type": "pin", "x": 1, "y": 2}', "reach"),
+        ('{"type": "spawn", "x": 1e999, "y": 2}', "x"),
+        (LOOK % "[0, 0, 4]", "part"),
+        (LOOK % "7", "part"),
+        (LOOK % '[0, 0, "a", 3]', "part"),
+        (LOOK % "[0, 0, 1e30, 3]", "part"),
+        (LOOK % "[0, 0, 0, 3]", "part"),
+        ('{"type": "look", "part": null, "width": 0, "height": 9, "colour": "speed", "dark": true, "velocity": true}', "width"),
+        (
+            '{"type": "look", "part": null, "width": 9, "height": 1e9, "colour": "speed", "dark": true, "velocity": true}',
+            "height",
+        ),
+        ('{"type": "look", "part": null, "width": 9, "height": 9, "colour": "pink", "dark": true, "velocity": true}', "colour"),
         ('{"type": "step", "pad": "' + "x" * MAX_MESSAGE + '"}', "characters"),
     ],
 )
@@ -97,7 +133,35 @@ def test_a_shape_in_bytes(world: pv.World) -> None:
     head, body = unpack(encode_shape(Session(world, title="nine").latest.shape))
     assert (head["kind"], head["title"], head["bounded"]) == ("shape", "nine", True)
     assert head["outlines"] == [[[-10, 0], [10, 0], [10, 20], [-10, 20]]]
-    assert np.frombuffer(body, dtype="<f4").tolist() == [0.5] * 9
+    radius, mass = np.frombuffer(body[:72], dtype="<f4").reshape(2, -1)
+    assert np.frombuffer(body[72:], dtype="<u4").tolist() == list(range(9))
+    assert radius.tolist() == [0.5] * 9
+    assert mass.tolist() == [1.0] * 9
+
+
+def test_own_colours_follow_in_the_shape(world: pv.World) -> None:
+    colours = np.arange(27, dtype=np.uint8).reshape(9, 3)
+    shape = Session(Exhibit("nine", pv.Panels.of(world), colours=colours)).latest.shape
+    head, body = unpack(encode_shape(shape))
+    assert head["coloured"]
+    assert body[108:] == bytes(range(27))
+
+
+def test_velocities_travel_if_wanted(world: pv.World) -> None:
+    world.velocity[:] = [(0.5 * k, -k) for k in range(9)]
+    head, body = unpack(encode_frame(Session(world).latest, velocity=True))
+    back = np.frombuffer(body, dtype="<i2").reshape(2, -1, 2)[1] * head["unit"]
+    np.testing.assert_allclose(back, world.velocity, atol=8 / 32767)
+
+
+def test_a_tab_may_look_at_a_part(world: pv.World) -> None:
+    part = (-1.0, 0.0, 1.0, 1.0)
+    head, body = unpack(encode_frame(Session(world).latest, part))
+    assert head["view"] == [-1, 0, 1, 1]
+    assert head["room"][0] < -10
+    grid = np.frombuffer(body, dtype="<u2").reshape(-1, 2)
+    assert grid[4].tolist() == [32768, 32768]  # the middle one, at (0, 0.5)
+    assert set(grid[[0, 8], 0].tolist()) == {0, 65535}
 
 
 def test_numbers_json_does_not_have_become_null(world: pv.World) -> None:

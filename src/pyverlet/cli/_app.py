@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -122,8 +121,8 @@ def run(
         show.window(chosen, chosen.settings(**overrides, integrator=methods[0] if methods else None), dt=dt)
         return
     if not ends:
-        build = partial(chosen.panels, integrators=methods, **overrides)
-        show.page(chosen, build, dt=dt, port=DEFAULT_PORT if port is None else port, open_browser=not no_open)
+        port = DEFAULT_PORT if port is None else port
+        show.page(chosen, integrators=methods, overrides=overrides, dt=dt, port=port, open_browser=not no_open)
         return
     if port is not None:
         raise InputError(f"port is {port}; allowed is none, since this run has no live page")

@@ -11,11 +11,11 @@ import typer
 from pyverlet import integrators
 from pyverlet.broadphase import BruteForce, Fast
 from pyverlet.errors import InputError
-from pyverlet.picture import DARK, LIGHT, ByMass, ByOrigin, BySpeed, Colouring, Theme
+from pyverlet.picture import DARK, LIGHT, ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Theme
 
 DType = Literal["float32", "float64"]
 Method = Literal["fast", "brute", "none"]
-ColourName = Literal["origin", "speed", "mass"]
+ColourName = Literal["origin", "speed", "mass", "energy"]
 ThemeName = Literal["dark", "light"]
 
 
@@ -87,7 +87,7 @@ Picture = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
-COLOURS: dict[ColourName, type[Colouring]] = {"origin": ByOrigin, "speed": BySpeed, "mass": ByMass}
+COLOURS: dict[ColourName, type[Colouring]] = {"origin": ByOrigin, "speed": BySpeed, "mass": ByMass, "energy": ByEnergy}
 THEMES: dict[ThemeName, Theme] = {"dark": DARK, "light": LIGHT}
 METHODS: dict[Method, Any] = {"fast": Fast(), "brute": BruteForce(), "none": False}
 

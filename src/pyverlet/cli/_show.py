@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping, Sequence
 from functools import partial
+from typing import Any
 
 from pyverlet.cli import _print as out
-from pyverlet.panels import Panels
+from pyverlet.integrators import Integrator
 from pyverlet.progress import Progress
 from pyverlet.scenes import Scene, Settings
 
 
-def page(scene: Scene, build: Callable[[], Panels], *, dt: float, port: int, open_browser: bool) -> None:
-    """Show what `build` makes on the live page until Ctrl-C."""
+def page(
+    scene: Scene, *, integrators: Sequence[Integrator], overrides: Mapping[str, Any], dt: float, port: int, open_browser: bool
+) -> None:
+    """Show the scene on the live page until Ctrl-C."""
     from pyverlet.viewers import serve
+    from pyverlet.viewers.exhibit import Exhibit, Repertoire
 
-    if scene.show.colours:
-        out.note("the page does not show this picture yet; with --window, or recorded by `pyverlet record`, it can be seen")
-    serve(build, scene_name=scene.name, port=port, open_browser=open_browser, dt=dt)
+    repertoire = Repertoire(scene, dt=dt, integrators=integrators, overrides=overrides)
+
+    def build() -> Exhibit:
+        with Progress("where each circle ends") as progress:
+            return repertoire.open(progress)
+
+    serve(build, scene_name=scene.name, repertoire=repertoire, port=port, open_browser=open_browser, dt=dt)
 
 
 def window(scene: Scene, settings: Settings, *, dt: float) -> None:

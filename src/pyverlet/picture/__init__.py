@@ -5,9 +5,12 @@ Loads nothing but NumPy and the engine.
 
 from __future__ import annotations
 
-from pyverlet.picture.colour import ByMass, ByOrigin, BySpeed, Colouring, Fixed, Groups
+from pyverlet.picture.colour import ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Fixed, Groups
 from pyverlet.picture.palette import DARK, LIGHT, Theme
 from pyverlet.picture.raster import Raster
 from pyverlet.picture.view import View, nearest
 
-__all__ = ["DARK", "LIGHT", "ByMass", "ByOrigin", "BySpeed", "Colouring", "Fixed", "Groups", "Raster", "Theme", "View", "nearest"]
+__all__ = [
+    "DARK", "LIGHT", "ByEnergy", "ByMass", "ByOrigin", "BySpeed", "Colouring", "Fixed", "Groups", "Raster", "Theme", "View",
+    "nearest",
+]  # fmt: skip

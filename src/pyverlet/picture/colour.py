@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,9 +13,6 @@ from pyverlet.errors import InputError
 from pyverlet.group import Group
 from pyverlet.picture.palette import STEPS, TONES, Packed, Theme, heat, hues, packed, shade
 
-if TYPE_CHECKING:
-    from pyverlet.world import World
-
 USUAL_S = 1 / 3
 """Simulated seconds over which the scale follows what is usual: no flicker, and the same for any number of pictures a second."""
 
@@ -23,49 +20,95 @@ USUAL_MULTIPLE = 3.0
 """The end of the palette, in terms of what is usual."""
 
 
+class Circles(Protocol):
+    """What colours are made from: a world, or a copy of what it was at some moment."""
+
+    @property
+    def velocity(self) -> NDArray[Any]:
+        """(n, 2) m/s."""
+
+    @property
+    def mass(self) -> NDArray[Any]:
+        """(n,) kg, infinite where pinned."""
+
+    @property
+    def time(self) -> float:
+        """Of the world, s."""
+
+    def __len__(self) -> int:
+        """How many."""
+
+
 class Colouring(ABC):
     """Gives every circle of a world a colour, picture after picture."""
 
     @abstractmethod
-    def colours(self, world: World, theme: Theme) -> Packed:
+    def colours(self, world: Circles, theme: Theme) -> Packed:
         """(n,) colours, R + G << 8 + B << 16, of the world's circles now."""
 
 
 class ByOrigin(Colouring):
     """Through the hues in the order the circles were added: scenes fill their room from the bottom up."""
 
-    def colours(self, world: World, theme: Theme) -> Packed:
+    def colours(self, world: Circles, theme: Theme) -> Packed:
         n = len(world)
         return hues(theme.dark)[shade(np.arange(n) * STEPS // max(n, 1))]
 
 
-class BySpeed(Colouring):
-    """From slow to fast.
+class _ByAmount(Colouring):
+    """From little to much of something that is 0 at rest.
 
     Args:
-        full: m/s at the end of the palette; None follows three times the usual speed.
+        full: the amount at the end of the palette; None follows three times what is usual.
     """
 
     def __init__(self, *, full: float | None = None) -> None:
         self._full = None if full is None else checks.number("full", full, above=0.0)
         self._usual, self._time = 0.0, -np.inf
 
-    def colours(self, world: World, theme: Theme) -> Packed:
-        speed = np.hypot(*world.velocity.T)
+    @abstractmethod
+    def _amount(self, world: Circles) -> NDArray[Any]:
+        """(n,) of each circle, finite."""
+
+    def colours(self, world: Circles, theme: Theme) -> Packed:
+        amount = self._amount(world)
         full = self._full
         if full is None:
-            mean = float(speed.mean(dtype=np.float64)) if len(speed) else 0.0
+            mean = float(amount.mean(dtype=np.float64)) if len(amount) else 0.0
             passed = world.time - self._time
             self._usual += (mean - self._usual) * (-np.expm1(-passed / USUAL_S) if passed >= 0 else 1.0)
             self._time = world.time
             full = USUAL_MULTIPLE * self._usual
-        return heat(theme.dark)[shade(_steps(speed, 0.0, full))]
+        return heat(theme.dark)[shade(_steps(amount, 0.0, full))]
+
+
+class BySpeed(_ByAmount):
+    """From slow to fast.
+
+    Args:
+        full: m/s at the end of the palette; None follows three times the usual speed.
+    """
+
+    def _amount(self, world: Circles) -> NDArray[Any]:
+        return np.asarray(np.hypot(*world.velocity.T))
+
+
+class ByEnergy(_ByAmount):
+    """From little to much kinetic energy, m v^2 / 2; pinned circles have none.
+
+    Args:
+        full: J at the end of the palette; None follows three times the usual energy.
+    """
+
+    def _amount(self, world: Circles) -> NDArray[Any]:
+        x, y = world.velocity.T
+        return np.asarray(np.where(np.isfinite(world.mass), 0.5 * world.mass * (x * x + y * y), 0.0))
 
 
 class ByMass(Colouring):
     """From light to heavy, over equal ratios; pinned circles stand at the end."""
 
-    def colours(self, world: World, theme: Theme) -> Packed:
+    def colours(self, world: Circles, theme: Theme) -> Packed:
         logarithm = np.log(world.mass.astype(np.float64))
         finite = logarithm[np.isfinite(logarithm)]
         low, high = (finite.min(), finite.max()) if len(finite) else (0.0, 0.0)
@@ -85,7 +128,7 @@ class Groups(Colouring):
                 raise InputError(f"groups[{k}] is {group!r}; allowed is what world.add returns")
         self._groups = groups
 
-    def colours(self, world: World, theme: Theme) -> Packed:
+    def colours(self, world: Circles, theme: Theme) -> Packed:
         result = np.full(len(world), 0x9A9A9A, dtype=np.uint32)
         for k, group in enumerate(self._groups):
             step = np.full(len(group), k * STEPS // max(len(self._groups), 1))
@@ -108,7 +151,7 @@ class Fixed(Colouring):
             raise InputError("rgb holds something else than numbers from 0 to 255; allowed are these")
         self._packed = packed(array)
 
-    def colours(self, world: World, theme: Theme) -> Packed:
+    def colours(self, world: Circles, theme: Theme) -> Packed:
         if self._packed.ndim and len(self._packed) != len(world):
             raise InputError(f"rgb has {len(self._packed)} rows; allowed are {len(world)}, one for each circle")
         return np.ascontiguousarray(np.broadcast_to(self._packed, len(world)))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pyverlet.panels import Panels
+    from pyverlet.viewers.exhibit import Exhibit, Repertoire
     from pyverlet.world import World
 
-__all__ = ["serve", "view"]
+__all__ = ["serve", "view", "widget"]
 
 DEFAULT_PORT = 8000
 
@@ -42,9 +43,10 @@ def view(
 
 
 def serve(
-    build: Callable[[], World | Panels],
+    build: Callable[[], World | Panels | Exhibit],
     *,
     scene_name: str,
+    repertoire: Repertoire | None = None,
     host: str = "127.0.0.1",
     port: int = DEFAULT_PORT,
     open_browser: bool = True,
@@ -55,8 +57,9 @@ def serve(
     The port is taken before the world is built, so that a taken one is told at once.
 
     Args:
-        build: makes the world or the panels.
+        build: makes the world, the panels or the exhibit.
         scene_name: heading of the page.
+        repertoire: scenes to pick from on the page; None: none.
         host: address to listen on; anything but this machine's own lets the whole network in.
         port: TCP port, 1 to 65535; 0 takes any free one.
         open_browser: open a tab when there is a screen to open it on.
@@ -67,4 +70,31 @@ def serve(
     """
     from pyverlet.viewers import launch
 
-    launch.serve(build, title=scene_name, host=host, port=port, open_browser=open_browser, dt=dt)
+    launch.serve(build, title=scene_name, host=host, port=port, open_browser=open_browser, dt=dt, repertoire=repertoire)
+
+
+def widget(world: World | Panels, *, title: str = "pyverlet", dt: float = 1 / 60, height: int = 480) -> Any:
+    """Show `world` in a cell of a notebook, live, where it can be dragged and steered; it moves whenever the kernel is idle.
+
+    Args:
+        world: the world or panels to step and show. Reset goes back to the state it has now.
+        title: heading.
+        dt: simulated seconds per frame.
+        height: of the cell, pixels.
+
+    Returns:
+        An anywidget, for JupyterLab, marimo and others. Where widgets do not run it is a picture of the world.
+
+    Raises:
+        InputError: the extra `notebook` is missing, or an argument is outside what is allowed.
+    """
+    import importlib.util
+
+    from pyverlet.errors import InputError
+
+    for module in ("anywidget", "PIL"):
+        if importlib.util.find_spec(module) is None:
+            raise InputError(f"a widget needs '{module}', which is not installed: pip install 'pyverlet[notebook]'")
+    from pyverlet.viewers.notebook import Widget
+
+    return Widget(world, title=title, dt=dt, height=height)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
-from pyverlet import checks
+from pyverlet import checks, integrators, scenes
 from pyverlet.errors import InputError
 
 MAX_SUBSTEPS = 64
@@ -14,14 +13,31 @@ MAX_SUBSTEPS = 64
 MAX_GRAVITY = 1000.0
 """m/s^2 in either direction. A hundred times the Earth's is play; beyond it is a typing error."""
 
+MAX_FRICTION = 10.0
+"""Coulomb's coefficient: rubber on rubber has 1.2."""
+
+MAX_PARTICLES = 1_000_000
+"""As many as a page may ask for: some seconds of building."""
+
 MAX_STEPS = 600
 """Frames one Step may ask for: ten seconds at 60 a second."""
 
+FARTHEST = 1e9
+"""m. Hands further out than this would leave what float32 can tell."""
 
-def _finite(name: str, value: float, limit: float = math.inf) -> None:
+SLOWEST = 1 / 64
+"""Least speed: a second takes a minute."""
+
+
+def _finite(name: str, value: float, limit: float) -> None:
     checks.number(name, value)
     if abs(value) > limit:
         raise InputError(f"{name} is {value:g}; allowed is a number from {-limit:g} to {limit:g}")
+
+
+def _between(name: str, value: float, low: float, high: float) -> None:
+    if not low <= checks.number(name, value) <= high:
+        raise InputError(f"{name} is {value:g}; allowed is a number from {low:g} to {high:g}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +59,31 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Reset:
-    """Go back to the state the session started with; gravity and substeps keep what the sliders say."""
+    """Go back to the state the session started with; settings keep what the sliders say."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetSpeed:
+    """How fast the world's time passes: 1 is real time, less is slow motion. The frames and their bits stay the same."""
+
+    value: float
+
+    def __post_init__(self) -> None:
+        _between("speed", self.value, SLOWEST, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Build:
+    """Replace the worlds by a scene's (None: the same scene) with so many particles (None: the scene's own number)."""
+
+    scene: str | None
+    particles: int | None
+
+    def __post_init__(self) -> None:
+        if self.scene is not None and self.scene not in scenes.SCENES:
+            raise InputError(f"scene is {self.scene[:40]!r}; allowed are {', '.join(scenes.SCENES)}")
+        if self.particles is not None:
+            checks.whole("particles", self.particles, most=MAX_PARTICLES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,33 +109,85 @@ class SetSubsteps:
 
 
 @dataclass(frozen=True, slots=True)
-class Drag:
-    """Pull a particle towards (x, y), metres. The first one of a hand picks the nearest particle whose rim is
-    within `reach` metres; if there is none, the hand stays empty until it is released.
-    """
+class SetRestitution:
+    """Set the restitution of circles and bounds."""
 
-    hand: int
-    x: float
-    y: float
-    reach: float = 0.0
+    value: float
 
     def __post_init__(self) -> None:
-        _finite("x", self.x)
-        _finite("y", self.y)
-        _finite("reach", self.reach)
+        checks.fraction("restitution", self.value)
 
 
 @dataclass(frozen=True, slots=True)
-class Poke:
-    """Push everything near (x, y), metres, away from it until the hand is released."""
+class SetFriction:
+    """Set the friction of circles and bounds."""
+
+    value: float
+
+    def __post_init__(self) -> None:
+        _between("friction", self.value, 0.0, MAX_FRICTION)
+
+
+@dataclass(frozen=True, slots=True)
+class SetIntegrator:
+    """Set how the circles move between contacts, by the method's name."""
+
+    name: str
+
+    def __post_init__(self) -> None:
+        if self.name not in integrators.BY_NAME:
+            raise InputError(f"integrator is {self.name[:40]!r}; allowed are {', '.join(integrators.BY_NAME)}")
+
+
+@dataclass(frozen=True, slots=True)
+class _AtPoint:
+    """Something a hand does at (x, y), metres."""
 
     hand: int
     x: float
     y: float
 
     def __post_init__(self) -> None:
-        _finite("x", self.x)
-        _finite("y", self.y)
+        _finite("x", self.x, FARTHEST)
+        _finite("y", self.y, FARTHEST)
+
+
+@dataclass(frozen=True, slots=True)
+class _Picking(_AtPoint):
+    """Something a hand does to the particle whose rim is nearest to (x, y), if it is within `reach` metres."""
+
+    reach: float = 0.0
+
+    def __post_init__(self) -> None:
+        _AtPoint.__post_init__(self)
+        _between("reach", self.reach, 0.0, FARTHEST)
+
+
+@dataclass(frozen=True, slots=True)
+class Drag(_Picking):
+    """Pull a particle towards (x, y). The first one of a hand picks it; if there is none within reach, the hand stays empty
+    until it is released.
+    """
+
+
+@dataclass(frozen=True, slots=True)
+class Pin(_Picking):
+    """Hold a particle where it is, whatever pushes it; let go of one that is held so."""
+
+
+@dataclass(frozen=True, slots=True)
+class Delete(_Picking):
+    """Take a particle out of the world, until reset."""
+
+
+@dataclass(frozen=True, slots=True)
+class Poke(_AtPoint):
+    """Push everything near (x, y) away from it until the hand is released."""
+
+
+@dataclass(frozen=True, slots=True)
+class Spawn(_AtPoint):
+    """Add a circle, as large as most are, at rest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,4 +197,5 @@ class Release:
     hand: int
 
 
-Command = Pause | Step | Reset | SetGravity | SetSubsteps | Drag | Poke | Release
+Setting = SetGravity | SetSubsteps | SetRestitution | SetFriction | SetIntegrator
+Command = Pause | Step | Reset | SetSpeed | Build | Setting | Drag | Poke | Pin | Spawn | Delete | Release

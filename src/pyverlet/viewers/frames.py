@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.bounds import Circle
+from pyverlet.viewers.sketch import NOTHING, Sketch
 
 if TYPE_CHECKING:
     from pyverlet.world import World
@@ -19,6 +20,9 @@ Rect = tuple[float, float, float, float]
 
 GRID_MAX = 65535
 """Largest coordinate on the 16-bit grid: 65,536 places across the view are 1/30 of a pixel on a 2,000 pixel screen."""
+
+VELOCITY_MAX = 32767
+"""Largest velocity component as a 16-bit number; the fastest circle has it."""
 
 VIEW_MARGIN = 0.03
 """Free space around the bounds, as a fraction of their longer side."""
@@ -58,16 +62,30 @@ class Shape:
     dt: float
     budget_ms: float
     bounded: bool
+    parted: bool
+    """Only a part of the room is on show."""
     outlines: tuple[tuple[tuple[float, float], ...], ...]
     """Closed lines of the bounds, metres."""
     lines: tuple[tuple[tuple[float, float], tuple[float, float]], ...]
     """Ends of dashed lines, metres."""
     panels: tuple[PanelShape, ...]
     """Several worlds side by side; empty for a single one."""
-    substeps_differ: bool
-    """The panels differ in their substeps, which then stay as they are."""
+    differing: tuple[str, ...]
+    """Settings in which the panels differ, and which therefore stay as they are."""
+    obstacles: Sketch
+    """Those that stand still."""
+    scene: str
+    """Name of the scene, or "" for worlds of the user's own."""
+    scenes: tuple[tuple[str, str], ...]
+    """Name and one line of each scene that can be picked; empty where none can."""
     radius: NDArray[np.float32]
     """(n,) metres, read-only."""
+    mass: NDArray[np.float32]
+    """(n,) kg, infinite where pinned; read-only."""
+    number: NDArray[np.uint32]
+    """(n,) what each circle is called as long as it lives; read-only."""
+    colours: NDArray[np.uint8] | None
+    """(n, 3) bytes R, G, B, the circles' own, if they have any; read-only."""
 
 
 @dataclass(frozen=True)
@@ -81,13 +99,27 @@ class Status:
     physics_ms: float
     physics_median_ms: float
     physics_p95_ms: float
+    stages: dict[str, float]
+    """Milliseconds of the last frame by stage of the engine."""
     kinetic: float
+    spin: float
+    """Kinetic energy of rotation, a part of `kinetic`."""
+    potential: float
+    links: float
     energy: float
     energies: tuple[float, ...]
-    """Total energy of each panel, J; `kinetic` and `energy` are their sums."""
+    """Total energy of each panel, J; `kinetic`, `spin`, `potential`, `links` and `energy` are sums over the panels."""
     gravity: tuple[float, float]
     substeps: int
+    restitution: float | None
+    """None where nothing can bounce, and so for friction."""
+    friction: float | None
+    integrator: str
+    speed: float
+    """Seconds of the world in a second of the wall."""
     paused: bool
+    busy: str | None
+    """What keeps the world from moving for now, such as building another."""
     error: str | None
 
 
@@ -102,17 +134,37 @@ class Frame:
     position: NDArray[np.float32]
     """(n, 2) metres, read-only copy, in the order the particles were added."""
 
+    velocity: NDArray[np.float32]
+    """(n, 2) m/s, likewise."""
+    obstacles: Sketch = NOTHING
+    """Those that move."""
+
     @cached_property
     def grid(self) -> NDArray[np.uint16]:
-        """(n, 2) positions on the 16-bit grid over `view`, y up. 0 and 65535 mean outside the view.
+        """(n, 2) positions on the 16-bit grid over `view`, as `quantise` makes it.
 
         Computed when first asked for, by whoever sends the frame, so that the physics thread never pays for it.
         """
         return quantise(self.position, self.view)
 
+    @cached_property
+    def velocity_unit(self) -> float:
+        """Metres a second that one count of `velocity_grid` stands for."""
+        fastest = float(np.abs(self.velocity).max(initial=0.0))
+        return fastest / VELOCITY_MAX if 0.0 < fastest < np.inf else 1.0
+
+    @cached_property
+    def velocity_grid(self) -> NDArray[np.int16]:
+        """(n, 2) velocities in whole `velocity_unit`."""
+        counts = np.nan_to_num(self.velocity * np.float32(1.0 / self.velocity_unit), posinf=0.0, neginf=0.0)
+        return np.asarray(np.rint(counts), dtype=np.int16)
+
 
 def quantise(position: NDArray[np.float32], view: Rect) -> NDArray[np.uint16]:
-    """Round (n, 2) positions in metres to the 16-bit grid over `view`; clipped, so that nothing wraps around."""
+    """(n, 2) positions in metres on the 16-bit grid over `view`, y up. Clipped, so that nothing wraps around.
+
+    0 and 65535 mean outside the view.
+    """
     x0, y0, x1, y1 = view
     origin = np.array([x0, y0], dtype=np.float32)
     scale = np.array([GRID_MAX / (x1 - x0), GRID_MAX / (y1 - y0)], dtype=np.float32)
@@ -147,11 +199,17 @@ class Camera:
     """Chooses the part of the plane on show: the bounds with a margin or, without bounds, where the particles are.
 
     Of several worlds it shows the same part: all of the largest bounds, or all the particles.
+
+    Args:
+        worlds: on show.
+        part: shown whatever the worlds do, metres.
     """
 
-    def __init__(self, *worlds: World) -> None:
+    def __init__(self, *worlds: World, part: Rect | None = None) -> None:
         extents = [extent for world in worlds if (extent := world.boundary.extent()) is not None]
-        self._fixed: Rect | None = None
+        self._fixed = part
+        if part is not None:
+            return
         if extents:
             lowest, highest = np.min(extents, axis=0), np.max(extents, axis=0)
             x0, y0, x1, y1 = (float(value) for value in (*lowest[:2], *highest[2:]))

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pyverlet.forces import Grip, Push
+from pyverlet.picture.view import nearest
+from pyverlet.viewers.tools import Pins, delete, spawn
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -45,7 +47,7 @@ class Hands:
         An unused hand first takes the particle whose rim is nearest, if within `reach` metres.
         """
         if hand not in self._held:
-            particle = self._nearest(x, y, reach)
+            particle = nearest(self._world, np.array([x, y]), reach)
             self._hold(hand, None if particle is None else Grip(particle, target=(x, y), frequency=GRIP_FREQUENCY))
         self._aim[hand] = (x, y)
 
@@ -82,14 +84,6 @@ class Hands:
         shorten = min(1.0, leash / max(float(np.hypot(dx, dy)), 1e-30))
         return (x + dx * shorten, y + dy * shorten)
 
-    def _nearest(self, x: float, y: float, reach: float) -> int | None:
-        if not len(self._world):
-            return None
-        offset = self._world.position - np.array([x, y], dtype=self._world.position.dtype)
-        gap = np.hypot(offset[:, 0], offset[:, 1]) - self._world.radius
-        nearest = int(np.argmin(gap))
-        return nearest if gap[nearest] <= reach else None
-
     def _hold(self, hand: int, force: Grip | Push | None) -> None:
         self._held[hand] = force
         if force is not None:
@@ -103,7 +97,9 @@ class HandsOnPanels:
     """
 
     def __init__(self, worlds: Sequence[World]) -> None:
+        self._worlds = worlds
         self._hands = [Hands(world) for world in worlds]
+        self._pins = [Pins() for _ in worlds]
         self._panel: dict[int, int] = {}
 
     def drag(self, hand: int, x: float, y: float, reach: float, layout: Layout) -> None:
@@ -116,6 +112,21 @@ class HandsOnPanels:
         panel, x, y = self._take(hand, x, y, layout)
         self._hands[panel].poke(hand, x, y, view_size)
 
+    def pin(self, x: float, y: float, reach: float, layout: Layout) -> bool:
+        """As `Pins.pin`."""
+        panel, x, y = _within(x, y, layout)
+        return self._pins[panel].pin(self._worlds[panel], x, y, reach)
+
+    def spawn(self, x: float, y: float, layout: Layout) -> None:
+        """Add a circle; see `tools.spawn`."""
+        panel, x, y = _within(x, y, layout)
+        spawn(self._worlds[panel], x, y)
+
+    def delete(self, x: float, y: float, reach: float, layout: Layout) -> None:
+        """Remove a circle; see `tools.delete`."""
+        panel, x, y = _within(x, y, layout)
+        delete(self._worlds[panel], x, y, reach)
+
     def _take(self, hand: int, x: float, y: float, layout: Layout) -> tuple[int, float, float]:
         panel = self._panel.setdefault(hand, layout.at(x, y))
         dx, dy = layout.offset(panel)
@@ -126,7 +137,7 @@ class HandsOnPanels:
         self._hands[self._panel.pop(hand, 0)].release(hand)
 
     def release_all(self) -> None:
-        """Every hand lets go."""
+        """Every hand lets go. Pins stay."""
         self._panel.clear()
         for hands in self._hands:
             hands.release_all()
@@ -135,3 +146,10 @@ class HandsOnPanels:
         """As `Hands.move`, before every frame."""
         for hands in self._hands:
             hands.move(view_size)
+
+
+def _within(x: float, y: float, layout: Layout) -> tuple[int, float, float]:
+    """The panel at a point of the picture, and the point in its own coordinates."""
+    panel = layout.at(x, y)
+    dx, dy = layout.offset(panel)
+    return panel, x - dx, y - dy

@@ -21,6 +21,9 @@ import uvicorn
 from pyverlet import checks
 from pyverlet.errors import InputError
 from pyverlet.progress import Progress
+from pyverlet.viewers.artist import Artist, draws_here
+from pyverlet.viewers.exhibit import Exhibit, Repertoire
+from pyverlet.viewers.looks import Look
 from pyverlet.viewers.protocol import MAX_MESSAGE
 from pyverlet.viewers.session import Session
 from pyverlet.viewers.web import LOOPBACK_NAMES, make_app
@@ -33,14 +36,25 @@ GOODBYE_S = 1
 """Whole seconds open tabs get to hang up."""
 
 
-def serve(build: Callable[[], World | Panels], *, title: str, host: str, port: int, open_browser: bool, dt: float) -> None:
+def serve(
+    build: Callable[[], World | Panels | Exhibit],
+    *,
+    title: str,
+    host: str,
+    port: int,
+    open_browser: bool,
+    dt: float,
+    repertoire: Repertoire | None = None,
+) -> None:
     """Show the world that `build` makes until Ctrl-C. See `pyverlet.viewers.serve`."""
     _refuse_running_loop()
     with contextlib.suppress(KeyboardInterrupt), _take_port(host, port) as listener:
         with _patient_workers():
-            world = build()
-            _compile(world)
-        session = Session(world, title=title, dt=dt)
+            exhibit = Exhibit.of(build(), title)
+            _compile(exhibit)
+        session = Session(exhibit, dt=dt, repertoire=repertoire)
+        if draws_here(session.latest.shape):
+            Artist().jpeg(session.latest, Look())  # compiles what it needs: no tab shall wait for that
         with _on_air(session, listener, only_loopback=host in LOOPBACK_NAMES), _ended_by_signals(session):
             address = _address(host, listener)
             _announce(title, address, host, open_browser)
@@ -173,11 +187,11 @@ def _why_not(error: OSError, host: str, port: int) -> str:
     return f"host is {host!r}, which cannot be listened on ({error.strerror}); allowed is an address of this machine"
 
 
-def _compile(world: World | Panels) -> None:
-    from pyverlet import Panels, warm_up
+def _compile(exhibit: Exhibit) -> None:
+    from pyverlet import warm_up
 
     with Progress("compiling kernels, once") as progress:
-        for each in Panels.of(world).worlds:
+        for each in exhibit.panels.worlds:
             warm_up(each, progress)
 
 
@@ -207,4 +221,5 @@ def _refuse_running_loop() -> None:
         asyncio.get_running_loop()
     except RuntimeError:
         return
-    raise InputError("view() was called inside a running event loop, which it would block; allowed is a plain script")
+    allowed = "a plain script (in a notebook: pyverlet.widget)"
+    raise InputError(f"view() was called inside a running event loop, which it would block; allowed is {allowed}")

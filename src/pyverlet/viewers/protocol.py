@@ -1,8 +1,10 @@
 """The words on the wire. Page to server: small JSON texts. Server to page: a JSON head, then an array of numbers.
 
 - 4 bytes: length of the head, little-endian, a multiple of 4.
-- head: JSON padded with spaces, {"kind": "shape" | "frame" | "refused", ...}.
-- body, little-endian: of a shape n float32 radii, of a frame n pairs of uint16 on the grid over "view".
+- head: JSON padded with spaces, {"kind": "shape" | "frame" | "picture" | "refused", ...}.
+- body, little-endian: of a shape n float32 radii, n float32 masses, n uint32 numbers and, if "coloured", n times three bytes R,
+  G, B; of a frame n pairs of uint16 on the grid over "view" and, if the tab looks at velocities, n pairs of int16 in units of
+  "unit" m/s; of a picture a JPEG.
 """
 
 from __future__ import annotations
@@ -15,21 +17,32 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pyverlet import integrators
 from pyverlet.errors import InputError
 from pyverlet.viewers.commands import (
+    MAX_PARTICLES,
     MAX_SUBSTEPS,
+    Build,
     Command,
+    Delete,
     Drag,
     Pause,
+    Pin,
     Poke,
     Release,
     Reset,
+    SetFriction,
     SetGravity,
+    SetIntegrator,
+    SetRestitution,
+    SetSpeed,
     SetSubsteps,
+    Spawn,
     Step,
 )
-from pyverlet.viewers.frames import Frame, Shape
+from pyverlet.viewers.frames import Frame, Rect, Shape, quantise
 from pyverlet.viewers.hands import POKE_RADIUS
+from pyverlet.viewers.looks import Look
 
 MAX_MESSAGE = 4096
 """Bytes. The longest honest message is about a hundred."""
@@ -42,7 +55,10 @@ class Ack:
     seq: int
 
 
-def decode(text: str, hand: int) -> Command | Ack:
+Request = Command | Ack | Look
+
+
+def decode(text: str, hand: int) -> Request:
     """Read one message of a page. `hand` is the tab's own number: no tab moves another's hand.
 
     Raises:
@@ -63,28 +79,74 @@ def decode(text: str, hand: int) -> Command | Ack:
     return maker(message, hand)
 
 
-def encode_frame(frame: Frame) -> bytes:
-    """A frame as one binary message."""
-    head = {"kind": "frame", "seq": frame.seq, "view": frame.view, "status": dataclasses.asdict(frame.status)}
-    return _join(head, frame.grid.tobytes())
+def encode_frame(frame: Frame, part: Rect | None = None, *, velocity: bool = False) -> bytes:
+    """A frame as one binary message.
+
+    Args:
+        frame: to encode.
+        part: of the plane, metres; None is all that the camera shows.
+        velocity: also send velocities.
+    """
+    grid = frame.grid if part is None else quantise(frame.position, part)
+    head = _head("frame", frame, part)
+    if not velocity:
+        return _join(head, grid.tobytes())
+    head["unit"] = frame.velocity_unit
+    return _join(head, grid.tobytes() + frame.velocity_grid.tobytes())
 
 
-def encode_shape(shape: Shape) -> bytes:
-    """A shape as one binary message."""
+def encode_picture(frame: Frame, part: Rect | None, jpeg: bytes) -> bytes:
+    """A frame that the server has drawn."""
+    return _join(_head("picture", frame, part), jpeg)
+
+
+def _head(kind: str, frame: Frame, part: Rect | None) -> dict[str, Any]:
+    return {
+        "kind": kind,
+        "seq": frame.seq,
+        "view": frame.view if part is None else part,
+        "room": frame.view,
+        "obstacles": frame.obstacles.lines,
+        "status": dataclasses.asdict(frame.status),
+    }
+
+
+def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = None) -> bytes:
+    """A shape as one binary message.
+
+    Args:
+        shape: to encode.
+        drawn_here: pictures will follow in place of frames: the page need not know the circles.
+        note: something the page should tell about how it is drawn.
+    """
+    coloured = shape.colours is not None
     head = {
         "kind": "shape",
         "title": shape.title,
         "dt": shape.dt,
         "budgetMs": shape.budget_ms,
         "bounded": shape.bounded,
+        "parted": shape.parted,
         "outlines": shape.outlines,
         "lines": shape.lines,
         "panels": [dataclasses.asdict(panel) for panel in shape.panels],
-        "substepsDiffer": shape.substeps_differ,
+        "differing": shape.differing,
+        "obstacles": shape.obstacles.lines,
+        "scene": shape.scene,
+        "scenes": shape.scenes,
+        "integrators": list(integrators.BY_NAME),
+        "count": len(shape.radius),
+        "coloured": coloured,
+        "drawnHere": drawn_here,
+        "note": note,
         "maxSubsteps": MAX_SUBSTEPS,
+        "maxParticles": MAX_PARTICLES,
         "pokeRadius": POKE_RADIUS,
     }
-    return _join(head, shape.radius.tobytes())
+    if drawn_here:
+        return _join(head, b"")
+    colours = b"" if shape.colours is None else shape.colours.tobytes()
+    return _join(head, shape.radius.tobytes() + shape.mass.tobytes() + shape.number.tobytes() + colours)
 
 
 def encode_refusal(reason: str) -> bytes:
@@ -138,14 +200,51 @@ def _flag(message: Mapping[str, Any], name: str) -> bool:
     return value
 
 
-_MAKERS: dict[str, Callable[[Mapping[str, Any], int], Command | Ack]] = {
+def _text(message: Mapping[str, Any], name: str) -> str:
+    value = message.get(name)
+    if not isinstance(value, str):
+        raise InputError(f"{name} is {_short(value)}; allowed is a text")
+    return value
+
+
+def _look(message: Mapping[str, Any]) -> Look:
+    part = message.get("part")
+    if part is not None:
+        if not isinstance(part, list) or len(part) != 4:
+            raise InputError(f"part is {_short(part)}; allowed are four numbers [x0, y0, x1, y1], and null")
+        part = tuple(_real({"part": value}, "part") for value in part)
+    return Look(
+        part,
+        _whole(message, "width"),
+        _whole(message, "height"),
+        _text(message, "colour"),
+        _flag(message, "dark"),
+        _flag(message, "velocity"),
+    )
+
+
+def _build(message: Mapping[str, Any]) -> Build:
+    scene = None if message.get("scene") is None else _text(message, "scene")
+    return Build(scene, None if message.get("particles") is None else _whole(message, "particles"))
+
+
+_MAKERS: dict[str, Callable[[Mapping[str, Any], int], Request]] = {
     "ack": lambda m, hand: Ack(_whole(m, "seq")),
+    "look": lambda m, hand: _look(m),
     "pause": lambda m, hand: Pause(_flag(m, "on")),
     "step": lambda m, hand: Step(),
     "reset": lambda m, hand: Reset(),
+    "speed": lambda m, hand: SetSpeed(_real(m, "value")),
+    "build": lambda m, hand: _build(m),
     "gravity": lambda m, hand: SetGravity(_real(m, "x"), _real(m, "y")),
     "substeps": lambda m, hand: SetSubsteps(_whole(m, "value")),
+    "restitution": lambda m, hand: SetRestitution(_real(m, "value")),
+    "friction": lambda m, hand: SetFriction(_real(m, "value")),
+    "integrator": lambda m, hand: SetIntegrator(_text(m, "value")),
     "drag": lambda m, hand: Drag(hand, _real(m, "x"), _real(m, "y"), _real(m, "reach")),
     "poke": lambda m, hand: Poke(hand, _real(m, "x"), _real(m, "y")),
+    "pin": lambda m, hand: Pin(hand, _real(m, "x"), _real(m, "y"), _real(m, "reach")),
+    "spawn": lambda m, hand: Spawn(hand, _real(m, "x"), _real(m, "y")),
+    "delete": lambda m, hand: Delete(hand, _real(m, "x"), _real(m, "y"), _real(m, "reach")),
     "release": lambda m, hand: Release(hand),
 }

@@ -1,7 +1,7 @@
 """The narrow door between a world and whoever watches it: commands go in, frames come out.
 
-A session owns the world, its clock and the one thread that steps it, the physics thread: the caller's (`run`) or one of its
-own (`start`). The compiled kernels' workers do not stand several callers. It knows nothing of how commands arrive or where
+A session owns the worlds, their clock and the one thread that steps them, the physics thread: the caller's (`run`, `turn`) or one
+of its own (`start`). The compiled kernels' workers do not stand several callers. It knows nothing of how commands arrive or where
 frames go.
 """
 
@@ -22,19 +22,36 @@ from pyverlet import checks
 from pyverlet.clock import Clock, FrameBudget
 from pyverlet.constants import FRAME_BUDGET_MS
 from pyverlet.errors import PyverletError
-from pyverlet.panels import Panels
-from pyverlet.viewers.commands import Command, Drag, Pause, Poke, Release, Reset, SetGravity, SetSubsteps, Step
-from pyverlet.viewers.frames import Camera, Frame, PanelShape, Shape, Status, outline
-from pyverlet.viewers.hands import HandsOnPanels
-from pyverlet.viewers.layout import Layout
+from pyverlet.viewers import levers
+from pyverlet.viewers.commands import (
+    Build,
+    Command,
+    Delete,
+    Drag,
+    Pause,
+    Pin,
+    Poke,
+    Release,
+    Reset,
+    SetFriction,
+    SetGravity,
+    SetIntegrator,
+    SetRestitution,
+    SetSpeed,
+    SetSubsteps,
+    Spawn,
+    Step,
+)
+from pyverlet.viewers.exhibit import Exhibit, Repertoire
+from pyverlet.viewers.frames import Frame, Shape
+from pyverlet.viewers.gauges import Gauges
+from pyverlet.viewers.stage import Stage
 
 if TYPE_CHECKING:
+    from pyverlet.panels import Panels
     from pyverlet.world import World
 
 _log = logging.getLogger(__name__)
-
-SLOW_STATUS_S = 0.1
-"""Energy and percentiles read every particle or many frames; ten times a second is as fast as anybody reads."""
 
 MAX_CATCH_UP = 4
 """Late frames made up for at once; more are dropped and counted. A world that is too slow runs slow, smoothly."""
@@ -52,37 +69,42 @@ class Session:
     Several worlds side by side run as one: every command is for all of them, but a hand works in the one it touches.
 
     Args:
-        world: a world or panels, stepped by this session only, while it runs. Reset goes back to the present state.
+        world: a world, panels or an exhibit, stepped by this session only, while it runs. Reset goes back to the present state.
         title: what the viewer calls it.
         dt: simulated seconds per frame, also the pace: 1/dt frames a second.
         budget_ms: milliseconds of physics a frame may take, for the figures on show.
+        repertoire: scenes a viewer may put in place of the world; None: the world is all there is.
 
     Raises:
         InputError: dt or budget_ms is not a positive finite number.
     """
 
     def __init__(
-        self, world: World | Panels, *, title: str = "pyverlet", dt: float = 1 / 60, budget_ms: float = FRAME_BUDGET_MS
+        self,
+        world: World | Panels | Exhibit,
+        *,
+        title: str = "pyverlet",
+        dt: float = 1 / 60,
+        budget_ms: float = FRAME_BUDGET_MS,
+        repertoire: Repertoire | None = None,
     ) -> None:
-        self._panels = Panels.of(world)
-        self._worlds = self._panels.worlds
-        self._title = title
         self._dt = checks.number("dt", dt, above=0.0)
         self._budget_ms = checks.number("budget_ms", budget_ms, above=0.0)
-        self._saved = self._panels.save()
-        self._start_energies = [float(each.energy().total) for each in self._worlds]
+        self._repertoire = repertoire
         self._commands: queue.SimpleQueue[Command | None] = queue.SimpleQueue()
         self._listeners: tuple[Callable[[], None], ...] = ()
         self._listeners_lock = threading.Lock()
         self._thread: threading.Thread | None = None
         self._stopping = threading.Event()
         self._paused = False
+        self._speed = 1.0
+        self._busy: str | None = None
         self._error: str | None = None
-        self._hands = HandsOnPanels(self._worlds)
-        self._substeps_differ = len({each.substeps for each in self._worlds}) > 1
+        self._before: list[NDArray[np.float32]] | None = None
+        self._shape: Shape
         self._seq = 0
-        self._fresh_start()
-        self._shape = self._make_shape()
+        self._last = time.perf_counter()
+        self._enter(Exhibit.of(world, title))
         self.latest: Frame = self._picture()
         """The newest frame. Replaced, never changed; read it from any thread."""
 
@@ -136,64 +158,97 @@ class Session:
         Prefer this where the world has been stepped before: OpenMP keeps a team of workers for each thread that ever called
         a parallel kernel, and with two teams alive every frame takes twice as long.
         """
-        last = time.perf_counter()
+        self._last = time.perf_counter()
         while not self._stopping.is_set():
+            wait = self.turn()
             if self._held():
-                if self._obey_next():
-                    self._publish()
-                last = time.perf_counter()  # time spent paused is not time to catch up with
-                continue
-            now = time.perf_counter()
-            due = self._clock.advance(now - last)
-            last = now
-            for _ in range(due):
-                self._advance()
+                self._obey_next()
+            elif wait > 0.0:
+                # Sleeping, not waiting on the queue: on some systems a timed wait only wakes at every 15 ms.
+                time.sleep(wait)
+        self._stage.hands.release_all()
+
+    def turn(self, *, longest: float | None = None) -> float:
+        """Obey what was asked, make the frames that are due since the last turn, and publish.
+
+        Args:
+            longest: most seconds of the wall that may have passed; None counts all of them.
+
+        Returns:
+            Seconds until the next frame is due.
+        """
+        if self._obey_all() and self._held():
+            self._publish()
+        now = time.perf_counter()
+        elapsed, self._last = now - self._last, now
+        if self._held():
+            return IDLE_S  # time spent paused is not time to catch up with
+        if longest is not None:
+            elapsed = min(elapsed, longest)
+        due = self._clock.advance(elapsed * self._speed)
+        for _ in range(due):
+            self._advance()
+            if self._speed == 1.0:
                 self._publish()
-                self._obey_all()
-                if self._held() or self._stopping.is_set():
-                    break
-            # Sleeping, not waiting on the queue: on some systems a timed wait only wakes at every 15 ms.
-            time.sleep(max(0.0, last + (1.0 - self._clock.alpha) * self._dt - time.perf_counter()))
             self._obey_all()
-            if self._held():
-                self._publish()  # the last picture for a while: it says why
-        self._hands.release_all()
+            if self._held() or self._stopping.is_set():
+                break
+        if self._held():
+            self._publish()  # the last picture for a while: it says why
+            return 0.0
+        if self._speed < 1.0:
+            self._publish()
+            return now + self._dt - time.perf_counter()
+        return now + (1.0 - self._clock.alpha) * self._dt - time.perf_counter()
 
     def _held(self) -> bool:
         return self._paused or self._error is not None
 
     def _advance(self) -> None:
         """One frame. An error stops the stepping, not the session: the page stays readable and Reset works."""
-        self._hands.move(self._view_size())
         began = time.perf_counter()
+        self._before = self._stage.look()[0] if self._speed < 1.0 else None
         try:
-            self._panels.step(self._dt)
+            self._stage.step(self._dt)
         except PyverletError as error:
             self._error = str(error)
         except Exception as error:  # a user's own force may raise anything
-            _log.exception("the world stopped at %.6g s", self._panels.time)
+            _log.exception("the world stopped at %.6g s", self._stage.panels.time)
             self._error = f"{type(error).__name__}: {error}"
         else:
-            self._budget.record(1000.0 * (time.perf_counter() - began))
+            self._gauges.budget.record(1000.0 * (time.perf_counter() - began))
 
-    def _obey_next(self) -> bool:
-        """Wait for a command and obey it and all behind it; False if none comes for a while."""
+    def _obey_next(self) -> None:
+        """Wait for a command and obey it and all behind it."""
         try:
             self._obey(self._commands.get(timeout=IDLE_S))
         except queue.Empty:
-            return False
+            return
         self._obey_all()
-        return True
+        self._publish()
 
-    def _obey_all(self) -> None:
+    def _obey_all(self) -> bool:
+        """Whether there was anything to obey."""
+        any_at_all = False
         while True:
             try:
                 command = self._commands.get_nowait()
             except queue.Empty:
-                return
+                return any_at_all
             self._obey(command)
+            any_at_all = True
 
     def _obey(self, command: Command | None) -> None:
+        try:
+            self._do(command)
+        except PyverletError as error:  # the world did not take it
+            self._error = str(error)
+        except Exception as error:  # nothing a viewer says may end the physics thread
+            _log.exception("a viewer asked for %r", command)
+            self._error = f"{type(error).__name__}: {error}"
+
+    def _do(self, command: Command | None) -> None:
+        stage = self._stage
         match command:
             case None:
                 pass  # only wakes the thread up
@@ -204,44 +259,77 @@ class Session:
                 for _ in range(frames):
                     if self._error is None and not self._stopping.is_set():
                         self._advance()
+                self._before = None  # show where it is, not what was between
+            case SetSpeed(value):
+                self._speed = value
+                self._before = None
             case Reset():
-                self._panels.restore(self._saved)
-                self._hands.release_all()
+                stage.reset()
                 self._fresh_start()
-            case SetGravity(x, y):
-                for world in self._worlds:
-                    world.gravity = (x, y)
-            case SetSubsteps(value):
-                for world in () if self._substeps_differ else self._worlds:
-                    world.substeps = value
+            case Build(scene, particles):
+                self._build(scene, particles)
+            case SetGravity() | SetSubsteps() | SetRestitution() | SetFriction() | SetIntegrator():
+                stage.pull(command)
             case Drag(hand, x, y, reach):
-                self._hands.drag(hand, x, y, reach, self._layout)
+                stage.hands.drag(hand, x, y, reach, stage.layout)
             case Poke(hand, x, y):
-                self._hands.poke(hand, x, y, self._view_size(), self._layout)
+                stage.hands.poke(hand, x, y, stage.view_size, stage.layout)
+            case Pin(_, x, y, reach):
+                stage.pin(x, y, reach)
+            case Spawn(_, x, y):
+                stage.hands.spawn(x, y, stage.layout)
+            case Delete(_, x, y, reach):
+                stage.hands.delete(x, y, reach, stage.layout)
             case Release(hand):
-                self._hands.release(hand)
+                stage.hands.release(hand)
+
+    # -- what is on show ----------------------------------------------------------------------------------------------
+
+    def _enter(self, exhibit: Exhibit) -> None:
+        self._stage = Stage(exhibit)
+        self._fresh_start()
 
     def _fresh_start(self) -> None:
         self._error = None
+        self._before = None
         self._clock = Clock(dt=self._dt, max_catch_up=MAX_CATCH_UP)
-        self._budget = FrameBudget(limit_ms=self._budget_ms)
-        self._camera = Camera(*self._worlds)
-        self._look()
-        self._slow_status_due = 0.0
+        self._gauges = Gauges(FrameBudget(limit_ms=self._budget_ms))
+        self._shape_of: object = None
+
+    def _build(self, scene: str | None, particles: int | None) -> None:
+        """Put another scene on, or the same with another number of circles, whose settings then stay as the sliders say."""
+        if self._repertoire is None:
+            return
+        old = self._stage
+        name = scene or old.exhibit.scene
+        old.hands.release_all()
+        self._say_busy(f"building {name}")
+        try:
+            self._enter(self._repertoire.build(name, particles, self._on_the_way(name)))
+        except _Stopped:
+            return
+        finally:
+            self._busy = None
+            self._last = time.perf_counter()
+        if scene is None:
+            for command in levers.present(old.worlds[0]):
+                self._stage.pull(command)
+        self._publish()
+
+    def _on_the_way(self, name: str) -> Callable[[int, int], None]:
+        def progress(done: int, total: int) -> None:
+            if self._stopping.is_set():
+                raise _Stopped
+            self._say_busy(f"building {name}: {100 * done // max(total, 1)} %")
+
+        return progress
+
+    def _say_busy(self, text: str) -> None:
+        if text != self._busy:
+            self._busy = text
+            self._publish()
 
     # -- frames -------------------------------------------------------------------------------------------------------
-
-    def _view_size(self) -> float:
-        x0, y0, x1, y1 = self._layout.room
-        return max(x1 - x0, y1 - y0)
-
-    def _look(self) -> list[NDArray[np.float32]]:
-        """Point the camera at where everybody is now; returns each world's positions."""
-        positions = [np.array(world.position, dtype=np.float32) for world in self._worlds]
-        bounded = any(world.boundary.extent() is not None for world in self._worlds)
-        together = positions[0] if len(positions) == 1 else np.concatenate(positions)
-        self._layout = Layout(self._camera.view(together), len(positions), bounded)
-        return positions
 
     def _publish(self) -> None:
         self._seq += 1
@@ -250,64 +338,33 @@ class Session:
             listener()
 
     def _picture(self) -> Frame:
-        positions = self._look()
-        if sum(map(len, positions)) != len(self._shape.radius):
-            self._shape = self._make_shape()
-        placed = [self._layout.place(k, position) for k, position in enumerate(positions)]
-        position = placed[0] if len(placed) == 1 else np.concatenate(placed)
-        position.flags.writeable = False
-        return Frame(self._seq, self._shape, self._layout.view, self._status(), position)
-
-    def _status(self) -> Status:
-        world, budget = self._worlds[0], self._budget
-        now = time.perf_counter()
-        if now >= self._slow_status_due or self._held():
-            self._slow_status_due = now + SLOW_STATUS_S
-            energies = [each.energy() for each in self._worlds]
-            self._kinetic = sum(float(energy.kinetic) for energy in energies)
-            self._energies = tuple(float(energy.total) for energy in energies)
-            self._percentiles = (float(budget.median_ms), float(budget.p95_ms))
-        return Status(
-            time=float(self._panels.time),
-            frames=int(self._panels.frames),
-            particles=sum(map(len, self._worlds)),
-            dropped=int(self._clock.dropped),
-            physics_ms=float(budget.last_ms),
-            physics_median_ms=self._percentiles[0],
-            physics_p95_ms=self._percentiles[1],
-            kinetic=self._kinetic,
-            energy=sum(self._energies),
-            energies=self._energies,
-            gravity=(float(world.gravity[0]), float(world.gravity[1])),
-            substeps=int(world.substeps),
+        stage = self._stage
+        positions, velocity = stage.look()
+        if self._shape_of != stage.version:
+            self._shape_of = stage.version
+            scenes = tuple(self._repertoire.summaries.items()) if self._repertoire else ()
+            self._shape = stage.shape(dt=self._dt, budget_ms=self._budget_ms, scenes=scenes)
+        position = stage.place(self._between(positions))
+        position.flags.writeable = velocity.flags.writeable = False
+        status = self._gauges.read(
+            stage,
+            dropped=self._clock.dropped,
+            speed=self._speed,
             paused=self._paused,
+            busy=self._busy,
             error=self._error,
+            at_once=self._held(),
         )
+        return Frame(self._seq, self._shape, stage.layout.view, status, position, velocity, stage.moving())
 
-    def _make_shape(self) -> Shape:
-        radius = np.concatenate([world.radius for world in self._worlds], dtype=np.float32)
-        radius.flags.writeable = False
-        bounded = any(world.boundary.extent() is not None for world in self._worlds)
-        outlines: list[tuple[tuple[float, float], ...]] = []
-        lines: list[tuple[tuple[float, float], tuple[float, float]]] = []
-        panels: list[PanelShape] = []
-        first = 0
-        for k, (panel, world) in enumerate(zip(self._panels, self._worlds, strict=True)):
-            dx, dy = self._layout.offset(k)
-            outlines += [tuple((x + dx, y + dy) for x, y in line) for line in outline(world.boundary)]
-            if self._panels.line is not None and (extent := world.boundary.extent()):
-                lines.append(((extent[0] + dx, self._panels.line + dy), (extent[2] + dx, self._panels.line + dy)))
-            if len(self._panels) > 1:
-                panels.append(PanelShape(panel.name, first, len(world), self._start_energies[k], self._layout.strip(k)))
-            first += len(world)
-        return Shape(
-            title=self._title,
-            dt=self._dt,
-            budget_ms=self._budget_ms,
-            bounded=bounded,
-            outlines=tuple(outlines),
-            lines=tuple(lines),
-            panels=tuple(panels),
-            substeps_differ=self._substeps_differ,
-            radius=radius,
-        )
+    def _between(self, now: list[NDArray[np.float32]]) -> list[NDArray[np.float32]]:
+        """In slow motion, where the circles are between the last two frames: one frame behind, and smooth."""
+        before = self._before
+        if self._speed == 1.0 or self._paused or before is None or list(map(len, before)) != list(map(len, now)):
+            return now
+        alpha = np.float32(self._clock.alpha)
+        return [a + alpha * (b - a) for a, b in zip(before, now, strict=True)]
+
+
+class _Stopped(Exception):  # noqa: N818  (no error: somebody has asked for it)
+    """The session ends while a scene is being built."""

@@ -21,9 +21,11 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from pyverlet.errors import InputError
+from pyverlet.viewers.artist import Artist, advice, draws_here
 from pyverlet.viewers.commands import Release
-from pyverlet.viewers.frames import Frame, Shape
-from pyverlet.viewers.protocol import Ack, decode, encode_frame, encode_refusal, encode_shape
+from pyverlet.viewers.frames import Frame, Rect, Shape
+from pyverlet.viewers.looks import Look
+from pyverlet.viewers.protocol import Ack, decode, encode_frame, encode_picture, encode_refusal, encode_shape
 from pyverlet.viewers.session import Session
 
 MAX_IN_FLIGHT = 2
@@ -34,19 +36,16 @@ LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
 POLICY_VIOLATION = 1008
 """WebSocket close code (RFC 6455, 7.4.1)."""
 
-PAGE = {
-    "/": ("index.html", "text/html; charset=utf-8"),
-    "/page.js": ("page.js", "text/javascript; charset=utf-8"),
-    "/draw.js": ("draw.js", "text/javascript; charset=utf-8"),
-    "/panels.js": ("panels.js", "text/javascript; charset=utf-8"),
-    "/chart.js": ("chart.js", "text/javascript; charset=utf-8"),
-    "/page.css": ("page.css", "text/css; charset=utf-8"),
+MEDIA_TYPES = {
+    "html": "text/html; charset=utf-8",
+    "js": "text/javascript; charset=utf-8",
+    "css": "text/css; charset=utf-8",
 }
 
 HEADERS = {
     # The page belongs to the running version: never one from the cache of an older one.
     "Cache-Control": "no-store",
-    "Content-Security-Policy": "default-src 'self'; img-src 'self' data:; connect-src 'self' ws: wss:",
+    "Content-Security-Policy": "default-src 'self'; img-src 'self' data: blob:; connect-src 'self' ws: wss:",
     "X-Content-Type-Options": "nosniff",
 }
 
@@ -59,7 +58,7 @@ def make_app(session: Session, *, only_loopback: bool = True) -> Starlette:
         only_loopback: refuse WebSockets that did not ask for this machine by one of its own names. Every page in the
             world may ask the browser to connect to localhost, or point a name of its own at 127.0.0.1.
     """
-    encoder = _Encoder()
+    encoder, artist = _Encoder(), Artist()
     hands = itertools.count()
 
     async def socket(websocket: WebSocket) -> None:
@@ -67,10 +66,16 @@ def make_app(session: Session, *, only_loopback: bool = True) -> Starlette:
             await websocket.close(POLICY_VIOLATION)
             return
         await websocket.accept()
-        await Tab(websocket, session, encoder, next(hands)).serve()
+        await Tab(websocket, session, encoder, artist, next(hands)).serve()
 
-    routes = [Route(path, _file(name, media_type)) for path, (name, media_type) in PAGE.items()]
+    routes = [Route("/" if name == "index.html" else f"/{name}", _file(name)) for name in page_files()]
     return Starlette(routes=[*routes, WebSocketRoute("/socket", socket)])
+
+
+def page_files() -> list[str]:
+    """Names of the files the page is made of."""
+    names = sorted(file.name for file in (resources.files("pyverlet.viewers") / "page").iterdir())
+    return [name for name in names if name.rpartition(".")[2] in MEDIA_TYPES]
 
 
 def welcome(origin: str | None, host: str, only_loopback: bool) -> bool:
@@ -90,7 +95,8 @@ def _name(url: str) -> str | None:
         return None
 
 
-def _file(name: str, media_type: str) -> Callable[[Request], Awaitable[Response]]:
+def _file(name: str) -> Callable[[Request], Awaitable[Response]]:
+    media_type = MEDIA_TYPES[name.rpartition(".")[2]]
     content = (resources.files("pyverlet.viewers") / "page" / name).read_bytes()
 
     async def answer(request: Request) -> Response:
@@ -100,33 +106,39 @@ def _file(name: str, media_type: str) -> Callable[[Request], Awaitable[Response]
 
 
 class _Encoder:
-    """Encodes each frame once, however many tabs watch."""
+    """Encodes each message once, however many tabs want the same."""
 
     def __init__(self) -> None:
         self._frame: Frame | None = None
-        self._frame_bytes = b""
+        self._frames: dict[tuple[Rect | None, bool], bytes] = {}
         self._shape: Shape | None = None
         self._shape_bytes = b""
 
-    def frame(self, frame: Frame) -> bytes:
+    def frame(self, frame: Frame, look: Look) -> bytes:
         if frame is not self._frame:
-            self._frame, self._frame_bytes = frame, encode_frame(frame)
-        return self._frame_bytes
+            self._frame, self._frames = frame, {}
+        key = (look.part, look.velocity)
+        if key not in self._frames:
+            self._frames[key] = encode_frame(frame, look.part, velocity=look.velocity)
+        return self._frames[key]
 
     def shape(self, shape: Shape) -> bytes:
         if shape is not self._shape:
-            self._shape, self._shape_bytes = shape, encode_shape(shape)
+            self._shape = shape
+            self._shape_bytes = encode_shape(shape, drawn_here=draws_here(shape), note=advice(shape))
         return self._shape_bytes
 
 
 class Tab:
     """One WebSocket: a reader of commands and acknowledgements, a writer of frames."""
 
-    def __init__(self, websocket: WebSocket, session: Session, encoder: _Encoder, hand: int) -> None:
+    def __init__(self, websocket: WebSocket, session: Session, encoder: _Encoder, artist: Artist, hand: int) -> None:
         self._websocket = websocket
         self._session = session
         self._encoder = encoder
+        self._artist = artist
         self._hand = hand
+        self._look = Look()
         self._in_flight: deque[int] = deque()
         self._wake = asyncio.Event()
 
@@ -163,6 +175,9 @@ class Tab:
                 request = decode(text, self._hand)
                 if isinstance(request, Ack):
                     self._acknowledge(request.seq)
+                elif isinstance(request, Look):
+                    self._look = request
+                    self._wake.set()
                 else:
                     self._session.submit(request)
             except InputError as error:
@@ -171,22 +186,30 @@ class Tab:
     def _acknowledge(self, seq: int) -> None:
         if seq not in self._in_flight:
             raise InputError(f"seq is {seq}; allowed are frames on the way: {list(self._in_flight)}")
-        while self._in_flight and self._in_flight[0] <= seq:
+        while self._in_flight[0] < seq:
             self._in_flight.popleft()
+        self._in_flight.popleft()  # one only: a frame is sent again when the tab looks elsewhere
         self._wake.set()
 
     async def _write(self) -> None:
         shape: Shape | None = None
-        seq = -1
+        sent: tuple[int, Look] | None = None
         while True:
-            frame = self._session.latest
-            if frame.seq == seq or len(self._in_flight) >= MAX_IN_FLIGHT:
+            frame, look = self._session.latest, self._look
+            if (frame.seq, look) == sent or len(self._in_flight) >= MAX_IN_FLIGHT:
                 await self._wake.wait()
                 self._wake.clear()
                 continue
             if frame.shape is not shape:
                 shape = frame.shape
                 await self._websocket.send_bytes(self._encoder.shape(shape))
-            seq = frame.seq
-            self._in_flight.append(seq)
-            await self._websocket.send_bytes(self._encoder.frame(frame))
+            sent = (frame.seq, look)
+            self._in_flight.append(frame.seq)
+            await self._websocket.send_bytes(await self._encode(frame, look))
+
+    async def _encode(self, frame: Frame, look: Look) -> bytes:
+        if not draws_here(frame.shape):
+            return self._encoder.frame(frame, look)
+        loop = asyncio.get_running_loop()
+        jpeg = await loop.run_in_executor(self._artist.thread, self._artist.jpeg, frame, look)
+        return encode_picture(frame, look.part, jpeg)

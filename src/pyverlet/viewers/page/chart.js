@@ -1,14 +1,15 @@
-// Two small curves that scroll: the physics time against its budget, and the energies.
+// Small curves that scroll, on a plain canvas: lines beside each other, or areas on top of each other.
 
 const LENGTH = 240; // samples on show
 
 export class Chart {
-  /** lines: CSS colour names (custom properties), one for each value pushed; options: `limit` draws a dashed line, `zero` keeps 0 in range. */
-  constructor(canvas, lines, { zero = false } = {}) {
+  /** lines: custom properties that hold colours, one for each value pushed. `zero` keeps 0 in range, `stacked` adds the values up. */
+  constructor(canvas, lines, { zero = false, stacked = false } = {}) {
     this.canvas = canvas;
     this.lines = lines;
     this.zero = zero;
-    this.limit = null;
+    this.stacked = stacked;
+    this.limit = null; // a dashed line that stays in range
     this.mark = null; // a dashed line that does not change the scale
     this.range = null; // the scale, where others share it
     this.clear();
@@ -19,7 +20,7 @@ export class Chart {
   }
 
   push(...values) {
-    this.samples.push(values);
+    this.samples.push(this.stacked ? sums(values) : values);
     if (this.samples.length > LENGTH) this.samples.shift();
   }
 
@@ -28,24 +29,26 @@ export class Chart {
     const width = Math.round(this.canvas.clientWidth * ratio), height = Math.round(this.canvas.clientHeight * ratio);
     if (!width || !height) return;
     if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, { width, height });
-    const context = this.canvas.getContext("2d"), style = getComputedStyle(document.documentElement);
+    const context = this.canvas.getContext("2d"), style = getComputedStyle(this.canvas);
     context.clearRect(0, 0, width, height);
     const sorted = this.samples.flat().filter((value) => value !== null).sort((a, b) => a - b);
     if (!sorted.length) return;
     // With a limit, the rare spike leaves the picture rather than flattening all the rest.
-    const top = this.limit === null ? sorted.at(-1) : Math.max(1.25 * this.limit, 1.1 * sorted[Math.floor(0.97 * (sorted.length - 1))]);
+    const usual = this.stacked ? this.samples.map((values) => values.at(-1)).sort((a, b) => a - b) : sorted;
+    const top = this.limit === null ? sorted.at(-1) : Math.max(1.25 * this.limit, 1.1 * usual[Math.floor(0.97 * (usual.length - 1))]);
     const [low, high] = this.range ?? [this.zero ? 0 : sorted[0], Math.max(top, this.zero ? 0 : sorted[0])];
     // A thousandth of the value is the finest thing on show: rounding noise is a flat line.
     const room = Math.max(0.05 * (high - low), 0.001 * Math.abs(high), 1e-12);
     const y = (value) => height - ((value - low + room) / (high - low + 2 * room)) * height;
     context.lineJoin = "round";
+    const points = (k) => this.samples.flatMap((values, i) => ((values[k] ?? null) === null ? [] : [[(i / (LENGTH - 1)) * width, y(values[k])]]));
+    this.lines.forEach((colour, k) => {
+      if (this.stacked) this.#area(context, style.getPropertyValue(colour), points(k), k ? points(k - 1) : [[(this.samples.length - 1) / (LENGTH - 1) * width, y(0)], [0, y(0)]].reverse());
+      else this.#line(context, style.getPropertyValue(colour), points(k), 1.4 * ratio, []);
+    });
     for (const level of [this.limit, this.mark].filter((value) => value !== null)) {
       this.#line(context, style.getPropertyValue("--soft"), [[0, y(level)], [width, y(level)]], ratio, [3 * ratio, 3 * ratio]);
     }
-    this.lines.forEach((colour, k) => {
-      const points = this.samples.flatMap((values, i) => (values[k] === null ? [] : [[(i / (LENGTH - 1)) * width, y(values[k])]]));
-      this.#line(context, style.getPropertyValue(colour), points, 1.4 * ratio, []);
-    });
   }
 
   #line(context, colour, points, lineWidth, dash) {
@@ -56,4 +59,17 @@ export class Chart {
     for (const [x, y] of points) context.lineTo(x, y);
     context.stroke();
   }
+
+  #area(context, colour, above, below) {
+    context.fillStyle = colour;
+    context.beginPath();
+    for (const [x, y] of above) context.lineTo(x, y);
+    for (const [x, y] of below.reverse()) context.lineTo(x, y);
+    context.fill();
+  }
+}
+
+function sums(values) {
+  let sum = 0;
+  return values.map((value) => (sum += value));
 }

@@ -2,10 +2,8 @@
 // Measured in headless Chromium without a GPU, 700 x 700 pixels: raster 2 ms at 5,000 circles and 7 ms at 100,000;
 // cached sprites through drawImage 15 and 300 ms; software WebGL worse still.
 
-const GRID_MAX = 65535; // see frames.py: 0 and GRID_MAX mean outside the view
+export const GRID_MAX = 65535; // see frames.py: 0 and GRID_MAX mean outside the view
 const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
-const TONES = 4; // neighbours of one colour differ a little in lightness, so that each circle can be told
-export const STEPS = 64; // colours along a palette
 
 /** A renderer for `canvas`: "auto", "webgl2" or "canvas". */
 export function makeRenderer(canvas, wanted = "auto") {
@@ -26,29 +24,6 @@ export function hardwareName() {
   return SOFTWARE.test(name) ? "" : name;
 }
 
-/** 256 colours as 0xBBGGRR: STEPS along a path through OKLCH, each in TONES shades. */
-export function palette(kind, dark) {
-  const lut = new Uint32Array(STEPS * TONES);
-  for (let step = 0; step < STEPS; step++) {
-    const t = step / (STEPS - 1);
-    let [light, chroma, hue] = [dark ? 0.74 : 0.68, 0.135, 25 + 300 * t];
-    if (kind === "speed") [light, chroma, hue] = dark ? [0.5 + 0.4 * t, 0.12 + 0.03 * t, 275 - 185 * t] : [0.8 - 0.28 * t, 0.1 + 0.08 * t, 250 + 120 * t];
-    for (let tone = 0; tone < TONES; tone++) lut[step * TONES + tone] = oklch(light + 0.035 * (tone - (TONES - 1) / 2), chroma, hue);
-  }
-  return lut;
-}
-
-/** The palette index of step `step` for particle `i`. */
-export const shade = (step, i) => step * TONES + ((Math.imul(i, 0x9e3779b1) >>> 16) & (TONES - 1));
-
-function oklch(l, c, degrees) {
-  const a = c * Math.cos((degrees * Math.PI) / 180), b = c * Math.sin((degrees * Math.PI) / 180);
-  const [L, M, S] = [l + 0.3963377774 * a + 0.2158037573 * b, l - 0.1055613458 * a - 0.0638541728 * b, l - 0.0894841775 * a - 1.291485548 * b].map((v) => v ** 3);
-  const linear = [4.0767416621 * L - 3.3077115913 * M + 0.2309699292 * S, -1.2684380046 * L + 2.6097574011 * M - 0.3413193965 * S, -0.0041960863 * L - 0.7034186147 * M + 1.707614701 * S];
-  const [r, g, blue] = linear.map((v) => Math.round(255 * Math.min(1, Math.max(0, v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055))));
-  return r | (g << 8) | (blue << 16);
-}
-
 /** Canvas2D: rows of pixels written straight into an ImageData, edges anti-aliased by coverage. */
 class Raster {
   name = "canvas";
@@ -62,8 +37,8 @@ class Raster {
     this.pixels = new Uint32Array(this.image.data.buffer);
   }
 
-  /** grid: 2n of 16 bits; radius: n in pixels; index: n of 8 bits into lut. */
-  draw(grid, radius, index, lut) {
+  /** grid: 2n of 16 bits; radius: n in pixels; ink: n of 0xBBGGRR. */
+  draw(grid, radius, ink) {
     const { width, height } = this.image;
     const pixels = this.pixels.fill(0);
     const sx = width / GRID_MAX, sy = height / GRID_MAX;
@@ -71,7 +46,7 @@ class Raster {
       const u = grid[2 * i], v = grid[2 * i + 1];
       if (u === 0 || v === 0 || u === GRID_MAX || v === GRID_MAX) continue;
       // A circle thinner than a pixel is drawn a pixel wide, else it would flicker.
-      circle(pixels, width, height, u * sx - 0.5, height - v * sy - 0.5, Math.max(radius[i], 0.5), lut[index[i]]);
+      circle(pixels, width, height, u * sx - 0.5, height - v * sy - 0.5, Math.max(radius[i], 0.5), ink[i]);
     }
     this.context.putImageData(this.image, 0, 0);
   }
@@ -115,15 +90,14 @@ function circle(pixels, width, height, cx, cy, radius, colour) {
 }
 
 const VERTEX = `#version 300 es
-in vec2 place; in float radius; in float index;
-uniform vec2 size; uniform sampler2D lut;
+in vec2 place; in float radius; in vec4 ink;
 out vec3 colour; out float reach;
 void main() {
   bool outside = any(equal(place, vec2(0.0))) || any(equal(place, vec2(1.0)));
   gl_Position = outside ? vec4(2.0, 2.0, 0.0, 1.0) : vec4(place * 2.0 - 1.0, 0.0, 1.0);
   reach = max(radius, 0.5);
   gl_PointSize = 2.0 * reach + 2.0;
-  colour = texture(lut, vec2((index + 0.5) / 256.0, 0.5)).rgb;
+  colour = ink.rgb;
 }`;
 const FRAGMENT = `#version 300 es
 precision highp float;
@@ -154,10 +128,8 @@ class Points {
     this.attributes = {
       place: this.#attribute(program, "place", 2, gl.UNSIGNED_SHORT, true),
       radius: this.#attribute(program, "radius", 1, gl.FLOAT, false),
-      index: this.#attribute(program, "index", 1, gl.UNSIGNED_BYTE, false),
+      ink: this.#attribute(program, "ink", 4, gl.UNSIGNED_BYTE, true),
     };
-    gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
-    for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, filter, gl.NEAREST);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
   }
@@ -174,16 +146,11 @@ class Points {
     this.gl.viewport(0, 0, width, height);
   }
 
-  draw(grid, radius, index, lut) {
+  draw(grid, radius, ink) {
     const gl = this.gl;
-    for (const [name, array] of [["place", grid], ["radius", radius], ["index", index]]) {
+    for (const [name, array] of [["place", grid], ["radius", radius], ["ink", ink]]) {
       gl.bindBuffer(gl.ARRAY_BUFFER, this.attributes[name]);
       gl.bufferData(gl.ARRAY_BUFFER, array, gl.STREAM_DRAW);
-    }
-    if (lut !== this.lut) {
-      this.lut = lut;
-      const rgba = new Uint8Array(new Uint32Array(lut).buffer);
-      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, lut.length, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, rgba);
     }
     gl.clear(gl.COLOR_BUFFER_BIT);
     gl.drawArrays(gl.POINTS, 0, radius.length);

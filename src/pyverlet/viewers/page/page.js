@@ -1,398 +1,344 @@
-// The page: receives frames, draws the newest at the screen's pace, acknowledges what it drew, sends commands.
+// The page: receives frames, draws the newest at the screen's pace, acknowledges what it drew, sends what the user wants.
+// It lives in one element, so that a notebook can show it too.
 
-import { Chart } from "./chart.js";
+import { Backdrop } from "./backdrop.js";
+import { Camera } from "./camera.js";
+import { Inks, isLively } from "./colour.js";
+import { Controls } from "./controls.js";
+import { GRID_MAX, makeRenderer } from "./draw.js";
+import { fillSheet, listen } from "./keys.js";
+import { Numbers } from "./numbers.js";
+import { MOST_CONTACTS, Overlay } from "./overlay.js";
 import { Panels } from "./panels.js";
-import { makeRenderer, palette, shade, STEPS } from "./draw.js";
+import { read, written } from "./permalink.js";
+import { Pointer } from "./pointer.js";
+import { unpack } from "./wire.js";
 
-const $ = (id) => document.getElementById(id);
-const show = (name) => document.querySelector(`[data-testid="${name}"]`);
-const GRID_MAX = 65535;
 const NUMBERS_EVERY_MS = 120; // nobody reads faster
-const RETRY_MS = 1000;
-const HEADER_PX = 62;
-const REACH_PX = 9; // a near miss of the mouse still takes the circle
+const HEADER_PX = 62; // names of panels stay clear of the title
+const STEP_ZOOM = 1.25, STEP_TURN = 15; // of a key: times as large, degrees
+const NAMES = { canvas: "Canvas2D", webgl2: "WebGL2" };
 
-const backdrop = $("backdrop"), stage = $("stage");
-const renderer = makeRenderer(stage, new URLSearchParams(location.search).get("renderer") ?? "auto");
-const darkness = matchMedia("(prefers-color-scheme: dark)");
-const physicsChart = new Chart($("physics-chart"), ["--accent"], { zero: true });
-const energyChart = new Chart($("energy-chart"), ["--accent"]);
-const panels = new Panels($("panels"));
-document.documentElement.dataset.renderer = renderer.name;
+/**
+ * Bring the page to life.
+ * root: an element with the page's markup. connect: see main.js. address: a Location, whose hash has settings; null in a notebook.
+ */
+export function mount(root, connect, { address = null, renderer: wanted = "auto" } = {}) {
+  const $ = (id) => root.querySelector(`#${id}`);
+  const stage = $("stage"), photo = $("photo"), renderer = makeRenderer(stage, wanted), photographs = photo.getContext("bitmaprenderer");
+  const darkness = matchMedia("(prefers-color-scheme: dark)");
+  const backdrop = new Backdrop($("backdrop")), overlay = new Overlay($("overlay")), camera = new Camera(), inks = new Inks();
+  const panels = new Panels($("panels"), root), numbers = new Numbers(root);
+  root.dataset.renderer = renderer.name;
 
-let socket = null;
-let shape = null; // head of the last shape message, with .radius
-let frame = null; // the frame on screen
-let pending = null; // a newer one, not drawn yet
-let place = null; // where the view is on screen: {left, top, width, height} in CSS pixels, scale in CSS pixels per metre
-let backdropKey = "";
-let radiusPx = new Float32Array(0), colours = new Uint8Array(0), lut = palette("origin", true);
-let numbersDue = 0, numbersStale = false;
-let drawn = []; // times of the last drawn frames, ms
+  let shape = null; // the last shape message
+  let frame = null; // the frame on screen
+  let last = null; // its numbers, or those of the frame before while there is none
+  let pending = null; // a newer one, not drawn yet
+  let radiusPx = new Float32Array(0), radiusFor = 0; // radii in pixels of the stage, at how many pixels a metre
+  let lookSent = "", placed = "", stale = true, numbersDue = 0, numbersStale = false;
+  let open = false, begun = false, linking = false, stopped = false;
 
-// -- the connection ---------------------------------------------------------------------------------------------------
+  // -- the connection -------------------------------------------------------------------------------------------------
 
-function connect() {
-  socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket`);
-  socket.binaryType = "arraybuffer";
-  socket.onmessage = ({ data }) => receive(data);
-  socket.onclose = () => {
-    link("lost", "the server has stopped; waiting for it");
-    setTimeout(connect, RETRY_MS);
-  };
-}
+  const write = connect({ receive, state: (is) => {
+    open = is;
+    lookSent = ""; // a new server does not know it
+    if (!open) link("lost", "the server has stopped; waiting for it");
+  } });
+  const send = (type, fields = {}) => write({ type, ...fields });
 
-function send(type, fields = {}) {
-  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ type, ...fields }));
-}
-
-function receive(data) {
-  const length = new DataView(data).getUint32(0, true);
-  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
-  if (head.kind === "shape") {
-    newShape({ ...head, radius: new Float32Array(data, 4 + length) });
-  } else if (head.kind === "frame") {
-    pending = { ...head, grid: new Uint16Array(data, 4 + length) };
-  } else if (head.kind === "refused") {
-    console.warn(head.reason);
+  async function receive(data) {
+    const message = unpack(data);
+    if (message.kind === "shape") newShape(message);
+    else if (message.kind === "frame") pending = message;
+    else if (message.kind === "picture") {
+      const bitmap = await createImageBitmap(message.jpeg);
+      pending?.bitmap?.close();
+      pending = { ...message, bitmap };
+    } else if (message.kind === "refused") console.warn(message.reason);
   }
-}
 
-function newShape(head) {
-  shape = head;
-  frame = pending = null;
-  document.title = `${head.title} · pyverlet`;
-  $("title").textContent = head.title;
-  $("budget").textContent = head.budgetMs;
-  physicsChart.limit = head.budgetMs;
-  $("substeps").max = Math.min(32, head.maxSubsteps);
-  $("substeps-slider").hidden = head.substepsDiffer;
-  panels.build(head.panels);
-  colours = new Uint8Array(head.radius.length);
-  paint();
-  layout();
-}
+  function newShape(message) {
+    const other = !shape || shape.scene !== message.scene || shape.title !== message.title || shape.panels.length !== message.panels.length;
+    shape = message;
+    frame = pending = null;
+    radiusFor = 0;
+    Object.assign(camera, { bounded: shape.bounded && !shape.parted, parted: shape.parted });
+    if (other) begin();
+    controls.shape = shape;
+    panels.build(shape.panels);
+    $("stage").hidden = shape.drawnHere;
+    $("photo").hidden = !shape.drawnHere;
+    for (const [id, off] of [["velocities", shape.drawnHere], ["contacts", shape.drawnHere || shape.count > MOST_CONTACTS]]) $(id).disabled = off;
+    notice(shape.note);
+    paint();
+  }
 
-function link(state, text) {
-  $("link").className = state;
-  $("link").lastElementChild.textContent = text;
-}
+  /** Another scene, or the first. */
+  function begin() {
+    camera.fit();
+    $("title").textContent = shape.title;
+    if (address) document.title = `${shape.title} · pyverlet`;
+    for (const option of $("colour").options) option.disabled = option.value === "picture" && !shape.coloured;
+    if (shape.coloured || $("colour").value === "picture") $("colour").value = shape.coloured ? "picture" : "order";
+    controls.begin(shape);
+    numbers.begin(shape);
+    startOver();
+  }
 
-// -- drawing ----------------------------------------------------------------------------------------------------------
+  function link(state, text) {
+    $("link").className = state;
+    $("link").lastElementChild.textContent = text;
+  }
 
-function tick(now) {
-  requestAnimationFrame(tick);
-  if (pending && shape) {
-    const before = frame;
-    frame = pending;
-    pending = null;
-    if (before && frame.status.time < before.status.time) startOver();
-    if (!place || String(frame.view) !== String(before?.view)) layout();
-    if (colourBy() === "speed" && before) paintSpeed(before, frame);
-    drawStage();
-    send("ack", { seq: frame.seq });
-    drawn.push(now);
-    physicsChart.push(frame.status.physics_ms);
+  function notice(text) {
+    $("notice").hidden = !text;
+    if (text) $("notice").textContent = text;
+  }
+
+  // -- drawing --------------------------------------------------------------------------------------------------------
+
+  const dark = () => ($("theme").value === "auto" ? darkness.matches : $("theme").value === "dark");
+  const colour = (name) => getComputedStyle(root).getPropertyValue(name).trim();
+  const ratio = () => Math.min(window.devicePixelRatio || 1, 2);
+  const size = () => ({ width: root.clientWidth, height: root.clientHeight });
+
+  function tick(now) {
+    if (stopped) return;
+    requestAnimationFrame(tick);
+    if (pending && shape) {
+      const before = frame;
+      frame = pending;
+      pending = null;
+      last = frame.status;
+      camera.room = frame.room;
+      if (!begun) arrive();
+      if (before && frame.status.time < before.status.time) startOver();
+      if (frame.grid) inks.follow(frame.velocity, frame.unit, frame.status.time);
+      drawCircles();
+      send("ack", { seq: frame.seq });
+      numbers.count(frame.status, now);
+      stale = numbersStale = true;
+    }
+    if (!frame) return;
+    look();
+    if (stale) drawRest();
+    if (numbersStale && (now >= numbersDue || frame.status.paused)) {
+      numbersStale = false;
+      numbersDue = now + NUMBERS_EVERY_MS;
+      showNumbers(now);
+    }
+  }
+
+  /** The circles, onto a canvas just as large as the part of the world that the frame shows. */
+  function drawCircles() {
+    if (frame.bitmap) {
+      Object.assign(photo, { width: frame.bitmap.width, height: frame.bitmap.height });
+      photographs.transferFromImageBitmap(frame.bitmap);
+      return;
+    }
+    if (frame.grid.length !== 2 * shape.radius.length) return;
+    measure();
+    const { width, height } = camera.place(frame.view);
+    const [across, down] = [Math.max(1, Math.round(width * ratio())), Math.max(1, Math.round(height * ratio()))];
+    if (stage.width !== across || stage.height !== down || !renderer.ready) {
+      Object.assign(stage, { width: across, height: down });
+      renderer.resize(across, down);
+      renderer.ready = true;
+    }
+    const pixels = camera.scale * ratio();
+    if (radiusFor !== pixels) {
+      radiusFor = pixels;
+      radiusPx = shape.radius.map((metres) => metres * pixels);
+    }
+    renderer.draw(frame.grid, radiusPx, inks.ink);
+  }
+
+  /** What lies behind, over and beside the circles; and the canvas of the circles to its place. */
+  function drawRest() {
+    stale = false;
+    measure();
+    const place = camera.place(frame.view), there = Object.values(place).join();
+    if (there !== placed) {
+      placed = there; // what did not change costs nothing: this runs with every frame
+      for (const canvas of [stage, photo]) for (const [side, value] of Object.entries(place)) canvas.style[side] = `${value}px`;
+    }
+    backdrop.draw(shape, camera, size(), ratio(), root.dataset.theme, colour);
+    overlay.draw(shape, frame, camera, size(), ratio(), { velocities: $("velocities").checked, contacts: $("contacts").checked }, colour);
+    panels.layout(camera.place(camera.room));
+  }
+
+  /** The part of the page that the controls leave free. */
+  function measure() {
+    const whole = root.getBoundingClientRect(), aside = root.querySelector("aside").getBoundingClientRect();
+    const below = aside.left - whole.left <= 1; // on a narrow page the controls are at its foot
+    const above = shape.panels.length ? HEADER_PX : 0;
+    const free = { left: 0, top: above, width: below ? whole.width : aside.left - whole.left, height: (below ? aside.top - whole.top : whole.height) - above };
+    camera.free = { ...free, width: Math.max(free.width, 1), height: Math.max(free.height, 1) };
+  }
+
+  /** Tell the server what is looked at, if that has changed. */
+  function look() {
+    measure();
+    const { width, height } = camera.free, by = $("colour").value, pixels = ratio();
+    const wish = {
+      part: camera.part,
+      width: Math.min(Math.max(Math.round(width * pixels), 1), 4096),
+      height: Math.min(Math.max(Math.round(height * pixels), 1), 4096),
+      colour: by,
+      dark: dark(),
+      velocity: !shape.drawnHere && (isLively(by) || $("velocities").checked),
+    };
+    const text = JSON.stringify(wish);
+    if (text === lookSent) return;
+    lookSent = text;
+    send("look", wish);
+  }
+
+  /** All colours anew. */
+  function paint() {
+    root.dataset.theme = dark() ? "dark" : "light";
+    if (!shape) return;
+    const { number } = shape, ever = (number.at(-1) ?? 0) + 1; // circles keep their colours when others come and go
+    inks.begin($("colour").value, shape, shape.panels.length ? (i) => panels.within(i) : (i) => [number[i], ever], dark());
+    if (!frame) return;
+    if (frame.grid) inks.follow(frame.velocity, frame.unit, frame.status.time);
+    if (frame.grid) drawCircles();
+    stale = true;
+  }
+
+  // -- numbers --------------------------------------------------------------------------------------------------------
+
+  function showNumbers(now) {
+    const { status } = frame;
+    numbers.show(status, shape.drawnHere ? "pictures (JPEG)" : NAMES[renderer.name], now);
+    panels.push(status.energies);
+    panels.draw();
+    $("pause").textContent = status.paused ? "Resume" : "Pause";
+    if (open) link(status.error ? "lost" : status.paused ? "held" : "live", status.error ? "stopped" : status.paused ? "paused" : status.speed < 1 ? "live, slowly" : "live");
+    $("busy").hidden = !status.busy;
+    $("busy").textContent = status.busy ?? "";
+    notice(status.error ? `${status.error}. Reset starts over.` : shape.note);
+    controls.follow(status);
+    if (linking && address) history.replaceState(null, "", `#${settings()}`);
+  }
+
+  function startOver() {
+    numbers.clear();
+    panels.clear();
+  }
+
+  const settings = () => written(shape, last, { colour: $("colour").value, theme: $("theme").value });
+
+  /** The first frame: bring the world to what the address asks for. */
+  function arrive() {
+    begun = true;
+    const { messages, view } = address ? read(address.hash.slice(1), shape, frame.status) : { messages: [], view: {} };
+    for (const [type, fields] of messages) send(type, fields);
+    for (const [id, value] of Object.entries(view)) if ([...$(id).options].some((option) => option.value === value && !option.disabled)) $(id).value = value;
+    linking = Boolean(address?.hash.length > 1);
+    paint();
+  }
+
+  // -- controls -------------------------------------------------------------------------------------------------------
+
+  const controls = new Controls(root, send, () => (linking = true));
+  const tools = () => [...root.querySelectorAll("[name=tool]")];
+  const flip = (id) => !$(id).disabled && $(id).click();
+  let before = null; // gravity before it was switched off
+
+  const act = {
+    pause: () => send("pause", { on: !last?.paused }),
+    step: () => send("step"),
+    reset: () => send("reset"),
+    slower: () => controls.next("speed"),
+    turn: (key) => controls.set("angle", ((controls.get("angle") + (key === "ArrowLeft" ? -STEP_TURN : STEP_TURN) + 540) % 360) - 180),
+    weightless() {
+      const now = controls.get("gravity");
+      controls.set("gravity", now ? 0 : before ?? 9.81);
+      before = now || null;
+    },
+    tool: (key) => tools()[Number(key) - 1].click(),
+    colour: () => controls.next("colour"),
+    theme: () => (($("theme").value = dark() ? "light" : "dark"), $("theme").dispatchEvent(new Event("change"))),
+    velocities: () => flip("velocities"),
+    contacts: () => flip("contacts"),
+    zoom: (key) => (camera.zoom(key === "+" ? STEP_ZOOM : 1 / STEP_ZOOM, camera.free.left + camera.free.width / 2, camera.free.top + camera.free.height / 2), zoomed()),
+    fit: () => (camera.fit(), zoomed()),
+    async copy() {
+      const text = address ? `${address.origin}${address.pathname}${address.search}#${settings()}` : settings();
+      if (address) history.replaceState(null, "", text);
+      linking = true;
+      const copied = await navigator.clipboard?.writeText(text).then(() => true, () => false);
+      $("copy").textContent = copied ? "Copied" : "In the address";
+      setTimeout(() => ($("copy").textContent = "Copy link"), 1500);
+    },
+    help: () => ($("sheet").open ? $("sheet").close() : $("sheet").showModal()),
+    fold() {
+      const folded = root.classList.toggle("folded");
+      $("fold").setAttribute("aria-expanded", String(!folded));
+      stale = true;
+    },
+  };
+  for (const id of ["pause", "step", "reset", "fit", "copy", "help", "fold"]) {
+    $(id).addEventListener("click", (event) => {
+      act[id]();
+      if (event.detail) $(id).blur(); // after a click with the mouse, space is pause again and not this button
+    });
+  }
+  for (const id of ["colour", "theme"]) {
+    $(id).addEventListener("change", () => {
+      linking = true;
+      $(id).blur();
+      paint();
+      numbersStale = true;
+    });
+  }
+  for (const id of ["velocities", "contacts"]) $(id).addEventListener("change", () => (stale = true, $(id).blur()));
+  for (const tool of tools()) tool.addEventListener("change", () => ((root.dataset.tool = tool.value), tool.blur()));
+  $("sheet-close").addEventListener("click", () => $("sheet").close());
+  fillSheet($("sheet").querySelector("tbody"));
+  listen(address ? document : root, root, act);
+
+  function zoomed() {
+    stale = true;
     numbersStale = true;
   }
-  if (numbersStale && (now >= numbersDue || frame.status.paused)) {
-    numbersStale = false;
-    numbersDue = now + NUMBERS_EVERY_MS;
-    numbers(now);
-  }
-}
 
-function drawStage() {
-  if (frame && place && frame.grid.length === 2 * shape.radius.length) renderer.draw(frame.grid, radiusPx, colours, lut);
-}
-
-/** Fit the view into the window beside the panel, and everything that follows from it. */
-function layout() {
-  const view = frame?.view ?? pending?.view;
-  if (!view || !shape) return;
-  const [x0, y0, x1, y1] = view;
-  const panel = document.querySelector("aside").getBoundingClientRect();
-  const below = panel.left <= 0; // a narrow window has the panel at its foot
-  const above = shape.panels.length ? HEADER_PX : 0; // names of panels stay clear of the title
-  const free = { width: below ? innerWidth : panel.left, height: (below ? panel.top : innerHeight) - above };
-  const scale = Math.max(Math.min(free.width / (x1 - x0), free.height / (y1 - y0)), 1e-9);
-  const width = (x1 - x0) * scale, height = (y1 - y0) * scale;
-  place = { left: (free.width - width) / 2, top: above + (free.height - height) / 2, width, height, scale, view };
-  const ratio = Math.min(window.devicePixelRatio || 1, 2);
-  const [pixelWidth, pixelHeight] = [Math.max(1, Math.round(width * ratio)), Math.max(1, Math.round(height * ratio))];
-  if (stage.width !== pixelWidth || stage.height !== pixelHeight || !stage.style.width) {
-    Object.assign(stage, { width: pixelWidth, height: pixelHeight });
-    renderer.resize(pixelWidth, pixelHeight);
-  }
-  Object.assign(stage.style, { left: `${place.left}px`, top: `${place.top}px`, width: `${width}px`, height: `${height}px` });
-  radiusPx = shape.radius.map((metres) => metres * scale * (pixelWidth / width));
-  panels.layout(place);
-  drawBackdrop(ratio);
-}
-
-function drawBackdrop(ratio) {
-  const key = [place.view, innerWidth, innerHeight, ratio, darkness.matches, place.scale].join();
-  if (key === backdropKey) return;
-  backdropKey = key;
-  const style = getComputedStyle(document.documentElement), colour = (name) => style.getPropertyValue(name);
-  Object.assign(backdrop, { width: innerWidth * ratio, height: innerHeight * ratio });
-  Object.assign(backdrop.style, { width: `${innerWidth}px`, height: `${innerHeight}px` });
-  const context = backdrop.getContext("2d");
-  context.scale(ratio, ratio);
-  context.fillStyle = colour("--ground");
-  context.fillRect(0, 0, innerWidth, innerHeight);
-  if (!shape.bounded) grid(context, colour);
-  for (const outline of shape.outlines) {
-    context.beginPath();
-    for (const [x, y] of outline) context.lineTo(...toScreen(x, y));
-    context.closePath();
-    context.fillStyle = colour("--inside");
-    context.strokeStyle = colour("--wall");
-    context.lineWidth = 4; // the circles cover its inner half
-    context.lineJoin = "round";
-    context.stroke();
-    context.fill();
-  }
-  context.strokeStyle = colour("--soft");
-  context.lineWidth = 1;
-  context.setLineDash([5, 5]);
-  context.beginPath();
-  for (const [from, to] of shape.lines) {
-    context.moveTo(...toScreen(...from));
-    context.lineTo(...toScreen(...to));
-  }
-  context.stroke();
-}
-
-/** Lines every 1, 2 or 5 times a power of ten metres: without bounds nothing else shows that the view moves. */
-function grid(context, colour) {
-  const wish = 90 / place.scale, power = 10 ** Math.floor(Math.log10(wish));
-  const space = power * [1, 2, 5, 10].find((m) => m * power >= wish);
-  const [left, top] = toWorld(0, 0), [right, bottom] = toWorld(innerWidth, innerHeight);
-  context.strokeStyle = colour("--grid");
-  context.fillStyle = colour("--soft");
-  context.lineWidth = 1;
-  context.beginPath();
-  for (let k = Math.ceil(left / space); k * space <= right; k++) {
-    const x = toScreen(k * space, 0)[0];
-    context.moveTo(x, 0);
-    context.lineTo(x, innerHeight);
-  }
-  for (let k = Math.ceil(bottom / space); k * space <= top; k++) {
-    const y = toScreen(0, k * space)[1];
-    context.moveTo(0, y);
-    context.lineTo(innerWidth, y);
-    context.fillText(`${Number((k * space).toPrecision(9))} m`, 8, y - 4);
-  }
-  context.stroke();
-}
-
-const toScreen = (x, y) => [place.left + (x - place.view[0]) * place.scale, place.top + (place.view[3] - y) * place.scale];
-const toWorld = (left, top) => [place.view[0] + (left - place.left) / place.scale, place.view[3] - (top - place.top) / place.scale];
-
-// -- colours ----------------------------------------------------------------------------------------------------------
-
-const colourBy = () => document.querySelector("[name=colour]:checked").value;
-let usualSpeed = 0;
-
-function paint() {
-  lut = palette(colourBy(), darkness.matches);
-  const n = colours.length;
-  for (let i = 0; i < n; i++) {
-    const [own, count] = panels.within(i, n);
-    colours[i] = shade(colourBy() === "origin" ? Math.floor((own * STEPS) / count) : 0, own);
-  }
-  backdropKey = "";
-}
-
-/** Speeds are read off two pictures: nothing more need travel. */
-function paintSpeed(a, b) {
-  const elapsed = b.status.time - a.status.time;
-  if (!(elapsed > 0) || a.grid.length !== b.grid.length) return;
-  const sx = (b.view[2] - b.view[0]) / GRID_MAX, sy = (b.view[3] - b.view[1]) / GRID_MAX;
-  const ax = (a.view[2] - a.view[0]) / GRID_MAX, ay = (a.view[3] - a.view[1]) / GRID_MAX;
-  const ox = b.view[0] - a.view[0], oy = b.view[1] - a.view[1];
-  const full = (STEPS - 1) / Math.max(3 * usualSpeed, 0.05 * (b.view[2] - b.view[0])) / elapsed;
-  let sum = 0;
-  for (let i = 0; i < colours.length; i++) {
-    const dx = b.grid[2 * i] * sx - a.grid[2 * i] * ax + ox, dy = b.grid[2 * i + 1] * sy - a.grid[2 * i + 1] * ay + oy;
-    const distance = Math.sqrt(dx * dx + dy * dy);
-    sum += distance;
-    colours[i] = shade(Math.min(STEPS - 1, (distance * full) | 0), i);
-  }
-  usualSpeed += 0.05 * (sum / Math.max(colours.length, 1) / elapsed - usualSpeed);
-}
-
-// -- numbers ----------------------------------------------------------------------------------------------------------
-
-function numbers(now) {
-  const { status } = frame;
-  drawn = drawn.filter((time) => now - time <= 1000);
-  const rate = drawn.length > 1 ? (1000 * (drawn.length - 1)) / (drawn.at(-1) - drawn[0]) : 0;
-  write("fps", status.paused || status.error || !rate ? "–" : rate.toFixed(0));
-  write("physics-ms", status.physics_median_ms.toFixed(2));
-  show("physics-ms").parentElement.classList.toggle("over", status.physics_median_ms > shape.budgetMs);
-  show("physics-ms").parentElement.title = `median of the last frames; 95 % took less than ${status.physics_p95_ms.toFixed(2)} ms`;
-  write("particles", String(status.particles));
-  write("time", status.time.toFixed(3));
-  write("dropped", String(status.dropped));
-  write("energy", joules(status.energy));
-  write("kinetic", joules(status.kinetic));
-  energyChart.push(status.energy);
-  energyChart.draw();
-  physicsChart.draw();
-  panels.push(status.energies);
-  panels.draw();
-
-  $("pause").textContent = status.paused ? "Resume" : "Pause";
-  if (socket.readyState === WebSocket.OPEN) link(status.error ? "lost" : status.paused ? "held" : "live", status.error ? "stopped" : status.paused ? "paused" : "live");
-  $("notice").hidden = !status.error;
-  if (status.error) $("notice").textContent = `${status.error}. Reset starts over.`;
-  follow("gravity", -status.gravity[1]);
-  follow("substeps", status.substeps);
-}
-
-const joules = (value) => (value === null ? "–" : value.toFixed(Math.abs(value) < 100 ? 2 : 0).replace(/^-0(\.0*)?$/, "0$1"));
-
-/** Write a number with its thousands set apart by style only, so that the text stays a plain number. */
-function write(name, text) {
-  const element = show(name);
-  if (element.textContent === text) return;
-  const [, sign, whole, rest] = text.match(/^(-?)(\d*)(.*)$/);
-  const groups = whole.length > 4 ? whole.replace(/\B(?=(\d{3})+$)/g, " ").split(" ") : [whole];
-  element.replaceChildren(sign + groups[0], ...groups.slice(1).map((digits) => Object.assign(document.createElement("span"), { className: "group", textContent: digits })), rest);
-}
-
-function startOver() {
-  energyChart.clear();
-  physicsChart.clear();
-  panels.clear();
-}
-
-// -- controls ---------------------------------------------------------------------------------------------------------
-
-const held = new Set(); // sliders in the user's hand do not follow the server
-const first = {};
-
-/** Show a slider's value as the server has it: another tab may have moved it. */
-function follow(id, value) {
-  const slider = $(id);
-  first[id] ??= value;
-  if (!held.has(id)) {
-    if (value > Number(slider.max)) slider.max = Math.ceil(value);
-    if (value < Number(slider.min)) slider.min = Math.floor(value);
-    slider.value = value;
-  }
-  label(id);
-}
-
-function label(id) {
-  const value = Number($(id).value);
-  $(`${id}-value`).textContent = id === "gravity" ? Math.abs(value).toFixed(2) : value;
-  if (id === "gravity") $("gravity-arrow").textContent = value > 0 ? "↓" : value < 0 ? "↑" : " ";
-}
-
-const setters = {
-  gravity: (value) => send("gravity", { x: frame?.status.gravity[0] ?? 0, y: -value || 0 }),
-  substeps: (value) => send("substeps", { value: Math.round(value) }),
-};
-for (const [id, set] of Object.entries(setters)) {
-  let release = 0;
-  const change = (value) => {
-    held.add(id);
-    clearTimeout(release);
-    release = setTimeout(() => held.delete(id), 400);
-    set(value);
-    label(id);
-  };
-  $(id).addEventListener("input", () => change(Number($(id).value)));
-  $(id).addEventListener("dblclick", () => {
-    $(id).value = first[id];
-    change(first[id]);
+  new Pointer(root, $("backdrop"), {
+    camera, send, zoomed,
+    shape: () => shape,
+    frame: () => frame,
+    tool: () => tools().find(({ checked }) => checked).value,
+    usualRadius: () => (shape.radius.length ? shape.radius[shape.radius.length >> 1] : 4 / camera.scale),
+    panelSize: () => panels.cell(camera.room),
   });
-}
 
-const actions = {
-  pause: () => send("pause", { on: !frame?.status.paused }),
-  step: () => send("step"),
-  reset: () => send("reset"),
-};
-for (const [id, act] of Object.entries(actions)) {
-  $(id).addEventListener("click", (event) => {
-    act();
-    if (event.detail) $(id).blur(); // after a click with the mouse, space is pause again and not this button
-  });
-}
-for (const radio of document.getElementsByName("colour")) {
-  radio.addEventListener("change", () => {
-    paint();
-    drawStage();
-    radio.blur();
-  });
-}
-addEventListener("keydown", (event) => {
-  document.body.classList.toggle("shift", event.shiftKey);
-  if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches("button, [type=radio]")) return;
-  const action = { " ": "pause", ".": "step", r: "reset", R: "reset" }[event.key];
-  if (!action || (event.repeat && action !== "step")) return;
-  event.preventDefault();
-  actions[action]();
-});
-addEventListener("keyup", (event) => document.body.classList.toggle("shift", event.shiftKey));
-
-// -- the mouse in the world -------------------------------------------------------------------------------------------
-
-let hand = null; // "drag" or "poke" while the button is down
-
-function point(event) {
-  if (!place) return;
-  const [x, y] = toWorld(event.clientX, event.clientY);
-  send(hand, hand === "drag" ? { x, y, reach: REACH_PX / place.scale } : { x, y });
-  const across = 2 * shape.pokeRadius * Math.max(place.width, place.height);
-  Object.assign($("poke").style, { left: `${event.clientX}px`, top: `${event.clientY}px`, width: `${across}px`, height: `${across}px` });
-}
-
-function letGo() {
-  if (hand) send("release");
-  hand = null;
-  $("poke").hidden = true;
-  document.body.classList.remove("holding");
-}
-
-backdrop.addEventListener("pointerdown", (event) => {
-  if (event.button !== 0 || hand || !frame) return;
-  backdrop.setPointerCapture(event.pointerId);
-  hand = event.shiftKey ? "poke" : "drag";
-  $("poke").hidden = hand !== "poke";
-  document.body.classList.toggle("holding", hand === "drag");
-  point(event);
-});
-backdrop.addEventListener("pointermove", (event) => {
-  document.body.classList.toggle("shift", event.shiftKey);
-  if (hand) point(event);
-});
-for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) backdrop.addEventListener(end, letGo);
-addEventListener("blur", letGo);
-
-addEventListener("resize", () => {
-  layout();
-  drawStage();
-});
-darkness.addEventListener("change", () => {
+  const resized = new ResizeObserver(() => (stale = true));
+  resized.observe(root);
+  darkness.addEventListener("change", paint);
   paint();
-  layout();
-  drawStage();
-});
+  requestAnimationFrame(tick);
 
-/** For the console and the tests: where particle `i` is on screen, CSS pixels, and in the world, metres. */
-window.pyverlet = {
-  where(i) {
-    const x = place.view[0] + ((place.view[2] - place.view[0]) * frame.grid[2 * i]) / GRID_MAX;
-    const y = place.view[1] + ((place.view[3] - place.view[1]) * frame.grid[2 * i + 1]) / GRID_MAX;
-    const [left, top] = toScreen(x, y);
-    return { x, y, left, top };
-  },
-};
-
-connect();
-requestAnimationFrame(tick);
+  return {
+    /** Where particle `i` is on screen, CSS pixels, and in the world, metres. */
+    where(i) {
+      const [x0, y0, x1, y1] = frame.view;
+      const x = x0 + ((x1 - x0) * frame.grid[2 * i]) / GRID_MAX, y = y0 + ((y1 - y0) * frame.grid[2 * i + 1]) / GRID_MAX;
+      const [left, top] = camera.toScreen(x, y), box = root.getBoundingClientRect();
+      return { x, y, left: left + box.left, top: top + box.top };
+    },
+    status: () => last,
+    mass: (i) => shape.mass[i],
+    ink: (i) => inks.ink[i],
+    overlay,
+    camera,
+    /** The element is gone. */
+    stop() {
+      stopped = true;
+      resized.disconnect();
+      darkness.removeEventListener("change", paint);
+    },
+  };
+}

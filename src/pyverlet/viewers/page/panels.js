@@ -3,8 +3,9 @@
 import { Chart } from "./chart.js";
 
 export class Panels {
-  constructor(container) {
+  constructor(container, root) {
     this.container = container;
+    this.root = root; // told by a class whether there are several
     this.panels = [];
   }
 
@@ -22,7 +23,7 @@ export class Panels {
       return { section, energy, strip, first, count, chart, start };
     });
     this.container.replaceChildren(...this.panels.map(({ section }) => section));
-    document.body.classList.toggle("side-by-side", this.panels.length > 1);
+    this.root.classList.toggle("side-by-side", this.panels.length > 1);
   }
 
   /** Put each strip where the picture has it; `place` is the picture on screen, CSS pixels. */
@@ -34,9 +35,15 @@ export class Panels {
   }
 
   /** The particle's number within its own panel and how many that has: alike particles of all panels get one colour. */
-  within(i, total) {
+  within(i) {
     const panel = this.panels.findLast(({ first }) => first <= i);
-    return panel ? [i - panel.first, panel.count] : [i, total];
+    return [i - panel.first, panel.count];
+  }
+
+  /** The longer side of what is shown of one panel, metres; `room` is the whole picture. */
+  cell([x0, y0, x1, y1]) {
+    const rows = new Set(this.panels.map(({ strip: [, top] }) => top)).size, [, , width, strip] = this.panels[0].strip;
+    return Math.max(width * (x1 - x0), (1 / rows - strip) * (y1 - y0));
   }
 
   push(energies) {

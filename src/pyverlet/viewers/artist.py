@@ -1,0 +1,141 @@
+"""Draws frames for pages: of very many circles one picture is less to send, and less work for a browser, than all of them."""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.obstacles import Outline
+from pyverlet.picture import DARK, LIGHT, ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Fixed, Raster, Theme, View
+from pyverlet.picture.palette import Packed
+from pyverlet.viewers.frames import Frame, Shape
+from pyverlet.viewers.looks import MOST_PIXELS, Look
+from pyverlet.viewers.sketch import NOTHING, Sketch
+
+PICTURES_FROM = 150_000
+"""Circles. A browser takes 40 to 60 ms to receive a message of 2 MB, and as long again to draw so many; a picture is smaller."""
+
+QUALITY = 85
+"""Of the JPEG: the rims of circles show no blocks, and 900 x 900 pixels are about 400 kB."""
+
+ADVICE = "a world of this size is shown faster as pictures: pip install 'pyverlet[page]'"
+
+
+def draws_here(shape: Shape) -> bool:
+    """Whether pages are sent pictures of this world, rather than its circles."""
+    return len(shape.radius) >= PICTURES_FROM and _can_draw()
+
+
+def advice(shape: Shape) -> str | None:
+    """What to tell a page that could be sent pictures, were Pillow there."""
+    return ADVICE if len(shape.radius) >= PICTURES_FROM and not _can_draw() else None
+
+
+def _can_draw() -> bool:
+    return importlib.util.find_spec("PIL") is not None
+
+
+@dataclass
+class _Seen:
+    """What a colouring asks of a world, from a frame."""
+
+    velocity: NDArray[Any]
+    mass: NDArray[Any]
+    time: float
+
+    def __len__(self) -> int:
+        return len(self.mass)
+
+
+class Artist:
+    """Makes JPEGs of frames, in one thread of its own: drawing and encoding hold no lock that the physics needs.
+
+    Every picture wanted by several tabs is drawn once.
+    """
+
+    def __init__(self) -> None:
+        self.thread = ThreadPoolExecutor(1, thread_name_prefix="pyverlet-artist")
+        self._raster: Raster | None = None
+        self._colouring: Colouring = ByOrigin()
+        self._colouring_of: tuple[str, Shape | None] = ("", None)
+        self._still: tuple[Any, Packed] | None = None
+        self._sketched: tuple[Sketch, Sketch, tuple[Outline, ...]] = (NOTHING, NOTHING, ())
+        self._done: dict[Look, bytes] = {}
+        self._frame: Frame | None = None
+
+    def jpeg(self, frame: Frame, look: Look) -> bytes:
+        """The frame as this look has it. Runs in the artist's thread."""
+        if frame is not self._frame:
+            self._frame, self._done = frame, {}
+        if look not in self._done:
+            self._done[look] = self._encode(self._paint(frame, look))
+        return self._done[look]
+
+    def _paint(self, frame: Frame, look: Look) -> NDArray[np.uint8]:
+        part = frame.view if look.part is None else look.part
+        theme = DARK if look.dark else LIGHT
+        size = fit(part, (look.width, look.height))
+        if self._raster is None or (self._raster.size, self._raster.theme) != (size, theme):
+            self._raster = Raster(size, theme=theme)
+        colours = self._colours(frame, look.colour, theme)
+        view = View(part[0], part[3], size[0] / (part[2] - part[0]), *size)
+        return self._raster.discs(
+            frame.position,
+            frame.shape.radius,
+            view,
+            outlines=frame.shape.outlines,
+            obstacles=self._obstacles(frame),
+            colours=colours,
+        )
+
+    def _obstacles(self, frame: Frame) -> Sequence[Outline]:
+        """All of them; the same object as long as none has moved, which the raster then need not draw again."""
+        standing, moving = frame.shape.obstacles, frame.obstacles
+        if self._sketched[0] is not standing or self._sketched[1] is not moving:
+            self._sketched = (standing, moving, standing.outlines + moving.outlines)
+        return self._sketched[2]
+
+    def _colours(self, frame: Frame, name: str, theme: Theme) -> Packed:
+        shape = frame.shape
+        if name == "picture" and shape.colours is None:
+            name = "order"
+        if self._colouring_of != (name, shape):
+            self._colouring_of = (name, shape)
+            self._colouring = Fixed(shape.colours) if shape.colours is not None and name == "picture" else COLOURINGS[name]()
+            self._still = None
+        if name in ("speed", "energy"):
+            return self._colouring.colours(_Seen(frame.velocity, shape.mass, frame.status.time), theme)
+        # The others say the same in every frame.
+        if self._still is None or self._still[0] is not theme:
+            self._still = (theme, self._colouring.colours(_Seen(frame.velocity, shape.mass, frame.status.time), theme))
+        return self._still[1]
+
+    def _encode(self, pixels: NDArray[np.uint8]) -> bytes:
+        from PIL import Image
+
+        height, width = pixels.shape[:2]
+        file = io.BytesIO()
+        Image.frombuffer("RGB", (width, height), pixels, "raw", "RGBX", 0, 1).save(file, "JPEG", quality=QUALITY)
+        return file.getvalue()
+
+
+COLOURINGS: dict[str, type[ByOrigin] | type[BySpeed] | type[ByMass] | type[ByEnergy]] = {
+    "order": ByOrigin,
+    "speed": BySpeed,
+    "mass": ByMass,
+    "energy": ByEnergy,
+}
+
+
+def fit(part: tuple[float, float, float, float], room: tuple[int, int]) -> tuple[int, int]:
+    """Width and height in pixels of a picture of `part`, as large as `room` allows and no larger than what is sensible."""
+    width, height = part[2] - part[0], part[3] - part[1]
+    scale = min(room[0] / width, room[1] / height, (MOST_PIXELS / (width * height)) ** 0.5)
+    return max(1, round(width * scale)), max(1, round(height * scale))

@@ -1,0 +1,97 @@
+"""What is on show: worlds under a title, with colours and a part of the plane where a scene asks for it; and what could be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet import scenes
+from pyverlet.integrators import Integrator
+from pyverlet.panels import Panels
+from pyverlet.scenes import Scene
+from pyverlet.viewers.frames import Rect
+from pyverlet.world import World
+
+Progress = Callable[[int, int], None]
+
+CARRIED = ("seed", "threads", "dtype")
+"""Settings that go along when the viewer picks another scene: they say how to compute, not what."""
+
+
+@dataclass(frozen=True)
+class Exhibit:
+    """Worlds, ready to be shown.
+
+    Attributes:
+        title: heading of the page.
+        panels: the worlds.
+        scene: the name of the scene they are, or "" for worlds of the user's own.
+        colours: (n, 3) bytes R, G, B, the circles' own; None leaves colours to the viewer.
+        part: of the plane to show, metres; None shows the bounds, or where the circles are.
+    """
+
+    title: str
+    panels: Panels
+    scene: str = ""
+    colours: NDArray[np.uint8] | None = None
+    part: Rect | None = None
+
+    @classmethod
+    def of(cls, shown: World | Panels | Exhibit, title: str) -> Exhibit:
+        """Worlds under a title; an exhibit as it is."""
+        return shown if isinstance(shown, Exhibit) else cls(title, Panels.of(shown))
+
+
+class Repertoire:
+    """The scenes a viewer may pick from, and how to build them.
+
+    Args:
+        scene: the one to begin with.
+        dt: simulated seconds a frame.
+        integrators: of the first scene; several stand side by side.
+        overrides: settings of the first scene, as for `Scene.settings`.
+    """
+
+    def __init__(
+        self, scene: Scene, *, dt: float, integrators: Sequence[Integrator] = (), overrides: Mapping[str, Any] | None = None
+    ) -> None:
+        self._scene, self._dt, self._integrators = scene, dt, tuple(integrators)
+        self._overrides = dict(overrides or {})
+
+    @property
+    def summaries(self) -> dict[str, str]:
+        """Name and one line of every scene."""
+        return {scene.name: scene.summary for scene in scenes.SCENES.values()}
+
+    def open(self, progress: Progress | None = None) -> Exhibit:
+        """The scene to begin with."""
+        return self.build(self._scene.name, None, progress)
+
+    def build(self, name: str, particles: int | None, progress: Progress | None = None) -> Exhibit:
+        """A scene with this many particles, None for its own number.
+
+        Args:
+            name: of the scene.
+            particles: how many.
+            progress: called as progress(done, total) while a scene finds out its colours.
+
+        Raises:
+            InputError: there is no such scene, or it cannot have so many particles.
+        """
+        scene = scenes.get(name)
+        first = scene is self._scene
+        overrides = self._overrides if first else {key: self._overrides.get(key) for key in CARRIED}
+        if particles is not None:
+            overrides = {**overrides, "particles": particles}
+        integrators = self._integrators if first else ()
+        settings = scene.settings(**overrides, integrator=integrators[0] if integrators else None)
+        panels = scene.panels(integrators=integrators, **overrides)
+        colours = None
+        if scene.show.colours and len(panels) == 1:
+            colours = scene.show.colours(settings, self._dt, progress)
+        part = scene.show.view(settings) if scene.show.view else None
+        return Exhibit(scene.name, panels, scene.name, colours, part)

@@ -1,0 +1,71 @@
+"""The numbers on show beside the picture."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from pyverlet.clock import FrameBudget
+from pyverlet.viewers import levers
+from pyverlet.viewers.frames import Status
+
+if TYPE_CHECKING:
+    from pyverlet.viewers.stage import Stage
+
+SLOW_STATUS_S = 0.1
+"""Energy and percentiles read every particle or many frames; ten times a second is as fast as anybody reads."""
+
+
+class Gauges:
+    """Reads a stage. Used by the physics thread only.
+
+    Args:
+        budget: is told of every frame.
+    """
+
+    def __init__(self, budget: FrameBudget) -> None:
+        self.budget = budget
+        self._due = 0.0
+
+    def read(
+        self, stage: Stage, *, dropped: int, speed: float, paused: bool, busy: str | None, error: str | None, at_once: bool
+    ) -> Status:
+        """The numbers now. Slow ones are of a moment ago, unless wanted `at_once`."""
+        now = time.perf_counter()
+        if now >= self._due or at_once:
+            self._due = now + SLOW_STATUS_S
+            self._read_slow(stage)
+        stages: dict[str, float] = {}
+        for world in stage.worlds:
+            for name, ms in world.profile.stages.items():
+                stages[name] = stages.get(name, 0.0) + ms
+        return Status(
+            time=float(stage.panels.time),
+            frames=int(stage.panels.frames),
+            particles=len(stage),
+            dropped=int(dropped),
+            physics_ms=float(self.budget.last_ms),
+            physics_median_ms=self._percentiles[0],
+            physics_p95_ms=self._percentiles[1],
+            stages=stages,
+            kinetic=self._kinetic,
+            spin=self._spin,
+            potential=self._potential,
+            links=self._links,
+            energy=sum(self._energies),
+            energies=self._energies,
+            **levers.read(stage.worlds[0]),
+            speed=speed,
+            paused=paused,
+            busy=busy,
+            error=error,
+        )
+
+    def _read_slow(self, stage: Stage) -> None:
+        energies = [each.energy() for each in stage.worlds]
+        self._kinetic = sum(float(energy.kinetic) for energy in energies)
+        self._spin = sum(float(energy.spin) for energy in energies)
+        self._potential = sum(float(energy.potential) for energy in energies)
+        self._links = sum(float(energy.links) for energy in energies)
+        self._energies = tuple(float(energy.total) for energy in energies)
+        self._percentiles = (float(self.budget.median_ms), float(self.budget.p95_ms))

@@ -1,0 +1,55 @@
+"""What one tab wants to see of a frame: which part, how large, in which colours. Every tab looks for itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pyverlet import checks
+from pyverlet.errors import InputError
+from pyverlet.viewers.commands import FARTHEST
+from pyverlet.viewers.frames import Rect
+
+COLOURINGS = ("order", "speed", "mass", "energy", "picture")
+"""What a circle's colour may say: its place in the order of adding, speed, mass, kinetic energy, or what it was given."""
+
+LARGEST_SIDE = 4096
+"""Pixels: no screen is larger, and a slip must not ask for gigabytes."""
+
+MOST_PIXELS = 2_560 * 1_600
+"""Of a picture that the server draws."""
+
+CLOSEST = 1e-6
+"""Least width and height of the part, m."""
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """A tab's view.
+
+    Attributes:
+        part: of the plane, (x0, y0, x1, y1) in metres; None leaves it to the camera.
+        width, height: pixels it may take on the screen.
+        colour: one of COLOURINGS.
+        dark: whether the page is.
+        velocity: whether the tab needs to know velocities.
+    """
+
+    part: Rect | None = None
+    width: int = 960
+    height: int = 720
+    colour: str = "order"
+    dark: bool = True
+    velocity: bool = False
+
+    def __post_init__(self) -> None:
+        checks.whole("width", self.width, most=LARGEST_SIDE)
+        checks.whole("height", self.height, most=LARGEST_SIDE)
+        if self.colour not in COLOURINGS:
+            raise InputError(f"colour is {self.colour[:40]!r}; allowed are {', '.join(COLOURINGS)}")
+        if self.part is not None:
+            for value in self.part:
+                if abs(checks.number("part", value)) > FARTHEST:
+                    raise InputError(f"part reaches to {value:g}; allowed is a number from {-FARTHEST:g} to {FARTHEST:g}")
+            x0, y0, x1, y1 = self.part
+            if x1 - x0 < CLOSEST or y1 - y0 < CLOSEST:
+                raise InputError(f"part is {x1 - x0:g} x {y1 - y0:g} m; allowed is at least {CLOSEST:g} m each way")

@@ -1,0 +1,153 @@
+"""A world in a cell of a notebook: the live page as an anywidget. Needs the extra `notebook`.
+
+The world moves in the kernel's own thread and only when the page asks, between two cells: what other cells do with it is safe,
+and while one of them runs, or nobody looks, it stands still.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import anywidget
+import traitlets
+from PIL import Image
+
+from pyverlet import checks
+from pyverlet.errors import InputError
+from pyverlet.viewers import bundle
+from pyverlet.viewers.artist import Artist, draws_here
+from pyverlet.viewers.commands import Release
+from pyverlet.viewers.exhibit import Exhibit
+from pyverlet.viewers.frames import Frame, Shape
+from pyverlet.viewers.looks import Look
+from pyverlet.viewers.painter import Painter
+from pyverlet.viewers.protocol import Ack, decode, encode_frame, encode_picture, encode_refusal, encode_shape
+from pyverlet.viewers.session import Session
+
+if TYPE_CHECKING:
+    from pyverlet.panels import Panels
+    from pyverlet.world import World
+
+LONGEST_S = 0.1
+"""Most seconds the world makes up for at once: after a cell that took minutes it goes on where it was."""
+
+MOST_WORDS = 256
+"""Messages in one; an honest page has a dozen."""
+
+MOST_VIEWS = 32
+"""Places that show one widget at the same time; those that were closed without a word make room."""
+
+STILL_WIDTH = 720
+"""Pixels of the picture that stands in where widgets do not run."""
+
+
+class _Eye:
+    """One place that shows the widget: what it looks at, and what it was sent."""
+
+    def __init__(self, hand: int) -> None:
+        self.hand = hand
+        self.look = Look()
+        self.shape: Shape | None = None
+        self.sent: tuple[int, Look] | None = None
+
+
+class Widget(anywidget.AnyWidget):
+    """Shows a world and lets it move. Made by `pyverlet.widget`.
+
+    Attributes:
+        world: the world or panels on show.
+        height: of the cell, pixels.
+    """
+
+    _esm = bundle.script()
+    height = traitlets.Int(480).tag(sync=True)
+
+    def __init__(self, world: World | Panels, *, title: str, dt: float, height: int) -> None:
+        self.world = world
+        self._session = Session(Exhibit.of(world, title), dt=dt)
+        self._artist = Artist()
+        self._eyes: dict[str, _Eye] = {}
+        self._hands = 0
+        super().__init__(height=checks.whole("height", height, least=100, most=4096))
+        self.on_msg(self._hear)
+
+    def _hear(self, widget: Any, content: Any, buffers: Sequence[Any]) -> None:
+        """Obey what a page says, let the world catch up, and answer with what is new."""
+        if not isinstance(content, dict) or not isinstance(content.get("view"), str):
+            return
+        if content.get("gone"):
+            self._forget(content["view"])
+            return
+        eye = self._eye(content["view"])
+        answers = self._obey(eye, content.get("words"))
+        self._session.turn(longest=LONGEST_S)
+        answers += self._news(eye)
+        self.send({"view": content["view"]}, buffers=answers)
+
+    def _eye(self, view: str) -> _Eye:
+        if view not in self._eyes:
+            while len(self._eyes) >= MOST_VIEWS:
+                self._forget(next(iter(self._eyes)))
+            self._hands += 1
+            self._eyes[view] = _Eye(self._hands)
+        return self._eyes[view]
+
+    def _forget(self, view: str) -> None:
+        if eye := self._eyes.pop(view, None):
+            self._session.submit(Release(eye.hand))
+
+    def _obey(self, eye: _Eye, words: Any) -> list[bytes]:
+        """The refusals of what cannot be obeyed."""
+        refusals = []
+        for text in words[:MOST_WORDS] if isinstance(words, list) else []:
+            try:
+                if not isinstance(text, str):
+                    raise InputError("message is no text; allowed is a JSON text")
+                request = decode(text, eye.hand)
+            except InputError as error:
+                refusals.append(encode_refusal(str(error)))
+                continue
+            if isinstance(request, Look):
+                eye.look = request
+            elif not isinstance(request, Ack):
+                self._session.submit(request)
+        return refusals
+
+    def _news(self, eye: _Eye) -> list[bytes]:
+        frame = self._session.latest
+        if (frame.seq, eye.look) == eye.sent:
+            return []
+        news = []
+        if frame.shape is not eye.shape:
+            eye.shape = frame.shape
+            news.append(encode_shape(frame.shape, drawn_here=draws_here(frame.shape)))
+        eye.sent = (frame.seq, eye.look)
+        return [*news, self._encode(frame, eye.look)]
+
+    def _encode(self, frame: Frame, look: Look) -> bytes:
+        if draws_here(frame.shape):
+            return encode_picture(frame, look.part, self._artist.jpeg(frame, look))
+        return encode_frame(frame, look.part, velocity=look.velocity)
+
+    # -- where widgets do not run -------------------------------------------------------------------------------------
+
+    def _repr_png_(self) -> bytes:
+        """The first of the worlds as it is now."""
+        from pyverlet.panels import Panels
+
+        world = Panels.of(self.world).worlds[0]
+        pixels = Painter(world, size=(STILL_WIDTH, self.height)).paint()
+        file = io.BytesIO()
+        Image.fromarray(pixels[..., :3]).save(file, "PNG", optimize=True)
+        return file.getvalue()
+
+    def _repr_mimebundle_(self, **options: Any) -> Any:
+        """The widget and, for where it does not run (a notebook on paper, on a code host), a picture."""
+        given: Any = super()._repr_mimebundle_(**options)
+        if given is None:
+            return None
+        data, metadata = given if isinstance(given, tuple) else (given, {})
+        return {**data, "image/png": base64.b64encode(self._repr_png_()).decode()}, metadata

@@ -1,0 +1,58 @@
+// Shortcuts, and the sheet that lists them: one table for both.
+
+/** [keys, what the sheet says, what it does]; `act` has a function for each name. */
+const SHORTCUTS = [
+  [[" "], "pause, go on", "pause"],
+  [["."], "one frame", "step", "repeats"],
+  [["r"], "back to the start", "reset"],
+  [["s"], "slow motion, slower, real time", "slower"],
+  [["ArrowLeft", "ArrowRight"], "turn gravity", "turn", "repeats"],
+  [["0"], "no gravity, gravity again", "weightless"],
+  [["1", "2", "3", "4", "5", "6"], "drag, poke, pin, add, erase, move", "tool"],
+  [["c"], "next colouring", "colour"],
+  [["v"], "velocities", "velocities"],
+  [["t"], "contacts", "contacts"],
+  [["+", "-"], "nearer, farther", "zoom", "repeats"],
+  [["f"], "show all", "fit"],
+  [["d"], "dark, light", "theme"],
+  [["l"], "copy a link with the settings", "copy"],
+  [["?", "h"], "this sheet", "help"],
+];
+const GESTURES = [
+  ["drag", "what the tool says: pull a circle, poke, pin, add, erase"],
+  ["shift drag", "push circles away"],
+  ["right button, alt drag, two fingers", "move the view"],
+  ["wheel, pinch", "zoom"],
+  ["double-click a slider", "where it was"],
+];
+const WRITTEN = { " ": "space", ArrowLeft: "←", ArrowRight: "→" };
+
+/** Obey the keyboard wherever `target` gets it. */
+export function listen(target, root, act) {
+  target.addEventListener("keydown", (event) => {
+    root.classList.toggle("shift", event.shiftKey);
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const field = event.composedPath()[0];
+    if (field.matches?.("[type=number], select, textarea, [contenteditable]")) return;
+    if (field.matches?.("button, summary, [type=checkbox]") && (event.key === " " || event.key === "Enter")) return;
+    if (field.matches?.("[type=radio], [type=range]") && event.key.startsWith("Arrow")) return;
+    const found = SHORTCUTS.find(([keys]) => keys.includes(event.key.length === 1 ? event.key.toLowerCase() : event.key));
+    if (!found) return;
+    const [, , name, repeats] = found;
+    event.preventDefault();
+    event.stopPropagation(); // a notebook has shortcuts of its own
+    if (!event.repeat || repeats) act[name](event.key);
+  });
+  target.addEventListener("keyup", (event) => root.classList.toggle("shift", event.shiftKey));
+}
+
+/** Fill the sheet. */
+export function fillSheet(body) {
+  const row = (keys, text) => {
+    const line = body.insertRow(), cell = line.insertCell();
+    cell.append(...keys.map((key) => Object.assign(document.createElement("kbd"), { textContent: WRITTEN[key] ?? key })));
+    line.insertCell().textContent = text;
+  };
+  for (const [keys, text] of SHORTCUTS) row(keys, text);
+  for (const [gesture, text] of GESTURES) row([gesture], text);
+}

@@ -1,0 +1,93 @@
+// The numbers beside the picture, and their curves.
+
+import { Chart } from "./chart.js";
+
+const STAGES = ["gather", "integrate", "broad phase", "contacts", "bounds", "velocities", "scatter"]; // as in World.step
+const OTHER = "other"; // stages that came later than this page
+const NOTHING = "–";
+const RATE_MS = 1000; // the rate of frames is that of the last second
+
+export class Numbers {
+  constructor(root) {
+    this.root = root;
+    this.drawn = []; // times of the last drawn frames, ms
+    this.stages = new Chart(this.#id("physics-chart"), [...STAGES, OTHER].map((_, k) => `--stage-${k}`), { zero: true, stacked: true });
+    this.energies = new Chart(this.#id("energy-chart"), ["--kinetic", "--potential", "--links", "--accent"]);
+  }
+
+  /** A new shape. */
+  begin(shape) {
+    this.#id("budget").textContent = shape.budgetMs;
+    this.stages.limit = shape.budgetMs;
+    this.budget = shape.budgetMs;
+  }
+
+  clear() {
+    this.stages.clear();
+    this.energies.clear();
+  }
+
+  /** A frame was drawn at this time, ms. */
+  count(status, now) {
+    this.drawn.push(now);
+    const known = STAGES.map((name) => status.stages[name] ?? 0);
+    const others = Object.entries(status.stages).filter(([name]) => !STAGES.includes(name));
+    this.stages.push(...known, others.reduce((sum, [, ms]) => sum + ms, 0));
+  }
+
+  /** Frames drawn a second. */
+  rate(now) {
+    this.drawn = this.drawn.filter((time) => now - time <= RATE_MS);
+    return this.drawn.length > 1 ? (1000 * (this.drawn.length - 1)) / (this.drawn.at(-1) - this.drawn[0]) : 0;
+  }
+
+  show(status, drawing, now) {
+    const rate = this.rate(now);
+    this.#write("fps", status.paused || status.error || !rate ? NOTHING : rate.toFixed(0));
+    this.#write("drawing", drawing);
+    this.#write("physics-ms", status.physics_median_ms.toFixed(2));
+    const physics = this.#named("physics-ms").parentElement;
+    physics.classList.toggle("over", status.physics_median_ms > this.budget);
+    physics.title = `median of the last frames; 95 % took less than ${status.physics_p95_ms.toFixed(2)} ms`;
+    this.#write("particles", String(status.particles));
+    this.#write("time", status.time.toFixed(3));
+    this.#write("dropped", String(status.dropped));
+    for (const name of ["energy", "kinetic", "potential", "links"]) this.#write(name, joules(status[name]));
+    this.#id("links-row").hidden = !status.links;
+    this.energies.push(status.kinetic, status.potential, status.links || null, status.energy);
+    this.energies.draw();
+    this.stages.draw();
+    this.#legend(status.stages);
+  }
+
+  /** Milliseconds by stage, each with the colour of its area. */
+  #legend(stages) {
+    const rows = Object.entries(stages).filter(([, ms]) => ms >= 0.005).map(([name, ms]) => {
+      const k = STAGES.indexOf(name), row = document.createElement("span"), key = document.createElement("i");
+      key.className = "key";
+      key.style.background = `var(--stage-${k < 0 ? STAGES.length : k})`;
+      row.append(key, `${name} ${ms.toFixed(2)}`);
+      return row;
+    });
+    this.#id("stages").replaceChildren(...rows);
+  }
+
+  #id(id) {
+    return this.root.querySelector(`#${id}`);
+  }
+
+  #named(name) {
+    return this.root.querySelector(`[data-testid="${name}"]`);
+  }
+
+  /** Write a number with its thousands set apart by style only, so that the text stays a plain number. */
+  #write(name, text) {
+    const element = this.#named(name);
+    if (element.textContent === text) return;
+    const [, sign, whole, rest] = text.match(/^(-?)(\d*)(.*)$/);
+    const groups = whole.length > 4 ? whole.replace(/\B(?=(\d{3})+$)/g, " ").split(" ") : [whole];
+    element.replaceChildren(sign + groups[0], ...groups.slice(1).map((digits) => Object.assign(document.createElement("span"), { className: "group", textContent: digits })), rest);
+  }
+}
+
+const joules = (value) => (value === null ? NOTHING : value.toFixed(Math.abs(value) < 100 ? 2 : 0).replace(/^-0(\.0*)?$/, "0$1"));

@@ -1,0 +1,104 @@
+// What is drawn over the circles: lines of the scene, what moves in it, pins, velocities, contacts.
+
+import { drawObstacles, resizeCanvas } from "./backdrop.js";
+import { touching } from "./contacts.js";
+import { GRID_MAX } from "./draw.js";
+
+export const MOST_CONTACTS = 20000; // circles whose contacts are searched for: beyond, it would cost frames
+const MOST_ARROWS = 4000; // of more circles, every so many has one
+const ARROW_S = 0.08; // a velocity is drawn as the way of so many seconds
+
+export class Overlay {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.clean = true;
+    this.contacts = 0; // pairs on show
+    this.arrows = 0;
+  }
+
+  /** `wants`: {velocities, contacts}; `colour(name)` is that of a custom property. */
+  draw(shape, frame, camera, size, ratio, wants, colour) {
+    const pinned = frame.grid ? pins(shape.mass) : [];
+    const busy = shape.lines.length || frame.obstacles.length || pinned.length || wants.velocities || wants.contacts;
+    this.contacts = this.arrows = 0;
+    if (!busy && this.clean) return;
+    this.clean = !busy;
+    resizeCanvas(this.canvas, size, ratio);
+    const context = this.canvas.getContext("2d");
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.clearRect(0, 0, size.width, size.height);
+    dashes(context, shape.lines, camera, colour("--soft"));
+    drawObstacles(context, frame.obstacles, camera, colour);
+    if (!frame.grid) return;
+    const place = camera.place(frame.view), sx = place.width / GRID_MAX, sy = place.height / GRID_MAX;
+    const { grid } = frame, seen = (i) => grid[2 * i] && grid[2 * i + 1] && grid[2 * i] !== GRID_MAX && grid[2 * i + 1] !== GRID_MAX;
+    const x = (i) => place.left + grid[2 * i] * sx, y = (i) => place.top + place.height - grid[2 * i + 1] * sy;
+    const n = grid.length / 2;
+    context.beginPath();
+    if (wants.contacts && n <= MOST_CONTACTS) {
+      const xs = new Float64Array(n), ys = new Float64Array(n), rs = new Float64Array(n);
+      for (let i = 0; i < n; i++) [xs[i], ys[i], rs[i]] = [seen(i) ? x(i) : NaN, y(i), shape.radius[i] * camera.scale];
+      const pairs = touching(xs, ys, rs);
+      for (let k = 0; k < pairs.length; k += 2) {
+        context.moveTo(xs[pairs[k]], ys[pairs[k]]);
+        context.lineTo(xs[pairs[k + 1]], ys[pairs[k + 1]]);
+      }
+      this.contacts = pairs.length / 2;
+      ink(context, colour("--text"), 1.2);
+    }
+    context.beginPath();
+    if (wants.velocities && frame.velocity) {
+      const metre = frame.unit * ARROW_S * camera.scale;
+      for (let i = 0; i < n; i += Math.ceil(n / MOST_ARROWS)) {
+        if (!seen(i)) continue;
+        const dx = frame.velocity[2 * i] * metre, dy = -frame.velocity[2 * i + 1] * metre, length = Math.hypot(dx, dy);
+        if (length < 1) continue;
+        arrow(context, x(i), y(i), dx, dy, Math.min(5, 0.4 * length) / length);
+        this.arrows++;
+      }
+      ink(context, colour("--text"), 1.2);
+    }
+    context.fillStyle = colour("--text");
+    context.beginPath();
+    for (const i of pinned) {
+      if (!seen(i)) continue;
+      const radius = Math.max(1.5, Math.min(4, 0.35 * shape.radius[i] * camera.scale));
+      context.moveTo(x(i) + radius, y(i));
+      context.arc(x(i), y(i), radius, 0, 2 * Math.PI);
+    }
+    context.fill();
+  }
+}
+
+const pinsOf = new WeakMap();
+
+/** Numbers of the pinned circles: those of infinite mass. */
+function pins(mass) {
+  if (!pinsOf.has(mass)) pinsOf.set(mass, Array.from(mass.keys()).filter((i) => mass[i] === Infinity));
+  return pinsOf.get(mass);
+}
+
+function dashes(context, lines, camera, colour) {
+  context.setLineDash([5, 5]);
+  context.beginPath();
+  for (const [from, to] of lines) {
+    context.moveTo(...camera.toScreen(...from));
+    context.lineTo(...camera.toScreen(...to));
+  }
+  ink(context, colour, 1);
+  context.setLineDash([]);
+}
+
+function arrow(context, x, y, dx, dy, head) {
+  context.moveTo(x, y);
+  context.lineTo(x + dx, y + dy);
+  context.lineTo(x + dx - head * (dx + 0.5 * dy), y + dy - head * (dy - 0.5 * dx));
+  context.moveTo(x + dx, y + dy);
+  context.lineTo(x + dx - head * (dx - 0.5 * dy), y + dy - head * (dy + 0.5 * dx));
+}
+
+function ink(context, colour, width) {
+  context.strokeStyle = colour;
+  context.lineWidth = width;
+  context.stroke();
+}

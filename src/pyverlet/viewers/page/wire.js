@@ -1,0 +1,22 @@
+// The words on the wire, see protocol.py: a JSON head, then arrays of numbers or a JPEG.
+
+/** One message of the server, its arrays as views on `data`, an ArrayBuffer. */
+export function unpack(data) {
+  const length = new DataView(data).getUint32(0, true), start = 4 + length;
+  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
+  if (head.kind === "shape" && !head.drawnHere) {
+    head.radius = new Float32Array(data, start, head.count);
+    head.mass = new Float32Array(data, start + 4 * head.count, head.count);
+    head.number = new Uint32Array(data, start + 8 * head.count, head.count);
+    head.rgb = head.coloured ? new Uint8Array(data, start + 12 * head.count, 3 * head.count) : null;
+  } else if (head.kind === "shape") {
+    Object.assign(head, { radius: new Float32Array(0), mass: new Float32Array(0), number: new Uint32Array(0), rgb: null });
+  } else if (head.kind === "frame") {
+    const pairs = (data.byteLength - start) / (head.unit ? 8 : 4);
+    head.grid = new Uint16Array(data, start, 2 * pairs);
+    head.velocity = head.unit ? new Int16Array(data, start + 4 * pairs, 2 * pairs) : null;
+  } else if (head.kind === "picture") {
+    head.jpeg = new Blob([new Uint8Array(data, start)], { type: "image/jpeg" });
+  }
+  return head;
+}

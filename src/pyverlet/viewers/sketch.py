@@ -1,0 +1,60 @@
+"""Obstacles as lines to draw: those that stand still go along once, those that move with every frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pyverlet.obstacles import Outline
+
+if TYPE_CHECKING:
+    from pyverlet.viewers.layout import Layout
+    from pyverlet.world import World
+
+
+@dataclass(frozen=True)
+class Sketch:
+    """Outlines of obstacles in the picture's coordinates."""
+
+    outlines: tuple[Outline, ...] = ()
+
+    @cached_property
+    def lines(self) -> list[tuple[list[list[float]], bool]]:
+        """For each outline its points in metres, and whether what it encloses is solid; ready for JSON."""
+        return [(np.round(points, 6).tolist(), filled) for points, filled in self.outlines]
+
+
+NOTHING = Sketch()
+
+
+class Sketcher:
+    """Draws the obstacles of worlds side by side; the same object as long as none has moved.
+
+    Args:
+        worlds: whose obstacles; only read.
+        moving: those that move, or those that stand still.
+    """
+
+    def __init__(self, worlds: Sequence[World], *, moving: bool) -> None:
+        self._worlds, self._moving = worlds, moving
+        self._drawn: list[list[Outline]] = []
+        self._sketch = NOTHING
+
+    def draw(self, layout: Layout) -> Sketch:
+        """As they are now."""
+        found = [
+            (layout.offset(k), obstacle.drawn())
+            for k, world in enumerate(self._worlds)
+            for obstacle in world.obstacles
+            if obstacle.moves == self._moving
+        ]
+        drawn = [outlines for _, outlines in found]
+        if len(drawn) != len(self._drawn) or any(a is not b for a, b in zip(drawn, self._drawn, strict=True)):
+            self._drawn = drawn
+            moved = (Outline(points + offset, filled) for offset, outlines in found for points, filled in outlines)
+            self._sketch = Sketch(tuple(moved)) if drawn else NOTHING
+        return self._sketch

@@ -1,0 +1,150 @@
+"""The worlds on show and all that is replaced together with them: their start, the hands in them, the camera, how they stand."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.viewers import levers
+from pyverlet.viewers.commands import Setting
+from pyverlet.viewers.exhibit import Exhibit
+from pyverlet.viewers.frames import Camera, PanelShape, Shape, outline
+from pyverlet.viewers.hands import HandsOnPanels
+from pyverlet.viewers.layout import Layout
+from pyverlet.viewers.sketch import Sketch, Sketcher
+
+GREY = 0x9A
+"""R, G and B of circles that joined a picture later."""
+
+
+class Stage:
+    """Worlds as a viewer sees them. Used by the physics thread only.
+
+    Args:
+        exhibit: what to show. Reset goes back to its present state.
+    """
+
+    def __init__(self, exhibit: Exhibit) -> None:
+        self.exhibit = exhibit
+        self.panels = exhibit.panels
+        self.worlds = self.panels.worlds
+        self.hands = HandsOnPanels(self.worlds)
+        self._pinned = 0
+        self.differing = levers.differing(self.worlds)
+        self._saved = self.panels.save()
+        self._coloured = [np.array(world.number) for world in self.worlds]
+        self._standing, self._moving = (Sketcher(self.worlds, moving=moving) for moving in (False, True))
+        self._start_energies = [float(each.energy().total) for each in self.worlds]
+        self.look_anew()
+
+    def __len__(self) -> int:
+        return sum(map(len, self.worlds))
+
+    def look_anew(self) -> None:
+        """Forget where the camera has followed to."""
+        self._camera = Camera(*self.worlds, part=self.exhibit.part)
+        self.look()
+
+    def look(self) -> tuple[list[NDArray[np.float32]], NDArray[np.float32]]:
+        """Point the camera at where everybody is now; each world's positions, and all velocities (n, 2), copied."""
+        positions = [np.array(world.position, dtype=np.float32) for world in self.worlds]
+        velocities = [np.array(world.velocity, dtype=np.float32) for world in self.worlds]
+        self.layout = Layout(self._camera.view(_joined(positions)), len(positions), self._bounded())
+        return positions, _joined(velocities)
+
+    def place(self, positions: list[NDArray[np.float32]]) -> NDArray[np.float32]:
+        """(n, 2) positions in the picture of each world's own."""
+        return _joined([self.layout.place(k, position) for k, position in enumerate(positions)])
+
+    @property
+    def view_size(self) -> float:
+        """The longer side of what is shown of each world, m."""
+        x0, y0, x1, y1 = self.layout.room
+        return max(x1 - x0, y1 - y0)
+
+    def step(self, dt: float) -> None:
+        """One frame of every world, the hands following their mice."""
+        self.hands.move(self.view_size)
+        self.panels.step(dt)
+
+    def pull(self, command: Setting) -> None:
+        """Change a setting of all worlds, unless they are side by side because they differ in it."""
+        if levers.NAMES[type(command)] not in self.differing:
+            for world in self.worlds:
+                levers.pull(world, command)
+
+    @property
+    def version(self) -> tuple[Any, ...]:
+        """What the shape depends on: it is out of date as soon as this changes."""
+        return (*(world.version for world in self.worlds), id(self._standing.draw(self.layout)), self._pinned)
+
+    def moving(self) -> Sketch:
+        """The obstacles that move, where they are now."""
+        return self._moving.draw(self.layout)
+
+    def pin(self, x: float, y: float, reach: float) -> None:
+        """Pin the nearest circle, or let go of it."""
+        self._pinned += self.hands.pin(x, y, reach, self.layout)
+
+    def reset(self) -> None:
+        """Back to the start; settings stay."""
+        self.hands.release_all()
+        self.panels.restore(self._saved)
+        self._pinned += 1  # masses are what they were
+        self.look_anew()
+
+    def shape(self, *, dt: float, budget_ms: float, scenes: tuple[tuple[str, str], ...]) -> Shape:
+        """What stays from frame to frame, as it is now."""
+        outlines: list[tuple[tuple[float, float], ...]] = []
+        lines: list[tuple[tuple[float, float], tuple[float, float]]] = []
+        panels: list[PanelShape] = []
+        first = 0
+        for k, (panel, world) in enumerate(zip(self.panels, self.worlds, strict=True)):
+            dx, dy = self.layout.offset(k)
+            outlines += [tuple((x + dx, y + dy) for x, y in line) for line in outline(world.boundary)]
+            if self.panels.line is not None and (extent := world.boundary.extent()):
+                lines.append(((extent[0] + dx, self.panels.line + dy), (extent[2] + dx, self.panels.line + dy)))
+            if len(self.panels) > 1:
+                panels.append(PanelShape(panel.name, first, len(world), self._start_energies[k], self.layout.strip(k)))
+            first += len(world)
+        return Shape(
+            title=self.exhibit.title,
+            dt=dt,
+            budget_ms=budget_ms,
+            bounded=self._bounded(),
+            parted=self.exhibit.part is not None,
+            outlines=tuple(outlines),
+            lines=tuple(lines),
+            panels=tuple(panels),
+            differing=self.differing,
+            obstacles=self._standing.draw(self.layout),
+            scene=self.exhibit.scene,
+            scenes=scenes,
+            radius=_kept(np.concatenate([world.radius for world in self.worlds], dtype=np.float32)),
+            mass=_kept(np.concatenate([world.mass for world in self.worlds], dtype=np.float32)),
+            number=_kept(np.concatenate([world.number for world in self.worlds], dtype=np.uint32, casting="unsafe")),
+            colours=self._colours(),
+        )
+
+    def _bounded(self) -> bool:
+        return any(world.boundary.extent() is not None for world in self.worlds)
+
+    def _colours(self) -> NDArray[np.uint8] | None:
+        """Everybody's own, grey for those that came later."""
+        given = self.exhibit.colours
+        if given is None:
+            return None
+        (world,), (first,) = self.worlds, self._coloured
+        row = np.searchsorted(first, world.number).clip(max=len(first) - 1)
+        return _kept(np.where((first[row] == world.number)[:, None], given[row], np.uint8(GREY)))
+
+
+def _joined(arrays: list[NDArray[np.float32]]) -> NDArray[np.float32]:
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
+
+
+def _kept(array: NDArray[Any]) -> NDArray[Any]:
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,118 @@
+"""A Chromium for the tests of the page: where it is found, how it is started, what is read off the page.
+
+The browser is the one PYVERLET_CHROMIUM names, or else an installed one; without any, tests that need it are skipped on
+somebody's machine and fail where CI is set.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from playwright.sync_api import Page, expect
+
+NOTHING = "\N{EN DASH}"
+"""What the page shows where there is no number."""
+
+FLAGS = [
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync",
+]  # fmt: skip
+
+SERVE = """
+import sys
+from pyverlet.scenes import get
+from pyverlet.viewers import serve
+from pyverlet.viewers.exhibit import Repertoire
+if len(sys.argv) > 3:
+    from pyverlet.viewers import artist
+    artist.PICTURES_FROM = int(sys.argv[3])
+repertoire = Repertoire(get(sys.argv[1]), dt=1 / 60, overrides={"particles": int(sys.argv[2])})
+serve(repertoire.open, scene_name=sys.argv[1], repertoire=repertoire, port=0, open_browser=False)
+"""
+
+
+def chromium() -> str:
+    """Path of a Chromium."""
+    named = os.environ.get("PYVERLET_CHROMIUM")
+    found = named or shutil.which("chromium") or shutil.which("google-chrome") or shutil.which("chromium-browser")
+    if found is None:
+        reason = "no Chromium found; set PYVERLET_CHROMIUM to one"
+        if os.environ.get("CI"):
+            pytest.fail(reason)
+        pytest.skip(reason)
+    return found
+
+
+class Program:
+    """A scene served by a process of its own, as the command line does it."""
+
+    def __init__(self, scene: str, particles: int, *settings: int) -> None:
+        command = [sys.executable, "-W", "error", "-c", SERVE, scene, str(particles), *map(str, settings)]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        assert self.process.stdout is not None
+        found = re.search(r"http://\S+", self.process.stdout.readline())
+        assert found, self.process.stderr.read() if self.process.stderr else ""
+        self.address = found[0]
+
+    def end(self) -> tuple[int, str]:
+        """Ctrl-C; the exit code and what it wrote to standard error."""
+        self.process.send_signal(signal.SIGINT)
+        _, err = self.process.communicate(timeout=20)
+        return self.process.returncode, err
+
+
+class Serve(Protocol):
+    """Starts programs: a scene, its circles and, if given, from how many on the server draws."""
+
+    def __call__(self, scene: str, particles: int, *settings: int) -> Program:
+        """Start one."""
+
+
+def number(page: Page, name: str) -> float:
+    return float(page.get_by_test_id(name).inner_text())
+
+
+def comes_true(page: Page, condition: Callable[[], bool]) -> bool:
+    """Whether a condition comes true within ten seconds."""
+    for _ in range(200):
+        if condition():
+            return True
+        page.wait_for_timeout(50)
+    return False
+
+
+def visit(page: Page, address: str) -> None:
+    page.goto(address)
+    expect(page.get_by_test_id("particles")).not_to_have_text(NOTHING)
+
+
+def where(page: Page, particle: int) -> dict[str, float]:
+    found: dict[str, float] = page.evaluate("(i) => window.pyverlet.where(i)", particle)
+    return found
+
+
+def everywhere(page: Page, count: int) -> NDArray[np.float64]:
+    """(count, 4) of x, y in metres and left, top in CSS pixels."""
+    script = "(n) => Array.from({length: n}, (_, i) => Object.values(window.pyverlet.where(i)))"
+    return np.array(page.evaluate(script, count), dtype=np.float64)
+
+
+def pause(page: Page) -> None:
+    page.get_by_test_id("pause").click()
+    expect(page.get_by_test_id("pause")).to_have_text("Resume")
+
+
+def status(page: Page) -> dict[str, Any]:
+    """All numbers of the frame on screen, as they came."""
+    found: dict[str, Any] = page.evaluate("() => window.pyverlet.status()")
+    return found

@@ -1,0 +1,249 @@
+"""The widget: its words over the comm, its picture where widgets do not run, and the page's script as one piece in Chromium."""
+
+from __future__ import annotations
+
+import base64
+import importlib.util
+import json
+import re
+import struct
+import time
+from collections.abc import Iterator
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib import image
+from playwright.sync_api import Page, expect, sync_playwright
+
+import pyverlet as pv
+from pyverlet.viewers import bundle
+from pyverlet.viewers.notebook import MOST_VIEWS
+
+from .browser import FLAGS, chromium
+
+LOOK = {"type": "look", "part": None, "width": 400, "height": 300, "colour": "order", "dark": True, "velocity": False}
+
+
+class Comm:
+    """A widget, and what it answers."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, world: Any, **options: Any) -> None:
+        self.widget = pv.widget(world, **options)
+        self.answers: list[tuple[Any, list[bytes]]] = []
+        monkeypatch.setattr(self.widget, "send", lambda content, buffers=(): self.answers.append((content, list(buffers))))
+
+    def say(self, *messages: Any, view: str = "a") -> list[tuple[dict[str, Any], bytes]]:
+        """Send messages as the page does; head and body of each answer."""
+        return self.raw({"view": view, "words": [json.dumps(message) for message in messages]})
+
+    def raw(self, content: Any) -> list[tuple[dict[str, Any], bytes]]:
+        count = len(self.answers)
+        self.widget._handle_custom_msg(content, [])
+        if len(self.answers) == count:
+            return []
+        reply, buffers = self.answers[-1]
+        assert reply == {"view": content["view"]}
+        parts = []
+        for data in buffers:
+            (length,) = struct.unpack_from("<I", data)
+            parts.append((json.loads(data[4 : 4 + length]), data[4 + length :]))
+        return parts
+
+
+@pytest.fixture
+def comm(monkeypatch: pytest.MonkeyPatch, world: pv.World) -> Comm:
+    return Comm(monkeypatch, world, title="nine")
+
+
+def test_the_first_question_is_answered_with_shape_and_frame(comm: Comm) -> None:
+    (shape, radii), (frame, grid) = comm.say(LOOK)
+    assert (shape["kind"], shape["title"], shape["count"], len(radii)) == ("shape", "nine", 9, 108)
+    assert (frame["kind"], len(grid)) == ("frame", 36)
+
+
+def test_the_world_moves_when_asked_and_only_then(comm: Comm, world: pv.World) -> None:
+    comm.say(LOOK)
+    before = world.frames
+    time.sleep(0.05)
+    assert world.frames == before
+    comm.say()
+    assert before + 1 <= world.frames <= before + 4
+    time.sleep(0.5)  # a cell that takes long
+    before = world.frames
+    ((frame, _),) = comm.say()
+    assert before < world.frames <= before + 6  # a tenth of a second, no more, is made up for
+    assert frame["status"]["dropped"] <= 4
+
+
+def test_commands_work_and_silence_costs_nothing(comm: Comm, world: pv.World) -> None:
+    comm.say(LOOK, {"type": "pause", "on": True}, {"type": "gravity", "x": 1, "y": 2}, {"type": "integrator", "value": "rk4"})
+    assert world.gravity == (1.0, 2.0)
+    held = world.frames
+    assert comm.say() == []
+    ((frame, _),) = comm.say({"type": "step"})
+    assert frame["status"]["paused"]
+    assert world.frames == held + 1
+    ((again, _),) = comm.say({**LOOK, "part": [0, 0, 1, 1]})
+    assert again["view"] == [0, 0, 1, 1]
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"type": "explode"}', '{"type": "substeps", "value": 0}'])
+def test_what_cannot_be_obeyed_is_refused(comm: Comm, text: str) -> None:
+    refused, _ = comm.raw({"view": "a", "words": [text]})[0]
+    assert refused["kind"] == "refused"
+    assert "allowed" in refused["reason"]
+
+
+@pytest.mark.parametrize("content", [None, 3, [], {}, {"view": 3}, {"view": "a", "words": 5}, {"view": "a", "words": [5, None]}])
+def test_nonsense_over_the_comm_does_no_harm(comm: Comm, world: pv.World, content: Any) -> None:
+    comm.widget._handle_custom_msg(content, [])
+    comm.say(LOOK)
+    assert world.time >= 0
+
+
+def test_two_views_have_looks_of_their_own_and_a_closed_one_lets_go(comm: Comm, world: pv.World) -> None:
+    comm.say(LOOK, {"type": "pause", "on": True})
+    (_, (frame, _)) = comm.say({**LOOK, "part": [0, 0, 1, 1]}, view="b")
+    assert frame["view"] == [0, 0, 1, 1]
+    assert comm.say() == []  # the first has what it wants
+    comm.say({"type": "drag", "x": 0, "y": 0.5, "reach": 1}, view="b")
+    assert len(world.forces) == 1
+    comm.widget._handle_custom_msg({"view": "b", "gone": True}, [])
+    comm.say()
+    assert world.forces == []
+
+
+def test_views_that_left_without_a_word_make_room(comm: Comm) -> None:
+    for k in range(MOST_VIEWS + 5):
+        comm.say(LOOK, view=str(k))
+    assert len(comm.widget._eyes) == MOST_VIEWS
+
+
+def test_large_worlds_come_as_pictures(monkeypatch: pytest.MonkeyPatch, world: pv.World) -> None:
+    monkeypatch.setattr("pyverlet.viewers.artist.PICTURES_FROM", 5)
+    (shape, _), (frame, jpeg) = Comm(monkeypatch, world).say(LOOK)
+    assert shape["drawnHere"]
+    assert frame["kind"] == "picture"
+    assert image.imread(BytesIO(jpeg), format="jpeg").shape == (300, 300, 3)  # a square room in 400 x 300
+
+
+def test_where_widgets_do_not_run_there_is_a_picture(comm: Comm) -> None:
+    data, _ = comm.widget._repr_mimebundle_()
+    assert "application/vnd.jupyter.widget-view+json" in data
+    pixels = image.imread(BytesIO(base64.b64decode(data["image/png"])))
+    assert pixels.shape == (480, 720, 3)
+    coloured = np.ptp(pixels, axis=2) > 0.3
+    assert 9 * 100 < coloured.sum() < 9 * 1000  # nine circles of 11 pixels radius
+
+
+def test_several_worlds_are_shown_by_their_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    panels = pv.scenes.get("bounce-order").panels()
+    data, _ = Comm(monkeypatch, panels).widget._repr_mimebundle_()
+    assert image.imread(BytesIO(base64.b64decode(data["image/png"]))).any()
+
+
+@pytest.mark.parametrize("module", ["anywidget", "PIL"])
+def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch, world: pv.World, module: str) -> None:
+    found = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *rest: None if name == module else found(name, *rest))
+    with pytest.raises(pv.InputError, match=rf"'{module}'.*pip install 'pyverlet\[notebook\]'"):
+        pv.widget(world)
+
+
+@pytest.mark.parametrize("height", [5, 1e9, "tall"])
+def test_bad_heights_are_named(world: pv.World, height: Any) -> None:
+    with pytest.raises(pv.InputError, match="height"):
+        pv.widget(world, height=height)
+
+
+def test_modules_share_no_names() -> None:
+    """Put together they are one module: two constants of one name would be an error, two functions a mix-up."""
+    script = bundle.script()
+    names = re.findall(r"^(?:async )?(?:function|class|const|let) (\w+)", script, re.MULTILINE)
+    # Several to a line: const a = 1, b = 2;
+    names += re.findall(r"^const \w+ = [^;(\n]*?, (\w+) = ", script, re.MULTILINE)
+    assert len(names) > 60
+    assert sorted(names) == sorted(set(names))
+    assert "import " not in re.sub(r"^const (STYLE|MARKUP).*$|^\s*(//|\*).*$|//.*$", "", script, flags=re.MULTILINE)
+
+
+HOST = """
+<!doctype html><body><div id="cell" style="width: 900px"></div><script type="module">
+const bytes = (text) => new DataView(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
+const listeners = new Set();
+const model = {
+  get: () => 500,
+  on: (_, listener) => listeners.add(listener),
+  off: (_, listener) => listeners.delete(listener),
+  send: async (content) => {
+    const [reply, buffers] = await window.hear(content);
+    if (reply) for (const listener of listeners) listener(reply, buffers.map(bytes));
+  },
+};
+const { default: widget } = await import(URL.createObjectURL(new Blob([await window.source()], { type: "text/javascript" })));
+const el = document.getElementById("cell");
+window.leave = widget.render({ model, el });
+window.host = el.firstChild;
+</script></body>
+"""
+
+
+@pytest.fixture(params=[[], ["--disable-3d-apis"]], ids=["webgl", "no-webgl"])
+def cell(comm: Comm, request: pytest.FixtureRequest) -> Iterator[Page]:
+    """A cell of a notebook in Chromium, around the real widget."""
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium(), args=[*FLAGS, *request.param])
+        page = browser.new_page(viewport={"width": 1000, "height": 700})
+        errors: list[str] = []
+        page.on("pageerror", lambda error: errors.append(str(error)))
+
+        def hear(content: Any) -> Any:
+            count = len(comm.answers)
+            comm.widget._handle_custom_msg(content, [])
+            if len(comm.answers) == count:
+                return [None, []]
+            reply, buffers = comm.answers[-1]
+            return [reply, [base64.b64encode(data).decode() for data in buffers]]
+
+        page.expose_function("hear", hear)
+        page.expose_function("source", bundle.script)
+        page.set_content(HOST)
+        yield page
+        browser.close()
+    assert errors == []
+
+
+def test_a_cell_shows_steers_and_leaves(cell: Page, comm: Comm, world: pv.World) -> None:
+    time_shown = cell.get_by_test_id("time")
+    cell.wait_for_function("window.host?.pyverlet.status()?.time > 0.3")
+    assert float(time_shown.inner_text()) > 0
+    cell.get_by_test_id("pause").click()
+    expect(cell.get_by_test_id("pause")).to_have_text("Resume")
+    held = world.frames
+    cell.get_by_test_id("step").click()
+    cell.wait_for_function(f"window.host?.pyverlet.status().frames === {held + 1}")
+    cell.get_by_test_id("restitution").fill("0.5")
+    cell.wait_for_function("window.host?.pyverlet.status().restitution === 0.5")
+    assert world.collisions is not None
+    assert world.collisions.restitution == 0.5
+    expect(cell.get_by_test_id("count")).to_be_hidden()
+
+    place = cell.evaluate("window.host?.pyverlet.where(4)")
+    cell.get_by_test_id("pause").click()
+    cell.mouse.move(place["left"], place["top"])
+    cell.mouse.down()
+    cell.mouse.move(place["left"], place["top"] - 60, steps=4)
+    cell.wait_for_function("window.host?.pyverlet.where(4).y > 2")
+    assert len(world.forces) == 1
+    picture = image.imread(BytesIO(cell.screenshot()))[:, :, :3]
+    where = cell.evaluate("window.host?.pyverlet.where(0)")
+    assert np.ptp(picture[round(where["top"]), round(where["left"])]) > 0.15  # a colour where a circle is
+    cell.evaluate("leave()")
+    cell.wait_for_function("true")
+    cell.wait_for_timeout(300)
+    assert comm.widget._eyes == {}
+    frames = world.frames
+    cell.wait_for_timeout(300)
+    assert world.frames == frames

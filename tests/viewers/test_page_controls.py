@@ -1,0 +1,411 @@
+"""Every control of the page, driven in Chromium as a user does, its effect read in the numbers. With and without WebGL."""
+
+from __future__ import annotations
+
+import math
+import re
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib import image
+from numpy.typing import NDArray
+from playwright.sync_api import Browser, Page, Playwright, expect
+
+from .browser import FLAGS, Serve, chromium, comes_true, everywhere, number, pause, status, visit, where
+
+
+def reads(page: Page, name: str, value: Any) -> bool:
+    return comes_true(page, lambda: status(page)[name] == value)
+
+
+def tool(page: Page, name: str) -> None:
+    page.locator(f"#tool label:has(input[value={name}])").click()
+
+
+def picture(page: Page) -> NDArray[np.float32]:
+    page.wait_for_timeout(150)
+    return np.asarray(image.imread(BytesIO(page.screenshot()))[:, :, :3])
+
+
+def test_gravity_has_a_strength_and_a_direction(page: Page, program: Serve) -> None:
+    visit(page, program("cage", 100).address)
+    pause(page)
+    page.get_by_test_id("gravity").fill("4")
+    assert reads(page, "gravity", [0, -4])
+    page.get_by_test_id("angle").fill("90")
+    assert reads(page, "gravity", [4, 0])
+    page.get_by_test_id("angle").blur()
+    page.keyboard.press("ArrowRight")
+    turned = math.radians(15)
+    assert comes_true(page, lambda: status(page)["gravity"] == pytest.approx([4 * math.cos(turned), 4 * math.sin(turned)]))
+    page.keyboard.press("0")
+    assert reads(page, "gravity", [0, 0])
+    expect(page.locator("#gravity-value")).to_have_text("0.00")
+    page.keyboard.press("0")
+    assert comes_true(page, lambda: math.hypot(*status(page)["gravity"]) == pytest.approx(4))
+    page.get_by_test_id("angle").dblclick(position={"x": 5, "y": 5})  # back to where it was at first
+    assert comes_true(page, lambda: status(page)["gravity"][0] == pytest.approx(0, abs=1e-6))
+
+
+def test_substeps_restitution_friction_and_integrator(page: Page, program: Serve) -> None:
+    visit(page, program("box", 60).address)
+    expect(page.get_by_test_id("restitution")).to_have_value("0.5")
+    expect(page.get_by_test_id("friction")).to_have_value("0.2")
+    page.get_by_test_id("restitution").fill("1")
+    assert reads(page, "restitution", 1)
+    page.get_by_test_id("friction").fill("0")
+    assert reads(page, "friction", 0)
+    # Elastic and smooth: from now on what is lost is rounding and overlap, not bounces.
+    page.wait_for_timeout(500)
+    before = status(page)["energy"]
+    page.wait_for_timeout(1500)
+    assert status(page)["energy"] == pytest.approx(before, rel=0.02)
+    page.get_by_test_id("substeps").fill("3")
+    assert reads(page, "substeps", 3)
+    page.get_by_test_id("integrator").select_option("rk4")
+    assert reads(page, "integrator", "rk4")
+    expect(page.get_by_test_id("integrator")).to_have_value("rk4")
+
+
+def test_what_a_world_lacks_is_not_offered(page: Page, program: Serve) -> None:
+    visit(page, program("bounce-order", 1).address)
+    expect(page.locator("#friction-field")).to_be_hidden()
+    expect(page.locator("#integrator-field")).to_be_hidden()  # it is what the two differ in
+    expect(page.locator("#restitution-field")).to_be_visible()
+
+
+def test_another_number_of_circles_and_another_scene(page: Page, program: Serve) -> None:
+    visit(page, program("cage", 100).address)
+    page.get_by_test_id("gravity").fill("5")
+    page.get_by_test_id("count").fill("150")
+    page.get_by_test_id("count").press("Enter")
+    assert reads(page, "particles", 150)
+    assert status(page)["gravity"] == [0, -5]
+    expect(page.get_by_test_id("particles")).to_have_text("150")
+    page.get_by_test_id("scene").select_option("bounce-order")
+    expect(page.locator("#title")).to_have_text("bounce-order")
+    expect(page.locator("#panels h2")).to_have_text(["position first", "velocity first"])
+    assert comes_true(page, lambda: number(page, "time") > 0.3)
+    page.get_by_test_id("scene").select_option("box")
+    expect(page.locator("#title")).to_have_text("box")
+    expect(page.locator("#panels h2")).to_have_count(0)
+    assert reads(page, "particles", 2000)
+
+
+def test_the_scene_image_shows_its_colours(page: Page, program: Serve) -> None:
+    visit(page, program("image", 40).address)
+    expect(page.get_by_test_id("colour")).to_have_value("picture")
+    inks = page.evaluate("() => Array.from({length: 40}, (_, i) => window.pyverlet.ink(i))")
+    pause(page)
+    colours = np.array([[(ink >> shift) & 255 for shift in (0, 8, 16)] for ink in inks]) / 255
+    seen = picture(page)
+    places = everywhere(page, 40)
+    inside = [i for i, (_, _, left, top) in enumerate(places) if 0 < left < 960 and 70 < top < 790]
+    assert len(inside) >= 3
+    for i in inside:
+        assert seen[round(places[i, 3]), round(places[i, 2])] == pytest.approx(colours[i], abs=0.02)
+    page.get_by_test_id("colour").select_option("order")
+    assert page.evaluate("() => window.pyverlet.ink(0)") != inks[0]
+
+
+@pytest.mark.parametrize("colouring", ["speed", "mass", "energy"])
+def test_colours_say_what_they_say(page: Page, program: Serve, colouring: str) -> None:
+    """Brighter and yellower for more: the palette's lightness grows along it."""
+    page.emulate_media(color_scheme="dark")
+    visit(page, program("box", 100).address)
+    assert comes_true(page, lambda: number(page, "time") > 0.3)
+    page.get_by_test_id("colour").select_option(colouring)
+    page.wait_for_timeout(500)
+    pause(page)
+    page.wait_for_timeout(300)
+    inks = np.array(page.evaluate("() => Array.from({length: 100}, (_, i) => window.pyverlet.ink(i))"))
+    light = sum(((inks >> shift) & 255) * weight for shift, weight in ((0, 0.3), (8, 0.59), (16, 0.11)))
+    mass = np.array(page.evaluate("() => Array.from({length: 100}, (_, i) => window.pyverlet.mass(i))"))
+    assert np.ptp(light) > 40
+    if colouring == "mass":
+        assert np.corrcoef(light, np.log(mass))[0, 1] > 0.9
+
+
+def test_slow_motion(page: Page, program: Serve) -> None:
+    visit(page, program("cage", 100).address)
+    page.get_by_test_id("speed").select_option("0.125")
+    assert reads(page, "speed", 0.125)
+    page.wait_for_timeout(400)
+    before = status(page)["time"]
+    page.wait_for_timeout(2000)
+    assert 0.1 < status(page)["time"] - before < 0.5
+    assert number(page, "fps") > 15  # smooth all the same: eight frames a second are made
+    page.keyboard.press("s")
+    assert reads(page, "speed", 0.03125)
+    page.keyboard.press("s")
+    assert reads(page, "speed", 1)
+
+
+def test_pin_and_let_go(page: Page, program: Serve) -> None:
+    visit(page, program("cage", 100).address)
+    pause(page)
+    place = where(page, 99)
+    tool(page, "pin")
+    page.mouse.click(place["left"], place["top"])
+    assert comes_true(page, lambda: bool(page.evaluate("() => window.pyverlet.mass(99) === Infinity")))
+    page.keyboard.press("Space")
+    assert comes_true(page, lambda: number(page, "time") > 1.5)
+    assert where(page, 99)["y"] == pytest.approx(place["y"], abs=0.01)
+    page.mouse.click(place["left"], place["top"])
+    assert comes_true(page, lambda: where(page, 99)["y"] < place["y"] - 1)
+
+
+def test_circles_are_added_one_by_one_and_poured(page: Page, program: Serve) -> None:
+    visit(page, program("cage", 100).address)
+    page.keyboard.press("4")
+    page.mouse.click(500, 300)
+    assert reads(page, "particles", 101)
+    page.mouse.move(300, 300)
+    page.mouse.down()
+    page.mouse.move(600, 300, steps=20)
+    page.mouse.up()
+    assert comes_true(page, lambda: status(page)["particles"] > 104)
+    page.get_by_test_id("reset").click()
+    assert reads(page, "particles", 100)
+
+
+def test_circles_are_erased_and_come_back(page: Page, program: Serve) -> None:
+    visit(page, program("cage", 100).address)
+    pause(page)
+    place = where(page, 99)
+    page.keyboard.press("5")
+    page.mouse.click(place["left"], place["top"])
+    assert reads(page, "particles", 99)
+    page.mouse.move(300, 400)
+    page.mouse.down()
+    page.mouse.move(700, 400, steps=30)
+    page.mouse.up()
+    assert comes_true(page, lambda: status(page)["particles"] < 96)
+    page.keyboard.press("r")
+    assert reads(page, "particles", 100)
+
+
+def test_zoom_move_and_fit(page: Page, program: Serve) -> None:
+    visit(page, program("cage", 400).address)
+    pause(page)
+    fitted = page.evaluate("() => window.pyverlet.camera.scale")
+    place = where(page, 200)
+    mouse = [round(place["left"]), round(place["top"])]  # wheels come in whole pixels
+    page.mouse.move(*mouse)
+    for _ in range(4):
+        page.mouse.wheel(0, -300)
+    assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.camera.scale") > 5 * fitted)
+    page.wait_for_timeout(300)
+    near = where(page, 200)
+    closer = page.evaluate("() => window.pyverlet.camera.scale") / fitted
+    expected = [mouse[0] + closer * (place["left"] - mouse[0]), mouse[1] + closer * (place["top"] - mouse[1])]
+    assert [near["left"], near["top"]] == pytest.approx(expected, abs=2)
+    # As large as it should be: a disc's colours over its whole width, and the wall's or a neighbour's beyond.
+    radius = 0.5 * page.evaluate("() => window.pyverlet.camera.scale")
+    seen = picture(page)
+    row = seen[round(near["top"]), round(near["left"] - 0.9 * radius) : round(near["left"] + 0.9 * radius)]
+    assert np.ptp(row, axis=0).max() < 0.02
+    page.mouse.down(button="right")
+    page.mouse.move(place["left"] + 50, place["top"] + 20, steps=4)
+    page.mouse.up(button="right")
+    page.wait_for_timeout(300)
+    moved = where(page, 200)
+    assert [moved["left"] - near["left"], moved["top"] - near["top"]] == pytest.approx([50, 20], abs=2)
+    tool(page, "move")
+    page.mouse.move(400, 400)
+    page.mouse.down()
+    page.mouse.move(360, 400, steps=4)
+    page.mouse.up()
+    page.wait_for_timeout(300)
+    assert where(page, 200)["left"] == pytest.approx(moved["left"] - 40, abs=2)
+    page.keyboard.press("+")
+    page.keyboard.press("-")
+    page.get_by_test_id("fit").click()
+    assert page.evaluate("() => window.pyverlet.camera.scale") == pytest.approx(fitted)
+    page.wait_for_timeout(300)
+    assert where(page, 200)["left"] == pytest.approx(place["left"], abs=1)
+
+
+def test_velocities_and_contacts_are_drawn(page: Page, program: Serve) -> None:
+    visit(page, program("box", 200).address)
+    assert comes_true(page, lambda: number(page, "time") > 0.5)
+    page.get_by_test_id("velocities").check()
+    assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.overlay.arrows") > 50)
+    assert comes_true(page, lambda: number(page, "time") > 8)
+    pause(page)
+    page.get_by_test_id("contacts").check()
+    assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.overlay.contacts") > 100)
+    page.wait_for_timeout(300)
+    found = page.evaluate("() => window.pyverlet.overlay.contacts")
+    # As many as there are, found here pair by pair from where the circles are.
+    places = everywhere(page, 200)[:, :2]
+    radii = (np.array(page.evaluate("() => Array.from({length: 200}, (_, i) => window.pyverlet.mass(i))"))) ** 0.5 / 2
+    apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
+    touching = np.triu(apart < 1.004 * (radii[:, None] + radii), 1).sum()
+    assert found == pytest.approx(touching, abs=3)
+    page.get_by_test_id("velocities").uncheck()
+    page.keyboard.press("t")
+    assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.overlay.contacts") == 0)
+
+
+def test_dark_and_light(page: Page, program: Serve) -> None:
+    visit(page, program("cage", 50).address)
+
+    def corner() -> float:
+        return float(picture(page)[-5, 5].mean())
+
+    page.get_by_test_id("theme").select_option("dark")
+    assert corner() < 0.2
+    page.keyboard.press("d")
+    expect(page.get_by_test_id("theme")).to_have_value("light")
+    assert corner() > 0.8
+
+
+def test_the_sheet_lists_the_keys(page: Page, program: Serve) -> None:
+    visit(page, program("cage", 50).address)
+    page.keyboard.press("?")
+    expect(page.get_by_test_id("sheet")).to_be_visible()
+    assert page.locator("#sheet tr").count() >= 18
+    page.keyboard.press("Escape")
+    expect(page.get_by_test_id("sheet")).to_be_hidden()
+    page.get_by_test_id("help").click()
+    page.locator("#sheet-close").click()
+    expect(page.get_by_test_id("sheet")).to_be_hidden()
+    for key in "cvtd":  # nothing fails
+        page.keyboard.press(key)
+    page.keyboard.press("f")
+
+
+def test_a_link_carries_scene_and_settings(page: Page, browser: Browser, program: Serve) -> None:
+    address = program("cage", 100).address
+    visit(page, address)
+    assert page.url == address  # nothing was changed yet
+    page.get_by_test_id("scene").select_option("box")
+    expect(page.locator("#title")).to_have_text("box")
+    page.get_by_test_id("count").fill("70")
+    page.get_by_test_id("count").press("Enter")
+    assert reads(page, "particles", 70)
+    for name, value in (("gravity", "3"), ("substeps", "5"), ("restitution", "0.9"), ("friction", "0.1")):
+        page.get_by_test_id(name).fill(value)
+    page.get_by_test_id("integrator").select_option("velocity-verlet")
+    page.get_by_test_id("colour").select_option("mass")
+    page.get_by_test_id("copy").click()
+    expect(page).to_have_url(re.compile("friction=0.1"))
+    expect(page).to_have_url(re.compile("integrator=velocity-verlet"))
+    link = page.url
+    assert "#" in link
+
+    elsewhere = program("cage", 100).address + "#" + link.partition("#")[2]
+    other = browser.new_page()
+    visit(other, elsewhere)
+    expect(other.locator("#title")).to_have_text("box")
+    assert reads(other, "integrator", "velocity-verlet")
+    now = status(other)
+    assert (now["particles"], now["gravity"], now["substeps"]) == (70, [0, -3], 5)
+    assert (now["restitution"], now["friction"]) == (0.9, 0.1)
+    expect(other.get_by_test_id("colour")).to_have_value("mass")
+    frames = status(other)["frames"]
+    other.reload()  # asks for what is there already: nothing begins anew
+    assert comes_true(other, lambda: (status(other) or {"frames": 0})["frames"] > frames)
+    other.close()
+
+
+NONSENSE = ("scene=nowhere&particles=-5", "particles=1e99&gravity=a,b&substeps=x", "%%%", "integrator=<b>&colour=pink")
+
+
+@pytest.mark.parametrize("settings", NONSENSE)
+def test_a_link_of_nonsense_does_no_harm(page: Page, program: Serve, settings: str) -> None:
+    visit(page, program("cage", 50).address + "#" + settings)
+    assert comes_true(page, lambda: number(page, "time") > 0.3)
+    assert status(page)["particles"] == 50
+    assert status(page)["error"] is None
+
+
+def test_curves_and_stages(page: Page, program: Serve) -> None:
+    visit(page, program("cage", 200).address)
+    assert comes_true(page, lambda: number(page, "time") > 1)
+    pause(page)
+    now = status(page)
+    assert now["kinetic"] + now["potential"] + now["links"] == pytest.approx(now["energy"])
+    assert number(page, "potential") == pytest.approx(now["potential"], rel=0.01, abs=1)
+    assert {"integrate", "contacts"} <= now["stages"].keys()
+    expect(page.get_by_test_id("stages")).to_contain_text("contacts")
+    drawn = """(id) => { const canvas = document.getElementById(id); const data = canvas.getContext("2d").getImageData(0, 0,
+        canvas.width, canvas.height).data; return new Set(Array.from({length: data.length / 4}, (_, i) => data[4 * i + 3] > 200 ?
+        (data[4 * i] << 16) | (data[4 * i + 1] << 8) | data[4 * i + 2] : -1)).size }"""
+    assert page.evaluate(drawn, "physics-chart") > 3  # several stages, several colours
+    assert page.evaluate(drawn, "energy-chart") > 3
+
+
+def test_a_phone_has_a_drawer_and_fingers(playwright: Playwright, program: Serve) -> None:
+    browser = playwright.chromium.launch(executable_path=chromium(), args=FLAGS)
+    context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True, device_scale_factor=2)
+    page = context.new_page()
+    visit(page, program("cage", 200).address)
+    assert page.evaluate("() => document.documentElement.scrollWidth") <= 390
+    drawer = page.locator("aside").bounding_box()
+    assert drawer is not None
+    assert drawer["y"] > 400
+    fold = page.get_by_test_id("fold")
+    fold.tap()
+    expect(fold).to_have_attribute("aria-expanded", "false")
+    folded = page.locator("aside").bounding_box()
+    assert folded is not None
+    assert folded["y"] > drawer["y"] + 200
+    page.get_by_test_id("pause").tap()
+    assert reads(page, "paused", True)
+    before = page.evaluate("() => window.pyverlet.camera.scale")
+    session = context.new_cdp_session(page)
+
+    def touch(kind: str, *points: tuple[float, float]) -> None:
+        fingers = [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)]
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": fingers})
+
+    for gap, kind in ((20, "touchStart"), (60, "touchMove"), (100, "touchMove")):  # two fingers zoom
+        touch(kind, (195 - gap, 300), (195 + gap, 300))
+    touch("touchEnd")
+    assert page.evaluate("() => window.pyverlet.camera.scale") > 3 * before
+    page.keyboard.press("f")
+    page.get_by_test_id("pause").tap()
+    place = where(page, 100)
+    touch("touchStart", (place["left"], place["top"]))  # one pulls
+    for k in range(1, 7):
+        touch("touchMove", (195, place["top"] - 10 * k))
+    assert comes_true(page, lambda: where(page, 100)["top"] < place["top"] - 30)
+    touch("touchEnd")
+    browser.close()
+
+
+def test_large_worlds_are_drawn_by_the_server(page: Page, program: Serve) -> None:
+    """Chosen by itself and shown; zoom, theme and colours reach the picture, and the mouse its circles."""
+    page.emulate_media(color_scheme="dark")
+    visit(page, program("cage", 300, 300).address)
+    expect(page.get_by_test_id("drawing")).to_have_text("pictures (JPEG)")
+    expect(page.get_by_test_id("velocities")).to_be_disabled()
+    assert comes_true(page, lambda: number(page, "time") > 2)
+    pause(page)
+    page.wait_for_timeout(300)
+
+    def seen() -> NDArray[np.float32]:
+        # The heap, at the cage's foot: the middle of what is left of the controls.
+        return picture(page)[500:780, 300:700]
+
+    before = seen()
+    assert (np.ptp(before, axis=2) > 0.15).mean() > 0.5
+    page.mouse.move(500, 700)
+    page.mouse.wheel(0, -600)
+    assert comes_true(page, lambda: bool(np.abs(seen() - before).mean() > 0.05))
+    page.get_by_test_id("fit").click()
+    assert comes_true(page, lambda: bool(np.abs(seen() - before).mean() < 0.01))
+    page.get_by_test_id("colour").select_option("mass")  # all alike: one colour instead of many
+    hues = np.ptp(before.reshape(-1, 3), axis=0).sum()
+    assert comes_true(page, lambda: bool(np.abs(seen() - before).mean() > 0.05))
+    assert hues > 1
+    page.get_by_test_id("theme").select_option("light")
+    assert comes_true(page, lambda: bool(seen().mean() > before.mean() + 0.15))
+    page.get_by_test_id("count").fill("200")
+    page.get_by_test_id("count").press("Enter")
+    assert reads(page, "particles", 200)
+    expect(page.get_by_test_id("drawing")).to_have_text("Canvas2D")  # few enough again
