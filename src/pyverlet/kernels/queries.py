@@ -1,7 +1,7 @@
 """Questions about circles in cells: `cell`, `columns`, `rows`, `start` as in kernels.grid, `member` the particle in each slot.
 
-A circle is in the cell of its centre; the layout covers all centres, so that nothing is clamped. Cells are found by a product with
-1 / cell, as when the particles were sorted: rounded alike, nobody is missed at the edge of one. All answers are float64.
+A circle is in the cell of its centre; the layout covers all centres, so that nothing is clamped. Cells are found by a product
+with 1 / cell, as when the particles were sorted: rounded alike, nobody is missed at the edge of one. Answers are float64.
 """
 
 from __future__ import annotations

@@ -14,10 +14,14 @@ from pyverlet.scenes import (
     box,
     cage,
     cage_brute_force,
+    conveyor,
     energy,
     fall,
     frame_rate,
+    galton,
+    hourglass,
     image,
+    orbit,
 )
 from pyverlet.scenes._scene import Scene, Settings, Variant
 
@@ -30,6 +34,10 @@ SCENES: dict[str, Scene] = {
         box.SCENE,
         fall.SCENE,
         image.SCENE,
+        galton.SCENE,
+        hourglass.SCENE,
+        orbit.SCENE,
+        conveyor.SCENE,
         bounce_euler.SCENE,
         bounce_order.SCENE,
         bounce_rest.SCENE,
