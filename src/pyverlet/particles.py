@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyverlet import checks
+from pyverlet.collisions import ContactSolver
 from pyverlet.forces import Force, Numbered
 from pyverlet.state import Group, Slots, State
 
@@ -19,6 +20,7 @@ class Particles:
 
     _state: State
     _slots: Slots
+    _contacts: ContactSolver | None
     forces: list[Force]
 
     def remove(self, which: Group | ArrayLike) -> None:
@@ -39,6 +41,8 @@ class Particles:
         kept[gone] = False
         now = self._state.remove(kept)
         self._slots.forget(now)
+        if self._contacts:
+            self._contacts.broad_phase.forget()
         self._renumber(now)
 
     def _renumber(self, now: Array) -> None:

@@ -15,10 +15,10 @@ ROWS = 12
 RADIUS = 0.22
 """Of balls and pegs, m. Between two pegs of a row, 1 m apart, a ball has 6 cm on either side."""
 
-PEG = 0.45
+PEG = 0.55
 """Length of a peg, m: a gap that long, with restitution 0, takes the ball's sideways speed and with it all memory."""
 
-DROP = 1.25
+DROP = 1.35
 """From row to row, m: a ball fits through between the foot of one peg and the head of the next."""
 
 APART = 1.2
