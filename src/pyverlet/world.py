@@ -390,7 +390,7 @@ class World(Particles, Queries, Doors):
         self.time, self.frames, self._h_last = saved.time, saved.frames, saved.h_last
         self._slots.restore(saved.slots, self._state)
         if self._contacts:
-            # None: collisions were off, or of a kind that remembers nothing. Or it had not met all of the particles yet.
+            # None: collisions were off, or of a kind that remembers nothing.
             self._contacts.broad_phase.forget()
-            if saved.neighbours is not None and len(saved.slots[0]) == len(self):
+            if saved.neighbours is not None:
                 self._contacts.broad_phase.restore(saved.neighbours, self._slots)
