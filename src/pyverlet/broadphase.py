@@ -202,7 +202,7 @@ class _SortedCells(BroadPhase):
     def restore(self, saved: tuple[Array | None, float, int], state: Slots) -> None:
         self.forget()
         built, self.skin_diameters, age = saved
-        if built is not None:
+        if built is not None and len(built) == len(state):  # or particles had been added that it had not met yet
             # The list is a function of the positions it was built from, and sorting what is sorted changes nothing.
             state.position[:] = built
             self.rebuild(state)

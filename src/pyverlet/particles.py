@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet import checks
 from pyverlet.bounds import Boundary
+from pyverlet.collisions import ContactSolver
 from pyverlet.forces import Force, Numbered
 from pyverlet.group import Column, Group
 from pyverlet.links import Links
@@ -22,6 +23,7 @@ class Particles:
 
     _state: State
     _slots: Slots
+    _contacts: ContactSolver | None
     forces: list[Force]
     links: Links
     _where = slice(None)
@@ -103,6 +105,8 @@ class Particles:
         kept[gone] = False
         now = self._state.remove(kept)
         self._slots.forget(now)
+        if self._contacts:
+            self._contacts.broad_phase.forget()
         self._renumber(now)
 
     def _renumber(self, now: Array) -> None:

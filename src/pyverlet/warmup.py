@@ -14,9 +14,10 @@ from pyverlet.bounds import Boundary, Box, Circle, Open
 from pyverlet.broadphase import BruteForce
 from pyverlet.collisions import Collisions
 from pyverlet.constants import SERIAL_BELOW
-from pyverlet.forces import Drag
+from pyverlet.forces import Conservative, Drag
 from pyverlet.group import Group
 from pyverlet.links import Angle, Area, Pin, Spring, Stick
+from pyverlet.obstacles import Segment
 from pyverlet.state import Slots
 from pyverlet.world import World
 
@@ -69,6 +70,8 @@ def _rehearse(world: World) -> None:
     small.integrator = world.integrator
     if world.links:
         _link(small)
+    if world.obstacles:
+        small.obstacles.append(Segment((0, 0), (1, 0)))
     _use(small)
     if len(world):  # one circle in the world's own room: a boundary of another kind has kernels of its own
         alone = World(boundary=world.boundary, collisions=None, substeps=1, dtype=world.dtype)
@@ -83,6 +86,8 @@ def _rehearse_forces(world: World) -> None:
     for force in world.forces:
         if type(force).__module__.startswith("pyverlet."):
             force.apply(slots, world.time)
+            if isinstance(force, Conservative):
+                force.potential(world._state)
 
 
 def _compile_all(dtype: np.dtype[Any]) -> None:

@@ -240,7 +240,8 @@ def convex(pixels, points, first, colour):
             y = row + 0.5
             low, high = _spanned(edges, y, 0.5)
             core_low, core_high = _spanned(edges, y, -0.5)
-            for column in range(int(max(low - 0.5, 0.0)), int(min(high + 0.5, float(width)))):
+            start, stop = min(max(low - 0.5, 0.0), float(width)), min(max(high + 0.5, 0.0), float(width))
+            for column in range(int(start), int(stop)):
                 x = column + 0.5
                 amount = 1.0
                 if not core_low <= x <= core_high:

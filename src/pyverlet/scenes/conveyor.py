@@ -1,0 +1,61 @@
+"""Grains ride down three conveyor belts into a pit that a wheel stirs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pyverlet.bounds import Box
+from pyverlet.obstacles import Capsule, Segment
+from pyverlet.scenes import _start
+from pyverlet.scenes._scene import Scene, Settings
+from pyverlet.world import World
+
+RADIUS = 0.25
+"""Root mean square radius of the grains, m."""
+
+WIDTH = 24.0
+"""Of the room, m."""
+
+BELTS = ((-3.0, 13.0), (3.0, 9.5), (-3.0, 6.0))
+"""Middle of each belt, m."""
+
+SPEED = 3.0
+"""Of the belts, m/s."""
+
+TURN = 1.0
+"""Of the wheel in the pit, rad/s."""
+
+
+def build(settings: Settings) -> World:
+    """300 grains lie on the topmost of three belts, which hand them down, left and right in turn, into a pit.
+
+    A belt is a capsule whose surface runs around it at 3 m/s and takes the grains along by friction. In the pit a wheel of four
+    arms turns: a moving obstacle that nothing stops.
+    """
+    rng = np.random.default_rng(settings.seed)
+    radii = _start.draw_radii(rng, settings.particles, settings.radius_spread, RADIUS)
+    height = 4.0
+    while (centres := _start.in_box(rng, radii, 14.0, height)) is None:
+        height *= 1.05
+    walls = {"restitution": settings.restitution, "friction": settings.friction}
+    world = settings.empty_world(Box((-WIDTH / 2, -6.0), (WIDTH / 2, 14.0 + 1.2 * height), **walls))
+    for k, (x, y) in enumerate(BELTS):
+        way = -SPEED if k % 2 == 0 else SPEED  # clockwise: to the right on top
+        world.obstacles.append(Capsule((x - 7, y), (x + 7, y), radius=0.5, surface_speed=way, **walls))
+    for side in (-1, 1):
+        world.obstacles.append(Segment((side * WIDTH / 2, 3.0), (side * 5.0, -6.0), **walls))
+    for k in range(2):
+        arm = 2.2 * np.array([np.cos(k * np.pi / 2), np.sin(k * np.pi / 2)])
+        hub = np.array([0.0, -2.5])
+        world.obstacles.append(Capsule(tuple(hub - arm), tuple(hub + arm), radius=0.2, angular_velocity=TURN, **walls))
+    x, y = BELTS[0]
+    world.add(position=centres + np.array([x, y + 0.51]), radius=radii, mass=(radii / RADIUS) ** 2)
+    return world
+
+
+SCENE = Scene(
+    "conveyor",
+    "grains ride down three conveyor belts into a pit that a wheel stirs",
+    build,
+    Settings(particles=300, friction=0.5, restitution=0.1),
+)

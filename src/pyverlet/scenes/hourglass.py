@@ -1,0 +1,67 @@
+"""Sand runs through the neck of an hourglass."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pyverlet.bounds import Open
+from pyverlet.obstacles import Chain
+from pyverlet.scenes import _start
+from pyverlet.scenes._scene import Scene, Settings, Show
+from pyverlet.world import World
+
+RADIUS = 0.5
+"""Root mean square radius of the grains, m."""
+
+NECK = 2.5
+"""Half the width of the neck, in largest diameters: through a narrower one it may stop."""
+
+STEEP = 1.2
+"""Height of a cone over its half width."""
+
+GROWTH = 1.03
+"""Step by which the glass grows until the grains fit into its upper half."""
+
+
+def build(settings: Settings) -> World:
+    """2,000 grains run from the upper bulb into the lower one.
+
+    The glass is one closed chain of segments, 5 grains wide at the neck, and no bound holds the grains besides: none gets through
+    the corners. Sand that rubs (--friction) runs more slowly, and heaps up below.
+    """
+    rng = np.random.default_rng(settings.seed)
+    radii = _start.draw_radii(rng, settings.particles, settings.radius_spread, RADIUS)
+    neck, wide = 2 * NECK * float(radii.max()), 4 * NECK * float(radii.max())
+    while True:
+        cone = STEEP * (wide - neck)
+        slant = np.hypot(wide - neck, cone) / cone
+
+        def half_width(y: float, margin: float, wide: float = wide, cone: float = cone, slant: float = slant) -> float:
+            return min(wide - margin, neck + y * (wide - neck) / cone - slant * margin)
+
+        top = cone + wide
+        if (centres := _start.in_rows(rng, radii, 0.0, top, half_width)) is not None:
+            break
+        wide *= GROWTH
+    world = settings.empty_world(Open())
+    right = np.array([(wide, -top), (wide, -cone), (neck, 0.0), (wide, cone), (wide, top)])
+    glass = np.concatenate((right, right[::-1] * (-1, 1)))
+    world.obstacles.append(Chain(glass, closed=True, restitution=settings.restitution, friction=settings.friction))
+    world.add(position=centres, radius=radii, mass=(radii / RADIUS) ** 2)
+    return world
+
+
+def view(settings: Settings) -> tuple[float, float, float, float]:
+    """x0, y0, x1, y1 in metres: the glass."""
+    low, high = (f(build(settings).obstacles[0].points, axis=0) for f in (np.min, np.max))
+    margin = 0.03 * float(high[1] - low[1])
+    return (float(low[0]) - margin, float(low[1]) - margin, float(high[0]) + margin, float(high[1]) + margin)
+
+
+SCENE = Scene(
+    "hourglass",
+    "2,000 grains run through the neck of an hourglass",
+    build,
+    Settings(particles=2_000),
+    show=Show(view=view),
+)

@@ -1,0 +1,58 @@
+"""A disc of small bodies around a star: the inner ones run ahead, by Kepler's third law."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pyverlet.bounds import Open
+from pyverlet.forces import Attractor
+from pyverlet.scenes._scene import Scene, Settings
+from pyverlet.world import World
+
+STRENGTH = 2_000.0
+"""G M of the star, m^3/s^2: at 10 m an orbit takes 4.4 s."""
+
+INNER = 6.0
+"""Radius of the innermost orbit, m."""
+
+RADIUS = 0.1
+"""Of the bodies, m."""
+
+SPACING = 0.35
+"""Of the bodies, m: each has about the square of it for itself."""
+
+GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
+"""Angle from one body to the next: like the seeds of a sunflower they are spread evenly."""
+
+SPREAD = 0.002
+"""Standard deviation of the speeds, as a fraction of that on a circle."""
+
+
+def build(settings: Settings) -> World:
+    """3,000 bodies circle a star, each on its own nearly circular orbit: T^2 = 4 pi^2 a^3 / (G M).
+
+    Neighbours at different distances drift apart, and what began as an even disc winds up into spirals. The bodies pass through
+    each other; the star's pull is all there is.
+    """
+    rng = np.random.default_rng(settings.seed)
+    number = np.arange(settings.particles)
+    number = number[np.argsort(GOLDEN * number % (2 * np.pi))]  # in the order of their angles: so the colours show the winding
+    distance = np.sqrt(INNER**2 + SPACING**2 * number / np.pi * 1.5)
+    outward = np.column_stack((np.cos(GOLDEN * number), np.sin(GOLDEN * number)))
+    speed = np.sqrt(STRENGTH / distance) * (1.0 + SPREAD * rng.normal(0.0, 1.0, settings.particles).clip(-3.0, 3.0))
+    world = settings.empty_world(Open())
+    world.forces.append(Attractor(strength=STRENGTH))
+    world.add(
+        position=distance[:, None] * outward,
+        velocity=speed[:, None] * outward[:, ::-1] * (-1, 1),
+        radius=RADIUS,
+    )
+    return world
+
+
+SCENE = Scene(
+    "orbit",
+    "3,000 bodies circle a star, the inner ones faster",
+    build,
+    Settings(particles=3_000, collisions=None, gravity=(0.0, 0.0)),
+)

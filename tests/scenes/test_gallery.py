@@ -1,0 +1,63 @@
+"""What scenes of the gallery promise: the binomial law, sand that stays in its glass, Kepler's third law, belts that carry."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from pyverlet import scenes
+from pyverlet.scenes import galton
+
+
+def test_the_bins_of_a_galton_board_follow_the_binomial_law() -> None:
+    scene = scenes.get("galton")
+    settings = scene.settings(threads=1)
+    world = scene.build(settings)
+    assert scene.show.seconds is not None
+    world.run(seconds=scene.show.seconds(settings), dt=1 / 60)
+    counts = galton.bins(world)
+    assert counts.sum() == settings.particles  # every ball is in a bin
+    # Bins that expect fewer than five are taken together, as the test of Pearson wants them.
+    expected = stats.binom.pmf(np.arange(galton.ROWS + 1), galton.ROWS, 0.5) * settings.particles
+    small = expected < 5
+    observed, wanted = (np.append(values[~small], values[small].sum()) for values in (counts, expected))
+    assert stats.chisquare(observed, wanted).pvalue > 0.01
+
+
+def test_all_sand_stays_in_its_glass_and_runs_through() -> None:
+    world = scenes.get("hourglass").world(particles=300, threads=1)
+    (glass,) = world.obstacles
+    corner = glass.points.max(axis=0)
+    for _ in range(15):
+        world.run(seconds=2, dt=1 / 60)
+        assert (np.abs(world.position) < corner).all()
+    assert (world.position[:, 1] < 0).all()
+    assert world.overlap().max < 0.03
+
+
+def test_the_bodies_of_a_disc_keep_keplers_third_law() -> None:
+    world = scenes.get("orbit").world(particles=200, dtype=np.float64)
+    x, y = world.position.T
+    distance, speed = np.hypot(x, y), np.hypot(*world.velocity.T)
+    axis = 1 / (2 / distance - speed**2 / 2000.0)  # vis viva: v^2 = G M (2 / r - 1 / a)
+    start, turned = np.arctan2(y, x), np.zeros(200)
+    last = start
+    frames = 600
+    for _ in range(frames):
+        world.step(1 / 60)
+        angle = np.arctan2(world.position[:, 1], world.position[:, 0])
+        turned += (angle - last) % (2 * np.pi)
+        last = angle
+    # An orbit of eccentricity up to 1.2 % is at most 2 e away from its mean angle, at both ends.
+    mean_rate = np.sqrt(2000.0 / axis**3)
+    assert turned == pytest.approx(mean_rate * world.time, abs=4 * 0.012)
+    assert np.polyfit(np.log(axis), np.log(turned / world.time), 1)[0] == pytest.approx(-1.5, abs=0.02)
+
+
+def test_the_belts_carry_all_grains_into_the_pit() -> None:
+    world = scenes.get("conveyor").world(particles=60, threads=1)
+    world.run(seconds=30, dt=1 / 60)
+    # A disc that landed backwards may roll on the spot for ever, v + w r = u with v = 0: nothing resists rolling.
+    assert (world.position[:, 1] < 3.0).mean() > 0.9
+    assert world.escaped() == 0
