@@ -92,8 +92,9 @@ class Pool(ABC):
         """(m, 2) the particles that follow each other in rows that are intact, and (m,) which row that is."""
         first, particle = self.first, self.entries["particle"]
         row = np.repeat(np.arange(len(self.rows)), self.rows["arity"])
-        inner = np.setdiff1d(np.arange(len(particle)), first[1:] - 1, assume_unique=True)
-        inner = inner[self.rows["intact"][row[inner]] != 0]
+        follows = np.repeat(self.rows["intact"] != 0, self.rows["arity"])
+        follows[first[1:] - 1] = False
+        inner = np.flatnonzero(follows)
         return np.column_stack((particle[inner], particle[inner + 1])), row[inner]
 
     @abstractmethod

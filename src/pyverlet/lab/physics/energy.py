@@ -53,7 +53,7 @@ def worst_rise(world: World, seconds: float) -> tuple[float, float, float]:
 
 
 def undriven_scenes() -> dict[str, Callable[..., World]]:
-    """The scenes in which energy must not rise: symplectic, forces with a potential, walls that find the impact, nothing that moves."""
+    """The scenes in which energy must not rise: symplectic, forces with a potential, no naive walls, nothing that moves."""
     found: dict[str, Callable[..., World]] = {}
     for name, scene in scenes.SCENES.items():
         world = scene.world(particles=min(scene.defaults.particles, 20))
