@@ -383,3 +383,28 @@ def test_without_pillow_a_large_world_says_what_would_help(monkeypatch: pytest.M
         tab = Tab(connection)
         assert tab.frame()["kind"] == "frame"
         assert "pip install 'pyverlet[page]'" in tab.shapes[0]["note"]
+
+
+def test_pictures_go_on_when_a_circle_is_pinned_or_lost(monkeypatch: pytest.MonkeyPatch, server: Server) -> None:
+    monkeypatch.setattr("pyverlet.viewers.artist.PICTURES_FROM", 5)
+    with dial(server) as connection:
+        tab = Tab(connection)
+        for message in (LOOK, {"type": "pin", "x": 0, "y": 0.5, "reach": 1}, {"type": "delete", "x": 8, "y": 0.5, "reach": 1}):
+            tab.send(**message)
+            for _ in range(4):
+                head = tab.head(60.0)
+                if head["kind"] == "picture":
+                    tab.ack(head)
+        while head["kind"] != "picture" or head["status"]["particles"] != 8:
+            head = tab.head(60.0)
+            if head["kind"] == "picture":
+                tab.ack(head)
+
+
+def test_a_tab_whose_frames_cannot_be_made_is_told_by_a_closed_socket(monkeypatch: pytest.MonkeyPatch, server: Server) -> None:
+    def broken(*_: Any, **__: Any) -> bytes:
+        raise MemoryError
+
+    monkeypatch.setattr("pyverlet.viewers.web.encode_frame", broken)
+    with dial(server) as connection, pytest.raises(ConnectionClosed):
+        Tab(connection).frame()

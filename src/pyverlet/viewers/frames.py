@@ -54,7 +54,7 @@ class PanelShape:
     """(left, top, width, height) of the strip for its name and curve, as fractions of the view from its upper left corner."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Shape:
     """What stays the same from frame to frame: sent once to each viewer, again when it changes."""
 
@@ -123,7 +123,7 @@ class Status:
     error: str | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Frame:
     """One picture of the world. `seq` grows by one with every frame published."""
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pyverlet.world import World
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sketch:
     """Outlines of obstacles in the picture's coordinates."""
 
