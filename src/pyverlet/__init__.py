@@ -13,6 +13,7 @@ from pyverlet.clock import Clock, FrameBudget
 from pyverlet.collisions import Collisions, Overlap
 from pyverlet.energy import Energy
 from pyverlet.errors import InputError, NonFiniteError, PyverletError
+from pyverlet.events import Events
 from pyverlet.forces import Attractor, ConstantForce, Drag, Gravitation, PointSpring, Wind, force
 from pyverlet.group import Group
 from pyverlet.integrators import (
@@ -37,7 +38,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "RK4", "Actor", "Angle", "Area", "Attractor", "Boundary", "Box", "BruteForce", "Capsule", "Chain", "Circle", "ClampAndFlip",
-    "Clock", "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy", "ExplicitEuler", "Fast", "FrameBudget",
+    "Clock", "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy", "Events", "ExplicitEuler", "Fast", "FrameBudget",
     "Gravitation", "Group", "InputError", "Integrator", "Ledger", "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel",
     "Panels", "Pin", "PointSpring", "Polygon", "PositionVerlet", "ProjectOnly", "PyverletError", "Rope", "Segment",
     "SemiImplicitEuler", "Sink", "Spring", "Stick", "TimeCorrectedVerlet", "VelocityVerlet", "Wind", "World", "Yoshida4",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,11 +33,13 @@ class PairList:
     """Candidate pairs by strip: slots pair_i[k], pair_j[k] for k in first[s] to first[s] + count[s].
 
     `meeting`, `touching` and `impulse` are where the contact solver notes, by strip too, how each stands, which of them touch and
-    how hard; `spent` (strips, 2) what energy impacts and friction have taken, J.
+    how hard; `spent` (strips, 2) what energy impacts and friction have taken, J. `closing` is where events are noted, and empty
+    unless somebody listens to them.
     """
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self._dtype = dtype
+        self.heard = False
         self.first = np.zeros(0, np.int64)
         self.count = np.zeros(0, np.int64)
         self.touches = np.zeros(0, np.int64)
@@ -50,6 +53,12 @@ class PairList:
         self.meeting = np.empty(pairs, np.uint8)
         self.touching = np.empty(pairs, np.uint32)
         self.impulse = np.empty(pairs, self._dtype)
+        self.closing = np.full(pairs if self.heard else 0, -1, self._dtype)
+
+    def listen(self) -> None:
+        """Note events from now on."""
+        self.heard = True
+        self.closing = np.full(len(self.pair_i), -1, self._dtype)
 
     def set_strips(self, strips: int) -> None:
         """Begin a new list of this many strips."""
@@ -70,6 +79,8 @@ class BroadPhase(ABC):
 
     list: PairList
     rebuilds: int = 0
+    renewing: Callable[[Slots, PairList], None] | None = None
+    """Called when the list is about to be made anew."""
 
     @abstractmethod
     def update(self, state: Slots) -> None:
@@ -102,6 +113,8 @@ class _AllPairs(BroadPhase):
         self.list = PairList(dtype)
 
     def update(self, state: Slots) -> None:
+        if self.renewing:
+            self.renewing(state, self.list)
         found = self._fill(state)
         if found > len(self.list.pair_i):
             self.list.make_room(2 * found)
@@ -191,6 +204,8 @@ class _SortedCells(BroadPhase):
                 return
             if self._adapts:
                 self._adapt()
+            if self.renewing:
+                self.renewing(state, self.list)
         self.rebuild(state)
 
     def forget(self) -> None:

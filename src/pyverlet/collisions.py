@@ -12,6 +12,7 @@ from pyverlet import checks
 from pyverlet.broadphase import BruteForce, Fast, PairList
 from pyverlet.constants import GROWTH, LARGEST_PUSH, REST_ACCELERATIONS, SMALLEST
 from pyverlet.errors import InputError
+from pyverlet.events import Events
 from pyverlet.kernels import contacts, impacts
 from pyverlet.state import Slots, State
 
@@ -51,17 +52,21 @@ class Overlap(NamedTuple):
 class ContactSolver:
     """The contact stages of a substep, in the order `World.step` calls them."""
 
-    def __init__(self, settings: Collisions, dtype: np.dtype[Any], unlist: Unlist) -> None:
+    def __init__(self, settings: Collisions, dtype: np.dtype[Any], unlist: Unlist, events: Events | None = None) -> None:
         self.settings = settings
         self.broad_phase = settings.method.start(dtype)
         self._unlist = unlist
         self._seen = 0
+        self._events = events
+        if events is not None:
+            self.broad_phase.list.listen()
+            self.broad_phase.renewing = events.collect
 
     def fit(self, state: Slots) -> None:
         """Let particles that were added on top of others start smaller."""
         fresh = np.isnan(state.acceleration[:, 0])
         if fresh.any():
-            self.find(state)
+            self._list(state)
             fresh = np.isnan(state.acceleration[:, 0])  # in the order of the list
             pairs = self.broad_phase.list
             which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
@@ -79,8 +84,13 @@ class ContactSolver:
         if self._rubs(state):
             state.start[:] = state.position
 
-    def find(self, state: Slots) -> None:
-        """Broad phase: bring the list of candidate pairs up to date."""
+    def find(self, state: Slots, lag: float) -> None:
+        """Broad phase: bring the list of candidate pairs up to date, and note events before contacts change a velocity."""
+        self._list(state)
+        if self._events is not None:
+            self._events.listen(state, self.broad_phase.list, lag)
+
+    def _list(self, state: Slots) -> None:
         self.broad_phase.update(state)
         if self._seen != self.broad_phase.rebuilds:
             self._seen = self.broad_phase.rebuilds

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pyverlet.collisions import ContactSolver, Overlap, measure_overlap
 from pyverlet.energy import Energy, energy
 from pyverlet.errors import InputError
+from pyverlet.events import Events
 from pyverlet.kernels import measure
 from pyverlet.ledger import Bookkeeper, Ledger
 from pyverlet.particles import Particles
@@ -24,6 +25,7 @@ class Measures(Particles):
     time: float
     gravity: tuple[float, float]
     _books: Bookkeeper | None
+    _events: Events | None
     _contacts: ContactSolver | None
 
     def energy(self) -> Energy:
@@ -45,6 +47,17 @@ class Measures(Particles):
         if self._books is None:
             raise InputError("ledger is off in this world; allowed is a world built with World(ledger=True)")
         return self._books.ledger
+
+    @property
+    def events(self) -> Events:
+        """Contacts that began or ended in the last frame, and hits.
+
+        Raises:
+            InputError: the world notes none.
+        """
+        if self._events is None:
+            raise InputError("events are off in this world; allowed is a world built with World(events=True)")
+        return self._events
 
     def _spent(self) -> tuple[float, float]:
         """What impacts and friction have taken in this frame, J, as the kernels of contacts and walls have noted."""

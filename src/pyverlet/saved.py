@@ -8,6 +8,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from pyverlet.actors import Actor
+from pyverlet.events import Events
 from pyverlet.ledger import Bookkeeper
 from pyverlet.state import State
 
@@ -26,6 +27,7 @@ class Saved:
     slots: tuple[Array, Array]
     neighbours: Any
     books: Bookkeeper | None
+    events: Events | None
     obstacles: Any
     actors: list[tuple[Actor, Any]]
     links: Any

@@ -15,6 +15,7 @@ from pyverlet.collisions import Collisions, ContactSolver
 from pyverlet.constants import ALL_THREADS_FROM, ONE_THREAD_BELOW, REST_ACCELERATIONS, STANDARD_GRAVITY
 from pyverlet.doors import Doors
 from pyverlet.errors import InputError, NonFiniteError
+from pyverlet.events import Events
 from pyverlet.forces import Force, ForceSum
 from pyverlet.integrators import Integrator, PositionVerlet
 from pyverlet.kernels import motion
@@ -43,6 +44,7 @@ class World(Measures, Queries, Doors):
         collisions: how particles collide; None lets them pass through each other.
         substeps: steps of length h = dt / substeps in one call of `step`.
         dtype: float32 or float64, of all arrays.
+        events: note in `events` which contacts begin and end in each frame, and who hit whom how hard.
         ledger: keep account of where the energy goes, in `ledger`.
         threads: at most this many for the parallel stages; None is as many as pay off. Never changes the result.
 
@@ -61,11 +63,13 @@ class World(Measures, Queries, Doors):
         dtype: DTypeLike = np.float32,
         threads: int | None = None,
         ledger: bool = False,
+        events: bool = False,
     ) -> None:
         self._state = State(checks.floating("dtype", dtype))
         self._h_last: float | None = None  # substep of the frame before; None: the integrator starts anew
         self._slots = Slots(self._state.dtype)
         self.links = Links(self._state)
+        self._events = Events() if events else None
         self.forces: list[Force] = []
         self._force_sum = ForceSum(checks.vector("gravity", gravity), self.forces)
         self.actors: list[Actor] = []
@@ -119,7 +123,7 @@ class World(Measures, Queries, Doors):
             strongest = self._strongest_acceleration()
             done("integrate")
             if contacts:
-                contacts.find(state)
+                contacts.find(state, lag)
                 done("broad phase")
                 contacts.project(state, h, lag, strongest)
                 done("contacts")
@@ -179,6 +183,10 @@ class World(Measures, Queries, Doors):
             books.close(self._spent())
         self._course.end(dt)
         self.links.scatter()
+        if self._events:
+            if self._contacts:
+                self._events.collect(self._slots, self._contacts.broad_phase.list)
+            self._events.close(self._slots, self._state)
         self.profile.mark("scatter")
         self.time += dt
         self.frames += 1
@@ -191,6 +199,8 @@ class World(Measures, Queries, Doors):
     def _clear_notes(self) -> None:
         """What walls and contacts note about a frame starts anew."""
         self._slots.clear_notes()
+        if self._events:
+            self._events.forget()
         if self._contacts:
             self._contacts.broad_phase.list.spent[:] = 0
 
@@ -279,7 +289,7 @@ class World(Measures, Queries, Doors):
         if value is not None and not isinstance(value, Collisions):
             raise InputError(f"collisions is {value!r}; allowed are pyverlet.Collisions(...) and None")
         self._collisions = value
-        self._contacts = None if value is None else ContactSolver(value, self._state.dtype, self.links.unlist)
+        self._contacts = None if value is None else ContactSolver(value, self._state.dtype, self.links.unlist, self._events)
 
     @property
     def threads(self) -> int:
@@ -306,6 +316,7 @@ class World(Measures, Queries, Doors):
             slots=self._slots.save(),
             neighbours=self._contacts.broad_phase.save() if self._contacts else None,
             books=self._books and self._books.copy(),
+            events=self._events and self._events.copy(),
             obstacles=self.obstacles.save(),
             actors=[(actor, actor.save()) for actor in self.actors],
             links=self.links.save(),
@@ -332,6 +343,8 @@ class World(Measures, Queries, Doors):
         self.time, self.frames, self._h_last = saved.time, saved.frames, saved.h_last
         self._slots.restore(saved.slots, self._state)
         self._books = saved.books and saved.books.copy()
+        if self._events and saved.events:
+            self._events.take(saved.events)
         if self._contacts:
             # None: collisions were off, or of a kind that remembers nothing.
             self._contacts.broad_phase.forget()

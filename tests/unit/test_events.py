@@ -1,0 +1,150 @@
+"""Contacts that begin and end, and hits, as arrays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+
+METHODS: list[Any] = [pv.Fast(), pv.BruteForce()]
+
+
+def touching(world: pv.World) -> set[tuple[int, int]]:
+    """Pairs that overlap, by brute force."""
+    distance = np.hypot(*(world.position[:, None] - world.position[None]).transpose(2, 0, 1))
+    i, j = np.nonzero(np.triu(distance < world.radius[:, None] + world.radius[None], 1))
+    return set(zip(i.tolist(), j.tolist(), strict=True))
+
+
+def follow(world: pv.World, frames: int) -> list[tuple[str, int, int]]:
+    """What begins and ends, frame by frame."""
+    told = []
+    for _ in range(frames):
+        world.step(1 / 60)
+        told += [("begin", int(a), int(b)) for a, b in world.events.begin.tolist()]
+        told += [("end", int(a), int(b)) for a, b in world.events.end.tolist()]
+    return told
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_bounce_begins_hits_and_ends(method: Any) -> None:
+    # Approach at 3 m/s along the normal: the speed of the hit, to rounding.
+    world = pv.World(gravity=(0, 0), collisions=pv.Collisions(restitution=1, method=method), dtype=np.float64, events=True)
+    world.add(position=[(2, 0), (-2, 0)], velocity=[(-1, 0), (2, 0)])
+    hits = []
+    told = []
+    for _ in range(90):
+        world.step(1 / 60)
+        hits += world.events.hit.tolist()
+        told += [name for name in ("begin", "end") if len(getattr(world.events, name))]
+    assert told == ["begin", "end"]
+    assert len(hits) == 1
+    assert hits[0][:2] == (0, 1)
+    assert hits[0][2] == pytest.approx(3.0, rel=1e-12)
+
+
+def test_slow_contacts_are_no_hits() -> None:
+    world = pv.World(gravity=(0, 0), dtype=np.float64, events=True)
+    world.add(position=[(1, 0), (-1, 0)], velocity=[(-0.4, 0), (0.4, 0)])
+    begun = hits = 0
+    for _ in range(120):
+        world.step(1 / 60)
+        begun, hits = begun + len(world.events.begin), hits + len(world.events.hit)
+    assert begun > 0
+    assert hits == 0
+    world.events.hit_speed = 0.5
+    world.position[:] = [(1, 0), (-1, 0)]
+    world.velocity[:] = [(-0.4, 0), (0.4, 0)]
+    for _ in range(120):
+        world.step(1 / 60)
+        hits += len(world.events.hit)
+    assert hits == 1
+
+
+def test_walls_stand_in_for_b() -> None:
+    # A fall of 2 m ends at sqrt(2 g 2).
+    world = pv.World(boundary=pv.Box((-5, 0), (5, 10), restitution=0.5), dtype=np.float64, events=True)
+    world.add(position=(0, 2.5), radius=0.5)
+    hits: list[Any] = []
+    while not hits:
+        world.step(1 / 60)
+        hits += world.events.hit.tolist()
+    assert hits[0][:2] == (0, -1)
+    assert hits[0][2] == pytest.approx(np.sqrt(2 * 9.81 * 2), rel=1e-12)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_begun_and_not_ended_are_those_that_touch(method: Any, restitution: float) -> None:
+    # Counted up, begins and ends say who touches; through rebuilds, reordering, and particles that come and go.
+    rng = np.random.default_rng(0)
+    world = pv.World(
+        boundary=pv.Circle(radius=12), collisions=pv.Collisions(restitution=restitution, method=method), events=True, substeps=1
+    )
+    world.add(position=rng.uniform(-8, 8, (120, 2)), velocity=rng.normal(0, 4, (120, 2)), radius=rng.uniform(0.2, 0.6, 120))
+    alive: set[tuple[int, int]] = set()
+    for frame in range(240):
+        if frame == 100:
+            world.remove([3, 50])
+            alive = {(a - (a > 3) - (a > 50), b if b < 0 else b - (b > 3) - (b > 50)) for a, b in alive if not {a, b} & {3, 50}}
+            world.add(position=(0, 11), radius=0.4)
+        world.step(1 / 60)
+        begun, ended = ({(int(a), int(b)) for a, b in pairs.tolist()} for pairs in (world.events.begin, world.events.end))
+        assert not begun & alive
+        assert ended <= alive
+        alive = (alive | begun) - ended
+        assert all(a < b or b == -1 for a, b in alive)
+    # Contacts push apart and into third ones after events are noted, so at the end of the frame some others overlap: a few.
+    overlapping = touching(world)
+    assert len(overlapping) > 60
+    assert len(overlapping & alive) > 0.8 * len(overlapping)
+
+
+def test_both_methods_tell_the_same() -> None:
+    told = []
+    for method in METHODS:
+        world = pv.World(gravity=(0, 0), collisions=pv.Collisions(restitution=1, method=method), dtype=np.float64, events=True)
+        x, y = np.meshgrid(np.arange(-3, 4) * 1.5, np.arange(-3, 4) * 1.5)
+        rng = np.random.default_rng(2)
+        world.boundary = pv.Box((-6, -6), (6, 6), restitution=1)
+        world.add(position=np.column_stack((x.ravel(), y.ravel())), velocity=rng.normal(0, 2, (49, 2)))
+        told.append(follow(world, 40))  # before rounding in another order makes another gas of it
+    assert told[0] == told[1]
+    assert len(told[0]) > 50
+
+
+def test_filtered_pairs_tell_nothing() -> None:
+    world = pv.World(gravity=(0, 0), events=True)
+    world.add(position=[(0, 0), (0.5, 0)], category=[1, 2], mask=[1, 2])
+    assert follow(world, 10) == []
+
+
+def test_saved_events_come_back() -> None:
+    world = pv.scenes.get("box").world(particles=60)
+    world = pv.World(boundary=world.boundary, collisions=world.collisions, events=True)
+    rng = np.random.default_rng(1)
+    x0, y0, x1, y1 = world.boundary.extent() or (0, 0, 1, 1)
+    world.add(position=rng.uniform((x0 + 1, y0 + 1), (x1 - 1, y1 - 1), (60, 2)), radius=0.3)
+    follow(world, 60)
+    saved = world.save()
+    then = follow(world, 60)
+    world.restore(saved)
+    assert follow(world, 60) == then
+
+
+def test_they_change_nothing_and_are_refused_where_they_are_off() -> None:
+    hashes = []
+    for events in (False, True):
+        world = pv.World(boundary=pv.Box((0, 0), (20, 20)), events=events)
+        world.add(position=np.random.default_rng(0).uniform(2, 18, (100, 2)))
+        world.run(seconds=1)
+        hashes.append(world.state_hash())
+    assert hashes[0] == hashes[1]
+    world = pv.World()
+    with pytest.raises(pv.InputError, match=r"allowed is a world built with World\(events=True\)"):
+        world.events  # noqa: B018
+    with pytest.raises(pv.InputError, match="hit_speed is -1; allowed is a finite number of at least 0"):
+        pv.World(events=True).events.hit_speed = -1
