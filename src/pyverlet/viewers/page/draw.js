@@ -35,6 +35,7 @@ class Raster {
   resize(width, height) {
     this.image = this.context.createImageData(width, height);
     this.pixels = new Uint32Array(this.image.data.buffer);
+    this.stamps = new Stamps(width);
   }
 
   /** grid: 2n of 16 bits; radius: n in pixels; ink: n of 0xBBGGRR. */
@@ -46,10 +47,59 @@ class Raster {
       const u = grid[2 * i], v = grid[2 * i + 1];
       if (u === 0 || v === 0 || u === GRID_MAX || v === GRID_MAX) continue;
       // A circle thinner than a pixel is drawn a pixel wide, else it would flicker.
-      circle(pixels, width, height, u * sx - 0.5, height - v * sy - 0.5, Math.max(radius[i], 0.5), ink[i]);
+      const x = u * sx - 0.5, y = height - v * sy - 0.5, r = radius[i] > 0.5 ? radius[i] : 0.5;
+      if (r > SMALL || x < 1 || y < 1 || x >= width - 3 || y >= height - 3) circle(pixels, width, height, x, y, r, ink[i]);
+      else this.stamps.put(pixels, x, y, r, ink[i]);
     }
     this.context.putImageData(this.image, 0, 0);
   }
+}
+
+const SMALL = 1.25; // radius in pixels up to which circles are stamped
+const FINE = 16; // places within a pixel, and radii within one, that are told apart
+
+/** Small circles, worked out beforehand: which pixels each covers, and how much of them. Half the time of `circle`. */
+class Stamps {
+  constructor(width) {
+    this.width = width;
+    this.made = []; // by radius, for each place of the centre within its pixel: where its pixels begin in the two lists
+  }
+
+  put(pixels, x, y, r, colour) {
+    const step = (r * FINE + 0.5) | 0, left = x | 0, top = y | 0;
+    const { first, offset, cover } = (this.made[step] ??= this.#make(step / FINE));
+    const place = (((y - top) * FINE) | 0) * FINE + (((x - left) * FINE) | 0), at = top * this.width + left;
+    for (let k = first[place], end = first[place + 1]; k < end; k++) blend(pixels, at + offset[k], colour, cover[k]);
+  }
+
+  #make(radius) {
+    const first = new Int32Array(FINE * FINE + 1), offset = [], cover = [];
+    for (let place = 0; place < FINE * FINE; place++) {
+      const cx = ((place % FINE) + 0.5) / FINE, cy = (Math.floor(place / FINE) + 0.5) / FINE;
+      for (let y = -1; y <= 2; y++) {
+        for (let x = -1; x <= 2; x++) {
+          const part = Math.min(255, (255 * (radius + 0.5 - Math.hypot(x - cx, y - cy))) | 0);
+          if (part > 0) offset.push(y * this.width + x), cover.push(part);
+        }
+      }
+      first[place + 1] = offset.length;
+    }
+    return { first, offset: Int32Array.from(offset), cover: Uint8Array.from(cover) };
+  }
+}
+
+/** Cover a part of a pixel, of 255, with a colour. */
+function blend(pixels, at, colour, cover) {
+  const under = pixels[at], alpha = under >>> 24;
+  if (alpha === 0 || cover === 255) {
+    pixels[at] = colour | (cover << 24);
+    return;
+  }
+  // Two touching rims share a pixel: mix their colours by coverage and add the coverages up.
+  const share = ((cover * 256) / (cover + alpha + 1)) | 0;
+  const rb = under & 0xff00ff, g = under & 0x00ff00;
+  const mixed = ((rb + ((((colour & 0xff00ff) - rb) * share) >> 8)) & 0xff00ff) | ((g + ((((colour & 0x00ff00) - g) * share) >> 8)) & 0x00ff00);
+  pixels[at] = mixed | (Math.min(255, alpha + cover) << 24);
 }
 
 function circle(pixels, width, height, cx, cy, radius, colour) {
@@ -72,19 +122,7 @@ function circle(pixels, width, height, cx, cy, radius, colour) {
     for (let x = left; x <= right; x++) {
       if (x === from) x = to + 1;
       if (x > right) break;
-      const at = row + x;
-      const cover = Math.min(255, (255 * (outer - Math.sqrt((x - cx) * (x - cx) + dy2))) | 0);
-      const under = pixels[at];
-      const alpha = under >>> 24;
-      if (alpha === 0) {
-        pixels[at] = colour | (cover << 24);
-      } else {
-        // Two touching rims share a pixel: mix their colours by coverage and add the coverages up.
-        const share = ((cover * 256) / (cover + alpha + 1)) | 0;
-        const rb = under & 0xff00ff, g = under & 0x00ff00;
-        const mixed = ((rb + ((((colour & 0xff00ff) - rb) * share) >> 8)) & 0xff00ff) | ((g + ((((colour & 0x00ff00) - g) * share) >> 8)) & 0x00ff00);
-        pixels[at] = mixed | (Math.min(255, alpha + cover) << 24);
-      }
+      blend(pixels, row + x, colour, Math.min(255, (255 * (outer - Math.sqrt((x - cx) * (x - cx) + dy2))) | 0));
     }
   }
 }

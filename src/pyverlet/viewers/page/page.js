@@ -36,6 +36,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   let last = null; // its numbers, or those of the frame before while there is none
   let pending = null; // a newer one, not drawn yet
   let radiusPx = new Float32Array(0), radiusFor = 0; // radii in pixels of the stage, at how many pixels a metre
+  let arrived = 0, newest = 0; // messages so far, and which of them is on show or about to be
   let lookSent = "", placed = "", stale = true, numbersDue = 0, numbersStale = false;
   let open = false, begun = false, linking = false, stopped = false;
 
@@ -49,11 +50,17 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   const send = (type, fields = {}) => write({ type, ...fields });
 
   async function receive(data) {
-    const message = unpack(data);
-    if (message.kind === "shape") newShape(message);
-    else if (message.kind === "frame") pending = message;
-    else if (message.kind === "picture") {
+    const message = unpack(data), order = ++arrived;
+    if (message.kind === "shape") {
+      newest = order;
+      newShape(message);
+    } else if (message.kind === "frame") {
+      newest = order;
+      pending = message;
+    } else if (message.kind === "picture") {
       const bitmap = await createImageBitmap(message.jpeg);
+      if (order < newest) return bitmap.close(); // while it was decoded, something newer has come
+      newest = order;
       pending?.bitmap?.close();
       pending = { ...message, bitmap };
     } else if (message.kind === "refused") console.warn(message.reason);
