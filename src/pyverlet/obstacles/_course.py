@@ -79,7 +79,9 @@ class Course:
         tables = []
         first = 0
         for k, obstacle in enumerate(self._seen):
-            table = _lowered(obstacle)
+            if obstacle.table is None:  # shapes do not change: adding one to many costs little
+                obstacle.table = _lowered(obstacle)
+            table = obstacle.table.copy()
             table["body"] = k
             table["first"] = first
             first += len(table)
