@@ -20,9 +20,11 @@ def swirl(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tu
     return -1e-3 * y, 1e-3 * x
 
 
-def ratio(particles: int, frames: int) -> tuple[float, float, float]:
+def ratio(particles: int, frames: int, seconds: float) -> tuple[float, float, float]:
     """Median milliseconds of a frame without and with the force, and the median of the ratios of neighbouring frames."""
     worlds = [pv.scenes.get("cage").world(particles=particles) for _ in range(2)]
+    for world in worlds:
+        world.run(seconds=seconds, dt=DT)
     worlds[1].forces.append(swirl)
     times: list[list[float]] = [[], []]
     for frame in range(-10, frames):
@@ -39,9 +41,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.forces", description=__doc__)
     parser.add_argument("--particles", type=int, nargs="+", default=[10_000, 100_000])
     parser.add_argument("--frames", type=int, default=60, help="frames measured of each world")
+    parser.add_argument("--seconds", type=float, default=0.0, help="simulated before: 0 in the air, 10 a heap of 20,000")
     arguments = parser.parse_args()
     for particles in arguments.particles:
-        without, with_force, costs = ratio(particles, arguments.frames)
+        without, with_force, costs = ratio(particles, arguments.frames, arguments.seconds)
         print(f"{particles:>9,} circles: {without:.2f} ms a frame without, {with_force:.2f} ms with, ratio {costs:.2f}")
 
 

@@ -94,11 +94,10 @@ class Events:
         self._keys.append(slots.particle[at_wall].astype(np.int64) << 32)
         self._speeds.append(slots.hits[at_wall].astype(np.float64))
         keys, speeds = _numbered(np.concatenate(self._keys), state), np.concatenate(self._speeds)
-        order = np.lexsort((-speeds, keys))
+        order = np.argsort(keys)
         keys, speeds = keys[order], speeds[order]
-        first = np.ones(len(keys), bool)
-        first[1:] = keys[1:] != keys[:-1]
-        keys, speeds = keys[first], speeds[first]
+        first = np.flatnonzero(np.diff(keys, prepend=-1))
+        keys, speeds = keys[first], np.maximum.reduceat(speeds, first) if len(first) else speeds
         new = ~_among(keys, self._touching)
         gone = self._touching[~_among(self._touching, keys)]
         self.begin, self.end = _contacts(keys[new], state), _contacts(gone, state)

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from pyverlet import scenes
-from pyverlet.scenes import galton
+from pyverlet.scenes import galton, orbit
 
 
 def test_the_bins_of_a_galton_board_follow_the_binomial_law() -> None:
@@ -40,7 +40,7 @@ def test_the_bodies_of_a_disc_keep_keplers_third_law() -> None:
     world = scenes.get("orbit").world(particles=200, dtype=np.float64)
     x, y = world.position.T
     distance, speed = np.hypot(x, y), np.hypot(*world.velocity.T)
-    axis = 1 / (2 / distance - speed**2 / 2000.0)  # vis viva: v^2 = G M (2 / r - 1 / a)
+    axis = 1 / (2 / distance - speed**2 / orbit.STRENGTH)  # vis viva: v^2 = G M (2 / r - 1 / a)
     start, turned = np.arctan2(y, x), np.zeros(200)
     last = start
     frames = 600
@@ -50,7 +50,7 @@ def test_the_bodies_of_a_disc_keep_keplers_third_law() -> None:
         turned += (angle - last) % (2 * np.pi)
         last = angle
     # An orbit of eccentricity up to 1.2 % is at most 2 e away from its mean angle, at both ends.
-    mean_rate = np.sqrt(2000.0 / axis**3)
+    mean_rate = np.sqrt(orbit.STRENGTH / axis**3)
     assert turned == pytest.approx(mean_rate * world.time, abs=4 * 0.012)
     assert np.polyfit(np.log(axis), np.log(turned / world.time), 1)[0] == pytest.approx(-1.5, abs=0.02)
 

@@ -27,7 +27,7 @@ def listen(position, velocity, acceleration, size, lag, first, count, pair_i, pa
 
 @kernel
 def heard(first, count, pair_i, pair_j, closing, particle, keys, speeds):
-    """Key (smaller index << 32, larger index + 1) and speed of all pairs that have touched; closing becomes -1. Returns how many."""
+    """Key (smaller index << 32, larger index + 1) and speed of pairs that have touched; closing becomes -1. Returns how many."""
     found = 0
     for s in range(first.shape[0]):
         for k in range(first[s], first[s] + count[s]):

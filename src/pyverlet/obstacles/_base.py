@@ -84,6 +84,8 @@ class Obstacle(ABC):
     pivot = _Checked(checks.vector)
     angle = _Checked(checks.number)
     revision: int
+    table: Any = None
+    """Its segments as the engine has them, made when it first meets a world."""
 
     def __init__(
         self,

@@ -39,13 +39,16 @@ class Course:
         """At the beginning of a frame: look what has changed."""
         if self._seen != self._obstacles:  # the same objects: obstacles are equal to themselves alone
             self._build()
-        fresh = [k for k, obstacle in enumerate(self._seen) if obstacle.revision > self._revision]
-        for k in fresh:
-            self._refresh(k)
-        if fresh:
-            self._revision = max(self._seen[k].revision for k in fresh)
-            self._moving = [k for k, obstacle in enumerate(self._seen) if obstacle.moves]
-            self._binned_for = -1.0
+        newest = max((obstacle.revision for obstacle in self._seen), default=0)
+        if newest <= self._revision:
+            return
+        if self._revision >= 0:
+            for k, obstacle in enumerate(self._seen):
+                if obstacle.revision > self._revision:
+                    self._refresh(k)
+        self._revision = newest
+        self._moving = [k for k, obstacle in enumerate(self._seen) if obstacle.moves]
+        self._binned_for = -1.0
 
     def before(self, state: Slots, h: float) -> None:
         """Before a substep: note where everybody comes from."""
@@ -74,22 +77,25 @@ class Course:
 
     def _build(self) -> None:
         self._seen = list(self._obstacles)
-        self._bodies = np.zeros(len(self._seen), kernels.BODY)
-        tables = []
-        first = 0
-        for k, obstacle in enumerate(self._seen):
-            table = _lowered(obstacle)
-            table["body"] = k
-            table["first"] = first
-            first += len(table)
-            tables.append(table)
-        self._segments = np.concatenate([np.zeros(0, kernels.SEGMENT), *tables])
-        self._first = np.searchsorted(self._segments["body"], np.arange(len(self._seen) + 1))
-        self._revision = 0
+        for obstacle in self._seen:
+            if obstacle.table is None:  # shapes do not change: adding one to many costs little
+                obstacle.table = _lowered(obstacle)
+        # As bytes: putting hundreds of arrays of records together takes milliseconds.
+        parts = [obstacle.table.view(np.uint8) for obstacle in self._seen]
+        self._segments = np.concatenate([np.zeros(0, np.uint8), *parts]).view(kernels.SEGMENT)
+        count = [len(obstacle.table) for obstacle in self._seen]
+        self._first = np.concatenate(([0], np.cumsum(count, dtype=np.int64)))
+        self._segments["body"] = np.repeat(np.arange(len(count)), count)
+        self._segments["first"] = np.repeat(self._first[:-1], count)
+        self._bodies = np.array([_body(obstacle) for obstacle in self._seen], kernels.BODY)
+        surfaces = [(obstacle.restitution, obstacle.friction, obstacle.surface_speed) for obstacle in self._seen]
+        for name, column in zip(("restitution", "friction", "belt"), zip(*surfaces, strict=True), strict=bool(surfaces)):
+            self._segments[name] = np.repeat(column, count)
+        self._revision = -1
 
     def _refresh(self, k: int) -> None:
         obstacle = self._seen[k]
-        self._bodies[k] = (*obstacle.pivot, obstacle.angle, *obstacle.velocity, obstacle.angular_velocity)
+        self._bodies[k] = _body(obstacle)
         part = self._segments[self._first[k] : self._first[k + 1]]
         part["restitution"] = obstacle.restitution
         part["friction"] = obstacle.friction
@@ -118,6 +124,10 @@ class Course:
             entries = np.empty(found, np.int32)
         self._cells = (*map(float, low), cell, columns, rows, start, entries)
         self._binned_for = largest
+
+
+def _body(obstacle: Obstacle) -> tuple[float, ...]:
+    return (*obstacle.pivot, obstacle.angle, *obstacle.velocity, obstacle.angular_velocity)
 
 
 def _lowered(obstacle: Obstacle) -> Array:

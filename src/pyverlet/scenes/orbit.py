@@ -9,8 +9,8 @@ from pyverlet.forces import Attractor
 from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world import World
 
-STRENGTH = 2_000.0
-"""G M of the star, m^3/s^2: at 10 m an orbit takes 4.4 s."""
+STRENGTH = 200.0
+"""G M of the star, m^3/s^2: at 10 m an orbit takes 14 s."""
 
 INNER = 6.0
 """Radius of the innermost orbit, m."""
