@@ -330,12 +330,12 @@ class World(Measures, Queries, Doors):
         """
         if saved.world is not self._state:
             raise InputError("saved is the state of another world; allowed is what save() of this one returned")
-        self.links.restore(saved.links)
         numbers = self._state.number.copy()
         self._state.restore(saved.arrays)
         if not np.array_equal(numbers, self._state.number):
             where = np.searchsorted(self._state.number, numbers).clip(max=max(len(self) - 1, 0))
             self._renumber(np.where(self._state.number[where] == numbers, where, -1) if len(self) else np.full(len(numbers), -1))
+        self.links.restore(saved.links)
         self.obstacles.restore(saved.obstacles)
         self.actors[:] = [actor for actor, _ in saved.actors]
         for actor, memory in saved.actors:

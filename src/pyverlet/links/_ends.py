@@ -66,6 +66,7 @@ def _brief(value: Any) -> str:
 def _column(kind: str, name: str, group: Any, index: Any) -> Indices:
     if not isinstance(group, Group):
         raise InputError(f"{kind}: the group of {name} is {_brief(group)}; allowed is what world.add returns")
+    everyone = group.index  # raises for a group whose particles were all removed
     array = np.atleast_1d(np.asarray(index))
     if array.ndim != 1 or array.dtype.kind not in "iu":
         raise InputError(f"{kind}: {name} is {_brief(index)}; allowed is an index in the group, or a (k,) array of them")
@@ -75,5 +76,5 @@ def _column(kind: str, name: str, group: Any, index: Any) -> Indices:
         raise InputError(
             f"{kind}: {where} is {array[wrong[0]]}; allowed is 0 to {len(group) - 1} for a group of {len(group)} particles"
         )
-    numbers: Indices = group.index[array]
+    numbers: Indices = everyone[array]
     return numbers

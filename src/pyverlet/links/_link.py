@@ -31,6 +31,7 @@ class Link(ABC):
         self.particles = particles
         self._pool: Pool | None = None  # where its numbers are once it is in a world
         self._id = -1
+        self._number = state.number[particles]  # indices change when others are removed, numbers never do
         self._where = slice(0, len(particles))
 
     def __len__(self) -> int:
@@ -51,6 +52,21 @@ class Link(ABC):
     @abstractmethod
     def _columns(self) -> dict[str, Any]:
         """What the pool takes for these links."""
+
+    def _find(self) -> None:
+        """Bring the indices up to date before they go into a world.
+
+        Raises:
+            InputError: one of the particles has been removed.
+        """
+        known = self._state.number
+        where = np.searchsorted(known, self._number)
+        gone = where >= len(known)
+        gone |= known[np.where(gone, 0, where)] != self._number if len(known) else True
+        if gone.any():
+            row = int(np.flatnonzero(gone.any(axis=1))[0])
+            raise InputError(f"{self!r} joins, in its row {row}, a particle that was removed; allowed are those of the world")
+        self.particles = where
 
     def _change(self, column: str, value: Any) -> None:
         """Write a column of the pool, if these are in a world."""

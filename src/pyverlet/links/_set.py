@@ -15,7 +15,7 @@ from pyverlet.errors import InputError
 from pyverlet.kernels import links as kernels
 from pyverlet.kernels import runs
 from pyverlet.links._link import Array, Link
-from pyverlet.links._pool import MOVING, Pool
+from pyverlet.links._pool import Pool
 from pyverlet.links._work import Work
 from pyverlet.state import Slots, State
 
@@ -60,6 +60,7 @@ class Links:
             raise InputError(f"{link!r} joins particles of another world; allowed are links between this world's particles")
         if link._pool is not None:
             raise InputError(f"{link!r} is in a world already; allowed is a new one")
+        link._find()
         family = link._family
         if family not in self._pools:
             self._pools[family] = link._new_pool()
@@ -251,22 +252,23 @@ class Links:
     # ---- save and restore ----------------------------------------------------------------------------------------------
 
     def save(self) -> Any:
-        """What moves: who is intact, and what each pulled with."""
-        return [{name: pool.rows[name].copy() for name in MOVING} for pool in self._order], self.broken, self._apart_changed
+        """A copy of all there is about links."""
+        pools = {family: (pool, pool.rows.copy(), pool.entries.copy()) for family, pool in self._pools.items()}
+        return [(link, link.particles, link._where) for link in self._links], pools, self.broken, self._apart_changed
 
     def restore(self, saved: Any) -> None:
-        """Go back to what `save` returned.
-
-        Raises:
-            InputError: links have been added or removed since.
-        """
-        pools, broken, apart_changed = saved
-        if [len(columns["intact"]) for columns in pools] != [len(pool.rows) for pool in self._order]:
-            raise InputError("saved holds other links; allowed is a state of this world with the links it has now")
-        for pool, columns in zip(self._order, pools, strict=True):
-            for name, column in columns.items():
-                pool.rows[name][:] = column
-        self.broken = broken
+        """Go back to what `save` returned, with the links of then."""
+        links, pools, self.broken, apart_changed = saved
+        for link in self._links:
+            link._pool = None
+        for pool in self._order:
+            pool.keep(np.zeros(len(pool.rows), bool))
+        for family, (pool, rows, entries) in pools.items():
+            pool.rows, pool.entries, pool.stale = rows.copy(), entries.copy(), True
+            self._pools[family] = pool
+        self._links = [link for link, _, _ in links]
+        for link, particles, where in links:
+            link.particles, link._where, link._pool = particles, where, self._pools[link._family]
         self._apart_stale = True
         self._know_apart()
         self._apart_changed = apart_changed

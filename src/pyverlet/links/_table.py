@@ -41,6 +41,13 @@ class Table:
         self._length = where.stop
         return where
 
+    def copy(self) -> Table:
+        """Another one with the same rows."""
+        other = Table()
+        other._store = {name: self[name].copy() for name in self._store}
+        other._length = self._length
+        return other
+
     def keep(self, mask: Array) -> None:
         """Remove all other rows."""
         self._store = {name: self[name][mask] for name in self._store}
