@@ -409,3 +409,17 @@ def test_large_worlds_are_drawn_by_the_server(page: Page, program: Serve) -> Non
     page.get_by_test_id("count").press("Enter")
     assert reads(page, "particles", 200)
     expect(page.get_by_test_id("drawing")).to_have_text("Canvas2D")  # few enough again
+
+
+def test_links_are_drawn_and_a_cloth_is_torn(page: Page, program: Serve) -> None:
+    visit(page, program("cloth", 500).address)
+    drawn = "() => window.pyverlet.overlay.links"
+    assert comes_true(page, lambda: page.evaluate(drawn) > 500)
+    whole = page.evaluate(drawn)
+    # Take the cloth in its middle and throw the mouse across the page: what pulls too hard breaks.
+    place = where(page, 240)
+    page.mouse.move(place["left"], place["top"])
+    page.mouse.down()
+    page.mouse.move(place["left"] + 400, place["top"] + 300, steps=4)
+    assert comes_true(page, lambda: page.evaluate(drawn) < whole)
+    page.mouse.up()

@@ -13,20 +13,22 @@ from pyverlet.state import Slots
 
 
 class Grip:
-    """The mouse: a critically damped spring that pulls one particle to a target, F = m w^2 (target - x) - 2 m w v.
+    """The mouse: a spring that pulls one particle to a target, F = m (s w^2 (target - x) - 2 w v); critically damped for s = 1.
 
     Args:
         particle: the user's index of the particle.
         target: (x, y) in m; set it anew as the mouse moves.
         frequency: w / (2 pi) in Hz; higher pulls harder.
+        strength: s, how much harder than for a particle alone: one that is linked to others moves them too.
     """
 
     velocity_dependent = True
 
-    def __init__(self, particle: int, *, target: Sequence[float], frequency: float = 5.0) -> None:
+    def __init__(self, particle: int, *, target: Sequence[float], frequency: float = 5.0, strength: float = 1.0) -> None:
         self.particle = checks.whole("particle", particle, least=0)
         self.target = checks.vector("target", target)
         self.frequency = checks.number("frequency", frequency, above=0.0)
+        self.strength = checks.number("strength", strength, above=0.0)
 
     def apply(self, state: Slots, t: float) -> None:
         if self.particle < 0:
@@ -36,7 +38,8 @@ class Grip:
         if not np.isfinite(mass):
             return
         w = 2.0 * np.pi * self.frequency
-        pull = (np.asarray(self.target, state.dtype) - state.position[slot]) * w**2 - 2.0 * w * state.velocity[slot]
+        reach = np.asarray(self.target, state.dtype) - state.position[slot]
+        pull = reach * (self.strength * w**2) - 2.0 * w * state.velocity[slot]
         state.force[slot] += mass * pull
 
     def renumber(self, now: NDArray[Any]) -> None:

@@ -231,13 +231,22 @@ class Links:
 
     def segments(self) -> tuple[Array, Array]:
         """Links as lines, without the broken: ends (m, 2, 2) in m, and what each pulls with (m,) in N, negative if it pushes."""
+        pairs, force = self.pulls()
+        return self._state.position[pairs], force
+
+    def pulls(self) -> tuple[Array, Array]:
+        """The same by particle: (m, 2) indices in place of ends, for who has their positions of the same moment."""
         pairs, force = [np.empty((0, 2), np.int64)], [np.empty(0)]
         for pool in self._order:
             if pool.drawn:
                 here, row = pool.lines()
                 pairs.append(here)
                 force.append(pool.rows["force"][row])
-        return self._state.position[np.concatenate(pairs)], np.concatenate(force)
+        return np.concatenate(pairs), np.concatenate(force)
+
+    def hold(self, particle: int) -> bool:
+        """Whether a link that is whole joins the particle of this index to anything."""
+        return bool((self.pulls()[0] == particle).any())
 
     def apart(self) -> Array:
         """(k, 2) sorted pairs i < j of particles that do not collide with each other, since a link says so."""

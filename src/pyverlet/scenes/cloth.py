@@ -25,7 +25,7 @@ SHEAR = 0.2
 PEGS = 9
 """The cloth hangs from."""
 
-STRENGTH = 60.0
+STRENGTH = 25.0
 """Weights of a column of the cloth that a thread carries before it breaks."""
 
 LEAST = 12

@@ -93,6 +93,7 @@ class Artist:
             outlines=frame.shape.outlines,
             obstacles=self._obstacles(frame),
             colours=colours,
+            links=(frame.position[frame.joined], frame.force) if len(frame.joined) else None,
         )
 
     def _obstacles(self, frame: Frame) -> Sequence[Outline]:

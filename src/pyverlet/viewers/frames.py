@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, singledispatch
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.bounds import Circle
+from pyverlet.picture.colour import USUAL_MULTIPLE
 from pyverlet.viewers.sketch import NOTHING, Sketch
 
 if TYPE_CHECKING:
@@ -138,6 +139,18 @@ class Frame:
     """(n, 2) m/s, likewise."""
     obstacles: Sketch = NOTHING
     """Those that move."""
+    joined: NDArray[np.uint32] = field(default_factory=lambda: np.empty((0, 2), np.uint32))
+    """(m, 2) which circles each link joins."""
+    force: NDArray[np.float32] = field(default_factory=lambda: np.empty(0, np.float32))
+    """(m,) what it pulls with, N; negative if it pushes."""
+
+    @cached_property
+    def strain(self) -> NDArray[np.uint8]:
+        """(m,) how hard each link works: 0 is slack, 255 three times the usual and more."""
+        load = np.abs(self.force)
+        usual = USUAL_MULTIPLE * float(load.mean()) if len(load) else 0.0
+        share = load * np.float32(255 / usual) if 0.0 < usual < np.inf else np.zeros_like(load)
+        return np.asarray(np.clip(np.nan_to_num(share), 0, 255), dtype=np.uint8)
 
     @cached_property
     def grid(self) -> NDArray[np.uint16]:

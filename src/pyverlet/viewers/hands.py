@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 GRIP_FREQUENCY = 4.0
 """Hz of the spring between mouse and particle: it follows a hand within a quarter of a second."""
 
+LINKED_STRENGTH = 8.0
+"""How much harder a particle is pulled that is linked to others: enough to tear a cloth, and w h sqrt(8) stays
+below 2, where it would become unstable, at one substep of 1/60 s."""
+
 LEASH = 0.08
 """The spring stretches to this part of the view at most: a flick of the mouse shoots no particle through a pile."""
 
@@ -48,7 +52,7 @@ class Hands:
         """
         if hand not in self._held:
             particle = nearest(self._world, np.array([x, y]), reach)
-            self._hold(hand, None if particle is None else Grip(particle, target=(x, y), frequency=GRIP_FREQUENCY))
+            self._hold(hand, None if particle is None else self._grip(particle, x, y))
         self._aim[hand] = (x, y)
 
     def poke(self, hand: int, x: float, y: float, view_size: float) -> None:
@@ -83,6 +87,10 @@ class Hands:
         dx, dy = aim[0] - x, aim[1] - y
         shorten = min(1.0, leash / max(float(np.hypot(dx, dy)), 1e-30))
         return (x + dx * shorten, y + dy * shorten)
+
+    def _grip(self, particle: int, x: float, y: float) -> Grip:
+        strength = LINKED_STRENGTH if self._world.links.hold(particle) else 1.0
+        return Grip(particle, target=(x, y), frequency=GRIP_FREQUENCY, strength=strength)
 
     def _hold(self, hand: int, force: Grip | Push | None) -> None:
         self._held[hand] = force

@@ -89,10 +89,14 @@ def encode_frame(frame: Frame, part: Rect | None = None, *, velocity: bool = Fal
     """
     grid = frame.grid if part is None else quantise(frame.position, part)
     head = _head("frame", frame, part)
-    if not velocity:
-        return _join(head, grid.tobytes())
-    head["unit"] = frame.velocity_unit
-    return _join(head, grid.tobytes() + frame.velocity_grid.tobytes())
+    body = grid.tobytes()
+    if velocity:
+        head["unit"] = frame.velocity_unit
+        body += frame.velocity_grid.tobytes()
+    if len(frame.joined):
+        head["links"] = len(frame.joined)
+        body += frame.joined.tobytes() + frame.strain.tobytes()
+    return _join(head, body)
 
 
 def encode_picture(frame: Frame, part: Rect | None, jpeg: bytes) -> bytes:

@@ -355,7 +355,7 @@ class Session:
             error=self._error,
             at_once=self._held(),
         )
-        return Frame(self._seq, self._shape, stage.layout.view, status, position, velocity, stage.moving())
+        return Frame(self._seq, self._shape, stage.layout.view, status, position, velocity, stage.moving(), *stage.links())
 
     def _between(self, now: list[NDArray[np.float32]]) -> list[NDArray[np.float32]]:
         """In slow motion, where the circles are between the last two frames: one frame behind, and smooth."""

@@ -84,6 +84,17 @@ class Stage:
         """The obstacles that move, where they are now."""
         return self._moving.draw(self.layout)
 
+    def links(self) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
+        """(m, 2) circles joined by links, numbered as they are in the picture, and (m,) what each pulls with, N."""
+        pairs, force, first = [np.empty((0, 2), np.uint32)], [np.empty(0, np.float32)], 0
+        for world in self.worlds:
+            if len(world.links):
+                joined, pull = world.links.pulls()
+                pairs.append((joined + first).astype(np.uint32))
+                force.append(pull.astype(np.float32))
+            first += len(world)
+        return np.concatenate(pairs), np.concatenate(force)
+
     def pin(self, x: float, y: float, reach: float) -> None:
         """Pin the nearest circle, or let go of it."""
         self._pinned += self.hands.pin(x, y, reach, self.layout)

@@ -17,6 +17,16 @@ function palette(heat, dark) {
   return lut;
 }
 
+/** `count` colours of the palette from cold to hot, for CSS. */
+export function heat(count, dark) {
+  const lut = palette(true, dark), css = [];
+  for (let k = 0; k < count; k++) {
+    const bgr = lut[Math.round((k * (STEPS - 1)) / (count - 1)) * TONES];
+    css.push(`rgb(${bgr & 255} ${(bgr >> 8) & 255} ${bgr >> 16})`);
+  }
+  return css;
+}
+
 const shade = (step, i) => step * TONES + ((Math.imul(i, 0x9e3779b1) >>> 16) & (TONES - 1));
 
 export function oklch(l, c, degrees) {

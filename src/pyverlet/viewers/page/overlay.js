@@ -1,10 +1,13 @@
 // What is drawn over the circles: lines of the scene, what moves in it, pins, velocities, contacts.
 
 import { drawObstacles, resizeCanvas } from "./backdrop.js";
+import { heat } from "./colour.js";
 import { touching } from "./contacts.js";
 import { GRID_MAX } from "./draw.js";
 
 export const MOST_CONTACTS = 20000; // circles whose contacts are searched for: beyond, it would cost frames
+const LINK_PX = 1.6;
+const LOADS = 12; // shades that links are drawn in: a stroke for each
 const MOST_ARROWS = 4000; // of more circles, every so many has one
 const ARROW_S = 0.08; // a velocity is drawn as the way of so many seconds
 
@@ -13,14 +16,15 @@ export class Overlay {
     this.canvas = canvas;
     this.clean = true;
     this.contacts = 0; // pairs on show
+    this.links = 0;
     this.arrows = 0;
   }
 
   /** `wants`: {velocities, contacts}; `colour(name)` is that of a custom property. */
-  draw(shape, frame, camera, size, ratio, wants, colour) {
+  draw(shape, frame, camera, size, ratio, wants, colour, dark) {
     const pinned = frame.grid ? pins(shape.mass) : [];
-    const busy = shape.lines.length || frame.obstacles.length || pinned.length || wants.velocities || wants.contacts;
-    this.contacts = this.arrows = 0;
+    const busy = shape.lines.length || frame.obstacles.length || frame.links || pinned.length || wants.velocities || wants.contacts;
+    this.contacts = this.arrows = this.links = 0;
     if (!busy && this.clean) return;
     this.clean = !busy;
     resizeCanvas(this.canvas, size, ratio);
@@ -34,6 +38,7 @@ export class Overlay {
     const { grid } = frame, seen = (i) => grid[2 * i] && grid[2 * i + 1] && grid[2 * i] !== GRID_MAX && grid[2 * i + 1] !== GRID_MAX;
     const x = (i) => place.left + grid[2 * i] * sx, y = (i) => place.top + place.height - grid[2 * i + 1] * sy;
     const n = grid.length / 2;
+    this.links = drawLinks(context, frame, { x, y, seen }, dark);
     context.beginPath();
     if (wants.contacts && n <= MOST_CONTACTS) {
       const xs = new Float64Array(n), ys = new Float64Array(n), rs = new Float64Array(n);
@@ -68,6 +73,26 @@ export class Overlay {
     }
     context.fill();
   }
+}
+
+/** Links as lines in the colour of their pull; returns how many. `at`: where a circle is on the screen. */
+function drawLinks(context, { joined, strain }, at, dark) {
+  if (!strain?.length) return 0;
+  const shades = heat(LOADS, dark), groups = shades.map(() => []);
+  for (let k = 0; k < strain.length; k++) groups[(strain[k] * LOADS) >> 8].push(k);
+  let drawn = 0;
+  for (const [load, group] of groups.entries()) {
+    context.beginPath();
+    for (const k of group) {
+      const a = joined[2 * k], b = joined[2 * k + 1];
+      if (!at.seen(a) || !at.seen(b)) continue;
+      context.moveTo(at.x(a), at.y(a));
+      context.lineTo(at.x(b), at.y(b));
+      drawn++;
+    }
+    ink(context, shades[load], LINK_PX);
+  }
+  return drawn;
 }
 
 const pinsOf = new WeakMap();

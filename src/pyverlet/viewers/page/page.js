@@ -172,7 +172,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
       for (const canvas of [stage, photo]) for (const [side, value] of Object.entries(place)) canvas.style[side] = `${value}px`;
     }
     backdrop.draw(shape, camera, size(), ratio(), root.dataset.theme, colour);
-    overlay.draw(shape, frame, camera, size(), ratio(), { velocities: $("velocities").checked, contacts: $("contacts").checked }, colour);
+    overlay.draw(shape, frame, camera, size(), ratio(), { velocities: $("velocities").checked, contacts: $("contacts").checked }, colour, root.dataset.theme === "dark");
     panels.layout(camera.place(camera.room));
   }
 
