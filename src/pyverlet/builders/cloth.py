@@ -43,7 +43,8 @@ def cloth(
         slack: part by which the threads along the rows are longer than the way: the cloth hangs in folds.
         compliance: of each piece of thread, m/N.
         shear: N/m of the springs across; 0 for none. None takes five times the weight over the height.
-        breaking_force: at which a piece of thread or a spring breaks, N.
+        breaking_force: at which a piece of thread or a spring breaks, N. Where that is finite, a spring does so at three times its
+            length too: it would hold on to what has been torn off.
     """
     k = 5.0 * weight(world, mass) / height if shear is None else checks.number("shear", shear, least=0.0)
     group, grid = lay_grid(world, top_left, width, height, columns, rows, mass, radius)
@@ -54,9 +55,11 @@ def cloth(
         Rope(group, c, d, compliance=compliance, breaking_force=breaking_force, collide=False),
     ]
     if k > 0.0:
+        diagonal = float(np.hypot(width / (grid.shape[1] - 1), height / (grid.shape[0] - 1)))
+        across = min(breaking_force, 2.0 * k * diagonal) if np.isfinite(breaking_force) else np.inf
         for square in (grid, grid[:, ::-1]):
             a, b = diagonals(square)
-            links.append(Spring(group, a, b, stiffness=k, breaking_force=breaking_force, collide=False))
+            links.append(Spring(group, a, b, stiffness=k, breaking_force=across, collide=False))
     world.links.extend(links)
     return Sheet(group, tuple(links), grid)
 
