@@ -43,8 +43,8 @@ def cloth(
         slack: part by which the threads along the rows are longer than the way: the cloth hangs in folds.
         compliance: of each piece of thread, m/N.
         shear: N/m of the springs across; 0 for none. None takes five times the weight over the height.
-        breaking_force: at which a piece of thread or a spring breaks, N. Where that is finite, a spring does so at three times its
-            length too: it would hold on to what has been torn off.
+        breaking_force: at which a piece of thread or a spring breaks, N. Where that is finite, a spring does so at three times
+            its length too: it would hold on to what has been torn off.
     """
     k = 5.0 * weight(world, mass) / height if shear is None else checks.number("shear", shear, least=0.0)
     group, grid = lay_grid(world, top_left, width, height, columns, rows, mass, radius)
