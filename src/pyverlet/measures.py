@@ -49,6 +49,11 @@ class Measures(Particles):
         return self._books.ledger
 
     @property
+    def tells_events(self) -> bool:
+        """Whether `events` is there to be read."""
+        return self._events is not None
+
+    @property
     def events(self) -> Events:
         """Contacts that began or ended in the last frame, and hits.
 

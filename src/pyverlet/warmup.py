@@ -27,8 +27,9 @@ Progress = Callable[[int, int], None]
 def warm_up(world: World, progress: Progress | None = None) -> float:
     """Compile or load every kernel this world may need, without touching it.
 
-    The first time on a machine all kernels of the world's dtype are compiled, so that nothing stalls when a setting is changed
-    later; the compiled code is kept on disk, and afterwards only the kernels in use are loaded.
+    The first time on a machine all kernels that circles of the world's dtype need are compiled, so that nothing stalls when a
+    setting is changed later; those of links, obstacles and the ledger when a world has them first. The compiled code is kept on disk, and
+    afterwards only the kernels in use are loaded.
 
     Args:
         world: the world about to be stepped.
@@ -66,6 +67,8 @@ def _rehearse(world: World) -> None:
         type(world.boundary),
         getattr(world.boundary, "restitution", 0.0),
         world.collisions,
+        ledger=world.keeps_ledger,
+        events=world.tells_events,
     )
     small.integrator = world.integrator
     if world.links:
@@ -99,7 +102,6 @@ def _compile_all(dtype: np.dtype[Any]) -> None:
         small = _lattice(count, dtype, boundary, 0.5, collisions)
         small.step(1e-3)
         small.forces.append(Drag(linear=0.1))
-        _link(small)
         _use(small)
 
 
@@ -121,15 +123,16 @@ def _use(world: World) -> None:
 
 
 def _lattice(
-    count: int, dtype: np.dtype[Any], boundary: type[Boundary], restitution: float, collisions: Collisions | None
-) -> World:
+    count: int, dtype: np.dtype[Any], boundary: type[Boundary], restitution: float, collisions: Collisions | None,
+    *, ledger: bool = False, events: bool = False,
+) -> World:  # fmt: skip
     side = int(np.ceil(np.sqrt(count)))
     room: Boundary = Open()
     if boundary is Circle:
         room = Circle(radius=2.0 * side, restitution=restitution)
     elif boundary is Box:
         room = Box((-side, -side), (side, side), restitution=restitution)
-    world = World(boundary=room, collisions=collisions, substeps=1, dtype=dtype)
+    world = World(boundary=room, collisions=collisions, substeps=1, dtype=dtype, ledger=ledger, events=events)
     row, column = np.divmod(np.arange(count), side)
     world.add(position=np.column_stack((column, row)) - 0.5 * side, radius=0.5)
     return world
