@@ -28,8 +28,8 @@ def warm_up(world: World, progress: Progress | None = None) -> float:
     """Compile or load every kernel this world may need, without touching it.
 
     The first time on a machine all kernels that circles of the world's dtype need are compiled, so that nothing stalls when a
-    setting is changed later; those of links, obstacles and the ledger when a world has them first. The compiled code is kept on disk, and
-    afterwards only the kernels in use are loaded.
+    setting is changed later; those of links, obstacles and the ledger when a world has them first. The compiled code is kept on
+    disk, and afterwards only the kernels in use are loaded.
 
     Args:
         world: the world about to be stepped.
