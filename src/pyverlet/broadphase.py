@@ -39,7 +39,7 @@ class PairList:
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self._dtype = dtype
-        self.heard = False
+        self.listening = False
         self.first = np.zeros(0, np.int64)
         self.count = np.zeros(0, np.int64)
         self.touches = np.zeros(0, np.int64)
@@ -53,11 +53,11 @@ class PairList:
         self.meeting = np.empty(pairs, np.uint8)
         self.touching = np.empty(pairs, np.uint32)
         self.impulse = np.empty(pairs, self._dtype)
-        self.closing = np.full(pairs if self.heard else 0, -1, self._dtype)
+        self.closing = np.full(pairs if self.listening else 0, -1, self._dtype)
 
     def listen(self) -> None:
         """Note events from now on."""
-        self.heard = True
+        self.listening = True
         self.closing = np.full(len(self.pair_i), -1, self._dtype)
 
     def set_strips(self, strips: int) -> None:

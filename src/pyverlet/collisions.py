@@ -24,6 +24,9 @@ Unlist = Callable[[PairList, Any], None]
 class Collisions:
     """How particles collide with each other.
 
+    Both numbers are for circles added without values of their own. Of two that differ the larger restitution counts, and the
+    geometric mean of the frictions, as in Box2D; of a circle with values of its own and a wall likewise.
+
     Args:
         restitution: e, 0 to 1. An impact leaves with e times the normal speed it came with; contact at rest never bounces.
         friction: mu of Coulomb, 0 or more. 0 leaves spin alone.

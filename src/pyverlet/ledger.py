@@ -18,7 +18,8 @@ from pyverlet.state import Slots
 class Ledger:
     """What has changed a world's energy since it was built, J: positive is gained, negative lost.
 
-    An empty world has none, so that the sum of all accounts is `world.energy().total`, to rounding.
+    An empty world has none, so that the sum of all accounts is `world.energy().total`, to rounding. What moving obstacles bring
+    or take is under restitution and projection.
 
     Attributes:
         restitution: taken by impacts: (1 - e^2) of the energy along the normal. Contacts at rest are impacts with e = 0.

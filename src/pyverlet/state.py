@@ -142,7 +142,8 @@ class Slots:
         fed: (n,) 1 where a contact at rest fed the velocity in the last substep: it carries weight. Kept only if circles bounce.
         resting: (n,) 1 where a contact without bounce held the particle in the last substep.
         hits: (n,) largest speed with which the circle met a wall in this frame, m/s; negative: none.
-        spent: (n, 2) energy that impacts on walls, and friction there, have taken in this frame, J, negative.
+        spent: (n, 2) energy that impacts on walls, and friction there, have taken in this frame, J, negative: to be summed, for
+            rows stay where they are when slots are reordered.
     """
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
@@ -259,7 +260,7 @@ class Slots:
             motion.take_rows(new, old, order)
             setattr(self, name, new)
             self._scratch[0] = old
-        for name in (*_COLUMNS, "inverse_mass", "particle", "resting", "fed", "start", "hits", "spent"):
+        for name in (*_COLUMNS, "inverse_mass", "particle", "resting", "fed", "start", "hits"):
             setattr(self, name, getattr(self, name)[order])
         if len(self.category):
             self.category, self.mask = self.category[order], self.mask[order]

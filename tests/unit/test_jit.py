@@ -88,8 +88,9 @@ def test_without_a_writable_folder_it_still_runs(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("boundary", [pv.Circle(radius=10), pv.Box((0, 0), (10, 10)), pv.Open()])
 def test_warm_up_leaves_the_world_alone_and_nothing_to_compile(boundary: pv.Boundary) -> None:
-    world = pv.World(boundary=boundary, collisions=pv.Collisions(restitution=0.5, friction=0.5))
-    world.add(position=[(3, 3), (4, 4)])
+    collisions = pv.Collisions(restitution=0.5, friction=0.5)
+    world = pv.World(boundary=boundary, collisions=collisions, ledger=True, events=True)
+    world.links.append(pv.Stick(world.add(position=[(3, 3), (4, 4)]), 0, 1))
     world.obstacles.append(pv.Disc((2, 2), 0.5, angular_velocity=1.0))
     world.forces += [pv.Wind((1, 0), linear=0.1), pv.Gravitation(strength=1.0), pv.force(lambda x, y, vx, vy, mass, t: (x, y))]
     before = world.state_hash()
