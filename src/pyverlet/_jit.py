@@ -34,12 +34,12 @@ _STALE_AFTER_S = 30 * 24 * 3600.0
 def sources_hash(root: Path | None = None) -> str:
     """Hash, 16 hex digits, of every source that compiled code can come from, and of the compiler's version.
 
-    Kernels live in `kernels/` and may use `constants.py` and this file, nothing else (a test checks that). An edit
+    Kernels live in `kernels/` and may use `constants.py`, `_lanes.py` and this file, nothing else (a test checks that). An edit
     elsewhere, in a viewer say, need not compile anything anew.
     """
     root = Path(__file__).parent if root is None else root
     digest = hashlib.blake2b(f"{numba.__version__} {sys.version_info[:2]}".encode(), digest_size=8)
-    for path in (root / "_jit.py", root / "constants.py", *sorted((root / "kernels").rglob("*.py"))):
+    for path in (root / "_jit.py", root / "_lanes.py", root / "constants.py", *sorted((root / "kernels").rglob("*.py"))):
         digest.update(path.relative_to(root).as_posix().encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()

@@ -78,6 +78,8 @@ class BroadPhase(ABC):
     """Keeps `list` good for the current positions."""
 
     list: PairList
+    built: Array
+    """(n, 2) positions the list was made from, m."""
     rebuilds: int = 0
     renewing: Callable[[Slots, PairList], None] | None = None
     """Called when the list is about to be made anew."""
@@ -119,6 +121,7 @@ class _AllPairs(BroadPhase):
         if found > len(self.list.pair_i):
             self.list.make_room(2 * found)
             self._fill(state)
+        self.built = state.position.copy()
         self.rebuilds += 1
 
     def _fill(self, state: Slots) -> int:

@@ -14,6 +14,7 @@ from pyverlet.constants import GROWTH, LARGEST_PUSH, REST_ACCELERATIONS, SMALLES
 from pyverlet.errors import InputError
 from pyverlet.events import Events
 from pyverlet.kernels import contacts, impacts
+from pyverlet.packs import Packs
 from pyverlet.state import Slots, State
 
 Unlist = Callable[[PairList, Any], None]
@@ -60,6 +61,8 @@ class ContactSolver:
         self.broad_phase = settings.method.start(dtype)
         self._unlist = unlist
         self._seen = 0
+        self._packs = Packs(dtype)
+        self._packed = False
         self._events = events
         if events is not None:
             self.broad_phase.list.listen()
@@ -98,6 +101,13 @@ class ContactSolver:
         if self._seen != self.broad_phase.rebuilds:
             self._seen = self.broad_phase.rebuilds
             self._unlist(self.broad_phase.list, state.particle)
+            self._packed = False
+
+    def _pack(self) -> Packs:
+        if not self._packed:
+            self._packs.take(self.broad_phase.list, self.broad_phase.built)
+            self._packed = True
+        return self._packs
 
     def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
         """Move overlapping circles apart, let impacts bounce, and note who touches."""
@@ -106,7 +116,9 @@ class ContactSolver:
         which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
         push = (real(1 / h), real(LARGEST_PUSH))
         notes = (pairs.touching, pairs.impulse, pairs.touches)
-        if not self._bounces(state):
+        if self._slides(state):
+            self._pack().project(state, h)
+        elif not self._bounces(state):
             contacts.project(*moving, *bodies, *which, *push, *notes)
         else:
             rest_speed = REST_ACCELERATIONS * strongest * h
@@ -121,12 +133,15 @@ class ContactSolver:
         """Take from touching circles the velocity that projection has put in, and rub them."""
         pairs, real = self.broad_phase.list, state.real
         which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
-        if not self._bounces(state) and not self._rubs(state):
-            contacts.still(state.position, state.velocity, state.inverse_mass, *which, pairs.touching, pairs.touches)
+        if self._slides(state):
+            self._packs.still(state)
         else:
             where = (state.position, state.velocity, state.spin, state.radius, state.inverse_mass)
             notes = (pairs.touching, pairs.impulse, pairs.touches, pairs.spent)
             contacts.rub(state.start, *where, state.friction, *which, real(h), real(self.settings.friction), *notes)
+
+    def _slides(self, state: Slots) -> bool:
+        return not self._bounces(state) and not self._rubs(state)
 
     def _bounces(self, state: Slots) -> bool:
         return self.settings.restitution > 0.0 or state.most_restitution > 0.0
@@ -136,6 +151,9 @@ class ContactSolver:
 
     def mark_resting(self, state: Slots) -> None:
         """Set `state.resting` for particles that touch another without bouncing off it."""
+        if self._slides(state):
+            self._packs.mark_resting(state)
+            return
         pairs = self.broad_phase.list
         notes = (pairs.touching, pairs.impulse, pairs.touches)
         contacts.mark_touching(pairs.first, pairs.pair_i, pairs.pair_j, *notes, state.resting)

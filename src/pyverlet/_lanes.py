@@ -1,0 +1,200 @@
+"""Eight numbers at once: a type for kernels whose values the processor adds, multiplies and compares in one instruction.
+
+Inside a kernel `take` and `load` give Lanes; + - * / and the functions here work on them lane by lane, with the same rounding as
+on single numbers; `put` and `store` write them back. The compiler cannot do this by itself where rows are chosen by an index: it
+would have to know that no two lanes write to the same row. Whoever calls `put` knows.
+
+Machines whose registers are narrower than eight numbers get the same bits from several instructions.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, models, register_model
+
+LANES = 8
+
+_INT32, _INT64 = ir.IntType(32), ir.IntType(64)
+
+
+class LanesType(types.Type):  # type: ignore[misc]
+    """What Numba calls LANES numbers of one floating type."""
+
+    def __init__(self, real: Any) -> None:
+        self.real = real
+        super().__init__(name=f"Lanes({real})")
+
+    @property
+    def key(self) -> Any:
+        return self.real
+
+
+@register_model(LanesType)
+class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, manager: Any, lanes: Any) -> None:
+        super().__init__(manager, lanes, ir.VectorType(manager.lookup(lanes.real).get_value_type(), LANES))
+
+
+_TYPES = (LanesType(types.float32), LanesType(types.float64))
+
+
+def _operator(symbol: Callable[..., Any], instruction: str) -> None:
+    """Teach Numba one of + - * / between lanes."""
+
+    @infer_global(symbol)
+    class _Typed(ConcreteTemplate):  # type: ignore[misc]
+        cases = [signature(lanes, lanes, lanes) for lanes in _TYPES]  # noqa: RUF012
+
+    for lanes in _TYPES:
+
+        @lower_builtin(symbol, lanes, lanes)  # type: ignore[untyped-decorator]
+        def _lowered(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            return getattr(builder, instruction)(*args)
+
+
+for _symbol, _instruction in (
+    (operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul"), (operator.truediv, "fdiv"),
+):  # fmt: skip
+    _operator(_symbol, _instruction)
+
+
+def _order(lanes: Any) -> Any:
+    """Which lanes a shuffle picks."""
+    lanes = list(lanes)
+    return ir.Constant(ir.VectorType(_INT32, len(lanes)), lanes)
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def spread(typing: Any, value: Any) -> Any:
+    """One number in every lane."""
+    lanes = LanesType(value)
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        empty = ir.Constant(context.get_value_type(lanes), ir.Undefined)
+        first = builder.insert_element(empty, args[0], ir.Constant(_INT32, 0))
+        return builder.shuffle_vector(first, empty, _order([0] * LANES))
+
+    return lanes(value), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def square_root(typing: Any, a: Any) -> Any:
+    """Square root, lane by lane."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        vector = context.get_value_type(a)
+        name = f"llvm.sqrt.v{LANES}f{a.real.bitwidth}"
+        function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(vector, [vector]), name)
+        return builder.call(function, args)
+
+    return a(a), generate
+
+
+def _chosen(comparison: str) -> Any:
+    @intrinsic  # type: ignore[untyped-decorator]
+    def choose(typing: Any, a: Any, b: Any) -> Any:
+        def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            return builder.select(builder.fcmp_ordered(comparison, *args), *args)
+
+        return a(a, b), generate
+
+    return choose
+
+
+larger = _chosen(">")
+"""The larger of two, lane by lane."""
+
+smaller = _chosen("<")
+"""The smaller of two, lane by lane."""
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def where_zero(typing: Any, test: Any, a: Any, b: Any) -> Any:
+    """a where test is 0, b elsewhere."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        zero = ir.Constant(context.get_value_type(test), None)
+        return builder.select(builder.fcmp_ordered("==", args[0], zero), args[1], args[2])
+
+    return a(test, a, b), generate
+
+
+def _pointer(context: Any, builder: Any, array: Any, value: Any, index: Any, item: Any) -> Any:
+    """To array[index], as if the array were of `item`s."""
+    data = context.make_array(array)(context, builder, value).data
+    return builder.bitcast(builder.gep(data, [index]), item.as_pointer())
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def load(typing: Any, array: Any, k: Any) -> Any:
+    """array[k : k + LANES] of an (n,) array."""
+    lanes = LanesType(array.dtype)
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        value = builder.load(_pointer(context, builder, array, args[0], args[1], context.get_value_type(lanes)))
+        value.align = array.dtype.bitwidth // 8
+        return value
+
+    return lanes(array, k), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def store(typing: Any, array: Any, k: Any, value: Any) -> Any:
+    """array[k : k + LANES] = value, on an (n,) array."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        written = builder.store(args[2], _pointer(context, builder, array, args[0], args[1], context.get_value_type(value)))
+        written.align = array.dtype.bitwidth // 8
+        return context.get_dummy_value()
+
+    return types.void(array, k, value), generate
+
+
+def _rows(context: Any, builder: Any, array: Any, index: Any, args: Any) -> list[Any]:
+    """Pointers to the rows index[k], index[k + 1], ... of an (n, 2) array."""
+    zero = ir.Constant(_INT64, 0)
+    rows = _pointer(context, builder, array, args[0], zero, ir.VectorType(context.get_value_type(array.dtype), 2))
+    first = _pointer(context, builder, index, args[1], args[2], context.get_value_type(index.dtype))
+    numbers = [builder.load(builder.gep(first, [ir.Constant(_INT64, lane)])) for lane in range(LANES)]
+    return [builder.gep(rows, [builder.zext(number, _INT64)]) for number in numbers]
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def take(typing: Any, array: Any, index: Any, k: Any) -> Any:
+    """(x, y) of the rows index[k : k + LANES] of an (n, 2) array in C order; index: unsigned."""
+    lanes = LanesType(array.dtype)
+    both = types.UniTuple(lanes, 2)
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        parts = []
+        for row in _rows(context, builder, array, index, args):
+            parts.append(builder.load(row))
+            parts[-1].align = array.dtype.bitwidth // 8
+        while len(parts) > 1:
+            double = _order(range(2 * parts[0].type.count))
+            parts = [builder.shuffle_vector(a, b, double) for a, b in zip(parts[::2], parts[1::2], strict=True)]
+        empty = ir.Constant(parts[0].type, ir.Undefined)
+        x, y = (builder.shuffle_vector(parts[0], empty, _order(range(axis, 2 * LANES, 2))) for axis in range(2))
+        return context.make_tuple(builder, both, [x, y])
+
+    return both(array, index, k), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def put(typing: Any, array: Any, index: Any, k: Any, x: Any, y: Any) -> Any:
+    """Rows index[k : k + LANES] of an (n, 2) array = (x, y). Lanes of one row must hold the same value."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        for lane, row in enumerate(_rows(context, builder, array, index, args)):
+            written = builder.store(builder.shuffle_vector(args[3], args[4], _order([lane, lane + LANES])), row)
+            written.align = array.dtype.bitwidth // 8
+        return context.get_dummy_value()
+
+    return types.void(array, index, k, x, y), generate

@@ -1,0 +1,58 @@
+"""Eight numbers at once must be what one number at a time is, to the last bit."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyverlet._jit import kernel
+from pyverlet._lanes import LANES, larger, load, put, smaller, spread, square_root, store, take, where_zero
+
+DTYPES = [np.float32, np.float64]
+
+
+@kernel
+def _compute(a: Any, b: Any, out: Any) -> None:
+    for k in range(0, a.shape[0], LANES):
+        x, y = load(a, k), load(b, k)
+        store(out[0], k, x + y)
+        store(out[1], k, x - y)
+        store(out[2], k, x * y)
+        store(out[3], k, x / y)
+        store(out[4], k, square_root(x * x))
+        store(out[5], k, larger(x, y))
+        store(out[6], k, smaller(x, y))
+        store(out[7], k, where_zero(x, y, x))
+        store(out[8], k, x * spread(b[0]))
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_arithmetic_is_that_of_single_numbers(dtype: Any) -> None:
+    rng = np.random.default_rng(0)
+    a, b = rng.normal(0, 3, (2, 10 * LANES)).astype(dtype)
+    a[3] = 0
+    out = np.empty((9, len(a)), dtype)
+    _compute(a, b, out)
+    expected = (a + b, a - b, a * b, a / b, np.sqrt(a * a), np.maximum(a, b), np.minimum(a, b), np.where(a == 0, b, a), a * b[0])
+    for row, right in zip(out, expected, strict=True):
+        assert row.tobytes() == right.tobytes()
+
+
+@kernel
+def _turn(points: Any, index: Any) -> None:
+    for k in range(0, index.shape[0], LANES):
+        x, y = take(points, index, k)
+        put(points, index, k, y, x + y)
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_rows_are_taken_and_put_by_their_index(dtype: Any) -> None:
+    rng = np.random.default_rng(1)
+    points = rng.normal(0, 1, (50, 2)).astype(dtype)
+    index = rng.permutation(50)[: 4 * LANES].astype(np.uint32)
+    expected = points.copy()
+    expected[index] = np.column_stack((points[index, 1], points[index, 0] + points[index, 1]))
+    _turn(points, index)
+    assert points.tobytes() == expected.tobytes()
