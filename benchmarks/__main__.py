@@ -1,4 +1,8 @@
-"""Run a comparison and print it: `python -m benchmarks --particles 2000 20000`, or `python -m benchmarks physics`."""
+"""Run a comparison and print it.
+
+`python -m benchmarks --particles 2000 20000` beside other engines, `python -m benchmarks physics` what their physics is worth,
+`python -m benchmarks own` what pyverlet promises about its own speed.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +20,7 @@ from time import perf_counter
 import numpy as np
 
 import pyverlet as pv
-from benchmarks import physics
+from benchmarks import own, physics
 from benchmarks.engines import CAREFUL, DT, ENGINES, RADIUS, Array, Engine
 from pyverlet import report
 
@@ -121,17 +125,23 @@ def machine() -> str:
 def main() -> None:
     """Print one table for each number of particles; write them all as CSV if asked to."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("table", nargs="?", choices=("speed", "physics"), default="speed", help="what to compare")
+    parser.add_argument("table", nargs="?", choices=("speed", "physics", "own"), default="speed", help="what to compare")
     parser.add_argument("--particles", type=int, nargs="+", help="discs in the cage: 2000 20000 for speed, 2000 for physics")
     parser.add_argument("--frames", type=int, default=60, help="frames measured for each engine")
     parser.add_argument("--csv", type=Path, help="write the rows to this file too")
+    parser.add_argument("--plot", type=Path, help="draw the cost against the number of discs into this file")
+    parser.add_argument("--million", action="store_true", help="own: a million discs too, some minutes")
     arguments = parser.parse_args()
     if arguments.table == "physics":
         print(machine())
         physics.main([engine for engine in CAREFUL if installed(engine)], (arguments.particles or [2_000])[0])
         return
-    engines = [engine for engine in ENGINES if installed(engine)]
     print(machine())
+    if arguments.table == "own":
+        if not own.main(report.triad()["ns_per_element"], arguments.million):
+            sys.exit(1)
+        return
+    engines = [engine for engine in ENGINES if installed(engine)]
     rows: list[Row] = []
     for particles in arguments.particles or [2_000, 20_000]:
         position, cage, compile_s = settled_heap(particles)
@@ -148,6 +158,28 @@ def main() -> None:
             writer = csv.DictWriter(file, list(asdict(rows[0])))
             writer.writeheader()
             writer.writerows(asdict(row) for row in rows)
+    if arguments.plot:
+        plot(rows, arguments.plot)
+
+
+def plot(rows: list[Row], path: Path) -> None:
+    """Milliseconds a frame against the number of discs, both on logarithmic axes, a line for each engine."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(7, 4.5), layout="constrained")
+    styles = zip(("o-", "s-", "^--", "D--", "v:"), ("#0072B2", "#56B4E9", "#D55E00", "#009E73", "#999999"), strict=True)
+    for (mark, colour), name in zip(styles, dict.fromkeys(row.engine for row in rows), strict=False):
+        mine = [row for row in rows if row.engine == name]
+        axes.loglog([row.particles for row in mine], [row.ms_per_frame for row in mine], mark, color=colour, label=name)
+    axes.axhline(1e3 / 60, color="k", linewidth=0.7)
+    axes.annotate("60 frames a second", (rows[0].particles, 1e3 / 60), xytext=(0, 3), textcoords="offset points", fontsize=8)
+    axes.set(xlabel="discs in the cage", ylabel="ms a frame of 1/60 s", title="A settled heap, whole frames")
+    axes.grid(which="major", alpha=0.3)
+    axes.legend(fontsize=8)
+    figure.savefig(path, dpi=120)
 
 
 if __name__ == "__main__":

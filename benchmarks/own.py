@@ -1,0 +1,261 @@
+"""What pyverlet promises about its own speed, each promise measured: `python -m benchmarks own`.
+
+Every line is a ratio of two times taken in turn in one process, or a time beside the machine's own (NumPy's triad), with
+substeps, spread of the radii and overlap of the heap it was measured on.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tracemalloc
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from statistics import median
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+import pyverlet as pv
+from benchmarks.engines import DT, RADIUS, Engine, Pymunk, PyverletOneThread
+
+SUBSTEPS = 8
+SETTLE_SECONDS = 10.0
+ROUNDS = 5
+"""Worlds that are compared take turns this often, so that the machine's moods hit them alike."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One promise."""
+
+    name: str
+    asked: str
+    measured: str
+    passed: bool
+
+
+def cage(particles: int, seconds: float = SETTLE_SECONDS, ratio: float = 1.0, **options: Any) -> pv.World:
+    """The scene `cage`, settled; with a ratio of radii above 1 a heap of as much area, radii uniform in their logarithm."""
+    if ratio == 1.0:
+        world = pv.scenes.get("cage").world(particles=particles)
+    else:
+        rng = np.random.default_rng(1)
+        radius = ratio ** rng.uniform(-1, 0, particles)
+        radius *= RADIUS / np.sqrt((radius**2).mean())
+        size = np.sqrt(particles * RADIUS**2 / 0.6)
+        world = pv.World(boundary=pv.Circle(radius=size), **options)
+        place(world, rng, radius, size)
+    world.run(seconds=seconds, dt=DT)
+    return world
+
+
+def place(world: pv.World, rng: np.random.Generator, radius: Any, size: float) -> None:
+    """Circles at random places of a cage of this size: they start small, and grow as they part."""
+    angle, out = rng.uniform(0, 2 * np.pi, len(radius)), (size - radius.max()) * np.sqrt(rng.uniform(0, 1, len(radius)))
+    world.add(position=out[:, None] * np.column_stack((np.cos(angle), np.sin(angle))), radius=radius)
+
+
+def in_turn(steps: list[Callable[[], object]], frames: int) -> list[float]:
+    """Median milliseconds of each, called in turns of `frames` calls."""
+    times: list[list[float]] = [[] for _ in steps]
+    for _ in range(ROUNDS):
+        for step, spent in zip(steps, times, strict=True):
+            step()  # memory of the one before is still in the caches
+            for _ in range(frames):
+                start = perf_counter()
+                step()
+                spent.append(1e3 * (perf_counter() - start))
+    return [median(spent) for spent in times]
+
+
+def stepping(world: pv.World, threads: int | None = None) -> Callable[[], None]:
+    """A frame of the world on so many threads."""
+
+    def step() -> None:
+        world.threads = threads
+        world.step(DT)
+
+    return step
+
+
+def heap(world: pv.World) -> str:
+    """What a reader must know to judge the time."""
+    found = world.overlap()
+    spread = float(world.radius.max() / world.radius.min())
+    return f"{world.substeps} substeps, radii 1:{spread:.3g}, overlap mean {found.mean:.2%}, max {found.max:.1%}"
+
+
+def per_substep(ms: float, particles: int) -> float:
+    """Nanoseconds a particle and substep."""
+    return 1e6 * ms / (particles * SUBSTEPS)
+
+
+def threads(triad: float) -> Iterator[Row]:
+    """20,000 on one thread and on two; 100,000 too."""
+    world = cage(20_000)
+    one, two = in_turn([stepping(world, 1), stepping(world, 2)], 20)
+    a, b = per_substep(one, 20_000), per_substep(two, 20_000)
+    yield Row(
+        "20,000 circles",
+        "<= 20 ns a particle and substep on one thread, <= 11 on two",
+        f"{a:.1f} and {b:.1f} ns ({a / triad:.1f} and {b / triad:.1f} triads); {heap(world)}",
+        a <= 20 and b <= 11,
+    )
+    world = cage(100_000)
+    one, two = in_turn([stepping(world, 1), stepping(world, 2)], 8)
+    yield Row(
+        "100,000 circles",
+        "a frame <= 16.7 ms on two threads, and at least 1.8 times as fast as on one",
+        f"{two:.1f} ms, {one / two:.2f} times as fast; {heap(world)}",
+        two <= 16.7 and one / two >= 1.8,
+    )
+
+
+def growth(particles: int = 1_000_000) -> Iterator[Row]:
+    """A million costs a million times one."""
+    small, large = cage(20_000), cage(particles)
+    a, b = in_turn([stepping(small), stepping(large)], 4)
+    cost = per_substep(b, particles) / per_substep(a, 20_000)
+    yield Row(
+        f"{particles:,} circles",
+        "a particle costs <= 1.4 times what it does at 20,000",
+        f"{cost:.2f} times, {b:.0f} ms a frame; {heap(large)}",
+        cost <= 1.4,
+    )
+
+
+def sizes(particles: int = 20_000) -> Iterator[Row]:
+    """Circles of unequal sizes, by contact."""
+    worlds = {ratio: cage(particles, ratio=ratio) for ratio in (1.0, 4.0, 50.0)}
+    times = dict(zip(worlds, in_turn([stepping(world, 1) for world in worlds.values()], 8), strict=True))
+    cost = {ratio: times[ratio] / world.overlap().contacts for ratio, world in worlds.items()}
+    for ratio, most in ((4.0, 1.8), (50.0, 4.0)):
+        times_as_much = cost[ratio] / cost[1.0]
+        yield Row(
+            f"radii 1:{ratio:g}",
+            f"a contact costs <= {most:g} times what it does with equal radii",
+            f"{times_as_much:.2f} times; {heap(worlds[ratio])}",
+            times_as_much <= most,
+        )
+
+
+def motion(particles: int = 20_000) -> Iterator[Row]:
+    """Falling and splashing, and stirred, against settled."""
+    settled = cage(particles)
+    still = median(in_turn([stepping(settled, 1)], 20))
+    scene = pv.scenes.get("cage")
+    falling = scene.world(particles=particles)
+    splash = []
+    for _ in range(round(5 / DT)):
+        falling.threads = 1
+        start = perf_counter()
+        falling.step(DT)
+        splash.append(1e3 * (perf_counter() - start))
+    stirred, angle = cage(particles), 0.0
+    churned = []
+    for _ in range(round(3 / DT)):
+        angle += 2 * np.pi * DT / 3
+        stirred.gravity = (9.81 * np.sin(angle), -9.81 * np.cos(angle))
+        stirred.threads = 1
+        start = perf_counter()
+        stirred.step(DT)
+        churned.append(1e3 * (perf_counter() - start))
+    for name, spent in (("falling, splashing", splash), ("stirred", churned)):
+        ratio = float(np.mean(spent)) / still
+        yield Row(
+            name,
+            "a frame costs <= 2 times a settled one, on average",
+            f"{ratio:.2f} times (worst second {max_second(spent) / still:.2f}); {heap(settled)}",
+            ratio <= 2,
+        )
+
+
+def max_second(spent: list[float]) -> float:
+    """Largest mean over a second."""
+    frames = round(1 / DT)
+    return max(float(np.mean(spent[a : a + frames])) for a in range(0, len(spent) - frames + 1, frames))
+
+
+def small(machine_limit_ms: float = 0.15) -> Iterator[Row]:
+    """A hundred circles, and ten beside pymunk."""
+    hundred = cage(100)
+    (ms,) = in_turn([stepping(hundred)], 100)
+    yield Row("100 circles", f"a frame <= {machine_limit_ms:g} ms", f"{ms:.3f} ms; {heap(hundred)}", ms <= machine_limit_ms)
+    ten = cage(10)
+    extent = ten.boundary.extent()
+    assert extent is not None
+    engines: list[Engine] = [PyverletOneThread(ten.position.copy(), extent[2])]
+    try:
+        engines.append(Pymunk(ten.position.copy(), extent[2]))
+    except ImportError:
+        return
+    ours, theirs = in_turn([engine.step for engine in engines], 200)
+    yield Row(
+        "10 circles",
+        "not slower than pymunk (10 iterations, one step a frame)",
+        f"{ours:.3f} ms a frame, pymunk {theirs:.3f}",
+        ours <= theirs,
+    )
+
+
+def memory(particles: int = 200_000) -> Iterator[Row]:
+    """What the engine keeps beyond the arrays a user sees."""
+    world = pv.scenes.get("cage").world(particles=2_000)
+    world.run(seconds=0.1)
+    tracemalloc.start()
+    world = pv.scenes.get("cage").world(particles=particles)
+    world.run(seconds=2.0)
+    held = tracemalloc.get_traced_memory()[0]
+    tracemalloc.stop()
+    seen = sum(array.nbytes for _, array in world._state.arrays())
+    each = (held - seen) / particles
+    yield Row("memory", "<= 200 bytes a particle beyond the arrays a user sees", f"{each:.0f} bytes", each <= 200)
+
+
+def start() -> Iterator[Row]:
+    """Import, and the second start of a command."""
+    for name, code, most in (
+        ("import pyverlet", "import pyverlet", 0.6),
+        (
+            "second start to first frame",
+            "import pyverlet as pv; w = pv.scenes.get('cage').world(particles=5000); pv.warm_up(w); w.step(1 / 60)",
+            2.5,
+        ),
+    ):
+        spent = []
+        for _ in range(ROUNDS):
+            begin = perf_counter()
+            subprocess.run([sys.executable, "-c", code], check=True)
+            spent.append(perf_counter() - begin)
+        yield Row(name, f"<= {most:g} s", f"{median(spent):.2f} s, Python's own start included", median(spent) <= most)
+
+
+def views(particles: int = 100_000) -> Iterator[Row]:
+    """Reading and writing all positions is no loop."""
+    world = pv.World()
+    world.add(position=np.random.default_rng(0).uniform(0, 1e3, (particles, 2)), radius=0.5)
+    values = np.zeros((particles, 2), world.dtype)
+    read, write, copy = in_turn(
+        [lambda: world.position, lambda: world.position.__setitem__(slice(None), values), lambda: values.copy()], 100
+    )
+    yield Row(
+        "all positions of 100,000",
+        "a view: reading takes no time, writing that of a copy",
+        f"reading {1e3 * read:.1f} us, writing {1e3 * write:.0f} us, a copy of as many numbers {1e3 * copy:.0f} us",
+        read < 0.1 * copy and write < 5 * copy,
+    )
+
+
+def main(triad: float, million: bool) -> bool:
+    """Print a line for each promise; returns whether all hold."""
+    held = True
+    parts: list[Iterator[Row]] = [start(), small(), views(), threads(triad), sizes(), motion(), memory()]
+    if million:
+        parts.append(growth())
+    for part in parts:
+        for row in part:
+            held &= row.passed
+            print(f"{row.name:<28}{'pass' if row.passed else 'FAIL':<6}{row.measured}\n{'':<34}asked: {row.asked}", flush=True)
+    return held
