@@ -17,7 +17,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from pyverlet.kernels import motion
-from pyverlet.state import Slots, advance
+from pyverlet.state import Slots, advance, kick_drift
 
 
 class Forces(Protocol):
@@ -105,8 +105,7 @@ class SemiImplicitEuler(Integrator):
 
     def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
         forces(state, t)
-        _kick(state, h)
-        _drift(state, h)
+        kick_drift(state, h)
 
 
 class _Stormer(Integrator):
@@ -156,8 +155,7 @@ class _Stormer(Integrator):
             advance(state.velocity, state.velocity, state.scratch(0), -0.5 * h)
         else:
             forces(state, t)
-        _kick(state, h)
-        _drift(state, h)
+        kick_drift(state, h)
 
     def end(self, state: Slots, h: float) -> None:
         motion.clear_where(state.acceleration, state.resting)

@@ -19,8 +19,10 @@ from pyverlet.kernels.bounds import Bodies
 Array = NDArray[Any]
 
 _ROWS = ("position", "velocity", "acceleration")
-_COLUMNS = ("spin", "radius", "mass", "grown", "restitution", "friction")
+_SET = ("radius", "mass", "restitution", "friction")
+_COLUMNS = ("spin", "grown", *_SET)
 _MARKS = ("category", "mask")
+_GIVEN = (*_SET, *_MARKS)
 _NUMBERS = ("number",)
 
 EVERYONE = 0xFFFFFFFF
@@ -168,7 +170,8 @@ class Slots:
         self.resting = np.zeros(count, np.uint8)
         self.fed = np.concatenate((fed, np.zeros(count - len(fed), np.uint8)))
         self._order = np.zeros(0, np.int32), np.zeros(0, np.uint8)
-        self._changed = True
+        self._given: dict[str, Any] = {name: np.zeros(count, np.uint32 if name in _MARKS else self.dtype) for name in _GIVEN}
+        self._changed = self._grows = True
         self.hits = np.full(count, -1, self.dtype)
         self.spent = np.zeros((count, 2))
         self.category = self.mask = np.empty(0, np.uint32)
@@ -194,31 +197,35 @@ class Slots:
         if len(state) != len(self):
             self._order = self.particle, self.fed
             self._resize(len(state))
-        resized, self._changed = self._changed, False
-        for name in _ROWS:
-            motion.take_rows(getattr(self, name), getattr(state, name), self.particle)
-        motion.take_checking(self.spin, state.spin, self.particle)
-        motion.take_checking(self.grown, state.grown, self.particle)
-        changed = motion.take_checking(self.radius, state.radius, self.particle)
-        if motion.take_checking(self.mass, state.mass, self.particle):
-            with np.errstate(divide="ignore"):  # a mass of 0 is refused by the world, with a sentence
-                np.divide(1, self.mass, out=self.inverse_mass)
-            changed = True
-        for name in ("restitution", "friction"):
-            motion.take_checking(getattr(self, name), getattr(state, name), self.particle)
-            setattr(self, f"most_{name}", float(getattr(self, name).max(initial=-1.0)))
-        changed |= self._take_marks(state)
-        self.resize()
-        return bool(resized or changed)
+        motion.take_motion(
+            self.position, self.velocity, self.acceleration, self.spin,
+            state.position, state.velocity, state.acceleration, state.spin, self.particle,
+        )  # fmt: skip
+        # What seldom changes is compared in the user's order, where neighbours in memory need no index.
+        now = (state.radius, state.mass, state.restitution, state.friction, state.category, state.mask)
+        if self._grows or self.size is not self.radius or motion.any_differs(*(*self._given.values(), *now)):
+            return self._take_given(state)
+        return False
 
-    def _take_marks(self, state: State) -> bool:
-        if (state.category == 1).all() and (state.mask == EVERYONE).all():
-            changed = len(self.category) > 0
-            self.category = self.mask = np.empty(0, np.uint32)
-            return changed
-        before = (self.category, self.mask)
-        self.category, self.mask = state.category[self.particle], state.mask[self.particle]
-        return not (np.array_equal(before[0], self.category) and np.array_equal(before[1], self.mask))
+    def _take_given(self, state: State) -> bool:
+        """Copy in what users set and engines leave alone."""
+        changed = self._changed
+        for name in _GIVEN:
+            given, now = self._given[name], getattr(state, name)
+            if name not in ("restitution", "friction"):
+                changed |= motion.differs(given, now)
+            given[:] = now
+        for name in (*_SET, "grown"):
+            np.take(getattr(state, name), self.particle, out=getattr(self, name))
+        with np.errstate(divide="ignore"):  # a mass of 0 is refused by the world, with a sentence
+            np.divide(1, self.mass, out=self.inverse_mass)
+        self.most_restitution, self.most_friction = (float(a.max(initial=-1.0)) for a in (self.restitution, self.friction))
+        filters = (state.category != 1).any() or (state.mask != EVERYONE).any()
+        order = self.particle if filters else self.particle[:0]
+        self.category, self.mask = state.category[order], state.mask[order]
+        self.resize()
+        self._grows, self._changed = self.size is not self.radius, False
+        return bool(changed)
 
     def clear_notes(self) -> None:
         """Forget what walls have noted in the last frame."""
@@ -238,10 +245,13 @@ class Slots:
 
     def scatter(self, state: State) -> None:
         """Copy what a frame changes back to the user's arrays."""
-        for name in _ROWS:
-            motion.put_rows(getattr(state, name), getattr(self, name), self.particle)
-        motion.put(state.spin, self.spin, self.particle)
-        motion.put(state.grown, self.grown, self.particle)
+        motion.put_motion(
+            self.position, self.velocity, self.acceleration, self.spin,
+            state.position, state.velocity, state.acceleration, state.spin, self.particle,
+        )  # fmt: skip
+        self._grows |= self.size is not self.radius  # some may have been found on top of others since the gathering
+        if self._grows:
+            state.grown[self.particle] = self.grown
 
     def in_users_order(self) -> State:
         """A state with the positions, velocities, spins, radii and masses of now."""
@@ -307,6 +317,15 @@ def advance(out: Array, base: Array, slope: Array, h: float) -> None:
         motion.advance_serial(out, base, slope, out.dtype.type(h))
     else:
         motion.advance_parallel(out, base, slope, out.dtype.type(h))
+
+
+def kick_drift(state: Slots, h: float) -> None:
+    """velocity += h * acceleration, then position += h * velocity."""
+    arguments = (state.position, state.velocity, state.acceleration, state.real(h))
+    if len(state) < SERIAL_BELOW:
+        motion.kick_drift_serial(*arguments)
+    else:
+        motion.kick_drift_parallel(*arguments)
 
 
 def farthest(position: Array, reference: Array) -> float:

