@@ -17,7 +17,7 @@ ROOT = Path(pyverlet.__file__).parent
 LAYERS = (
     {"errors", "constants", "_jit", "checks", "progress"},
     {"state", "group", "kernels"},
-    {"integrators", "forces", "bounds", "obstacles", "naive", "broadphase", "events", "collisions", "energy", "ledger", "links"},
+    {"integrators", "forces", "bounds", "obstacles", "naive", "grids", "broadphase", "events", "collisions", "energy", "ledger", "links"},
     {"world", "actors", "particles", "measures", "queries", "saved", "doors", "profile", "clock", "warmup", "panels", "builders"},
     {"scenes", "report", "lab", "picture"},
     {"viewers", "record", "draw"},
@@ -28,6 +28,7 @@ BESIDE = {
     "checks": {"errors"},
     "state": {"kernels"},
     "group": {"state"},
+    "broadphase": {"grids"},
     "collisions": {"broadphase", "events"},
     "events": {"broadphase"},
     "ledger": {"forces", "links"},
