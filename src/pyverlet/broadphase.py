@@ -11,19 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet import checks
-from pyverlet.constants import (
-    CELLS_PER_PARTICLE,
-    COLOUR_SLOTS,
-    GRID_SPREAD,
-    LIST_OLD,
-    LIST_YOUNG,
-    SKIN,
-    SKIN_LEAST,
-    SKIN_MOST,
-    STRIP_PARTICLES,
-    STRIPS,
-)
-from pyverlet.kernels import grid
+from pyverlet.constants import REBUILD_PAIRS, SAMPLE, SKIN, SKIN_LEAST, SKIN_MOST, SKIN_STEP, UNSORTED
+from pyverlet.grids import Grids
+from pyverlet.kernels import pairs as kernels
 from pyverlet.state import Slots, farthest
 
 Array = NDArray[Any]
@@ -127,7 +117,7 @@ class _AllPairs(BroadPhase):
     def _fill(self, state: Slots) -> int:
         pairs = self.list
         found = int(
-            grid.list_all_pairs(
+            kernels.list_all_pairs(
                 state.position, state.radius, state.inverse_mass, state.category, state.mask, pairs.pair_i, pairs.pair_j
             )
         )
@@ -158,52 +148,22 @@ class Fast:
         return _SortedCells(dtype, self.skin)
 
 
-@dataclass
-class _Layout:
-    """A grid of `rows` x `columns` square cells of side `cell`, its corner at (x0, y0)."""
-
-    x0: float
-    y0: float
-    cell: float
-    columns: int
-    rows: int
-
-    @classmethod
-    def fit(cls, position: Array, cell: float) -> _Layout:
-        """The grid over all particles; over the bulk of them if a few are so far away that it would grow too large."""
-        x0, y0, x1, y1 = map(float, grid.extent(position))
-        most = CELLS_PER_PARTICLE * len(position) + 64
-        layout = cls._over(x0, y0, x1, y1, cell)
-        if layout.columns * layout.rows > most:
-            mean, spread = position.mean(axis=0, dtype=np.float64), position.std(axis=0, dtype=np.float64) * GRID_SPREAD
-            if np.isfinite(spread).all():
-                (x0, y0), (x1, y1) = np.maximum(mean - spread, (x0, y0)), np.minimum(mean + spread, (x1, y1))
-            layout = cls._over(x0, y0, x1, y1, cell)
-        while layout.columns * layout.rows > most:
-            cell *= 1.5
-            layout = cls._over(x0, y0, x1, y1, cell)
-        return layout
-
-    @classmethod
-    def _over(cls, x0: float, y0: float, x1: float, y1: float, cell: float) -> _Layout:
-        return cls(x0, y0, cell, int((x1 - x0) / cell) + 1, int((y1 - y0) / cell) + 1)
-
-
 class _SortedCells(BroadPhase):
     def __init__(self, dtype: np.dtype[Any], skin: float | None) -> None:
         self.list = PairList(dtype)
         self.skin_diameters = SKIN if skin is None else skin
         self._adapts = skin is None
         self._room = 4  # pairs kept free for each particle; six neighbours make three pairs
-        self._age = 0
-        self._allowed = -1.0  # distance anyone may move before the list is rebuilt, m; negative: rebuild now
-        self.built = np.empty((0, 2), dtype)
+        self._age = 0  # substeps the list has lasted
+        self._excess = 0.0  # pairs for each particle that are listed only because of the skin
+        self._allowed = -1.0  # distance anyone may move from `_checked` before we look closer, m; negative: rebuild now
+        self.built = self._checked = np.empty((0, 2), dtype)
         self._reserve(0)
 
     def update(self, state: Slots) -> None:
         self._age += 1
         if self._allowed >= 0:
-            if farthest(state.position, self.built) <= self._allowed:
+            if self._still_good(state):
                 return
             if self._adapts:
                 self._adapt()
@@ -214,65 +174,74 @@ class _SortedCells(BroadPhase):
     def forget(self) -> None:
         self._allowed = -1.0
 
-    def save(self) -> tuple[Array | None, float, int]:
-        return (self.built.copy() if self._allowed >= 0 else None, self.skin_diameters, self._age)
+    def save(self) -> tuple[Any, ...]:
+        kept = (self.built.copy(), self._checked.copy(), self._allowed) if self._allowed >= 0 else None
+        return kept, self.skin_diameters, self._age
 
-    def restore(self, saved: tuple[Array | None, float, int], state: Slots) -> None:
+    def restore(self, saved: tuple[Any, ...], state: Slots) -> None:
         self.forget()
-        built, self.skin_diameters, age = saved
-        if built is not None and len(built) == len(state):  # or particles had been added that it had not met yet
-            # The list is a function of the positions it was built from, and sorting what is sorted changes nothing.
+        kept, self.skin_diameters, age = saved
+        if kept is not None and len(kept[0]) == len(state):  # or particles had been added that it had not met yet
+            # The list is a function of the positions it was built from and the order of the slots, which is that of then.
+            built, checked, allowed = kept
             state.position[:] = built
             self.rebuild(state)
+            self._checked, self._allowed = checked.copy(), allowed
         self._age = age
 
+    def _still_good(self, state: Slots) -> bool:
+        """Whether no pair that is not listed can touch. The cheap test first, and again after a closer look has said how much is left."""
+        if farthest(state.position, self._checked) <= self._allowed:
+            return True
+        slack = self._grids.slack(state.position, self.built, 2.0 * self._half_skin)
+        if not slack > 0:
+            return False
+        self._checked, self._allowed = state.position.copy(), 0.5 * slack
+        return True
+
     def _adapt(self) -> None:
-        if self._age <= LIST_YOUNG:
-            self.skin_diameters = min(self.skin_diameters * 1.25, SKIN_MOST)
-        elif self._age > LIST_OLD:
-            self.skin_diameters = max(self.skin_diameters * 0.9, SKIN_LEAST)
+        """Towards the skin where a substep pays as much for rebuilding as for the pairs that are listed for nothing."""
+        rebuilding = REBUILD_PAIRS / self._age
+        if rebuilding > self._excess:
+            self.skin_diameters = min(self.skin_diameters * SKIN_STEP, SKIN_MOST)
+        elif rebuilding * SKIN_STEP**2 < self._excess:
+            self.skin_diameters = max(self.skin_diameters / SKIN_STEP, SKIN_LEAST)
 
     def rebuild(self, state: Slots) -> None:
         """Sort the particles by cell and list the pairs."""
         self.rebuilds += 1
         self._age = 0
         skin = self.skin_diameters * 2.0 * float(state.radius.mean(dtype=np.float64))
-        layout = _Layout.fit(state.position, 2.0 * float(state.radius.max()) + skin)
-        start = self._sort(state, layout)
-        strip_row = np.empty(STRIPS + 1, np.int64)
-        least = max(len(state) // STRIPS, STRIP_PARTICLES)
-        strips = grid.cut_strips(start, layout.columns, layout.rows, least, strip_row)
-        self.list.set_strips(strips)
-        self._fill(state, layout, start, strip_row[: strips + 1], state.real(skin))
-        self.built = state.position.copy()
-        self._allowed = 0.5 * skin
+        self._half_skin = 0.5 * skin
+        self._grids = Grids(state.position, state.radius, skin)
+        if self._grids.falls > UNSORTED * len(state):
+            state.reorder(self._grids.order)
+            self._grids.renumber()
+        self._fill(state, state.real(skin))
+        self.built = self._checked = state.position.copy()
+        self._allowed = self._half_skin
+        which = (self.list.first, self.list.count, self.list.pair_i, self.list.pair_j)
+        looked, far = kernels.count_far(state.position, state.radius, *which, state.real(self._half_skin), SAMPLE)
+        self._excess = 2.0 * far / max(looked, 1) * int(self.list.count.sum()) / max(len(state), 1)
 
-    def _sort(self, state: Slots, layout: _Layout) -> Array:
-        real = state.real
-        cell = np.empty(len(state), np.int32)
-        start = np.empty(layout.columns * layout.rows + 1, np.int64)
-        grid.count_cells(
-            state.position, real(layout.x0), real(layout.y0), real(1 / layout.cell), layout.columns, layout.rows, cell, start
-        )
-        order = np.empty(len(state), np.int32)
-        grid.sort_by_cell(cell, start, order)
-        state.reorder(order)
-        return start
-
-    def _fill(self, state: Slots, layout: _Layout, start: Array, strip_row: Array, skin: Any) -> None:
-        pairs = self.list
+    def _fill(self, state: Slots, skin: Any) -> None:
+        pairs, cells = self.list, self._grids
+        rows, held = cells.strips()
+        picky = len(state.category) > 0 or not state.inverse_mass.all()
+        pairs.set_strips(len(rows) - 1)
         if len(pairs.pair_i) != self._room * len(state):
             self._reserve(len(state))
         while True:
-            grid.list_pairs(
-                state.position, state.radius, state.inverse_mass, state.category, state.mask, start, layout.columns,
-                layout.rows, strip_row, skin, self._room, COLOUR_SLOTS, self._raw_i, self._raw_j, self._colour,
-                pairs.pair_i, pairs.pair_j, pairs.first, pairs.count,
+            first = held * self._room
+            kernels.list_pairs(
+                state.position, state.radius, cells.order, cells.levels, cells.start, rows, first, skin,
+                picky, state.category, state.mask, state.inverse_mass,
+                self._spot, self._raw_i, self._raw_j, self._colour, self._used, pairs.pair_i, pairs.pair_j, pairs.count,
             )  # fmt: skip
-            held = np.diff(start[strip_row * layout.columns])
-            if (pairs.count <= held * self._room).all():
+            if (pairs.count <= np.diff(first)).all():
+                pairs.first[:] = first[:-1]
                 return
-            self._room = int(np.ceil(1.25 * (pairs.count / np.maximum(held, 1)).max()))
+            self._room = int(np.ceil(1.25 * (pairs.count / np.maximum(np.diff(held), 1)).max()))
             self._reserve(len(state))
 
     def _reserve(self, particles: int) -> None:
@@ -280,4 +249,6 @@ class _SortedCells(BroadPhase):
         self.list.make_room(pairs)
         self._raw_i = np.empty(pairs, np.uint32)
         self._raw_j = np.empty(pairs, np.uint32)
-        self._colour = np.empty(pairs, np.uint16)
+        self._colour = np.empty(pairs, np.uint8)
+        self._used = np.empty(particles, np.int32)
+        self._spot = np.empty((particles, 3), self.built.dtype)

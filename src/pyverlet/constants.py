@@ -14,13 +14,33 @@ On a settling cage of 20,000, 0.1 rebuilt 1.7 times as often and listed 1 % fewe
 CELLS_PER_PARTICLE: Final = 4
 """The grid never has more cells than this many per particle; beyond it the cells grow. Memory stays linear in n."""
 
-SKIN_LEAST: Final = 0.1
+SKIN_LEAST: Final = 0.02
 SKIN_MOST: Final = 0.6
 """Mean diameters between which the skin adapts: below, trembling piles rebuild; above, most pairs are listed for nothing."""
 
-LIST_YOUNG: Final = 4
-LIST_OLD: Final = 32
-"""Substeps: a list outlived sooner than LIST_YOUNG had too small a skin, one that lasted longer than LIST_OLD too large a one."""
+SKIN_STEP: Final = 1.25
+"""Factor by which the skin adapts at a rebuild."""
+
+REBUILD_PAIRS: Final = 20.0
+"""Candidate pairs that contacts solve in a substep in the time in which the list is built anew; all for each particle."""
+
+SAMPLE: Final = 16
+"""Every so many pairs of a new list are looked at to tell how many the skin has brought."""
+
+UNSORTED: Final = 0.1
+"""Slots are put in order again when so many of them, as a part of all, are followed by one that belongs before."""
+
+COLUMNS: Final = 2
+"""Columns of a grid in the width of a row's height: narrower ones cut out neighbours more closely, and are more cells to count."""
+
+LEVELS: Final = 16
+"""Grids at most, each with cells half as large as the one before."""
+
+ROUNDING: Final = 1.001
+"""Cells are larger than the longest distance of a listed pair by this factor, so that rounding cannot skip a row."""
+
+BLOCK_ROWS: Final = 2
+"""Rows and columns, of the largest cells, of the blocks in which displacements are compared."""
 
 GRID_SPREAD: Final = 4.0
 """Standard deviations about the mean that the grid covers when a few outliers would stretch it; those share its rim cells."""
@@ -32,9 +52,9 @@ Fixed, never derived from the number of threads, so that any number gives the sa
 STRIP_PARTICLES: Final = 256
 """A strip has at least this many particles: below it, starting a thread costs more than it saves."""
 
-COLOUR_SLOTS: Final = 6
-"""Pairs of one cell that get colours of their own; later ones share the last. Six circles touch a circle, three pairs of its own.
-Only speed depends on it, never correctness."""
+COLOURS: Final = 12
+"""Colours of pairs in a strip. Up to ten listed neighbours of a circle have pairs of different colours with nearly any order of
+choosing; only speed depends on it, never correctness."""
 
 SERIAL_BELOW: Final = 32768
 """Worlds with fewer particles run the simple loops on one thread: over 32,768 of them that takes 22 us, 15 on two threads, and

@@ -1,0 +1,103 @@
+"""Nested grids over all particles, what stands in their cells, and how far the particles have moved against each other since."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.constants import BLOCK_ROWS, CELLS_PER_PARTICLE, COLUMNS, GRID_SPREAD, LEVELS, ROUNDING, STRIP_PARTICLES, STRIPS
+from pyverlet.kernels import grid
+
+Array = NDArray[Any]
+
+
+class Grids:
+    """Circles of these radii at these positions, (n, 2), sorted by cell; any two nearer than `skin` are in neighbouring cells.
+
+    Attributes:
+        levels: the grids, as kernels take them.
+        start: (cells + 1,) circles in all cells before each.
+        order: (n,) the row of `position` of each circle, in the order of the cells.
+        falls: how often `order` falls: 0 if the positions are in that order already, n / 2 if they are in none.
+    """
+
+    def __init__(self, position: Array, radius: Array, skin: float) -> None:
+        self.levels = _fit(position, radius, skin)
+        self.start = np.empty(_cells(self.levels) + 1, np.int32)
+        cell = np.empty(len(position), np.int32)
+        grid.count_level_cells(position, radius, self.levels, cell, self.start)
+        self.order = np.empty(len(position), np.int32)
+        self.falls = int(grid.sort_by_cell(cell, self.start, self.order))
+        self._boxes: list[Array] = []
+
+    def renumber(self) -> None:
+        """The rows of `position` are in the order of the cells now."""
+        self.order = np.arange(len(self.order), dtype=np.int32)
+        self.falls = 0
+
+    def strips(self) -> tuple[Array, Array]:
+        """(strips + 1,) first row of each strip, and how many circles stand in all before it."""
+        row, held = np.empty(STRIPS + 1, np.int64), np.empty(STRIPS + 1, np.int64)
+        strips = grid.cut_strips(self.levels, self.start, max(len(self.order) // STRIPS, STRIP_PARTICLES), row, held)
+        return row[: strips + 1], held[: strips + 1]
+
+    def slack(self, position: Array, built: Array, skin: float) -> float:
+        """How much nearer any pair that was farther apart than `skin` may still come before it can touch, m; negative: too near.
+
+        For displacements u_i, | |x_i - x_j| - |b_i - b_j| | <= |u_i - u_j|: all that counts is how differently two circles have
+        moved that were near each other, and that is no more than the diagonal of the box of all displacements around them.
+        Circles in blocks that are not neighbours have more than the block between them.
+        """
+        cell = 1.0 / float(self.levels.along[0])
+        if not self._boxes:
+            shape = (-(-int(n) // BLOCK_ROWS) for n in (self.levels.height[0], self.levels.width[0] // COLUMNS))
+            self._boxes = [np.empty((*shape, 2), position.dtype)]
+            self._boxes.append(np.empty_like(self._boxes[0]))
+        grid.displacement_boxes(position, built, self.order, self.levels, self.start, *self._boxes)
+        near, far = grid.spreads(*self._boxes)
+        return min(skin - float(near), BLOCK_ROWS * cell - 2.0 * float(self.levels.largest[0]) - float(far))
+
+
+def _cells(levels: grid.Levels) -> int:
+    return int((levels.width * levels.height).sum())
+
+
+def _fit(position: Array, radius: Array, skin: float) -> grid.Levels:
+    """Levels over all particles; over the bulk of them if a few are so far away that the cells would be too many."""
+    real = position.dtype.type
+    x0, y0, x1, y1 = map(float, grid.extent(position))
+    most = CELLS_PER_PARTICLE * len(position) + 64
+    largest = float(radius.max())
+    cell = (2.0 * largest + skin) * ROUNDING
+
+    def size(cell: float) -> tuple[int, int]:
+        return int((x1 - x0) / cell) + 1, int((y1 - y0) / cell) + 1
+
+    def cells(cell: float) -> int:
+        columns, rows = size(cell)
+        return columns * rows * COLUMNS
+
+    if cells(cell) > most:
+        mean, spread = position.mean(axis=0, dtype=np.float64), position.std(axis=0, dtype=np.float64) * GRID_SPREAD
+        if np.isfinite(spread).all():
+            (x0, y0), (x1, y1) = np.maximum(mean - spread, (x0, y0)), np.minimum(mean + spread, (x1, y1))
+    while cells(cell) > most:
+        cell *= 1.5
+    columns, rows = size(cell)
+    shift = np.arange(LEVELS)
+    fits = (cell / 2.0**shift / ROUNDING - skin) / 2.0
+    deepest = int(np.searchsorted(-fits, -float(radius.min()), side="right"))
+    count = np.cumsum(columns * rows * COLUMNS << 2 * shift)
+    shift = shift[: max(1, min(deepest, int(np.searchsorted(count, most, side="right"))))]
+    if len(shift) > 1:
+        held = np.empty(len(shift), np.int64)
+        fits = np.minimum(fits, largest)
+        grid.count_levels(radius, fits[shift].astype(position.dtype), held)
+        shift = shift[held > 0]
+    width, height = columns * COLUMNS << shift, rows << shift
+    along = (2.0**shift / cell).astype(position.dtype)
+    base = np.cumsum(width * height) - width * height
+    largest_of = np.minimum(fits[shift], largest).astype(position.dtype)
+    return grid.Levels(real(x0), real(y0), largest_of, base, width, height, shift, along * real(COLUMNS), along)

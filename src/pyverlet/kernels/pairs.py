@@ -1,0 +1,207 @@
+"""Broad phase, second half: which pairs of circles might touch soon.
+
+Rows of level 0 of the grid are cut into strips, and each strip lists its candidate pairs: circles nearer than the sum of their
+radii plus a skin, whose cells are the same or neighbours on the level of the larger one. Every pair belongs to the strip of the one
+in the lower row of level 0, so a strip writes only to its own particles and to the lowest row of the next strip: even strips may be
+solved in parallel, then odd ones.
+
+Inside a strip pairs are ordered by colour: no two pairs of a colour share a particle, so that the processor can overlap them.
+A circle with more pairs than there are colours has them spread over all colours.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pyverlet._jit import kernel, parallel_kernel, prange
+from pyverlet.constants import COLOURS, COLUMNS
+from pyverlet.kernels.grid import before_row, cell_number
+
+# Number of the lowest bit of a power of two of 32 bits, by its product with a de Bruijn sequence.
+_DE_BRUIJN = 0x077CB531
+_BIT = np.zeros(32, np.int64)
+for _k in range(32):
+    _BIT[((_DE_BRUIJN << _k) & 0xFFFFFFFF) >> 27] = _k
+_ALL = (1 << COLOURS) - 1
+
+
+@kernel
+def _accept(category, mask, inverse_mass, a, b):
+    """Whether one of a and b is free, and each takes the other's category."""
+    free = (inverse_mass[a] > 0) | (inverse_mass[b] > 0)
+    if category.shape[0] == 0:
+        return free
+    return free & (category[a] & mask[b] != 0) & (category[b] & mask[a] != 0)
+
+
+@kernel
+def _near(spot, order, a, low, high, skin, picky, category, mask, inverse_mass, raw_i, raw_j, found):
+    """Note which of the places low to high are near place a."""
+    x, y, reach_a = spot[a, 0], spot[a, 1], spot[a, 2] + skin
+    for b in range(low, high):
+        dx = spot[b, 0] - x
+        dy = spot[b, 1] - y
+        reach = reach_a + spot[b, 2]
+        # Written whether or not it counts: an unpredictable branch costs more than the store.
+        if found < raw_i.shape[0]:
+            raw_i[found] = a
+            raw_j[found] = b
+        near = dx * dx + dy * dy < reach * reach
+        if picky:
+            near &= _accept(category, mask, inverse_mass, order[a], order[b])
+        found += near
+    return found
+
+
+@kernel
+def _near_larger(
+    spot, order, a, level, row0, row1, levels, start, skin, picky, category, mask, inverse_mass, raw_i, raw_j, found
+):  # fmt: skip
+    """Note which circles of the levels with larger cells, in the rows row0 to row1 of level 0, are near place a of `level`."""
+    x, y = spot[a, 0] - levels.x0, spot[a, 1] - levels.y0
+    for other in range(level):
+        wide, high, shift = levels.width[other], levels.height[other], levels.shift[other]
+        reach = spot[a, 2] + levels.largest[other] + skin
+        left = cell_number((x - reach) * levels.across[other], wide)
+        right = cell_number((x + reach) * levels.across[other], wide)
+        first = max(cell_number((y - reach) * levels.along[other], high), row0 << shift)
+        end = min(cell_number((y + reach) * levels.along[other], high) + 1, row1 << shift)
+        for row in range(first, end):
+            k = levels.base[other] + row * wide
+            found = _near(
+                spot, order, a, start[k + left], start[k + right + 1], skin, picky, category, mask, inverse_mass,
+                raw_i, raw_j, found,
+            )  # fmt: skip
+    return found
+
+
+@kernel
+def _list_strip(
+    spot, order, row0, row1, levels, start, skin, picky, category, mask, inverse_mass, raw_i, raw_j
+):  # fmt: skip
+    """Candidate pairs, as places in the order of the cells, of rows row0 to row1; how many there are, also beyond the room."""
+    found = 0
+    rows = levels.height[0]
+    for level in range(levels.base.shape[0]):
+        wide, high, shift, across = levels.width[level], levels.height[level], levels.shift[level], levels.across[level]
+        for row in range(row0 << shift, row1 << shift):
+            this = levels.base[level] + row * wide
+            above = this + wide
+            for a in range(start[this], start[this + wide]):
+                column = cell_number((spot[a, 0] - levels.x0) * across, wide)
+                left, right = max(column - COLUMNS, 0), min(column + COLUMNS, wide - 1)
+                found = _near(
+                    spot, order, a, a + 1, start[this + right + 1], skin, picky, category, mask, inverse_mass,
+                    raw_i, raw_j, found,
+                )  # fmt: skip
+                if row + 1 < high:
+                    found = _near(
+                        spot, order, a, start[above + left], start[above + right + 1], skin, picky, category, mask,
+                        inverse_mass, raw_i, raw_j, found,
+                    )  # fmt: skip
+                if level > 0:
+                    found = _near_larger(
+                        spot, order, a, level, row0, rows, levels, start, skin, picky, category, mask, inverse_mass,
+                        raw_i, raw_j, found,
+                    )  # fmt: skip
+        # Of the first row of the next strip, what is nearer to larger ones below: these pairs belong to this strip.
+        if level > 0:
+            for a in range(before_row(levels, start, level, row1), before_row(levels, start, level, row1 + 1)):
+                found = _near_larger(
+                    spot, order, a, level, row0, row1, levels, start, skin, picky, category, mask, inverse_mass,
+                    raw_i, raw_j, found,
+                )  # fmt: skip
+    return found
+
+
+@kernel
+def _forget_colours(used, row0, row1, levels, start):
+    """No colours are used in the rows row0 to row1 of level 0."""
+    for level in range(levels.base.shape[0]):
+        used[before_row(levels, start, level, row0) : before_row(levels, start, level, row1)] = 0
+
+
+@kernel
+def _colour_strip(used, raw_i, raw_j, found, colour, begin):
+    """Give each pair the lowest colour that neither of its circles has; begin[c]: pairs of the colours before c."""
+    begin[:] = 0
+    for p in range(found):
+        i, j = raw_i[p], raw_j[p]
+        free = ~np.int64(used[i] | used[j]) & _ALL
+        lowest = free & -free
+        used[i] |= lowest
+        used[j] |= lowest
+        c = _BIT[((lowest * _DE_BRUIJN) & 0xFFFFFFFF) >> 27] if free != 0 else p % COLOURS
+        colour[p] = c
+        begin[c + 1] += 1
+    for c in range(COLOURS):
+        begin[c + 1] += begin[c]
+
+
+@parallel_kernel
+def list_pairs(
+    position, radius, order, levels, start, strip_row, first, skin, picky, category, mask, inverse_mass,
+    spot, raw_i, raw_j, colour, used, pair_i, pair_j, count,
+):  # fmt: skip
+    """Fill the pair list of every strip: pair_i, pair_j[first[s] : first[s] + count[s]], slots.
+
+    first has one entry more than there are strips. A strip that needs more room than up to the next reports its full count and
+    lists nothing: the caller makes room and calls again, so that no pair is ever dropped. Not `picky`: everyone collides.
+    spot, raw_i, raw_j, colour, used: scratch.
+    """
+    for k in prange(order.shape[0]):
+        i = order[k]
+        spot[k, 0] = position[i, 0]
+        spot[k, 1] = position[i, 1]
+        spot[k, 2] = radius[i]
+    for parity in range(2):
+        for half in prange((strip_row.shape[0] - parity) // 2):
+            s = 2 * half + parity
+            a, b = first[s], first[s + 1]
+            found = _list_strip(
+                spot, order, strip_row[s], strip_row[s + 1], levels, start, skin, picky, category, mask, inverse_mass,
+                raw_i[a:b], raw_j[a:b],
+            )  # fmt: skip
+            count[s] = found
+            if found <= b - a:
+                _forget_colours(used, strip_row[s], strip_row[s + 1] + 1, levels, start)
+                begin = np.empty(COLOURS + 1, np.int64)
+                _colour_strip(used, raw_i[a:b], raw_j[a:b], found, colour[a:b], begin)
+                for p in range(a, a + found):
+                    c = colour[p]
+                    to = a + begin[c]
+                    begin[c] += 1
+                    pair_i[to] = order[raw_i[p]]
+                    pair_j[to] = order[raw_j[p]]
+
+
+@kernel
+def count_far(position, radius, first, count, pair_i, pair_j, gap, step):
+    """(pairs looked at, every step-th; how many of these are farther from touching than `gap`)."""
+    looked = far = 0
+    for s in range(count.shape[0]):
+        for k in range(first[s], first[s] + count[s], step):
+            i, j = pair_i[k], pair_j[k]
+            dx = position[j, 0] - position[i, 0]
+            dy = position[j, 1] - position[i, 1]
+            reach = radius[i] + radius[j] + gap
+            looked += 1
+            far += dx * dx + dy * dy > reach * reach
+    return looked, far
+
+
+@kernel
+def list_all_pairs(position, radius, inverse_mass, category, mask, pair_i, pair_j):
+    """The readable reference, O(n^2): every overlapping pair, in natural order. Returns how many, also beyond the room."""
+    found = 0
+    for i in range(position.shape[0]):
+        for j in range(i + 1, position.shape[0]):
+            dx = position[j, 0] - position[i, 0]
+            dy = position[j, 1] - position[i, 1]
+            reach = radius[i] + radius[j]
+            if dx * dx + dy * dy < reach * reach and _accept(category, mask, inverse_mass, i, j):
+                if found < pair_i.shape[0]:
+                    pair_i[found] = i
+                    pair_j[found] = j
+                found += 1
+    return found
