@@ -78,6 +78,13 @@ class BroadPhase(ABC):
     def update(self, state: Slots) -> None:
         """Make the list good again if anyone may have moved too far since it was built. May reorder the slots."""
 
+    def renew(self, state: Slots) -> None:
+        """Make the list anew at once: in the middle of a frame somebody has turned out to be free."""
+        if self.renewing:
+            self.renewing(state, self.list)
+        self.forget()
+        self.update(state)
+
     @abstractmethod
     def forget(self) -> None:
         """The list is no longer valid (particles, radii or masses changed)."""

@@ -15,6 +15,7 @@ from pyverlet.errors import InputError
 from pyverlet.events import Events
 from pyverlet.kernels import contacts, impacts
 from pyverlet.packs import Packs
+from pyverlet.sleep import Sleep
 from pyverlet.state import Slots, State
 
 Unlist = Callable[[PairList, Any], None]
@@ -56,7 +57,14 @@ class Overlap(NamedTuple):
 class ContactSolver:
     """The contact stages of a substep, in the order `World.step` calls them."""
 
-    def __init__(self, settings: Collisions, dtype: np.dtype[Any], unlist: Unlist, events: Events | None = None) -> None:
+    def __init__(
+        self,
+        settings: Collisions,
+        dtype: np.dtype[Any],
+        unlist: Unlist,
+        events: Events | None = None,
+        sleep: Sleep | None = None,
+    ) -> None:
         self.settings = settings
         self.broad_phase = settings.method.start(dtype)
         self._unlist = unlist
@@ -64,6 +72,7 @@ class ContactSolver:
         self._packs = Packs(dtype)
         self._packed = False
         self._events = events
+        self._sleep = sleep
         if events is not None:
             self.broad_phase.list.listen()
             self.broad_phase.renewing = events.collect
@@ -93,6 +102,9 @@ class ContactSolver:
     def find(self, state: Slots, lag: float) -> None:
         """Broad phase: bring the list of candidate pairs up to date, and note events before contacts change a velocity."""
         self._list(state)
+        while self._sleep and self._sleep.touched(state, self.broad_phase.list):
+            self.broad_phase.renew(state)
+            self._list(state)
         if self._events is not None:
             self._events.listen(state, self.broad_phase.list, lag)
 
@@ -157,6 +169,11 @@ class ContactSolver:
         pairs = self.broad_phase.list
         notes = (pairs.touching, pairs.impulse, pairs.touches)
         contacts.mark_touching(pairs.first, pairs.pair_i, pairs.pair_j, *notes, state.resting)
+
+    def rest(self, state: Slots, dt: float, gravity: float) -> None:
+        """At the end of a frame: let those fall asleep that are tired; the list has no use for pairs among them."""
+        if self._sleep and self._sleep.end(state, self.broad_phase.list, dt, gravity):
+            self.broad_phase.forget()
 
 
 def find_contacts(state: State, method: Fast | BruteForce) -> np.ndarray[Any, np.dtype[np.int64]]:

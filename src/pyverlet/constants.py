@@ -72,6 +72,15 @@ REST_ACCELERATIONS: Final = 4.0
 """An approach slower than this many |a| h is contact at rest, not an impact: 0.08 m/s under gravity at 480 substeps a second. One
 substep of gravity is 1. Four times as much settled the scene `box` no better."""
 
+SLEEP_SPEED: Final = 0.02
+"""Of sqrt(g r): circles slower than this are calm, 0.04 m/s at a radius of 0.5 m. Box2D has 0.05 m/s for all."""
+
+SLEEP_AFTER_S: Final = 0.5
+"""s an island must have been calm before it falls asleep; the time Box2D takes too."""
+
+SLEEP_NEAR: Final = 1.01
+"""Circles nearer than this times their contact distance belong to one island."""
+
 PUSHED: Final = 0.6
 FED: Final = 1.6
 """Parts of an overlap that a substep takes from the positions, and feeds, divided by h, into the velocities. Less than all of

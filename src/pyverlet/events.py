@@ -94,6 +94,8 @@ class Events:
         self._keys.append(slots.particle[at_wall].astype(np.int64) << 32)
         self._speeds.append(slots.hits[at_wall].astype(np.float64))
         keys, speeds = _numbered(np.concatenate(self._keys), state), np.concatenate(self._speeds)
+        asleep = self._sleeping(slots, state)  # their pairs are not listed, but go on
+        keys, speeds = np.concatenate((keys, asleep)), np.concatenate((speeds, np.full(len(asleep), -1.0)))
         order = np.argsort(keys)
         keys, speeds = keys[order], speeds[order]
         first = np.flatnonzero(np.diff(keys, prepend=-1))
@@ -108,6 +110,12 @@ class Events:
         self._touching = keys
         self.forget()
 
+    def _sleeping(self, slots: Slots, state: State) -> Array:
+        """Those of the contacts of the frame before whose circles sleep."""
+        numbers = np.sort(state.number[slots.particle[slots.island >= 0]])
+        b = (self._touching & _LOWER) - 1
+        return self._touching[_among(self._touching >> 32, numbers) & ((b < 0) | _among(b, numbers))]
+
 
 def _numbered(keys: Array, state: State) -> Array:
     """Keys from numbers, which particles keep, in the place of keys from indices, which they do not."""
@@ -116,7 +124,7 @@ def _numbered(keys: Array, state: State) -> Array:
 
 
 def _among(keys: Array, others: Array) -> Array:
-    """Which of the sorted keys are among the others, sorted too."""
+    """Which of the keys are among the others, which are sorted."""
     if not len(others):
         return np.zeros(len(keys), bool)
     where = np.searchsorted(others, keys).clip(max=len(others) - 1)

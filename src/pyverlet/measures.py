@@ -49,6 +49,13 @@ class Measures(Particles):
         return self._books.ledger
 
     @property
+    def asleep(self) -> Array:
+        """(n,) bool, which particles sleep; nobody does unless the world was built with World(sleep=True). A copy."""
+        asleep = np.zeros(len(self), bool)
+        asleep[self._slots.particle] = self._slots.island >= 0
+        return asleep
+
+    @property
     def tells_events(self) -> bool:
         """Whether `events` is there to be read."""
         return self._events is not None

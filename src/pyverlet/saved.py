@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pyverlet.actors import Actor
 from pyverlet.events import Events
 from pyverlet.ledger import Bookkeeper
+from pyverlet.sleep import Sleep
 from pyverlet.state import State
 
 Array = NDArray[Any]
@@ -24,10 +25,11 @@ class Saved:
     time: float
     frames: int
     h_last: float | None
-    slots: tuple[Array, Array]
+    slots: dict[str, Array]
     neighbours: Any
     books: Bookkeeper | None
     events: Events | None
+    sleep: Sleep | None
     obstacles: Any
     actors: list[tuple[Actor, Any]]
     links: Any

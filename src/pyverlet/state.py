@@ -129,6 +129,10 @@ class State:
             setattr(self, name, array[:count])
 
 
+# What a slot remembers from frame to frame beside the user's arrays: dtype, and value for a new particle.
+_REMEMBERED: dict[str, tuple[Any, Any]] = {"fed": (np.uint8, 0), "island": (np.int64, -1), "calm": (np.float32, 0)}
+
+
 class Slots:
     """The engine's working copy, in an order of its own: what forces, integrators, contacts and bounds see during a frame.
 
@@ -142,6 +146,7 @@ class Slots:
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
         start: (n, 2) positions before the integration of this substep, m. Kept only if circles rub.
         fed: (n,) 1 where a contact at rest fed the velocity in the last substep: it carries weight. Kept only if circles bounce.
+        island: (n,) number of the island a sleeping particle belongs to, -1 for those awake. calm: (n,) seconds it has been so.
         resting: (n,) 1 where a contact without bounce held the particle in the last substep.
         hits: (n,) largest speed with which the circle met a wall in this frame, m/s; negative: none.
         spent: (n, 2) energy that impacts on walls, and friction there, have taken in this frame, J, negative: to be summed, for
@@ -151,16 +156,20 @@ class Slots:
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self.dtype = dtype
         self.real = dtype.type
-        self._order = np.zeros(0, np.int32), np.zeros(0, np.uint8)
+        self._kept: dict[str, Array] = {}
         self._resize(0)
 
     def __len__(self) -> int:
         return len(self.radius)
 
     def _resize(self, count: int) -> None:
-        """Room for `count` particles: those of `_order`, as they stood, and behind them the new ones."""
-        order, fed = self._order
+        """Room for `count` particles: those of `_kept`, as they stood, and behind them the new ones."""
+        order = self._kept.pop("particle", np.zeros(0, np.int32))
         self.particle = np.concatenate((order, np.arange(len(order), count, dtype=np.int32)))
+        for name, (dtype, value) in _REMEMBERED.items():
+            column = np.full(count, value, dtype)
+            column[: len(order)] = self._kept.pop(name, column[: len(order)])
+            setattr(self, name, column)
         for name in (*_ROWS, "force"):
             setattr(self, name, np.zeros((count, 2), self.dtype))
         for name in (*_COLUMNS, "inverse_mass"):
@@ -168,8 +177,6 @@ class Slots:
         self.start = np.zeros((count, 2), self.dtype)
         self.size = self.radius
         self.resting = np.zeros(count, np.uint8)
-        self.fed = np.concatenate((fed, np.zeros(count - len(fed), np.uint8)))
-        self._order = np.zeros(0, np.int32), np.zeros(0, np.uint8)
         self._given: dict[str, Any] = {name: np.zeros(count, np.uint32 if name in _MARKS else self.dtype) for name in _GIVEN}
         self._changed = self._grows = True
         self.hits = np.full(count, -1, self.dtype)
@@ -191,11 +198,19 @@ class Slots:
     restitution: Array
     friction: Array
     inverse_mass: Array
+    fed: Array
+    island: Array
+    calm: Array
+
+    @property
+    def is_new(self) -> bool:
+        """Whether particles have come or gone since the last frame: nothing but their order is known yet."""
+        return self._changed
 
     def gather(self, state: State) -> bool:
         """Copy the user's arrays in. True if particles, radii or masses are not what they were: no list survives that."""
         if len(state) != len(self):
-            self._order = self.particle, self.fed
+            self._keep(slice(None))
             self._resize(len(state))
         motion.take_motion(
             self.position, self.velocity, self.acceleration, self.spin,
@@ -217,8 +232,7 @@ class Slots:
             given[:] = now
         for name in (*_SET, "grown"):
             np.take(getattr(state, name), self.particle, out=getattr(self, name))
-        with np.errstate(divide="ignore"):  # a mass of 0 is refused by the world, with a sentence
-            np.divide(1, self.mass, out=self.inverse_mass)
+        self.weigh()
         self.most_restitution, self.most_friction = (float(a.max(initial=-1.0)) for a in (self.restitution, self.friction))
         filters = (state.category != 1).any() or (state.mask != EVERYONE).any()
         order = self.particle if filters else self.particle[:0]
@@ -226,6 +240,16 @@ class Slots:
         self.resize()
         self._grows, self._changed = self.size is not self.radius, False
         return bool(changed)
+
+    def weigh(self) -> None:
+        """Bring `inverse_mass` up to date with `mass` and who sleeps."""
+        with np.errstate(divide="ignore"):  # a mass of 0 is refused by the world, with a sentence
+            np.divide(1, self.mass, out=self.inverse_mass)
+        self.inverse_mass[self.island >= 0] = 0
+
+    def _keep(self, slots: Any) -> None:
+        """Remember what outlives a change of size, of these slots."""
+        self._kept = {name: getattr(self, name)[slots] for name in ("particle", *_REMEMBERED)}
 
     def clear_notes(self) -> None:
         """Forget what walls have noted in the last frame."""
@@ -236,7 +260,8 @@ class Slots:
         """The user's particles are now at `now` (n,), or no more (-1): let those go, keep the order of the others."""
         order = now[self.particle].astype(np.int32)
         kept = order >= 0
-        self._order = order[kept], self.fed[kept]
+        self._keep(kept)
+        self._kept["particle"] = order[kept]
         self._resize(int(np.count_nonzero(kept)))
 
     def resize(self) -> None:
@@ -270,21 +295,21 @@ class Slots:
             motion.take_rows(new, old, order)
             setattr(self, name, new)
             self._scratch[0] = old
-        for name in (*_COLUMNS, "inverse_mass", "particle", "resting", "fed", "start", "hits"):
+        for name in (*_COLUMNS, "inverse_mass", "particle", "resting", *_REMEMBERED, "start", "hits"):
             setattr(self, name, getattr(self, name)[order])
         if len(self.category):
             self.category, self.mask = self.category[order], self.mask[order]
         self.resize()
         self._slot_of = None
 
-    def save(self) -> tuple[Array, Array]:
-        """What outlives a frame here and not in the user's arrays: the order, and who carried weight."""
-        return self.particle.copy(), self.fed.copy()
+    def save(self) -> dict[str, Array]:
+        """What outlives a frame here and not in the user's arrays: the order, who carried weight, who sleeps."""
+        return {name: getattr(self, name).copy() for name in ("particle", *_REMEMBERED)}
 
-    def restore(self, saved: tuple[Array, Array], state: State) -> None:
+    def restore(self, saved: dict[str, Array], state: State) -> None:
         """Take up what `save` returned and gather the state into that order."""
-        self._order = saved[0].copy(), saved[1].copy()
-        self._resize(len(saved[0]))
+        self._kept = {name: column.copy() for name, column in saved.items()}
+        self._resize(len(saved["particle"]))
         self.gather(state)
 
     def scratch(self, number: int) -> Array:

@@ -26,6 +26,7 @@ from pyverlet.obstacles import Course, Obstacles
 from pyverlet.profile import Profile
 from pyverlet.queries import Queries
 from pyverlet.saved import Saved
+from pyverlet.sleep import Sleep, laws
 from pyverlet.state import Slots, State
 
 Array = NDArray[Any]
@@ -45,6 +46,8 @@ class World(Measures, Queries, Doors):
         substeps: steps of length h = dt / substeps in one call of `step`.
         dtype: float32 or float64, of all arrays.
         events: note in `events` which contacts begin and end in each frame, and who hit whom how hard.
+        sleep: let circles that have come to rest, and hang together, sleep until something touches them: they cost little. Not
+            in worlds with links, moving obstacles or forces other than gravity and drag.
         ledger: keep account of where the energy goes, in `ledger`.
         threads: at most this many for the parallel stages; None is as many as pay off. Never changes the result.
 
@@ -64,12 +67,14 @@ class World(Measures, Queries, Doors):
         threads: int | None = None,
         ledger: bool = False,
         events: bool = False,
+        sleep: bool = False,
     ) -> None:
         self._state = State(checks.floating("dtype", dtype))
         self._h_last: float | None = None  # substep of the frame before; None: the integrator starts anew
         self._slots = Slots(self._state.dtype)
         self.links = Links(self._state)
         self._events = Events() if events else None
+        self._sleep = Sleep() if sleep else None
         self.forces: list[Force] = []
         self._force_sum = ForceSum(checks.vector("gravity", gravity), self.forces)
         self.actors: list[Actor] = []
@@ -115,6 +120,8 @@ class World(Measures, Queries, Doors):
         lag = integrator.velocity_lag * h
         self._gather()
         done("gather")
+        if self._sleep and self._sleep.all_asleep(state):
+            return
         integrator.begin(state, forces, self.time, h, self._h_last)
         for substep in range(self.substeps):
             for part in parts:
@@ -143,6 +150,7 @@ class World(Measures, Queries, Doors):
                 done("links")
         if contacts:
             contacts.mark_resting(state)
+            contacts.rest(state, self.substeps * h, float(np.hypot(*self.gravity)))
         integrator.end(state, h)
         done("finish")
 
@@ -155,7 +163,8 @@ class World(Measures, Queries, Doors):
     def _gather(self) -> None:
         if self.links.begin() and self._contacts:
             self._contacts.broad_phase.forget()
-        changed = self._slots.gather(self._state)
+        woken = self._sleep.begin(self._slots, self._state, laws(self)) if self._sleep else False
+        changed = self._slots.gather(self._state) or woken
         self._course.begin()
         self._clear_notes()
         if not self._slots.most_restitution <= 1.0:
@@ -289,7 +298,9 @@ class World(Measures, Queries, Doors):
         if value is not None and not isinstance(value, Collisions):
             raise InputError(f"collisions is {value!r}; allowed are pyverlet.Collisions(...) and None")
         self._collisions = value
-        self._contacts = None if value is None else ContactSolver(value, self._state.dtype, self.links.unlist, self._events)
+        self._contacts = (
+            None if value is None else ContactSolver(value, self._state.dtype, self.links.unlist, self._events, self._sleep)
+        )
 
     @property
     def threads(self) -> int:
@@ -317,6 +328,7 @@ class World(Measures, Queries, Doors):
             neighbours=self._contacts.broad_phase.save() if self._contacts else None,
             books=self._books and self._books.copy(),
             events=self._events and self._events.copy(),
+            sleep=self._sleep and self._sleep.copy(),
             obstacles=self.obstacles.save(),
             actors=[(actor, actor.save()) for actor in self.actors],
             links=self.links.save(),
@@ -343,6 +355,8 @@ class World(Measures, Queries, Doors):
         self.time, self.frames, self._h_last = saved.time, saved.frames, saved.h_last
         self._slots.restore(saved.slots, self._state)
         self._books = saved.books and saved.books.copy()
+        if self._sleep and saved.sleep:
+            self._sleep.take(saved.sleep, laws(self))
         if self._events and saved.events:
             self._events.take(saved.events)
         if self._contacts:

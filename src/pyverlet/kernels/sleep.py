@@ -1,0 +1,70 @@
+"""Who has been calm for how long, who hangs together, and who is touched while asleep. One thread: these are rare or short."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pyverlet._jit import kernel
+
+
+@kernel
+def count_calm(velocity, spin, radius, island, limit, dt, calm):
+    """calm[i] += dt for everyone awake whose speed, that of the rim included, is at most sqrt(limit * radius); else it is 0."""
+    zero = calm.dtype.type(0)
+    for i in range(calm.shape[0]):
+        if island[i] < 0:
+            rim = spin[i] * radius[i]
+            square = velocity[i, 0] * velocity[i, 0] + velocity[i, 1] * velocity[i, 1] + rim * rim
+            calm[i] = calm[i] + dt if square <= limit * radius[i] else zero
+
+
+@kernel
+def _root(root, i):
+    while root[i] != i:
+        root[i] = root[root[i]]
+        i = root[i]
+    return i
+
+
+@kernel
+def find_islands(position, size, inverse_mass, calm, first, count, pair_i, pair_j, near, after, root):
+    """root[i]: the lowest slot of the island of i, if all of it has been calm for `after` seconds; else -1.
+
+    An island is what hangs together by pairs nearer than `near` times their contact distance (union-find). Pinned circles and
+    sleepers (inverse mass 0) belong to none.
+    """
+    zero = size.dtype.type(0)
+    for i in range(root.shape[0]):
+        root[i] = i
+    for s in range(first.shape[0]):
+        for k in range(first[s], first[s] + count[s]):
+            i, j = pair_i[k], pair_j[k]
+            if inverse_mass[i] > zero and inverse_mass[j] > zero:
+                dx, dy = position[j, 0] - position[i, 0], position[j, 1] - position[i, 1]
+                reach = near * (size[i] + size[j])
+                if dx * dx + dy * dy < reach * reach:
+                    a, b = _root(root, np.int64(i)), _root(root, np.int64(j))
+                    root[max(a, b)] = min(a, b)
+    restless = np.zeros(root.shape[0], np.uint8)
+    for i in range(root.shape[0]):
+        if calm[i] < after or inverse_mass[i] <= zero:
+            restless[_root(root, i)] = 1
+    for i in range(root.shape[0] - 1, -1, -1):  # from above: roots are below what they are the roots of
+        r = _root(root, i)
+        root[i] = -1 if restless[r] else r
+
+
+@kernel
+def touch(position, size, island, first, count, pair_i, pair_j, touched):
+    """Set touched[i] = 1 for sleepers that overlap somebody awake; returns how many such pairs there are."""
+    found = 0
+    for s in range(first.shape[0]):
+        for k in range(first[s], first[s] + count[s]):
+            i, j = pair_i[k], pair_j[k]
+            if (island[i] < 0) != (island[j] < 0):
+                dx, dy = position[j, 0] - position[i, 0], position[j, 1] - position[i, 1]
+                reach = size[i] + size[j]
+                if dx * dx + dy * dy < reach * reach:
+                    touched[j if island[i] < 0 else i] = 1
+                    found += 1
+    return found

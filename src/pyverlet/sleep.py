@@ -1,0 +1,121 @@
+"""Circles that have come to rest are left alone until something touches them: `World(sleep=True)`.
+
+Circles that hang together are an island. One that has been calm for a while falls asleep as a whole: its circles stop, and count
+as pinned, so that pairs among them are not even listed. It wakes as a whole, in the very substep, when somebody awake touches one
+of them; and before a frame in which the user has moved or removed one of them, or changed a law of the world.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.broadphase import PairList
+from pyverlet.constants import SLEEP_AFTER_S, SLEEP_NEAR, SLEEP_SPEED
+from pyverlet.forces import Drag
+from pyverlet.kernels import sleep as kernels
+from pyverlet.state import Slots, State
+
+Array = NDArray[Any]
+
+
+class Sleep:
+    """Puts islands of one world to sleep and wakes them. Who sleeps is in `Slots.island`: a number for each island, -1 awake."""
+
+    def __init__(self) -> None:
+        self._next = 0  # number of the next island
+        self._laws: Any = None
+        self._members: dict[int, int] = {}  # of each island, when it fell asleep
+
+    def copy(self) -> Sleep:
+        """Another one that remembers the same."""
+        other = Sleep()
+        other._next, other._laws, other._members = self._next, self._laws, dict(self._members)
+        return other
+
+    def take(self, other: Sleep, laws: Any) -> None:
+        """Remember what the other does; `laws` are those of now, when the obstacles are back where they were."""
+        self._next, self._laws, self._members = other._next, other._laws, dict(other._members)
+        if laws and other._laws and laws[:-1] == other._laws[:-1]:
+            self._laws = laws
+
+    def begin(self, slots: Slots, state: State, laws: Any) -> bool:
+        """Before the slots gather the state of a new frame. Whether somebody woke."""
+        same, self._laws = laws == self._laws, laws
+        asleep = slots.island >= 0
+        if not asleep.any():
+            return False
+        if not same:
+            return self._wake(slots, asleep)
+        who = slots.particle[asleep]
+        edited = (state.velocity[who] != 0).any(axis=1) | (state.spin[who] != 0)
+        if not slots.is_new:  # else positions are not in the slots yet; whoever is gone is missed below
+            edited |= (state.position[who] != slots.position[asleep]).any(axis=1)
+            edited |= (state.radius[who] != slots.radius[asleep]) | (state.mass[who] != slots.mass[asleep])
+        island = slots.island[asleep]
+        number, left = np.unique(island, return_counts=True)
+        fewer = [k for k, n in zip(number, left, strict=True) if n != self._members[int(k)]]
+        return self._wake(slots, np.isin(slots.island, np.concatenate((island[edited], fewer))) & asleep)
+
+    def all_asleep(self, slots: Slots) -> bool:
+        """Whether nothing can move."""
+        return len(self._members) > 0 and not slots.inverse_mass.any()
+
+    def touched(self, slots: Slots, pairs: PairList) -> bool:
+        """Wake islands that somebody awake overlaps. Whether there were any: then the list lacks pairs."""
+        if not self._members:
+            return False
+        touched = np.zeros(len(slots), np.uint8)
+        which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
+        if not kernels.touch(slots.position, slots.size, slots.island, *which, touched):
+            return False
+        return self._wake(slots, np.isin(slots.island, slots.island[touched == 1]))
+
+    def end(self, slots: Slots, pairs: PairList, dt: float, gravity: float) -> bool:
+        """At the end of a frame: let islands that have been calm long enough fall asleep. Whether there were any."""
+        real = slots.real
+        limit = real(SLEEP_SPEED**2 * gravity)
+        kernels.count_calm(slots.velocity, slots.spin, slots.radius, slots.island, limit, np.float32(dt), slots.calm)
+        tired = (slots.calm >= SLEEP_AFTER_S) & (slots.island < 0) & (slots.inverse_mass > 0)
+        if self._laws is None or not tired.any():
+            return False
+        root = np.empty(len(slots), np.int64)
+        which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
+        kernels.find_islands(
+            slots.position, slots.size, slots.inverse_mass, slots.calm, *which, real(SLEEP_NEAR), np.float32(SLEEP_AFTER_S), root
+        )
+        sleeper = root >= 0
+        if not sleeper.any():
+            return False
+        slots.island[sleeper] = self._next + root[sleeper]
+        self._next += len(slots)
+        number, members = np.unique(slots.island[sleeper], return_counts=True)
+        self._members |= dict(zip(number.tolist(), members.tolist(), strict=True))
+        for array in (slots.velocity, slots.acceleration, slots.spin):
+            array[sleeper] = 0
+        slots.weigh()
+        return True
+
+    def _wake(self, slots: Slots, who: Array) -> bool:
+        if not who.any():
+            return False
+        for island in np.unique(slots.island[who]):
+            del self._members[int(island)]
+        slots.island[who] = -1
+        slots.calm[who] = 0
+        slots.weigh()
+        return True
+
+
+def laws(world: Any) -> Any:
+    """What sleepers rely on: when it changes all wake. None where nobody may sleep.
+
+    That is so with links, with obstacles that move, and with forces that may change with time: all but gravity and drag.
+    """
+    moving = any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
+    if world.links or moving or not all(type(force) is Drag for force in world.forces):
+        return None
+    obstacles = tuple((id(obstacle), obstacle.revision) for obstacle in world.obstacles)
+    return (world.gravity, id(world.boundary), world.boundary.extent(), id(world.collisions), obstacles)

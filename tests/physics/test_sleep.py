@@ -1,0 +1,188 @@
+"""Sleep: what rests costs little, wakes exactly when touched, and nothing else is different."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+
+G, RADIUS = 9.81, 0.5
+
+
+def troughs(**options: Any) -> pv.World:
+    """Two V-shaped troughs, in which circles without friction come to rest."""
+    world = pv.World(boundary=pv.Box((0, 0), (60, 60)), **{"sleep": True, **options})
+    for x in (10, 45):
+        world.obstacles.append(pv.Chain([(x - 8, 8), (x, 0.5), (x + 8, 8)]))
+    return world
+
+
+def fill(world: pv.World, *x: float) -> list[pv.Group]:
+    """Six circles into the troughs there."""
+    return [
+        world.add(position=[(at + 1.02 * k - 1.02 * row, 3 + 1.1 * row + k) for row in range(3) for k in range(2)], radius=RADIUS)
+        for at in x
+    ]
+
+
+def settle(world: pv.World, seconds: float = 15.0) -> None:
+    world.run(seconds=seconds)
+
+
+def test_islands_fall_asleep_and_stop() -> None:
+    world = troughs()
+    fill(world, 10, 45)
+    settle(world)
+    assert world.asleep.all()
+    assert world.energy().kinetic == 0
+    position, time = world.position.copy(), world.time
+    world.run(seconds=1)
+    assert (world.position == position).all()
+    assert world.time == pytest.approx(time + 1)
+
+
+def test_nobody_sleeps_unless_asked() -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (60, 60)))
+    fill(world, 10)
+    settle(world)
+    assert not world.asleep.any()
+
+
+def test_an_island_wakes_in_the_frame_it_is_touched_and_the_other_sleeps_on() -> None:
+    world = troughs(dtype=np.float64)
+    a, _ = fill(world, 10, 45)
+    settle(world)
+    assert world.asleep.all()
+    still = a.position.copy()
+    highest = int(np.argmax(a.position[:, 1]))
+    ball = world.add(position=still[highest] + (0.0, 6.0), velocity=(0.0, 0.0), radius=RADIUS)
+    reached = 6.0 - 2 * RADIUS  # m to fall until it touches
+    start = world.time
+    while 0.5 * G * (world.time + 1 / 60 - start) ** 2 < reached:
+        world.step(1 / 60)
+        assert world.asleep.tolist() == [True] * 12 + [False]
+    assert (a.position == still).all()
+    world.step(1 / 60)
+    # Awake in the very frame that closes the gap, and moved already.
+    assert not world.asleep[:6].any()
+    assert world.asleep[6:12].all()
+    assert np.hypot(*a.velocity[highest]) > 0.2
+    assert ball.velocity[0, 1] > -np.sqrt(2 * G * reached)
+
+
+def test_a_blow_is_what_it_would_be_without_sleep() -> None:
+    # The same blow on the same heap, asleep and awake.
+    results = []
+    for sleep in (True, False):
+        world = troughs(sleep=sleep, dtype=np.float64)
+        (group,) = fill(world, 10)
+        settle(world)
+        assert world.asleep.all() == sleep
+        start = group.position.copy()
+        highest = int(np.argmax(start[:, 1]))
+        ball = world.add(position=start[highest] + (0.1, 2.5 * RADIUS), velocity=(0.0, -20.0), radius=RADIUS)
+        world.run(seconds=4 / 60)
+        results.append((group.position - start, ball.velocity[0]))
+    # They were calm: no faster than SLEEP_SPEED sqrt(g r), 0.04 m/s, in four frames. The blow moves them fifty times that.
+    assert np.abs(results[1][0]).max() > 0.1
+    assert results[0][0] == pytest.approx(results[1][0], abs=0.045 * 4 / 60)
+    assert results[0][1] == pytest.approx(results[1][1], abs=0.1)
+
+
+@pytest.mark.parametrize("change", ["velocity", "position", "radius", "gravity", "boundary", "force", "spin"])
+def test_what_the_user_does_wakes(change: str) -> None:
+    world = troughs()
+    a, _ = fill(world, 10, 45)
+    settle(world)
+    assert world.asleep.all()
+    everybody = change in ("gravity", "boundary", "force")
+    if change == "velocity":
+        a.velocity[5] = (0, 3)
+    elif change == "position":
+        a.position[5, 1] += 0.5
+    elif change == "spin":
+        a.spin[5] = 5
+    elif change == "radius":
+        a.radius[5] = 0.4
+    elif change == "gravity":
+        world.gravity = (1, -9)
+    elif change == "boundary":
+        world.boundary = pv.Box((-10, -10), (60, 60), friction=0.5)
+    else:
+        world.forces.append(pv.Wind(velocity=(5, 0), linear=1.0))
+    world.step(1 / 60)
+    assert not world.asleep[:6].any()
+    assert world.asleep[6:].all() != everybody
+
+
+def test_removing_one_wakes_its_island_alone() -> None:
+    world = troughs()
+    a, _ = fill(world, 10, 45)
+    settle(world)
+    a.remove([0])
+    world.step(1 / 60)
+    assert world.asleep.tolist() == [False] * 5 + [True] * 6
+
+
+def test_only_the_island_below_a_falling_circle_wakes() -> None:
+    world = troughs()
+    fill(world, 10, 45)
+    settle(world)
+    world.add(position=(10.3, 12.0), radius=RADIUS)
+    seen = False
+    for _ in range(120):
+        world.step(1 / 60)
+        seen |= not world.asleep[:6].any()
+        assert world.asleep[6:12].all()
+    assert seen
+    settle(world)
+    assert world.asleep.all()
+
+
+def test_linked_circles_and_worlds_that_move_do_not_sleep() -> None:
+    world = troughs()
+    (group,) = fill(world, 10)
+    world.links.append(pv.Stick(group, 0, 1))
+    settle(world)
+    assert not world.asleep.any()
+    world = troughs()
+    fill(world, 10)
+    world.obstacles.append(pv.Segment((0, 30), (10, 30), velocity=(0, 0.1)))
+    settle(world)
+    assert not world.asleep.any()
+
+
+def test_save_and_restore_keep_the_sleepers_and_the_bits() -> None:
+    world = troughs()
+    fill(world, 10, 45)
+    world.add(position=(10.3, 50.0), radius=RADIUS)
+    world.run(seconds=2)
+    saved = world.save()
+    asleep = world.asleep
+    world.run(seconds=3)
+    expected, later = world.state_hash(), world.asleep
+    world.restore(saved)
+    assert world.asleep.tolist() == asleep.tolist()
+    world.run(seconds=3)
+    assert (world.state_hash(), world.asleep.tolist()) == (expected, later.tolist())
+
+
+def test_contacts_of_sleepers_go_on() -> None:
+    world = troughs(events=True)
+    fill(world, 10)
+    settle(world)
+    assert world.asleep.all()
+    for _ in range(10):
+        world.step(1 / 60)
+        assert len(world.events.begin) == len(world.events.end) == 0
+
+
+def test_ledger_closes_with_sleepers() -> None:
+    world = troughs(ledger=True, dtype=np.float64)
+    fill(world, 10)
+    settle(world)
+    assert world.asleep.all()
+    assert world.ledger.total == pytest.approx(world.energy().total, abs=1e-9 * 6 * G * 3)
