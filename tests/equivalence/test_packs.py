@@ -84,7 +84,7 @@ def one_by_one(slots: Slots, packs: Packs) -> None:
         d = packs.gap[:, k] + (moved[j] - moved[i])
         distance = np.sqrt(d[0] * d[0] + d[1] * d[1])
         depth = min(max(reach - distance, real(0)), real(LARGEST_PUSH) * reach)
-        n = d / distance
+        n = d * (real(1) / distance)
         normals[k] = n if depth > 0 else 0 * n
         c = n * (real(PUSHED) * depth)
         moved[i] = moved[i] - c * shares[k]

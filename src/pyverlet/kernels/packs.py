@@ -23,6 +23,9 @@ from pyverlet.constants import PUSHED
 # Golden angle, rad: coincident centres part in directions spread evenly over the circle.
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 
+# Particles one thread takes at a time where each is on its own.
+_CHUNK = 1024
+
 # Of the contact distance: how far apart coincident centres are taken to be, for the direction's sake.
 _ASIDE = 1e-6
 
@@ -116,13 +119,35 @@ def _project_strip(moved, lane_i, lane_j, gap_x, gap_y, reach, share, varied, mo
         depth = smaller(larger(r - distance, zero), most * r)
         dx = where_zero(distance, r, dx)
         distance = where_zero(distance, r, distance)
-        nx, ny = dx / distance, dy / distance
+        per_metre = one / distance
+        nx, ny = dx * per_metre, dy * per_metre
         push = pushed * depth
         cx, cy = nx * push, ny * push
         put(moved, lane_i, k, xi - cx * part, yi - cy * part)
         put(moved, lane_j, k, xj + cx * (one - part), yj + cy * (one - part))
         store(normal_x, k, where_zero(depth, zero, nx))
         store(normal_y, k, where_zero(depth, zero, ny))
+
+
+# Two passes over all particles, as 2 n numbers one after the other: so they are vectorised.
+
+
+@kernel
+def _set_out(position, origin, moved):
+    """moved = position - origin."""
+    x, start, way = position.reshape(-1), origin.reshape(-1), moved.reshape(-1)
+    for k in range(x.shape[0]):
+        way[k] = x[k] - start[k]
+
+
+@kernel
+def _arrive(position, velocity, origin, moved, feed):
+    """Add to positions what has been added to `moved`, and feed the velocities."""
+    x, v, start, way = position.reshape(-1), velocity.reshape(-1), origin.reshape(-1), moved.reshape(-1)
+    for k in range(x.shape[0]):
+        by = way[k] - (x[k] - start[k])
+        x[k] = x[k] + by
+        v[k] = v[k] + feed * by
 
 
 @parallel_kernel
@@ -132,9 +157,11 @@ def project(position, velocity, origin, moved, begin, lanes, lane_i, lane_j, gap
     varied: 1; or 0 if reach and share are the same for all and have one pack only. feed: FED / PUSHED / h, 1/s.
     moved: (n, 2) to work with. normal: (2, lanes).
     """
-    for i in prange(position.shape[0]):
-        moved[i, 0] = position[i, 0] - origin[i, 0]
-        moved[i, 1] = position[i, 1] - origin[i, 1]
+    n = position.shape[0]
+    chunks = (n + _CHUNK - 1) // _CHUNK
+    for c in prange(chunks):
+        a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
+        _set_out(position[a:b], origin[a:b], moved[a:b])
     for parity in range(2):
         for half in prange((lanes.shape[0] + 1 - parity) // 2):
             s = 2 * half + parity
@@ -143,11 +170,9 @@ def project(position, velocity, origin, moved, begin, lanes, lane_i, lane_j, gap
                 moved, lane_i[a:b], lane_j[a:b], gap[0, a:b], gap[1, a:b], reach[a * varied :], share[a * varied :], varied, most,
                 normal[0, a:b], normal[1, a:b],
             )  # fmt: skip
-    for i in prange(position.shape[0]):
-        for axis in range(2):
-            by = moved[i, axis] - (position[i, axis] - origin[i, axis])
-            position[i, axis] += by
-            velocity[i, axis] += feed * by
+    for c in prange(chunks):
+        a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
+        _arrive(position[a:b], velocity[a:b], origin[a:b], moved[a:b], feed)
 
 
 @kernel
