@@ -125,9 +125,7 @@ def _unpack(arguments: int, count: int, want: int, words: int) -> int:
                 _put(words + 40 + 8 * axis, length)
                 _put(words + 40 + 8 * (dimensions + axis), _word(strides + 8 * axis))
             longest = max(longest, _word(shape))
-            # Nobody who counts references, no parent, the number of elements, the bytes of each, the address.
-            _put(words, 0)
-            _put(words + 8, 0)
+            # In the order of `_parts`, after two that stay empty.
             _put(words + 16, size)
             _put(words + 24, _word(want + _BYTES))
             _put(words + 32, _word(given + _DATA))
@@ -171,6 +169,14 @@ def _door(cached: bool) -> Any:
     return numba.cfunc(types.int64(types.int64, types.int64, types.int64), error_model="numpy", cache=cached)(_enter)
 
 
+def _parts(kind: Any) -> list[Any]:
+    """Of what words Numba's functions take an argument of this kind."""
+    if not isinstance(kind, types.Array):
+        return [kind]
+    parts = [types.MemInfoPointer(kind.dtype), types.pyobject, types.intp, types.intp, types.CPointer(kind.dtype)]
+    return parts + [types.intp] * (2 * kind.ndim)
+
+
 def _stub(compiled: Any) -> int:
     """Address of a function of two words, where arguments are and whether to let other threads run, that calls a kernel."""
     context, made = compiled.target_context, compiled.fndesc
@@ -180,19 +186,23 @@ def _stub(compiled: Any) -> int:
     builder = ir.IRBuilder(function.append_basic_block())
     api = context.get_python_api(builder)
     words, release = function.args
-    packer = context.get_arg_packer(made.argtypes)
-    flat = []
-    for k, kind in enumerate(packer.argument_types):
-        place = builder.inttoptr(builder.add(words, ir.Constant(word, 8 * k)), kind.as_pointer())
-        flat.append(builder.load(place))
+    words = builder.inttoptr(words, word.as_pointer())
+    kinds = [part for kind in made.argtypes for part in _parts(kind)]
+    taken = []
+    for k, kind in enumerate(kinds):
+        what = context.get_argument_type(kind)
+        if isinstance(kind, types.MemInfoPointer | types.PyObject):
+            taken.append(ir.Constant(what, None))  # nobody counts references, for the arguments outlive the call
+        else:
+            place = builder.gep(words, [ir.Constant(word, k)])
+            taken.append(builder.load(builder.bitcast(place, what.as_pointer())))
     released = builder.icmp_signed("!=", release, ir.Constant(word, 0))
     thread = cgutils.alloca_once_value(builder, api.get_null_object())
     with builder.if_then(released):
         builder.store(api.save_thread(), thread)
     llvm.add_symbol(made.llvm_func_name, compiled.library.get_pointer_to_function(made.llvm_func_name))
     kernel = context.declare_function(module, made)
-    values = packer.from_arguments(builder, flat)
-    status, result = context.call_conv.call_function(builder, kernel, made.restype, made.argtypes, values)
+    status, result = context.call_conv.call_function(builder, kernel, made.restype, kinds, taken)
     with builder.if_then(released):
         api.restore_thread(builder.load(thread))
     with builder.if_then(status.is_ok, likely=True):
@@ -201,14 +211,14 @@ def _stub(compiled: Any) -> int:
         else:
             result_object = api.from_native_value(made.restype, result)
         builder.ret(builder.ptrtoint(result_object, word))
-    context.call_conv.raise_error(builder, api, status)
+    api.err_set_string("PyExc_MemoryError", "a compiled kernel found no memory")  # it knows no other error
     builder.ret(ir.Constant(word, 0))
     return _assembled(module, function.name)
 
 
 @cache
 def _assembler() -> Any:
-    machine = llvm.Target.from_default_triple().create_target_machine(opt=1)
+    machine = llvm.Target.from_default_triple().create_target_machine(opt=0)
     return llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
 
 

@@ -99,18 +99,19 @@ class Kernel(functools.partial[Any]):
     Attributes:
         function: as it is written.
         alone: the same, on one thread always.
+        parallel: whether it has loops to spread over threads.
     """
 
     function: Callable[..., Any]
     alone: Kernel
-    _parallel: bool
+    parallel: bool
     _made: dict[tuple[bool, bool], Any]
     _met: set[Any]
 
     def __new__(cls, function: Callable[..., Any], parallel: bool = False) -> Kernel:
         self = super().__new__(cls, function)
         self.function, self.__doc__ = function, function.__doc__
-        self._parallel, self._made, self._met = parallel, {}, set()
+        self.parallel, self._made, self._met = parallel, {}, set()
         self.alone = cls(function) if parallel else self
         self._lead_to(self._learn)
         return self
@@ -138,7 +139,7 @@ class Kernel(functools.partial[Any]):
 
     def _learn(self, *arguments: Any) -> Any:
         """Called with arguments of kinds that no entry knows."""
-        parallel = self._parallel and numba.get_num_threads() > 1
+        parallel = self.parallel and numba.get_num_threads() > 1
         kinds = tuple(map(numba.typeof, arguments)) if _entry.takes(arguments) and _entry.usable() else ()
         if not kinds or (parallel, kinds) in self._met:
             return self.variant(parallel=parallel, wrapped=True)(*arguments)
@@ -147,7 +148,7 @@ class Kernel(functools.partial[Any]):
         lean.compile(kinds)
         compiled = lean.overloads[kinds]
         if _entry.gives(compiled):
-            when = _entry.ANY if not self._parallel else _entry.TOGETHER if parallel else _entry.ALONE
+            when = _entry.ANY if not self.parallel else _entry.TOGETHER if parallel else _entry.ALONE
             with _caching("entry") as kept:
                 self._lead_to(_entry.entry(compiled, arguments, when, self.func, kept))
         return self(*arguments)
