@@ -7,6 +7,7 @@ The cache folder is therefore named after a hash of all sources of kernels (and 
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import os
 import re
@@ -23,10 +24,11 @@ import numba
 import numpy as np
 from numba.core import event as numba_event
 
+from pyverlet import _entry
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-KERNELS: dict[str, Any] = {}
-"""Every kernel by qualified name, in the order it was declared."""
+_COMPILED_FROM = ("_jit.py", "_entry.py", "_lanes.py", "constants.py")
 
 _STALE_AFTER_S = 30 * 24 * 3600.0
 
@@ -39,7 +41,7 @@ def sources_hash(root: Path | None = None) -> str:
     """
     root = Path(__file__).parent if root is None else root
     digest = hashlib.blake2b(f"{numba.__version__} {sys.version_info[:2]}".encode(), digest_size=8)
-    for path in (root / "_jit.py", root / "_lanes.py", root / "constants.py", *sorted((root / "kernels").rglob("*.py"))):
+    for path in (*(root / name for name in _COMPILED_FROM), *sorted((root / "kernels").rglob("*.py"))):
         digest.update(path.relative_to(root).as_posix().encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()
@@ -80,30 +82,100 @@ def _forget_stale(current: Path) -> None:
                 shutil.rmtree(other, ignore_errors=True)
 
 
-def _compile_lazily(function: Function, parallel: bool) -> Function:
+@contextlib.contextmanager
+def _caching(variant: str) -> Iterator[bool]:
+    """Declare functions whose compiled code is kept in the folder of this name; False if it cannot be kept."""
     folder = cache_dir()
     previous = numba.config.CACHE_DIR
-    # Numba reads the folder once, when the kernel is declared. Nothing global changes for the user's own functions.
-    numba.config.CACHE_DIR = str(folder) if folder else previous
+    # Numba reads the folder once, when a function is declared. Nothing global changes for the user's own functions.
+    numba.config.CACHE_DIR = str(folder / variant) if folder else previous
     try:
-        # No fastmath: it would break NaN checks and equal bits. error_model: a division is a division, not a branch and a raise.
-        compiled = numba.njit(nogil=True, error_model="numpy", cache=folder is not None, parallel=parallel, fastmath=False)(
-            function
-        )
+        yield folder is not None
     finally:
         numba.config.CACHE_DIR = previous
-    KERNELS[f"{function.__module__}.{function.__qualname__}"] = compiled
-    return compiled  # type: ignore[no-any-return]
+
+
+class Kernel(functools.partial[Any]):
+    """A compiled function: compiled on its first call with arguments of some kinds, then called by the short way of `_entry`.
+
+    Attributes:
+        function: as it is written.
+        alone: the same, on one thread always.
+        parallel: whether it has loops to spread over threads.
+    """
+
+    function: Callable[..., Any]
+    alone: Kernel
+    parallel: bool
+    _made: dict[tuple[bool, bool], Any]
+    _met: set[Any]
+
+    def __new__(cls, function: Callable[..., Any], parallel: bool = False) -> Kernel:
+        self = super().__new__(cls, function)
+        self.function, self.__doc__ = function, function.__doc__
+        self.parallel, self._made, self._met = parallel, {}, set()
+        self.alone = cls(function) if parallel else self
+        self._lead_to(self._learn)
+        return self
+
+    def _lead_to(self, callee: Callable[..., Any]) -> None:
+        self.__setstate__((callee, (), {}, self.__dict__))  # type: ignore[attr-defined]
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What other kernels call: one thread's code."""
+        return numba.types.Dispatcher(self.alone.variant(parallel=False))
+
+    def variant(self, *, parallel: bool, wrapped: bool = False) -> Any:
+        """Numba's own: its loops over threads or not; `wrapped` for calls from Python with any arguments."""
+        if self._made.get((parallel, wrapped)) is None:
+            name = ("parallel" if parallel else "alone") + ("-wrapped" if wrapped else "")
+            with _caching(name) as kept:
+                # No fastmath: it would break NaN checks and equal bits. error_model: a division is a division, not a branch and a
+                # raise. Wrappers take as long to compile as the kernel.
+                self._made[parallel, wrapped] = numba.njit(
+                    nogil=True, error_model="numpy", cache=kept, parallel=parallel, fastmath=False,
+                    no_cpython_wrapper=not wrapped, no_cfunc_wrapper=True,
+                )(self.function)  # fmt: skip
+        return self._made[parallel, wrapped]
+
+    def _learn(self, *arguments: Any) -> Any:
+        """Called with arguments of kinds that no entry knows."""
+        parallel = self.parallel and numba.get_num_threads() > 1
+        kinds = tuple(map(numba.typeof, arguments)) if _entry.takes(arguments) and _entry.usable() else ()
+        if not kinds or (parallel, kinds) in self._met:
+            return self.variant(parallel=parallel, wrapped=True)(*arguments)
+        self._met.add((parallel, kinds))
+        lean = self.variant(parallel=parallel)
+        lean.compile(kinds)
+        compiled = lean.overloads[kinds]
+        if _entry.gives(compiled):
+            when = _entry.ANY if not self.parallel else _entry.TOGETHER if parallel else _entry.ALONE
+            with _caching("entry") as kept:
+                self._lead_to(_entry.entry(compiled, arguments, when, self.func, kept))
+        return self(*arguments)
+
+
+KERNELS: dict[str, Kernel] = {}
+"""Every kernel by qualified name, in the order it was declared."""
+
+
+def _declared(kernel: Kernel) -> Any:
+    KERNELS[f"{kernel.function.__module__}.{kernel.function.__qualname__}"] = kernel
+    return kernel
 
 
 def kernel(function: Function) -> Function:
     """Compile on first call, to one thread's code; may be called from other kernels."""
-    return _compile_lazily(function, parallel=False)
+    return _declared(Kernel(function))  # type: ignore[no-any-return]
 
 
-def parallel_kernel(function: Function) -> Function:
-    """Compile on first call, its `prange` loops spread over threads. Each element of the output must have one writer."""
-    return _compile_lazily(function, parallel=True)
+def parallel_kernel(function: Callable[..., Any]) -> Kernel:
+    """Compile on first call, its `prange` loops spread over threads if there are several: not at all for one.
+
+    Each element of the output must have one writer. `kernel.alone` never leaves the thread it is called from.
+    """
+    return _declared(Kernel(function, parallel=True))  # type: ignore[no-any-return]
 
 
 prange = numba.prange
@@ -136,7 +208,7 @@ class _CompileListener(numba_event.Listener):  # type: ignore[misc]
         self._started = started
 
     def on_start(self, event: Any) -> None:
-        if event.data.get("dispatcher") in self._ours:
+        if getattr(event.data.get("dispatcher"), "py_func", None) in self._ours:
             self._started()
 
     def on_end(self, event: Any) -> None:
@@ -146,7 +218,9 @@ class _CompileListener(numba_event.Listener):  # type: ignore[misc]
 @contextlib.contextmanager
 def watch_compiling(started: Callable[[], None]) -> Iterator[None]:
     """Call `started` whenever one of our kernels begins to compile (not when it is loaded from disk)."""
-    with numba_event.install_listener("numba:compile", _CompileListener(set(KERNELS.values()), started)):
+    with numba_event.install_listener(
+        "numba:compile", _CompileListener({kernel.function for kernel in KERNELS.values()}, started)
+    ):
         yield
 
 

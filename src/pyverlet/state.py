@@ -6,12 +6,14 @@ space are neighbours in memory, and ends by scattering the result back; nobody o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet._jit import Kernel
 from pyverlet.constants import SERIAL_BELOW
 from pyverlet.kernels import motion
 from pyverlet.kernels.bounds import Bodies
@@ -338,23 +340,19 @@ class Slots:
 
 def advance(out: Array, base: Array, slope: Array, h: float) -> None:
     """out = base + h * slope on (n, 2) arrays; the move every integrator is made of. out may be base."""
-    if len(out) < SERIAL_BELOW:
-        motion.advance_serial(out, base, slope, out.dtype.type(h))
-    else:
-        motion.advance_parallel(out, base, slope, out.dtype.type(h))
+    _light(motion.advance, out)(out, base, slope, out.dtype.type(h))
 
 
 def kick_drift(state: Slots, h: float) -> None:
     """velocity += h * acceleration, then position += h * velocity."""
-    arguments = (state.position, state.velocity, state.acceleration, state.real(h))
-    if len(state) < SERIAL_BELOW:
-        motion.kick_drift_serial(*arguments)
-    else:
-        motion.kick_drift_parallel(*arguments)
+    _light(motion.kick_drift, state.position)(state.position, state.velocity, state.acceleration, state.real(h))
 
 
 def farthest(position: Array, reference: Array) -> float:
     """The largest distance any particle has moved from its row of `reference`, m."""
-    if len(position) < SERIAL_BELOW:
-        return float(np.sqrt(motion.farthest_serial(position, reference)))
-    return float(np.sqrt(motion.farthest_parallel(position, reference)))
+    return math.sqrt(_light(motion.farthest, position)(position, reference))
+
+
+def _light(kernel: Kernel, particles: Array) -> Kernel:
+    """For loops so light that a meeting of the threads costs more in all but the largest worlds."""
+    return kernel if len(particles) >= SERIAL_BELOW else kernel.alone

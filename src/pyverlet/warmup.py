@@ -13,7 +13,7 @@ from pyverlet import _jit
 from pyverlet.bounds import Boundary, Box, Circle, Open
 from pyverlet.broadphase import BruteForce
 from pyverlet.collisions import Collisions
-from pyverlet.constants import SERIAL_BELOW
+from pyverlet.constants import ONE_THREAD_BELOW, SERIAL_BELOW
 from pyverlet.forces import Conservative, Drag
 from pyverlet.group import Group
 from pyverlet.links import Angle, Area, Pin, Spring, Stick
@@ -31,8 +31,8 @@ def warm_up(world: World, progress: Progress | None = None) -> float:
     """Compile or load every kernel this world may need, without touching it.
 
     The first time on a machine all kernels that circles of the world's dtype need are compiled, so that nothing stalls when a
-    setting is changed later; those of links, obstacles and the ledger when a world has them first. The compiled code is kept on
-    disk, and afterwards only the kernels in use are loaded.
+    setting is changed later: for one thread, or for several if the world uses several. Those of links, obstacles and the ledger
+    are compiled when a world has them first. The compiled code is kept on disk, and later only what is in use is loaded.
 
     Args:
         world: the world about to be stepped.
@@ -52,9 +52,9 @@ def warm_up(world: World, progress: Progress | None = None) -> float:
             progress(min(done, total), total)
 
     with _jit.watch_compiling(started):
-        if not _compiled_before(world.dtype):
-            _compile_all(world.dtype)
-            _remember_compiled(world.dtype)
+        if not _compiled_before(world.dtype, world.threads):
+            _compile_all(world.dtype, world.threads)
+            _remember_compiled(world.dtype, world.threads)
         _rehearse(world)
         _rehearse_forces(world)
     if done and progress:
@@ -65,11 +65,12 @@ def warm_up(world: World, progress: Progress | None = None) -> float:
 def _rehearse(world: World) -> None:
     """One frame of a small world of the same kind."""
     small = _lattice(
-        SERIAL_BELOW if len(world) >= SERIAL_BELOW else 9,
+        _enough(world.threads) if len(world) < SERIAL_BELOW else SERIAL_BELOW,
         world.dtype,
         type(world.boundary),
         getattr(world.boundary, "restitution", 0.0),
         world.collisions,
+        threads=world.threads,
         ledger=world.keeps_ledger,
         events=world.tells_events,
     )
@@ -96,13 +97,18 @@ def _rehearse_forces(world: World) -> None:
                 force.potential(world._state)
 
 
-def _compile_all(dtype: np.dtype[Any]) -> None:
+def _enough(threads: int) -> int:
+    """Particles for a world to use so many threads."""
+    return 9 if threads == 1 else ONE_THREAD_BELOW
+
+
+def _compile_all(dtype: np.dtype[Any], threads: int) -> None:
     for count, boundary, collisions in (
-        (SERIAL_BELOW, Circle, Collisions()),
-        (9, Box, Collisions(restitution=0.5, friction=0.5)),
-        (9, Open, Collisions(method=BruteForce())),
+        (9 if threads == 1 else SERIAL_BELOW, Circle, Collisions()),
+        (_enough(threads), Box, Collisions(restitution=0.5, friction=0.5)),
+        (_enough(threads), Open, Collisions(method=BruteForce())),
     ):
-        small = _lattice(count, dtype, boundary, 0.5, collisions)
+        small = _lattice(count, dtype, boundary, 0.5, collisions, threads=threads)
         small.step(1e-3)
         small.forces.append(Drag(linear=0.1))
         _use(small)
@@ -127,7 +133,7 @@ def _use(world: World) -> None:
 
 def _lattice(
     count: int, dtype: np.dtype[Any], boundary: type[Boundary], restitution: float, collisions: Collisions | None,
-    *, ledger: bool = False, events: bool = False,
+    *, threads: int, ledger: bool = False, events: bool = False,
 ) -> World:  # fmt: skip
     side = int(np.ceil(np.sqrt(count)))
     room: Boundary = Open()
@@ -135,24 +141,24 @@ def _lattice(
         room = Circle(radius=2.0 * side, restitution=restitution)
     elif boundary is Box:
         room = Box((-side, -side), (side, side), restitution=restitution)
-    world = World(boundary=room, collisions=collisions, substeps=1, dtype=dtype, ledger=ledger, events=events)
+    world = World(boundary=room, collisions=collisions, substeps=1, dtype=dtype, threads=threads, ledger=ledger, events=events)
     row, column = np.divmod(np.arange(count), side)
     world.add(position=np.column_stack((column, row)) - 0.5 * side, radius=0.5)
     return world
 
 
-def _marker(dtype: np.dtype[Any]) -> Any:
+def _marker(dtype: np.dtype[Any], threads: int) -> Any:
     folder = _jit.cache_dir()
-    return folder / f"compiled-{dtype.name}" if folder else None
+    return folder / f"compiled-{dtype.name}{'-threads' if threads > 1 else ''}" if folder else None
 
 
-def _compiled_before(dtype: np.dtype[Any]) -> bool:
-    marker = _marker(dtype)
+def _compiled_before(dtype: np.dtype[Any], threads: int) -> bool:
+    marker = _marker(dtype, threads)
     return marker is not None and marker.exists()
 
 
-def _remember_compiled(dtype: np.dtype[Any]) -> None:
-    marker = _marker(dtype)
+def _remember_compiled(dtype: np.dtype[Any], threads: int) -> None:
+    marker = _marker(dtype, threads)
     if marker is not None:
         with contextlib.suppress(OSError):
             marker.touch()

@@ -25,7 +25,7 @@ def test_the_hash_sees_an_edit_in_any_kernel_and_no_other(tmp_path: Path) -> Non
     assert before == _jit.sources_hash()
     (copy / "world.py").write_text("# edited")
     assert _jit.sources_hash(copy) == before
-    for name in ("kernels/contacts.py", "kernels/motion.py", "constants.py", "_jit.py", "_lanes.py"):
+    for name in ("kernels/contacts.py", "kernels/motion.py", "constants.py", "_jit.py", "_entry.py", "_lanes.py"):
         with (copy / name).open("a") as file:
             file.write("\n# edited\n")
         after = _jit.sources_hash(copy)
@@ -38,8 +38,8 @@ import numpy as np
 from pyverlet.kernels import motion
 from pyverlet import _jit
 out = np.zeros((1, 2))
-motion.advance_serial(out, out, np.ones((1, 2)), 1.0)
-print(out[0, 0], sum(motion.advance_serial.stats.cache_hits.values()))
+motion.advance.alone(out, out, np.ones((1, 2)), 1.0)
+print(out[0, 0], sum(motion.advance.alone.variant(parallel=False).stats.cache_hits.values()))
 """
 
 
@@ -51,7 +51,7 @@ def test_an_edited_helper_is_not_served_from_the_cache(tmp_path: Path) -> None:
     (kernels / "_helper.py").write_text("from pyverlet._jit import kernel\n\n\n@kernel\ndef gain():\n    return 1.0\n")
     motion = (kernels / "motion.py").read_text()
     motion = motion.replace("import numpy as np\n", "import numpy as np\nfrom pyverlet.kernels._helper import gain\n", 1)
-    motion = motion.replace("out[i, 0] = base[i, 0] + h * slope[i, 0]", "out[i, 0] = base[i, 0] + gain() * h * slope[i, 0]", 1)
+    motion = motion.replace("to[k] = start[k] + h * rate[k]", "to[k] = start[k] + gain() * h * rate[k]", 1)
     (kernels / "motion.py").write_text(motion)
 
     def call() -> list[str]:

@@ -41,7 +41,7 @@ class FunctionForce:
             InputError: it does not compile, or returns something other than two numbers.
             NonFiniteError: it returned NaN or infinity.
         """
-        call: Any = forces.call_serial if len(state) < SERIAL_BELOW else forces.call_parallel
+        call = forces.call if len(state) >= SERIAL_BELOW else forces.call.alone
         if call(self._code.native().pointer, state.force, state.position, state.velocity, state.mass, float(t)):
             self._blame(state, t)
 

@@ -11,35 +11,17 @@ import numpy as np
 from pyverlet._jit import kernel, parallel_kernel, prange
 
 
-@kernel
-def advance_serial(out, base, slope, h):
-    """out = base + h * slope, on (n, 2) arrays; out may be base."""
-    to, start, rate = out.reshape(-1), base.reshape(-1), slope.reshape(-1)
-    for k in range(to.shape[0]):
-        to[k] = start[k] + h * rate[k]
-
-
 @parallel_kernel
-def advance_parallel(out, base, slope, h):
-    """The same on many threads: each element has one writer and one formula, so the bits are the same."""
+def advance(out, base, slope, h):
+    """out = base + h * slope, on (n, 2) arrays; out may be base."""
     to, start, rate = out.reshape(-1), base.reshape(-1), slope.reshape(-1)
     for k in prange(to.shape[0]):
         to[k] = start[k] + h * rate[k]
 
 
-@kernel
-def kick_drift_serial(position, velocity, acceleration, h):
-    """v += h a, then x += h v: both moves in one pass over the memory."""
-    x, v, a = position.reshape(-1), velocity.reshape(-1), acceleration.reshape(-1)
-    for k in range(x.shape[0]):
-        kicked = v[k] + h * a[k]
-        v[k] = kicked
-        x[k] = x[k] + h * kicked
-
-
 @parallel_kernel
-def kick_drift_parallel(position, velocity, acceleration, h):
-    """The same on many threads."""
+def kick_drift(position, velocity, acceleration, h):
+    """v += h a, then x += h v: both moves in one pass over the memory."""
     x, v, a = position.reshape(-1), velocity.reshape(-1), acceleration.reshape(-1)
     for k in prange(x.shape[0]):
         kicked = v[k] + h * a[k]
@@ -79,20 +61,9 @@ def largest_norm(vectors):
     return np.sqrt(largest)
 
 
-@kernel
-def farthest_serial(position, reference):
-    """Square of the largest distance any particle has moved from its reference position."""
-    farthest = position.dtype.type(0)
-    for i in range(position.shape[0]):
-        dx = position[i, 0] - reference[i, 0]
-        dy = position[i, 1] - reference[i, 1]
-        farthest = max(farthest, dx * dx + dy * dy)
-    return farthest
-
-
 @parallel_kernel
-def farthest_parallel(position, reference):
-    """The same on many threads; a maximum does not depend on the order it is taken in."""
+def farthest(position, reference):
+    """Square of the largest distance any particle has moved from its reference position."""
     farthest = position.dtype.type(0)
     for i in prange(position.shape[0]):
         dx = position[i, 0] - reference[i, 0]
