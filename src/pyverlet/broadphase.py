@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet import checks
-from pyverlet.constants import REBUILD_PAIRS, SAMPLE, SKIN, SKIN_LEAST, SKIN_MOST, SKIN_STEP, UNSORTED
+from pyverlet.constants import REBUILD_PAIRS, SAMPLE, SKIN, SKIN_HOLD, SKIN_LEAST, SKIN_MOST, SKIN_STEP, UNSORTED, WORTH_LOOKING
 from pyverlet.grids import Grids
 from pyverlet.kernels import pairs as kernels
 from pyverlet.state import Slots, farthest
@@ -162,7 +162,8 @@ class _SortedCells(BroadPhase):
         self._adapts = skin is None
         self._room = 4  # pairs kept free for each particle; six neighbours make three pairs
         self._age = 0  # substeps the list has lasted
-        self._excess = 0.0  # pairs for each particle that are listed only because of the skin
+        self._excess = 0.0  # pairs for each particle that a skin smaller by SKIN_STEP would not list
+        self._hold = 0  # rebuilds before the skin may grow again
         self._allowed = -1.0  # distance anyone may move from `_checked` before we look closer, m; negative: rebuild now
         self.built = self._checked = np.empty((0, 2), dtype)
         self._reserve(0)
@@ -183,11 +184,11 @@ class _SortedCells(BroadPhase):
 
     def save(self) -> tuple[Any, ...]:
         kept = (self.built.copy(), self._checked.copy(), self._allowed) if self._allowed >= 0 else None
-        return kept, self.skin_diameters, self._age
+        return kept, self.skin_diameters, self._age, self._hold
 
     def restore(self, saved: tuple[Any, ...], state: Slots) -> None:
         self.forget()
-        kept, self.skin_diameters, age = saved
+        kept, self.skin_diameters, age, self._hold = saved
         if kept is not None and len(kept[0]) == len(state):  # or particles had been added that it had not met yet
             # The list is a function of the positions it was built from and the order of the slots, which is that of then.
             built, checked, allowed = kept
@@ -201,18 +202,21 @@ class _SortedCells(BroadPhase):
         if farthest(state.position, self._checked) <= self._allowed:
             return True
         slack = self._grids.slack(state.position, self.built, 2.0 * self._half_skin)
-        if not slack > 0:
+        if not slack > WORTH_LOOKING * self._half_skin:
             return False
         self._checked, self._allowed = state.position.copy(), 0.5 * slack
         return True
 
     def _adapt(self) -> None:
-        """Towards the skin where a substep pays as much for rebuilding as for the pairs that are listed for nothing."""
-        rebuilding = REBUILD_PAIRS / self._age
-        if rebuilding > self._excess:
-            self.skin_diameters = min(self.skin_diameters * SKIN_STEP, SKIN_MOST)
-        elif rebuilding * SKIN_STEP**2 < self._excess:
+        """Towards the skin where a substep pays as little as it can for rebuilding and for pairs that are listed for nothing."""
+        # A list lives about as long as its skin is thick: a step up saves this much for each particle and substep.
+        saved = REBUILD_PAIRS / self._age * (1.0 - 1.0 / SKIN_STEP)
+        self._hold = max(self._hold - 1, 0)
+        if self._excess > saved * SKIN_STEP:
             self.skin_diameters = max(self.skin_diameters / SKIN_STEP, SKIN_LEAST)
+            self._hold = SKIN_HOLD
+        elif saved > self._excess * SKIN_STEP and not self._hold:
+            self.skin_diameters = min(self.skin_diameters * SKIN_STEP, SKIN_MOST)
 
     def rebuild(self, state: Slots) -> None:
         """Sort the particles by cell and list the pairs."""
@@ -228,8 +232,8 @@ class _SortedCells(BroadPhase):
         self.built = self._checked = state.position.copy()
         self._allowed = self._half_skin
         which = (self.list.first, self.list.count, self.list.pair_i, self.list.pair_j)
-        looked, far = kernels.count_far(state.position, state.radius, *which, state.real(self._half_skin), SAMPLE)
-        self._excess = 2.0 * far / max(looked, 1) * int(self.list.count.sum()) / max(len(state), 1)
+        looked, far = kernels.count_far(state.position, state.radius, *which, state.real(skin / SKIN_STEP), SAMPLE)
+        self._excess = far / max(looked, 1) * int(self.list.count.sum()) / max(len(state), 1)
 
     def _fill(self, state: Slots, skin: Any) -> None:
         pairs, cells = self.list, self._grids

@@ -15,13 +15,19 @@ CELLS_PER_PARTICLE: Final = 4
 """The grid never has more cells than this many per particle; beyond it the cells grow. Memory stays linear in n."""
 
 SKIN_LEAST: Final = 0.02
-SKIN_MOST: Final = 0.6
+SKIN_MOST: Final = 2.0
 """Mean diameters between which the skin adapts: below, trembling piles rebuild; above, most pairs are listed for nothing."""
 
 SKIN_STEP: Final = 1.25
 """Factor by which the skin adapts at a rebuild."""
 
-REBUILD_PAIRS: Final = 20.0
+SKIN_HOLD: Final = 16
+"""Rebuilds before a skin that was too large is tried again: second neighbours in a crystal come all at once."""
+
+WORTH_LOOKING: Final = 0.3
+"""With less than this part of half the skin left the list is rebuilt: looking again and again would cost as much."""
+
+REBUILD_PAIRS: Final = 30.0
 """Candidate pairs that contacts solve in a substep in the time in which the list is built anew; all for each particle."""
 
 SAMPLE: Final = 16
@@ -33,8 +39,11 @@ UNSORTED: Final = 0.1
 COLUMNS: Final = 2
 """Columns of a grid in the width of a row's height: narrower ones cut out neighbours more closely, and are more cells to count."""
 
-LEVELS: Final = 16
+LEVELS: Final = 12
 """Grids at most, each with cells half as large as the one before."""
+
+SPARSE: Final = 1.0
+"""A grid that would hold fewer circles than this part of the next coarser one is left out, and its circles stand in that."""
 
 ROUNDING: Final = 1.001
 """Cells are larger than the longest distance of a listed pair by this factor, so that rounding cannot skip a row."""

@@ -7,7 +7,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.constants import BLOCK_ROWS, CELLS_PER_PARTICLE, COLUMNS, GRID_SPREAD, LEVELS, ROUNDING, STRIP_PARTICLES, STRIPS
+from pyverlet.constants import (
+    BLOCK_ROWS,
+    CELLS_PER_PARTICLE,
+    COLUMNS,
+    GRID_SPREAD,
+    LEVELS,
+    ROUNDING,
+    SPARSE,
+    STRIP_PARTICLES,
+    STRIPS,
+)
 from pyverlet.kernels import grid
 
 Array = NDArray[Any]
@@ -30,7 +40,7 @@ class Grids:
         grid.count_level_cells(position, radius, self.levels, cell, self.start)
         self.order = np.empty(len(position), np.int32)
         self.falls = int(grid.sort_by_cell(cell, self.start, self.order))
-        self._boxes: list[Array] = []
+        self._first: Any = None
 
     def renumber(self) -> None:
         """The rows of `position` are in the order of the cells now."""
@@ -48,16 +58,18 @@ class Grids:
 
         For displacements u_i, | |x_i - x_j| - |b_i - b_j| | <= |u_i - u_j|: all that counts is how differently two circles have
         moved that were near each other, and that is no more than the diagonal of the box of all displacements around them.
-        Circles in blocks that are not neighbours have more than the block between them.
+        Circles in blocks that are not neighbours have more than a block between them.
         """
-        cell = 1.0 / float(self.levels.along[0])
-        if not self._boxes:
-            shape = (-(-int(n) // BLOCK_ROWS) for n in (self.levels.height[0], self.levels.width[0] // COLUMNS))
-            self._boxes = [np.empty((*shape, 2), position.dtype)]
-            self._boxes.append(np.empty_like(self._boxes[0]))
-        grid.displacement_boxes(position, built, self.order, self.levels, self.start, *self._boxes)
-        near, far = grid.spreads(*self._boxes)
-        return min(skin - float(near), BLOCK_ROWS * cell - 2.0 * float(self.levels.largest[0]) - float(far))
+        if self._first is None:
+            count = [columns * rows for columns, rows in (grid.blocks(self.levels, k) for k in range(len(self.levels.base)))]
+            self._first = np.cumsum(count) - count
+            self._own = np.empty((sum(count), 4), position.dtype)
+            self._smaller = np.empty_like(self._own)
+        boxes = (self._first, self._own, self._smaller)
+        grid.bound_displacements(position, built, self.order, self.levels, self.start, *boxes)
+        near, far = grid.spreads(self.levels, *boxes)
+        gap = (BLOCK_ROWS / self.levels.along - 2 * self.levels.largest).min()
+        return min(skin - float(near), float(gap) - float(far))
 
 
 def _cells(levels: grid.Levels) -> int:
@@ -95,9 +107,19 @@ def _fit(position: Array, radius: Array, skin: float) -> grid.Levels:
         held = np.empty(len(shift), np.int64)
         fits = np.minimum(fits, largest)
         grid.count_levels(radius, fits[shift].astype(position.dtype), held)
-        shift = shift[held > 0]
+        shift = shift[_worth(held)]
     width, height = columns * COLUMNS << shift, rows << shift
     along = (2.0**shift / cell).astype(position.dtype)
     base = np.cumsum(width * height) - width * height
     largest_of = np.minimum(fits[shift], largest).astype(position.dtype)
     return grid.Levels(real(x0), real(y0), largest_of, base, width, height, shift, along * real(COLUMNS), along)
+
+
+def _worth(held: Array) -> list[int]:
+    """Which levels are worth having, given how many circles each holds: a few stand as well among those twice as large."""
+    kept: list[int] = []
+    for level in np.flatnonzero(held):
+        if kept and kept[-1] == level - 1 and held[level] < SPARSE * held[level - 1]:
+            continue
+        kept.append(int(level))
+    return kept

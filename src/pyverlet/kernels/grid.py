@@ -154,49 +154,109 @@ def cut_strips(levels, start, least, strip_row, held):
     return strips
 
 
-@parallel_kernel
-def displacement_boxes(position, built, order, levels, start, low, high):
-    """low, high (rows, columns, 2) of blocks of BLOCK_ROWS rows of level 0: the bounds of position - built in each."""
-    for row in prange(low.shape[0]):
-        low[row] = np.inf
-        high[row] = -np.inf
-        across = levels.along[0] / position.dtype.type(BLOCK_ROWS)
-        for level in range(levels.base.shape[0]):
-            first = before_row(levels, start, level, row * BLOCK_ROWS)
-            for k in range(first, before_row(levels, start, level, (row + 1) * BLOCK_ROWS)):
-                i = order[k]
-                column = cell_number((built[i, 0] - levels.x0) * across, low.shape[1])
-                dx = position[i, 0] - built[i, 0]
-                dy = position[i, 1] - built[i, 1]
-                low[row, column, 0] = min(low[row, column, 0], dx)
-                low[row, column, 1] = min(low[row, column, 1], dy)
-                high[row, column, 0] = max(high[row, column, 0], dx)
-                high[row, column, 1] = max(high[row, column, 1], dy)
+@kernel
+def _cover(boxes, to, of, source):
+    """Let box `to` of `boxes` cover box `source` of `of`, too."""
+    boxes[to, 0] = min(boxes[to, 0], of[source, 0])
+    boxes[to, 1] = min(boxes[to, 1], of[source, 1])
+    boxes[to, 2] = max(boxes[to, 2], of[source, 2])
+    boxes[to, 3] = max(boxes[to, 3], of[source, 3])
 
 
 @kernel
-def spreads(low, high):
-    """(most that two particles in the same or neighbouring blocks, most that any two have moved against each other), m.
+def blocks(levels, level):
+    """(columns, rows) of blocks of a level: squares of BLOCK_ROWS by BLOCK_ROWS rows."""
+    wide = BLOCK_ROWS * COLUMNS
+    return (levels.width[level] + wide - 1) // wide, (levels.height[level] + BLOCK_ROWS - 1) // BLOCK_ROWS
 
-    low, high: of `displacement_boxes`. Neighbours by a corner count; two by two blocks hold any two that are neighbours.
+
+@kernel
+def _bound_row(position, built, order, levels, start, level, row, first, own):
+    """Boxes of a row of blocks whose first box is `first`: around position - built of the circles of the level itself."""
+    columns, _ = blocks(levels, level)
+    wide = levels.width[level]
+    for line in range(row * BLOCK_ROWS, min((row + 1) * BLOCK_ROWS, levels.height[level])):
+        k = levels.base[level] + line * wide
+        for column in range(columns):
+            low = start[k + column * BLOCK_ROWS * COLUMNS]
+            end = start[k + min((column + 1) * BLOCK_ROWS * COLUMNS, wide)]
+            if low == end:
+                continue
+            b = first + column
+            x0, y0, x1, y1 = own[b, 0], own[b, 1], own[b, 2], own[b, 3]
+            for place in range(low, end):
+                i = order[place]
+                dx = position[i, 0] - built[i, 0]
+                dy = position[i, 1] - built[i, 1]
+                x0, y0, x1, y1 = min(x0, dx), min(y0, dy), max(x1, dx), max(y1, dy)
+            own[b, 0], own[b, 1], own[b, 2], own[b, 3] = x0, y0, x1, y1
+
+
+@parallel_kernel
+def bound_displacements(position, built, order, levels, start, first, own, smaller):
+    """For each block of each level the box (x0, y0, x1, y1) of position - built of its circles, metres.
+
+    first[level]: number of the level's first block. own (blocks, 4): of the circles that stand in the level; smaller: also of those
+    in levels with smaller cells.
     """
-    rows, columns = low.shape[0], low.shape[1]
-    zero = low.dtype.type(0)
+    for top in prange((levels.height[0] + BLOCK_ROWS - 1) // BLOCK_ROWS):
+        for back in range(levels.base.shape[0]):
+            level = levels.base.shape[0] - 1 - back
+            columns, rows = blocks(levels, level)
+            shift = levels.shift[level]
+            for row in range(top << shift, min((top + 1) << shift, rows)):
+                here = first[level] + row * columns
+                own[here : here + columns, :2] = np.inf
+                own[here : here + columns, 2:] = -np.inf
+                smaller[here : here + columns, :2] = np.inf
+                smaller[here : here + columns, 2:] = -np.inf
+                _bound_row(position, built, order, levels, start, level, row, here, own)
+                for b in range(here, here + columns):
+                    _cover(smaller, b, own, b)
+            if back > 0:
+                below, rows_below = blocks(levels, level + 1)
+                step = levels.shift[level + 1] - shift
+                for row in range(top << levels.shift[level + 1], min((top + 1) << levels.shift[level + 1], rows_below)):
+                    for column in range(below):
+                        to = first[level] + (row >> step) * columns + (column >> step)
+                        _cover(smaller, to, smaller, first[level + 1] + row * below + column)
+
+
+@kernel
+def _around(boxes, first, columns, rows, row, column):
+    """The box around the boxes of two by two blocks."""
+    right, above = min(column + 1, columns - 1), min(row + 1, rows - 1)
+    a, b = first + row * columns + column, first + row * columns + right
+    c, d = first + above * columns + column, first + above * columns + right
+    return (
+        min(min(boxes[a, 0], boxes[b, 0]), min(boxes[c, 0], boxes[d, 0])),
+        min(min(boxes[a, 1], boxes[b, 1]), min(boxes[c, 1], boxes[d, 1])),
+        max(max(boxes[a, 2], boxes[b, 2]), max(boxes[c, 2], boxes[d, 2])),
+        max(max(boxes[a, 3], boxes[b, 3]), max(boxes[c, 3], boxes[d, 3])),
+    )
+
+
+@kernel
+def spreads(levels, first, own, smaller):
+    """(most that two circles in the same or neighbouring blocks, most that any two have moved against each other), m.
+
+    Blocks are those of the level of the larger circle; neighbours by a corner count. Any two blocks that are neighbours are among
+    some two by two.
+    """
+    zero = own.dtype.type(0)
     near = zero
-    x0 = y0 = low.dtype.type(np.inf)
-    x1 = y1 = low.dtype.type(-np.inf)
-    for row in range(max(rows - 1, 1)):
-        above = min(row + 1, rows - 1)
-        for column in range(max(columns - 1, 1)):
-            right = min(column + 1, columns - 1)
-            left_x = min(min(low[row, column, 0], low[row, right, 0]), min(low[above, column, 0], low[above, right, 0]))
-            left_y = min(min(low[row, column, 1], low[row, right, 1]), min(low[above, column, 1], low[above, right, 1]))
-            right_x = max(max(high[row, column, 0], high[row, right, 0]), max(high[above, column, 0], high[above, right, 0]))
-            right_y = max(max(high[row, column, 1], high[row, right, 1]), max(high[above, column, 1], high[above, right, 1]))
-            if left_x <= right_x:
-                dx, dy = right_x - left_x, right_y - left_y
+    x0 = y0 = own.dtype.type(np.inf)
+    x1 = y1 = own.dtype.type(-np.inf)
+    for level in range(levels.base.shape[0]):
+        columns, rows = blocks(levels, level)
+        for row in range(rows):
+            for column in range(columns):
+                a0, b0, a1, b1 = _around(own, first[level], columns, rows, row, column)
+                if not a0 <= a1:
+                    continue
+                c0, d0, c1, d1 = _around(smaller, first[level], columns, rows, row, column)
+                dx, dy = max(a1 - c0, c1 - a0), max(b1 - d0, d1 - b0)
                 near = max(near, dx * dx + dy * dy)
-            x0, y0 = min(x0, left_x), min(y0, left_y)
-            x1, y1 = max(x1, right_x), max(y1, right_y)
+                x0, y0, x1, y1 = min(x0, c0), min(y0, d0), max(x1, c1), max(y1, d1)
     dx, dy = max(x1 - x0, zero), max(y1 - y0, zero)
     return np.sqrt(near), np.sqrt(dx * dx + dy * dy)

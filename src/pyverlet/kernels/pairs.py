@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet.constants import COLOURS, COLUMNS
+from pyverlet.constants import COLOURS, COLUMNS, ROUNDING
 from pyverlet.kernels.grid import before_row, cell_number
 
 # Number of the lowest bit of a power of two of 32 bits, by its product with a de Bruijn sequence.
@@ -35,82 +35,82 @@ def _accept(category, mask, inverse_mass, a, b):
 
 
 @kernel
-def _near(spot, order, a, low, high, skin, picky, category, mask, inverse_mass, raw_i, raw_j, found):
-    """Note which of the places low to high are near place a."""
-    x, y, reach_a = spot[a, 0], spot[a, 1], spot[a, 2] + skin
-    for b in range(low, high):
-        dx = spot[b, 0] - x
-        dy = spot[b, 1] - y
-        reach = reach_a + spot[b, 2]
-        # Written whether or not it counts: an unpredictable branch costs more than the store.
-        if found < raw_i.shape[0]:
-            raw_i[found] = a
-            raw_j[found] = b
-        near = dx * dx + dy * dy < reach * reach
-        if picky:
-            near &= _accept(category, mask, inverse_mass, order[a], order[b])
-        found += near
-    return found
+def _runs_of_smaller(spot, a, level, row0, row1, levels, start, skin, low, end, runs):
+    """Add to the runs of places (low, end) those of the levels with smaller cells near place a, in the rows row0 to row1 of level 0.
 
-
-@kernel
-def _near_larger(
-    spot, order, a, level, row0, row1, levels, start, skin, picky, category, mask, inverse_mass, raw_i, raw_j, found
-):  # fmt: skip
-    """Note which circles of the levels with larger cells, in the rows row0 to row1 of level 0, are near place a of `level`."""
+    From the larger to the smaller: what is near a large circle stands around it, and inside of it the rows are empty.
+    """
     x, y = spot[a, 0] - levels.x0, spot[a, 1] - levels.y0
-    for other in range(level):
+    zero, one = spot.dtype.type(0), spot.dtype.type(1)
+    for other in range(level + 1, levels.base.shape[0]):
         wide, high, shift = levels.width[other], levels.height[other], levels.shift[other]
-        reach = spot[a, 2] + levels.largest[other] + skin
-        left = cell_number((x - reach) * levels.across[other], wide)
-        right = cell_number((x + reach) * levels.across[other], wide)
-        first = max(cell_number((y - reach) * levels.along[other], high), row0 << shift)
-        end = min(cell_number((y + reach) * levels.along[other], high) + 1, row1 << shift)
-        for row in range(first, end):
+        reach = (spot[a, 2] + levels.largest[other] + skin) * spot.dtype.type(ROUNDING)
+        first = cell_number((y - reach) * levels.along[other], high)
+        last = cell_number((y + reach) * levels.along[other], high)
+        tall = one / levels.along[other]
+        for row in range(max(first, row0 << shift), min(last + 1, row1 << shift)):
+            # The chord of the circle of that reach where it is widest within the row; the rim rows have no outer edge.
+            below = spot.dtype.type(row) * tall - y
+            away = max(max(below if row > 0 else zero, -below - tall if row < high - 1 else zero), zero)
+            half = np.sqrt(max(reach * reach - away * away, zero))
+            left = cell_number((x - half) * levels.across[other], wide)
+            right = cell_number((x + half) * levels.across[other], wide)
             k = levels.base[other] + row * wide
-            found = _near(
-                spot, order, a, start[k + left], start[k + right + 1], skin, picky, category, mask, inverse_mass,
-                raw_i, raw_j, found,
-            )  # fmt: skip
-    return found
+            low[runs], end[runs] = start[k + left], start[k + right + 1]
+            runs += low[runs] < end[runs]
+    return runs
 
 
 @kernel
-def _list_strip(
-    spot, order, row0, row1, levels, start, skin, picky, category, mask, inverse_mass, raw_i, raw_j
-):  # fmt: skip
-    """Candidate pairs, as places in the order of the cells, of rows row0 to row1; how many there are, also beyond the room."""
+def _most_runs(levels):
+    """Runs that a circle may have at most: two on its own level, and a row each on those below."""
+    most = 2
+    for level in range(1, levels.base.shape[0]):
+        most += (4 << levels.shift[level]) + 2
+    return most
+
+
+@kernel
+def _list_strip(spot, order, row0, row1, levels, start, skin, picky, category, mask, inverse_mass, raw_i, raw_j):
+    """Candidate pairs of the rows row0 to row1, as places in the order of the cells; how many there are, also beyond the room."""
     found = 0
-    rows = levels.height[0]
-    for level in range(levels.base.shape[0]):
+    last = levels.base.shape[0] - 1
+    low, end = np.empty(_most_runs(levels), np.int64), np.empty(_most_runs(levels), np.int64)
+    for level in range(last + 1):
         wide, high, shift, across = levels.width[level], levels.height[level], levels.shift[level], levels.across[level]
-        for row in range(row0 << shift, row1 << shift):
+        # Pairs of a circle of the first row above and a smaller one below belong to this strip, too.
+        above = min(row1 + (level < last), levels.height[0])
+        for row in range(row0 << shift, above << shift):
+            here = row < row1 << shift
             this = levels.base[level] + row * wide
-            above = this + wide
             for a in range(start[this], start[this + wide]):
-                column = cell_number((spot[a, 0] - levels.x0) * across, wide)
-                left, right = max(column - COLUMNS, 0), min(column + COLUMNS, wide - 1)
-                found = _near(
-                    spot, order, a, a + 1, start[this + right + 1], skin, picky, category, mask, inverse_mass,
-                    raw_i, raw_j, found,
-                )  # fmt: skip
-                if row + 1 < high:
-                    found = _near(
-                        spot, order, a, start[above + left], start[above + right + 1], skin, picky, category, mask,
-                        inverse_mass, raw_i, raw_j, found,
-                    )  # fmt: skip
-                if level > 0:
-                    found = _near_larger(
-                        spot, order, a, level, row0, rows, levels, start, skin, picky, category, mask, inverse_mass,
-                        raw_i, raw_j, found,
-                    )  # fmt: skip
-        # Of the first row of the next strip, what is nearer to larger ones below: these pairs belong to this strip.
-        if level > 0:
-            for a in range(before_row(levels, start, level, row1), before_row(levels, start, level, row1 + 1)):
-                found = _near_larger(
-                    spot, order, a, level, row0, row1, levels, start, skin, picky, category, mask, inverse_mass,
-                    raw_i, raw_j, found,
-                )  # fmt: skip
+                runs = 0
+                if here:
+                    # The rest of this row, and the row above, from COLUMNS to the left to COLUMNS to the right.
+                    column = cell_number((spot[a, 0] - levels.x0) * across, wide)
+                    left, right = max(column - COLUMNS, 0), min(column + COLUMNS, wide - 1) + 1
+                    low[0], end[0] = a + 1, start[this + right]
+                    runs = 1
+                    if row + 1 < high:
+                        low[1], end[1] = start[this + wide + left], start[this + wide + right]
+                        runs = 2
+                if level < last:
+                    top = levels.height[0] if here else row1
+                    runs = _runs_of_smaller(spot, a, level, row0, top, levels, start, skin, low, end, runs)
+                x, y, reach_a = spot[a, 0], spot[a, 1], spot[a, 2] + skin
+                for run in range(runs):
+                    for b in range(low[run], end[run]):
+                        dx = spot[b, 0] - x
+                        dy = spot[b, 1] - y
+                        reach = reach_a + spot[b, 2]
+                        # Written whether or not it counts: an unpredictable branch costs more than the store.
+                        if found < raw_i.shape[0]:
+                            raw_i[found] = a
+                            raw_j[found] = b
+                        near = dx * dx + dy * dy < reach * reach
+                        if picky:
+                            near &= _accept(category, mask, inverse_mass, order[a], order[b])
+                        found += near
     return found
 
 
