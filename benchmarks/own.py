@@ -178,6 +178,28 @@ def max_second(spent: list[float]) -> float:
     return max(float(np.mean(spent[a : a + frames])) for a in range(0, len(spent) - frames + 1, frames))
 
 
+def resting(particles: int = 20_000) -> Iterator[Row]:
+    """A heap on a flat floor, asleep, and a ball that drops on a small heap beside it."""
+    worlds = []
+    for sleep in (False, True):
+        side = round(np.sqrt(2 * particles))
+        world = pv.World(boundary=pv.Box((0, 0), (1.4 * side, 2 * side)), sleep=sleep)
+        world.obstacles.append(pv.Segment((1.1 * side, 0), (1.1 * side, 2 * side)))
+        row, column = np.divmod(np.arange(particles), side)
+        shaken = np.random.default_rng(0).uniform(0, 0.02, (particles, 2))
+        world.add(position=np.column_stack((1 + 1.05 * column, 1 + 1.05 * row)) + shaken, radius=RADIUS)
+        world.run(seconds=40, dt=DT)
+        world.add(position=(1.2 * side, 2 * side - 2), radius=RADIUS)
+        worlds.append(world)
+    awake, asleep = in_turn([stepping(world, 1) for world in worlds], 4)
+    yield Row(
+        "resting",
+        "a mostly resting world costs less",
+        f"{asleep / awake:.2f} of what it costs awake, {worlds[1].asleep.sum():,} of {particles + 1:,} asleep; {heap(worlds[0])}",
+        asleep < 0.7 * awake,
+    )
+
+
 def small(machine_limit_ms: float = 0.15) -> Iterator[Row]:
     """A hundred circles, and ten beside pymunk."""
     hundred = cage(100)
@@ -251,7 +273,7 @@ def views(particles: int = 100_000) -> Iterator[Row]:
 def main(triad: float, million: bool) -> bool:
     """Print a line for each promise; returns whether all hold."""
     held = True
-    parts: list[Iterator[Row]] = [start(), small(), views(), threads(triad), sizes(), motion(), memory()]
+    parts: list[Iterator[Row]] = [start(), small(), views(), threads(triad), sizes(), motion(), resting(), memory()]
     if million:
         parts.append(growth())
     for part in parts:
