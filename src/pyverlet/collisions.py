@@ -161,7 +161,13 @@ class ContactSolver:
     def _rubs(self, state: Slots) -> bool:
         return self.settings.friction > 0.0 or state.most_friction > 0.0
 
-    def mark_resting(self, state: Slots) -> None:
+    def end(self, state: Slots, dt: float, gravity: tuple[float, float]) -> None:
+        """At the end of a frame of dt seconds: note who was held by a contact, and let those fall asleep that are tired."""
+        self._mark_resting(state)
+        if self._sleep and self._sleep.end(state, self.broad_phase.list, dt, float(np.hypot(*gravity))):
+            self.broad_phase.forget()  # it has no use for pairs among sleepers
+
+    def _mark_resting(self, state: Slots) -> None:
         """Set `state.resting` for particles that touch another without bouncing off it."""
         if self._slides(state):
             self._packs.mark_resting(state)
@@ -169,11 +175,6 @@ class ContactSolver:
         pairs = self.broad_phase.list
         notes = (pairs.touching, pairs.impulse, pairs.touches)
         contacts.mark_touching(pairs.first, pairs.pair_i, pairs.pair_j, *notes, state.resting)
-
-    def rest(self, state: Slots, dt: float, gravity: float) -> None:
-        """At the end of a frame: let those fall asleep that are tired; the list has no use for pairs among them."""
-        if self._sleep and self._sleep.end(state, self.broad_phase.list, dt, gravity):
-            self.broad_phase.forget()
 
 
 def find_contacts(state: State, method: Fast | BruteForce) -> np.ndarray[Any, np.dtype[np.int64]]:

@@ -149,8 +149,7 @@ class World(Measures, Queries, Doors):
                 links.after(state)
                 done("links")
         if contacts:
-            contacts.mark_resting(state)
-            contacts.rest(state, self.substeps * h, float(np.hypot(*self.gravity)))
+            contacts.end(state, self.substeps * h, self.gravity)
         integrator.end(state, h)
         done("finish")
 
