@@ -44,20 +44,22 @@ class Sleep:
     def begin(self, slots: Slots, state: State, laws: Any) -> bool:
         """Before the slots gather the state of a new frame. Whether somebody woke."""
         same, self._laws = laws == self._laws, laws
-        asleep = slots.island >= 0
-        if not asleep.any():
+        if not self._members:
             return False
         if not same:
-            return self._wake(slots, asleep)
-        who = slots.particle[asleep]
-        edited = (state.velocity[who] != 0).any(axis=1) | (state.spin[who] != 0)
-        if not slots.is_new:  # else positions are not in the slots yet; whoever is gone is missed below
-            edited |= (state.position[who] != slots.position[asleep]).any(axis=1)
-            edited |= (state.radius[who] != slots.radius[asleep]) | (state.mass[who] != slots.mass[asleep])
-        island = slots.island[asleep]
-        number, left = np.unique(island, return_counts=True)
-        fewer = [k for k, n in zip(number, left, strict=True) if n != self._members[int(k)]]
-        return self._wake(slots, np.isin(slots.island, np.concatenate((island[edited], fewer))) & asleep)
+            return self._wake(slots, slots.island >= 0)
+        edited = np.zeros(len(slots), np.uint8)
+        if slots.is_new:  # some have gone, and what the slots hold of the others is not known yet
+            number, left = np.unique(slots.island, return_counts=True)
+            fewer = [k for k, n in zip(number.tolist(), left.tolist(), strict=True) if n != self._members.get(k, n)]
+            edited[np.isin(slots.island, fewer)] = 1
+            edited |= (state.velocity[slots.particle] != 0).any(axis=1)
+        else:
+            now = (state.position, state.velocity, state.spin, state.radius, state.mass)
+            before = (slots.position, slots.radius, slots.mass)
+            if not kernels.find_edited(*now, *before, slots.particle, slots.island, edited):
+                return False
+        return self._wake(slots, np.isin(slots.island, slots.island[(edited == 1) & (slots.island >= 0)]))
 
     def all_asleep(self, slots: Slots) -> bool:
         """Whether nothing can move."""

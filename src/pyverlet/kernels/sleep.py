@@ -68,3 +68,21 @@ def touch(position, size, island, first, count, pair_i, pair_j, touched):
                     touched[j if island[i] < 0 else i] = 1
                     found += 1
     return found
+
+
+@kernel
+def find_edited(position, velocity, spin, radius, mass, slot_position, slot_radius, slot_mass, particle, island, edited):
+    """Set edited[k] = 1 for sleepers whose user has written to them; returns how many there are.
+
+    First what the user has, in the user's order; then what the slots hold.
+    """
+    found = 0
+    for k in range(island.shape[0]):
+        if island[k] >= 0:
+            i = particle[k]
+            moved = (position[i, 0] != slot_position[k, 0]) | (position[i, 1] != slot_position[k, 1])
+            moved |= (velocity[i, 0] != 0) | (velocity[i, 1] != 0) | (spin[i] != 0)
+            if moved | (radius[i] != slot_radius[k]) | (mass[i] != slot_mass[k]):
+                edited[k] = 1
+                found += 1
+    return found
