@@ -25,7 +25,7 @@ class Saved:
     frames: int
     h_last: float | None
     slots: tuple[Array, Array]
-    neighbours: Any
+    contacts: Any
     books: Bookkeeper | None
     events: Events | None
     obstacles: Any

@@ -138,7 +138,10 @@ class Slots:
         size: (n,) grown * radius, m: what contacts between particles take as the radius.
         inverse_mass: (n,) 1/kg; 0 for a pinned particle.
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
-        start: (n, 2) positions before the integration of this substep, m. Kept only if circles rub.
+        start: (n, 2) positions before the integration of this substep, m. Kept only if circles rub, or meet obstacles.
+        turn: (n,) rad by which each circle turns in this substep; empty unless circles rub each other.
+        lift: (n,) s; times -a it is the velocity with which circles at rest against others end a substep, for others 0.
+        drop: a circle that starts at rest falls drop * a h^2 in a substep; depends on the integrator.
         fed: (n,) 1 where a contact at rest fed the velocity in the last substep: it carries weight. Kept only if circles bounce.
         resting: (n,) 1 where a contact without bounce held the particle in the last substep.
         hits: (n,) largest speed with which the circle met a wall in this frame, m/s; negative: none.
@@ -150,6 +153,7 @@ class Slots:
         self.dtype = dtype
         self.real = dtype.type
         self._order = np.zeros(0, np.int32), np.zeros(0, np.uint8)
+        self.drop = 1.0
         self._resize(0)
 
     def __len__(self) -> int:
@@ -164,6 +168,7 @@ class Slots:
         for name in (*_COLUMNS, "inverse_mass"):
             setattr(self, name, np.zeros(count, self.dtype))
         self.start = np.zeros((count, 2), self.dtype)
+        self.turn, self.lift = np.zeros(0, self.dtype), np.zeros(count, self.dtype)
         self.size = self.radius
         self.resting = np.zeros(count, np.uint8)
         self.fed = np.concatenate((fed, np.zeros(count - len(fed), np.uint8)))
@@ -221,9 +226,11 @@ class Slots:
         return not (np.array_equal(before[0], self.category) and np.array_equal(before[1], self.mask))
 
     def clear_notes(self) -> None:
-        """Forget what walls have noted in the last frame."""
+        """Forget what walls and friction have noted in the last frame."""
         self.hits[:] = -1
         self.spent[:] = 0
+        self.lift[:] = 0
+        self.turn = self.turn[:0]
 
     def forget(self, now: Array) -> None:
         """The user's particles are now at `now` (n,), or no more (-1): let those go, keep the order of the others."""

@@ -17,7 +17,8 @@ ROOT = Path(pyverlet.__file__).parent
 LAYERS = (
     {"errors", "constants", "_jit", "checks", "progress"},
     {"state", "group", "kernels"},
-    {"integrators", "forces", "bounds", "obstacles", "naive", "broadphase", "events", "collisions", "energy", "ledger", "links"},
+    {"integrators", "forces", "bounds", "obstacles", "naive"}
+    | {"broadphase", "events", "slips", "collisions", "energy", "ledger", "links"},
     {"world", "actors", "particles", "measures", "queries", "saved", "doors", "profile", "clock", "warmup", "panels", "builders"},
     {"scenes", "report", "lab", "picture"},
     {"viewers", "record", "draw"},
@@ -28,7 +29,8 @@ BESIDE = {
     "checks": {"errors"},
     "state": {"kernels"},
     "group": {"state"},
-    "collisions": {"broadphase", "events"},
+    "collisions": {"broadphase", "events", "slips"},
+    "slips": {"broadphase"},
     "events": {"broadphase"},
     "ledger": {"forces", "links"},
     "energy": {"forces"},
