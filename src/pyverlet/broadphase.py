@@ -24,7 +24,8 @@ class PairList:
 
     `meeting`, `touching` and `impulse` are where the contact solver notes, by strip too, how each stands, which of them touch and
     how hard; `spent` (strips, 2) what energy impacts and friction have taken, J. `closing` is where events are noted, and empty
-    unless somebody listens to them.
+    unless somebody listens to them. `slip`, `slipped` and `held` are for friction, and empty without: how far a pair has slipped,
+    m, and by touching pair how far it had before this substep, and the impulse that answered it, N s.
     """
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
@@ -34,6 +35,7 @@ class PairList:
         self.count = np.zeros(0, np.int64)
         self.touches = np.zeros(0, np.int64)
         self.spent = np.zeros((0, 2))
+        self.slip = self.slipped = self.held = np.empty(0, dtype)
         self.make_room(0)
 
     def make_room(self, pairs: int) -> None:
@@ -49,6 +51,11 @@ class PairList:
         """Note events from now on."""
         self.listening = True
         self.closing = np.full(len(self.pair_i), -1, self._dtype)
+
+    def hold_slips(self) -> None:
+        """Room for what friction notes; the values are anything."""
+        if len(self.slip) != len(self.pair_i):
+            self.slip, self.slipped, self.held = (np.empty(len(self.pair_i), self._dtype) for _ in range(3))
 
     def set_strips(self, strips: int) -> None:
         """Begin a new list of this many strips."""
@@ -73,6 +80,8 @@ class BroadPhase(ABC):
     rebuilds: int = 0
     renewing: Callable[[Slots, PairList], None] | None = None
     """Called when the list is about to be made anew."""
+    replacing: Callable[[PairList], None] | None = None
+    """The same, but also when the list was no longer valid: slots may hold other particles by now."""
 
     @abstractmethod
     def update(self, state: Slots) -> None:
@@ -112,6 +121,8 @@ class _AllPairs(BroadPhase):
         self.list = PairList(dtype)
 
     def update(self, state: Slots) -> None:
+        if self.replacing:
+            self.replacing(self.list)
         if self.renewing:
             self.renewing(state, self.list)
         found = self._fill(state)
@@ -220,6 +231,8 @@ class _SortedCells(BroadPhase):
 
     def rebuild(self, state: Slots) -> None:
         """Sort the particles by cell and list the pairs."""
+        if self.replacing:
+            self.replacing(self.list)
         self.rebuilds += 1
         self._age = 0
         skin = self.skin_diameters * 2.0 * float(state.radius.mean(dtype=np.float64))

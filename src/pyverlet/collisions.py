@@ -10,12 +10,13 @@ import numpy as np
 
 from pyverlet import checks
 from pyverlet.broadphase import BruteForce, Fast, PairList
-from pyverlet.constants import GROWTH, LARGEST_PUSH, REST_ACCELERATIONS, SMALLEST
+from pyverlet.constants import FED, GROWTH, LARGEST_PUSH, PUSHED, REST_ACCELERATIONS, SMALLEST
 from pyverlet.errors import InputError
 from pyverlet.events import Events
-from pyverlet.kernels import contacts, impacts
+from pyverlet.kernels import contacts, friction, impacts
 from pyverlet.packs import Packs
 from pyverlet.sleep import Sleep
+from pyverlet.slips import Kept, Slips
 from pyverlet.state import Slots, State
 
 Unlist = Callable[[PairList, Any], None]
@@ -73,6 +74,8 @@ class ContactSolver:
         self._packed = False
         self._events = events
         self._sleep = sleep
+        self._slips = Slips(dtype)
+        self.broad_phase.replacing = self._slips.stop
         if events is not None:
             self.broad_phase.list.listen()
             self.broad_phase.renewing = events.collect
@@ -89,7 +92,7 @@ class ContactSolver:
             state.resize()
 
     def before(self, state: Slots, h: float) -> None:
-        """Let those that are not full-grown grow; note where the substep starts, for friction at rest measures from there."""
+        """Let those that are not full-grown grow; note where the substep starts, for friction measures slip from there."""
         if state.size is not state.radius:
             real = state.real
             # In proportion at first: a crowd in one point would otherwise double its size in every substep.
@@ -98,6 +101,8 @@ class ContactSolver:
             state.resize()
         if self._rubs(state):
             state.start[:] = state.position
+        else:
+            self._slips.forget()
 
     def find(self, state: Slots, lag: float) -> None:
         """Broad phase: bring the list of candidate pairs up to date, and note events before contacts change a velocity."""
@@ -122,7 +127,7 @@ class ContactSolver:
         return self._packs
 
     def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
-        """Move overlapping circles apart, let impacts bounce, and note who touches."""
+        """Move overlapping circles apart, let impacts bounce, note who touches, and let those grip each other."""
         pairs, real = self.broad_phase.list, state.real
         moving, bodies = (state.position, state.velocity), (state.size, state.inverse_mass)
         which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
@@ -140,6 +145,14 @@ class ContactSolver:
             state.fed[:] = 0
             slow = real(1 / h if strongest > 0 else 0.0)
             contacts.project_resting(*moving, *bodies, *which, *push, slow, pairs.meeting, state.fed, *notes)
+        if self._rubs(state):
+            self._slips.start(pairs, state.particle)
+            state.turn = state.spin * real(h)
+            state.lift[:] = 0
+            leaning = (state.drop - PUSHED / FED) * h
+            where = (*moving, state.spin, state.turn, state.lift, state.radius, state.inverse_mass, state.friction)
+            numbers = (real(h), real(self.settings.friction), real(leaning))
+            friction.grip(*where, *which, *numbers, *notes, pairs.slip, pairs.slipped, pairs.held, pairs.spent)
 
     def still(self, state: Slots, h: float) -> None:
         """Take from touching circles the velocity that projection has put in, and rub them."""
@@ -147,10 +160,33 @@ class ContactSolver:
         which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
         if self._slides(state):
             self._packs.still(state)
+            return
+        moving = (state.position, state.velocity)
+        notes = (pairs.touching, pairs.impulse, pairs.touches)
+        if self._rubs(state):
+            where = (state.start, *moving, state.spin, state.turn, state.radius, state.inverse_mass, state.friction)
+            numbers = (real(h), real(self.settings.friction))
+            friction.rub(*where, *which, *numbers, *notes, pairs.slip, pairs.slipped, pairs.held, pairs.spent)
         else:
-            where = (state.position, state.velocity, state.spin, state.radius, state.inverse_mass)
-            notes = (pairs.touching, pairs.impulse, pairs.touches, pairs.spent)
-            contacts.rub(state.start, *where, state.friction, *which, real(h), real(self.settings.friction), *notes)
+            contacts.still_resting(*moving, state.inverse_mass, *which, *notes)
+
+    def save(self) -> tuple[Any, Kept]:
+        """What outlives a frame here: what the broad phase says, and what friction remembers."""
+        return self.broad_phase.save(), self._slips.save(self.broad_phase.list)
+
+    def restore(self, saved: tuple[Any, Kept] | None, state: Slots) -> None:
+        """Back to what `save` returned, or to nothing; `state` already has the order and radii of then."""
+        phase, slips = saved or (None, None)
+        self.broad_phase.forget()
+        if phase is not None:  # None: collisions were off, or of a kind that remembers nothing
+            self.broad_phase.restore(phase, state)
+        self._slips.forget()
+        if slips is not None:
+            self._slips.restore(slips)
+
+    def renumber(self, now: np.ndarray[Any, Any]) -> None:
+        """The particles are now at `now` (n,), or no more (-1)."""
+        self._slips.renumber(now)
 
     def _slides(self, state: Slots) -> bool:
         return not self._bounces(state) and not self._rubs(state)

@@ -38,11 +38,13 @@ class Integrator(ABC):
         order: global order in h for unconstrained motion.
         symplectic: whether the map preserves phase space volume (for forces that do not depend on velocity).
         velocity_lag: the velocity seen by contacts during a frame belongs to this fraction of h before the position.
+        drop: from rest, under a constant acceleration a, a step moves a particle by drop * a h^2.
     """
 
     order: ClassVar[int]
     symplectic: ClassVar[bool]
     velocity_lag: ClassVar[float] = 0.0
+    drop: ClassVar[float] = 0.5
 
     def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
         """Before the substeps of a frame. `h_last`: the substep of the frame before, None after a restart."""
@@ -87,6 +89,7 @@ class ExplicitEuler(Integrator):
 
     order = 1
     symplectic = False
+    drop = 0.0
 
     def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
         forces(state, t)
@@ -102,6 +105,7 @@ class SemiImplicitEuler(Integrator):
 
     order = 1
     symplectic = True
+    drop = 1.0
 
     def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
         forces(state, t)
@@ -118,6 +122,7 @@ class _Stormer(Integrator):
 
     order = 2
     symplectic = True
+    drop = 1.0
     velocity_lag = 0.5
 
     def __init__(self, *, naive_start: bool = False) -> None:

@@ -111,7 +111,7 @@ class Particles:
 
     def _renumber(self, now: Array) -> None:
         """Tell those who hold a particle by its index where it is now, or that it is no more (-1)."""
-        for holder in (self.links, *self.forces):
+        for holder in (self.links, self._contacts, *self.forces):
             if isinstance(holder, Numbered):
                 holder.renumber(now)
 

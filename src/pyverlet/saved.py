@@ -26,7 +26,7 @@ class Saved:
     frames: int
     h_last: float | None
     slots: dict[str, Array]
-    neighbours: Any
+    contacts: Any
     books: Bookkeeper | None
     events: Events | None
     sleep: Sleep | None

@@ -146,7 +146,10 @@ class Slots:
         size: (n,) grown * radius, m: what contacts between particles take as the radius.
         inverse_mass: (n,) 1/kg; 0 for a pinned particle.
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
-        start: (n, 2) positions before the integration of this substep, m. Kept only if circles rub.
+        start: (n, 2) positions before the integration of this substep, m. Kept only if circles rub, or meet obstacles.
+        turn: (n,) rad by which each circle turns in this substep; empty unless circles rub each other.
+        lift: (n,) s; times -a it is the velocity with which circles at rest against others end a substep, for others 0.
+        drop: a circle that starts at rest falls drop * a h^2 in a substep; depends on the integrator.
         fed: (n,) 1 where a contact at rest fed the velocity in the last substep: it carries weight. Kept only if circles bounce.
         island: (n,) number of the island a sleeping particle belongs to, -1 for those awake. calm: (n,) seconds it has been so.
         resting: (n,) 1 where a contact without bounce held the particle in the last substep.
@@ -159,6 +162,7 @@ class Slots:
         self.dtype = dtype
         self.real = dtype.type
         self._kept: dict[str, Array] = {}
+        self.drop = 1.0
         self._resize(0)
 
     def __len__(self) -> int:
@@ -177,6 +181,7 @@ class Slots:
         for name in (*_COLUMNS, "inverse_mass"):
             setattr(self, name, np.zeros(count, self.dtype))
         self.start = np.zeros((count, 2), self.dtype)
+        self.turn, self.lift = np.zeros(0, self.dtype), np.zeros(count, self.dtype)
         self.size = self.radius
         self.resting = np.zeros(count, np.uint8)
         self._given: dict[str, Any] = {name: np.zeros(count, np.uint32 if name in _MARKS else self.dtype) for name in _GIVEN}
@@ -254,9 +259,11 @@ class Slots:
         self._kept = {name: getattr(self, name)[slots] for name in ("particle", *_REMEMBERED)}
 
     def clear_notes(self) -> None:
-        """Forget what walls have noted in the last frame."""
+        """Forget what walls and friction have noted in the last frame."""
         self.hits[:] = -1
         self.spent[:] = 0
+        self.lift[:] = 0
+        self.turn = self.turn[:0]
 
     def forget(self, now: Array) -> None:
         """The user's particles are now at `now` (n,), or no more (-1): let those go, keep the order of the others."""

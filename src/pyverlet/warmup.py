@@ -21,7 +21,7 @@ from pyverlet.obstacles import Segment
 from pyverlet.state import Slots
 from pyverlet.world import World
 
-OF_CIRCLES = ("bounds", "contacts", "grid", "impacts", "measure", "motion", "pairs")
+OF_CIRCLES = ("bounds", "contacts", "friction", "grid", "impacts", "measure", "motion", "packs", "pairs")
 """Modules of the kernels that every world of circles may need: how many there are is what progress is measured by."""
 
 Progress = Callable[[int, int], None]

@@ -117,7 +117,7 @@ class World(Measures, Queries, Doors):
         contacts, course = self._contacts if len(self) > 1 else None, self._course
         links = self.links
         parts: list[Any] = [part for part in (contacts, links, course) if part]
-        lag = integrator.velocity_lag * h
+        lag, state.drop = integrator.velocity_lag * h, integrator.drop
         self._gather()
         done("gather")
         if self._sleep and self._sleep.all_asleep(state):
@@ -324,7 +324,7 @@ class World(Measures, Queries, Doors):
             frames=self.frames,
             h_last=self._h_last,
             slots=self._slots.save(),
-            neighbours=self._contacts.broad_phase.save() if self._contacts else None,
+            contacts=self._contacts.save() if self._contacts else None,
             books=self._books and self._books.copy(),
             events=self._events and self._events.copy(),
             sleep=self._sleep and self._sleep.copy(),
@@ -359,7 +359,4 @@ class World(Measures, Queries, Doors):
         if self._events and saved.events:
             self._events.take(saved.events)
         if self._contacts:
-            # None: collisions were off, or of a kind that remembers nothing.
-            self._contacts.broad_phase.forget()
-            if saved.neighbours is not None:
-                self._contacts.broad_phase.restore(saved.neighbours, self._slots)
+            self._contacts.restore(saved.contacts, self._slots)

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pyverlet._jit import kernel, parallel_kernel, prange
+from pyverlet.constants import FED, PUSHED
 
 BLOCK = 64
 """Circles looked at together for whether any of them is at a wall: hardly any is."""
@@ -34,6 +35,9 @@ class Bodies(NamedTuple):
     resting: Any
     hits: Any
     spent: Any
+    start: Any
+    turn: Any
+    lift: Any
 
 
 @kernel
@@ -69,16 +73,19 @@ def meet(i, nx, ny, depth, bodies, h, lag, e, mu, rest_speed):
             shift = depth + travelled
             bodies.spent[i, 0] -= 0.5 * mass * (hit * hit - leaving * leaving)
     held = after == zero
+    # A circle in a pile ends each substep with the velocity that the next one's gravity needs to press it down again.
+    lift = bodies.lift[i] if held else zero
+    lx, ly = -lift * bodies.acceleration[i, 0], -lift * bodies.acceleration[i, 1]
     if held:
         bodies.resting[i] = 1
-        after = max(before, zero)
+        after = max(before, lx * nx + ly * ny)
     position[i, 0] += shift * nx
     position[i, 1] += shift * ny
     velocity[i, 0] += (after - before) * nx
     velocity[i, 1] += (after - before) * ny
     if mu > zero:
         # Tangent (ny, -nx); impulses per unit mass; the contact point of a disc has inverse mass 3 / m.
-        slip = velocity[i, 0] * ny - velocity[i, 1] * nx + spin[i] * radius[i]
+        slip = (velocity[i, 0] - lx) * ny - (velocity[i, 1] - ly) * nx + spin[i] * radius[i]
         most = mu * (after - before)
         rub = max(min(-slip / three, most), -most)
         velocity[i, 0] += rub * ny
@@ -86,8 +93,15 @@ def meet(i, nx, ny, depth, bodies, h, lag, e, mu, rest_speed):
         spin[i] += two * rub / radius[i]
         bodies.spent[i, 1] += mass * rub * (slip + 1.5 * rub)
         if held:
-            position[i, 0] += h * rub * ny
-            position[i, 1] -= h * rub * nx
+            back = h * rub
+            if bodies.turn.shape[0] > 0:
+                # Among circles that rub each other: from what it has slipped, for they have pushed it since the integration.
+                sx, sy = position[i, 0] - bodies.start[i, 0], position[i, 1] - bodies.start[i, 1]
+                most *= h if lift == zero else h * position.dtype.type(PUSHED / FED)
+                back = max(min(-(sx * ny - sy * nx + bodies.turn[i] * radius[i]) / three, most), -most)
+                bodies.turn[i] += two * back / radius[i]
+            position[i, 0] += back * ny
+            position[i, 1] -= back * nx
 
 
 @kernel
@@ -188,9 +202,9 @@ def _any_beyond_box(x0, y0, x1, y1, position, radius, resting, first, stop):
 @parallel_kernel
 def circle(
     x0, y0, size, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent,
-    h, lag, e, mu, rest_speed,
+    start, turn, lift, h, lag, e, mu, rest_speed,
 ):  # fmt: skip
-    """A cage: all circles stay inside that of radius `size` about (x0, y0). position to spent: the fields of Bodies."""
+    """A cage: all circles stay inside that of radius `size` about (x0, y0). position to lift: the fields of Bodies."""
     zero = h - h
     for block in prange((radius.shape[0] + BLOCK - 1) // BLOCK):
         first, stop = block * BLOCK, min((block + 1) * BLOCK, radius.shape[0])
@@ -200,17 +214,18 @@ def circle(
             dx, dy, room = position[i, 0] - x0, position[i, 1] - y0, size - radius[i]
             if dx * dx + dy * dy > room * room and inverse_mass[i] > zero:
                 bodies = Bodies(
-                    position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent
-                )
+                    position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent,
+                    start, turn, lift,
+                )  # fmt: skip
                 _at_cage(i, x0, y0, size, bodies, h, lag, e, mu, rest_speed)
 
 
 @parallel_kernel
 def box(
     x0, y0, x1, y1, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent,
-    h, lag, e, mu, rest_speed,
+    start, turn, lift, h, lag, e, mu, rest_speed,
 ):  # fmt: skip
-    """Four walls; in a corner both axes act, one after the other. position to spent: the fields of Bodies."""
+    """Four walls; in a corner both axes act, one after the other. position to lift: the fields of Bodies."""
     zero = h - h
     for block in prange((radius.shape[0] + BLOCK - 1) // BLOCK):
         first, stop = block * BLOCK, min((block + 1) * BLOCK, radius.shape[0])
@@ -221,8 +236,9 @@ def box(
             left, right, down, up = x0 + r - px, px - (x1 - r), y0 + r - py, py - (y1 - r)
             if max(left, right, down, up) > zero and inverse_mass[i] > zero:
                 bodies = Bodies(
-                    position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent
-                )
+                    position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent,
+                    start, turn, lift,
+                )  # fmt: skip
                 _at_box(i, left, right, down, up, bodies, h, lag, e, mu, rest_speed)
                 # As in the cage: what one reflection has sent beyond the other side waits at that wall.
                 if position[i, 0] < x0 or position[i, 0] > x1:

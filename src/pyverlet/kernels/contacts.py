@@ -7,8 +7,7 @@ positions, FED of it, divided by h, into the velocities: that is what carries th
 (Mueller et al. 2007, Position Based Dynamics, has 1 and 1).
 
 Velocity: what projection feeds in must not become a bounce. A second pass sets the normal velocity of touching pairs
-to 0, and applies Coulomb friction with the normal impulse the projection has found (Mueller et al. 2020, Detailed Rigid Body
-Simulation, section 3.5).
+to 0 (Mueller et al. 2020, Detailed Rigid Body Simulation, section 3.5). With friction that pass is kernels.friction.rub.
 
 Impacts, when e > 0, come before both: kernels.impacts.
 
@@ -20,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet.constants import FED, HELD, PUSHED
+from pyverlet.constants import FED, PUSHED
 from pyverlet.kernels.impacts import APART, PARTING, part
 
 # Golden angle, rad: coincident centres part in directions spread evenly over the circle.
@@ -153,61 +152,6 @@ def _still_strip(position, velocity, inverse_mass, pair_i, pair_j, touching):
         velocity[j, 1] = vyj - cy * wj
 
 
-@kernel
-def _pair_friction(a, b, mu):
-    """The geometric mean of two circles' friction; mu, that of all, stands for one that is negative: not given."""
-    zero = mu - mu
-    if a < zero and b < zero:
-        return mu
-    return np.sqrt((a if a >= zero else mu) * (b if b >= zero else mu))
-
-
-@kernel
-def _rub_strip(start, position, velocity, spin, radius, inverse_mass, friction, pair_i, pair_j, h, mu, touching, impulse, spent):
-    zero = h - h
-    two = position.dtype.type(2)
-    three = position.dtype.type(3)
-    tiny = position.dtype.type(_TINY)
-    part = position.dtype.type(HELD)
-    for t in range(touching.shape[0]):
-        k = touching[t]
-        i, j = pair_i[k], pair_j[k]
-        wi, wj = inverse_mass[i], inverse_mass[j]
-        dx = position[j, 0] - position[i, 0]
-        dy = position[j, 1] - position[i, 1]
-        distance = np.sqrt(dx * dx + dy * dy) + tiny
-        nx, ny = dx / distance, dy / distance
-        vx = velocity[j, 0] - velocity[i, 0]
-        vy = velocity[j, 1] - velocity[i, 1]
-        bounced = impulse[t] < zero
-        kick = zero if bounced else -(vx * nx + vy * ny) / (wi + wj)
-        # Tangent (ny, -nx). A disc has I = m r^2 / 2, so the contact point has the inverse mass w + r^2 / I = 3 w.
-        slip = vx * ny - vy * nx + spin[i] * radius[i] + spin[j] * radius[j]
-        most = _pair_friction(friction[i], friction[j], mu) * max(abs(impulse[t]) + min(kick, zero), zero)
-        rub = max(min(-slip / (three * (wi + wj)), most), -most)
-        spent[1] += np.float64(rub) * (slip + 1.5 * (wi + wj) * rub)
-        px = kick * nx + rub * ny
-        py = kick * ny - rub * nx
-        velocity[i, 0] -= px * wi
-        velocity[i, 1] -= py * wi
-        velocity[j, 0] += px * wj
-        velocity[j, 1] += py * wj
-        spin[i] += two * rub * wi / radius[i]
-        spin[j] += two * rub * wj / radius[j]
-        # Between circles at rest friction has held during the substep too: without this a heap creeps by g h^2 each substep. What
-        # slipped is measured from where the substep started; the velocity would count feeds that have moved nobody yet.
-        sx = (position[j, 0] - start[j, 0]) - (position[i, 0] - start[i, 0])
-        sy = (position[j, 1] - start[j, 1]) - (position[i, 1] - start[i, 1])
-        slipped = sx * ny - sy * nx + h * (spin[i] * radius[i] + spin[j] * radius[j])
-        back = part * max(min(-slipped / (wi + wj), h * most), -h * most)
-        held = zero if bounced else back
-        sx, sy = held * ny, -held * nx
-        position[i, 0] -= sx * wi
-        position[i, 1] -= sy * wi
-        position[j, 0] += sx * wj
-        position[j, 1] += sy * wj
-
-
 @parallel_kernel
 def project(position, velocity, radius, inverse_mass, first, count, pair_i, pair_j, rate, most, touching, impulse, touches):
     """Move overlapping pairs apart (e = 0) and list them. rate = 1 / h; touches[s]: how many strip s has in touching, impulse."""
@@ -240,35 +184,22 @@ def project_resting(
             )  # fmt: skip
 
 
-@parallel_kernel
-def still(position, velocity, inverse_mass, first, count, pair_i, pair_j, touching, touches):
-    """Set the normal velocity of touching pairs to 0."""
-    for parity in range(2):
-        for half in prange((first.shape[0] + 1 - parity) // 2):
-            s = 2 * half + parity
-            a, b = first[s], first[s] + count[s]
-            _still_strip(position, velocity, inverse_mass, pair_i[a:b], pair_j[a:b], touching[a : a + touches[s]])
+@kernel
+def _still_resting_strip(position, velocity, inverse_mass, pair_i, pair_j, touching, impulse):
+    for t in range(touching.shape[0]):
+        if not impulse[t] < 0:
+            _still_strip(position, velocity, inverse_mass, pair_i, pair_j, touching[t : t + 1])
 
 
 @parallel_kernel
-def rub(
-    start, position, velocity, spin, radius, inverse_mass, friction, first, count, pair_i, pair_j, h, mu,
-    touching, impulse, touches, spent,
-):  # fmt: skip
-    """The same, but not for pairs that have bounced (impulse < 0); and Coulomb friction for both.
-
-    It is at most mu times the normal impulse, and no more than stops the slip. start: positions before the integration.
-    spent[s, 1] gains the energy that friction in strip s has taken, J, negative.
-    """
+def still_resting(position, velocity, inverse_mass, first, count, pair_i, pair_j, touching, impulse, touches):
+    """Set the normal velocity of touching pairs to 0, but not for pairs that have bounced (impulse < 0)."""
     for parity in range(2):
         for half in prange((first.shape[0] + 1 - parity) // 2):
             s = 2 * half + parity
             a, b = first[s], first[s] + count[s]
             t = a + touches[s]
-            _rub_strip(
-                start, position, velocity, spin, radius, inverse_mass, friction, pair_i[a:b], pair_j[a:b], h, mu,
-                touching[a:t], impulse[a:t], spent[s],
-            )  # fmt: skip
+            _still_resting_strip(position, velocity, inverse_mass, pair_i[a:b], pair_j[a:b], touching[a:t], impulse[a:t])
 
 
 @kernel

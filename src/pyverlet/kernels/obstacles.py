@@ -237,9 +237,9 @@ def _search(segments, x0, y0, cell, columns, rows, start, entries, fresh, px, py
 
 @kernel
 def _travel(
-    i, segments, bodies, until, x0, y0, cell, columns, rows, start, entries, before,
+    i, segments, bodies, until, x0, y0, cell, columns, rows, start, entries,
     position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent,
-    h, lag, rest_speed,
+    before, turn, lift, h, lag, rest_speed,
 ):  # fmt: skip
     """Circle i goes its way through a substep and meets what there is to meet."""
     real = position.dtype.type
@@ -265,11 +265,17 @@ def _travel(
         velocity[i, 0] -= wx
         velocity[i, 1] -= wy
         circles = Bodies(
-            position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent
-        )
+            position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent,
+            before, turn, lift,
+        )  # fmt: skip
+        # And how far it went.
+        from_x, from_y = before[i, 0], before[i, 1]
+        before[i, 0] += h * wx
+        before[i, 1] += h * wy
         meet(i, real(nx), real(ny), real(depth), circles, h, lag, real(segment.restitution), real(segment.friction), rest_speed)
         velocity[i, 0] += wx
         velocity[i, 1] += wy
+        before[i, 0], before[i, 1] = from_x, from_y
         if time < 0.0:  # it was inside: the way so far does not count
             px, py = np.float64(position[i, 0]), np.float64(position[i, 1])
         elif number == 0:
@@ -300,9 +306,9 @@ def _alone(px, py, qx, qy, x0, y0, cell, columns, rows, start):
 
 @parallel_kernel
 def collide(
-    segments, bodies, until, x0, y0, cell, columns, rows, start, entries, before,
+    segments, bodies, until, x0, y0, cell, columns, rows, start, entries,
     position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent,
-    h, lag, rest_speed,
+    before, turn, lift, h, lag, rest_speed,
 ):  # fmt: skip
     """All circles, from their places `before` the substep (n, 2) to `position`; `until`: seconds into the frame at its end."""
     for i in prange(position.shape[0]):
@@ -310,7 +316,7 @@ def collide(
             before[i, 0], before[i, 1], position[i, 0], position[i, 1], x0, y0, cell, columns, rows, start
         ):
             _travel(
-                i, segments, bodies, until, x0, y0, cell, columns, rows, start, entries, before,
+                i, segments, bodies, until, x0, y0, cell, columns, rows, start, entries,
                 position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent,
-                h, lag, rest_speed,
+                before, turn, lift, h, lag, rest_speed,
             )  # fmt: skip

@@ -62,9 +62,7 @@ class Course:
             self._bin(largest)
         numbers = map(state.real, (h, lag, rest_speed))
         collide: Any = kernels.collide
-        collide(
-            self._segments, self._bodies, time + h, *self._cells, state.start, *state.bodies(), *numbers,
-        )  # fmt: skip
+        collide(self._segments, self._bodies, time + h, *self._cells, *state.bodies(), *numbers)
 
     def end(self, dt: float) -> None:
         """At the end of a frame that went well: the obstacles are where they moved to."""
