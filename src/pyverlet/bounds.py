@@ -67,10 +67,15 @@ class _Walls(Boundary):
     def __init__(self, restitution: float, friction: float) -> None:
         self.restitution = checks.fraction("restitution", restitution)
         self.friction = checks.number("friction", friction, least=0.0)
+        self._given: tuple[Any, ...] = ()
+        self._shape: list[Any] = []
+        self._laws: list[Any] = []
 
     def _confine(self, kernel: Any, shape: Sequence[float], state: Slots, h: float, lag: float, rest_speed: float) -> None:
-        real = state.real
-        kernel(*map(real, shape), *state.bodies(), *map(real, (h, lag, self.restitution, self.friction, rest_speed)))
+        given = (state.real, shape, h, lag, self.restitution, self.friction, rest_speed)
+        if given != self._given:  # the same in all substeps of a frame, and rounding takes longer than the walls of a small world
+            self._given, self._shape, self._laws = given, [*map(state.real, shape)], [*map(state.real, given[2:])]
+        kernel(*self._shape, *state.bodies(), *self._laws)
 
 
 class Circle(_Walls):

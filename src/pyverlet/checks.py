@@ -53,7 +53,7 @@ def vector(name: str, value: Sequence[SupportsFloat] | NDArray[Any]) -> tuple[fl
     """Two finite floats (x, y)."""
     try:
         x, y = value
-        result = (float(x), float(y))
+        result = (float(x) + 0.0, float(y) + 0.0)  # of two zeros that are equal but not in their bits, one
     except (TypeError, ValueError):
         raise InputError(f"{name} is {value!r}; allowed are two numbers (x, y)") from None
     if not all(map(math.isfinite, result)):

@@ -30,6 +30,9 @@ class Forces(Protocol):
     def __call__(self, state: Slots, t: float) -> None:
         """Evaluate."""
 
+    def kick_drift(self, state: Slots, t: float, h: float) -> None:
+        """Evaluate, then velocity += h * acceleration, then position += h * velocity."""
+
 
 class Integrator(ABC):
     """One substep at a time; stateless, so that one object may serve many worlds (memory lives in the state).
@@ -108,8 +111,7 @@ class SemiImplicitEuler(Integrator):
     drop = 1.0
 
     def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
-        forces(state, t)
-        kick_drift(state, h)
+        forces.kick_drift(state, t, h)
 
 
 class _Stormer(Integrator):
@@ -146,9 +148,8 @@ class _Stormer(Integrator):
             else:
                 forces(state, t)
             state.acceleration[~fresh] = known[~fresh]
-        pinned = state.inverse_mass == 0
-        if pinned.any():
-            state.acceleration[pinned] = 0  # pinned since the frame before: what is left of its fall would move it for ever
+        # Pinned since the frame before: what is left of its fall would move it for ever.
+        motion.clear_pinned(state.acceleration, state.inverse_mass)
         advance(state.velocity, state.velocity, state.acceleration, -0.5 * (h if h_last is None else h_last))
 
     def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
@@ -158,9 +159,9 @@ class _Stormer(Integrator):
             _swap_acceleration(state)
             forces(state, t)
             advance(state.velocity, state.velocity, state.scratch(0), -0.5 * h)
+            kick_drift(state, h)
         else:
-            forces(state, t)
-        kick_drift(state, h)
+            forces.kick_drift(state, t, h)
 
     def end(self, state: Slots, h: float) -> None:
         motion.clear_where(state.acceleration, state.resting)

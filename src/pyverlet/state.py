@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,6 @@ from numpy.typing import NDArray
 from pyverlet._jit import Kernel
 from pyverlet.constants import SERIAL_BELOW
 from pyverlet.kernels import motion
-from pyverlet.kernels.bounds import Bodies
 
 Array = NDArray[Any]
 
@@ -139,6 +139,7 @@ class Slots:
     """The engine's working copy, in an order of its own: what forces, integrators, contacts and bounds see during a frame.
 
     Attributes:
+        real: rounds a number to the dtype; it remembers some, for NumPy takes longer to round one than a kernel to be called.
         particle: (n,) the user's index of the particle in each slot.
         position, velocity, acceleration, spin, radius, mass, grown, restitution, friction: as in State.
         category, mask: as in State, or empty while every circle collides with every other.
@@ -160,7 +161,7 @@ class Slots:
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self.dtype = dtype
-        self.real = dtype.type
+        self.real = lru_cache(64)(dtype.type)
         self._kept: dict[str, Array] = {}
         self.drop = 1.0
         self._resize(0)
@@ -327,9 +328,12 @@ class Slots:
             self._scratch.append(np.empty_like(self.position))
         return self._scratch[number]
 
-    def bodies(self) -> Bodies:
-        """What walls need of the particles."""
-        return Bodies(*(getattr(self, name) for name in Bodies._fields))
+    def bodies(self) -> tuple[Array, ...]:
+        """What walls need of the particles: the fields of `kernels.bounds.Bodies`, in their order."""
+        return (
+            self.position, self.velocity, self.acceleration, self.spin, self.radius, self.inverse_mass, self.restitution,
+            self.friction, self.resting, self.hits, self.spent,
+        )  # fmt: skip
 
     def slot_of(self, particle: int) -> int:
         """The slot that holds the user's particle."""
@@ -353,6 +357,13 @@ def advance(out: Array, base: Array, slope: Array, h: float) -> None:
 def kick_drift(state: Slots, h: float) -> None:
     """velocity += h * acceleration, then position += h * velocity."""
     _light(motion.kick_drift, state.position)(state.position, state.velocity, state.acceleration, state.real(h))
+
+
+def fall(state: Slots, gravity: tuple[float, float], h: float) -> None:
+    """`kick_drift` where gravity alone acts, which becomes everyone's acceleration."""
+    real = state.real
+    numbers = real(gravity[0]), real(gravity[1]), real(h)
+    _light(motion.fall, state.position)(state.position, state.velocity, state.acceleration, state.inverse_mass, *numbers)
 
 
 def farthest(position: Array, reference: Array) -> float:

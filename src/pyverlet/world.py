@@ -127,7 +127,7 @@ class World(Measures, Queries, Doors):
             for part in parts:
                 part.before(state, h)
             integrator.step(state, forces, self.time + substep * h, h)
-            strongest = self._strongest_acceleration()
+            strongest = forces.strongest(state)
             done("integrate")
             if contacts:
                 contacts.find(state, lag)
@@ -211,11 +211,6 @@ class World(Measures, Queries, Doors):
             self._events.forget()
         if self._contacts:
             self._contacts.broad_phase.list.spent[:] = 0
-
-    def _strongest_acceleration(self) -> float:
-        if not self.forces:
-            return float(np.hypot(*self.gravity))
-        return float(motion.largest_norm(self._slots.acceleration))
 
     def _first_non_finite(self) -> int:
         for array in (self._slots.position, self._slots.velocity):

@@ -155,10 +155,14 @@ def _at_cage(i, x0, y0, size, bodies, h, lag, e, mu, rest_speed):
 
 
 @kernel
-def _at_box(i, left, right, down, up, bodies, h, lag, e, mu, rest_speed):
-    """Circle i is beyond at least one wall of the box, by left, right, down or up > 0."""
+def _at_box(i, x0, y0, x1, y1, bodies, h, lag, e, mu, rest_speed):
+    """Circle i is beyond at least one wall of the box."""
+    position = bodies.position
     zero = h - h
     one = h / h
+    r = bodies.radius[i]
+    left, right = x0 + r - position[i, 0], position[i, 0] - (x1 - r)
+    down, up = y0 + r - position[i, 1], position[i, 1] - (y1 - r)
     if left > zero:
         meet(i, one, zero, left, bodies, h, lag, e, mu, rest_speed)
     elif right > zero:
@@ -167,36 +171,44 @@ def _at_box(i, left, right, down, up, bodies, h, lag, e, mu, rest_speed):
         meet(i, zero, one, down, bodies, h, lag, e, mu, rest_speed)
     elif up > zero:
         meet(i, zero, -one, up, bodies, h, lag, e, mu, rest_speed)
+    # As in the cage: what one reflection has sent beyond the other side waits at that wall.
+    if position[i, 0] < x0 or position[i, 0] > x1:
+        position[i, 0] = min(max(position[i, 0], x0 + r), x1 - r)
+    if position[i, 1] < y0 or position[i, 1] > y1:
+        position[i, 1] = min(max(position[i, 1], y0 + r), y1 - r)
 
 
 @kernel
-def _any_beyond_circle(x0, y0, size, position, radius, resting, first, stop):
-    """Whether any circle from `first` to `stop` reaches beyond the cage; none rests at it yet. Without a branch, in vectors."""
+def _beyond_circle(x0, y0, size, position, radius, first, stop, flag):
+    """Flag the circles from `first` to `stop` that reach beyond the cage; whether there are any. No branch, so in vectors."""
     x = position.reshape(-1)
     found = False
     for k in range(first, stop):
         i = np.uint64(k)  # spares the check for a negative index, which vectors cannot take
-        resting[i] = 0
         dx, dy, room = x[_TWO * i] - x0, x[_TWO * i + _ONE] - y0, size - radius[i]
-        found |= dx * dx + dy * dy > room * room
+        beyond = dx * dx + dy * dy > room * room
+        flag[i] = beyond
+        found |= beyond
     return found
 
 
 @kernel
-def _any_beyond_box(x0, y0, x1, y1, position, radius, resting, first, stop):
+def _beyond_box(x0, y0, x1, y1, position, radius, first, stop, flag):
     """The same for a box."""
     x = position.reshape(-1)
     zero = x0 - x0
     found = False
     for k in range(first, stop):
         i = np.uint64(k)
-        resting[i] = 0
         px, py, r = x[_TWO * i], x[_TWO * i + _ONE], radius[i]
-        found |= (x0 + r - px > zero) | (px - (x1 - r) > zero) | (y0 + r - py > zero) | (py - (y1 - r) > zero)
+        beyond = (x0 + r - px > zero) | (px - (x1 - r) > zero) | (y0 + r - py > zero) | (py - (y1 - r) > zero)
+        flag[i] = beyond
+        found |= beyond
     return found
 
 
-# The loops make the tuple themselves, and only for circles at a wall: from Python it is slow to hand over.
+# The loops make the tuple themselves, and only for circles at a wall: from Python it is slow to hand over. Until a circle has met
+# the wall, `resting` is where it is flagged.
 
 
 @parallel_kernel
@@ -208,16 +220,16 @@ def circle(
     zero = h - h
     for block in prange((radius.shape[0] + BLOCK - 1) // BLOCK):
         first, stop = block * BLOCK, min((block + 1) * BLOCK, radius.shape[0])
-        if not _any_beyond_circle(x0, y0, size, position, radius, resting, first, stop):
-            continue
-        for i in range(first, stop):
-            dx, dy, room = position[i, 0] - x0, position[i, 1] - y0, size - radius[i]
-            if dx * dx + dy * dy > room * room and inverse_mass[i] > zero:
-                bodies = Bodies(
-                    position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent,
-                    start, turn, lift,
-                )  # fmt: skip
-                _at_cage(i, x0, y0, size, bodies, h, lag, e, mu, rest_speed)
+        if _beyond_circle(x0, y0, size, position, radius, first, stop, resting):
+            for i in range(first, stop):
+                if resting[i] != 0:
+                    resting[i] = 0
+                    if inverse_mass[i] > zero:
+                        bodies = Bodies(
+                            position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits,
+                            spent, start, turn, lift,
+                        )  # fmt: skip
+                        _at_cage(i, x0, y0, size, bodies, h, lag, e, mu, rest_speed)
 
 
 @parallel_kernel
@@ -229,19 +241,13 @@ def box(
     zero = h - h
     for block in prange((radius.shape[0] + BLOCK - 1) // BLOCK):
         first, stop = block * BLOCK, min((block + 1) * BLOCK, radius.shape[0])
-        if not _any_beyond_box(x0, y0, x1, y1, position, radius, resting, first, stop):
-            continue
-        for i in range(first, stop):
-            px, py, r = position[i, 0], position[i, 1], radius[i]
-            left, right, down, up = x0 + r - px, px - (x1 - r), y0 + r - py, py - (y1 - r)
-            if max(left, right, down, up) > zero and inverse_mass[i] > zero:
-                bodies = Bodies(
-                    position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent,
-                    start, turn, lift,
-                )  # fmt: skip
-                _at_box(i, left, right, down, up, bodies, h, lag, e, mu, rest_speed)
-                # As in the cage: what one reflection has sent beyond the other side waits at that wall.
-                if position[i, 0] < x0 or position[i, 0] > x1:
-                    position[i, 0] = min(max(position[i, 0], x0 + r), x1 - r)
-                if position[i, 1] < y0 or position[i, 1] > y1:
-                    position[i, 1] = min(max(position[i, 1], y0 + r), y1 - r)
+        if _beyond_box(x0, y0, x1, y1, position, radius, first, stop, resting):
+            for i in range(first, stop):
+                if resting[i] != 0:
+                    resting[i] = 0
+                    if inverse_mass[i] > zero:
+                        bodies = Bodies(
+                            position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits,
+                            spent, start, turn, lift,
+                        )  # fmt: skip
+                        _at_box(i, x0, y0, x1, y1, bodies, h, lag, e, mu, rest_speed)

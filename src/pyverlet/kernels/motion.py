@@ -40,6 +40,21 @@ def uniform_acceleration(acceleration, inverse_mass, gx, gy):
         a[2 * i + 1] = gy if free else zero
 
 
+@parallel_kernel
+def fall(position, velocity, acceleration, inverse_mass, gx, gy, h):
+    """A substep under gravity alone: a = g for every free particle, v += h a, x += h v."""
+    x, v, a = position.reshape(-1), velocity.reshape(-1), acceleration.reshape(-1)
+    zero = gx - gx
+    for i in prange(inverse_mass.shape[0]):
+        free = inverse_mass[i] > zero
+        a[2 * i] = gx if free else zero
+        a[2 * i + 1] = gy if free else zero
+    for k in prange(x.shape[0]):
+        kicked = v[k] + h * a[k]
+        v[k] = kicked
+        x[k] = x[k] + h * kicked
+
+
 @kernel
 def newton(acceleration, force, inverse_mass, gx, gy):
     """a = g + F / m for every free particle, 0 for a pinned one (Newton's second law)."""
@@ -125,6 +140,16 @@ def clear_where(vectors, flag):
     zero = vectors.dtype.type(0)
     for i in range(vectors.shape[0]):
         if flag[i] != 0:
+            vectors[i, 0] = zero
+            vectors[i, 1] = zero
+
+
+@kernel
+def clear_pinned(vectors, inverse_mass):
+    """Set the rows of pinned particles to 0."""
+    zero = vectors.dtype.type(0)
+    for i in range(vectors.shape[0]):
+        if inverse_mass[i] == zero:
             vectors[i, 0] = zero
             vectors[i, 1] = zero
 
