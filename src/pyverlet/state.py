@@ -332,7 +332,7 @@ class Slots:
         """What walls need of the particles: the fields of `kernels.bounds.Bodies`, in their order."""
         return (
             self.position, self.velocity, self.acceleration, self.spin, self.radius, self.inverse_mass, self.restitution,
-            self.friction, self.resting, self.hits, self.spent,
+            self.friction, self.resting, self.hits, self.spent, self.start, self.turn, self.lift,
         )  # fmt: skip
 
     def slot_of(self, particle: int) -> int:
