@@ -15,6 +15,9 @@ import numpy as np
 from pyverlet._jit import kernel, parallel_kernel, prange
 from pyverlet.constants import FED, PUSHED
 
+# What is noted of a circle in `fed`: a contact at rest has fed its velocity; a wall has touched it, in this substep or the last.
+CARRIES, AT_WALL, WAS_AT_WALL = 1, 2, 4
+
 
 class Bodies(NamedTuple):
     """What walls need to know of the circles, and note about them; as in `pyverlet.state.Slots`."""
@@ -27,6 +30,7 @@ class Bodies(NamedTuple):
     inverse_mass: Any
     restitution: Any
     friction: Any
+    fed: Any
     resting: Any
     hits: Any
     spent: Any
@@ -59,7 +63,10 @@ def meet(i, nx, ny, depth, bodies, h, lag, e, mu, rest_speed):
     after = zero
     shift = depth
     bodies.hits[i] = max(bodies.hits[i], hit if vn < zero else zero)
-    if e * hit > rest_speed and vn < zero:
+    # The wall of a pile carries it: the speed that the weight of others has fed is no arrival.
+    loaded = bodies.fed[i] & CARRIES and bodies.fed[i] & WAS_AT_WALL
+    bodies.fed[i] |= AT_WALL
+    if e * hit > rest_speed and vn < zero and not loaded:
         time = min(two * depth / (hit - vn), h)
         leaving = e * hit
         travelled = leaving * time + an * time * time / two
@@ -169,8 +176,8 @@ def _at_box(i, left, right, down, up, bodies, h, lag, e, mu, rest_speed):
 
 @parallel_kernel
 def circle(
-    x0, y0, size, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent,
-    start, turn, lift, h, lag, e, mu, rest_speed,
+    x0, y0, size, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits,
+    spent, start, turn, lift, h, lag, e, mu, rest_speed,
 ):  # fmt: skip
     """A cage: all circles stay inside that of radius `size` about (x0, y0). position to lift: the fields of Bodies."""
     zero = h - h
@@ -181,7 +188,7 @@ def circle(
         room = size - radius[i]
         if dx * dx + dy * dy > room * room and inverse_mass[i] > zero:
             bodies = Bodies(
-                position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent,
+                position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
                 start, turn, lift,
             )  # fmt: skip
             _at_cage(i, x0, y0, size, bodies, h, lag, e, mu, rest_speed)
@@ -189,8 +196,8 @@ def circle(
 
 @parallel_kernel
 def box(
-    x0, y0, x1, y1, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent,
-    start, turn, lift, h, lag, e, mu, rest_speed,
+    x0, y0, x1, y1, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits,
+    spent, start, turn, lift, h, lag, e, mu, rest_speed,
 ):  # fmt: skip
     """Four walls; in a corner both axes act, one after the other. position to lift: the fields of Bodies."""
     zero = h - h
@@ -203,7 +210,7 @@ def box(
         up = position[i, 1] - (y1 - r)
         if max(left, right, down, up) > zero and inverse_mass[i] > zero:
             bodies = Bodies(
-                position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent,
+                position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
                 start, turn, lift,
             )  # fmt: skip
             _at_box(i, left, right, down, up, bodies, h, lag, e, mu, rest_speed)
