@@ -15,9 +15,9 @@ LIMIT = np.tan(np.radians(15))  # 0.268
 def pyramid(friction: float, **options: object) -> tuple[pv.World, pv.Group]:
     """One circle on two that touch, on a floor.
 
-    It stands if mu >= tan 15 deg between circles: a lower one has two points of contact that carry, 150 degrees apart as seen from
-    its centre. Without a torque the friction at both is the same, and with the weight and the two normal forces it balances only
-    if it is tan 15 deg of the upper normal force. The floor, which carries more, needs less.
+    It stands if mu >= tan 15 deg between circles: a lower one has two points of contact that carry, 150 degrees apart as seen
+    from its centre. Without a torque the friction at both is the same, and with the weight and the two normal forces it
+    balances only if it is tan 15 deg of the upper normal force. The floor, which carries more, needs less.
     """
     world = pv.World(
         boundary=pv.Box((-20, 0), (20, 20), friction=friction),
@@ -70,7 +70,7 @@ def test_a_pyramid_stands_while_others_come_and_go() -> None:
 def test_the_slip_of_a_pair_follows_its_particles() -> None:
     world, circles = pyramid(1.1 * LIMIT)
     gone = world.add(position=[(5, RADIUS), (9, RADIUS)], radius=RADIUS)
-    more = world.add(position=circles.position + (12, 0), radius=RADIUS)
+    more = world.add(position=circles.position + np.array([12, 0]), radius=RADIUS)
     world.run(seconds=2)
 
     def slips() -> dict[tuple[int, int], float]:
