@@ -151,7 +151,8 @@ class Slots:
         turn: (n,) rad by which each circle turns in this substep; empty unless circles rub each other.
         lift: (n,) s; times -a it is the velocity with which circles at rest against others end a substep, for others 0.
         drop: a circle that starts at rest falls drop * a h^2 in a substep; depends on the integrator.
-        fed: (n,) 1 where a contact at rest fed the velocity in the last substep: it carries weight. Kept only if circles bounce.
+        fed: (n,) bits: CARRIES where a contact at rest fed the velocity in the last substep, AT_WALL where a wall was touched
+            in it, WAS_AT_WALL in the one before. Kept only if circles bounce.
         island: (n,) number of the island a sleeping particle belongs to, -1 for those awake. calm: (n,) seconds it has been so.
         resting: (n,) 1 where a contact without bounce held the particle in the last substep.
         hits: (n,) largest speed with which the circle met a wall in this frame, m/s; negative: none.
@@ -332,7 +333,7 @@ class Slots:
         """What walls need of the particles: the fields of `kernels.bounds.Bodies`, in their order."""
         return (
             self.position, self.velocity, self.acceleration, self.spin, self.radius, self.inverse_mass, self.restitution,
-            self.friction, self.resting, self.hits, self.spent, self.start, self.turn, self.lift,
+            self.friction, self.fed, self.resting, self.hits, self.spent, self.start, self.turn, self.lift,
         )  # fmt: skip
 
     def slot_of(self, particle: int) -> int:

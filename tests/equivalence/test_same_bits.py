@@ -56,10 +56,10 @@ def falling_heap(**options: Any) -> pv.World:
     return world
 
 
-@pytest.mark.parametrize("restitution", [0.0, 0.5])
+@pytest.mark.parametrize(("restitution", "friction"), [(0.0, 0.0), (0.5, 0.0), (0.0, 0.3), (0.5, 0.3)])
 @pytest.mark.parametrize("name", pv.integrators.BY_NAME)
-def test_restore_continues_with_the_same_bits(name: str, restitution: float) -> None:
-    collisions = pv.Collisions(restitution=restitution)
+def test_restore_continues_with_the_same_bits(name: str, restitution: float, friction: float) -> None:
+    collisions = pv.Collisions(restitution=restitution, friction=friction)
     world = falling_heap(integrator=pv.integrators.BY_NAME[name](), collisions=collisions)
     world.run(seconds=0.7)
     saved = world.save()

@@ -16,9 +16,6 @@ from pyverlet.lab.physics import energy, friction, gas, lost
 
 # Promises that do not hold yet. Strict: the first run in which one holds fails until its line here is removed.
 BROKEN = {
-    "rest-column": "a column of 100 breathes for some 30 s before it rests: 7e-3 m g R after 10 s",
-    "left-alone": "a frictionless pile creeps by 0.4 R in 30 s",
-    "left-alone-rough": "single circles of a pile with friction roll by 1.4 R in 30 s",
     "radii": "overlap 22 % of a small circle between large ones",
     "radii-masses": "overlap 11 % where small heavy circles lie on large light ones",
     "heavy-on-column": "it stays on top, but trembles: 0.2 m g R",

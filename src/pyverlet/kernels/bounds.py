@@ -19,6 +19,8 @@ BLOCK = 64
 """Circles looked at together for whether any of them is at a wall: hardly any is."""
 
 _ONE, _TWO = np.uint64(1), np.uint64(2)
+# What is noted of a circle in `fed`: a contact at rest has fed its velocity; a wall has touched it, in this substep or the last.
+CARRIES, AT_WALL, WAS_AT_WALL = 1, 2, 4
 
 
 class Bodies(NamedTuple):
@@ -32,6 +34,7 @@ class Bodies(NamedTuple):
     inverse_mass: Any
     restitution: Any
     friction: Any
+    fed: Any
     resting: Any
     hits: Any
     spent: Any
@@ -64,7 +67,10 @@ def meet(i, nx, ny, depth, bodies, h, lag, e, mu, rest_speed):
     after = zero
     shift = depth
     bodies.hits[i] = max(bodies.hits[i], hit if vn < zero else zero)
-    if e * hit > rest_speed and vn < zero:
+    # The wall of a pile carries it: the speed that the weight of others has fed is no arrival.
+    loaded = bodies.fed[i] & CARRIES and bodies.fed[i] & WAS_AT_WALL
+    bodies.fed[i] |= AT_WALL
+    if e * hit > rest_speed and vn < zero and not loaded:
         time = min(two * depth / (hit - vn), h)
         leaving = e * hit
         travelled = leaving * time + an * time * time / two
@@ -213,8 +219,8 @@ def _beyond_box(x0, y0, x1, y1, position, radius, first, stop, flag):
 
 @parallel_kernel
 def circle(
-    x0, y0, size, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent,
-    start, turn, lift, h, lag, e, mu, rest_speed,
+    x0, y0, size, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits,
+    spent, start, turn, lift, h, lag, e, mu, rest_speed,
 ):  # fmt: skip
     """A cage: all circles stay inside that of radius `size` about (x0, y0). position to lift: the fields of Bodies."""
     zero = h - h
@@ -226,16 +232,16 @@ def circle(
                     resting[i] = 0
                     if inverse_mass[i] > zero:
                         bodies = Bodies(
-                            position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits,
-                            spent, start, turn, lift,
+                            position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting,
+                            hits, spent, start, turn, lift,
                         )  # fmt: skip
                         _at_cage(i, x0, y0, size, bodies, h, lag, e, mu, rest_speed)
 
 
 @parallel_kernel
 def box(
-    x0, y0, x1, y1, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent,
-    start, turn, lift, h, lag, e, mu, rest_speed,
+    x0, y0, x1, y1, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits,
+    spent, start, turn, lift, h, lag, e, mu, rest_speed,
 ):  # fmt: skip
     """Four walls; in a corner both axes act, one after the other. position to lift: the fields of Bodies."""
     zero = h - h
@@ -247,7 +253,7 @@ def box(
                     resting[i] = 0
                     if inverse_mass[i] > zero:
                         bodies = Bodies(
-                            position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits,
-                            spent, start, turn, lift,
+                            position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting,
+                            hits, spent, start, turn, lift,
                         )  # fmt: skip
                         _at_box(i, x0, y0, x1, y1, bodies, h, lag, e, mu, rest_speed)

@@ -20,6 +20,7 @@ import numpy as np
 
 from pyverlet._jit import kernel, parallel_kernel, prange
 from pyverlet.constants import FED, PUSHED
+from pyverlet.kernels.bounds import CARRIES
 from pyverlet.kernels.impacts import APART, PARTING, part
 
 # Golden angle, rad: coincident centres part in directions spread evenly over the circle.
@@ -102,7 +103,7 @@ def _rest_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rate, 
     for k in range(pair_i.shape[0]):
         i, j = pair_i[k], pair_j[k]
         if meeting[k] == PARTING:
-            _make_room(position, velocity, radius, inverse_mass, i, j, slow, most, fed[i] | fed[j])
+            _make_room(position, velocity, radius, inverse_mass, i, j, slow, most, (fed[i] | fed[j]) & CARRIES)
             # At or before k: nothing that is still to be read is overwritten.
             if impulse[k] > zero:
                 touching[count] = k
@@ -110,7 +111,7 @@ def _rest_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rate, 
                 count += 1
             continue
         # A pair that has come together only now waits for the next substep, unless one of them carries weight.
-        if meeting[k] == APART and not (fed[i] | fed[j]):
+        if meeting[k] == APART and not (fed[i] | fed[j]) & CARRIES:
             continue
         dx = position[j, 0] - position[i, 0]
         dy = position[j, 1] - position[i, 1]
@@ -125,8 +126,8 @@ def _rest_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rate, 
             shift = min(reach - distance, most * reach) / (inverse_mass[i] + inverse_mass[j])
             kick = shift * feed
             part(position, velocity, inverse_mass, i, j, nx, ny, shift * pushed, kick)
-            fed[i] = 1
-            fed[j] = 1
+            fed[i] |= CARRIES
+            fed[j] |= CARRIES
             touching[count] = k
             impulse[count] = kick
             count += 1
@@ -172,7 +173,7 @@ def project_resting(
     """What `project` does, after `impacts`. Those that have bounced are listed too, with their impulse made negative.
 
     slow: 1/s, as for _make_room; rate where accelerations could stop a pair that parts, 0 where nothing can.
-    fed[i] is set to 1 for every particle whose velocity is fed.
+    fed[i] becomes CARRIES for every particle whose velocity is fed.
     """
     for parity in range(2):
         for half in prange((first.shape[0] + 1 - parity) // 2):

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet.kernels.bounds import impact_time
+from pyverlet.kernels.bounds import CARRIES, impact_time
 
 # How a candidate pair stands at the end of the integration, before contacts have changed a velocity.
 APART, RESTING, PARTING = 0, 1, 2
@@ -54,7 +54,7 @@ def _impact_strip(
         vx = velocity[j, 0] - velocity[i, 0] + lag * ax
         vy = velocity[j, 1] - velocity[i, 1] + lag * ay
         along = dx * vx + dy * vy
-        if fed[i] & fed[j] or square == zero:
+        if fed[i] & fed[j] & CARRIES or square == zero:
             # Both carried weight a substep ago: what speed they have is the trembling of the pile, not an arrival.
             meeting[k] = RESTING
         elif along > rest_speed * np.sqrt(square):

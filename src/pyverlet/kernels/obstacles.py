@@ -238,7 +238,7 @@ def _search(segments, x0, y0, cell, columns, rows, start, entries, fresh, px, py
 @kernel
 def _travel(
     i, segments, bodies, until, x0, y0, cell, columns, rows, start, entries,
-    position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent,
+    position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
     before, turn, lift, h, lag, rest_speed,
 ):  # fmt: skip
     """Circle i goes its way through a substep and meets what there is to meet."""
@@ -265,7 +265,7 @@ def _travel(
         velocity[i, 0] -= wx
         velocity[i, 1] -= wy
         circles = Bodies(
-            position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent,
+            position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
             before, turn, lift,
         )  # fmt: skip
         # And how far it went.
@@ -307,7 +307,7 @@ def _alone(px, py, qx, qy, x0, y0, cell, columns, rows, start):
 @parallel_kernel
 def collide(
     segments, bodies, until, x0, y0, cell, columns, rows, start, entries,
-    position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent,
+    position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
     before, turn, lift, h, lag, rest_speed,
 ):  # fmt: skip
     """All circles, from their places `before` the substep (n, 2) to `position`; `until`: seconds into the frame at its end."""
@@ -317,6 +317,6 @@ def collide(
         ):
             _travel(
                 i, segments, bodies, until, x0, y0, cell, columns, rows, start, entries,
-                position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, resting, hits, spent,
+                position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
                 before, turn, lift, h, lag, rest_speed,
             )  # fmt: skip
