@@ -330,7 +330,7 @@ class Slots:
         return self._scratch[number]
 
     def bodies(self) -> tuple[Array, ...]:
-        """What walls need of the particles: the fields of `kernels.bounds.Bodies`, in their order."""
+        """What walls need of the particles: the arrays that `kernels.bounds.look` takes, in that order."""
         return (
             self.position, self.velocity, self.acceleration, self.spin, self.radius, self.inverse_mass, self.restitution,
             self.friction, self.fed, self.resting, self.hits, self.spent, self.start, self.turn, self.lift,

@@ -23,12 +23,18 @@ _ONE, _TWO = np.uint64(1), np.uint64(2)
 CARRIES, AT_WALL, WAS_AT_WALL = 1, 2, 4
 
 
-class Bodies(NamedTuple):
-    """What walls need to know of the circles, and note about them; as in `pyverlet.state.Slots`."""
+class Body(NamedTuple):
+    """What a wall needs to know of one circle, and notes about it; of x, v and a both components, the others as in `Slots`.
 
-    position: Any
-    velocity: Any
-    acceleration: Any
+    Numbers, not arrays: a tuple of arrays counts references, which costs more than a bounce.
+    """
+
+    x: Any
+    y: Any
+    vx: Any
+    vy: Any
+    ax: Any
+    ay: Any
     spin: Any
     radius: Any
     inverse_mass: Any
@@ -36,40 +42,84 @@ class Bodies(NamedTuple):
     friction: Any
     fed: Any
     resting: Any
-    hits: Any
-    spent: Any
-    start: Any
+    hit: Any
+    to_impact: Any  # J, of `spent`
+    to_friction: Any
+    from_x: Any
+    from_y: Any
+    share: Any  # of an impulse of friction that positions take, where circles rub each other; 0 where they do not
     turn: Any
     lift: Any
 
 
 @kernel
-def meet(i, nx, ny, depth, bodies, h, lag, e, mu, rest_speed):
-    """Circle i is `depth` > 0 beyond a wall of normal (nx, ny): bounce it or hold it, with friction mu.
+def look(
+    i, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
+    start, turn, lift,
+):  # fmt: skip
+    """Circle i."""
+    zero = radius[i] - radius[i]
+    rubs = turn.shape[0] > 0
+    share = position.dtype.type(PUSHED / FED) if rubs else zero
+    return Body(
+        position[i, 0], position[i, 1], velocity[i, 0], velocity[i, 1], acceleration[i, 0], acceleration[i, 1], spin[i],
+        radius[i], inverse_mass[i], restitution[i], friction[i], np.int64(fed[i]), np.int64(resting[i]), hits[i], spent[i, 0],
+        spent[i, 1], start[i, 0], start[i, 1], share, turn[i] if rubs else zero, lift[i],
+    )  # fmt: skip
+
+
+@kernel
+def put(i, body, position, velocity, spin, fed, resting, hits, spent, turn):
+    """Write down what has become of circle i."""
+    position[i, 0] = body.x
+    position[i, 1] = body.y
+    velocity[i, 0] = body.vx
+    velocity[i, 1] = body.vy
+    spin[i] = body.spin
+    fed[i] = body.fed
+    resting[i] = body.resting
+    hits[i] = body.hit
+    spent[i, 0] = body.to_impact
+    spent[i, 1] = body.to_friction
+    if body.share > 0:
+        turn[i] = body.turn
+
+
+@kernel
+def moved(b, x, y, vx, vy, from_x, from_y):
+    """The circle b, but there and so fast."""
+    return Body(
+        x, y, vx, vy, b.ax, b.ay, b.spin, b.radius, b.inverse_mass, b.restitution, b.friction, b.fed, b.resting, b.hit,
+        b.to_impact, b.to_friction, from_x, from_y, b.share, b.turn, b.lift,
+    )  # fmt: skip
+
+
+@kernel
+def meet(b, nx, ny, depth, h, lag, e, mu, rest_speed):
+    """The circle b is `depth` > 0 beyond a wall of normal (nx, ny): what becomes of it, bounced or held, with friction mu.
 
     A circle with a restitution or friction of its own (not negative) changes the wall's: the larger e, the geometric mean of mu.
-    bodies.hits[i] becomes the largest speed it hit with; bodies.spent[i] gains the energy that impact and friction took, J.
+    `hit` becomes the largest speed it hit with; `to_impact`, `to_friction` gain the energy that each took, J.
     """
-    position, velocity, spin, radius = bodies.position, bodies.velocity, bodies.spin, bodies.radius
     zero = h - h
-    two = position.dtype.type(2)
-    three = position.dtype.type(3)
-    e = max(e, bodies.restitution[i])
-    if bodies.friction[i] >= zero:
-        mu = np.sqrt(mu * bodies.friction[i])
-    mass = 1.0 / np.float64(bodies.inverse_mass[i])
-    an = bodies.acceleration[i, 0] * nx + bodies.acceleration[i, 1] * ny
+    two = (h + h) / h
+    three = (h + h + h) / h
+    e = max(e, b.restitution)
+    if b.friction >= zero:
+        mu = np.sqrt(mu * b.friction)
+    mass = 1.0 / np.float64(b.inverse_mass)
+    x, y, vx, vy, spin, turn, resting = b.x, b.y, b.vx, b.vy, b.spin, b.turn, b.resting
+    to_impact, to_friction = b.to_impact, b.to_friction
+    an = b.ax * nx + b.ay * ny
     # The velocity at the time of the position; integrators of Stormer's kind carry one that lags behind.
-    vn = velocity[i, 0] * nx + velocity[i, 1] * ny + lag * an
+    vn = vx * nx + vy * ny + lag * an
     before = vn - lag * an
     square = vn * vn + two * an * depth
     hit = np.sqrt(max(square, zero))
     after = zero
     shift = depth
-    bodies.hits[i] = max(bodies.hits[i], hit if vn < zero else zero)
     # The wall of a pile carries it: the speed that the weight of others has fed is no arrival.
-    loaded = bodies.fed[i] & CARRIES and bodies.fed[i] & WAS_AT_WALL
-    bodies.fed[i] |= AT_WALL
+    loaded = (b.fed & CARRIES) != 0 and (b.fed & WAS_AT_WALL) != 0
     if e * hit > rest_speed and vn < zero and not loaded:
         time = min(two * depth / (hit - vn), h)
         leaving = e * hit
@@ -77,37 +127,41 @@ def meet(i, nx, ny, depth, bodies, h, lag, e, mu, rest_speed):
         if travelled >= zero:
             after = leaving + an * time - lag * an
             shift = depth + travelled
-            bodies.spent[i, 0] -= 0.5 * mass * (hit * hit - leaving * leaving)
+            to_impact -= 0.5 * mass * (hit * hit - leaving * leaving)
     held = after == zero
     # A circle in a pile ends each substep with the velocity that the next one's gravity needs to press it down again.
-    lift = bodies.lift[i] if held else zero
-    lx, ly = -lift * bodies.acceleration[i, 0], -lift * bodies.acceleration[i, 1]
+    lift = b.lift if held else zero
+    lx, ly = -lift * b.ax, -lift * b.ay
     if held:
-        bodies.resting[i] = 1
+        resting = 1
         after = max(before, lx * nx + ly * ny)
-    position[i, 0] += shift * nx
-    position[i, 1] += shift * ny
-    velocity[i, 0] += (after - before) * nx
-    velocity[i, 1] += (after - before) * ny
+    x += shift * nx
+    y += shift * ny
+    vx += (after - before) * nx
+    vy += (after - before) * ny
     if mu > zero:
         # Tangent (ny, -nx); impulses per unit mass; the contact point of a disc has inverse mass 3 / m.
-        slip = (velocity[i, 0] - lx) * ny - (velocity[i, 1] - ly) * nx + spin[i] * radius[i]
+        slip = (vx - lx) * ny - (vy - ly) * nx + spin * b.radius
         most = mu * (after - before)
         rub = max(min(-slip / three, most), -most)
-        velocity[i, 0] += rub * ny
-        velocity[i, 1] -= rub * nx
-        spin[i] += two * rub / radius[i]
-        bodies.spent[i, 1] += mass * rub * (slip + 1.5 * rub)
+        vx += rub * ny
+        vy -= rub * nx
+        spin += two * rub / b.radius
+        to_friction += mass * rub * (slip + 1.5 * rub)
         if held:
             back = h * rub
-            if bodies.turn.shape[0] > 0:
+            if b.share > zero:
                 # Among circles that rub each other: from what it has slipped, for they have pushed it since the integration.
-                sx, sy = position[i, 0] - bodies.start[i, 0], position[i, 1] - bodies.start[i, 1]
-                most *= h if lift == zero else h * position.dtype.type(PUSHED / FED)
-                back = max(min(-(sx * ny - sy * nx + bodies.turn[i] * radius[i]) / three, most), -most)
-                bodies.turn[i] += two * back / radius[i]
-            position[i, 0] += back * ny
-            position[i, 1] -= back * nx
+                sx, sy = x - b.from_x, y - b.from_y
+                most *= h if lift == zero else h * b.share
+                back = max(min(-(sx * ny - sy * nx + turn * b.radius) / three, most), -most)
+                turn += two * back / b.radius
+            x += back * ny
+            y -= back * nx
+    return Body(
+        x, y, vx, vy, b.ax, b.ay, spin, b.radius, b.inverse_mass, b.restitution, b.friction, b.fed | AT_WALL, resting,
+        max(b.hit, hit if vn < zero else zero), to_impact, to_friction, b.from_x, b.from_y, b.share, turn, b.lift,
+    )  # fmt: skip
 
 
 @kernel
@@ -130,58 +184,49 @@ def impact_time(dx, dy, vx, vy, ax, ay, reach, h):
 
 
 @kernel
-def _at_cage(i, x0, y0, size, bodies, h, lag, e, mu, rest_speed):
-    """Circle i is beyond the wall of the cage."""
-    position, velocity, acceleration = bodies.position, bodies.velocity, bodies.acceleration
+def _at_cage(b, x0, y0, size, h, lag, e, mu, rest_speed):
+    """The circle b is beyond the wall of the cage: what becomes of it."""
     zero = h - h
     half = h / (h + h)
-    dx = position[i, 0] - x0
-    dy = position[i, 1] - y0
-    room = size - bodies.radius[i]
+    dx, dy = b.x - x0, b.y - y0
+    room = size - b.radius
     distance = np.sqrt(dx * dx + dy * dy)
     nx, ny, depth = -dx / distance, -dy / distance, distance - room
-    ax, ay = acceleration[i, 0], acceleration[i, 1]
-    vx, vy = velocity[i, 0] + lag * ax, velocity[i, 1] + lag * ay
+    vx, vy = b.vx + lag * b.ax, b.vy + lag * b.ay
     if -(vx * nx + vy * ny) > rest_speed and room > zero:
         # The wall it hit is the tangent where it hit, not where it would be now: that keeps the angular momentum.
-        time = impact_time(dx, dy, vx, vy, ax, ay, room, h)
-        px = dx - time * (vx - half * time * ax)
-        py = dy - time * (vy - half * time * ay)
+        time = impact_time(dx, dy, vx, vy, b.ax, b.ay, room, h)
+        px = dx - time * (vx - half * time * b.ax)
+        py = dy - time * (vy - half * time * b.ay)
         reached = np.sqrt(px * px + py * py)
         nx, ny = -px / reached, -py / reached
         depth = max((px - dx) * nx + (py - dy) * ny, zero)
-    meet(i, nx, ny, depth, bodies, h, lag, e, mu, rest_speed)
+    b = meet(b, nx, ny, depth, h, lag, e, mu, rest_speed)
     # Faster than a room width a substep one reflection is not enough: what is still outside waits at the wall.
-    dx = position[i, 0] - x0
-    dy = position[i, 1] - y0
+    dx, dy = b.x - x0, b.y - y0
     distance = np.sqrt(dx * dx + dy * dy)
     if distance > size:
-        position[i, 0] = x0 + dx * (room / distance)
-        position[i, 1] = y0 + dy * (room / distance)
+        b = moved(b, x0 + dx * (room / distance), y0 + dy * (room / distance), b.vx, b.vy, b.from_x, b.from_y)
+    return b
 
 
 @kernel
-def _at_box(i, x0, y0, x1, y1, bodies, h, lag, e, mu, rest_speed):
-    """Circle i is beyond at least one wall of the box."""
-    position = bodies.position
+def _at_box(b, x0, y0, x1, y1, h, lag, e, mu, rest_speed):
+    """The circle b is beyond at least one wall of the box: what becomes of it. In a corner one axis acts after the other."""
     zero = h - h
     one = h / h
-    r = bodies.radius[i]
-    left, right = x0 + r - position[i, 0], position[i, 0] - (x1 - r)
-    down, up = y0 + r - position[i, 1], position[i, 1] - (y1 - r)
-    if left > zero:
-        meet(i, one, zero, left, bodies, h, lag, e, mu, rest_speed)
-    elif right > zero:
-        meet(i, -one, zero, right, bodies, h, lag, e, mu, rest_speed)
-    if down > zero:
-        meet(i, zero, one, down, bodies, h, lag, e, mu, rest_speed)
-    elif up > zero:
-        meet(i, zero, -one, up, bodies, h, lag, e, mu, rest_speed)
+    r = b.radius
+    for axis in range(2):
+        low, high, at = (x0, x1, b.x) if axis == 0 else (y0, y1, b.y)
+        below, above = low + r - at, at - (high - r)
+        if max(below, above) > zero:
+            inward = one if below > zero else -one
+            nx, ny = (inward, zero) if axis == 0 else (zero, inward)
+            b = meet(b, nx, ny, below if below > zero else above, h, lag, e, mu, rest_speed)
     # As in the cage: what one reflection has sent beyond the other side waits at that wall.
-    if position[i, 0] < x0 or position[i, 0] > x1:
-        position[i, 0] = min(max(position[i, 0], x0 + r), x1 - r)
-    if position[i, 1] < y0 or position[i, 1] > y1:
-        position[i, 1] = min(max(position[i, 1], y0 + r), y1 - r)
+    x = min(max(b.x, x0 + r), x1 - r) if b.x < x0 or b.x > x1 else b.x
+    y = min(max(b.y, y0 + r), y1 - r) if b.y < y0 or b.y > y1 else b.y
+    return moved(b, x, y, b.vx, b.vy, b.from_x, b.from_y)
 
 
 @kernel
@@ -222,7 +267,7 @@ def circle(
     x0, y0, size, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits,
     spent, start, turn, lift, h, lag, e, mu, rest_speed,
 ):  # fmt: skip
-    """A cage: all circles stay inside that of radius `size` about (x0, y0). position to lift: the fields of Bodies."""
+    """A cage: all circles stay inside that of radius `size` about (x0, y0). position to lift: what `look` takes."""
     zero = h - h
     for block in prange((radius.shape[0] + BLOCK - 1) // BLOCK):
         first, stop = block * BLOCK, min((block + 1) * BLOCK, radius.shape[0])
@@ -231,11 +276,12 @@ def circle(
                 if resting[i] != 0:
                     resting[i] = 0
                     if inverse_mass[i] > zero:
-                        bodies = Bodies(
-                            position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting,
+                        body = look(
+                            i, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting,
                             hits, spent, start, turn, lift,
                         )  # fmt: skip
-                        _at_cage(i, x0, y0, size, bodies, h, lag, e, mu, rest_speed)
+                        body = _at_cage(body, x0, y0, size, h, lag, e, mu, rest_speed)
+                        put(i, body, position, velocity, spin, fed, resting, hits, spent, turn)
 
 
 @parallel_kernel
@@ -243,7 +289,7 @@ def box(
     x0, y0, x1, y1, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits,
     spent, start, turn, lift, h, lag, e, mu, rest_speed,
 ):  # fmt: skip
-    """Four walls; in a corner both axes act, one after the other. position to lift: the fields of Bodies."""
+    """Four walls; in a corner both axes act, one after the other. position to lift: what `look` takes."""
     zero = h - h
     for block in prange((radius.shape[0] + BLOCK - 1) // BLOCK):
         first, stop = block * BLOCK, min((block + 1) * BLOCK, radius.shape[0])
@@ -252,8 +298,9 @@ def box(
                 if resting[i] != 0:
                     resting[i] = 0
                     if inverse_mass[i] > zero:
-                        bodies = Bodies(
-                            position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting,
+                        body = look(
+                            i, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting,
                             hits, spent, start, turn, lift,
                         )  # fmt: skip
-                        _at_box(i, x0, y0, x1, y1, bodies, h, lag, e, mu, rest_speed)
+                        body = _at_box(body, x0, y0, x1, y1, h, lag, e, mu, rest_speed)
+                        put(i, body, position, velocity, spin, fed, resting, hits, spent, turn)

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet.kernels.bounds import Bodies, meet
+from pyverlet.kernels.bounds import look, meet, moved, put
 
 BODY = np.dtype([(name, np.float64) for name in ("x", "y", "angle", "vx", "vy", "spin")])
 """Where an obstacle's pivot is at the beginning of a frame, m and rad, and how it moves, m/s and rad/s."""
@@ -262,20 +262,15 @@ def _travel(
         if segment.around == 0 and nx * segment.bs - ny * segment.bc < 0.0:
             belt_x, belt_y = -belt_x, -belt_y
         wx, wy = real(body.vx - body.spin * touch_y + belt_x), real(body.vy + body.spin * touch_x + belt_y)
-        velocity[i, 0] -= wx
-        velocity[i, 1] -= wy
-        circles = Bodies(
-            position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
+        b = look(
+            i, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
             before, turn, lift,
         )  # fmt: skip
-        # And how far it went.
-        from_x, from_y = before[i, 0], before[i, 1]
-        before[i, 0] += h * wx
-        before[i, 1] += h * wy
-        meet(i, real(nx), real(ny), real(depth), circles, h, lag, real(segment.restitution), real(segment.friction), rest_speed)
-        velocity[i, 0] += wx
-        velocity[i, 1] += wy
-        before[i, 0], before[i, 1] = from_x, from_y
+        # As the surface sees it: how fast it is, and how far it went.
+        b = moved(b, b.x, b.y, b.vx - wx, b.vy - wy, b.from_x + h * wx, b.from_y + h * wy)
+        b = meet(b, real(nx), real(ny), real(depth), h, lag, real(segment.restitution), real(segment.friction), rest_speed)
+        b = moved(b, b.x, b.y, b.vx + wx, b.vy + wy, b.from_x, b.from_y)
+        put(i, b, position, velocity, spin, fed, resting, hits, spent, turn)
         if time < 0.0:  # it was inside: the way so far does not count
             px, py = np.float64(position[i, 0]), np.float64(position[i, 1])
         elif number == 0:
