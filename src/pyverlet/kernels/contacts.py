@@ -135,8 +135,8 @@ def _rest_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rate, 
 
 
 @kernel
-def _still_strip(position, velocity, inverse_mass, pair_i, pair_j, touching):
-    tiny = position.dtype.type(_TINY)
+def _still_strip(position, velocity, inverse_mass, pair_i, pair_j, touching, impulse):
+    zero, tiny = position.dtype.type(0), position.dtype.type(_TINY)
     for t in range(touching.shape[0]):
         k = touching[t]
         i, j = pair_i[k], pair_j[k]
@@ -146,6 +146,7 @@ def _still_strip(position, velocity, inverse_mass, pair_i, pair_j, touching):
         vxi, vyi, vxj, vyj = velocity[i, 0], velocity[i, 1], velocity[j, 0], velocity[j, 1]
         vn = (vxj - vxi) * dx + (vyj - vyi) * dy
         kick = vn / ((wi + wj) * (dx * dx + dy * dy + tiny))
+        kick = zero if impulse[t] < zero else kick
         cx, cy = kick * dx, kick * dy
         velocity[i, 0] = vxi + cx * wi
         velocity[i, 1] = vyi + cy * wi
@@ -185,13 +186,6 @@ def project_resting(
             )  # fmt: skip
 
 
-@kernel
-def _still_resting_strip(position, velocity, inverse_mass, pair_i, pair_j, touching, impulse):
-    for t in range(touching.shape[0]):
-        if not impulse[t] < 0:
-            _still_strip(position, velocity, inverse_mass, pair_i, pair_j, touching[t : t + 1])
-
-
 @parallel_kernel
 def still_resting(position, velocity, inverse_mass, first, count, pair_i, pair_j, touching, impulse, touches):
     """Set the normal velocity of touching pairs to 0, but not for pairs that have bounced (impulse < 0)."""
@@ -200,7 +194,7 @@ def still_resting(position, velocity, inverse_mass, first, count, pair_i, pair_j
             s = 2 * half + parity
             a, b = first[s], first[s] + count[s]
             t = a + touches[s]
-            _still_resting_strip(position, velocity, inverse_mass, pair_i[a:b], pair_j[a:b], touching[a:t], impulse[a:t])
+            _still_strip(position, velocity, inverse_mass, pair_i[a:b], pair_j[a:b], touching[a:t], impulse[a:t])
 
 
 @kernel
