@@ -105,13 +105,14 @@ class Kernel(functools.partial[Any]):
     function: Callable[..., Any]
     alone: Kernel
     parallel: bool
+    _inlined: bool
     _made: dict[tuple[bool, bool], Any]
     _met: set[Any]
 
-    def __new__(cls, function: Callable[..., Any], parallel: bool = False) -> Kernel:
+    def __new__(cls, function: Callable[..., Any], *, parallel: bool = False, inlined: bool = False) -> Kernel:
         self = super().__new__(cls, function)
         self.function, self.__doc__ = function, function.__doc__
-        self.parallel, self._made, self._met = parallel, {}, set()
+        self.parallel, self._inlined, self._made, self._met = parallel, inlined, {}, set()
         self.alone = cls(function) if parallel else self
         self._lead_to(self._learn)
         return self
@@ -133,7 +134,7 @@ class Kernel(functools.partial[Any]):
                 # raise. Wrappers take as long to compile as the kernel.
                 self._made[parallel, wrapped] = numba.njit(
                     nogil=True, error_model="numpy", cache=kept, parallel=parallel, fastmath=False,
-                    no_cpython_wrapper=not wrapped, no_cfunc_wrapper=True,
+                    no_cpython_wrapper=not wrapped, no_cfunc_wrapper=True, forceinline=self._inlined,
                 )(self.function)  # fmt: skip
         return self._made[parallel, wrapped]
 
@@ -166,6 +167,11 @@ def _declared(kernel: Kernel) -> Any:
 def kernel(function: Function) -> Function:
     """Compile on first call, to one thread's code; may be called from other kernels."""
     return _declared(Kernel(function))  # type: ignore[no-any-return]
+
+
+def inlined_kernel(function: Function) -> Function:
+    """The same, but put into the kernels that call it: a call that hands over a dozen arrays costs more than a small kernel."""
+    return _declared(Kernel(function, inlined=True))  # type: ignore[no-any-return]
 
 
 def parallel_kernel(function: Callable[..., Any]) -> Kernel:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyverlet._jit import kernel, parallel_kernel, prange
+from pyverlet._jit import inlined_kernel, kernel, parallel_kernel, prange
 
 BLOCK = 64
 """Circles looked at together for whether any of them is at a wall: hardly any is."""
@@ -36,7 +36,7 @@ class Bodies(NamedTuple):
     spent: Any
 
 
-@kernel
+@inlined_kernel
 def meet(i, nx, ny, depth, bodies, h, lag, e, mu, rest_speed):
     """Circle i is `depth` > 0 beyond a wall of normal (nx, ny): bounce it or hold it, with friction mu.
 
@@ -109,7 +109,7 @@ def impact_time(dx, dy, vx, vy, ax, ay, reach, h):
     return min(max(time, zero), h)
 
 
-@kernel
+@inlined_kernel
 def _at_cage(i, x0, y0, size, bodies, h, lag, e, mu, rest_speed):
     """Circle i is beyond the wall of the cage."""
     position, velocity, acceleration = bodies.position, bodies.velocity, bodies.acceleration
@@ -140,7 +140,7 @@ def _at_cage(i, x0, y0, size, bodies, h, lag, e, mu, rest_speed):
         position[i, 1] = y0 + dy * (room / distance)
 
 
-@kernel
+@inlined_kernel
 def _at_box(i, x0, y0, x1, y1, bodies, h, lag, e, mu, rest_speed):
     """Circle i is beyond at least one wall of the box."""
     position = bodies.position
