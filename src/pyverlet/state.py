@@ -232,8 +232,8 @@ class Slots:
 
     def clear_notes(self) -> None:
         """Forget what walls have noted in the last frame."""
-        self.hits[:] = -1
-        self.spent[:] = 0
+        self.hits.fill(-1)
+        self.spent.fill(0)
 
     def forget(self, now: Array) -> None:
         """The user's particles are now at `now` (n,), or no more (-1): let those go, keep the order of the others."""
