@@ -262,9 +262,9 @@ class Slots:
 
     def clear_notes(self) -> None:
         """Forget what walls and friction have noted in the last frame."""
-        self.hits[:] = -1
-        self.spent[:] = 0
-        self.lift[:] = 0
+        self.hits.fill(-1)
+        self.spent.fill(0)
+        self.lift.fill(0)
         self.turn = self.turn[:0]
 
     def forget(self, now: Array) -> None:

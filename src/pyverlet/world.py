@@ -114,8 +114,8 @@ class World(Measures, Queries, Doors):
     def _frame(self, h: float, done: Callable[[str], None]) -> None:
         """The table of contents of the engine. `done` is told the name of each stage as it ends."""
         state, forces, integrator = self._slots, self._force_sum, self.integrator
-        contacts, course = self._contacts if len(self) > 1 else None, self._course
-        links = self.links
+        contacts = self._contacts if len(self) > 1 else None
+        links, course = self.links or None, self._course or None
         parts: list[Any] = [part for part in (contacts, links, course) if part]
         lag, state.drop = integrator.velocity_lag * h, integrator.drop
         self._gather()
@@ -210,7 +210,7 @@ class World(Measures, Queries, Doors):
         if self._events:
             self._events.forget()
         if self._contacts:
-            self._contacts.broad_phase.list.spent[:] = 0
+            self._contacts.broad_phase.list.spent.fill(0)
 
     def _first_non_finite(self) -> int:
         for array in (self._slots.position, self._slots.velocity):

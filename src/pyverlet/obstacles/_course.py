@@ -39,7 +39,9 @@ class Course:
         """At the beginning of a frame: look what has changed."""
         if self._seen != self._obstacles:  # the same objects: obstacles are equal to themselves alone
             self._build()
-        newest = max((obstacle.revision for obstacle in self._seen), default=0)
+        if not self._seen:
+            return
+        newest = max(obstacle.revision for obstacle in self._seen)
         if newest <= self._revision:
             return
         if self._revision >= 0:
@@ -90,6 +92,7 @@ class Course:
         for name, column in zip(("restitution", "friction", "belt"), zip(*surfaces, strict=True), strict=bool(surfaces)):
             self._segments[name] = np.repeat(column, count)
         self._revision = -1
+        self._moving = []
 
     def _refresh(self, k: int) -> None:
         obstacle = self._seen[k]
