@@ -128,7 +128,7 @@ class _AllPairs(BroadPhase):
 
 @dataclass(frozen=True)
 class Fast:
-    """Sorted cells, coloured pairs in strips, kept until somebody has moved half the skin (Verlet 1967).
+    """Nested grids, coloured pairs in strips, kept until neighbours have moved against each other by the skin.
 
     Args:
         skin: extra distance, in mean diameters, within which pairs are listed. None adapts it to the motion.

@@ -7,16 +7,16 @@ from typing import Final
 STANDARD_GRAVITY: Final = (0.0, -9.81)
 """m/s^2, y up. Rounded as in the teaching literature (CODATA's 9.80665 is a convention too)."""
 
-SKIN: Final = 0.2
-"""Skin of the neighbour list, in mean diameters: the list stays valid until somebody has moved half of it.
-On a settling cage of 20,000, 0.1 rebuilt 1.7 times as often and listed 1 % fewer pairs. It is the start; the skin then adapts."""
+SKIN: Final = 0.4
+"""Skin of the neighbour list to begin with, in mean diameters: the list stays valid until neighbours have moved against each other
+by as much. It adapts; docs/design/broad-phase.md says what to."""
 
 CELLS_PER_PARTICLE: Final = 4
 """The grid never has more cells than this many per particle; beyond it the cells grow. Memory stays linear in n."""
 
 SKIN_LEAST: Final = 0.02
 SKIN_MOST: Final = 2.0
-"""Mean diameters between which the skin adapts: below, trembling piles rebuild; above, most pairs are listed for nothing."""
+"""Mean diameters between which the skin adapts: below, rounding would rebuild; above, cells would hold a crowd."""
 
 SKIN_STEP: Final = 1.25
 """Factor by which the skin adapts at a rebuild."""
