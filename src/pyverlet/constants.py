@@ -8,8 +8,8 @@ STANDARD_GRAVITY: Final = (0.0, -9.81)
 """m/s^2, y up. Rounded as in the teaching literature (CODATA's 9.80665 is a convention too)."""
 
 SKIN: Final = 0.4
-"""Skin of the neighbour list to begin with, in mean diameters: the list stays valid until neighbours have moved against each other
-by as much. It adapts; docs/design/broad-phase.md says what to."""
+"""Skin of the neighbour list to begin with, in mean diameters: the list stays valid until neighbours have moved against each
+other by as much. It adapts; docs/design/broad-phase.md says what to."""
 
 CELLS_PER_PARTICLE: Final = 4
 """The grid never has more cells than this many per particle; beyond it the cells grow. Memory stays linear in n."""
