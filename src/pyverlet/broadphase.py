@@ -149,7 +149,7 @@ class _AllPairs(BroadPhase):
 
 @dataclass(frozen=True)
 class Fast:
-    """Sorted cells, coloured pairs in strips, kept until somebody has moved half the skin (Verlet 1967).
+    """Nested grids, coloured pairs in strips, kept until neighbours have moved against each other by the skin.
 
     Args:
         skin: extra distance, in mean diameters, within which pairs are listed. None adapts it to the motion.
@@ -176,6 +176,7 @@ class _SortedCells(BroadPhase):
         self._excess = 0.0  # pairs for each particle that a skin smaller by SKIN_STEP would not list
         self._hold = 0  # rebuilds before the skin may grow again
         self._allowed = -1.0  # distance anyone may move from `_checked` before we look closer, m; negative: rebuild now
+        self._mean_radius = 0.0  # m; 0: not known. Its last bit depends on the order of the slots, so it is saved, too
         self.built = self._checked = np.empty((0, 2), dtype)
         self._reserve(0)
 
@@ -192,14 +193,15 @@ class _SortedCells(BroadPhase):
 
     def forget(self) -> None:
         self._allowed = -1.0
+        self._mean_radius = 0.0
 
     def save(self) -> tuple[Any, ...]:
         kept = (self.built.copy(), self._checked.copy(), self._allowed) if self._allowed >= 0 else None
-        return kept, self.skin_diameters, self._age, self._hold
+        return kept, self.skin_diameters, self._age, self._hold, self._mean_radius
 
     def restore(self, saved: tuple[Any, ...], state: Slots) -> None:
         self.forget()
-        kept, self.skin_diameters, age, self._hold = saved
+        kept, self.skin_diameters, age, self._hold, self._mean_radius = saved
         if kept is not None and len(kept[0]) == len(state):  # or particles had been added that it had not met yet
             # The list is a function of the positions it was built from and the order of the slots, which is that of then.
             built, checked, allowed = kept
@@ -209,7 +211,7 @@ class _SortedCells(BroadPhase):
         self._age = age
 
     def _still_good(self, state: Slots) -> bool:
-        """Whether no pair that is not listed can touch. The cheap test first, and again after a closer look has said how much is left."""
+        """Whether no pair that is not listed can touch: a cheap test, then a closer look that says how long that will do."""
         if farthest(state.position, self._checked) <= self._allowed:
             return True
         slack = self._grids.slack(state.position, self.built, 2.0 * self._half_skin)
@@ -235,7 +237,9 @@ class _SortedCells(BroadPhase):
             self.replacing(self.list)
         self.rebuilds += 1
         self._age = 0
-        skin = self.skin_diameters * 2.0 * float(state.radius.mean(dtype=np.float64))
+        if not self._mean_radius:
+            self._mean_radius = float(state.radius.mean(dtype=np.float64))
+        skin = self.skin_diameters * 2.0 * self._mean_radius
         self._half_skin = 0.5 * skin
         self._grids = Grids(state.position, state.radius, skin)
         if self._grids.falls > UNSORTED * len(state):

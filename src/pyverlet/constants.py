@@ -7,16 +7,16 @@ from typing import Final
 STANDARD_GRAVITY: Final = (0.0, -9.81)
 """m/s^2, y up. Rounded as in the teaching literature (CODATA's 9.80665 is a convention too)."""
 
-SKIN: Final = 0.2
-"""Skin of the neighbour list, in mean diameters: the list stays valid until somebody has moved half of it.
-On a settling cage of 20,000, 0.1 rebuilt 1.7 times as often and listed 1 % fewer pairs. It is the start; the skin then adapts."""
+SKIN: Final = 0.4
+"""Skin of the neighbour list to begin with, in mean diameters: the list stays valid until neighbours have moved against each
+other by as much. It adapts; docs/design/broad-phase.md says what to."""
 
 CELLS_PER_PARTICLE: Final = 4
 """The grid never has more cells than this many per particle; beyond it the cells grow. Memory stays linear in n."""
 
 SKIN_LEAST: Final = 0.02
 SKIN_MOST: Final = 2.0
-"""Mean diameters between which the skin adapts: below, trembling piles rebuild; above, most pairs are listed for nothing."""
+"""Mean diameters between which the skin adapts: below, rounding would rebuild; above, cells would hold a crowd."""
 
 SKIN_STEP: Final = 1.25
 """Factor by which the skin adapts at a rebuild."""
@@ -30,14 +30,14 @@ WORTH_LOOKING: Final = 0.3
 REBUILD_PAIRS: Final = 30.0
 """Candidate pairs that contacts solve in a substep in the time in which the list is built anew; all for each particle."""
 
-SAMPLE: Final = 16
+SAMPLE: Final = 64
 """Every so many pairs of a new list are looked at to tell how many the skin has brought."""
 
-UNSORTED: Final = 0.1
+UNSORTED: Final = 0.2
 """Slots are put in order again when so many of them, as a part of all, are followed by one that belongs before."""
 
-COLUMNS: Final = 2
-"""Columns of a grid in the width of a row's height: narrower ones cut out neighbours more closely, and are more cells to count."""
+COLUMNS: Final = 3
+"""Columns of a grid in the width of a row's height: narrow ones cut out neighbours more closely, and are more cells to count."""
 
 LEVELS: Final = 12
 """Grids at most, each with cells half as large as the one before."""
@@ -54,8 +54,8 @@ BLOCK_ROWS: Final = 2
 GRID_SPREAD: Final = 4.0
 """Standard deviations about the mean that the grid covers when a few outliers would stretch it; those share its rim cells."""
 
-STRIPS: Final = 64
-"""Strips of grid rows a large world is cut into: 32 even and 32 odd ones keep 8 threads busy and even.
+STRIPS: Final = 1024
+"""Strips of grid rows a large world is cut into at most: thin ones stay in the cache while their colours are gone through.
 Fixed, never derived from the number of threads, so that any number gives the same bits."""
 
 STRIP_PARTICLES: Final = 256

@@ -24,7 +24,9 @@ Array = NDArray[Any]
 
 
 class Grids:
-    """Circles of these radii at these positions, (n, 2), sorted by cell; any two nearer than `skin` are in neighbouring cells.
+    """Circles of these radii (n,) at these positions (n, 2), sorted by cell.
+
+    Any two whose rims are nearer than `skin` stand in neighbouring cells of the level of the larger one.
 
     Attributes:
         levels: the grids, as kernels take them.
@@ -35,7 +37,7 @@ class Grids:
 
     def __init__(self, position: Array, radius: Array, skin: float) -> None:
         self.levels = _fit(position, radius, skin)
-        self.start = np.empty(_cells(self.levels) + 1, np.int32)
+        self.start = np.empty(int((self.levels.width * self.levels.height).sum()) + 1, np.int32)
         cell = np.empty(len(position), np.int32)
         grid.count_level_cells(position, radius, self.levels, cell, self.start)
         self.order = np.empty(len(position), np.int32)
@@ -72,24 +74,19 @@ class Grids:
         return min(skin - float(near), float(gap) - float(far))
 
 
-def _cells(levels: grid.Levels) -> int:
-    return int((levels.width * levels.height).sum())
-
-
 def _fit(position: Array, radius: Array, skin: float) -> grid.Levels:
     """Levels over all particles; over the bulk of them if a few are so far away that the cells would be too many."""
     real = position.dtype.type
+    smallest, largest = float(radius.min()), float(radius.max())
     x0, y0, x1, y1 = map(float, grid.extent(position))
     most = CELLS_PER_PARTICLE * len(position) + 64
-    largest = float(radius.max())
     cell = (2.0 * largest + skin) * ROUNDING
 
-    def size(cell: float) -> tuple[int, int]:
-        return int((x1 - x0) / cell) + 1, int((y1 - y0) / cell) + 1
+    def cells(cell: float, shift: int = 0) -> int:
+        return ((int((x1 - x0) / cell) + 1) << shift) * ((int((y1 - y0) / cell) + 1) << shift) * COLUMNS
 
-    def cells(cell: float) -> int:
-        columns, rows = size(cell)
-        return columns * rows * COLUMNS
+    def fits(shift: int) -> float:
+        return min((cell / 2.0**shift / ROUNDING - skin) / 2.0, largest)
 
     if cells(cell) > most:
         mean, spread = position.mean(axis=0, dtype=np.float64), position.std(axis=0, dtype=np.float64) * GRID_SPREAD
@@ -97,22 +94,19 @@ def _fit(position: Array, radius: Array, skin: float) -> grid.Levels:
             (x0, y0), (x1, y1) = np.maximum(mean - spread, (x0, y0)), np.minimum(mean + spread, (x1, y1))
     while cells(cell) > most:
         cell *= 1.5
-    columns, rows = size(cell)
-    shift = np.arange(LEVELS)
-    fits = (cell / 2.0**shift / ROUNDING - skin) / 2.0
-    deepest = int(np.searchsorted(-fits, -float(radius.min()), side="right"))
-    count = np.cumsum(columns * rows * COLUMNS << 2 * shift)
-    shift = shift[: max(1, min(deepest, int(np.searchsorted(count, most, side="right"))))]
-    if len(shift) > 1:
-        held = np.empty(len(shift), np.int64)
-        fits = np.minimum(fits, largest)
-        grid.count_levels(radius, fits[shift].astype(position.dtype), held)
-        shift = shift[_worth(held)]
-    width, height = columns * COLUMNS << shift, rows << shift
-    along = (2.0**shift / cell).astype(position.dtype)
+    shifts, total = [0], cells(cell)
+    while len(shifts) < LEVELS and smallest <= fits(len(shifts)) and (total := total + cells(cell, len(shifts))) <= most:
+        shifts.append(len(shifts))
+    if len(shifts) > 1:
+        held = np.empty(len(shifts), np.int64)
+        grid.count_levels(radius, np.array([fits(k) for k in shifts], position.dtype), held)
+        shifts = _worth(held)
+    shift = np.array(shifts)
+    width, height = (int((x1 - x0) / cell) + 1) * COLUMNS << shift, int((y1 - y0) / cell) + 1 << shift
     base = np.cumsum(width * height) - width * height
-    largest_of = np.minimum(fits[shift], largest).astype(position.dtype)
-    return grid.Levels(real(x0), real(y0), largest_of, base, width, height, shift, along * real(COLUMNS), along)
+    along = (2.0**shift / cell).astype(position.dtype)
+    fitting = np.array([fits(k) for k in shifts], position.dtype)
+    return grid.Levels(real(x0), real(y0), fitting, base, width, height, shift, along * real(COLUMNS), along)
 
 
 def _worth(held: Array) -> list[int]:

@@ -166,7 +166,7 @@ def test_what_falls_as_a_whole_needs_no_new_list() -> None:
     world = pv.World(dtype=np.float64)
     x, y = np.meshgrid(np.arange(20.0), np.arange(20.0))
     lattice = np.column_stack((x.ravel(), y.ravel()))
-    world.add(position=np.concatenate((lattice, lattice + (50, 7))), velocity=(3, 0), radius=0.4)
+    world.add(position=np.concatenate((lattice, lattice + np.array((50.0, 7.0)))), velocity=(3, 0), radius=0.4)
     world.run(seconds=5)
     assert world.rebuilds <= 2  # one to look for circles on top of each other, one to begin with
 

@@ -2,8 +2,8 @@
 
 Circles of very different sizes share no good cell, so there are several grids over the same corner, the levels: level 0 has the
 largest cells, each other one has cells smaller by a power of 2, and a circle stands in the smallest that its diameter and the
-skin fit into. Cells are numbered through all levels, row by row; columns are COLUMNS times as narrow as rows are high, so that the
-neighbours of a circle, which stand together in memory along a row, are cut out more closely.
+skin fit into. Cells are numbered through all levels, row by row; columns are COLUMNS times as narrow as rows are high, so that
+the neighbours of a circle, which stand together in memory along a row, are cut out more closely.
 
 """
 
@@ -196,8 +196,8 @@ def _bound_row(position, built, order, levels, start, level, row, first, own):
 def bound_displacements(position, built, order, levels, start, first, own, smaller):
     """For each block of each level the box (x0, y0, x1, y1) of position - built of its circles, metres.
 
-    first[level]: number of the level's first block. own (blocks, 4): of the circles that stand in the level; smaller: also of those
-    in levels with smaller cells.
+    first[level]: number of the level's first block. own (blocks, 4): of the circles that stand in the level; smaller: also of
+    those in levels with smaller cells.
     """
     for top in prange((levels.height[0] + BLOCK_ROWS - 1) // BLOCK_ROWS):
         for back in range(levels.base.shape[0]):

@@ -1,9 +1,8 @@
 """Broad phase, second half: which pairs of circles might touch soon.
 
-Rows of level 0 of the grid are cut into strips, and each strip lists its candidate pairs: circles nearer than the sum of their
-radii plus a skin, whose cells are the same or neighbours on the level of the larger one. Every pair belongs to the strip of the one
-in the lower row of level 0, so a strip writes only to its own particles and to the lowest row of the next strip: even strips may be
-solved in parallel, then odd ones.
+Rows of level 0 of the grids are cut into strips, and each strip lists its candidate pairs: circles nearer than the sum of their
+radii plus a skin. Every pair belongs to the strip of the circle in the lower row of level 0, so a strip writes only to its own
+particles and to the lowest row of the next strip: even strips may be solved in parallel, then odd ones.
 
 Inside a strip pairs are ordered by colour: no two pairs of a colour share a particle, so that the processor can overlap them.
 A circle with more pairs than there are colours has them spread over all colours.
@@ -36,7 +35,7 @@ def _accept(category, mask, inverse_mass, a, b):
 
 @kernel
 def _runs_of_smaller(spot, a, level, row0, row1, levels, start, skin, low, end, runs):
-    """Add to the runs of places (low, end) those of the levels with smaller cells near place a, in the rows row0 to row1 of level 0.
+    """Add to the runs of places (low, end) those near place a of levels with smaller cells, in the rows row0 to row1 of level 0.
 
     From the larger to the smaller: what is near a large circle stands around it, and inside of it the rows are empty.
     """
