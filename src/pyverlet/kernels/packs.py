@@ -26,48 +26,68 @@ _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 # Particles one thread takes at a time where each is on its own.
 _CHUNK = 1024
 
+# Pairs that are looked at again for each new pack.
+_WAITING = 32
+
 # Of the contact distance: how far apart coincident centres are taken to be, for the direction's sake.
 _ASIDE = 1e-6
 
 
 @kernel
 def _pack_strip(origin, pair_i, pair_j, used, number, lane_i, lane_j, gap_x, gap_y):
-    """Cut the pairs into packs, in their order; returns how many lanes they take, also beyond the room.
+    """Cut the pairs into packs; returns how many lanes they take, also beyond the room.
 
+    Pairs are taken in their order. One that shares a particle with the pack waits for the next: around a large circle many do.
     used[i]: the last pack of particle i, by a number that no other strip gives; this strip's are `number` and up.
     """
-    lanes = 0
-    for k in range(pair_i.shape[0]):
-        i, j = pair_i[k], pair_j[k]
-        pack = number + lanes // LANES
-        if lanes % LANES != 0 and (used[i] == pack or used[j] == pack):
-            lanes = _fill_up(lanes, lane_i, lane_j, gap_x, gap_y)
-            pack += 1
-        used[i] = pack
-        used[j] = pack
-        if lanes < lane_i.shape[0]:
-            lane_i[lanes] = i
-            lane_j[lanes] = j
-            dx, dy = origin[j, 0] - origin[i, 0], origin[j, 1] - origin[i, 1]
-            if dx == 0 and dy == 0:
-                angle = _GOLDEN_ANGLE * (i + j)
-                dx, dy = origin.dtype.type(_ASIDE * np.cos(angle)), origin.dtype.type(_ASIDE * np.sin(angle))
-            gap_x[lanes] = dx
-            gap_y[lanes] = dy
-        lanes += 1
-    return _fill_up(lanes, lane_i, lane_j, gap_x, gap_y)
+    pairs, k, lanes = pair_i.shape[0], 0, 0
+    waiting, waits = np.empty(pairs, np.int64), 0
+    while k < pairs or waits > 0:
+        pack, end = number + lanes // LANES, lanes + LANES
+        # Those that came last first: the others would have to be moved up.
+        first = max(waits - _WAITING, 0)
+        left = first
+        for w in range(first, waits):
+            p = waiting[w]
+            if lanes < end and used[pair_i[p]] != pack and used[pair_j[p]] != pack:
+                _place(p, pack, lanes, origin, pair_i, pair_j, used, lane_i, lane_j, gap_x, gap_y)
+                lanes += 1
+            else:
+                waiting[left] = p
+                left += 1
+        waits = left
+        while lanes < end and k < pairs:
+            if used[pair_i[k]] != pack and used[pair_j[k]] != pack:
+                _place(k, pack, lanes, origin, pair_i, pair_j, used, lane_i, lane_j, gap_x, gap_y)
+                lanes += 1
+            else:
+                waiting[waits] = k
+                waits += 1
+            k += 1
+        for full in range(lanes, min(end, lane_i.shape[0])):
+            lane_i[full] = lane_i[full - 1]
+            lane_j[full] = lane_j[full - 1]
+            gap_x[full] = gap_x[full - 1]
+            gap_y[full] = gap_y[full - 1]
+        lanes = end
+    return lanes
 
 
 @kernel
-def _fill_up(lanes, lane_i, lane_j, gap_x, gap_y):
-    """Repeat the last pair to the end of its pack; returns the lanes then taken."""
-    end = (lanes + LANES - 1) // LANES * LANES
-    for k in range(lanes, min(end, lane_i.shape[0])):
-        lane_i[k] = lane_i[k - 1]
-        lane_j[k] = lane_j[k - 1]
-        gap_x[k] = gap_x[k - 1]
-        gap_y[k] = gap_y[k - 1]
-    return end
+def _place(p, pack, lane, origin, pair_i, pair_j, used, lane_i, lane_j, gap_x, gap_y):
+    """Pair p stands in this lane, if there is room."""
+    i, j = pair_i[p], pair_j[p]
+    used[i] = pack
+    used[j] = pack
+    if lane < lane_i.shape[0]:
+        lane_i[lane] = i
+        lane_j[lane] = j
+        dx, dy = origin[j, 0] - origin[i, 0], origin[j, 1] - origin[i, 1]
+        if dx == 0 and dy == 0:
+            angle = _GOLDEN_ANGLE * (i + j)
+            dx, dy = origin.dtype.type(_ASIDE * np.cos(angle)), origin.dtype.type(_ASIDE * np.sin(angle))
+        gap_x[lane] = dx
+        gap_y[lane] = dy
 
 
 @parallel_kernel
