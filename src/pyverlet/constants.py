@@ -96,6 +96,9 @@ FED: Final = 1.6
 it keeps neighbours from undoing each other's push, more than all of it is stiffer: it holds the same weight with less overlap.
 docs/design/contacts.md has the comparison."""
 
+FED_SMOOTH: Final = 2.0
+"""FED of circles that neither bounce nor rub. With friction, more than 1.6 makes piles restless."""
+
 GRIP: Final = 1.0
 """Part of the slip of a contact that friction at rest feeds, divided by h, into the velocities: the tangential FED. Piles with
 friction stood still at 0.8 to 1.3; at 0.5 single circles crept, at 1.6 some turned."""

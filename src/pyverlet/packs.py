@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pyverlet._lanes import LANES
 from pyverlet.broadphase import PairList
-from pyverlet.constants import COLOURS, FED, LARGEST_PUSH, PUSHED
+from pyverlet.constants import COLOURS, FED_SMOOTH, LARGEST_PUSH, PUSHED
 from pyverlet.kernels import packs
 from pyverlet.state import Slots
 
@@ -70,7 +70,7 @@ class Packs:
         if self._size is not state.size:
             self._share_out(state)
         where = (self.begin, self.lanes, self.lane_i, self.lane_j, self.gap, self.reach, self.share, self._varied)
-        settings = (state.real(FED / PUSHED / h), state.real(LARGEST_PUSH))
+        settings = (state.real(FED_SMOOTH / PUSHED / h), state.real(LARGEST_PUSH))
         packs.project(state.position, state.velocity, self.origin, self._moved, *where, *settings, self.normal)
 
     def still(self, state: Slots) -> None:

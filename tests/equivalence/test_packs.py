@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import pyverlet as pv
 from pyverlet._lanes import LANES
 from pyverlet.broadphase import BruteForce, Fast
-from pyverlet.constants import FED, LARGEST_PUSH, PUSHED
+from pyverlet.constants import FED_SMOOTH, LARGEST_PUSH, PUSHED
 from pyverlet.packs import Packs
 from pyverlet.state import Slots
 
@@ -91,7 +91,7 @@ def one_by_one(slots: Slots, packs: Packs) -> None:
         moved[j] = moved[j] + c * (real(1) - shares[k])
     by = moved - (slots.position - packs.origin)
     slots.position += by
-    slots.velocity += real(FED / PUSHED / H) * by
+    slots.velocity += real(FED_SMOOTH / PUSHED / H) * by
     v = slots.velocity
     for k, i, j in lanes:
         n = normals[k]

@@ -142,7 +142,10 @@ def test_unequal_masses_follow_newton(e: float) -> None:
     world.run(seconds=1)
     expected = [(m1 * v - e * m2 * v) / (m1 + m2), m1 * v * (1 + e) / (m1 + m2)]
     assert balls.velocity[:, 0] == pytest.approx(expected, abs=1e-9)
-    assert world.momentum() == pytest.approx([m1 * v, 0], rel=1e-12, abs=1e-12)
+    # e = 0: from how far the circles were pushed, whose rounding is that of the way since the list was made, 1 m, times 1300 / s
+    # and the mass: 1e-16 m * 1300 / s * 1000 kg, in some substeps. Impacts, e > 0, change the velocities themselves.
+    exact = 1e-12 if e > 0 else 1e-9
+    assert world.momentum() == pytest.approx([m1 * v, 0], rel=exact, abs=exact)
 
 
 def test_sliding_disc_ends_rolling_at_two_thirds() -> None:

@@ -6,7 +6,7 @@ What is computed for each pair, and why, is in kernels.contacts; here it is arra
   writes no other one reads. A pack that is not full repeats its last pair: both lanes write the same.
 - A pair reads how far its circles have moved since the list was made, and adds what it knows of them from then: their distance,
   the sum of their radii, how they share a push. Such small numbers keep their digits in float32, so that the velocities need not
-  be carried along: FED / PUSHED / h times what a circle has been moved is what it is fed.
+  be carried along: FED_SMOOTH / PUSHED / h times what a circle has been moved is what it is fed.
 - The second pass finds the normals where the first has left them, 0 for pairs that do not touch, and has nothing to decide.
 
 Everything runs strip by strip as kernels.grid explains: even strips in parallel, then odd ones.
@@ -174,7 +174,7 @@ def _arrive(position, velocity, origin, moved, feed):
 def project(position, velocity, origin, moved, begin, lanes, lane_i, lane_j, gap, reach, share, varied, feed, most, normal):
     """Move overlapping pairs apart, feed their velocities, and note the normals of those that touch.
 
-    varied: 1; or 0 if reach and share are the same for all and have one pack only. feed: FED / PUSHED / h, 1/s.
+    varied: 1; or 0 if reach and share are the same for all and have one pack only. feed: FED_SMOOTH / PUSHED / h, 1/s.
     moved: (n, 2) to work with. normal: (2, lanes).
     """
     n = position.shape[0]
