@@ -14,6 +14,7 @@ import re
 import shutil
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -186,20 +187,25 @@ def max_threads() -> int:
     return int(numba.config.NUMBA_NUM_THREADS)
 
 
+_chosen = threading.local()
+
+
 def use_threads(count: int) -> None:
     """Let the parallel kernels called from this thread use `count` threads."""
-    numba.set_num_threads(count)
+    if getattr(_chosen, "count", 0) != count:  # asking Numba takes as long as a stage of a small world
+        numba.set_num_threads(count)
+        _chosen.count = count
 
 
 @contextlib.contextmanager
 def one_thread(only_if: bool = True) -> Iterator[None]:
     """Parallel kernels called inside use one thread: work that is too little to be worth a meeting."""
     before = numba.get_num_threads()
-    numba.set_num_threads(1 if only_if else before)
+    use_threads(1 if only_if else before)
     try:
         yield
     finally:
-        numba.set_num_threads(before)
+        use_threads(before)
 
 
 class _CompileListener(numba_event.Listener):  # type: ignore[misc]

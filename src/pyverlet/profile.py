@@ -9,33 +9,43 @@ from time import perf_counter
 class Profile:
     """Milliseconds by stage, of the last frame (`stages`) and since the start (`total_ms`).
 
-    `world.step` calls `begin`, then `mark(stage)` at the end of each stage, then `end`.
+    `world.step` calls `begin`, then `mark(stage)` at the end of each stage, then `end`. Only seconds are summed meanwhile: frames
+    of small worlds are not much longer than what it takes to make a table of them.
     """
 
     def __init__(self) -> None:
-        self.stages: dict[str, float] = {}
-        self.total_ms: dict[str, float] = {}
         self.frame_ms = 0.0
         self.frames = 0
         self.rebuilds = 0
         self._start = self._last = 0.0
-        self._current: defaultdict[str, float] = defaultdict(float)  # s
+        self._before: dict[str, float] = {}
+        self._after: dict[str, float] = {}
+        self._sum: defaultdict[str, float] = defaultdict(float)  # s, since the start, up to now
 
     def begin(self) -> None:
         """A frame begins."""
-        self._current = defaultdict(float)
+        self._sum = defaultdict(float, self._after)  # without what a frame that failed has left
         self._start = self._last = perf_counter()
 
     def mark(self, stage: str) -> None:
         """Charge the time since the last mark to `stage`."""
         now = perf_counter()
-        self._current[stage] += now - self._last
+        self._sum[stage] += now - self._last
         self._last = now
 
     def end(self) -> None:
         """The frame is complete."""
         self.frame_ms = (perf_counter() - self._start) * 1e3
         self.frames += 1
-        self.stages = {stage: seconds * 1e3 for stage, seconds in self._current.items()}
-        for stage, ms in self.stages.items():
-            self.total_ms[stage] = self.total_ms.get(stage, 0.0) + ms
+        self._before, self._after = self._after, self._sum
+
+    @property
+    def stages(self) -> dict[str, float]:
+        """Milliseconds of each stage that the last complete frame had."""
+        before = self._before
+        return {stage: (s - before.get(stage, 0.0)) * 1e3 for stage, s in self._after.items() if s > before.get(stage, 0.0)}
+
+    @property
+    def total_ms(self) -> dict[str, float]:
+        """Milliseconds of each stage in all complete frames."""
+        return {stage: seconds * 1e3 for stage, seconds in self._after.items()}
