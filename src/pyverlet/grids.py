@@ -111,9 +111,9 @@ def _fit(position: Array, radius: Array, skin: float) -> grid.Levels:
 
 def _worth(held: Array) -> list[int]:
     """Which levels are worth having, given how many circles each holds: a few stand as well among those twice as large."""
-    kept: list[int] = []
-    for level in np.flatnonzero(held):
-        if kept and kept[-1] == level - 1 and held[level] < SPARSE * held[level - 1]:
+    kept = [0]
+    for level in np.flatnonzero(held[1:]) + 1:
+        if kept[-1] == level - 1 and held[level] < SPARSE * held[level - 1]:
             continue
         kept.append(int(level))
     return kept

@@ -128,6 +128,7 @@ def _link(world: World) -> None:
 
 def _use(world: World) -> None:
     world.step(1e-3)
+    world.step(1e-3)  # by now somebody has moved far enough for a closer look at the list of pairs
     world.energy()
     world.momentum()
     world.overlap()
@@ -145,7 +146,9 @@ def _lattice(
         room = Box((-side, -side), (side, side), restitution=restitution)
     world = World(boundary=room, collisions=collisions, substeps=1, dtype=dtype, threads=threads, ledger=ledger, events=events)
     row, column = np.divmod(np.arange(count), side)
-    world.add(position=np.column_stack((column, row)) - 0.5 * side, radius=0.5)
+    # Small ones for a second grid, and one fast enough to pass through the skin in a step.
+    group = world.add(position=np.column_stack((column, row)) - 0.5 * side, radius=np.where(np.arange(count) % 4, 0.5, 0.05))
+    group.velocity[-1] = (500.0, 0.0)
     return world
 
 

@@ -111,7 +111,7 @@ def test_both_methods_tell_the_same() -> None:
         rng = np.random.default_rng(2)
         world.boundary = pv.Box((-6, -6), (6, 6), restitution=1)
         world.add(position=np.column_stack((x.ravel(), y.ravel())), velocity=rng.normal(0, 2, (49, 2)))
-        told.append(follow(world, 20))  # before rounding in another order makes another gas of it
+        told.append(follow(world, 20))  # before a circle meets two at once, and the order of the list makes another gas of it
     assert told[0] == told[1]
     assert len(told[0]) > 50
 

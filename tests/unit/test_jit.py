@@ -103,13 +103,20 @@ def test_warm_up_leaves_the_world_alone_and_nothing_to_compile(boundary: pv.Boun
     assert compiled == []
 
 
-def test_warm_up_reports_progress(tmp_path: Path) -> None:
+def test_warm_up_reports_progress_and_leaves_nothing_to_compile(tmp_path: Path) -> None:
     code = (
         "import pyverlet as pv; world = pv.World(); world.add(position=(0, 0)); seen = []\n"
         "pv.warm_up(world, lambda done, total: seen.append((done, total)))\n"
         "assert seen[0][0] == 1 and seen[-1][0] == seen[-1][1] > 20, seen\n"
         "assert [d for d, _ in seen] == sorted(d for d, _ in seen)\n"
         "pv.warm_up(world, lambda done, total: exit('compiled twice'))\n"
+        # The look at how neighbours have moved, and the second grid for small circles, are needed late, not in the first frame.
+        "import numpy as np; from pyverlet import _jit; rng = np.random.default_rng(0); late = []\n"
+        "world = pv.World(boundary=pv.Box((0, 0), (20, 20)))\n"
+        "size = 0.5 * 20.0 ** -rng.random(200)\n"
+        "world.add(position=rng.uniform(1, 19, (200, 2)), velocity=rng.normal(0, 20, (200, 2)), radius=size)\n"
+        "with _jit.watch_compiling(lambda: late.append(1)): world.run(seconds=0.5)\n"
+        "assert world.rebuilds > 3 and not late, (world.rebuilds, late)\n"
     )
     subprocess.run([sys.executable, "-c", code], env={**os.environ, "PYVERLET_CACHE_DIR": str(tmp_path)}, check=True, timeout=300)
 

@@ -192,6 +192,31 @@ def _bound_row(position, built, order, levels, start, level, row, first, own):
             own[b, 0], own[b, 1], own[b, 2], own[b, 3] = x0, y0, x1, y1
 
 
+@kernel
+def _bound_rows(position, built, order, levels, start, first, own, smaller, top):
+    """What `bound_displacements` does, for the row `top` of blocks of level 0 and what lies in it."""
+    inf = own.dtype.type(np.inf)
+    for back in range(levels.base.shape[0]):
+        level = levels.base.shape[0] - 1 - back
+        columns, rows = blocks(levels, level)
+        shift = levels.shift[level]
+        for row in range(top << shift, min((top + 1) << shift, rows)):
+            here = first[level] + row * columns
+            for b in range(here, here + columns):
+                own[b, 0] = own[b, 1] = smaller[b, 0] = smaller[b, 1] = inf
+                own[b, 2] = own[b, 3] = smaller[b, 2] = smaller[b, 3] = -inf
+            _bound_row(position, built, order, levels, start, level, row, here, own)
+            for b in range(here, here + columns):
+                _cover(smaller, b, own, b)
+        if back > 0:
+            below, rows_below = blocks(levels, level + 1)
+            step = levels.shift[level + 1] - shift
+            for row in range(top << levels.shift[level + 1], min((top + 1) << levels.shift[level + 1], rows_below)):
+                for column in range(below):
+                    to = first[level] + (row >> step) * columns + (column >> step)
+                    _cover(smaller, to, smaller, first[level + 1] + row * below + column)
+
+
 @parallel_kernel
 def bound_displacements(position, built, order, levels, start, first, own, smaller):
     """For each block of each level the box (x0, y0, x1, y1) of position - built of its circles, metres.
@@ -200,26 +225,7 @@ def bound_displacements(position, built, order, levels, start, first, own, small
     those in levels with smaller cells.
     """
     for top in prange((levels.height[0] + BLOCK_ROWS - 1) // BLOCK_ROWS):
-        for back in range(levels.base.shape[0]):
-            level = levels.base.shape[0] - 1 - back
-            columns, rows = blocks(levels, level)
-            shift = levels.shift[level]
-            for row in range(top << shift, min((top + 1) << shift, rows)):
-                here = first[level] + row * columns
-                own[here : here + columns, :2] = np.inf
-                own[here : here + columns, 2:] = -np.inf
-                smaller[here : here + columns, :2] = np.inf
-                smaller[here : here + columns, 2:] = -np.inf
-                _bound_row(position, built, order, levels, start, level, row, here, own)
-                for b in range(here, here + columns):
-                    _cover(smaller, b, own, b)
-            if back > 0:
-                below, rows_below = blocks(levels, level + 1)
-                step = levels.shift[level + 1] - shift
-                for row in range(top << levels.shift[level + 1], min((top + 1) << levels.shift[level + 1], rows_below)):
-                    for column in range(below):
-                        to = first[level] + (row >> step) * columns + (column >> step)
-                        _cover(smaller, to, smaller, first[level + 1] + row * below + column)
+        _bound_rows(position, built, order, levels, start, first, own, smaller, top)
 
 
 @kernel

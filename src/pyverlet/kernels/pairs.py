@@ -137,6 +137,25 @@ def _colour_strip(used, raw_i, raw_j, found, colour, begin):
         begin[c + 1] += begin[c]
 
 
+@kernel
+def _fill_strip(
+    order, levels, start, row0, row1, skin, picky, category, mask, inverse_mass,
+    spot, raw_i, raw_j, colour, used, pair_i, pair_j,
+):  # fmt: skip
+    """What `list_pairs` does, for a strip of the rows row0 to row1, into its own part of the arrays."""
+    found = _list_strip(spot, order, row0, row1, levels, start, skin, picky, category, mask, inverse_mass, raw_i, raw_j)
+    if found <= raw_i.shape[0]:
+        _forget_colours(used, row0, row1 + 1, levels, start)
+        begin = np.empty(COLOURS + 1, np.int64)
+        _colour_strip(used, raw_i, raw_j, found, colour, begin)
+        for p in range(found):
+            c = colour[p]
+            pair_i[begin[c]] = order[raw_i[p]]
+            pair_j[begin[c]] = order[raw_j[p]]
+            begin[c] += 1
+    return found
+
+
 @parallel_kernel
 def list_pairs(
     position, radius, order, levels, start, strip_row, first, skin, picky, category, mask, inverse_mass,
@@ -157,21 +176,10 @@ def list_pairs(
         for half in prange((strip_row.shape[0] - parity) // 2):
             s = 2 * half + parity
             a, b = first[s], first[s + 1]
-            found = _list_strip(
-                spot, order, strip_row[s], strip_row[s + 1], levels, start, skin, picky, category, mask, inverse_mass,
-                raw_i[a:b], raw_j[a:b],
+            count[s] = _fill_strip(
+                order, levels, start, strip_row[s], strip_row[s + 1], skin, picky, category, mask, inverse_mass,
+                spot, raw_i[a:b], raw_j[a:b], colour[a:b], used, pair_i[a:b], pair_j[a:b],
             )  # fmt: skip
-            count[s] = found
-            if found <= b - a:
-                _forget_colours(used, strip_row[s], strip_row[s + 1] + 1, levels, start)
-                begin = np.empty(COLOURS + 1, np.int64)
-                _colour_strip(used, raw_i[a:b], raw_j[a:b], found, colour[a:b], begin)
-                for p in range(a, a + found):
-                    c = colour[p]
-                    to = a + begin[c]
-                    begin[c] += 1
-                    pair_i[to] = order[raw_i[p]]
-                    pair_j[to] = order[raw_j[p]]
 
 
 @kernel
