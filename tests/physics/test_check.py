@@ -20,7 +20,6 @@ BROKEN = {
     "radii-masses": "overlap 11 % where small heavy circles lie on large light ones",
     "heavy-on-column": "it stays on top, but trembles: 0.2 m g R",
     "heavy-on-smooth-bed": "overlap 11 % below the heavy circle",
-    "repose": "heaps with friction creep, so that their angle hardly depends on it",
     "energy-scenes": "at 1 and 2 substeps contacts add energy",
     "energy-overlapped": "4e-3 of the scale in the frame of a crash",
     "energy-coincident": "6e-3 of the scale in the frame of a crash",
@@ -28,8 +27,7 @@ BROKEN = {
 
 
 def parameters() -> list[Any]:
-    # The few heaps of repose may come out in order by chance; all others fail for certain until they are mended.
-    marks = {name: pytest.mark.xfail(strict=name != "repose", reason=f"{name}: {reason}") for name, reason in BROKEN.items()}
+    marks = {name: pytest.mark.xfail(strict=True, reason=f"{name}: {reason}") for name, reason in BROKEN.items()}
     return [pytest.param(check, id=check.name, marks=marks.get(check.name, ())) for check in physics.CHECKS]
 
 
