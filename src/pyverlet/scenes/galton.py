@@ -64,7 +64,7 @@ def _in_hopper(settings: Settings, radii: Floats) -> tuple[Floats, float]:
     """Centres (n, 2) above the stirrer, between walls that rise at 45 degrees, and the height of the lid, m."""
 
     def half_width(y: float, margin: float) -> float:
-        return min(HALF - margin, MOUTH / 2 + y - BRIM - np.sqrt(2) * margin)
+        return min(HALF - margin, MOUTH / 2 + y - BRIM - 2**0.5 * margin)
 
     top = BRIM + HALF
     while True:
