@@ -69,6 +69,36 @@ def test_substeps_restitution_friction_and_integrator(page: Page, program: Serve
     expect(page.get_by_test_id("integrator")).to_have_value("rk4")
 
 
+def test_the_ledger_says_where_the_energy_has_gone(page: Page, program: Serve) -> None:
+    visit(page, program("box", 60, 150_000, 1).address)
+    assert comes_true(page, lambda: number(page, "time") > 2)
+    pause(page)
+    page.wait_for_timeout(300)
+    booked = status(page)["ledger"]
+    assert sum(booked.values()) == pytest.approx(status(page)["energy"], rel=1e-6)
+    assert booked["restitution"] < -10  # this scene bounces with e = 0.5 and rubs
+    assert booked["friction"] < -1
+    rows = page.locator("#ledger tr")
+    shown = {row.locator("td").nth(0).inner_text(): row for row in rows.all()}
+    assert list(shown) == [name for name in booked if booked[name] or name == "residual"]
+    assert float(shown["restitution"].locator("td").nth(2).inner_text()) == pytest.approx(booked["restitution"], abs=0.6)
+    middle = shown["restitution"].locator("td").nth(1).bounding_box()
+    bar = shown["restitution"].locator("i").bounding_box()
+    assert middle
+    assert bar
+    # What is lost goes to the left of the middle; the largest loss fills its half.
+    assert bar["x"] + bar["width"] == pytest.approx(middle["x"] + middle["width"] / 2, abs=1)
+    assert bar["width"] == pytest.approx(middle["width"] / 2, abs=1)
+    page.get_by_test_id("scene").select_option("cage")  # another scene keeps one too
+    assert comes_true(page, lambda: status(page)["particles"] == 5000 and status(page)["ledger"] is not None)
+
+
+def test_a_world_without_a_ledger_shows_none(page: Page, program: Serve) -> None:
+    visit(page, program("cage", 50).address)
+    assert status(page)["ledger"] is None
+    expect(page.get_by_test_id("ledger")).to_be_hidden()
+
+
 def test_what_a_world_lacks_is_not_offered(page: Page, program: Serve) -> None:
     visit(page, program("bounce-order", 1).address)
     expect(page.locator("#friction-field")).to_be_hidden()

@@ -85,6 +85,9 @@ Picture = Annotated[
     Path | None,
     typer.Option(help="What the circles form (scene image).", metavar="FILE", show_default=False),
 ]
+Ledger = Annotated[
+    bool, typer.Option("--ledger", help="Show on the page where the energy goes; reports always have it. Costs time.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 COLOURS: dict[ColourName, type[Colouring]] = {"origin": ByOrigin, "speed": BySpeed, "mass": ByMass, "energy": ByEnergy}

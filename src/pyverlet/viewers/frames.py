@@ -108,6 +108,8 @@ class Status:
     potential: float
     links: float
     energy: float
+    ledger: dict[str, float] | None
+    """Where the energies have gone, J by account; None unless all worlds keep a ledger."""
     energies: tuple[float, ...]
     """Total energy of each panel, J; `kinetic`, `spin`, `potential`, `links` and `energy` are sums over the panels."""
     gravity: tuple[float, float]
