@@ -158,6 +158,27 @@ def test_colours_say_what_they_say(page: Page, program: Serve, colouring: str) -
         assert np.corrcoef(light, np.log(mass))[0, 1] > 0.9
 
 
+def test_groups_have_a_colour_each(page: Page, program: Serve) -> None:
+    visit(page, program("soft-bodies", 2200).address)
+    page.get_by_test_id("colour").select_option("group")
+    groups = page.evaluate("() => window.pyverlet.groups()")
+    assert len(groups) == 6  # the grains, and five bodies
+    assert sum(count for _, count in groups) == 2200
+    inks = page.evaluate("() => Array.from({length: 2200}, (_, i) => window.pyverlet.ink(i))")
+    first, hues = 0, []
+    for _, count in groups:
+        own = np.array([[(ink >> shift) & 255 for shift in (0, 8, 16)] for ink in inks[first : first + count]])
+        assert np.ptp(own, axis=0).max() < 60  # tones of one hue
+        hues.append(own.mean(axis=0))
+        first += count
+    apart = np.hypot.reduce(np.array(hues)[1:] - np.array(hues)[:-1], axis=1)
+    assert apart.min() > 60  # neighbours in the order of adding are told apart
+    page.keyboard.press("4")
+    page.mouse.click(500, 120)  # a circle added by hand is a group of its own
+    assert comes_true(page, lambda: len(page.evaluate("() => window.pyverlet.groups()")) == len(groups) + 1)
+    assert page.evaluate("() => window.pyverlet.ink(0)") == inks[0]
+
+
 def test_slow_motion(page: Page, program: Serve) -> None:
     visit(page, program("cage", 100).address)
     page.get_by_test_id("speed").select_option("0.125")

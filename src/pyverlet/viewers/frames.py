@@ -85,6 +85,8 @@ class Shape:
     """(n,) kg, infinite where pinned; read-only."""
     number: NDArray[np.uint32]
     """(n,) what each circle is called as long as it lives; read-only."""
+    group: NDArray[np.int64]
+    """(n,) ascending in each world: which circles were added together; read-only."""
     colours: NDArray[np.uint8] | None
     """(n, 3) bytes R, G, B, the circles' own, if they have any; read-only."""
 

@@ -17,6 +17,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pyverlet import integrators
 from pyverlet.errors import InputError
 from pyverlet.viewers.commands import (
@@ -140,6 +143,7 @@ def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = N
         "scenes": shape.scenes,
         "integrators": list(integrators.BY_NAME),
         "count": len(shape.radius),
+        "groups": [] if drawn_here else _runs(shape.group),
         "coloured": coloured,
         "drawnHere": drawn_here,
         "note": note,
@@ -151,6 +155,13 @@ def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = N
         return _join(head, b"")
     colours = b"" if shape.colours is None else shape.colours.tobytes()
     return _join(head, shape.radius.tobytes() + shape.mass.tobytes() + shape.number.tobytes() + colours)
+
+
+def _runs(group: NDArray[np.int64]) -> list[list[int]]:
+    """[number, how many] of each run of circles of one group."""
+    starts = np.flatnonzero(np.diff(group, prepend=-1))
+    runs: list[list[int]] = np.column_stack((group[starts], np.diff(starts, append=len(group)))).tolist()
+    return runs
 
 
 def encode_refusal(reason: str) -> bytes:

@@ -136,6 +136,7 @@ class Stage:
             radius=_kept(np.concatenate([world.radius for world in self.worlds], dtype=np.float32)),
             mass=_kept(np.concatenate([world.mass for world in self.worlds], dtype=np.float32)),
             number=_kept(np.concatenate([world.number for world in self.worlds], dtype=np.uint32, casting="unsafe")),
+            group=_kept(np.concatenate([world.group_number for world in self.worlds])),
             colours=self._colours(),
         )
 

@@ -338,6 +338,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     },
     status: () => last,
     mass: (i) => shape.mass[i],
+    groups: () => shape.groups,
     ink: (i) => inks.ink[i],
     overlay,
     camera,
