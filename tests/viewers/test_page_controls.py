@@ -305,6 +305,37 @@ def test_velocities_and_contacts_are_drawn(page: Page, program: Serve) -> None:
     assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.overlay.contacts") == 0)
 
 
+def test_circles_that_do_not_collide_have_no_contacts(page: Page, program: Serve) -> None:
+    visit(page, program("orbit", 300).address)  # a world without collisions
+    page.get_by_test_id("contacts").check()
+    assert comes_true(page, lambda: number(page, "time") > 1)
+    assert page.evaluate("() => window.pyverlet.overlay.contacts") == 0
+    # Six circles in a row, each of radius 0.5 and touching the next: who may not is left out.
+    row = """async (shape) => (await import("/contacts.js")).touching(
+        {count: 6, mass: [1, 1, 1, 1, 1, 1], apart: [], kinds: null, ...shape},
+        [0, 1, 2, 3, 4, 5], [0, 0, 0, 0, 0, 0], Array(6).fill(0.5))"""
+    assert page.evaluate(row, {}) == [0, 1, 1, 2, 2, 3, 3, 4, 4, 5]
+    assert page.evaluate(row, {"apart": [1, 2, 4, 5]}) == [0, 1, 2, 3, 3, 4]
+    everyone = 0xFFFFFFFF
+    kinds = [1, everyone, 2, everyone, 4, everyone - 2, 4, everyone, 4, everyone, 4, 4]
+    assert page.evaluate(row, {"kinds": kinds}) == [0, 1, 2, 3, 3, 4, 4, 5]
+    pinned = """async () => (await import("/contacts.js")).touching(
+        {count: 3, mass: [1, Infinity, Infinity], apart: [], kinds: null}, [0, 1, 2], [0, 0, 0], [0.5, 0.5, 0.5])"""
+    assert page.evaluate(pinned) == [0, 1]
+
+
+def test_the_page_says_why_an_overlay_is_off(page: Page, program: Serve) -> None:
+    visit(page, program("cage", 100, 50).address)  # the server draws
+    for name in ("velocities", "contacts"):
+        expect(page.get_by_test_id(name)).to_be_disabled()
+        expect(page.locator(f"label:has(#{name})")).to_have_attribute("title", re.compile("Not drawn over pictures"))
+    page.get_by_test_id("count").fill("40")
+    page.get_by_test_id("count").press("Enter")
+    for name in ("velocities", "contacts"):
+        expect(page.get_by_test_id(name)).to_be_enabled()
+        expect(page.locator(f"label:has(#{name})")).to_have_attribute("title", "")
+
+
 def test_dark_and_light(page: Page, program: Serve) -> None:
     visit(page, program("cage", 50).address)
 
