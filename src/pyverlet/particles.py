@@ -134,6 +134,11 @@ class Particles:
         return self._state.number
 
     @property
+    def group_number(self) -> NDArray[np.int64]:
+        """(n,) which call of `add` brought each particle, ascending from 0; it keeps that while others come and go."""
+        return np.searchsorted(self._state.begun, self.number, side="right") - 1
+
+    @property
     def version(self) -> int:
         """How often particles were added or removed."""
         return self._state.version

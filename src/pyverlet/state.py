@@ -47,6 +47,7 @@ class State:
         restitution, friction: (n,) of circles that have values of their own; negative: as `Collisions` and the bounds say.
         category, mask: (n,) 32 bits each; two circles collide if each has a bit of its category in the other's mask.
         number: (n,) of each particle, in ascending order; no two particles of a world ever have the same.
+        begun: the number of the first particle of each `append`, ascending.
         version: how often particles were added or removed.
     """
 
@@ -70,6 +71,7 @@ class State:
         self._store |= {name: np.empty(0, np.uint32) for name in _MARKS}
         self._store |= {name: np.empty(0, np.int64) for name in _NUMBERS}
         self._numbers = 0
+        self.begun: list[int] = []
         self.version = 0
         self._show(0)
 
@@ -95,6 +97,7 @@ class State:
         self._show(stop)
         for name, value in (_DEFAULTS | values).items():
             getattr(self, name)[start:stop] = value
+        self.begun.append(self._numbers)
         self.number[start:] = np.arange(self._numbers, self._numbers + stop - start)
         self._numbers += stop - start
         self.version += 1

@@ -76,6 +76,18 @@ def test_groups_have_a_hue_each_and_the_rest_is_grey() -> None:
         Groups(first, 3)  # type: ignore[arg-type]
 
 
+def test_all_groups_of_a_world_have_hues_far_apart() -> None:
+    world = row(2)
+    for k in range(5):
+        world.add(position=[(0, 5 + 4 * k)])
+    found = steps(Groups().colours(world, DARK), hues(True))
+    assert found[0] == found[1]
+    assert found[1:] == [int(k * (5**0.5 - 1) / 2 % 1 * STEPS) for k in range(6)]
+    assert np.diff(sorted(found[1:])).min() >= 5
+    world.remove(3)
+    assert steps(Groups().colours(world, DARK), hues(True)) == found[:3] + found[4:]
+
+
 def test_fixed_colours_are_the_users() -> None:
     world = row(2)
     assert Fixed([(255, 0, 1), (0, 128, 0)]).colours(world, DARK).tolist() == [0x0100FF, 0x008000]
@@ -90,7 +102,7 @@ def test_bad_colours_are_refused(rgb: Any) -> None:
         Fixed(rgb)
 
 
-@pytest.mark.parametrize("colouring", [ByOrigin(), BySpeed(), ByMass()])
+@pytest.mark.parametrize("colouring", [ByOrigin(), BySpeed(), ByMass(), Groups()])
 def test_an_empty_world_has_no_colours(colouring: Any) -> None:
     assert len(colouring.colours(pv.World(), DARK)) == 0
 

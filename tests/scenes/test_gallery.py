@@ -4,10 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy import stats
 
 from pyverlet import scenes
 from pyverlet.scenes import galton, orbit
+
+
+def assert_binomial(counts: NDArray[np.float64], least: float) -> None:
+    """Pearson's chi-squared against 12 tosses; bins that expect fewer than five are taken together, as it wants them."""
+    expected = stats.binom.pmf(np.arange(galton.ROWS + 1), galton.ROWS, 0.5) * counts.sum()
+    small = expected < 5
+    observed, wanted = (np.append(values[~small], values[small].sum()) for values in (counts, expected))
+    assert stats.chisquare(observed, wanted).pvalue > least
 
 
 def test_the_bins_of_a_galton_board_follow_the_binomial_law() -> None:
@@ -18,11 +27,40 @@ def test_the_bins_of_a_galton_board_follow_the_binomial_law() -> None:
     world.run(seconds=scene.show.seconds(settings), dt=1 / 60)
     counts = galton.bins(world)
     assert counts.sum() == settings.particles  # every ball is in a bin
-    # Bins that expect fewer than five are taken together, as the test of Pearson wants them.
-    expected = stats.binom.pmf(np.arange(galton.ROWS + 1), galton.ROWS, 0.5) * settings.particles
-    small = expected < 5
-    observed, wanted = (np.append(values[~small], values[small].sum()) for values in (counts, expected))
-    assert stats.chisquare(observed, wanted).pvalue > 0.01
+    assert_binomial(counts, 0.01)
+
+
+def test_pegs_alone_send_a_ball_left_or_right_whatever_it_did_before() -> None:
+    """Many balls that do not meet, dropped below the hopper's lips: no force but gravity, nothing random but where they start."""
+    world = scenes.get("galton").world(particles=1, collisions=False, threads=1)
+    assert not world.forces
+    assert not world.actors
+    count = 4_000
+    start = np.random.default_rng(0).uniform(
+        (-0.05 * galton.SPACING, 0.9 * galton.DROP), (0.05 * galton.SPACING, 1.1 * galton.DROP), (count, 2)
+    )
+    balls = world.add(position=start, radius=galton.BALL)
+    at = np.full((galton.ROWS, count), np.nan)  # where each last came through each row, in spacings
+    above = start[:, 1].copy()
+    while world.time < 8.0:
+        world.step(1 / 60)
+        x, y = balls.position.astype(np.float64).T
+        for row in range(galton.ROWS):
+            through = (above > -row * galton.DROP) & (y <= -row * galton.DROP)
+            middle = 0.5 * (row % 2 == 0)  # of its gaps
+            at[row, through] = np.round(x[through] / galton.SPACING - middle) + middle
+        above = y
+    assert (above < galton.LAST).mean() > 0.999  # but for those that dance on a peg a little longer
+    at = at[:, above < galton.LAST]
+    turns = np.diff(at, axis=0, prepend=0.0)
+    assert (np.abs(turns) == 0.5).mean() > 0.999
+    side = np.sign(turns)
+    # Of 44,000 pairs of tosses the mean product is 0 with a standard error of 0.005; measured 0.01 on the same board.
+    for later in (1, 2, 3):
+        assert abs((side[later:] * side[:-later]).mean()) < 0.025
+    # The variance of a walk of k steps of 1/2 is k / 4: sums of n squares have a relative standard error of sqrt(2 / n) = 0.022.
+    assert at.var(axis=1) == pytest.approx(np.arange(1, galton.ROWS + 1) / 4, rel=4 * np.sqrt(2 / count))
+    assert_binomial(np.bincount((at[-1] + galton.ROWS / 2).astype(int), minlength=galton.ROWS + 1).astype(float), 0.001)
 
 
 def test_all_sand_stays_in_its_glass_and_runs_through() -> None:

@@ -34,6 +34,9 @@ def test_groups_keep_the_particles_that_are_left() -> None:
     d = world.add(position=(20, 20))
     assert d.position[0].tolist() == [20, 20]
     assert repr(c) == "Group of 15 particles, 27 to 41"
+    assert world.group_number.tolist() == [0] * 14 + [1] * 13 + [2] * 15 + [3]
+    b.remove()
+    assert world.group_number.tolist() == [0] * 14 + [2] * 15 + [3]  # they keep it, and nobody gets it again
 
 
 def test_a_dead_group_says_so() -> None:

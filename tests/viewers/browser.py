@@ -36,7 +36,7 @@ from pyverlet.viewers.exhibit import Repertoire
 if len(sys.argv) > 3:
     from pyverlet.viewers import artist
     artist.PICTURES_FROM = int(sys.argv[3])
-repertoire = Repertoire(get(sys.argv[1]), dt=1 / 60, overrides={"particles": int(sys.argv[2])})
+repertoire = Repertoire(get(sys.argv[1]), dt=1 / 60, overrides={"particles": int(sys.argv[2]), "ledger": sys.argv[4:] == ["1"]})
 serve(repertoire.open, scene_name=sys.argv[1], repertoire=repertoire, port=0, open_browser=False)
 """
 
@@ -72,7 +72,7 @@ class Program:
 
 
 class Serve(Protocol):
-    """Starts programs: a scene, its circles and, if given, from how many on the server draws."""
+    """Starts programs: a scene, its circles and, if given, from how many on the server draws, and 1 for a ledger."""
 
     def __call__(self, scene: str, particles: int, *settings: int) -> Program:
         """Start one."""

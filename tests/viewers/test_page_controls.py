@@ -69,6 +69,36 @@ def test_substeps_restitution_friction_and_integrator(page: Page, program: Serve
     expect(page.get_by_test_id("integrator")).to_have_value("rk4")
 
 
+def test_the_ledger_says_where_the_energy_has_gone(page: Page, program: Serve) -> None:
+    visit(page, program("box", 60, 150_000, 1).address)
+    assert comes_true(page, lambda: number(page, "time") > 2)
+    pause(page)
+    page.wait_for_timeout(300)
+    booked = status(page)["ledger"]
+    assert sum(booked.values()) == pytest.approx(status(page)["energy"], rel=1e-6)
+    assert booked["restitution"] < -10  # this scene bounces with e = 0.5 and rubs
+    assert booked["friction"] < -1
+    rows = page.locator("#ledger tr")
+    shown = {row.locator("td").nth(0).inner_text(): row for row in rows.all()}
+    assert list(shown) == [name for name in booked if booked[name] or name == "residual"]
+    assert float(shown["restitution"].locator("td").nth(2).inner_text()) == pytest.approx(booked["restitution"], abs=0.6)
+    middle = shown["restitution"].locator("td").nth(1).bounding_box()
+    bar = shown["restitution"].locator("i").bounding_box()
+    assert middle
+    assert bar
+    # What is lost goes to the left of the middle; the largest loss fills its half.
+    assert bar["x"] + bar["width"] == pytest.approx(middle["x"] + middle["width"] / 2, abs=1)
+    assert bar["width"] == pytest.approx(middle["width"] / 2, abs=1)
+    page.get_by_test_id("scene").select_option("cage")  # another scene keeps one too
+    assert comes_true(page, lambda: status(page)["particles"] == 5000 and status(page)["ledger"] is not None)
+
+
+def test_a_world_without_a_ledger_shows_none(page: Page, program: Serve) -> None:
+    visit(page, program("cage", 50).address)
+    assert status(page)["ledger"] is None
+    expect(page.get_by_test_id("ledger")).to_be_hidden()
+
+
 def test_what_a_world_lacks_is_not_offered(page: Page, program: Serve) -> None:
     visit(page, program("bounce-order", 1).address)
     expect(page.locator("#friction-field")).to_be_hidden()
@@ -126,6 +156,27 @@ def test_colours_say_what_they_say(page: Page, program: Serve, colouring: str) -
     assert np.ptp(light) > 40
     if colouring == "mass":
         assert np.corrcoef(light, np.log(mass))[0, 1] > 0.9
+
+
+def test_groups_have_a_colour_each(page: Page, program: Serve) -> None:
+    visit(page, program("soft-bodies", 2200).address)
+    page.get_by_test_id("colour").select_option("group")
+    groups = page.evaluate("() => window.pyverlet.groups()")
+    assert len(groups) == 6  # the grains, and five bodies
+    assert sum(count for _, count in groups) == 2200
+    inks = page.evaluate("() => Array.from({length: 2200}, (_, i) => window.pyverlet.ink(i))")
+    first, hues = 0, []
+    for _, count in groups:
+        own = np.array([[(ink >> shift) & 255 for shift in (0, 8, 16)] for ink in inks[first : first + count]])
+        assert np.ptp(own, axis=0).max() < 60  # tones of one hue
+        hues.append(own.mean(axis=0))
+        first += count
+    apart = np.hypot.reduce(np.array(hues)[1:] - np.array(hues)[:-1], axis=1)
+    assert apart.min() > 60  # neighbours in the order of adding are told apart
+    page.keyboard.press("4")
+    page.mouse.click(500, 120)  # a circle added by hand is a group of its own
+    assert comes_true(page, lambda: len(page.evaluate("() => window.pyverlet.groups()")) == len(groups) + 1)
+    assert page.evaluate("() => window.pyverlet.ink(0)") == inks[0]
 
 
 def test_slow_motion(page: Page, program: Serve) -> None:
@@ -252,6 +303,37 @@ def test_velocities_and_contacts_are_drawn(page: Page, program: Serve) -> None:
     page.get_by_test_id("velocities").uncheck()
     page.keyboard.press("t")
     assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.overlay.contacts") == 0)
+
+
+def test_circles_that_do_not_collide_have_no_contacts(page: Page, program: Serve) -> None:
+    visit(page, program("orbit", 300).address)  # a world without collisions
+    page.get_by_test_id("contacts").check()
+    assert comes_true(page, lambda: number(page, "time") > 1)
+    assert page.evaluate("() => window.pyverlet.overlay.contacts") == 0
+    # Six circles in a row, each of radius 0.5 and touching the next: who may not is left out.
+    row = """async (shape) => (await import("/contacts.js")).touching(
+        {count: 6, mass: [1, 1, 1, 1, 1, 1], apart: [], kinds: null, ...shape},
+        [0, 1, 2, 3, 4, 5], [0, 0, 0, 0, 0, 0], Array(6).fill(0.5))"""
+    assert page.evaluate(row, {}) == [0, 1, 1, 2, 2, 3, 3, 4, 4, 5]
+    assert page.evaluate(row, {"apart": [1, 2, 4, 5]}) == [0, 1, 2, 3, 3, 4]
+    everyone = 0xFFFFFFFF
+    kinds = [1, everyone, 2, everyone, 4, everyone - 2, 4, everyone, 4, everyone, 4, 4]
+    assert page.evaluate(row, {"kinds": kinds}) == [0, 1, 2, 3, 3, 4, 4, 5]
+    pinned = """async () => (await import("/contacts.js")).touching(
+        {count: 3, mass: [1, Infinity, Infinity], apart: [], kinds: null}, [0, 1, 2], [0, 0, 0], [0.5, 0.5, 0.5])"""
+    assert page.evaluate(pinned) == [0, 1]
+
+
+def test_the_page_says_why_an_overlay_is_off(page: Page, program: Serve) -> None:
+    visit(page, program("cage", 100, 50).address)  # the server draws
+    for name in ("velocities", "contacts"):
+        expect(page.get_by_test_id(name)).to_be_disabled()
+        expect(page.locator(f"label:has(#{name})")).to_have_attribute("title", re.compile("Not drawn over pictures"))
+    page.get_by_test_id("count").fill("40")
+    page.get_by_test_id("count").press("Enter")
+    for name in ("velocities", "contacts"):
+        expect(page.get_by_test_id(name)).to_be_enabled()
+        expect(page.locator(f"label:has(#{name})")).to_have_attribute("title", "")
 
 
 def test_dark_and_light(page: Page, program: Serve) -> None:

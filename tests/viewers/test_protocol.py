@@ -18,6 +18,7 @@ from pyverlet.viewers.frames import Frame
 from pyverlet.viewers.looks import Look
 from pyverlet.viewers.protocol import MAX_MESSAGE, Ack, decode, encode_frame, encode_refusal, encode_shape
 from pyverlet.viewers.session import Session
+from pyverlet.viewers.stage import Stage
 
 LOOK = '{"type": "look", "part": %s, "width": 800, "height": 600, "colour": "speed", "dark": false, "velocity": true}'
 
@@ -138,6 +139,38 @@ def test_a_shape_in_bytes(world: pv.World) -> None:
     assert np.frombuffer(body[72:], dtype="<u4").tolist() == list(range(9))
     assert radius.tolist() == [0.5] * 9
     assert mass.tolist() == [1.0] * 9
+
+
+def test_who_collides_with_whom_follows_in_the_shape(world: pv.World) -> None:
+    plain = Session(world).latest.shape
+    assert plain.kinds is None
+    assert len(plain.apart) == 0
+    world.category[2], world.mask[3] = 8, 0xFFFFFFF7
+    world.links.append(pv.Stick(world.add(position=[(0, 5), (3, 5)]), 0, 1, collide=False))
+    head, body = unpack(encode_shape(Session(world).latest.shape))
+    assert head["kinds"] is True
+    assert head["apart"] == 1
+    count = 11
+    words = np.frombuffer(body, np.uint32)
+    assert words[3 * count : 3 * count + 2].tolist() == [9, 10]
+    kinds = words[3 * count + 2 :].reshape(count, 2)
+    assert kinds[2].tolist() == [8, 0xFFFFFFFF]
+    assert kinds[3].tolist() == [1, 0xFFFFFFF7]
+    world.collisions = None
+    nobody = Session(world).latest.shape.kinds
+    assert nobody is not None
+    assert not nobody.any()
+
+
+def test_a_link_that_goes_changes_the_shape(world: pv.World) -> None:
+    stick = pv.Stick(world.add(position=[(0, 5), (3, 5)]), 0, 1, collide=False)
+    world.links.append(stick)
+    stage = Stage(Exhibit.of(world, "nine"))
+    before = stage.version
+    assert stage.version == before
+    world.links.remove(stick)
+    assert stage.version != before
+    assert len(stage.shape(dt=1 / 60, budget_ms=5.0, scenes=()).apart) == 0
 
 
 def test_own_colours_follow_in_the_shape(world: pv.World) -> None:

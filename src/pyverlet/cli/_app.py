@@ -76,6 +76,7 @@ def run(
     dtype: options.Precision = None,
     collisions: options.CollisionMethod = None,
     picture: options.Picture = None,
+    ledger: options.Ledger = False,
     dt: options.Dt = DEFAULT_DT,
     seconds: options.Seconds = None,
     frames: options.Frames = None,
@@ -113,7 +114,7 @@ def run(
     methods = integrators(integrator)
     chosen.settings(**overrides)  # refuse what is wrong before anything starts
     ends = headless or as_json or plot or seconds is not None or frames is not None
-    if window and (ends or port is not None or no_open):
+    if window and (ends or port is not None or no_open or ledger):
         raise InputError("window is asked for together with a run that ends or with options of the page; allowed is one of them")
     if window:
         if len(methods) > 1:
@@ -122,7 +123,9 @@ def run(
         return
     if not ends:
         port = DEFAULT_PORT if port is None else port
-        show.page(chosen, integrators=methods, overrides=overrides, dt=dt, port=port, open_browser=not no_open)
+        show.page(
+            chosen, integrators=methods, overrides={**overrides, "ledger": ledger}, dt=dt, port=port, open_browser=not no_open
+        )
         return
     if port is not None:
         raise InputError(f"port is {port}; allowed is none, since this run has no live page")

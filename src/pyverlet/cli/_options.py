@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -11,11 +12,11 @@ import typer
 from pyverlet import integrators
 from pyverlet.broadphase import BruteForce, Fast
 from pyverlet.errors import InputError
-from pyverlet.picture import DARK, LIGHT, ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Theme
+from pyverlet.picture import DARK, LIGHT, ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Groups, Theme
 
 DType = Literal["float32", "float64"]
 Method = Literal["fast", "brute", "none"]
-ColourName = Literal["origin", "speed", "mass", "energy"]
+ColourName = Literal["origin", "speed", "mass", "group", "energy"]
 ThemeName = Literal["dark", "light"]
 
 
@@ -85,9 +86,14 @@ Picture = Annotated[
     Path | None,
     typer.Option(help="What the circles form (scene image).", metavar="FILE", show_default=False),
 ]
+Ledger = Annotated[
+    bool, typer.Option("--ledger", help="Show on the page where the energy goes; reports always have it. Costs time.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
-COLOURS: dict[ColourName, type[Colouring]] = {"origin": ByOrigin, "speed": BySpeed, "mass": ByMass, "energy": ByEnergy}
+COLOURS: dict[ColourName, Callable[[], Colouring]] = {
+    "origin": ByOrigin, "speed": BySpeed, "mass": ByMass, "group": Groups, "energy": ByEnergy,
+}  # fmt: skip
 THEMES: dict[ThemeName, Theme] = {"dark": DARK, "light": LIGHT}
 METHODS: dict[Method, Any] = {"fast": Fast(), "brute": BruteForce(), "none": False}
 

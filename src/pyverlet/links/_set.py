@@ -161,6 +161,11 @@ class Links:
         self._partners = np.searchsorted(both[:, 0], np.arange(len(self._state) + 1)), both[:, 1].copy()
         self._apart_changed |= not np.array_equal(before, self._apart)
 
+    def known_apart(self) -> Array:
+        """As `apart`; the same object as long as nothing has changed."""
+        self._know_apart()
+        return self._apart
+
     def unlist(self, pairs: PairList, particle: Array) -> None:
         """Take the pairs of `apart` from a list of candidates; particle: the user's index in each slot."""
         self._know_apart()

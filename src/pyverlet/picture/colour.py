@@ -20,6 +20,10 @@ USUAL_MULTIPLE = 3.0
 """The end of the palette, in terms of what is usual."""
 
 
+GOLDEN = 0.6180339887498949
+"""(sqrt(5) - 1) / 2"""
+
+
 class Circles(Protocol):
     """What colours are made from: a world, or a copy of what it was at some moment."""
 
@@ -30,6 +34,10 @@ class Circles(Protocol):
     @property
     def mass(self) -> NDArray[Any]:
         """(n,) kg, infinite where pinned."""
+
+    @property
+    def group_number(self) -> NDArray[Any]:
+        """(n,) of whole numbers, the same for those that were added together."""
 
     @property
     def time(self) -> float:
@@ -116,10 +124,10 @@ class ByMass(Colouring):
 
 
 class Groups(Colouring):
-    """One hue for each of these groups; circles in none of them are grey.
+    """One hue for each group.
 
     Args:
-        groups: what `world.add` returned.
+        groups: what `world.add` returned; circles in none of them are grey. Without any, all groups of the world.
     """
 
     def __init__(self, *groups: Group) -> None:
@@ -129,6 +137,9 @@ class Groups(Colouring):
         self._groups = groups
 
     def colours(self, world: Circles, theme: Theme) -> Packed:
+        if not self._groups:
+            # Steps of the golden ratio: however many groups there are, or come later, each is far from those before it.
+            return hues(theme.dark)[shade((world.group_number * GOLDEN % 1.0 * STEPS).astype(np.uint32))]
         result = np.full(len(world), 0x9A9A9A, dtype=np.uint32)
         for k, group in enumerate(self._groups):
             step = np.full(len(group), k * STEPS // max(len(self._groups), 1))

@@ -1,99 +1,106 @@
-"""A Galton board: balls fall past rows of pegs, left or right, and their counts follow the binomial law."""
+"""A Galton board: balls pour from a hopper through rows of pegs, left or right, and their counts follow the binomial law."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from pyverlet.bounds import Box
-from pyverlet.forces import Drag
-from pyverlet.obstacles import Capsule, Segment
+from pyverlet.obstacles import Capsule, Disc, Segment
+from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Floats, Scene, Settings, Show
-from pyverlet.state import Slots
 from pyverlet.world import World
 
 ROWS = 12
-RADIUS = 0.22
-"""Of balls and pegs, m. Between two pegs of a row, 1 m apart, a ball has 6 cm on either side."""
 
-PEG = 0.55
-"""Length of a peg, m: a gap that long, with restitution 0, takes the ball's sideways speed and with it all memory."""
+SPACING, DROP = 0.1, 0.08
+"""From peg to peg and from row to row, m: a ball that jumps off a peg does not get past the next one."""
 
-DROP = 1.35
-"""From row to row, m: a ball fits through between the foot of one peg and the head of the next."""
+PEG, BALL = 0.030, 0.014
+"""Their radii, m: a ball bounces about in a gap it just fits through, and has forgotten where it came from when it leaves."""
 
-APART = 1.2
-"""Between balls that follow each other, m: nearer ones meet on a peg."""
+BRIM, MOUTH = 0.115, 0.034
+"""Height of the hopper's lips above the first row, and how far apart, m: one ball at a time, so that few meet on the board."""
 
-FALLING = 3.0
-"""Speed at which the air lets balls fall, m/s."""
+STIRRER, TURNING = 0.07, 1.0
+"""Half its length, m, and its speed, rad/s: without it, balls lock in an arch over the mouth."""
 
-PUFF = 1.2
-"""Speed to which a puff of air would bring a ball sideways in the end, m/s."""
+HALF = (ROWS + 1) * SPACING / 2
+"""Half the width, m: of 13 bins."""
 
-
-class Puffs:
-    """A puff of air at each row, left or right by the toss of a coin: pegs alone would send every ball the same way.
-
-    Args:
-        tosses: (rows, n) of -1 and 1, for the ball of each index.
-        newtons: N.
-    """
-
-    velocity_dependent = False
-
-    def __init__(self, tosses: Floats, newtons: float) -> None:
-        self.tosses, self.newtons = tosses, newtons
-
-    def apply(self, state: Slots, t: float) -> None:
-        row = np.floor(0.45 - state.position[:, 1] / DROP).astype(int)  # from above its pegs to between them
-        blows = (row >= 0) & (row < len(self.tosses))
-        state.force[blows, 0] += self.newtons * self.tosses[row[blows], state.particle[blows]]
+LAST = -(ROWS - 1) * DROP
+"""Height of the last row, m; that of the first is 0."""
 
 
 def build(settings: Settings) -> World:
-    """Balls fall one by one past 12 rows of pegs into 13 bins.
+    """Balls pour from a hopper, nearly one by one, onto 12 rows of round pegs, and from there into 13 bins.
 
-    At each row a ball goes left or right with equal chances, whatever it did before: the numbers in the bins are those of 12
-    tosses of a coin, n 12! / (k! (12 - k)! 2^12). The tosses are puffs of air; the pegs, between which the balls just fit, count.
+    Nothing tosses a coin: chance is where the balls start in the hopper, and the pegs make the most of it. With a restitution
+    of 0.75 a ball goes left or right at each row as often whatever it did before, and the numbers in the bins are those of 12
+    tosses, n 12! / (k! (12 - k)! 2^12). That is no law of all boards: with --restitution 0.5 a ball tends to go on as before,
+    with --friction 0.2 to turn back (for balls alone, 4.3 and 0.75 times the variance of tosses); with 0, all go the same way.
     """
-    half, floor = ROWS / 2 + 1, -(ROWS * DROP + 2.0 + 0.06 * settings.particles)
+    radii = _start.draw_radii(np.random.default_rng(settings.seed), settings.particles, settings.radius_spread, BALL)
+    radii *= BALL / radii.max()
+    centres, top = _in_hopper(settings, radii)
+    floor = _floor(settings)
     surface = {"restitution": settings.restitution, "friction": settings.friction}
-    world = settings.empty_world(Box((-half, floor), (half, APART * (settings.particles + 2)), **surface))
-    for row in range(ROWS):
-        for x in np.arange(-half, half + 1) + 0.5 * (row % 2):
-            if abs(x) <= half:
-                world.obstacles.append(Capsule((x, -row * DROP), (x, -row * DROP - PEG), radius=RADIUS, **surface))
-    for x in np.arange(-half + 0.5, half):
-        world.obstacles.append(Segment((x, -(ROWS - 1) * DROP - PEG), (x, floor), **surface))
-    drag = float(np.hypot(*settings.gravity)) / FALLING
-    tosses = np.random.default_rng(settings.seed).choice((-1.0, 1.0), (ROWS, settings.particles))
-    world.forces += [Drag(linear=drag), Puffs(tosses, drag * PUFF)]
-    y = APART * (1.0 + np.arange(settings.particles))
-    world.add(position=np.column_stack((0 * y, y)), velocity=(0, -FALLING), radius=RADIUS)
+    world = settings.empty_world(Box((-HALF, floor), (HALF, top), friction=settings.friction))
+    for row in range(-1, ROWS):  # the one above the first keeps balls from jumping over it
+        edge = HALF if row % 2 else HALF - 1.5 * SPACING
+        for x in np.arange(-edge, edge + SPACING / 2, SPACING):
+            world.obstacles.append(Disc((x, -row * DROP), PEG, **surface))
+    for x in np.arange(SPACING - HALF, HALF - SPACING / 2, SPACING):
+        world.obstacles.append(Segment((x, LAST), (x, floor), friction=settings.friction))
+    for side in (-1, 1):
+        lip, wall = (side * MOUTH / 2, BRIM), (side * HALF, BRIM + HALF - MOUTH / 2)
+        world.obstacles.append(Segment(lip, wall, friction=settings.friction))
+    axis = BRIM + STIRRER + 2 * BALL
+    world.obstacles.append(Capsule((-STIRRER, axis), (STIRRER, axis), radius=BALL / 4, angular_velocity=TURNING))
+    world.add(position=centres, radius=radii, mass=(radii / BALL) ** 2)
     return world
+
+
+def _in_hopper(settings: Settings, radii: Floats) -> tuple[Floats, float]:
+    """Centres (n, 2) above the stirrer, between walls that rise at 45 degrees, and the height of the lid, m."""
+
+    def half_width(y: float, margin: float) -> float:
+        return min(HALF - margin, MOUTH / 2 + y - BRIM - 2**0.5 * margin)
+
+    top = BRIM + HALF
+    while True:
+        rng = np.random.default_rng(settings.seed)
+        centres = _start.in_rows(rng, radii, BRIM + 2 * STIRRER + 3 * BALL, top, half_width)
+        if centres is not None:
+            return centres, top
+        top *= 1.03
+
+
+def _floor(settings: Settings) -> float:
+    """Height of the floor, m: the bins hold the balls, with some room to spare."""
+    return LAST - SPACING * (1.5 + 0.02 * settings.particles)
 
 
 def bins(world: World) -> Floats:
     """(13,) how many balls are in each bin."""
     x, y = world.position.T
-    fallen = y < -(ROWS - 1) * DROP - PEG
-    return np.bincount(np.clip(np.round(x[fallen] + ROWS / 2), 0, ROWS).astype(int), minlength=ROWS + 1).astype(float)
+    fallen = x[y < LAST - PEG] / SPACING
+    return np.bincount(np.clip(np.round(fallen + ROWS / 2), 0, ROWS).astype(int), minlength=ROWS + 1).astype(float)
 
 
 def view(settings: Settings) -> tuple[float, float, float, float]:
-    """x0, y0, x1, y1 in metres: board and bins, not the balls above them."""
-    return (-ROWS / 2 - 2, -(ROWS * DROP + 3.0 + 0.06 * settings.particles), ROWS / 2 + 2, 3.0)
+    """x0, y0, x1, y1 in metres: from the bins to the brim of the hopper."""
+    return (-HALF - SPACING / 2, _floor(settings) - SPACING / 2, HALF + SPACING / 2, BRIM + HALF + SPACING)
 
 
 def lasts(settings: Settings) -> float:
-    """Seconds until the last ball is in its bin."""
-    return (APART * settings.particles + 2 * ROWS * DROP) / FALLING + 15.0
+    """Seconds until the last ball is in its bin: 8 leave the hopper in a second."""
+    return settings.particles / 7 + 8.0
 
 
 SCENE = Scene(
     "galton",
-    "balls fall past rows of pegs, and their counts follow the binomial law",
+    "balls pour through rows of pegs, and their counts follow the binomial law",
     build,
-    Settings(particles=300),
+    Settings(particles=400, substeps=16, restitution=0.75),
     show=Show(view=view, seconds=lasts),
 )

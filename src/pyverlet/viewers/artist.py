@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.obstacles import Outline
-from pyverlet.picture import DARK, LIGHT, ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Fixed, Raster, Theme, View
+from pyverlet.picture import DARK, LIGHT, ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Fixed, Groups, Raster, Theme, View
 from pyverlet.picture.palette import Packed
 from pyverlet.viewers.frames import Frame, Shape
 from pyverlet.viewers.looks import MOST_PIXELS, Look
@@ -48,6 +48,7 @@ class _Seen:
 
     velocity: NDArray[Any]
     mass: NDArray[Any]
+    group_number: NDArray[Any]
     time: float
 
     def __len__(self) -> int:
@@ -111,11 +112,12 @@ class Artist:
             self._colouring_of = (name, shape)
             self._colouring = Fixed(shape.colours) if shape.colours is not None and name == "picture" else COLOURINGS[name]()
             self._still = None
+        seen = _Seen(frame.velocity, shape.mass, shape.group, frame.status.time)
         if name in ("speed", "energy"):
-            return self._colouring.colours(_Seen(frame.velocity, shape.mass, frame.status.time), theme)
+            return self._colouring.colours(seen, theme)
         # The others say the same in every frame.
         if self._still is None or self._still[0] is not theme:
-            self._still = (theme, self._colouring.colours(_Seen(frame.velocity, shape.mass, frame.status.time), theme))
+            self._still = (theme, self._colouring.colours(seen, theme))
         return self._still[1]
 
     def _encode(self, pixels: NDArray[np.uint8]) -> bytes:
@@ -127,10 +129,11 @@ class Artist:
         return file.getvalue()
 
 
-COLOURINGS: dict[str, type[ByOrigin] | type[BySpeed] | type[ByMass] | type[ByEnergy]] = {
+COLOURINGS: dict[str, Callable[[], Colouring]] = {
     "order": ByOrigin,
     "speed": BySpeed,
     "mass": ByMass,
+    "group": Groups,
     "energy": ByEnergy,
 }
 

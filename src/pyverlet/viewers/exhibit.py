@@ -18,7 +18,7 @@ from pyverlet.world import World
 
 Progress = Callable[[int, int], None]
 
-CARRIED = ("seed", "threads", "dtype")
+CARRIED = ("seed", "threads", "dtype", "ledger")
 """Settings that go along when the viewer picks another scene: they say how to compute, not what."""
 
 

@@ -85,6 +85,12 @@ class Shape:
     """(n,) kg, infinite where pinned; read-only."""
     number: NDArray[np.uint32]
     """(n,) what each circle is called as long as it lives; read-only."""
+    group: NDArray[np.int64]
+    """(n,) ascending in each world: which circles were added together; read-only."""
+    kinds: NDArray[np.uint32] | None
+    """(n, 2) category and mask, read-only; (0, 0) in worlds without collisions. None if all collide with all."""
+    apart: NDArray[np.uint32]
+    """(k, 2) circles that do not collide with each other since a link says so."""
     colours: NDArray[np.uint8] | None
     """(n, 3) bytes R, G, B, the circles' own, if they have any; read-only."""
 
@@ -108,6 +114,8 @@ class Status:
     potential: float
     links: float
     energy: float
+    ledger: dict[str, float] | None
+    """Where the energies have gone, J by account; None unless all worlds keep a ledger."""
     energies: tuple[float, ...]
     """Total energy of each panel, J; `kinetic`, `spin`, `potential`, `links` and `energy` are sums over the panels."""
     gravity: tuple[float, float]

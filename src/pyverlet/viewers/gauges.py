@@ -53,6 +53,7 @@ class Gauges:
             potential=self._potential,
             links=self._links,
             energy=sum(self._energies),
+            ledger=_booked(stage),
             energies=self._energies,
             **levers.read(stage.worlds[0]),
             speed=speed,
@@ -69,3 +70,11 @@ class Gauges:
         self._links = sum(float(energy.links) for energy in energies)
         self._energies = tuple(float(energy.total) for energy in energies)
         self._percentiles = (float(self.budget.median_ms), float(self.budget.p95_ms))
+
+
+def _booked(stage: Stage) -> dict[str, float] | None:
+    """What the ledgers of all worlds have under each account, J."""
+    if not all(world.keeps_ledger for world in stage.worlds):
+        return None
+    books = [world.ledger.as_dict() for world in stage.worlds]
+    return {account: sum(book[account] for book in books) for account in books[0]}

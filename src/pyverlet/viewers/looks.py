@@ -9,8 +9,8 @@ from pyverlet.errors import InputError
 from pyverlet.viewers.commands import FARTHEST
 from pyverlet.viewers.frames import Rect
 
-COLOURINGS = ("order", "speed", "mass", "energy", "picture")
-"""What a circle's colour may say: its place in the order of adding, speed, mass, kinetic energy, or what it was given."""
+COLOURINGS = ("order", "speed", "mass", "group", "energy", "picture")
+"""What a circle's colour may say: its place in the order of adding, speed, mass, group, kinetic energy, or what it was given."""
 
 LARGEST_SIDE = 4096
 """Pixels: no screen is larger, and a slip must not ask for gigabytes."""

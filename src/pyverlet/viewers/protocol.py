@@ -2,9 +2,10 @@
 
 - 4 bytes: length of the head, little-endian, a multiple of 4.
 - head: JSON padded with spaces, {"kind": "shape" | "frame" | "picture" | "refused", ...}.
-- body, little-endian: of a shape n float32 radii, n float32 masses, n uint32 numbers and, if "coloured", n times three bytes R,
-  G, B; of a frame n pairs of uint16 on the grid over "view" and, if the tab looks at velocities, n pairs of int16 in units of
-  "unit" m/s; of a picture a JPEG.
+- body, little-endian: of a shape n float32 radii, n float32 masses, n uint32 numbers, "apart" pairs of uint32, circles that do
+  not collide, if "kinds" n pairs of uint32, category and mask, and if "coloured" n times three bytes R, G, B; of a frame n pairs
+  of uint16 on the grid over "view" and, if the tab looks at velocities, n pairs of int16 in units of "unit" m/s; of a picture a
+  JPEG.
 """
 
 from __future__ import annotations
@@ -16,6 +17,9 @@ import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from pyverlet import integrators
 from pyverlet.errors import InputError
@@ -140,6 +144,9 @@ def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = N
         "scenes": shape.scenes,
         "integrators": list(integrators.BY_NAME),
         "count": len(shape.radius),
+        "groups": [] if drawn_here else _runs(shape.group),
+        "apart": 0 if drawn_here else len(shape.apart),
+        "kinds": shape.kinds is not None,
         "coloured": coloured,
         "drawnHere": drawn_here,
         "note": note,
@@ -150,7 +157,17 @@ def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = N
     if drawn_here:
         return _join(head, b"")
     colours = b"" if shape.colours is None else shape.colours.tobytes()
-    return _join(head, shape.radius.tobytes() + shape.mass.tobytes() + shape.number.tobytes() + colours)
+    kinds = b"" if shape.kinds is None else shape.kinds.tobytes()
+    return _join(
+        head, shape.radius.tobytes() + shape.mass.tobytes() + shape.number.tobytes() + shape.apart.tobytes() + kinds + colours
+    )
+
+
+def _runs(group: NDArray[np.int64]) -> list[list[int]]:
+    """[number, how many] of each run of circles of one group."""
+    starts = np.flatnonzero(np.diff(group, prepend=-1))
+    runs: list[list[int]] = np.column_stack((group[starts], np.diff(starts, append=len(group)))).tolist()
+    return runs
 
 
 def encode_refusal(reason: str) -> bytes:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.state import EVERYONE
 from pyverlet.viewers import levers
 from pyverlet.viewers.commands import Setting
 from pyverlet.viewers.exhibit import Exhibit
@@ -32,6 +33,8 @@ class Stage:
         self.worlds = self.panels.worlds
         self.hands = HandsOnPanels(self.worlds)
         self._pinned = 0
+        self._apart: list[NDArray[Any]] = []
+        self._parted = 0  # how often these have changed
         self.differing = levers.differing(self.worlds)
         self._saved = self.panels.save()
         self._coloured = [np.array(world.number) for world in self.worlds]
@@ -78,7 +81,10 @@ class Stage:
     @property
     def version(self) -> tuple[Any, ...]:
         """What the shape depends on: it is out of date as soon as this changes."""
-        return (*(world.version for world in self.worlds), id(self._standing.draw(self.layout)), self._pinned)
+        apart = [world.links.known_apart() for world in self.worlds]
+        if len(apart) != len(self._apart) or any(a is not b for a, b in zip(apart, self._apart, strict=True)):
+            self._apart, self._parted = apart, self._parted + 1
+        return (*(world.version for world in self.worlds), id(self._standing.draw(self.layout)), self._pinned, self._parted)
 
     def moving(self) -> Sketch:
         """The obstacles that move, where they are now."""
@@ -111,7 +117,7 @@ class Stage:
         outlines: list[tuple[tuple[float, float], ...]] = []
         lines: list[tuple[tuple[float, float], tuple[float, float]]] = []
         panels: list[PanelShape] = []
-        first = 0
+        first, starts = 0, []
         for k, (panel, world) in enumerate(zip(self.panels, self.worlds, strict=True)):
             dx, dy = self.layout.offset(k)
             outlines += [tuple((x + dx, y + dy) for x, y in line) for line in outline(world.boundary)]
@@ -119,6 +125,7 @@ class Stage:
                 lines.append(((extent[0] + dx, self.panels.line + dy), (extent[2] + dx, self.panels.line + dy)))
             if len(self.panels) > 1:
                 panels.append(PanelShape(panel.name, first, len(world), self._start_energies[k], self.layout.strip(k)))
+            starts.append(first)
             first += len(world)
         return Shape(
             title=self.exhibit.title,
@@ -136,11 +143,22 @@ class Stage:
             radius=_kept(np.concatenate([world.radius for world in self.worlds], dtype=np.float32)),
             mass=_kept(np.concatenate([world.mass for world in self.worlds], dtype=np.float32)),
             number=_kept(np.concatenate([world.number for world in self.worlds], dtype=np.uint32, casting="unsafe")),
+            group=_kept(np.concatenate([world.group_number for world in self.worlds])),
+            kinds=self._kinds(),
+            apart=_kept(
+                np.concatenate([pairs + start for pairs, start in zip(self._apart, starts, strict=True)]).astype(np.uint32)
+            ),
             colours=self._colours(),
         )
 
     def _bounded(self) -> bool:
         return any(world.boundary.extent() is not None for world in self.worlds)
+
+    def _kinds(self) -> NDArray[np.uint32] | None:
+        """Category and mask of everybody."""
+        kinds = [np.column_stack((world.category, world.mask)) * np.uint32(world.collisions is not None) for world in self.worlds]
+        joined = np.concatenate(kinds)
+        return None if (joined == (1, EVERYONE)).all() else _kept(joined)
 
     def _colours(self) -> NDArray[np.uint8] | None:
         """Everybody's own, grey for those that came later."""

@@ -3,6 +3,7 @@
 const STEPS = 64; // colours along a palette
 const TONES = 4; // neighbours of one colour differ a little in lightness, so that each circle can be told
 const USUAL_MULTIPLE = 3; // the end of the palette, in terms of what is usual
+const GOLDEN = (Math.sqrt(5) - 1) / 2;
 const FOLLOW_S = 1 / 3; // seconds of the world over which the scale follows what is usual: no flicker
 
 /** Colours as 0xBBGGRR: STEPS along a path through OKLCH, each in TONES shades. */
@@ -51,7 +52,7 @@ export class Inks {
     const { radius, mass, rgb } = shape, n = radius.length;
     this.colouring = colouring === "picture" && !rgb ? "order" : colouring;
     if (this.ink.length !== n) this.ink = new Uint32Array(n);
-    this.lut = palette(this.colouring !== "order", dark);
+    this.lut = palette(this.colouring !== "order" && this.colouring !== "group", dark);
     this.mass = mass;
     this.usual = 0;
     this.time = -Infinity;
@@ -60,11 +61,22 @@ export class Inks {
       for (let i = 0; i < n; i++) ink[i] = rgb[3 * i] | (rgb[3 * i + 1] << 8) | (rgb[3 * i + 2] << 16);
     } else if (this.colouring === "mass") {
       this.#byMass();
+    } else if (this.colouring === "group") {
+      this.#byGroup(shape.groups);
     } else {
       for (let i = 0; i < n; i++) {
         const [own, count] = within(i);
         ink[i] = this.lut[shade(this.colouring === "order" ? Math.floor((own * STEPS) / count) : 0, own)];
       }
+    }
+  }
+
+  /** Steps of the golden ratio: however many groups there are, or come later, each is far from those before it. */
+  #byGroup(groups) {
+    let i = 0;
+    for (const [number, count] of groups) {
+      const step = Math.floor(((number * GOLDEN) % 1) * STEPS);
+      for (const end = i + count; i < end; i++) this.ink[i] = this.lut[shade(step, i)];
     }
   }
 

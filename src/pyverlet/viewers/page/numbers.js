@@ -1,5 +1,6 @@
 // The numbers beside the picture, and their curves.
 
+import { fillBooks } from "./books.js";
 import { Chart } from "./chart.js";
 
 const STAGES = ["gather", "integrate", "broad phase", "contacts", "bounds", "velocities", "scatter"]; // as in World.step
@@ -57,6 +58,7 @@ export class Numbers {
     this.energies.push(status.kinetic, status.potential, status.links || null, status.energy);
     this.energies.draw();
     this.stages.draw();
+    fillBooks(this.#id("ledger"), status.ledger, signed);
     this.#legend(status.stages);
   }
 
@@ -91,3 +93,4 @@ export class Numbers {
 }
 
 const joules = (value) => (value === null ? NOTHING : value.toFixed(Math.abs(value) < 100 ? 2 : 0).replace(/^-0(\.0*)?$/, "0$1"));
+const signed = (value) => (value > 0 && joules(value) !== joules(0) ? "+" : "") + (value ? (Math.abs(value) < 0.005 ? value.toExponential(0) : joules(value)) : "0");

@@ -43,7 +43,7 @@ export class Overlay {
     if (wants.contacts && n <= MOST_CONTACTS) {
       const xs = new Float64Array(n), ys = new Float64Array(n), rs = new Float64Array(n);
       for (let i = 0; i < n; i++) [xs[i], ys[i], rs[i]] = [seen(i) ? x(i) : NaN, y(i), shape.radius[i] * camera.scale];
-      const pairs = touching(xs, ys, rs);
+      const pairs = touching(shape, xs, ys, rs);
       for (let k = 0; k < pairs.length; k += 2) {
         context.moveTo(xs[pairs[k]], ys[pairs[k]]);
         context.lineTo(xs[pairs[k + 1]], ys[pairs[k + 1]]);

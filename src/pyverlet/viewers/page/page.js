@@ -77,7 +77,9 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     panels.build(shape.panels);
     $("stage").hidden = shape.drawnHere;
     $("photo").hidden = !shape.drawnHere;
-    for (const [id, off] of [["velocities", shape.drawnHere], ["contacts", shape.drawnHere || shape.count > MOST_CONTACTS]]) $(id).disabled = off;
+    const pictures = shape.drawnHere && "Not drawn over pictures: of so many circles the server sends no more than these";
+    offer("velocities", pictures);
+    offer("contacts", pictures || (shape.count > MOST_CONTACTS && `Drawn for at most ${MOST_CONTACTS} circles; here are ${shape.count}`));
     notice(shape.note);
     paint();
   }
@@ -92,6 +94,12 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     controls.begin(shape);
     numbers.begin(shape);
     startOver();
+  }
+
+  /** A tick box, unless there is a reason against it, which it then tells. */
+  function offer(id, against) {
+    $(id).disabled = Boolean(against);
+    $(id).parentElement.title = against || "";
   }
 
   function link(state, text) {
@@ -338,6 +346,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     },
     status: () => last,
     mass: (i) => shape.mass[i],
+    groups: () => shape.groups,
     ink: (i) => inks.ink[i],
     overlay,
     camera,

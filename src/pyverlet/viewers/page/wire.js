@@ -8,9 +8,12 @@ export function unpack(data) {
     head.radius = new Float32Array(data, start, head.count);
     head.mass = new Float32Array(data, start + 4 * head.count, head.count);
     head.number = new Uint32Array(data, start + 8 * head.count, head.count);
-    head.rgb = head.coloured ? new Uint8Array(data, start + 12 * head.count, 3 * head.count) : null;
+    const pairs = start + 12 * head.count, kinds = pairs + 8 * head.apart;
+    head.apart = new Uint32Array(data, pairs, 2 * head.apart);
+    head.kinds = head.kinds ? new Uint32Array(data, kinds, 2 * head.count) : null;
+    head.rgb = head.coloured ? new Uint8Array(data, kinds + (head.kinds ? 8 * head.count : 0), 3 * head.count) : null;
   } else if (head.kind === "shape") {
-    Object.assign(head, { radius: new Float32Array(0), mass: new Float32Array(0), number: new Uint32Array(0), rgb: null });
+    Object.assign(head, { radius: new Float32Array(0), mass: new Float32Array(0), number: new Uint32Array(0), apart: new Uint32Array(0), kinds: null, rgb: null });
   } else if (head.kind === "frame") {
     const links = head.links ?? 0, pairs = (data.byteLength - start - 9 * links) / (head.unit ? 8 : 4);
     head.grid = new Uint16Array(data, start, 2 * pairs);
