@@ -14,7 +14,7 @@ from pyverlet import checks
 from pyverlet.constants import REBUILD_PAIRS, SAMPLE, SKIN, SKIN_HOLD, SKIN_LEAST, SKIN_MOST, SKIN_STEP, UNSORTED, WORTH_LOOKING
 from pyverlet.grids import Grids
 from pyverlet.kernels import pairs as kernels
-from pyverlet.state import Slots, farthest
+from pyverlet.state import Slots, strayed
 
 Array = NDArray[Any]
 
@@ -212,7 +212,7 @@ class _SortedCells(BroadPhase):
 
     def _still_good(self, state: Slots) -> bool:
         """Whether no pair that is not listed can touch: a cheap test, then a closer look that says how long that will do."""
-        if farthest(state.position, self._checked) <= self._allowed:
+        if not strayed(state.position, self._checked, self._allowed):
             return True
         slack = self._grids.slack(state.position, self.built, 2.0 * self._half_skin)
         if not slack > WORTH_LOOKING * self._half_skin:

@@ -6,7 +6,6 @@ space are neighbours in memory, and ends by scattering the result back; nobody o
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from functools import lru_cache
 from typing import Any
@@ -370,9 +369,9 @@ def fall(state: Slots, gravity: tuple[float, float], h: float) -> None:
     _light(motion.fall, state.position)(state.position, state.velocity, state.acceleration, state.inverse_mass, *numbers)
 
 
-def farthest(position: Array, reference: Array) -> float:
-    """The largest distance any particle has moved from its row of `reference`, m."""
-    return math.sqrt(_light(motion.farthest, position)(position, reference))
+def strayed(position: Array, reference: Array, distance: float) -> bool:
+    """Whether any particle has moved by more than this, m, from its row of `reference`."""
+    return bool(_light(motion.strayed, position)(position, reference, position.dtype.type(distance * distance)))
 
 
 def _light(kernel: Kernel, particles: Array) -> Kernel:
