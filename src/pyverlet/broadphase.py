@@ -42,15 +42,20 @@ class PairList:
         """Room for at least this many pairs."""
         self.pair_i = np.empty(pairs, np.uint32)
         self.pair_j = np.empty(pairs, np.uint32)
-        self.meeting = np.empty(pairs, np.uint8)
-        self.touching = np.empty(pairs, np.uint32)
-        self.impulse = np.empty(pairs, self._dtype)
+        self.meeting, self.touching, self.impulse = np.empty(0, np.uint8), np.empty(0, np.uint32), np.empty(0, self._dtype)
         self.closing = np.full(pairs if self.listening else 0, -1, self._dtype)
 
     def listen(self) -> None:
         """Note events from now on."""
         self.listening = True
         self.closing = np.full(len(self.pair_i), -1, self._dtype)
+
+    def hold_notes(self) -> None:
+        """Room for `meeting`, `touching` and `impulse`; the values are anything."""
+        pairs = len(self.pair_i)
+        if len(self.meeting) != pairs:
+            self.meeting, self.touching = np.empty(pairs, np.uint8), np.empty(pairs, np.uint32)
+            self.impulse = np.empty(pairs, self._dtype)
 
     def hold_slips(self) -> None:
         """Room for what friction notes; the values are anything."""
@@ -178,7 +183,6 @@ class _SortedCells(BroadPhase):
         self._allowed = -1.0  # distance anyone may move from `_checked` before we look closer, m; negative: rebuild now
         self._mean_radius = 0.0  # m; 0: not known. Its last bit depends on the order of the slots, so it is saved, too
         self.built = self._checked = np.empty((0, 2), dtype)
-        self._reserve(0)
 
     def update(self, state: Slots) -> None:
         self._age += 1
@@ -258,25 +262,20 @@ class _SortedCells(BroadPhase):
         picky = len(state.category) > 0 or not state.inverse_mass.all()
         pairs.set_strips(len(rows) - 1)
         if len(pairs.pair_i) != self._room * len(state):
-            self._reserve(len(state))
+            pairs.make_room(self._room * len(state))
         while True:
             first = held * self._room
+            # Not kept: half as much again as the list itself, which is made anew less than once a frame.
+            raw_i, raw_j = (np.empty(self._room * len(state), np.uint32) for _ in range(2))
+            colour = np.empty(len(raw_i), np.uint8)
+            spot, used = np.empty((len(state), 3), state.dtype), np.empty(len(state), np.int32)
             kernels.list_pairs(
                 state.position, state.radius, cells.order, cells.levels, cells.start, rows, first, skin,
                 picky, state.category, state.mask, state.inverse_mass,
-                self._spot, self._raw_i, self._raw_j, self._colour, self._used, pairs.pair_i, pairs.pair_j, pairs.count,
+                spot, raw_i, raw_j, colour, used, pairs.pair_i, pairs.pair_j, pairs.count,
             )  # fmt: skip
             if (pairs.count <= np.diff(first)).all():
                 pairs.first[:] = first[:-1]
                 return
             self._room = int(np.ceil(1.25 * (pairs.count / np.maximum(np.diff(held), 1)).max()))
-            self._reserve(len(state))
-
-    def _reserve(self, particles: int) -> None:
-        pairs = self._room * particles
-        self.list.make_room(pairs)
-        self._raw_i = np.empty(pairs, np.uint32)
-        self._raw_j = np.empty(pairs, np.uint32)
-        self._colour = np.empty(pairs, np.uint8)
-        self._used = np.empty(particles, np.int32)
-        self._spot = np.empty((particles, 3), self.built.dtype)
+            pairs.make_room(self._room * len(state))

@@ -129,14 +129,16 @@ class ContactSolver:
 
     def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
         """Move overlapping circles apart, let impacts bounce, note who touches, and let those grip each other."""
+        if self._slides(state):
+            self._pack().project(state, h)
+            return
         pairs, real = self.broad_phase.list, state.real
+        pairs.hold_notes()
         moving, bodies = (state.position, state.velocity), (state.size, state.inverse_mass)
         which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
         push = (real(1 / h), real(LARGEST_PUSH))
         notes = (pairs.touching, pairs.impulse, pairs.touches)
-        if self._slides(state):
-            self._pack().project(state, h)
-        elif not self._bounces(state):
+        if not self._bounces(state):
             contacts.project(*moving, *bodies, *which, *push, *notes)
         else:
             rest_speed = REST_ACCELERATIONS * strongest * h
@@ -157,11 +159,11 @@ class ContactSolver:
 
     def still(self, state: Slots, h: float) -> None:
         """Take from touching circles the velocity that projection has put in, and rub them."""
-        pairs, real = self.broad_phase.list, state.real
-        which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
         if self._slides(state):
             self._packs.still(state)
             return
+        pairs, real = self.broad_phase.list, state.real
+        which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
         moving = (state.position, state.velocity)
         notes = (pairs.touching, pairs.impulse, pairs.touches)
         if self._rubs(state):

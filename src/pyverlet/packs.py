@@ -44,8 +44,8 @@ class Packs:
         which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
         while True:
             self.begin = np.concatenate(([0], np.cumsum(need)))
-            if not self.begin[-1] <= len(self.lane_i) <= 2 * self.begin[-1]:
-                self._make_room(int(1.25 * self.begin[-1]))
+            if not self.begin[-1] <= len(self.lane_i) <= 1.5 * self.begin[-1]:
+                self._make_room(int(1.1 * self.begin[-1]))
             packs.pack(origin, *which, used, self.begin, self.lanes, self.lane_i, self.lane_j, self.gap)
             if (self.lanes <= need).all():
                 break

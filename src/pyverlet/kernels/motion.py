@@ -12,6 +12,9 @@ from pyverlet._jit import kernel, parallel_kernel, prange
 
 _ONE = np.uint64(1)
 
+_BLOCK = 4096
+"""Particles that one thread looks at, at a time."""
+
 
 @parallel_kernel
 def advance(out, base, slope, h):
@@ -78,6 +81,16 @@ def largest_norm(vectors):
     return np.sqrt(largest)
 
 
+@kernel
+def _strayed(x, start, first, stop, square):
+    found = False
+    for k in range(first, stop):
+        i = np.uint64(2 * k)
+        dx, dy = x[i] - start[i], x[i + _ONE] - start[i + _ONE]
+        found |= dx * dx + dy * dy > square
+    return found
+
+
 @parallel_kernel
 def strayed(position, reference, square):
     """Whether any particle has moved from its reference position by more than the root of `square`.
@@ -85,12 +98,11 @@ def strayed(position, reference, square):
     Yes or no, for the largest distance takes four times as long: a maximum is not vectorised.
     """
     x, start = position.reshape(-1), reference.reshape(-1)
-    found = False
-    for k in prange(position.shape[0]):
-        i = np.uint64(2 * k)
-        dx, dy = x[i] - start[i], x[i + _ONE] - start[i + _ONE]
-        found |= dx * dx + dy * dy > square
-    return found
+    found = 0
+    for block in prange((position.shape[0] + _BLOCK - 1) // _BLOCK):
+        first = block * _BLOCK
+        found += int(_strayed(x, start, first, min(first + _BLOCK, position.shape[0]), square))
+    return found > 0
 
 
 @parallel_kernel
