@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from pyverlet import _loading  # noqa: F401  (first: all that follows takes a second)
+
+# isort: split
 from pyverlet import builders, errors, forces, integrators, scenes
 from pyverlet.actors import Actor, Emitter, Sink
 from pyverlet.bounds import Boundary, Box, Circle, Open

@@ -82,6 +82,51 @@ def test_ctrl_c_ends_a_run_with_130() -> None:
     assert "Traceback" not in err
 
 
+USER = """
+import os, signal, pyverlet
+try:
+    os.kill(os.getpid(), signal.SIGINT)
+except KeyboardInterrupt:
+    print("mine")
+"""
+INTERRUPTED_IMPORT = """
+import os, signal, time
+os.kill(os.getpid(), signal.SIGINT)
+time.sleep(10)
+"""
+
+
+@pytest.mark.usefixtures("interruptible")
+@pytest.mark.skipif(os.name == "nt", reason="no SIGINT to a child on Windows")
+@pytest.mark.parametrize("module", ["numba", "typer"])
+@pytest.mark.parametrize("script", [False, True], ids=["module", "script"])
+def test_ctrl_c_while_the_command_loads_is_a_sentence(tmp_path: Path, module: str, script: bool) -> None:
+    (tmp_path / f"{module}.py").write_text(INTERRUPTED_IMPORT)  # the library whose import is interrupted
+    installed = tmp_path / "scripts" / "pyverlet"
+    installed.parent.mkdir()
+    installed.write_text("import sys\nfrom pyverlet.cli import main\nsys.exit(main())\n")
+    command = [sys.executable, str(installed)] if script else COMMAND
+    path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
+    environment = os.environ | {"PYTHONPATH": path}
+    done = subprocess.run([*command, "list"], capture_output=True, text=True, timeout=60, env=environment)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "pyverlet: interrupted\n")
+
+
+@pytest.mark.usefixtures("interruptible")
+@pytest.mark.skipif(os.name == "nt", reason="no SIGINT to a child on Windows")
+@pytest.mark.parametrize("start", [["-c", "import user"], ["-m", "user"]])
+def test_who_imports_the_library_keeps_ctrl_c(tmp_path: Path, start: list[str]) -> None:
+    user = tmp_path / "user"
+    user.mkdir()
+    # The package itself imports the library, while Python still looks for what it is to run.
+    (user / "__init__.py").write_text(USER)
+    (user / "__main__.py").write_text("")
+    path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
+    environment = os.environ | {"PYTHONPATH": path}
+    done = subprocess.run([sys.executable, *start], capture_output=True, text=True, timeout=60, env=environment)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "mine\n", "")
+
+
 @pytest.mark.skipif(os.name == "nt", reason="a POSIX shell's pipe")
 def test_a_closed_pipe_is_no_drama() -> None:
     reader, writer = os.pipe()

@@ -15,7 +15,7 @@ ROOT = Path(pyverlet.__file__).parent
 
 # From the ground up. A module may import from its own layer only within its own package (the first part of its name).
 LAYERS = (
-    {"errors", "constants", "_entry", "_jit", "_lanes", "checks", "progress"},
+    {"_loading", "errors", "constants", "_entry", "_jit", "_lanes", "checks", "progress"},
     {"state", "group", "kernels"},
     {
         "integrators",

@@ -25,6 +25,13 @@ def test_what_is_outside_is_clipped_and_does_not_wrap() -> None:
     assert grid.tolist() == [[0, middle], [GRID_MAX, middle], [middle, 0], [middle, GRID_MAX], [GRID_MAX, 0]]
 
 
+def test_the_grid_is_what_numpy_makes_of_it() -> None:
+    position = np.random.default_rng(2).uniform(-60, 60, (10_000, 2)).astype(np.float32)
+    scale = np.float32(GRID_MAX / 94.0)
+    plain = np.clip((position - np.float32(-47.0)) * scale + np.float32(0.5), 0, GRID_MAX).astype(np.uint16)
+    assert (quantise(position, VIEW) == plain).all()
+
+
 def test_the_frame_shows_all_of_the_bounds() -> None:
     world = pv.World(boundary=pv.Circle(center=(3, 4), radius=10))
     x0, y0, x1, y1 = Camera(world).view(world.position)

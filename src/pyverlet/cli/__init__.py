@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import typer
 
+from pyverlet import _loading
 from pyverlet.cli import _lab, _record  # noqa: F401  (they register their commands)
 from pyverlet.cli._app import app
 from pyverlet.errors import InputError, Interrupted, PyverletError
@@ -26,6 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Whatever goes wrong is told in one sentence on standard error. With PYVERLET_TRACEBACK=1 in the environment the
     traceback of an unexpected error comes along.
     """
+    _loading.done()
     try:
         code = app(args=arguments, prog_name="pyverlet", standalone_mode=False)
         sys.stdout.flush()

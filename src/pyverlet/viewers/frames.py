@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.bounds import Circle
+from pyverlet.kernels import wire
 from pyverlet.picture.colour import USUAL_MULTIPLE
 from pyverlet.viewers.sketch import NOTHING, Sketch
 
@@ -189,13 +190,9 @@ def quantise(position: NDArray[np.float32], view: Rect) -> NDArray[np.uint16]:
     x0, y0, x1, y1 = view
     origin = np.array([x0, y0], dtype=np.float32)
     scale = np.array([GRID_MAX / (x1 - x0), GRID_MAX / (y1 - y0)], dtype=np.float32)
-    grid = position - origin
-    grid *= scale
-    grid += np.float32(0.5)
-    # fmax rather than clip: it turns a NaN into 0, "outside", where a cast of NaN would be undefined.
-    np.fmax(grid, np.float32(0.0), out=grid)
-    np.fmin(grid, np.float32(GRID_MAX), out=grid)
-    return grid.astype(np.uint16)
+    grid = np.empty(position.shape, dtype=np.uint16)
+    wire.quantise(position, origin, scale, np.float32(GRID_MAX), grid)
+    return grid
 
 
 @singledispatch

@@ -1,0 +1,44 @@
+"""Ctrl-C while the command still loads: one sentence, as at any later time, and no traceback out of somebody's import.
+
+Imported before anything that takes long. It does something only in a process that is the command, `pyverlet` or
+`python -m pyverlet`; whoever imports the library keeps the signals as they are.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+INTERRUPTED = 130
+"""Exit code: 128 + the number of the signal."""
+
+
+def _leave(number: int, frame: Any) -> None:
+    os.write(2, b"pyverlet: interrupted\n")
+    os._exit(INTERRUPTED)  # an exception might be caught by whatever is being imported
+
+
+def done() -> None:
+    """Everything is loaded: from now on Ctrl-C raises KeyboardInterrupt again."""
+    if signal.getsignal(signal.SIGINT) is _leave:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _is_the_command() -> bool:
+    if not sys.argv or sys.argv[0] != "-m":
+        return bool(sys.argv) and Path(sys.argv[0]).stem == "pyverlet"
+    # Python looks for the module that it is to run: is it this one, or one that uses it?
+    words = sys.orig_argv
+    return "-m" in words and words[words.index("-m") + 1] == "pyverlet"
+
+
+if (
+    _is_the_command()
+    and threading.current_thread() is threading.main_thread()
+    and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+):
+    signal.signal(signal.SIGINT, _leave)
