@@ -58,9 +58,9 @@ FED: Final = 1.6
 it keeps neighbours from undoing each other's push, more than all of it is stiffer: it holds the same weight with less overlap.
 docs/design/contacts.md has the comparison."""
 
-GRIP: Final = 1.0
+GRIP: Final = 0.8
 """Part of the slip of a contact that friction at rest feeds, divided by h, into the velocities: the tangential FED. Piles with
-friction stood still at 0.8 to 1.3; at 0.5 single circles crept, at 1.6 some turned."""
+friction stood still from 0.8 on; at 0.5 single circles crept, at 1 a few in a box, and at 1.6 more, had a spin that turned nobody."""
 
 LINK_GIVE: Final = 1e-7
 """What a rigid link gives way, as a part of what its particles do: a straight chain between two walls has no rigid solution."""
