@@ -10,10 +10,10 @@ import numpy as np
 
 from pyverlet import checks
 from pyverlet.broadphase import BruteForce, Fast, PairList
-from pyverlet.constants import FED, GROWTH, LARGEST_PUSH, PUSHED, REST_ACCELERATIONS, SMALLEST
+from pyverlet.constants import FED, GROWTH, LARGEST_PUSH, PUSHED, REST_ACCELERATIONS, SMALLEST, UNEVEN
 from pyverlet.errors import InputError
 from pyverlet.events import Events
-from pyverlet.kernels import contacts, friction, impacts
+from pyverlet.kernels import contacts, friction, impacts, refine
 from pyverlet.kernels.bounds import AT_WALL, WAS_AT_WALL
 from pyverlet.slips import Kept, Slips
 from pyverlet.state import Slots, State
@@ -62,6 +62,7 @@ class ContactSolver:
         self.broad_phase = settings.method.start(dtype)
         self._unlist = unlist
         self._seen = 0
+        self._uneven = False  # whether masses differ so much that contacts need to be refined
         self._events = events
         self._slips = Slips(dtype)
         self.broad_phase.replacing = self._slips.stop
@@ -104,6 +105,8 @@ class ContactSolver:
         if self._seen != self.broad_phase.rebuilds:
             self._seen = self.broad_phase.rebuilds
             self._unlist(self.broad_phase.list, state.particle)
+            free = state.inverse_mass[state.inverse_mass > 0]
+            self._uneven = bool(len(free)) and float(free.max()) > UNEVEN * float(free.min())
 
     def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
         """Move overlapping circles apart, let impacts bounce, note who touches, and let those grip each other."""
@@ -122,6 +125,8 @@ class ContactSolver:
             state.fed[:] = (state.fed & AT_WALL) // AT_WALL * WAS_AT_WALL
             slow = real(1 / h if strongest > 0 else 0.0)
             contacts.project_resting(*moving, *bodies, *which, *push, slow, pairs.meeting, state.fed, *notes)
+        if self._uneven:
+            refine.refine(*moving, *bodies, *which, *push, *notes)
         if self._rubs(state):
             self._slips.start(pairs, state.particle)
             state.turn = state.spin * real(h)
