@@ -10,10 +10,10 @@ import numpy as np
 
 from pyverlet import checks
 from pyverlet.broadphase import BruteForce, Fast, PairList
-from pyverlet.constants import FED, GROWTH, LARGEST_PUSH, PUSHED, REST_ACCELERATIONS, SMALLEST
+from pyverlet.constants import FED, GROWTH, LARGEST_PUSH, PUSHED, REST_ACCELERATIONS, SMALLEST, UNEVEN
 from pyverlet.errors import InputError
 from pyverlet.events import Events
-from pyverlet.kernels import contacts, friction, impacts
+from pyverlet.kernels import contacts, friction, impacts, refine
 from pyverlet.kernels.bounds import AT_WALL, WAS_AT_WALL
 from pyverlet.packs import Packs
 from pyverlet.sleep import Sleep
@@ -73,6 +73,7 @@ class ContactSolver:
         self._seen = 0
         self._packs = Packs(dtype)
         self._packed = False
+        self._uneven = False  # whether masses differ so much that contacts need to be refined
         self._events = events
         self._sleep = sleep
         self._slips = Slips(dtype)
@@ -119,6 +120,8 @@ class ContactSolver:
         if self._seen != self.broad_phase.rebuilds:
             self._seen = self.broad_phase.rebuilds
             self._unlist(self.broad_phase.list, state.particle)
+            free = state.inverse_mass[state.inverse_mass > 0]
+            self._uneven = bool(len(free)) and float(free.max()) > UNEVEN * float(free.min())
             self._packed = False
 
     def _pack(self) -> Packs:
@@ -148,6 +151,8 @@ class ContactSolver:
             state.fed[:] = (state.fed & AT_WALL) // AT_WALL * WAS_AT_WALL
             slow = real(1 / h if strongest > 0 else 0.0)
             contacts.project_resting(*moving, *bodies, *which, *push, slow, pairs.meeting, state.fed, *notes)
+        if self._uneven:
+            refine.refine(*moving, *bodies, *which, *push, *notes)
         if self._rubs(state):
             self._slips.start(pairs, state.particle)
             state.turn = state.spin * real(h)
@@ -192,7 +197,8 @@ class ContactSolver:
         self._slips.renumber(now)
 
     def _slides(self, state: Slots) -> bool:
-        return not self._bounces(state) and not self._rubs(state)
+        """Whether contacts are of the simple kind that is solved eight at a time."""
+        return not (self._bounces(state) or self._rubs(state) or self._uneven)
 
     def _bounces(self, state: Slots) -> bool:
         return self.settings.restitution > 0.0 or state.most_restitution > 0.0

@@ -99,9 +99,18 @@ docs/design/contacts.md has the comparison."""
 FED_SMOOTH: Final = 2.0
 """FED of circles that neither bounce nor rub. With friction, more than 1.6 makes piles restless."""
 
-GRIP: Final = 1.0
+GRIP: Final = 0.8
 """Part of the slip of a contact that friction at rest feeds, divided by h, into the velocities: the tangential FED. Piles with
-friction stood still at 0.8 to 1.3; at 0.5 single circles crept, at 1.6 some turned."""
+friction stood still from 0.8 on; at 0.5 single circles crept; at 1 a few in a box had a spin that turned nobody, at 1.6 many."""
+
+UNEVEN: Final = 10.0
+"""Ratio of masses from which on contacts are refined: the overlap that a light circle needs to carry a heavy one goes with it."""
+
+REFINED_FROM: Final = 0.01
+REFINED: Final = 0.25
+REFINEMENTS: Final = 4
+"""Of overlap that a sweep leaves beyond this part of the contact distance, this part is treated again, so many times. All of it
+at once, or all of the overlap of pairs beyond, made piles tremble."""
 
 LINK_GIVE: Final = 1e-7
 """What a rigid link gives way, as a part of what its particles do: a straight chain between two walls has no rigid solution."""

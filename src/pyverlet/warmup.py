@@ -13,7 +13,7 @@ from pyverlet import _jit
 from pyverlet.bounds import Boundary, Box, Circle, Open
 from pyverlet.broadphase import BruteForce
 from pyverlet.collisions import Collisions
-from pyverlet.constants import ONE_THREAD_BELOW, SERIAL_BELOW
+from pyverlet.constants import ONE_THREAD_BELOW, SERIAL_BELOW, UNEVEN
 from pyverlet.forces import Conservative, Drag
 from pyverlet.group import Group
 from pyverlet.links import Angle, Area, Pin, Spring, Stick
@@ -21,7 +21,7 @@ from pyverlet.obstacles import Segment
 from pyverlet.state import Slots
 from pyverlet.world import World
 
-OF_CIRCLES = ("bounds", "contacts", "friction", "grid", "impacts", "measure", "motion", "packs", "pairs")
+OF_CIRCLES = ("bounds", "contacts", "friction", "grid", "impacts", "measure", "motion", "packs", "pairs", "refine")
 """Modules of the kernels that every world of circles may need: how many there are is what progress is measured by."""
 
 _ROOMS = (Open, Circle, Box)
@@ -112,6 +112,8 @@ def _compile_all(dtype: np.dtype[Any], threads: int) -> None:
     ):
         small = _lattice(_enough(threads), dtype, boundary, 0.5, collisions, threads=threads)
         small.step(1e-3)
+        small.mass[0] *= 2 * UNEVEN
+        small.save()
         small.forces.append(Drag(linear=0.1))
         _use(small)
 

@@ -127,7 +127,7 @@ def _rub_strip(
         sx = (position[j, 0] - start[j, 0]) - (position[i, 0] - start[i, 0])
         sy = (position[j, 1] - start[j, 1]) - (position[i, 1] - start[i, 1])
         slipped = before[t] + sx * ny - sy * nx + turn[i] * radius[i] + turn[j] * radius[j]
-        most *= three * (wi + wj) * h
+        most *= three * (wi + wj) * h / position.dtype.type(GRIP)
         slip[k] = max(min(slipped, most), -most)
 
 
