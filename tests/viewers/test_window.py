@@ -168,6 +168,7 @@ def test_on_the_command_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Cap
     assert len(options["colour"].colours(asked[1][0], None)) == 30
     assert main(["run", "--window", "--json"]) == 2
     assert main(["run", "--window", "--port", "80"]) == 2
+    assert main(["run", "--window", "--ledger"]) == 2
 
 
 def test_show_builds_and_runs(world: pv.World, monkeypatch: pytest.MonkeyPatch) -> None:
