@@ -15,8 +15,8 @@ import numpy as np
 from pyverlet._jit import kernel, parallel_kernel, prange
 from pyverlet.constants import FED, PUSHED
 
-# What is noted of a circle in `fed`: a contact at rest has fed its velocity; a wall has touched it, in this substep or the last.
-CARRIES, AT_WALL, WAS_AT_WALL = 1, 2, 4
+# What is noted of a circle in `fed`: a contact at rest has fed its velocity, a wall has touched it; in this substep, or the last.
+CARRIES, AT_WALL, CARRIED, WAS_AT_WALL = 1, 2, 4, 8
 
 
 class Bodies(NamedTuple):
@@ -64,7 +64,7 @@ def meet(i, nx, ny, depth, bodies, h, lag, e, mu, rest_speed):
     shift = depth
     bodies.hits[i] = max(bodies.hits[i], hit if vn < zero else zero)
     # The wall of a pile carries it: the speed that the weight of others has fed is no arrival.
-    loaded = bodies.fed[i] & CARRIES and bodies.fed[i] & WAS_AT_WALL
+    loaded = bodies.fed[i] & CARRIES and bodies.fed[i] & CARRIED and bodies.fed[i] & WAS_AT_WALL
     bodies.fed[i] |= AT_WALL
     if e * hit > rest_speed and vn < zero and not loaded:
         time = min(two * depth / (hit - vn), h)
