@@ -14,7 +14,7 @@ from pyverlet.constants import FED, GROWTH, LARGEST_PUSH, PUSHED, REST_ACCELERAT
 from pyverlet.errors import InputError
 from pyverlet.events import Events
 from pyverlet.kernels import contacts, friction, impacts, refine
-from pyverlet.kernels.bounds import AT_WALL, WAS_AT_WALL
+from pyverlet.kernels.bounds import AT_WALL, CARRIED, CARRIES
 from pyverlet.packs import Packs
 from pyverlet.sleep import Sleep
 from pyverlet.slips import Kept, Slips
@@ -148,7 +148,7 @@ class ContactSolver:
             settings = (real(h), real(lag), real(self.settings.restitution), real(rest_speed))
             found = (state.fed, pairs.meeting, pairs.impulse, pairs.spent)
             impacts.impacts(*moving, state.acceleration, *bodies, state.restitution, *which, *settings, *found)
-            state.fed[:] = (state.fed & AT_WALL) // AT_WALL * WAS_AT_WALL
+            state.fed[:] = (state.fed & (CARRIES | AT_WALL)) * CARRIED
             slow = real(1 / h if strongest > 0 else 0.0)
             contacts.project_resting(*moving, *bodies, *which, *push, slow, pairs.meeting, state.fed, *notes)
         if self._uneven:

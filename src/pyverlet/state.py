@@ -154,7 +154,7 @@ class Slots:
         lift: (n,) s; times -a it is the velocity with which circles at rest against others end a substep, for others 0.
         drop: a circle that starts at rest falls drop * a h^2 in a substep; depends on the integrator.
         fed: (n,) bits: CARRIES where a contact at rest fed the velocity in the last substep, AT_WALL where a wall was touched
-            in it, WAS_AT_WALL in the one before. Kept only if circles bounce.
+            in it, CARRIED and WAS_AT_WALL the same in the one before. Kept only if circles bounce.
         island: (n,) number of the island a sleeping particle belongs to, -1 for those awake. calm: (n,) seconds it has been so.
         resting: (n,) 1 where a contact without bounce held the particle in the last substep.
         hits: (n,) largest speed with which the circle met a wall in this frame, m/s; negative: none.

@@ -19,8 +19,11 @@ BLOCK = 64
 """Circles looked at together for whether any of them is at a wall: hardly any is."""
 
 _ONE, _TWO = np.uint64(1), np.uint64(2)
-# What is noted of a circle in `fed`: a contact at rest has fed its velocity; a wall has touched it, in this substep or the last.
-CARRIES, AT_WALL, WAS_AT_WALL = 1, 2, 4
+
+# What is noted of a circle in `fed`: a contact at rest has fed its velocity, a wall has touched it; in this substep, or the last.
+CARRIES, AT_WALL, CARRIED, WAS_AT_WALL = 1, 2, 4, 8
+
+_LOADED = CARRIES | CARRIED | WAS_AT_WALL
 
 
 class Body(NamedTuple):
@@ -119,7 +122,7 @@ def meet(b, nx, ny, depth, h, lag, e, mu, rest_speed):
     after = zero
     shift = depth
     # The wall of a pile carries it: the speed that the weight of others has fed is no arrival.
-    loaded = (b.fed & CARRIES) != 0 and (b.fed & WAS_AT_WALL) != 0
+    loaded = b.fed & _LOADED == _LOADED
     if e * hit > rest_speed and vn < zero and not loaded:
         time = min(two * depth / (hit - vn), h)
         leaving = e * hit
