@@ -10,7 +10,7 @@ import numpy as np
 
 from pyverlet import checks
 from pyverlet.broadphase import BruteForce, Fast, PairList
-from pyverlet.constants import FED, GROWTH, LARGEST_PUSH, PUSHED, REST_ACCELERATIONS, SMALLEST, UNEVEN
+from pyverlet.constants import FED, FED_SMOOTH, GROWTH, LARGEST_PUSH, PUSHED, REST_ACCELERATIONS, SMALLEST, UNEVEN
 from pyverlet.errors import InputError
 from pyverlet.events import Events
 from pyverlet.kernels import contacts, friction, impacts, refine
@@ -139,7 +139,8 @@ class ContactSolver:
         pairs.hold_notes()
         moving, bodies = (state.position, state.velocity), (state.size, state.inverse_mass)
         which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
-        push = (real(1 / h), real(LARGEST_PUSH))
+        fed = FED if self._rubs(state) or self._bounces(state) else FED_SMOOTH
+        push = (real(fed / h), real(LARGEST_PUSH))
         notes = (pairs.touching, pairs.impulse, pairs.touches)
         if not self._bounces(state):
             contacts.project(*moving, *bodies, *which, *push, *notes)

@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet.constants import FED, PUSHED
+from pyverlet.constants import PUSHED
 from pyverlet.kernels.bounds import CARRIES
 from pyverlet.kernels.impacts import APART, PARTING, part
 
@@ -38,9 +38,9 @@ def _any_normal(i, j):
 
 
 @kernel
-def _project_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rate, most, touching, impulse):
-    zero = rate - rate
-    pushed, feed = position.dtype.type(PUSHED), position.dtype.type(FED) * rate
+def _project_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, feed, most, touching, impulse):
+    zero = feed - feed
+    pushed = position.dtype.type(PUSHED)
     count = 0
     for k in range(pair_i.shape[0]):
         i, j = pair_i[k], pair_j[k]
@@ -96,9 +96,9 @@ def _make_room(position, velocity, radius, inverse_mass, i, j, slow, most, weigh
 
 
 @kernel
-def _rest_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rate, most, slow, meeting, fed, touching, impulse):
-    zero = rate - rate
-    pushed, feed = position.dtype.type(PUSHED), position.dtype.type(FED) * rate
+def _rest_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, feed, most, slow, meeting, fed, touching, impulse):
+    zero = feed - feed
+    pushed = position.dtype.type(PUSHED)
     count = 0
     for k in range(pair_i.shape[0]):
         i, j = pair_i[k], pair_j[k]
@@ -155,25 +155,28 @@ def _still_strip(position, velocity, inverse_mass, pair_i, pair_j, touching, imp
 
 
 @parallel_kernel
-def project(position, velocity, radius, inverse_mass, first, count, pair_i, pair_j, rate, most, touching, impulse, touches):
-    """Move overlapping pairs apart (e = 0) and list them. rate = 1 / h; touches[s]: how many strip s has in touching, impulse."""
+def project(position, velocity, radius, inverse_mass, first, count, pair_i, pair_j, feed, most, touching, impulse, touches):
+    """Move overlapping pairs apart (e = 0) and list them.
+
+    feed: FED / h, 1/s. touches[s]: how many strip s has in touching, impulse.
+    """
     for parity in range(2):
         for half in prange((first.shape[0] + 1 - parity) // 2):
             s = 2 * half + parity
             a, b = first[s], first[s] + count[s]
             touches[s] = _project_strip(
-                position, velocity, radius, inverse_mass, pair_i[a:b], pair_j[a:b], rate, most, touching[a:b], impulse[a:b]
+                position, velocity, radius, inverse_mass, pair_i[a:b], pair_j[a:b], feed, most, touching[a:b], impulse[a:b]
             )
 
 
 @parallel_kernel
 def project_resting(
-    position, velocity, radius, inverse_mass, first, count, pair_i, pair_j, rate, most, slow, meeting, fed,
+    position, velocity, radius, inverse_mass, first, count, pair_i, pair_j, feed, most, slow, meeting, fed,
     touching, impulse, touches,
 ):  # fmt: skip
     """What `project` does, after `impacts`. Those that have bounced are listed too, with their impulse made negative.
 
-    slow: 1/s, as for _make_room; rate where accelerations could stop a pair that parts, 0 where nothing can.
+    feed: FED / h, 1/s. slow: 1/s, as for _make_room; 1 / h where accelerations could stop a pair that parts, 0 where nothing can.
     fed[i] becomes CARRIES for every particle whose velocity is fed.
     """
     for parity in range(2):
@@ -181,7 +184,7 @@ def project_resting(
             s = 2 * half + parity
             a, b = first[s], first[s] + count[s]
             touches[s] = _rest_strip(
-                position, velocity, radius, inverse_mass, pair_i[a:b], pair_j[a:b], rate, most, slow, meeting[a:b], fed,
+                position, velocity, radius, inverse_mass, pair_i[a:b], pair_j[a:b], feed, most, slow, meeting[a:b], fed,
                 touching[a:b], impulse[a:b],
             )  # fmt: skip
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet.constants import FED, PUSHED, REFINED, REFINED_FROM, REFINEMENTS
+from pyverlet.constants import PUSHED, REFINED, REFINED_FROM, REFINEMENTS
 from pyverlet.kernels.impacts import part
 
 
@@ -28,9 +28,9 @@ def _excess(position, radius, i, j, most):
 
 
 @kernel
-def _refine_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rate, most, touching, impulse):
-    zero = rate - rate
-    pushed, feed = position.dtype.type(REFINED * PUSHED), position.dtype.type(REFINED * FED) * rate
+def _refine_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, feed, most, touching, impulse):
+    zero = feed - feed
+    pushed, feed = position.dtype.type(REFINED * PUSHED), position.dtype.type(REFINED) * feed
     deep = np.empty(touching.shape[0], np.int64)
     count = 0
     for t in range(touching.shape[0]):
@@ -50,7 +50,7 @@ def _refine_strip(position, velocity, radius, inverse_mass, pair_i, pair_j, rate
 
 
 @parallel_kernel
-def refine(position, velocity, radius, inverse_mass, first, count, pair_i, pair_j, rate, most, touching, impulse, touches):
+def refine(position, velocity, radius, inverse_mass, first, count, pair_i, pair_j, feed, most, touching, impulse, touches):
     """After `project` or `project_resting`, with the same arguments; impulse gains what is added. Not for pairs that bounced."""
     for parity in range(2):
         for half in prange((first.shape[0] + 1 - parity) // 2):
@@ -58,5 +58,5 @@ def refine(position, velocity, radius, inverse_mass, first, count, pair_i, pair_
             a, b = first[s], first[s] + count[s]
             t = a + touches[s]
             _refine_strip(
-                position, velocity, radius, inverse_mass, pair_i[a:b], pair_j[a:b], rate, most, touching[a:t], impulse[a:t]
+                position, velocity, radius, inverse_mass, pair_i[a:b], pair_j[a:b], feed, most, touching[a:t], impulse[a:t]
             )
