@@ -34,58 +34,59 @@ _ASIDE = 1e-6
 
 
 @kernel
-def _pack_strip(origin, pair_i, pair_j, used, number, lane_i, lane_j, gap_x, gap_y):
-    """Cut the pairs into packs; returns how many lanes they take, also beyond the room.
+def _choose(pair_i, pair_j, used, number, chosen):
+    """Which pair stands in each lane: chosen[lane]; returns how many lanes there are, also beyond the room.
 
     Pairs are taken in their order. One that shares a particle with the pack waits for the next: around a large circle many do.
     used[i]: the last pack of particle i, by a number that no other strip gives; this strip's are `number` and up.
     """
-    pairs, k, lanes = pair_i.shape[0], 0, 0
+    pairs, room, k, lanes = pair_i.shape[0], chosen.shape[0], 0, 0
     waiting, waits = np.empty(pairs, np.int64), 0
     while k < pairs or waits > 0:
-        pack, end = number + lanes // LANES, lanes + LANES
+        pack, end, last = number + lanes // LANES, lanes + LANES, 0
         # Those that came last first: the others would have to be moved up.
         first = max(waits - _WAITING, 0)
         left = first
-        for w in range(first, waits):
-            p = waiting[w]
-            if lanes < end and used[pair_i[p]] != pack and used[pair_j[p]] != pack:
-                _place(p, pack, lanes, origin, pair_i, pair_j, used, lane_i, lane_j, gap_x, gap_y)
+        w = first
+        while lanes < end and (w < waits or k < pairs):
+            again = w < waits
+            p = waiting[w] if again else k
+            i, j = pair_i[p], pair_j[p]
+            if used[i] != pack and used[j] != pack:
+                used[i] = pack
+                used[j] = pack
+                last = p
+                if lanes < room:
+                    chosen[lanes] = p
                 lanes += 1
             else:
                 waiting[left] = p
                 left += 1
-        waits = left
-        while lanes < end and k < pairs:
-            if used[pair_i[k]] != pack and used[pair_j[k]] != pack:
-                _place(k, pack, lanes, origin, pair_i, pair_j, used, lane_i, lane_j, gap_x, gap_y)
-                lanes += 1
+            if again:
+                w += 1
             else:
-                waiting[waits] = k
-                waits += 1
-            k += 1
-        for full in range(lanes, min(end, lane_i.shape[0])):
-            lane_i[full] = lane_i[full - 1]
-            lane_j[full] = lane_j[full - 1]
-            gap_x[full] = gap_x[full - 1]
-            gap_y[full] = gap_y[full - 1]
+                k += 1
+        while w < waits:  # the pack was full before they came
+            waiting[left] = waiting[w]
+            left += 1
+            w += 1
+        waits = left
+        for lane in range(lanes, min(end, room)):
+            chosen[lane] = last
         lanes = end
     return lanes
 
 
 @kernel
-def _place(p, pack, lane, origin, pair_i, pair_j, used, lane_i, lane_j, gap_x, gap_y):
-    """Pair p stands in this lane, if there is room."""
-    i, j = pair_i[p], pair_j[p]
-    used[i] = pack
-    used[j] = pack
-    if lane < lane_i.shape[0]:
-        lane_i[lane] = i
-        lane_j[lane] = j
+def _fill(origin, pair_i, pair_j, chosen, lane_i, lane_j, gap_x, gap_y):
+    for lane in range(chosen.shape[0]):
+        i, j = pair_i[chosen[lane]], pair_j[chosen[lane]]
         dx, dy = origin[j, 0] - origin[i, 0], origin[j, 1] - origin[i, 1]
         if dx == 0 and dy == 0:
             angle = _GOLDEN_ANGLE * (i + j)
             dx, dy = origin.dtype.type(_ASIDE * np.cos(angle)), origin.dtype.type(_ASIDE * np.sin(angle))
+        lane_i[lane] = i
+        lane_j[lane] = j
         gap_x[lane] = dx
         gap_y[lane] = dy
 
@@ -103,17 +104,13 @@ def pack(origin, first, count, pair_i, pair_j, used, begin, lanes, lane_i, lane_
             s = 2 * half + parity
             a, b = first[s], first[s] + count[s]
             low, high = begin[s], begin[s + 1]
-            lanes[s] = _pack_strip(
-                origin,
-                pair_i[a:b],
-                pair_j[a:b],
-                used,
-                low,
-                lane_i[low:high],
-                lane_j[low:high],
-                gap[0, low:high],
-                gap[1, low:high],
-            )
+            chosen = np.empty(high - low, np.int64)
+            lanes[s] = _choose(pair_i[a:b], pair_j[a:b], used, low, chosen)
+            high = low + min(lanes[s], high - low)
+            _fill(
+                origin, pair_i[a:b], pair_j[a:b], chosen[: high - low], lane_i[low:high], lane_j[low:high],
+                gap[0, low:high], gap[1, low:high],
+            )  # fmt: skip
 
 
 @parallel_kernel
