@@ -11,7 +11,7 @@ to 0 (Mueller et al. 2020, Detailed Rigid Body Simulation, section 3.5). With fr
 
 Impacts, when e > 0, come before both: kernels.impacts.
 
-Everything here runs strip by strip as kernels.grid explains: even strips in parallel, then odd ones.
+Everything here runs strip by strip as kernels.pairs explains: even strips in parallel, then odd ones.
 """
 
 from __future__ import annotations

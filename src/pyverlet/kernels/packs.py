@@ -9,7 +9,7 @@ What is computed for each pair, and why, is in kernels.contacts; here it is arra
   be carried along: FED_SMOOTH / PUSHED / h times what a circle has been moved is what it is fed.
 - The second pass finds the normals where the first has left them, 0 for pairs that do not touch, and has nothing to decide.
 
-Everything runs strip by strip as kernels.grid explains: even strips in parallel, then odd ones.
+Everything runs strip by strip as kernels.pairs explains: even strips in parallel, then odd ones.
 """
 
 from __future__ import annotations
