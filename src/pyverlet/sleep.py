@@ -120,4 +120,4 @@ def laws(world: Any) -> Any:
     if world.links or moving or not all(type(force) is Drag for force in world.forces):
         return None
     obstacles = tuple((id(obstacle), obstacle.revision) for obstacle in world.obstacles)
-    return (world.gravity, id(world.boundary), world.boundary.extent(), id(world.collisions), obstacles)
+    return (world.gravity, repr(world.boundary), world.boundary.extent(), world.collisions, obstacles)

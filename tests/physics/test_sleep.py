@@ -92,13 +92,13 @@ def test_a_blow_is_what_it_would_be_without_sleep() -> None:
     assert results[0][1] == pytest.approx(results[1][1], abs=0.1)
 
 
-@pytest.mark.parametrize("change", ["velocity", "position", "radius", "gravity", "boundary", "force", "spin"])
+@pytest.mark.parametrize("change", ["velocity", "position", "radius", "gravity", "boundary", "wall", "force", "spin"])
 def test_what_the_user_does_wakes(change: str) -> None:
     world = troughs()
     a, _ = fill(world, 10, 45)
     settle(world)
     assert world.asleep.all()
-    everybody = change in ("gravity", "boundary", "force")
+    everybody = change in ("gravity", "boundary", "wall", "force")
     if change == "velocity":
         a.velocity[5] = (0, 3)
     elif change == "position":
@@ -109,6 +109,8 @@ def test_what_the_user_does_wakes(change: str) -> None:
         a.radius[5] = 0.4
     elif change == "gravity":
         world.gravity = (1, -9)
+    elif change == "wall":
+        world.boundary.friction = 0.3  # type: ignore[attr-defined]
     elif change == "boundary":
         world.boundary = pv.Box((-10, -10), (60, 60), friction=0.5)
     else:
