@@ -197,6 +197,11 @@ def use_threads(count: int) -> None:
         _chosen.count = count
 
 
+def threads_in_use() -> int:
+    """How many the parallel kernels called from this thread use."""
+    return getattr(_chosen, "count", 0) or int(numba.get_num_threads())
+
+
 @contextlib.contextmanager
 def one_thread(only_if: bool = True) -> Iterator[None]:
     """Parallel kernels called inside use one thread: work that is too little to be worth a meeting."""

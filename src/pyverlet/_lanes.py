@@ -126,6 +126,17 @@ def where_zero(typing: Any, test: Any, a: Any, b: Any) -> Any:
     return a(test, a, b), generate
 
 
+@intrinsic  # type: ignore[untyped-decorator]
+def which_above(typing: Any, a: Any, b: Any) -> Any:
+    """The lanes in which a > b, as the bits of a number: 1 for the first."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        bits = builder.bitcast(builder.fcmp_ordered(">", *args), ir.IntType(LANES))
+        return builder.zext(bits, _INT64)
+
+    return types.int64(a, b), generate
+
+
 def _pointer(context: Any, builder: Any, array: Any, value: Any, index: Any, item: Any) -> Any:
     """To array[index], as if the array were of `item`s."""
     data = context.make_array(array)(context, builder, value).data
@@ -157,13 +168,35 @@ def store(typing: Any, array: Any, k: Any, value: Any) -> Any:
     return types.void(array, k, value), generate
 
 
-def _rows(context: Any, builder: Any, array: Any, index: Any, args: Any) -> list[Any]:
-    """Pointers to the rows index[k], index[k + 1], ... of an (n, 2) array."""
-    zero = ir.Constant(_INT64, 0)
-    rows = _pointer(context, builder, array, args[0], zero, ir.VectorType(context.get_value_type(array.dtype), 2))
+@intrinsic  # type: ignore[untyped-decorator]
+def load_rows(typing: Any, array: Any, k: Any) -> Any:
+    """(x, y) of the rows array[k : k + LANES] of an (n, 2) array in C order."""
+    lanes = LanesType(array.dtype)
+    both = types.UniTuple(lanes, 2)
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        real = context.get_value_type(array.dtype)
+        first = builder.shl(args[1], ir.Constant(args[1].type, 1))
+        rows = builder.load(_pointer(context, builder, array, args[0], first, ir.VectorType(real, 2 * LANES)))
+        rows.align = array.dtype.bitwidth // 8
+        return context.make_tuple(builder, both, _columns(builder, rows))
+
+    return both(array, k), generate
+
+
+def _columns(builder: Any, rows: Any) -> list[Any]:
+    """The eight x and the eight y of eight rows that follow each other."""
+    empty = ir.Constant(rows.type, ir.Undefined)
+    return [builder.shuffle_vector(rows, empty, _order(range(axis, 2 * LANES, 2))) for axis in range(2)]
+
+
+def _picked(context: Any, builder: Any, array: Any, index: Any, args: Any) -> list[Any]:
+    """Pointers to the rows, or numbers, index[k], index[k + 1], ... of an (n, 2), or (n,), array."""
+    zero, real = ir.Constant(_INT64, 0), context.get_value_type(array.dtype)
+    start = _pointer(context, builder, array, args[0], zero, ir.VectorType(real, 2) if array.ndim == 2 else real)
     first = _pointer(context, builder, index, args[1], args[2], context.get_value_type(index.dtype))
     numbers = [builder.load(builder.gep(first, [ir.Constant(_INT64, lane)])) for lane in range(LANES)]
-    return [builder.gep(rows, [builder.zext(number, _INT64)]) for number in numbers]
+    return [builder.gep(start, [builder.zext(number, _INT64)]) for number in numbers]
 
 
 @intrinsic  # type: ignore[untyped-decorator]
@@ -174,15 +207,13 @@ def take(typing: Any, array: Any, index: Any, k: Any) -> Any:
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         parts = []
-        for row in _rows(context, builder, array, index, args):
+        for row in _picked(context, builder, array, index, args):
             parts.append(builder.load(row))
             parts[-1].align = array.dtype.bitwidth // 8
         while len(parts) > 1:
             double = _order(range(2 * parts[0].type.count))
             parts = [builder.shuffle_vector(a, b, double) for a, b in zip(parts[::2], parts[1::2], strict=True)]
-        empty = ir.Constant(parts[0].type, ir.Undefined)
-        x, y = (builder.shuffle_vector(parts[0], empty, _order(range(axis, 2 * LANES, 2))) for axis in range(2))
-        return context.make_tuple(builder, both, [x, y])
+        return context.make_tuple(builder, both, _columns(builder, parts[0]))
 
     return both(array, index, k), generate
 
@@ -192,9 +223,35 @@ def put(typing: Any, array: Any, index: Any, k: Any, x: Any, y: Any) -> Any:
     """Rows index[k : k + LANES] of an (n, 2) array = (x, y). Lanes of one row must hold the same value."""
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        for lane, row in enumerate(_rows(context, builder, array, index, args)):
+        for lane, row in enumerate(_picked(context, builder, array, index, args)):
             written = builder.store(builder.shuffle_vector(args[3], args[4], _order([lane, lane + LANES])), row)
             written.align = array.dtype.bitwidth // 8
         return context.get_dummy_value()
 
     return types.void(array, index, k, x, y), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def pick(typing: Any, array: Any, index: Any, k: Any) -> Any:
+    """array[index[k : k + LANES]] of an (n,) array; index: unsigned."""
+    lanes = LanesType(array.dtype)
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        value = ir.Constant(context.get_value_type(lanes), ir.Undefined)
+        for lane, item in enumerate(_picked(context, builder, array, index, args)):
+            value = builder.insert_element(value, builder.load(item), ir.Constant(_INT32, lane))
+        return value
+
+    return lanes(array, index, k), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def place(typing: Any, array: Any, index: Any, k: Any, value: Any) -> Any:
+    """array[index[k : k + LANES]] = value, on an (n,) array. Lanes of one item must hold the same value."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        for lane, item in enumerate(_picked(context, builder, array, index, args)):
+            builder.store(builder.extract_element(args[3], ir.Constant(_INT32, lane)), item)
+        return context.get_dummy_value()
+
+    return types.void(array, index, k, value), generate

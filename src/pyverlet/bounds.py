@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pyverlet import checks
 from pyverlet.errors import InputError
-from pyverlet.kernels import bounds
+from pyverlet.kernels import bounds, cage
 from pyverlet.state import Slots
 
 Array = NDArray[Any]
@@ -72,10 +72,15 @@ class _Walls(Boundary):
         self._laws: list[Any] = []
 
     def _confine(self, kernel: Any, shape: Sequence[float], state: Slots, h: float, lag: float, rest_speed: float) -> None:
+        shape, laws = self._rounded(shape, state, h, lag, rest_speed)
+        kernel(*shape, *state.bodies(), *laws)
+
+    def _rounded(self, shape: Sequence[float], state: Slots, h: float, lag: float, rest_speed: float) -> tuple[Any, Any]:
+        """The numbers of `shape`, and h, lag, e, mu and rest_speed, in the dtype of the state."""
         given = (state.real, shape, h, lag, self.restitution, self.friction, rest_speed)
         if given != self._given:  # the same in all substeps of a frame, and rounding takes longer than the walls of a small world
             self._given, self._shape, self._laws = given, [*map(state.real, shape)], [*map(state.real, given[2:])]
-        kernel(*self._shape, *state.bodies(), *self._laws)
+        return self._shape, self._laws
 
 
 class Circle(_Walls):
@@ -96,7 +101,13 @@ class Circle(_Walls):
         self.radius = checks.number("radius", radius, above=0.0)
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
-        self._confine(bounds.circle, (*self.center, self.radius), state, h, lag, rest_speed)
+        shape: Sequence[float] = (*self.center, self.radius)
+        if self.restitution == 0.0 == self.friction and state.smooth:
+            shape, (h, lag, _, _, rest_speed) = self._rounded(shape, state, h, lag, rest_speed)
+            bodies = (state.position, state.velocity, state.acceleration, state.radius, state.inverse_mass)
+            cage.hold(*shape, *bodies, state.resting, state.hits, h, lag, rest_speed)
+        else:
+            self._confine(bounds.circle, shape, state, h, lag, rest_speed)
 
     def extent(self) -> Extent:
         (x, y), r = self.center, self.radius

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet import _jit
 from pyverlet._lanes import LANES
 from pyverlet.broadphase import PairList
 from pyverlet.constants import COLOURS, FED_SMOOTH, LARGEST_PUSH, PUSHED
@@ -27,6 +28,7 @@ class Packs:
         self._dtype = dtype
         self.begin, self.lanes = np.zeros(1, np.int64), np.zeros(0, np.int64)
         self._make_room(0)
+        self._cut = np.zeros((2, 2), np.int64)
         self.origin = self._moved = np.empty((0, 2), dtype)
         self._size: Array | None = None
         self._varied = 0
@@ -50,9 +52,24 @@ class Packs:
             if (self.lanes <= need).all():
                 break
             need = np.maximum(need, self.lanes)
+        self._cut = np.empty((2, 0), np.int64)
         self.origin = origin
         self._moved = np.empty_like(origin)
         self._size = None
+
+    def _parts(self) -> Array:
+        """(2, threads + 1): even and odd strips, each cut into as many parts of as nearly the same number of lanes as can be.
+
+        By their number alone a round room's would not be: the short rows of strips at its ends hold fewer.
+        """
+        threads = _jit.threads_in_use()
+        if self._cut.shape[1] != threads + 1:
+            self._cut = np.empty((2, threads + 1), np.int64)
+            for parity in range(2):
+                before = np.concatenate(([0], np.cumsum(self.lanes[parity::2])))
+                middle = 0.5 * (before[1:] + before[:-1])
+                self._cut[parity] = np.searchsorted(middle, np.linspace(0, before[-1], threads + 1))
+        return self._cut
 
     def _share_out(self, state: Slots) -> None:
         """Bring reach and share up to date with the sizes of now."""
@@ -69,14 +86,15 @@ class Packs:
         """Move overlapping circles apart and feed their velocities."""
         if self._size is not state.size:
             self._share_out(state)
-        where = (self.begin, self.lanes, self.lane_i, self.lane_j, self.gap, self.reach, self.share, self._varied)
+        where = (self._parts(), self.begin, self.lanes, self.lane_i, self.lane_j, self.gap, self.reach, self.share, self._varied)
         settings = (state.real(FED_SMOOTH / PUSHED / h), state.real(LARGEST_PUSH))
         packs.project(state.position, state.velocity, self.origin, self._moved, *where, *settings, self.normal)
 
     def still(self, state: Slots) -> None:
         """Take from touching circles the velocity that projection has put in."""
-        packs.still(state.velocity, self.begin, self.lanes, self.lane_i, self.lane_j, self.share, self._varied, self.normal)
+        where = (self._parts(), self.begin, self.lanes, self.lane_i, self.lane_j)
+        packs.still(state.velocity, *where, self.share, self._varied, self.normal)
 
     def mark_resting(self, state: Slots) -> None:
         """Set `state.resting` for particles that touch another."""
-        packs.mark_touching(self.begin, self.lanes, self.lane_i, self.lane_j, self.normal, state.resting)
+        packs.mark_touching(self._parts(), self.begin, self.lanes, self.lane_i, self.lane_j, self.normal, state.resting)

@@ -331,6 +331,11 @@ class Slots:
             self._scratch.append(np.empty_like(self.position))
         return self._scratch[number]
 
+    @property
+    def smooth(self) -> bool:
+        """Whether circles neither bounce nor rub by themselves, nor rub each other."""
+        return self.most_restitution <= 0.0 and not len(self.turn)
+
     def bodies(self) -> tuple[Array, ...]:
         """What walls need of the particles: the arrays that `kernels.bounds.look` takes, in that order."""
         return (

@@ -8,7 +8,22 @@ import numpy as np
 import pytest
 
 from pyverlet._jit import kernel
-from pyverlet._lanes import LANES, larger, load, put, smaller, spread, square_root, store, take, where_zero
+from pyverlet._lanes import (
+    LANES,
+    larger,
+    load,
+    load_rows,
+    pick,
+    place,
+    put,
+    smaller,
+    spread,
+    square_root,
+    store,
+    take,
+    where_zero,
+    which_above,
+)
 
 DTYPES = [np.float32, np.float64]
 
@@ -56,3 +71,24 @@ def test_rows_are_taken_and_put_by_their_index(dtype: Any) -> None:
     expected[index] = np.column_stack((points[index, 1], points[index, 0] + points[index, 1]))
     _turn(points, index)
     assert points.tobytes() == expected.tobytes()
+
+
+@kernel
+def _move(points: Any, numbers: Any, index: Any, limit: Any, above: Any) -> None:
+    for k in range(0, points.shape[0], LANES):
+        x, y = load_rows(points, k)
+        above[k // LANES] = which_above(x, spread(limit))
+        place(numbers, index, k, pick(numbers, index, k) + y)
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_rows_and_numbers_come_lane_by_lane(dtype: Any) -> None:
+    rng = np.random.default_rng(2)
+    points, numbers = rng.normal(0, 1, (3 * LANES, 2)).astype(dtype), rng.normal(0, 1, 50).astype(dtype)
+    index = rng.permutation(50)[: 3 * LANES].astype(np.uint32)
+    expected, above = numbers.copy(), np.zeros(3, np.int64)
+    expected[index] += points[:, 1]
+    _move(points, numbers, index, dtype(0.3), above)
+    assert numbers.tobytes() == expected.tobytes()
+    bits = (points[:, 0] > dtype(0.3)).reshape(3, LANES)
+    assert above.tolist() == [sum(1 << lane for lane in np.flatnonzero(row)) for row in bits]

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet._lanes import LANES, larger, load, put, smaller, spread, square_root, store, take, where_zero
+from pyverlet._lanes import LANES, larger, load, put, smaller, spread, square_root, store, take, where_zero, which_above
 from pyverlet.constants import PUSHED
 
 # Golden angle, rad: coincident centres part in directions spread evenly over the circle.
@@ -168,11 +168,14 @@ def _arrive(position, velocity, origin, moved, feed):
 
 
 @parallel_kernel
-def project(position, velocity, origin, moved, begin, lanes, lane_i, lane_j, gap, reach, share, varied, feed, most, normal):
+def project(
+    position, velocity, origin, moved, cut, begin, lanes, lane_i, lane_j, gap, reach, share, varied, feed, most, normal
+):  # fmt: skip
     """Move overlapping pairs apart, feed their velocities, and note the normals of those that touch.
 
     varied: 1; or 0 if reach and share are the same for all and have one pack only. feed: FED_SMOOTH / PUSHED / h, 1/s.
-    moved: (n, 2) to work with. normal: (2, lanes).
+    cut: (2, threads + 1), which half s // 2 of the strips s with s % 2 = 0, and 1, each thread begins with. moved: (n, 2) to work
+    with. normal: (2, lanes).
     """
     n = position.shape[0]
     chunks = (n + _CHUNK - 1) // _CHUNK
@@ -180,13 +183,13 @@ def project(position, velocity, origin, moved, begin, lanes, lane_i, lane_j, gap
         a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
         _set_out(position[a:b], origin[a:b], moved[a:b])
     for parity in range(2):
-        for half in prange((lanes.shape[0] + 1 - parity) // 2):
-            s = 2 * half + parity
-            a, b = begin[s], begin[s] + lanes[s]
-            _project_strip(
-                moved, lane_i[a:b], lane_j[a:b], gap[0, a:b], gap[1, a:b], reach[a * varied :], share[a * varied :], varied, most,
-                normal[0, a:b], normal[1, a:b],
-            )  # fmt: skip
+        for part in prange(cut.shape[1] - 1):
+            for half in range(cut[parity, part], cut[parity, part + 1]):
+                a, b = begin[2 * half + parity], begin[2 * half + parity] + lanes[2 * half + parity]
+                _project_strip(
+                    moved, lane_i[a:b], lane_j[a:b], gap[0, a:b], gap[1, a:b], reach[a * varied :], share[a * varied :], varied,
+                    most, normal[0, a:b], normal[1, a:b],
+                )  # fmt: skip
     for c in prange(chunks):
         a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
         _arrive(position[a:b], velocity[a:b], origin[a:b], moved[a:b], feed)
@@ -206,21 +209,33 @@ def _still_strip(velocity, lane_i, lane_j, share, varied, one, normal_x, normal_
 
 
 @parallel_kernel
-def still(velocity, begin, lanes, lane_i, lane_j, share, varied, normal):
+def still(velocity, cut, begin, lanes, lane_i, lane_j, share, varied, normal):
     """Set the normal velocity of touching pairs to 0."""
     one = velocity.dtype.type(1)
     for parity in range(2):
-        for half in prange((lanes.shape[0] + 1 - parity) // 2):
-            s = 2 * half + parity
-            a, b = begin[s], begin[s] + lanes[s]
-            _still_strip(velocity, lane_i[a:b], lane_j[a:b], share[a * varied :], varied, one, normal[0, a:b], normal[1, a:b])
+        for part in prange(cut.shape[1] - 1):
+            for half in range(cut[parity, part], cut[parity, part + 1]):
+                a, b = begin[2 * half + parity], begin[2 * half + parity] + lanes[2 * half + parity]
+                _still_strip(velocity, lane_i[a:b], lane_j[a:b], share[a * varied :], varied, one, normal[0, a:b], normal[1, a:b])
 
 
 @kernel
-def mark_touching(begin, lanes, lane_i, lane_j, normal, flag):
+def _mark_strip(flag, lane_i, lane_j, normal_x, normal_y):
+    zero = spread(normal_x.dtype.type(0))
+    for k in range(0, lane_i.shape[0], LANES):
+        nx, ny = load(normal_x, k), load(normal_y, k)
+        touches = which_above(nx * nx + ny * ny, zero)
+        for lane in range(LANES):
+            bit = np.uint8((touches >> lane) & 1)
+            flag[lane_i[k + lane]] |= bit
+            flag[lane_j[k + lane]] |= bit
+
+
+@parallel_kernel
+def mark_touching(cut, begin, lanes, lane_i, lane_j, normal, flag):
     """flag[i] = 1 for every particle of a touching pair."""
-    for s in range(lanes.shape[0]):
-        for k in range(begin[s], begin[s] + lanes[s]):
-            touches = (normal[0, k] != 0) | (normal[1, k] != 0)
-            flag[lane_i[k]] |= touches
-            flag[lane_j[k]] |= touches
+    for parity in range(2):
+        for part in prange(cut.shape[1] - 1):
+            for half in range(cut[parity, part], cut[parity, part + 1]):
+                a, b = begin[2 * half + parity], begin[2 * half + parity] + lanes[2 * half + parity]
+                _mark_strip(flag, lane_i[a:b], lane_j[a:b], normal[0, a:b], normal[1, a:b])

@@ -1,0 +1,125 @@
+"""A cage around circles that neither bounce nor rub, eight at a time: those beyond its wall are looked for, and then held.
+
+What becomes of a circle is what `kernels.bounds` makes of it with e = 0 and mu = 0, to the last bit: the same sums, without
+its branches.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pyverlet._jit import kernel, parallel_kernel, prange
+from pyverlet._lanes import (
+    LANES,
+    larger,
+    load,
+    load_rows,
+    pick,
+    place,
+    put,
+    smaller,
+    spread,
+    square_root,
+    take,
+    where_zero,
+    which_above,
+)
+
+# Circles one thread takes at a time.
+_CHUNK = 2048
+
+
+@kernel
+def _find(x0, y0, size, position, radius, inverse_mass, first, stop, found):
+    """List the free circles from `first` up to `stop` that reach beyond the cage; returns how many."""
+    number = 0
+    packed = stop - (stop - first) % LANES
+    centre_x, centre_y, whole = spread(x0), spread(y0), spread(size)
+    for k in range(first, packed, LANES):
+        x, y = load_rows(position, k)
+        dx, dy, room = x - centre_x, y - centre_y, whole - load(radius, k)
+        beyond = which_above(dx * dx + dy * dy, room * room)
+        lane = 0
+        while beyond != 0:  # hardly ever
+            found[number] = k + lane
+            number += (beyond & 1) & (inverse_mass[k + lane] > 0)
+            beyond >>= 1
+            lane += 1
+    for i in range(packed, stop):
+        dx, dy, room = position[i, 0] - x0, position[i, 1] - y0, size - radius[i]
+        if dx * dx + dy * dy > room * room and inverse_mass[i] > 0:
+            found[number] = i
+            number += 1
+    return number
+
+
+@kernel
+def _impact_time(dx, dy, vx, vy, ax, ay, reach, zero, half, h):
+    """As `kernels.bounds.impact_time`."""
+    gap = reach * reach - dx * dx - dy * dy
+    along = dx * vx + dy * vy
+    root = square_root(larger(along * along + (vx * vx + vy * vy) * gap, zero))
+    time = larger(gap, zero - gap) / (larger(along, zero - along) + root)
+    for _ in range(2):
+        px = dx - time * (vx - half * time * ax)
+        py = dy - time * (vy - half * time * ay)
+        slope = px * (ax * time - vx) + py * (ay * time - vy)
+        time = where_zero(slope, time, time + half * (reach * reach - px * px - py * py) / slope)
+    return smaller(larger(time, zero), h)
+
+
+@kernel
+def _hold(which, x0, y0, size, position, velocity, acceleration, radius, hits, h, lag, rest_speed):
+    """Hold the circles of `which`, all beyond the wall, on it; eight times the same is as good as once."""
+    none = h - h
+    zero, half, h, lag = spread(none), spread(h / (h + h)), spread(h), spread(lag)
+    x0, y0, size, rest_speed = spread(x0), spread(y0), spread(size), spread(rest_speed)
+    for k in range(0, which.shape[0], LANES):
+        x, y = take(position, which, k)
+        vx, vy = take(velocity, which, k)
+        ax, ay = take(acceleration, which, k)
+        dx, dy, room = x - x0, y - y0, size - pick(radius, which, k)
+        distance = square_root(dx * dx + dy * dy)
+        nx, ny, depth = (zero - dx) / distance, (zero - dy) / distance, distance - room
+        ux, uy = vx + lag * ax, vy + lag * ay
+        # 0 if it rests on the wall; otherwise that which it hit is the tangent where it hit.
+        fast = smaller(larger((zero - (ux * nx + uy * ny)) - rest_speed, zero), larger(room, zero))
+        time = _impact_time(dx, dy, ux, uy, ax, ay, room, zero, half, h)
+        px = dx - time * (ux - half * time * ax)
+        py = dy - time * (uy - half * time * ay)
+        reached = square_root(px * px + py * py)
+        nx, ny = where_zero(fast, nx, (zero - px) / reached), where_zero(fast, ny, (zero - py) / reached)
+        depth = where_zero(fast, depth, larger((px - dx) * nx + (py - dy) * ny, zero))
+        # What `meet` does with a circle that is held.
+        an = ax * nx + ay * ny
+        vn = vx * nx + vy * ny + lag * an
+        before = vn - lag * an
+        away = larger(before, zero) - before
+        hit = square_root(larger(vn * vn + (depth + depth) * an, zero))
+        hit = where_zero(smaller(vn, zero), zero, hit)
+        place(hits, which, k, larger(pick(hits, which, k), hit))
+        x, y = x + depth * nx, y + depth * ny
+        # Faster than a room width a substep: what is still outside waits at the wall.
+        dx, dy = x - x0, y - y0
+        distance = square_root(dx * dx + dy * dy)
+        outside = larger(distance - size, zero)
+        part = room / distance
+        put(position, which, k, where_zero(outside, x, x0 + dx * part), where_zero(outside, y, y0 + dy * part))
+        put(velocity, which, k, vx + away * nx, vy + away * ny)
+
+
+@parallel_kernel
+def hold(x0, y0, size, position, velocity, acceleration, radius, inverse_mass, resting, hits, h, lag, rest_speed):
+    """All circles stay inside the cage of radius `size` about (x0, y0); `resting` is 1 for those that were beyond."""
+    count = radius.shape[0]
+    for chunk in prange((count + _CHUNK - 1) // _CHUNK):
+        first, stop = chunk * _CHUNK, min((chunk + 1) * _CHUNK, count)
+        resting[first:stop] = 0
+        found = np.empty(_CHUNK + 2 * LANES, np.uint32)
+        number = _find(x0, y0, size, position, radius, inverse_mass, first, stop, found)
+        if number > 0:
+            for k in range(number):
+                resting[found[k]] = 1
+            lanes = (number + LANES - 1) // LANES * LANES
+            found[number:lanes] = found[number - 1]
+            _hold(found[:lanes], x0, y0, size, position, velocity, acceleration, radius, hits, h, lag, rest_speed)

@@ -1,0 +1,86 @@
+"""A cage that holds eight circles at a time against one that meets one after the other: the same bits."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import pyverlet as pv
+from pyverlet import _jit
+from pyverlet.bounds import Circle
+from pyverlet.kernels import bounds
+from pyverlet.state import Slots
+
+H = 1 / 480
+CHANGED = ("position", "velocity", "resting", "hits")
+
+
+def crowd(seed: int, n: int, speed: float, dtype: Any) -> Slots:
+    """Circles in and around a cage of radius 10 m about (1, 2), some of them pinned, some faster than a room width a substep."""
+    rng = np.random.default_rng(seed)
+    angle, distance = rng.uniform(0, 2 * np.pi, n), 10 * rng.uniform(0.5, 1.1, n)
+    world = pv.World(dtype=dtype)
+    world.add(
+        position=np.column_stack((1 + distance * np.cos(angle), 2 + distance * np.sin(angle))),
+        velocity=rng.normal(0, speed, (n, 2)),
+        radius=rng.uniform(0.1, 1, n),
+        mass=np.where(rng.random(n) < 0.1, np.inf, 1.0),
+    )
+    slots = Slots(np.dtype(dtype))
+    slots.gather(world._state)
+    slots.acceleration[:] = rng.normal(0, 10, (n, 2))
+    slots.hits[:] = rng.normal(0, 5, n)
+    return slots
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    n=st.integers(1, 100),
+    speed=st.sampled_from([0.0, 0.02, 3.0, 1e4]),
+    lag=st.sampled_from([0.0, H / 2]),
+    dtype=st.sampled_from([np.float32, np.float64]),
+)
+@settings(max_examples=200, deadline=None)
+def test_eight_at_a_time_are_one_after_the_other(seed: int, n: int, speed: float, lag: float, dtype: Any) -> None:
+    one, eight = crowd(seed, n, speed, dtype), crowd(seed, n, speed, dtype)
+    cage = Circle(center=(1, 2), radius=10)
+    cage._confine(bounds.circle, (1, 2, 10), one, H, lag, 0.08)
+    cage.confine(eight, H, lag, 0.08)
+    for name in CHANGED:
+        assert getattr(one, name).tobytes() == getattr(eight, name).tobytes(), name
+
+
+@pytest.mark.skipif(_jit.max_threads() < 2, reason="one core")
+def test_any_number_of_threads_gives_the_same() -> None:
+    results = []
+    for count in (1, 2):
+        slots = crowd(0, 10_000, 3.0, np.float32)
+        _jit.use_threads(count)
+        try:
+            Circle(center=(1, 2), radius=10).confine(slots, H, 0.0, 0.08)
+        finally:
+            _jit.use_threads(1)
+        results.append([getattr(slots, name).tobytes() for name in CHANGED])
+    assert results[0] == results[1]
+
+
+@pytest.mark.parametrize("change", ["bouncy wall", "rough wall", "bouncy circle", "circles that rub"])
+def test_circles_that_bounce_or_rub_go_the_long_way(change: str) -> None:
+    slots = crowd(0, 100, 3.0, np.float64)
+    cage = Circle(center=(1, 2), radius=10, restitution=0.5 * (change == "bouncy wall"), friction=0.5 * (change == "rough wall"))
+    if change == "bouncy circle":
+        slots.restitution[:] = slots.most_restitution = 0.5
+    if change == "circles that rub":
+        slots.turn = slots.spin * H
+    smooth = crowd(0, 100, 3.0, np.float64)
+    cage.confine(slots, H, 0.0, 0.08)
+    Circle(center=(1, 2), radius=10).confine(smooth, H, 0.0, 0.08)
+    assert np.isfinite(slots.position).all()
+    if change == "circles that rub":  # nothing rubs at a smooth wall; the angles are kept
+        assert slots.position == pytest.approx(smooth.position)
+    else:
+        assert np.abs(slots.velocity - smooth.velocity).max() > 1e-3
