@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet import checks
+from pyverlet._lanes import LANES
 from pyverlet.constants import REBUILD_PAIRS, SAMPLE, SKIN, SKIN_HOLD, SKIN_LEAST, SKIN_MOST, SKIN_STEP, UNSORTED, WORTH_LOOKING
 from pyverlet.grids import Grids
 from pyverlet.kernels import pairs as kernels
@@ -266,9 +267,9 @@ class _SortedCells(BroadPhase):
         while True:
             first = held * self._room
             # Not kept: half as much again as the list itself, which is made anew less than once a frame.
-            raw_i, raw_j = (np.empty(self._room * len(state), np.uint32) for _ in range(2))
-            colour = np.empty(len(raw_i), np.uint8)
-            spot, used = np.empty((len(state), 3), state.dtype), np.empty(len(state), np.int32)
+            raw_i, raw_j = (np.empty(int(first[-1]) + LANES * len(rows), np.uint32) for _ in range(2))
+            colour = np.empty(int(first[-1]), np.uint8)
+            spot, used = np.empty((3, len(state) + LANES), state.dtype), np.empty(len(state), np.int32)
             kernels.list_pairs(
                 state.position, state.radius, cells.order, cells.levels, cells.start, rows, first, skin,
                 picky, state.category, state.mask, state.inverse_mass,

@@ -10,9 +10,11 @@ import pytest
 from pyverlet._jit import kernel
 from pyverlet._lanes import (
     LANES,
+    count_bits,
     larger,
     load,
     load_rows,
+    lowest_bit,
     pick,
     place,
     put,
@@ -23,6 +25,8 @@ from pyverlet._lanes import (
     take,
     where_zero,
     which_above,
+    write_all,
+    write_chosen,
 )
 
 DTYPES = [np.float32, np.float64]
@@ -92,3 +96,28 @@ def test_rows_and_numbers_come_lane_by_lane(dtype: Any) -> None:
     assert numbers.tobytes() == expected.tobytes()
     bits = (points[:, 0] > dtype(0.3)).reshape(3, LANES)
     assert above.tolist() == [sum(1 << lane for lane in np.flatnonzero(row)) for row in bits]
+
+
+@kernel
+def _sift(numbers: Any, limit: Any, found: Any, of: Any, lowest: Any) -> int:
+    count = 0
+    for k in range(0, numbers.shape[0], LANES):
+        above = which_above(load(numbers, k), spread(limit))
+        write_chosen(found, count, above, k)
+        write_all(of, count, k)
+        lowest[k // LANES] = lowest_bit(above)
+        count += count_bits(above)
+    return count
+
+
+def test_lanes_are_chosen_by_bits() -> None:
+    # Each of the 256 ways to choose among eight comes up among 4,096 packs, but for one with probability 256 exp(-16).
+    numbers = np.random.default_rng(3).normal(0, 1, 4096 * LANES)
+    found, of = (np.zeros(len(numbers) + LANES, np.uint32) for _ in range(2))
+    expected = np.flatnonzero(numbers > 0)
+    lowest = np.zeros(4096, np.int64)
+    assert _sift(numbers, 0.0, found, of, lowest) == len(expected)
+    rows = (numbers > 0).reshape(-1, LANES)
+    assert lowest[rows.any(axis=1)].tolist() == rows[rows.any(axis=1)].argmax(axis=1).tolist()
+    assert found[: len(expected)].tolist() == expected.tolist()
+    assert of[: len(expected)].tolist() == (expected // LANES * LANES).tolist()

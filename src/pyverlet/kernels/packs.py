@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet._lanes import LANES, larger, load, put, smaller, spread, square_root, store, take, where_zero, which_above
+from pyverlet._lanes import ALL, LANES, larger, load, put, smaller, spread, square_root, store, take, where_zero, which_above
 from pyverlet.constants import PUSHED
 
 # Golden angle, rad: coincident centres part in directions spread evenly over the circle.
@@ -34,13 +34,13 @@ _ASIDE = 1e-6
 
 
 @kernel
-def _choose(pair_i, pair_j, used, number, chosen):
-    """Which pair stands in each lane: chosen[lane]; returns how many lanes there are, also beyond the room.
+def _choose(pair_i, pair_j, used, number, lane_i, lane_j):
+    """Which pair stands in each lane; returns how many lanes there are, also beyond the room.
 
     Pairs are taken in their order. One that shares a particle with the pack waits for the next: around a large circle many do.
     used[i]: the last pack of particle i, by a number that no other strip gives; this strip's are `number` and up.
     """
-    pairs, room, k, lanes = pair_i.shape[0], chosen.shape[0], 0, 0
+    pairs, room, k, lanes = pair_i.shape[0], lane_i.shape[0], 0, 0
     waiting, waits = np.empty(pairs, np.int64), 0
     while k < pairs or waits > 0:
         pack, end, last = number + lanes // LANES, lanes + LANES, 0
@@ -57,7 +57,8 @@ def _choose(pair_i, pair_j, used, number, chosen):
                 used[j] = pack
                 last = p
                 if lanes < room:
-                    chosen[lanes] = p
+                    lane_i[lanes] = i
+                    lane_j[lanes] = j
                 lanes += 1
             else:
                 waiting[left] = p
@@ -72,23 +73,28 @@ def _choose(pair_i, pair_j, used, number, chosen):
             w += 1
         waits = left
         for lane in range(lanes, min(end, room)):
-            chosen[lane] = last
+            lane_i[lane] = pair_i[last]
+            lane_j[lane] = pair_j[last]
         lanes = end
     return lanes
 
 
 @kernel
-def _fill(origin, pair_i, pair_j, chosen, lane_i, lane_j, gap_x, gap_y):
-    for lane in range(chosen.shape[0]):
-        i, j = pair_i[chosen[lane]], pair_j[chosen[lane]]
-        dx, dy = origin[j, 0] - origin[i, 0], origin[j, 1] - origin[i, 1]
-        if dx == 0 and dy == 0:
-            angle = _GOLDEN_ANGLE * (i + j)
-            dx, dy = origin.dtype.type(_ASIDE * np.cos(angle)), origin.dtype.type(_ASIDE * np.sin(angle))
-        lane_i[lane] = i
-        lane_j[lane] = j
-        gap_x[lane] = dx
-        gap_y[lane] = dy
+def _measure(origin, lane_i, lane_j, gap_x, gap_y):
+    """From i to j of every lane, m; of coincident ones a hair in a direction of their own."""
+    zero = spread(origin.dtype.type(0))
+    for k in range(0, lane_i.shape[0], LANES):
+        xi, yi = take(origin, lane_i, k)
+        xj, yj = take(origin, lane_j, k)
+        dx, dy = xj - xi, yj - yi
+        store(gap_x, k, dx)
+        store(gap_y, k, dy)
+        if which_above(larger(dx * dx, dy * dy), zero) != ALL:
+            for lane in range(k, k + LANES):
+                if gap_x[lane] == 0 and gap_y[lane] == 0:
+                    angle = _GOLDEN_ANGLE * (lane_i[lane] + lane_j[lane])
+                    gap_x[lane] = _ASIDE * np.cos(angle)
+                    gap_y[lane] = _ASIDE * np.sin(angle)
 
 
 @parallel_kernel
@@ -104,13 +110,10 @@ def pack(origin, first, count, pair_i, pair_j, used, begin, lanes, lane_i, lane_
             s = 2 * half + parity
             a, b = first[s], first[s] + count[s]
             low, high = begin[s], begin[s + 1]
-            chosen = np.empty(high - low, np.int64)
-            lanes[s] = _choose(pair_i[a:b], pair_j[a:b], used, low, chosen)
-            high = low + min(lanes[s], high - low)
-            _fill(
-                origin, pair_i[a:b], pair_j[a:b], chosen[: high - low], lane_i[low:high], lane_j[low:high],
-                gap[0, low:high], gap[1, low:high],
-            )  # fmt: skip
+            lanes[s] = _choose(pair_i[a:b], pair_j[a:b], used, low, lane_i[low:high], lane_j[low:high])
+            if lanes[s] <= high - low:
+                high = low + lanes[s]
+                _measure(origin, lane_i[low:high], lane_j[low:high], gap[0, low:high], gap[1, low:high])
 
 
 @parallel_kernel

@@ -13,14 +13,10 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet._jit import kernel, parallel_kernel, prange
+from pyverlet._lanes import LANES, count_bits, load, lowest_bit, spread, which_above, write_all, write_chosen
 from pyverlet.constants import COLOURS, COLUMNS, ROUNDING
 from pyverlet.kernels.grid import before_row, cell_number
 
-# Number of the lowest bit of a power of two of 32 bits, by its product with a de Bruijn sequence.
-_DE_BRUIJN = 0x077CB531
-_BIT = np.zeros(32, np.int64)
-for _k in range(32):
-    _BIT[((_DE_BRUIJN << _k) & 0xFFFFFFFF) >> 27] = _k
 _ALL = (1 << COLOURS) - 1
 
 
@@ -34,16 +30,26 @@ def _accept(category, mask, inverse_mass, a, b):
 
 
 @kernel
+def _accepted(near, category, mask, inverse_mass, order, a, b):
+    """Those of the lanes `near`, of the places from b on, that are accepted for place a."""
+    for lane in range(LANES):
+        bit = 1 << lane
+        if near & bit != 0 and not _accept(category, mask, inverse_mass, order[a], order[b + lane]):
+            near -= bit
+    return near
+
+
+@kernel
 def _runs_of_smaller(spot, a, level, row0, row1, levels, start, skin, low, end, runs):
     """Add to the runs of places (low, end) those near place a of levels with smaller cells, in the rows row0 to row1 of level 0.
 
     From the larger to the smaller: what is near a large circle stands around it, and inside of it the rows are empty.
     """
-    x, y = spot[a, 0] - levels.x0, spot[a, 1] - levels.y0
+    x, y = spot[0, a] - levels.x0, spot[1, a] - levels.y0
     zero, one = spot.dtype.type(0), spot.dtype.type(1)
     for other in range(level + 1, levels.base.shape[0]):
         wide, high, shift = levels.width[other], levels.height[other], levels.shift[other]
-        reach = (spot[a, 2] + levels.largest[other] + skin) * spot.dtype.type(ROUNDING)
+        reach = (spot[2, a] + levels.largest[other] + skin) * spot.dtype.type(ROUNDING)
         first = cell_number((y - reach) * levels.along[other], high)
         last = cell_number((y + reach) * levels.along[other], high)
         tall = one / levels.along[other]
@@ -86,7 +92,7 @@ def _list_strip(spot, order, row0, row1, levels, start, skin, picky, category, m
                 runs = 0
                 if here:
                     # The rest of this row, and the row above, from COLUMNS to the left to COLUMNS to the right.
-                    column = cell_number((spot[a, 0] - levels.x0) * across, wide)
+                    column = cell_number((spot[0, a] - levels.x0) * across, wide)
                     left, right = max(column - COLUMNS, 0), min(column + COLUMNS, wide - 1) + 1
                     low[0], end[0] = a + 1, start[this + right]
                     runs = 1
@@ -96,20 +102,17 @@ def _list_strip(spot, order, row0, row1, levels, start, skin, picky, category, m
                 if level < last:
                     top = levels.height[0] if here else row1
                     runs = _runs_of_smaller(spot, a, level, row0, top, levels, start, skin, low, end, runs)
-                x, y, reach_a = spot[a, 0], spot[a, 1], spot[a, 2] + skin
+                x, y, reach_a = spread(spot[0, a]), spread(spot[1, a]), spread(spot[2, a] + skin)
                 for run in range(runs):
-                    for b in range(low[run], end[run]):
-                        dx = spot[b, 0] - x
-                        dy = spot[b, 1] - y
-                        reach = reach_a + spot[b, 2]
-                        # Written whether or not it counts: an unpredictable branch costs more than the store.
-                        if found < raw_i.shape[0]:
-                            raw_i[found] = a
-                            raw_j[found] = b
-                        near = dx * dx + dy * dy < reach * reach
+                    for b in range(low[run], end[run], LANES):
+                        dx, dy, reach = load(spot[0], b) - x, load(spot[1], b) - y, load(spot[2], b) + reach_a
+                        near = which_above(reach * reach, dx * dx + dy * dy) & ((1 << min(end[run] - b, LANES)) - 1)
                         if picky:
-                            near &= _accept(category, mask, inverse_mass, order[a], order[b])
-                        found += near
+                            near = _accepted(near, category, mask, inverse_mass, order, a, b)
+                        if found + LANES <= raw_i.shape[0]:
+                            write_all(raw_i, found, a)
+                            write_chosen(raw_j, found, near, b)
+                        found += count_bits(near)
     return found
 
 
@@ -130,9 +133,9 @@ def _colour_strip(used, raw_i, raw_j, found, colour, begin):
         lowest = free & -free
         used[i] |= lowest
         used[j] |= lowest
-        c = _BIT[((lowest * _DE_BRUIJN) & 0xFFFFFFFF) >> 27] if free != 0 else p % COLOURS
+        c = lowest_bit(free) if free != 0 else p % COLOURS
         colour[p] = c
-        begin[c + 1] += 1
+        begin[c + 1] += np.uint32(1)
     for c in range(COLOURS):
         begin[c + 1] += begin[c]
 
@@ -144,15 +147,15 @@ def _fill_strip(
 ):  # fmt: skip
     """What `list_pairs` does, for a strip of the rows row0 to row1, into its own part of the arrays."""
     found = _list_strip(spot, order, row0, row1, levels, start, skin, picky, category, mask, inverse_mass, raw_i, raw_j)
-    if found <= raw_i.shape[0]:
+    if found <= pair_i.shape[0]:
         _forget_colours(used, row0, row1 + 1, levels, start)
-        begin = np.empty(COLOURS + 1, np.int64)
+        begin = np.empty(COLOURS + 1, np.uint32)
         _colour_strip(used, raw_i, raw_j, found, colour, begin)
         for p in range(found):
-            c = colour[p]
-            pair_i[begin[c]] = order[raw_i[p]]
-            pair_j[begin[c]] = order[raw_j[p]]
-            begin[c] += 1
+            to = begin[colour[p]]
+            begin[colour[p]] += np.uint32(1)
+            pair_i[to] = order[raw_i[p]]
+            pair_j[to] = order[raw_j[p]]
     return found
 
 
@@ -165,20 +168,21 @@ def list_pairs(
 
     first has one entry more than there are strips. A strip that needs more room than up to the next reports its full count and
     lists nothing: the caller makes room and calls again, so that no pair is ever dropped. Not `picky`: everyone collides.
-    spot, raw_i, raw_j, colour, used: scratch.
+    spot (3, n + LANES), raw_i, raw_j (LANES a strip more than there is room), colour, used: scratch.
     """
     for k in prange(order.shape[0]):
         i = order[k]
-        spot[k, 0] = position[i, 0]
-        spot[k, 1] = position[i, 1]
-        spot[k, 2] = radius[i]
+        spot[0, k] = position[i, 0]
+        spot[1, k] = position[i, 1]
+        spot[2, k] = radius[i]
     for parity in range(2):
         for half in prange((strip_row.shape[0] - parity) // 2):
             s = 2 * half + parity
             a, b = first[s], first[s + 1]
+            c, d = a + LANES * s, b + LANES * (s + 1)
             count[s] = _fill_strip(
                 order, levels, start, strip_row[s], strip_row[s + 1], skin, picky, category, mask, inverse_mass,
-                spot, raw_i[a:b], raw_j[a:b], colour[a:b], used, pair_i[a:b], pair_j[a:b],
+                spot, raw_i[c:d], raw_j[c:d], colour[a:b], used, pair_i[a:b], pair_j[a:b],
             )  # fmt: skip
 
 
