@@ -124,16 +124,16 @@ class ContactSolver:
             self._uneven = bool(len(free)) and float(free.max()) > UNEVEN * float(free.min())
             self._packed = False
 
-    def _pack(self) -> Packs:
+    def _pack(self, state: Slots) -> Packs:
         if not self._packed:
-            self._packs.take(self.broad_phase.list, self.broad_phase.built)
+            self._packs.take(self.broad_phase.list, self.broad_phase.built, state.radius)
             self._packed = True
         return self._packs
 
     def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
         """Move overlapping circles apart, let impacts bounce, note who touches, and let those grip each other."""
         if self._slides(state):
-            self._pack().project(state, h)
+            self._pack(state).project(state, h)
             return
         pairs, real = self.broad_phase.list, state.real
         pairs.hold_notes()

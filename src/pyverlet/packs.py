@@ -20,13 +20,15 @@ Array = NDArray[Any]
 class Packs:
     """The pairs of one list, packed each time the list is made anew.
 
-    `lane_i`, `lane_j` slots, those of strip s from begin[s] to begin[s] + lanes[s]; `gap` (2, room) from i to j when the list was
-    made, m; `reach`, `share` one for each lane, or (LANES,) if they are the same for all; `normal` (2, room) of touching pairs.
+    `lane_i`, `lane_j` slots, those of strip s from begin[s] to begin[s] + lanes[s], the first close[s] of them likely to touch;
+    `gap` (2, room) from i to j when the list was made, m; `reach`, `share` one for each lane, or (LANES,) if they are the same
+    for all; `normal` (2, room) of touching pairs.
     """
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self._dtype = dtype
-        self.begin, self.lanes = np.zeros(1, np.int64), np.zeros(0, np.int64)
+        self.begin = np.zeros(1, np.int64)
+        self.lanes = self.close = np.zeros(0, np.int64)
         self._make_room(0)
         self._cut = np.zeros((2, 2), np.int64)
         self.origin = self._moved = np.empty((0, 2), dtype)
@@ -37,18 +39,18 @@ class Packs:
         self.lane_i, self.lane_j = np.empty(lanes, np.uint32), np.empty(lanes, np.uint32)
         self.gap, self.normal = np.empty((2, lanes), self._dtype), np.empty((2, lanes), self._dtype)
 
-    def take(self, pairs: PairList, origin: Array) -> None:
-        """Pack a new list; origin: (n, 2) positions it was made from."""
+    def take(self, pairs: PairList, origin: Array, radius: Array) -> None:
+        """Pack a new list; origin: (n, 2) positions it was made from; radius: (n,) m."""
         # A sixteenth more than there are pairs, and a pack for each colour, is nearly always enough.
         need = pairs.count + pairs.count // 16 + COLOURS * LANES
-        self.lanes = np.empty(len(pairs.count), np.int64)
+        self.lanes, self.close = (np.empty(len(pairs.count), np.int64) for _ in range(2))
         used = np.empty(len(origin), np.int64)
         which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
         while True:
             self.begin = np.concatenate(([0], np.cumsum(need)))
             if not self.begin[-1] <= len(self.lane_i) <= 1.5 * self.begin[-1]:
                 self._make_room(int(1.1 * self.begin[-1]))
-            packs.pack(origin, *which, used, self.begin, self.lanes, self.lane_i, self.lane_j, self.gap)
+            packs.pack(origin, radius, *which, used, self.begin, self.lanes, self.close, self.lane_i, self.lane_j, self.gap)
             if (self.lanes <= need).all():
                 break
             need = np.maximum(need, self.lanes)
@@ -86,13 +88,24 @@ class Packs:
         """Move overlapping circles apart and feed their velocities."""
         if self._size is not state.size:
             self._share_out(state)
-        where = (self._parts(), self.begin, self.lanes, self.lane_i, self.lane_j, self.gap, self.reach, self.share, self._varied)
+        where = (
+            self._parts(),
+            self.begin,
+            self.lanes,
+            self.close,
+            self.lane_i,
+            self.lane_j,
+            self.gap,
+            self.reach,
+            self.share,
+            self._varied,
+        )
         settings = (state.real(FED_SMOOTH / PUSHED / h), state.real(LARGEST_PUSH))
         packs.project(state.position, state.velocity, self.origin, self._moved, *where, *settings, self.normal)
 
     def still(self, state: Slots) -> None:
         """Take from touching circles the velocity that projection has put in."""
-        where = (self._parts(), self.begin, self.lanes, self.lane_i, self.lane_j)
+        where = (self._parts(), self.begin, self.lanes, self.close, self.lane_i, self.lane_j)
         packs.still(state.velocity, *where, self.share, self._varied, self.normal)
 
     def mark_resting(self, state: Slots) -> None:

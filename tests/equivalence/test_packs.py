@@ -39,7 +39,7 @@ def packed(slots: Slots, method: Fast | BruteForce) -> tuple[Any, Packs]:
     phase = method.start(slots.dtype)
     phase.update(slots)
     packs = Packs(slots.dtype)
-    packs.take(phase.list, phase.built)
+    packs.take(phase.list, phase.built, slots.radius)
     return phase.list, packs
 
 

@@ -4,7 +4,8 @@ Rows of level 0 of the grids are cut into strips, and each strip lists its candi
 radii plus a skin. Every pair belongs to the strip of the circle in the lower row of level 0, so a strip writes only to its own
 particles and to the lowest row of the next strip: even strips may be solved in parallel, then odd ones.
 
-Inside a strip pairs are ordered by colour: no two pairs of a colour share a particle, so that the processor can overlap them.
+Inside a strip those come first that are close enough to touch soon: the solver makes short work of others that stand together.
+Both kinds are ordered by colour: no two pairs of a colour share a particle, so that the processor can overlap them.
 A circle with more pairs than there are colours has them spread over all colours.
 """
 
@@ -14,10 +15,15 @@ import numpy as np
 
 from pyverlet._jit import kernel, parallel_kernel, prange
 from pyverlet._lanes import LANES, count_bits, load, lowest_bit, spread, which_above, write_all, write_chosen
-from pyverlet.constants import COLOURS, COLUMNS, ROUNDING
+from pyverlet.constants import CLOSE, COLOURS, COLUMNS, ROUNDING
 from pyverlet.kernels.grid import before_row, cell_number
 
 _ALL = (1 << COLOURS) - 1
+
+_LATER = 1 << 31
+"""Set in the second place of a pair that is not close."""
+
+_PLACE = np.uint32(_LATER - 1)
 
 
 @kernel
@@ -79,6 +85,7 @@ def _most_runs(levels):
 def _list_strip(spot, order, row0, row1, levels, start, skin, picky, category, mask, inverse_mass, raw_i, raw_j):
     """Candidate pairs of the rows row0 to row1, as places in the order of the cells; how many there are, also beyond the room."""
     found = 0
+    close = spread(spot.dtype.type(CLOSE))
     last = levels.base.shape[0] - 1
     low, end = np.empty(_most_runs(levels), np.int64), np.empty(_most_runs(levels), np.int64)
     for level in range(last + 1):
@@ -102,17 +109,20 @@ def _list_strip(spot, order, row0, row1, levels, start, skin, picky, category, m
                 if level < last:
                     top = levels.height[0] if here else row1
                     runs = _runs_of_smaller(spot, a, level, row0, top, levels, start, skin, low, end, runs)
-                x, y, reach_a = spread(spot[0, a]), spread(spot[1, a]), spread(spot[2, a] + skin)
+                x, y, radius, margin = spread(spot[0, a]), spread(spot[1, a]), spread(spot[2, a]), spread(skin)
                 for run in range(runs):
                     for b in range(low[run], end[run], LANES):
-                        dx, dy, reach = load(spot[0], b) - x, load(spot[1], b) - y, load(spot[2], b) + reach_a
-                        near = which_above(reach * reach, dx * dx + dy * dy) & ((1 << min(end[run] - b, LANES)) - 1)
+                        dx, dy, reach = load(spot[0], b) - x, load(spot[1], b) - y, load(spot[2], b) + radius
+                        square, listed, soon = dx * dx + dy * dy, reach + margin, reach * close
+                        near = which_above(listed * listed, square) & ((1 << min(end[run] - b, LANES)) - 1)
                         if picky:
                             near = _accepted(near, category, mask, inverse_mass, order, a, b)
-                        if found + LANES <= raw_i.shape[0]:
-                            write_all(raw_i, found, a)
-                            write_chosen(raw_j, found, near, b)
-                        found += count_bits(near)
+                        soon_bits = near & which_above(soon * soon, square)
+                        for bits, mark in ((soon_bits, 0), (near - soon_bits, _LATER)):
+                            if found + LANES <= raw_i.shape[0]:
+                                write_all(raw_i, found, a)
+                                write_chosen(raw_j, found, bits, b + mark)
+                            found += count_bits(bits)
     return found
 
 
@@ -125,18 +135,21 @@ def _forget_colours(used, row0, row1, levels, start):
 
 @kernel
 def _colour_strip(used, raw_i, raw_j, found, colour, begin):
-    """Give each pair the lowest colour that neither of its circles has; begin[c]: pairs of the colours before c."""
+    """Give each pair the lowest colour that neither of its circles has; begin[c]: pairs of the colours before c.
+
+    Those that are not close have the colours from COLOURS on.
+    """
     begin[:] = 0
     for p in range(found):
-        i, j = raw_i[p], raw_j[p]
+        i, j = raw_i[p], raw_j[p] & _PLACE
         free = ~np.int64(used[i] | used[j]) & _ALL
         lowest = free & -free
         used[i] |= lowest
         used[j] |= lowest
-        c = lowest_bit(free) if free != 0 else p % COLOURS
+        c = (lowest_bit(free) if free != 0 else p % COLOURS) + (COLOURS if raw_j[p] > _PLACE else 0)
         colour[p] = c
         begin[c + 1] += np.uint32(1)
-    for c in range(COLOURS):
+    for c in range(2 * COLOURS):
         begin[c + 1] += begin[c]
 
 
@@ -149,13 +162,13 @@ def _fill_strip(
     found = _list_strip(spot, order, row0, row1, levels, start, skin, picky, category, mask, inverse_mass, raw_i, raw_j)
     if found <= pair_i.shape[0]:
         _forget_colours(used, row0, row1 + 1, levels, start)
-        begin = np.empty(COLOURS + 1, np.uint32)
+        begin = np.empty(2 * COLOURS + 1, np.uint32)
         _colour_strip(used, raw_i, raw_j, found, colour, begin)
         for p in range(found):
             to = begin[colour[p]]
             begin[colour[p]] += np.uint32(1)
             pair_i[to] = order[raw_i[p]]
-            pair_j[to] = order[raw_j[p]]
+            pair_j[to] = order[raw_j[p] & _PLACE]
     return found
 
 
