@@ -20,10 +20,11 @@ def swirl(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tu
     return -1e-3 * y, 1e-3 * x
 
 
-def ratio(particles: int, frames: int, seconds: float) -> tuple[float, float, float]:
+def ratio(particles: int, frames: int, seconds: float, threads: int | None) -> tuple[float, float, float]:
     """Median milliseconds of a frame without and with the force, and the median of the ratios of neighbouring frames."""
     worlds = [pv.scenes.get("cage").world(particles=particles) for _ in range(2)]
     for world in worlds:
+        world.threads = threads
         world.run(seconds=seconds, dt=DT)
     worlds[1].forces.append(swirl)
     times: list[list[float]] = [[], []]
@@ -42,9 +43,10 @@ def main() -> None:
     parser.add_argument("--particles", type=int, nargs="+", default=[10_000, 100_000])
     parser.add_argument("--frames", type=int, default=60, help="frames measured of each world")
     parser.add_argument("--seconds", type=float, default=0.0, help="simulated before: 0 in the air, 10 a heap of 20,000")
+    parser.add_argument("--threads", type=int, help="as many as pay off unless said otherwise; 1 on a busy machine")
     arguments = parser.parse_args()
     for particles in arguments.particles:
-        without, with_force, costs = ratio(particles, arguments.frames, arguments.seconds)
+        without, with_force, costs = ratio(particles, arguments.frames, arguments.seconds, arguments.threads)
         print(f"{particles:>9,} circles: {without:.2f} ms a frame without, {with_force:.2f} ms with, ratio {costs:.2f}")
 
 

@@ -1,4 +1,4 @@
-"""The only place that calls numba: how kernels are compiled, cached and counted.
+"""How kernels are compiled, cached and counted.
 
 Numba's disk cache looks at the file a kernel stands in and misses an edit in another file whose function was inlined.
 The cache folder is therefore named after a hash of all sources of kernels (and Numba's version): any edit starts a fresh one.
@@ -10,7 +10,6 @@ import contextlib
 import functools
 import hashlib
 import os
-import re
 import shutil
 import sys
 import tempfile
@@ -19,10 +18,9 @@ import time
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numba
-import numpy as np
 from numba.core import event as numba_event
 
 from pyverlet import _entry
@@ -233,79 +231,3 @@ def watch_compiling(started: Callable[[], None]) -> Iterator[None]:
         "numba:compile", _CompileListener({kernel.function for kernel in KERNELS.values()}, started)
     ):
         yield
-
-
-class NotCompiled(Exception):  # noqa: N818  (the caller says whose code it was)
-    """A user's function cannot be compiled, or not to what was asked for; the message says why, as the end of a sentence."""
-
-
-class Native(NamedTuple):
-    """A user's function of float64 numbers in compiled form."""
-
-    pointer: Any
-    """For kernels: of one type for all functions with as many arguments and results, so that no kernel is compiled anew."""
-    call: Any
-    """For Python, with the exceptions it raises."""
-
-
-def native(function: Callable[..., Any], arguments: int, results: int) -> Native:
-    """Compile a user's function of 6 numbers that returns 2, or of 3 that returns 1. Where it raises, the pointer returns NaN.
-
-    Raises:
-        NotCompiled: it does not compile, or returns something else.
-    """
-    real = numba.float64
-    compiled = numba.njit(nogil=True, error_model="numpy")(function)
-    try:
-        compiled.compile((real,) * arguments)
-    except Exception as error:  # the compiler raises all kinds
-        raise NotCompiled(f"does not compile: {_reason(str(error))}") from error
-    (overload,) = compiled.overloads.values()
-    returned = overload.signature.return_type
-    parts = list(returned) if isinstance(returned, numba.types.BaseTuple) else [returned]
-    if len(parts) != results or not all(
-        isinstance(part, numba.types.Integer | numba.types.Float | numba.types.Boolean) for part in parts
-    ):
-        raise NotCompiled(f"returns {_plain(returned)}")
-
-    # No star in the arguments of a pointer, and no conversion between a number and a tuple of one: a guard for each shape.
-    if results == 1:
-
-        def guard(a: float, b: float, c: float) -> Any:
-            try:
-                return real(compiled(a, b, c))
-            except Exception:
-                return np.nan
-    else:
-
-        def guard(a: float, b: float, c: float, d: float, e: float, f: float) -> Any:  # type: ignore[misc]
-            try:
-                x, y = compiled(a, b, c, d, e, f)
-            except Exception:
-                return np.nan, np.nan
-            return real(x), real(y)
-
-    gives = real if results == 1 else numba.types.UniTuple(real, 2)
-    return Native(numba.cfunc(gives(*(real,) * arguments))(guard), compiled)
-
-
-def _reason(message: str) -> str:
-    """What the compiler means, out of the pages it writes: its first telling line, and where."""
-    lines = [line.strip() for line in message.splitlines() if line.strip() and not line.startswith("Failed in")]
-    says = lines[0].removesuffix(" found for signature:")
-    if says != lines[0]:
-        says += " for " + next((line.removeprefix(">>> ") for line in lines if line.startswith(">>> ")), "these arguments")
-    says = re.sub(r"Function\(<(.*?)>\)", r"\1", says).split(" Raised from ")[0].rstrip(".:")
-    where = re.findall(r"line (\d+):", message)
-    return f"{says} (line {where[-1]})" if where else says
-
-
-def _plain(returned: Any) -> str:
-    """A type in words that a user of Python knows."""
-    if isinstance(returned, numba.types.Optional):
-        return "None on some of its ways"
-    if isinstance(returned, numba.types.NoneType):
-        return "None"
-    if isinstance(returned, numba.types.BaseTuple):
-        return f"a tuple of {len(returned)}, {returned}"
-    return f"one number, {returned}" if isinstance(returned, numba.types.Number) else str(returned)

@@ -17,7 +17,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from pyverlet.kernels import motion
-from pyverlet.state import Slots, advance, kick_drift
+from pyverlet.state import Slots, advance
 
 
 class Forces(Protocol):
@@ -30,8 +30,11 @@ class Forces(Protocol):
     def __call__(self, state: Slots, t: float) -> None:
         """Evaluate."""
 
-    def kick_drift(self, state: Slots, t: float, h: float) -> None:
-        """Evaluate, then velocity += h * acceleration, then position += h * velocity."""
+    def kick_drift(self, state: Slots, t: float, h: float, ahead: float = 0.0) -> None:
+        """Evaluate, then velocity += h * acceleration, then position += h * velocity.
+
+        `ahead`: seconds by which the velocity has been kicked for the forces to see; what that was is taken back first.
+        """
 
 
 class Integrator(ABC):
@@ -153,15 +156,11 @@ class _Stormer(Integrator):
         advance(state.velocity, state.velocity, state.acceleration, -0.5 * (h if h_last is None else h_last))
 
     def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
-        if forces.velocity_dependent:
-            # Forces that look at the velocity get the one at time t, not the one half a substep behind.
-            _kick(state, 0.5 * h)
-            _swap_acceleration(state)
-            forces(state, t)
-            advance(state.velocity, state.velocity, state.scratch(0), -0.5 * h)
-            kick_drift(state, h)
-        else:
-            forces.kick_drift(state, t, h)
+        # Forces that look at the velocity get the one at time t, not the one half a substep behind.
+        ahead = 0.5 * h if forces.velocity_dependent else 0.0
+        if ahead:
+            _kick(state, ahead)
+        forces.kick_drift(state, t, h, ahead)
 
     def end(self, state: Slots, h: float) -> None:
         motion.clear_where(state.acceleration, state.resting)

@@ -362,16 +362,17 @@ def advance(out: Array, base: Array, slope: Array, h: float) -> None:
     _light(motion.advance, out)(out, base, slope, out.dtype.type(h))
 
 
-def kick_drift(state: Slots, h: float) -> None:
-    """velocity += h * acceleration, then position += h * velocity."""
-    _light(motion.kick_drift, state.position)(state.position, state.velocity, state.acceleration, state.real(h))
+def newton(state: Slots, force: Array, gravity: tuple[float, float]) -> float:
+    """acceleration = gravity + force / mass; force: (n, 2), or (0, 2) for none. Returns the largest of them, m/s^2."""
+    numbers = state.real(gravity[0]), state.real(gravity[1])
+    return float(_light(motion.newton, state.position)(state.acceleration, force, state.inverse_mass, *numbers))
 
 
-def fall(state: Slots, gravity: tuple[float, float], h: float) -> None:
-    """`kick_drift` where gravity alone acts, which becomes everyone's acceleration."""
-    real = state.real
-    numbers = real(gravity[0]), real(gravity[1]), real(h)
-    _light(motion.fall, state.position)(state.position, state.velocity, state.acceleration, state.inverse_mass, *numbers)
+def newton_kick_drift(state: Slots, force: Array, gravity: tuple[float, float], h: float, ahead: float) -> float:
+    """Take back a kick of `ahead` seconds; `newton`; velocity += h * acceleration; position += h * velocity."""
+    where = state.position, state.velocity, state.acceleration, force, state.inverse_mass
+    numbers = state.real(gravity[0]), state.real(gravity[1]), state.real(h), state.real(ahead)
+    return float(_light(motion.newton_kick_drift, state.position)(*where, *numbers))
 
 
 def strayed(position: Array, reference: Array, distance: float) -> bool:

@@ -127,7 +127,7 @@ class World(Measures, Queries, Doors):
             for part in parts:
                 part.before(state, h)
             integrator.step(state, forces, self.time + substep * h, h)
-            strongest = forces.strongest(state)
+            strongest = forces.strongest
             done("integrate")
             if contacts:
                 contacts.find(state, lag)

@@ -102,15 +102,34 @@ def test_float32_worlds_take_them_too() -> None:
     assert ball.velocity[0, 1] == pytest.approx(0.5 / 60, rel=1e-3)
 
 
-def test_many_particles_give_the_same_bits_on_all_threads() -> None:
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_many_particles_give_the_same_bits_on_all_threads(dtype: Any) -> None:
     rng = np.random.default_rng(0)
-    position = rng.normal(0, 100, (40_000, 2))
-    worlds = [world_with(swirl, threads=threads) for threads in (1, None)]
+    position, mass = rng.normal(0, 100, (40_001, 2)), np.where(np.arange(40_001) % 7, 2.0, np.inf)
+    worlds = [pv.World(gravity=(0, 0), collisions=None, dtype=dtype, threads=threads) for threads in (1, None)]
     for world in worlds:
-        world.add(position=position, radius=0.01)
+        world.forces.append(swirl)
+        world.add(position=position, radius=0.01, mass=mass)
         world.step(1 / 60)
     assert worlds[0].state_hash() == worlds[1].state_hash()
-    assert worlds[0].velocity[:, 0] == pytest.approx(-0.5 / 60 * position[:, 1], abs=1e-3)
+    assert worlds[0].velocity[:, 0] == pytest.approx(-0.5 / 60 * position[:, 1] / mass, abs=2e-3)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_the_largest_acceleration_of_all_is_known(dtype: Any) -> None:
+    # Walls and impacts ask for it: an approach slower than a few times |a| h is rest.
+    rng = np.random.default_rng(0)
+    world = pv.World(gravity=(3.0, -4.0), collisions=None, dtype=dtype)
+    position, mass = rng.normal(0, 100, (10_001, 2)), rng.uniform(1, 2, 10_001)
+    mass[::5] = np.inf
+    world.add(position=position, radius=0.01, mass=mass)
+    world.step(1e-6)
+    assert world._force_sum.strongest == pytest.approx(5.0, rel=1e-6)
+    world.forces.append(swirl)
+    world.step(1e-6)
+    pull = np.where(np.isinf(mass)[:, None], 0, (3.0, -4.0) + 0.5 * position[:, ::-1] * (-1, 1) / mass[:, None])
+    assert world._state.acceleration == pytest.approx(pull, rel=1e-5, abs=1e-4)
+    assert world._force_sum.strongest == pytest.approx(np.hypot(*pull.T).max(), rel=1e-5)
 
 
 # ---- what is wrong with a function is said in one sentence with its name, file and line --------------------------------------

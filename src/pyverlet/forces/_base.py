@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import Any, Protocol, runtime_checkable
 
-import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.kernels import motion
-from pyverlet.state import Slots, State, fall, kick_drift
+from pyverlet.state import Slots, State, newton, newton_kick_drift
 
 
 @runtime_checkable
@@ -41,40 +39,33 @@ class ForceSum:
     Args:
         gravity: (x, y), m/s^2.
         forces: the world's list, read anew at each evaluation.
+
+    Attributes:
+        strongest: the largest acceleration that anyone has felt in the last evaluation, m/s^2.
     """
 
     def __init__(self, gravity: tuple[float, float], forces: list[Any]) -> None:
         self.gravity = gravity
         self.forces = forces
-        self._strength = gravity, float(np.hypot(*gravity))
+        self.strongest = 0.0
 
     @property
     def velocity_dependent(self) -> bool:
         """Whether any of the forces may look at the velocity."""
         return bool(self.forces) and any(getattr(force, "velocity_dependent", True) for force in self.forces)
 
-    def strongest(self, state: Slots) -> float:
-        """The largest acceleration that anyone has felt in the last evaluation, m/s^2."""
-        if self.forces:
-            return float(motion.largest_norm(state.acceleration))
-        if self._strength[0] != self.gravity:
-            self._strength = self.gravity, float(np.hypot(*self.gravity))
-        return self._strength[1]
-
     def __call__(self, state: Slots, t: float) -> None:
-        gx, gy = state.real(self.gravity[0]), state.real(self.gravity[1])
+        self.strongest = newton(state, self._summed(state, t), self.gravity)
+
+    def kick_drift(self, state: Slots, t: float, h: float, ahead: float = 0.0) -> None:
+        """Evaluate, take back a kick of `ahead` seconds, then velocity += h * acceleration, then position += h * velocity."""
+        self.strongest = newton_kick_drift(state, self._summed(state, t), self.gravity, h, ahead)
+
+    def _summed(self, state: Slots, t: float) -> NDArray[Any]:
+        """The sum of all forces but gravity (n, 2), N; (0, 2) if there are none."""
         if not self.forces:
-            motion.uniform_acceleration(state.acceleration, state.inverse_mass, gx, gy)
-            return
-        state.force[:] = 0
+            return state.force[:0]
+        state.force.fill(0)
         for force in self.forces:
             force.apply(state, t)
-        motion.newton(state.acceleration, state.force, state.inverse_mass, gx, gy)
-
-    def kick_drift(self, state: Slots, t: float, h: float) -> None:
-        """Evaluate, then velocity += h * acceleration, then position += h * velocity."""
-        if not self.forces:
-            fall(state, self.gravity, h)
-            return
-        self(state, t)
-        kick_drift(state, h)
+        return state.force

@@ -10,7 +10,7 @@ from typing import Any, NoReturn, overload
 
 import numpy as np
 
-from pyverlet import _jit
+from pyverlet._native import Native, NotCompiled
 from pyverlet.constants import SERIAL_BELOW
 from pyverlet.errors import InputError, NonFiniteError
 from pyverlet.kernels import forces
@@ -42,7 +42,7 @@ class FunctionForce:
             NonFiniteError: it returned NaN or infinity.
         """
         call = forces.call if len(state) >= SERIAL_BELOW else forces.call.alone
-        if call(self._code.native().pointer, state.force, state.position, state.velocity, state.mass, float(t)):
+        if call(self._code.native().force(state.dtype), state.force, state.position, state.velocity, state.mass, float(t)):
             self._blame(state, t)
 
     def _blame(self, state: Slots, t: float) -> None:
@@ -76,7 +76,7 @@ class ConservativeFunctionForce(FunctionForce):
 
     def potential(self, state: State) -> float:
         """Sum of the potential over all free particles, J."""
-        return float(forces.call_potential(self._potential.native().pointer, state.position, state.mass))
+        return float(forces.call_potential(self._potential.native().potential, state.position, state.mass))
 
 
 class _Code:
@@ -93,7 +93,7 @@ class _Code:
         takes = inspect.signature(self.function).parameters.values()
         if len(takes) != self._count or any(p.kind not in (p.POSITIONAL_OR_KEYWORD, p.POSITIONAL_ONLY) for p in takes):
             raise InputError(f"{self.name} takes ({', '.join(map(str, takes))}); allowed are the arguments ({arguments})")
-        self._native: _jit.Native | None = None
+        self._native: Native | None = None
 
     def names(self, *which: int) -> bool:
         """Whether the function's code names one of these of its arguments."""
@@ -104,12 +104,12 @@ class _Code:
             if isinstance(step.argval, str | tuple)
         )
 
-    def native(self) -> _jit.Native:
+    def native(self) -> Native:
         """The compiled form, kept. Raises InputError if there is none."""
         if self._native is None:
             try:
-                self._native = _jit.native(self.function, self._count, 2 if self._returns.startswith("two") else 1)
-            except _jit.NotCompiled as error:
+                self._native = Native(self.function, self._count, 2 if self._returns.startswith("two") else 1)
+            except NotCompiled as error:
                 raise InputError(f"{self.name} {error}; allowed is numeric code that returns {self._returns}") from None
         return self._native
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet._jit import kernel, parallel_kernel, prange
+from pyverlet._lanes import larger_finite
 
 _ONE = np.uint64(1)
 
@@ -24,60 +25,64 @@ def advance(out, base, slope, h):
         to[k] = start[k] + h * rate[k]
 
 
-@parallel_kernel
-def kick_drift(position, velocity, acceleration, h):
+@kernel
+def _kick_drift(position, velocity, acceleration, h):
     """v += h a, then x += h v: both moves in one pass over the memory."""
     x, v, a = position.reshape(-1), velocity.reshape(-1), acceleration.reshape(-1)
-    for k in prange(x.shape[0]):
+    for k in range(x.shape[0]):
         kicked = v[k] + h * a[k]
         v[k] = kicked
         x[k] = x[k] + h * kicked
 
 
 @kernel
-def uniform_acceleration(acceleration, inverse_mass, gx, gy):
-    """a = g for every free particle, 0 for a pinned one."""
-    a = acceleration.reshape(-1)
+def _newton(acceleration, force, inverse_mass, gx, gy):
+    """`newton`; returns the square of the largest acceleration."""
+    a, f = acceleration.reshape(-1), force.reshape(-1)
     zero = gx - gx
-    for i in range(inverse_mass.shape[0]):
-        free = inverse_mass[i] > zero
-        a[2 * i] = gx if free else zero
-        a[2 * i + 1] = gy if free else zero
+    largest = zero
+    if f.shape[0] == 0:
+        for k in range(inverse_mass.shape[0]):
+            i = np.uint64(2 * k)
+            free = inverse_mass[np.uint64(k)] > zero
+            a[i] = gx if free else zero
+            a[i + _ONE] = gy if free else zero
+        return gx * gx + gy * gy
+    for k in range(inverse_mass.shape[0]):
+        i = np.uint64(2 * k)
+        w = inverse_mass[np.uint64(k)]
+        # Computed before it is known whether it counts: a load that may not happen is not vectorised.
+        ax, ay = gx + f[i] * w, gy + f[i + _ONE] * w
+        free = w > zero
+        ax, ay = ax if free else zero, ay if free else zero
+        a[i], a[i + _ONE] = ax, ay
+        largest = larger_finite(largest, ax * ax + ay * ay)
+    return largest
 
 
 @parallel_kernel
-def fall(position, velocity, acceleration, inverse_mass, gx, gy, h):
-    """A substep under gravity alone: a = g for every free particle, v += h a, x += h v."""
-    x, v, a = position.reshape(-1), velocity.reshape(-1), acceleration.reshape(-1)
-    zero = gx - gx
-    for i in prange(inverse_mass.shape[0]):
-        free = inverse_mass[i] > zero
-        a[2 * i] = gx if free else zero
-        a[2 * i + 1] = gy if free else zero
-    for k in prange(x.shape[0]):
-        kicked = v[k] + h * a[k]
-        v[k] = kicked
-        x[k] = x[k] + h * kicked
-
-
-@kernel
 def newton(acceleration, force, inverse_mass, gx, gy):
-    """a = g + F / m for every free particle, 0 for a pinned one (Newton's second law)."""
-    a, f = acceleration.reshape(-1), force.reshape(-1)
-    zero = gx - gx
-    for i in range(inverse_mass.shape[0]):
-        w = inverse_mass[i]
-        free = w > zero
-        a[2 * i] = gx + f[2 * i] * w if free else zero
-        a[2 * i + 1] = gy + f[2 * i + 1] * w if free else zero
+    """a = g + F / m for every free particle, 0 for a pinned one (Newton's second law); returns the largest |a|.
+
+    force: (n, 2), or (0, 2) where gravity alone acts.
+    """
+    largest = gx - gx
+    for block in prange((inverse_mass.shape[0] + _BLOCK - 1) // _BLOCK):
+        a, b = block * _BLOCK, min((block + 1) * _BLOCK, inverse_mass.shape[0])
+        largest = max(largest, _newton(acceleration[a:b], force[a:b], inverse_mass[a:b], gx, gy))
+    return np.sqrt(largest)
 
 
-@kernel
-def largest_norm(vectors):
-    """Largest length among the rows of an (n, 2) array; 0 if there are none."""
-    largest = vectors.dtype.type(0)
-    for i in range(vectors.shape[0]):
-        largest = max(largest, vectors[i, 0] * vectors[i, 0] + vectors[i, 1] * vectors[i, 1])
+@parallel_kernel
+def newton_kick_drift(position, velocity, acceleration, force, inverse_mass, gx, gy, h, ahead):
+    """v -= ahead a with the a of before, `newton`, v += h a, x += h v: block by block, for the caches' sake."""
+    largest = gx - gx
+    for block in prange((inverse_mass.shape[0] + _BLOCK - 1) // _BLOCK):
+        a, b = block * _BLOCK, min((block + 1) * _BLOCK, inverse_mass.shape[0])
+        if ahead != 0:
+            advance(velocity[a:b], velocity[a:b], acceleration[a:b], -ahead)
+        largest = max(largest, _newton(acceleration[a:b], force[a:b], inverse_mass[a:b], gx, gy))
+        _kick_drift(position[a:b], velocity[a:b], acceleration[a:b], h)
     return np.sqrt(largest)
 
 

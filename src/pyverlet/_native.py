@@ -1,0 +1,134 @@
+"""Functions of the user's own in compiled form. Kernels call them by pointers of a fixed type: none is compiled anew for another.
+
+Of a force the pointer is not to the function but to a loop over particles around it. There the compiler puts the function in line
+and takes eight particles at once, where a call for each took five times as long.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import numba
+import numpy as np
+from numba.core import cgutils, types
+from numba.extending import intrinsic
+
+_REAL = types.float64
+_ONE = np.uint64(1)
+
+
+class NotCompiled(Exception):  # noqa: N818  (the caller says whose code it was)
+    """A user's function cannot be compiled, or not to what was asked for; the message says why, as the end of a sentence."""
+
+
+class Native:
+    """A user's function of so many float64 numbers that returns so many, compiled.
+
+    Attributes:
+        call: for Python, with the exceptions it raises.
+
+    Raises:
+        NotCompiled: it does not compile, or returns something else.
+    """
+
+    def __init__(self, function: Callable[..., Any], arguments: int, results: int) -> None:
+        self.call = numba.njit(nogil=True, error_model="numpy")(function)
+        try:
+            self.call.compile((_REAL,) * arguments)
+        except Exception as error:  # the compiler raises all kinds
+            raise NotCompiled(f"does not compile: {_reason(str(error))}") from error
+        (compiled,) = self.call.overloads.values()
+        returned = compiled.signature.return_type
+        parts = list(returned) if isinstance(returned, types.BaseTuple) else [returned]
+        if len(parts) != results or not all(isinstance(part, types.Integer | types.Float | types.Boolean) for part in parts):
+            raise NotCompiled(f"returns {_plain(returned)}")
+        self._attempt = _attempt(compiled, parts)
+        self._forces: dict[Any, Any] = {}
+
+    def force(self, dtype: np.dtype[Any]) -> Any:
+        """What `kernels.forces.call` takes: adds the two numbers returned for (x, y, vx, vy, mass, t) of every free particle.
+
+        It returns for how many of them the function raised, or returned something that is not finite.
+        """
+        if dtype not in self._forces:
+            attempt = self._attempt
+
+            def loop(force, position, velocity, mass, t):  # type: ignore[no-untyped-def]
+                f, x, v, wrong = force.reshape(-1), position.reshape(-1), velocity.reshape(-1), 0
+                for k in range(mass.shape[0]):
+                    i = np.uint64(k)
+                    a = i + i
+                    b = a + _ONE
+                    m, ax, ay, vx, vy = _REAL(mass[i]), _REAL(x[a]), _REAL(x[b]), _REAL(v[a]), _REAL(v[b])
+                    fine, fx, fy = attempt((ax, ay, vx, vy, m, t))
+                    free = m < np.inf
+                    f[a] += fx if free else 0.0
+                    f[b] += fy if free else 0.0
+                    # z - z is 0 for finite numbers, NaN for others.
+                    fine &= (fx - fx) + (fy - fy) == 0.0
+                    wrong += int(free and not fine and (ax - ax) + (ay - ay) + (vx - vx) + (vy - vy) == 0.0)
+                return wrong
+
+            rows, column = types.Array(numba.from_dtype(dtype), 2, "C"), types.Array(numba.from_dtype(dtype), 1, "C")
+            kind = types.int64(rows, rows, rows, column, _REAL)
+            self._forces[dtype] = numba.cfunc(kind, error_model="numpy")(loop)
+        return self._forces[dtype]
+
+    @cached_property
+    def potential(self) -> Any:
+        """What `kernels.forces.call_potential` takes: a function of (x, y, mass), NaN where the user's raises."""
+        attempt = self._attempt
+
+        def one(x: float, y: float, mass: float) -> Any:
+            fine, value = attempt((x, y, mass))
+            return value if fine else np.nan
+
+        return numba.cfunc(_REAL(_REAL, _REAL, _REAL), error_model="numpy")(one)
+
+
+def _attempt(compiled: Any, parts: list[Any]) -> Any:
+    """For compiled code: call a function with a tuple of arguments. Returns whether it did not raise, and what it returned.
+
+    In place of `try`, which takes the compiler five times as long and keeps loops from being turned into vectors.
+    """
+    made, library, kind = compiled.fndesc, compiled.library, compiled.signature
+    gives = types.Tuple((types.boolean, *(_REAL for _ in parts)))
+
+    @intrinsic  # type: ignore[untyped-decorator]
+    def attempt(typing: Any, arguments: Any) -> Any:
+        def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            context.active_code_library.add_linking_library(library)
+            given = cgutils.unpack_tuple(builder, args[0])
+            status, result = context.call_internal_no_propagate(builder, made, kind, given)
+            values = cgutils.unpack_tuple(builder, result) if isinstance(kind.return_type, types.BaseTuple) else [result]
+            numbers = [context.cast(builder, *what, _REAL) for what in zip(values, parts, strict=True)]
+            return context.make_tuple(builder, gives, [status.is_ok, *numbers])
+
+        return gives(arguments), generate
+
+    return attempt
+
+
+def _reason(message: str) -> str:
+    """What the compiler means, out of the pages it writes: its first telling line, and where."""
+    lines = [line.strip() for line in message.splitlines() if line.strip() and not line.startswith("Failed in")]
+    says = lines[0].removesuffix(" found for signature:")
+    if says != lines[0]:
+        says += " for " + next((line.removeprefix(">>> ") for line in lines if line.startswith(">>> ")), "these arguments")
+    says = re.sub(r"Function\(<(.*?)>\)", r"\1", says).split(" Raised from ")[0].rstrip(".:")
+    where = re.findall(r"line (\d+):", message)
+    return f"{says} (line {where[-1]})" if where else says
+
+
+def _plain(returned: Any) -> str:
+    """A type in words that a user of Python knows."""
+    if isinstance(returned, types.Optional):
+        return "None on some of its ways"
+    if isinstance(returned, types.NoneType):
+        return "None"
+    if isinstance(returned, types.BaseTuple):
+        return f"a tuple of {len(returned)}, {returned}"
+    return f"one number, {returned}" if isinstance(returned, types.Number) else str(returned)
