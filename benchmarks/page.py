@@ -1,7 +1,7 @@
 """How fast the live page is, and what it costs the physics: `python -m benchmarks page`.
 
-A server as `pyverlet run` starts it and a Chromium without a screen, WebGL off, both on this machine's cores. A world starts anew for
-every line and runs once unwatched and once with the page open, for the same time. A picture counts when the page has drawn it.
+A server as `pyverlet run` starts it and a Chromium without a screen, WebGL off, both on this machine's cores. A world starts
+anew for every line and runs once unwatched and once with the page open, for the same time. A picture counts once it is drawn.
 """
 
 from __future__ import annotations
