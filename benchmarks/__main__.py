@@ -1,7 +1,7 @@
 """Run a comparison and print it.
 
 `python -m benchmarks --particles 2000 20000` beside other engines, `python -m benchmarks physics` what their physics is worth,
-`python -m benchmarks own` what pyverlet promises about its own speed.
+`python -m benchmarks own` what pyverlet promises about its own speed, `python -m benchmarks page` how fast the live page is.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from time import perf_counter
 import numpy as np
 
 import pyverlet as pv
-from benchmarks import own, physics
+from benchmarks import own, page, physics
 from benchmarks.engines import CAREFUL, DT, ENGINES, RADIUS, Array, Engine
 from pyverlet import report
 
@@ -125,18 +125,23 @@ def machine() -> str:
 def main() -> None:
     """Print one table for each number of particles; write them all as CSV if asked to."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("table", nargs="?", choices=("speed", "physics", "own"), default="speed", help="what to compare")
+    parser.add_argument("table", nargs="?", choices=("speed", "physics", "own", "page"), default="speed", help="what to compare")
     parser.add_argument("--particles", type=int, nargs="+", help="discs in the cage: 2000 20000 for speed, 2000 for physics")
     parser.add_argument("--frames", type=int, default=60, help="frames measured for each engine")
     parser.add_argument("--csv", type=Path, help="write the rows to this file too")
     parser.add_argument("--plot", type=Path, help="draw the cost against the number of discs into this file")
     parser.add_argument("--million", action="store_true", help="own: a million discs too, some minutes")
+    parser.add_argument("--scene", default="cage", help="page: what is shown")
+    parser.add_argument("--seconds", type=float, default=12.0, help="page: how long each is watched")
     arguments = parser.parse_args()
     if arguments.table == "physics":
         print(machine())
         physics.main([engine for engine in CAREFUL if installed(engine)], (arguments.particles or [2_000])[0])
         return
     print(machine())
+    if arguments.table == "page":
+        page.main(arguments.scene, arguments.particles or [20_000, 100_000, 1_000_000], arguments.seconds)
+        return
     if arguments.table == "own":
         if not own.main(report.triad()["ns_per_element"], arguments.million):
             sys.exit(1)

@@ -22,6 +22,7 @@ from pyverlet.kernels import motion
 from pyverlet.ledger import Bookkeeper
 from pyverlet.links import Links
 from pyverlet.measures import Measures
+from pyverlet.moments import Moment
 from pyverlet.obstacles import Course, Obstacles
 from pyverlet.profile import Profile
 from pyverlet.queries import Queries
@@ -89,6 +90,8 @@ class World(Measures, Queries, Doors):
         self.frames = 0
         self.profile = Profile()
         self._books = Bookkeeper() if ledger else None
+        self.onlooker: Callable[[Moment], None] | None = None
+        """Called between the substeps of a frame. It may look, and must not touch."""
 
     # ---- one frame -----------------------------------------------------------------------------------------------------
 
@@ -114,8 +117,7 @@ class World(Measures, Queries, Doors):
     def _frame(self, h: float, done: Callable[[str], None]) -> None:
         """The table of contents of the engine. `done` is told the name of each stage as it ends."""
         state, forces, integrator = self._slots, self._force_sum, self.integrator
-        contacts = self._contacts if len(self) > 1 else None
-        links, course = self.links or None, self._course or None
+        contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course or None
         parts: list[Any] = [part for part in (contacts, links, course) if part]
         lag, state.drop = integrator.velocity_lag * h, integrator.drop
         self._gather()
@@ -148,6 +150,7 @@ class World(Measures, Queries, Doors):
             if links:
                 links.after(state)
                 done("links")
+            self._show(substep + 1, h, lag)
         if contacts:
             contacts.end(state, self.substeps * h, self.gravity)
         integrator.end(state, h)
@@ -199,6 +202,11 @@ class World(Measures, Queries, Doors):
         self.time += dt
         self.frames += 1
         self._h_last = h
+
+    def _show(self, done: int, h: float, lag: float) -> None:
+        if self.onlooker and done < self.substeps:
+            self.onlooker(Moment(self._slots, self.time + done * h, lag))
+            self.profile.mark("pictures")
 
     def _open_books(self, h: float) -> Any:
         lag = self.integrator.velocity_lag * h

@@ -175,6 +175,75 @@ def test_a_slow_world_drops_frames_counts_them_and_still_publishes_each_step(
     assert session.latest.status.physics_median_ms > 30.0
 
 
+class Treacle:
+    """A force of nothing that takes its time: eight times in a frame of as many substeps."""
+
+    velocity_dependent = False
+
+    def apply(self, state: pv.state.Slots, t: float) -> None:
+        time.sleep(0.012)
+
+
+def test_a_slow_world_is_seen_between_its_substeps_if_somebody_asks(wait_until: WaitUntil) -> None:
+    watched, alone = falling(), falling()
+    watched.forces.append(Treacle())
+    session = Session(watched)
+    seen: list[tuple[float, int, float]] = []
+
+    def take() -> None:
+        frame = session.latest
+        seen.append((frame.status.time, frame.status.frames, float(frame.position[7, 1])))
+        session.take(frame)
+
+    session.subscribe(take)
+    with session:
+        wait_until(lambda: watched.frames > 6)
+    frames = watched.frames
+    for _ in range(frames):
+        alone.step(1 / 60)
+    assert watched.state_hash() == alone.state_hash()  # but for the wait the force does nothing
+    times = [time for time, _, _ in seen]
+    assert times == sorted(set(times))
+    assert len(seen) > 3 * frames
+    assert all(-1e-6 < time * 60 - frames < 1 for time, frames, _ in seen)
+    between = [(time, y) for time, frames, y in seen if time * 60 - frames > 1e-3]
+    assert len(between) > 2 * frames
+    for t, y in between:  # y0 - g t^2 / 2, in float32
+        assert y == pytest.approx(20 - 0.5 * 9.80665 * t * t, abs=2e-3)
+    assert session.latest.status.stages["pictures"] > 0
+
+
+def falling() -> pv.World:
+    world = pv.World(collisions=None)
+    world.add(position=np.column_stack((np.arange(12.0)[::-1], np.full(12, 20.0))), radius=0.3)
+    return world
+
+
+def test_a_slow_world_that_nobody_asks_for_pictures_makes_one_a_frame(wait_until: WaitUntil) -> None:
+    world = falling()
+    world.forces.append(Treacle())
+    session = Session(world)
+    seen: list[float] = []
+    session.subscribe(lambda: seen.append(session.latest.status.time))
+    with session:
+        wait_until(lambda: world.frames > 4)
+    assert len(seen) <= world.frames + 1  # and the last, for the pause
+
+
+def test_the_pace_is_that_of_the_wall(wait_until: WaitUntil) -> None:
+    world = falling()
+    world.forces.append(Treacle())
+    with Session(world) as session:
+        wait_until(lambda: world.frames > 6)
+        pace, slow = session.latest.status.pace, session.latest.status.physics_median_ms
+        # A frame of 1/60 s each `slow` ms and a little more.
+        assert pace is not None
+        assert 0.3 * (1000 / 60) / slow < pace < 1.1 * (1000 / 60) / slow
+        session.submit(Pause(True))
+        wait_until(lambda: session.latest.status.paused)
+        assert session.latest.status.pace is None
+
+
 def test_drag_takes_the_nearest_circle_moves_it_and_lets_go(session: Session, world: pv.World, wait_until: WaitUntil) -> None:
     session.submit(Drag(hand=1, x=2.3, y=0.9, reach=0.3))  # particle 5 stands at (2, 0.5)
     session.submit(Drag(hand=1, x=2.0, y=8.0))

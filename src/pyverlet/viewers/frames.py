@@ -126,7 +126,9 @@ class Status:
     friction: float | None
     integrator: str
     speed: float
-    """Seconds of the world in a second of the wall."""
+    """Seconds of the world in a second of the wall, as wished."""
+    pace: float | None
+    """The same as it was over the last second; None while that is not known."""
     paused: bool
     busy: str | None
     """What keeps the world from moving for now, such as building another."""
@@ -141,17 +143,36 @@ class Frame:
     shape: Shape
     view: Rect
     status: Status
-    position: NDArray[np.float32]
-    """(n, 2) metres, read-only copy, in the order the particles were added."""
-
-    velocity: NDArray[np.float32]
-    """(n, 2) m/s, likewise."""
+    rows: NDArray[np.float32]
+    """(n, 2) positions in metres, read-only copy, in the order the particles were added or that of `whose`."""
+    moving: NDArray[np.float32]
+    """(n, 2) velocities in m/s, likewise."""
     obstacles: Sketch = NOTHING
     """Those that move."""
     joined: NDArray[np.uint32] = field(default_factory=lambda: np.empty((0, 2), np.uint32))
     """(m, 2) which circles each link joins."""
     force: NDArray[np.float32] = field(default_factory=lambda: np.empty(0, np.float32))
     """(m,) what it pulls with, N; negative if it pushes."""
+    whose: NDArray[np.int32] | None = None
+    """(n,) which particle each row is of, between the substeps of a frame; None: row k is particle k."""
+
+    @cached_property
+    def position(self) -> NDArray[np.float32]:
+        """(n, 2) metres, read-only, in the order the particles were added. Sorted by whoever asks first, as in `grid`."""
+        return self._sorted(self.rows)
+
+    @cached_property
+    def velocity(self) -> NDArray[np.float32]:
+        """(n, 2) m/s, likewise."""
+        return self._sorted(self.moving)
+
+    def _sorted(self, rows: NDArray[np.float32]) -> NDArray[np.float32]:
+        if self.whose is not None:
+            result = np.empty_like(rows)
+            wire.put_rows(result, rows, self.whose)
+            rows = result
+        rows.flags.writeable = False
+        return rows
 
     @cached_property
     def strain(self) -> NDArray[np.uint8]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from typing import TYPE_CHECKING
 
 from pyverlet.clock import FrameBudget
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
 SLOW_STATUS_S = 0.1
 """Energy and percentiles read every particle or many frames; ten times a second is as fast as anybody reads."""
 
+PACE_S = 1.0
+"""How fast the world goes is a mean over this long."""
+
 
 class Gauges:
     """Reads a stage. Used by the physics thread only.
@@ -26,6 +30,26 @@ class Gauges:
     def __init__(self, budget: FrameBudget) -> None:
         self.budget = budget
         self._due = 0.0
+        self._passed: deque[tuple[float, float]] = deque()
+
+    def passed(self, time_of_world: float) -> None:
+        """A frame has ended at this time, s."""
+        now = time.perf_counter()
+        self._passed.append((now, time_of_world))
+        while len(self._passed) > 2 and now - self._passed[1][0] >= PACE_S:
+            self._passed.popleft()
+
+    def held(self) -> None:
+        """The world stands still for a while, which does not count."""
+        self._passed.clear()
+
+    @property
+    def pace(self) -> float | None:
+        """Seconds of the world in a second of the wall, lately."""
+        if len(self._passed) < 2:
+            return None
+        (began, start), (ended, end) = self._passed[0], self._passed[-1]
+        return (end - start) / max(ended - began, 1e-9)
 
     def read(
         self, stage: Stage, *, dropped: int, speed: float, paused: bool, busy: str | None, error: str | None, at_once: bool
@@ -57,6 +81,7 @@ class Gauges:
             energies=self._energies,
             **levers.read(stage.worlds[0]),
             speed=speed,
+            pace=self.pace,
             paused=paused,
             busy=busy,
             error=error,

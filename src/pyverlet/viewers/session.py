@@ -12,6 +12,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -22,28 +23,12 @@ from pyverlet import checks
 from pyverlet.clock import Clock, FrameBudget
 from pyverlet.constants import FRAME_BUDGET_MS
 from pyverlet.errors import PyverletError
+from pyverlet.moments import Moment
+from pyverlet.viewers import commands as asked
 from pyverlet.viewers import levers
-from pyverlet.viewers.commands import (
-    Build,
-    Command,
-    Delete,
-    Drag,
-    Pause,
-    Pin,
-    Poke,
-    Release,
-    Reset,
-    SetFriction,
-    SetGravity,
-    SetIntegrator,
-    SetRestitution,
-    SetSpeed,
-    SetSubsteps,
-    Spawn,
-    Step,
-)
+from pyverlet.viewers.commands import Command
 from pyverlet.viewers.exhibit import Exhibit, Repertoire
-from pyverlet.viewers.frames import Frame, Shape
+from pyverlet.viewers.frames import Frame, Shape, Status
 from pyverlet.viewers.gauges import Gauges
 from pyverlet.viewers.stage import Stage
 
@@ -52,6 +37,9 @@ if TYPE_CHECKING:
     from pyverlet.world import World
 
 _log = logging.getLogger(__name__)
+
+PICTURE_S = 0.9 / 60
+"""Least seconds between two pictures of a slow world: a little less than a screen takes, or the screen would miss some."""
 
 MAX_CATCH_UP = 4
 """Late frames made up for at once; more are dropped and counted. A world that is too slow runs slow, smoothly."""
@@ -103,16 +91,21 @@ class Session:
         self._before: list[NDArray[np.float32]] | None = None
         self._shape: Shape
         self._seq = 0
-        self._last = time.perf_counter()
+        self._shown, self._last = 0.0, time.perf_counter()
         self._enter(Exhibit.of(world, title))
         self.latest: Frame = self._picture()
         """The newest frame. Replaced, never changed; read it from any thread."""
+        self._taken = 0
 
     # -- for viewers, from any thread ---------------------------------------------------------------------------------
 
     def submit(self, command: Command) -> None:
         """Ask for something. Returns at once; the physics thread does it between two frames, in the order asked."""
         self._commands.put(command)
+
+    def take(self, frame: Frame) -> None:
+        """Say that a viewer has this frame and would like the next: a world that is slow makes some between its substeps then."""
+        self._taken = max(self._taken, frame.seq)
 
     def subscribe(self, listener: Callable[[], None]) -> Callable[[], None]:
         """Have `listener()` called on the physics thread after every new frame; it must return at once and not raise.
@@ -189,7 +182,7 @@ class Session:
         for _ in range(due):
             self._advance()
             if self._speed == 1.0:
-                self._publish()
+                self._publish_if_due()
             self._obey_all()
             if self._held() or self._stopping.is_set():
                 break
@@ -197,7 +190,7 @@ class Session:
             self._publish()  # the last picture for a while: it says why
             return 0.0
         if self._speed < 1.0:
-            self._publish()
+            self._publish_if_due()
             return now + self._dt - time.perf_counter()
         return now + (1.0 - self._clock.alpha) * self._dt - time.perf_counter()
 
@@ -207,9 +200,11 @@ class Session:
     def _advance(self) -> None:
         """One frame. An error stops the stepping, not the session: the page stays readable and Reset works."""
         began = time.perf_counter()
-        self._before = self._stage.look()[0] if self._speed < 1.0 else None
+        # With the frame before in mind: what is late by more than a picture is shown on its way.
+        self._late = self._gauges.budget.last_ms * self._speed > 1000.0 * max(self._dt, PICTURE_S)
+        self._before = self._stage.look()[0] if self._speed < 1.0 and not self._late else None
         try:
-            self._stage.step(self._dt)
+            self._stage.step(self._dt, self._look_on if self._late else None)
         except PyverletError as error:
             self._error = str(error)
         except Exception as error:  # a user's own force may raise anything
@@ -217,6 +212,7 @@ class Session:
             self._error = f"{type(error).__name__}: {error}"
         else:
             self._gauges.budget.record(1000.0 * (time.perf_counter() - began))
+            self._gauges.passed(float(self._stage.panels.time))
 
     def _obey_next(self) -> None:
         """Wait for a command and obey it and all behind it."""
@@ -252,35 +248,37 @@ class Session:
         match command:
             case None:
                 pass  # only wakes the thread up
-            case Pause(on):
+            case asked.Pause(on):
                 self._paused = on
-            case Step(frames):
+                self._gauges.held()
+            case asked.Step(frames):
                 self._paused = True
                 for _ in range(frames):
                     if self._error is None and not self._stopping.is_set():
                         self._advance()
                 self._before = None  # show where it is, not what was between
-            case SetSpeed(value):
+            case asked.SetSpeed(value):
                 self._speed = value
+                self._gauges.held()
                 self._before = None
-            case Reset():
+            case asked.Reset():
                 stage.reset()
                 self._fresh_start()
-            case Build(scene, particles):
+            case asked.Build(scene, particles):
                 self._build(scene, particles)
-            case SetGravity() | SetSubsteps() | SetRestitution() | SetFriction() | SetIntegrator():
+            case asked.SetGravity() | asked.SetSubsteps() | asked.SetRestitution() | asked.SetFriction() | asked.SetIntegrator():
                 stage.pull(command)
-            case Drag(hand, x, y, reach):
+            case asked.Drag(hand, x, y, reach):
                 stage.hands.drag(hand, x, y, reach, stage.layout)
-            case Poke(hand, x, y):
+            case asked.Poke(hand, x, y):
                 stage.hands.poke(hand, x, y, stage.view_size, stage.layout)
-            case Pin(_, x, y, reach):
+            case asked.Pin(_, x, y, reach):
                 stage.pin(x, y, reach)
-            case Spawn(_, x, y):
+            case asked.Spawn(_, x, y):
                 stage.hands.spawn(x, y, stage.layout)
-            case Delete(_, x, y, reach):
+            case asked.Delete(_, x, y, reach):
                 stage.hands.delete(x, y, reach, stage.layout)
-            case Release(hand):
+            case asked.Release(hand):
                 stage.hands.release(hand)
 
     # -- what is on show ----------------------------------------------------------------------------------------------
@@ -292,8 +290,9 @@ class Session:
     def _fresh_start(self) -> None:
         self._error = None
         self._before = None
+        self._late = False
         self._clock = Clock(dt=self._dt, max_catch_up=MAX_CATCH_UP)
-        self._gauges = Gauges(FrameBudget(limit_ms=self._budget_ms))
+        self._gauges: Gauges = Gauges(FrameBudget(limit_ms=self._budget_ms))
         self._shape_of: object = None
 
     def _build(self, scene: str | None, particles: int | None) -> None:
@@ -331,11 +330,38 @@ class Session:
 
     # -- frames -------------------------------------------------------------------------------------------------------
 
-    def _publish(self) -> None:
+    def _publish(self, moment: Moment | None = None) -> None:
         self._seq += 1
-        self.latest = self._picture()
+        self._shown = time.perf_counter()
+        self.latest = self._picture() if moment is None else self._picture_of(moment)
         for listener in self._listeners:
             listener()
+
+    def _publish_if_due(self) -> None:
+        """At the end of a frame."""
+        if self._wanted() and not self._due():  # the last was made just now, on the way through this frame
+            self._status = self._read()
+        else:
+            self._publish()
+
+    def _look_on(self, moment: Moment) -> None:
+        """Between two substeps of a frame that takes longer than a picture may."""
+        if self._wanted() and self._due() and self._shape_of == self._stage.version:
+            self._publish(moment)
+
+    def _wanted(self) -> bool:
+        """Whether the world is slow, and somebody has the last picture and waits for more."""
+        return self._late and self._taken == self._seq
+
+    def _due(self) -> bool:
+        return time.perf_counter() - self._shown >= PICTURE_S
+
+    def _picture_of(self, moment: Moment) -> Frame:
+        """As `_picture`; what is read off the world only once a frame is that of the last."""
+        rows, moving, whose = moment.look()
+        rows.flags.writeable = moving.flags.writeable = False
+        status = replace(self._status, time=moment.time, **levers.read(self._stage.worlds[0]))
+        return replace(self.latest, seq=self._seq, status=status, rows=rows, moving=moving, whose=whose)
 
     def _picture(self) -> Frame:
         stage = self._stage
@@ -346,8 +372,12 @@ class Session:
             self._shape = stage.shape(dt=self._dt, budget_ms=self._budget_ms, scenes=scenes)
         position = stage.place(self._between(positions))
         position.flags.writeable = velocity.flags.writeable = False
-        status = self._gauges.read(
-            stage,
+        self._status = self._read()
+        return Frame(self._seq, self._shape, stage.layout.view, self._status, position, velocity, stage.moving(), *stage.links())
+
+    def _read(self) -> Status:
+        return self._gauges.read(
+            self._stage,
             dropped=self._clock.dropped,
             speed=self._speed,
             paused=self._paused,
@@ -355,7 +385,6 @@ class Session:
             error=self._error,
             at_once=self._held(),
         )
-        return Frame(self._seq, self._shape, stage.layout.view, status, position, velocity, stage.moving(), *stage.links())
 
     def _between(self, now: list[NDArray[np.float32]]) -> list[NDArray[np.float32]]:
         """In slow motion, where the circles are between the last two frames: one frame behind, and smooth."""

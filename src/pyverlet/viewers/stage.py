@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.moments import Moment
 from pyverlet.state import EVERYONE
 from pyverlet.viewers import levers
 from pyverlet.viewers.commands import Setting
@@ -67,10 +69,21 @@ class Stage:
         x0, y0, x1, y1 = self.layout.room
         return max(x1 - x0, y1 - y0)
 
-    def step(self, dt: float) -> None:
-        """One frame of every world, the hands following their mice."""
+    def step(self, dt: float, onlooker: Callable[[Moment], None] | None = None) -> None:
+        """One frame of every world, the hands following their mice.
+
+        Args:
+            dt: s.
+            onlooker: called between the substeps of a single world, but where obstacles move: their way is known by the frame.
+        """
         self.hands.move(self.view_size)
-        self.panels.step(dt)
+        world = self.worlds[0]
+        if len(self.worlds) == 1 and not any(obstacle.moves for obstacle in world.obstacles):
+            world.onlooker = onlooker
+        try:
+            self.panels.step(dt)
+        finally:
+            world.onlooker = None
 
     def pull(self, command: Setting) -> None:
         """Change a setting of all worlds, unless they are side by side because they differ in it."""

@@ -31,6 +31,8 @@ export class Numbers {
   /** A frame was drawn at this time, ms. */
   count(status, now) {
     this.drawn.push(now);
+    if (status.frames === this.frames) return; // a picture between the substeps of a frame
+    this.frames = status.frames;
     const known = STAGES.map((name) => status.stages[name] ?? 0);
     const others = Object.entries(status.stages).filter(([name]) => !STAGES.includes(name));
     this.stages.push(...known, others.reduce((sum, [, ms]) => sum + ms, 0));
@@ -52,6 +54,7 @@ export class Numbers {
     physics.title = `median of the last frames; 95 % took less than ${status.physics_p95_ms.toFixed(2)} ms`;
     this.#write("particles", String(status.particles));
     this.#write("time", status.time.toFixed(3));
+    this.#write("pace", status.paused || status.error || status.pace === null ? NOTHING : String(Number(status.pace.toPrecision(2))));
     this.#write("dropped", String(status.dropped));
     for (const name of ["energy", "kinetic", "potential", "links"]) this.#write(name, joules(status[name]));
     this.#id("links-row").hidden = !status.links;

@@ -15,6 +15,7 @@ import { Pointer } from "./pointer.js";
 import { unpack } from "./wire.js";
 
 const NUMBERS_EVERY_MS = 120; // nobody reads faster
+const SLOW = 0.95; // of real time: less is said
 const HEADER_PX = 62; // names of panels stay clear of the title
 const STEP_ZOOM = 1.25, STEP_TURN = 15; // of a key: times as large, degrees
 const NAMES = { canvas: "Canvas2D", webgl2: "WebGL2" };
@@ -223,6 +224,9 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     stale = true;
   }
 
+  /** How fast the world goes, unless that is as fast as the clock: wished so, or more the machine cannot do. */
+  const pace = ({ pace, speed }) => (speed === 1 && (pace === null || pace > SLOW) ? "live" : `live at ${pace === null ? speed : Number(pace.toPrecision(2))}× speed`);
+
   // -- numbers --------------------------------------------------------------------------------------------------------
 
   function showNumbers(now) {
@@ -231,7 +235,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     panels.push(status.energies);
     panels.draw();
     $("pause").textContent = status.paused ? "Resume" : "Pause";
-    if (open) link(status.error ? "lost" : status.paused ? "held" : "live", status.error ? "stopped" : status.paused ? "paused" : status.speed < 1 ? "live, slowly" : "live");
+    if (open) link(status.error ? "lost" : status.paused ? "held" : "live", status.error ? "stopped" : status.paused ? "paused" : pace(status));
     $("busy").hidden = !status.busy;
     $("busy").textContent = status.busy ?? "";
     notice(status.error ? `${status.error}. Reset starts over.` : shape.note);

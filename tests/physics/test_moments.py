@@ -1,0 +1,115 @@
+"""A look between two substeps: true states at true times, and the same bits whether anybody looks or not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import pyverlet as pv
+from pyverlet.integrators import BY_NAME
+from pyverlet.moments import Moment
+
+DT = 1 / 60
+
+
+def in_users_order(rows: NDArray[Any], whose: NDArray[Any]) -> NDArray[Any]:
+    result = np.empty_like(rows)
+    result[whose] = rows
+    return result
+
+
+class Looks:
+    """An onlooker that keeps what it sees: time, positions and velocities in the user's order."""
+
+    def __init__(self) -> None:
+        self.seen: list[tuple[float, NDArray[Any], NDArray[Any]]] = []
+
+    def __call__(self, moment: Moment) -> None:
+        position, velocity, whose = moment.look()
+        assert len(moment) == len(whose)
+        self.seen.append((moment.time, in_users_order(position, whose), in_users_order(velocity, whose)))
+
+
+@pytest.mark.parametrize("name", [name for name, kind in BY_NAME.items() if kind.order >= 2])
+def test_circles_in_free_fall_are_where_the_closed_form_says(name: str) -> None:
+    """x(t) = x0 + v0 t + g t^2 / 2 and v(t) = v0 + g t, which methods of order 2 and more meet exactly."""
+    rng = np.random.default_rng(1)
+    x0, v0 = rng.uniform(-50, 50, (300, 2)), rng.uniform(-5, 5, (300, 2))
+    world = pv.World(integrator=BY_NAME[name](), collisions=None, dtype=np.float64)
+    world.add(position=x0, radius=0.1).velocity[:] = v0
+    world.onlooker = looks = Looks()
+    world.run(seconds=3 * DT, dt=DT)
+    assert [round(t / (DT / 8), 6) for t, _, _ in looks.seen] == [k for k in range(24) if k % 8]
+    g = np.array(world.gravity)
+    for t, position, velocity in looks.seen:
+        # What was seen is float32: 2^-24 of coordinates up to 64.
+        np.testing.assert_allclose(position, x0 + v0 * t + 0.5 * g * t * t, atol=64 * 2**-24)
+        np.testing.assert_allclose(velocity, v0 + g * t, atol=8 * 2**-24)
+
+
+def falling_heap(**options: Any) -> pv.World:
+    rng = np.random.default_rng(2)
+    world = pv.World(boundary=pv.Circle(radius=12), **options)
+    world.add(position=rng.uniform(-7, 7, (400, 2)), radius=rng.uniform(0.1, 0.3, 400))
+    return world
+
+
+def joined(world: pv.World) -> pv.World:
+    group = world.add(position=[(0, 9), (1, 9), (2, 9)], radius=0.3)
+    world.links.append(pv.Stick(group, [0, 1], [1, 2]))
+    return world
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"sleep": True}, {"events": True, "ledger": True}, {"integrator": pv.VelocityVerlet()}, {"threads": 1}]
+)
+def test_who_looks_changes_no_bit(options: dict[str, Any]) -> None:
+    watched, alone = falling_heap(**options), falling_heap(**options)
+    watched.onlooker = looks = Looks()
+    for _ in range(60):
+        watched.step(DT)
+        alone.step(DT)
+        assert watched.state_hash() == alone.state_hash()
+    assert len(looks.seen) == 60 * 7
+
+
+def test_who_looks_changes_no_bit_of_links() -> None:
+    watched, alone = joined(falling_heap()), joined(falling_heap())
+    watched.onlooker = Looks()
+    for _ in range(30):
+        watched.step(DT)
+        alone.step(DT)
+    assert watched.state_hash() == alone.state_hash()
+
+
+def test_a_look_is_what_a_shorter_frame_would_end_with() -> None:
+    """After k of n substeps everybody is where a frame of k substeps of the same length leaves them, with contacts and walls."""
+    world = falling_heap()
+    world.run(seconds=0.5, dt=DT)
+    saved = world.save()
+    world.onlooker = looks = Looks()
+    world.step(DT)
+    world.onlooker = None
+    for done, (time, position, _) in enumerate(looks.seen, start=1):
+        world.restore(saved)
+        world._substeps = done  # not as a user does it, which restarts the integrator
+        world.step(DT * done / 8)
+        world._substeps = 8
+        assert world.time == pytest.approx(time)
+        np.testing.assert_allclose(position, world.position, atol=1e-6)
+
+
+def test_an_onlooker_that_fails_ends_the_frame_and_leaves_the_world_as_it_was() -> None:
+    world = falling_heap()
+    before = world.state_hash()
+
+    def fails(moment: Moment) -> None:
+        raise RuntimeError("eyes closed")
+
+    world.onlooker = fails
+    with pytest.raises(RuntimeError, match="eyes closed"):
+        world.step(DT)
+    assert world.state_hash() == before
