@@ -246,6 +246,21 @@ def put(typing: Any, array: Any, index: Any, k: Any, x: Any, y: Any) -> Any:
 
 
 @intrinsic  # type: ignore[untyped-decorator]
+def copy_row(typing: Any, array: Any, k: Any, source: Any, i: Any) -> Any:
+    """array[k] = source[i] for two (n, 2) arrays of one type: one load and one store."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        row = ir.VectorType(context.get_value_type(array.dtype), 2)
+        to, start = (_pointer(context, builder, a, args[n], ir.Constant(_INT64, 0), row) for n, a in ((0, array), (2, source)))
+        value = builder.load(builder.gep(start, [args[3]]))
+        written = builder.store(value, builder.gep(to, [args[1]]))
+        value.align = written.align = array.dtype.bitwidth // 8
+        return context.get_dummy_value()
+
+    return types.void(array, k, source, i), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
 def pick(typing: Any, array: Any, index: Any, k: Any) -> Any:
     """array[index[k : k + LANES]] of an (n,) array; index: unsigned."""
     lanes = LanesType(array.dtype)

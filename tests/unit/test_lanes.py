@@ -10,6 +10,7 @@ import pytest
 from pyverlet._jit import kernel
 from pyverlet._lanes import (
     LANES,
+    copy_row,
     count_bits,
     larger,
     load,
@@ -75,6 +76,21 @@ def test_rows_are_taken_and_put_by_their_index(dtype: Any) -> None:
     expected[index] = np.column_stack((points[index, 1], points[index, 0] + points[index, 1]))
     _turn(points, index)
     assert points.tobytes() == expected.tobytes()
+
+
+@kernel
+def _copy(to: Any, source: Any, index: Any) -> None:
+    for k in range(index.shape[0]):
+        copy_row(to, k, source, np.int64(index[k]))
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_rows_are_copied_whole(dtype: Any) -> None:
+    rng = np.random.default_rng(4)
+    source, index = rng.normal(0, 1, (20, 2)).astype(dtype), rng.permutation(20).astype(np.int32)
+    to = np.empty_like(source)
+    _copy(to, source, index)
+    assert to.tobytes() == source[index].tobytes()
 
 
 @kernel

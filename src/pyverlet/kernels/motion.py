@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet._lanes import larger_finite
+from pyverlet._lanes import copy_row, larger_finite
 
 _ONE = np.uint64(1)
 
@@ -114,18 +114,17 @@ def strayed(position, reference, square):
 def take_rows(out, source, index):
     """out[k] = source[index[k]] for (n, 2) arrays."""
     for k in prange(index.shape[0]):
-        out[k, 0] = source[index[k], 0]
-        out[k, 1] = source[index[k], 1]
+        copy_row(out, k, source, np.int64(index[k]))
 
 
 @parallel_kernel
 def take_motion(position, velocity, acceleration, spin, from_position, from_velocity, from_acceleration, from_spin, index):
     """Row k of the first four arrays is row index[k] of the others: one pass, for what changes in every frame."""
     for k in prange(index.shape[0]):
-        i = index[k]
-        position[k, 0], position[k, 1] = from_position[i, 0], from_position[i, 1]
-        velocity[k, 0], velocity[k, 1] = from_velocity[i, 0], from_velocity[i, 1]
-        acceleration[k, 0], acceleration[k, 1] = from_acceleration[i, 0], from_acceleration[i, 1]
+        i = np.int64(index[k])
+        copy_row(position, k, from_position, i)
+        copy_row(velocity, k, from_velocity, i)
+        copy_row(acceleration, k, from_acceleration, i)
         spin[k] = from_spin[i]
 
 
@@ -133,10 +132,10 @@ def take_motion(position, velocity, acceleration, spin, from_position, from_velo
 def put_motion(position, velocity, acceleration, spin, to_position, to_velocity, to_acceleration, to_spin, index):
     """The way back: index is a permutation, so every row has one writer."""
     for k in prange(index.shape[0]):
-        i = index[k]
-        to_position[i, 0], to_position[i, 1] = position[k, 0], position[k, 1]
-        to_velocity[i, 0], to_velocity[i, 1] = velocity[k, 0], velocity[k, 1]
-        to_acceleration[i, 0], to_acceleration[i, 1] = acceleration[k, 0], acceleration[k, 1]
+        i = np.int64(index[k])
+        copy_row(to_position, i, position, k)
+        copy_row(to_velocity, i, velocity, k)
+        copy_row(to_acceleration, i, acceleration, k)
         to_spin[i] = spin[k]
 
 
