@@ -141,6 +141,32 @@ def where_zero(typing: Any, test: Any, a: Any, b: Any) -> Any:
 
 
 @intrinsic  # type: ignore[untyped-decorator]
+def where_above(typing: Any, test: Any, limit: Any, a: Any, b: Any) -> Any:
+    """a where test > limit, b elsewhere."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.select(builder.fcmp_ordered(">", args[0], args[1]), args[2], args[3])
+
+    return a(test, limit, a, b), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def add_lanes(typing: Any, a: Any, lanes: Any) -> Any:
+    """The sum, in float64, of the first so many lanes, one after the other."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        wide, total = ir.DoubleType(), ir.Constant(ir.DoubleType(), 0.0)
+        for lane in range(LANES):
+            value = builder.extract_element(args[0], ir.Constant(_INT32, lane))
+            value = value if value.type == wide else builder.fpext(value, wide)
+            counts = builder.icmp_signed(">", args[1], ir.Constant(args[1].type, lane))
+            total = builder.fadd(total, builder.select(counts, value, ir.Constant(wide, 0.0)))
+        return total
+
+    return types.float64(a, lanes), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
 def which_above(typing: Any, a: Any, b: Any) -> Any:
     """The lanes in which a > b, as the bits of a number: 1 for the first."""
 
@@ -248,6 +274,8 @@ def put(typing: Any, array: Any, index: Any, k: Any, x: Any, y: Any) -> Any:
 @intrinsic  # type: ignore[untyped-decorator]
 def copy_row(typing: Any, array: Any, k: Any, source: Any, i: Any) -> Any:
     """array[k] = source[i] for two (n, 2) arrays of one type: one load and one store."""
+    if array.dtype != source.dtype:
+        return None  # does not compile
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         row = ir.VectorType(context.get_value_type(array.dtype), 2)

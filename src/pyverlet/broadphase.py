@@ -58,6 +58,10 @@ class PairList:
             self.meeting, self.touching = np.empty(pairs, np.uint8), np.empty(pairs, np.uint32)
             self.impulse = np.empty(pairs, self._dtype)
 
+    def listed(self) -> tuple[Array, Array, Array, Array]:
+        """first, count, pair_i, pair_j: where the pairs are, for kernels."""
+        return self.first, self.count, self.pair_i, self.pair_j
+
     def hold_slips(self) -> None:
         """Room for what friction notes; the values are anything."""
         if len(self.slip) != len(self.pair_i):

@@ -105,6 +105,7 @@ class ContactSolver:
             state.start[:] = state.position
         else:
             self._slips.forget()
+            self._packs.drop_slips()
 
     def find(self, state: Slots, lag: float) -> None:
         """Broad phase: bring the list of candidate pairs up to date, and note events before contacts change a velocity."""
@@ -135,6 +136,12 @@ class ContactSolver:
         if self._slides(state):
             self._pack(state).project(state, h)
             return
+        if self._grips(state):
+            packs = self._pack(state)
+            self._slips.start(packs, state.particle)
+            packs.project(state, h, FED)
+            packs.grip(state, h, self.settings.friction, self._leaning(state, h), self.broad_phase.list.spent)
+            return
         pairs, real = self.broad_phase.list, state.real
         pairs.hold_notes()
         moving, bodies = (state.position, state.velocity), (state.size, state.inverse_mass)
@@ -158,15 +165,17 @@ class ContactSolver:
             self._slips.start(pairs, state.particle)
             state.turn = state.spin * real(h)
             state.lift[:] = 0
-            leaning = (state.drop - PUSHED / FED) * h
             where = (*moving, state.spin, state.turn, state.lift, state.radius, state.inverse_mass, state.friction)
-            numbers = (real(h), real(self.settings.friction), real(leaning))
+            numbers = (real(h), real(self.settings.friction), real(self._leaning(state, h)))
             friction.grip(*where, *which, *numbers, *notes, pairs.slip, pairs.slipped, pairs.held, pairs.spent)
 
     def still(self, state: Slots, h: float) -> None:
         """Take from touching circles the velocity that projection has put in, and rub them."""
         if self._slides(state):
             self._packs.still(state)
+            return
+        if self._grips(state):
+            self._packs.rub(state, h, self.settings.friction, self.broad_phase.list.spent)
             return
         pairs, real = self.broad_phase.list, state.real
         which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
@@ -181,7 +190,7 @@ class ContactSolver:
 
     def save(self) -> tuple[Any, Kept]:
         """What outlives a frame here: what the broad phase says, and what friction remembers."""
-        return self.broad_phase.save(), self._slips.save(self.broad_phase.list)
+        return self.broad_phase.save(), self._slips.save()
 
     def restore(self, saved: tuple[Any, Kept] | None, state: Slots) -> None:
         """Back to what `save` returned, or to nothing; `state` already has the order and radii of then."""
@@ -201,6 +210,14 @@ class ContactSolver:
         """Whether contacts are of the simple kind that is solved eight at a time."""
         return not (self._bounces(state) or self._rubs(state) or self._uneven)
 
+    def _grips(self, state: Slots) -> bool:
+        """Whether they are solved so, too, and rub."""
+        return self._rubs(state) and not (self._bounces(state) or self._uneven)
+
+    def _leaning(self, state: Slots, h: float) -> float:
+        """s; times -a it is the velocity that a circle at rest against others ends a substep with."""
+        return (state.drop - PUSHED / FED) * h
+
     def _bounces(self, state: Slots) -> bool:
         return self.settings.restitution > 0.0 or state.most_restitution > 0.0
 
@@ -215,7 +232,7 @@ class ContactSolver:
 
     def _mark_resting(self, state: Slots) -> None:
         """Set `state.resting` for particles that touch another without bouncing off it."""
-        if self._slides(state):
+        if self._slides(state) or self._grips(state):
             self._packs.mark_resting(state)
             return
         pairs = self.broad_phase.list

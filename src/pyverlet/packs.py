@@ -11,7 +11,7 @@ from pyverlet import _jit
 from pyverlet._lanes import LANES
 from pyverlet.broadphase import PairList
 from pyverlet.constants import COLOURS, FED_SMOOTH, LARGEST_PUSH, PUSHED
-from pyverlet.kernels import packs
+from pyverlet.kernels import grips, packs
 from pyverlet.state import Slots
 
 Array = NDArray[Any]
@@ -38,6 +38,11 @@ class Packs:
     def _make_room(self, lanes: int) -> None:
         self.lane_i, self.lane_j = np.empty(lanes, np.uint32), np.empty(lanes, np.uint32)
         self.gap, self.normal = np.empty((2, lanes), self._dtype), np.empty((2, lanes), self._dtype)
+        self._hold(0)
+
+    def _hold(self, lanes: int) -> None:
+        """Room for the notes of friction; the values are anything."""
+        self.slip, self._depths, self._held = (np.empty(lanes, self._dtype) for _ in range(3))
 
     def take(self, pairs: PairList, origin: Array, radius: Array) -> None:
         """Pack a new list; origin: (n, 2) positions it was made from; radius: (n,) m."""
@@ -77,36 +82,66 @@ class Packs:
         """Bring reach and share up to date with the sizes of now."""
         self._size = state.size
         size, inverse_mass = state.size, state.inverse_mass
-        self._varied = int((size != size[0]).any() or (inverse_mass != inverse_mass[0]).any())
+        self._varied = int(any((values != values[0]).any() for values in (size, state.radius, inverse_mass)))
+        self._body = np.empty((6, 0), self._dtype)
         if self._varied:
             self.reach, self.share = (np.empty(len(self.lane_i), self._dtype) for _ in range(2))
             packs.share_out(self.begin, self.lanes, self.lane_i, self.lane_j, size, inverse_mass, self.reach, self.share)
         else:
             self.reach, self.share = np.full(LANES, size[0] + size[0]), np.full(LANES, self._dtype.type(0.5))
 
-    def project(self, state: Slots, h: float) -> None:
+    def project(self, state: Slots, h: float, fed: float = FED_SMOOTH) -> None:
         """Move overlapping circles apart and feed their velocities."""
         if self._size is not state.size:
             self._share_out(state)
-        where = (
-            self._parts(),
-            self.begin,
-            self.lanes,
-            self.close,
-            self.lane_i,
-            self.lane_j,
-            self.gap,
-            self.reach,
-            self.share,
-            self._varied,
-        )
-        settings = (state.real(FED_SMOOTH / PUSHED / h), state.real(LARGEST_PUSH))
-        packs.project(state.position, state.velocity, self.origin, self._moved, *where, *settings, self.normal)
+        where = (self._parts(), self.begin, self.lanes, self.close, self.lane_i, self.lane_j, self.gap)
+        settings = (self.reach, self.share, self._varied, state.real(fed / PUSHED / h), state.real(LARGEST_PUSH))
+        packs.project(state.position, state.velocity, self.origin, self._moved, *where, *settings, self.normal, self._depths)
 
     def still(self, state: Slots) -> None:
         """Take from touching circles the velocity that projection has put in."""
         where = (self._parts(), self.begin, self.lanes, self.close, self.lane_i, self.lane_j)
         packs.still(state.velocity, *where, self.share, self._varied, self.normal)
+
+    # ---- friction ------------------------------------------------------------------------------------------------------
+
+    def listed(self) -> tuple[Array, Array, Array, Array]:
+        """Where the pairs are whose `slip` is held: first, count, pair_i, pair_j. Some come twice, and slip alike."""
+        return self.begin[:-1], self.lanes, self.lane_i, self.lane_j
+
+    def hold_slips(self) -> None:
+        """Room for what friction notes; the values are anything."""
+        if len(self.slip) != len(self.lane_i):
+            self._hold(len(self.lane_i))
+
+    def drop_slips(self) -> None:
+        """Nobody rubs any more."""
+        if len(self.slip):
+            self._hold(0)
+
+    def grip(self, state: Slots, h: float, mu: float, leaning: float, spent: Array) -> None:
+        """Answer what touching pairs have slipped."""
+        state.turn = np.empty_like(state.spin)
+        around = (state.position, state.velocity, state.spin, state.turn, state.lift, self._own(state))
+        before = (self._moved, np.empty_like(state.spin))
+        real = state.real
+        grips.grip(*around, *before, *self._rubbing(state), real(h), real(mu), real(leaning), spent)
+
+    def rub(self, state: Slots, h: float, mu: float, spent: Array) -> None:
+        """Stop the slip and the approach of touching pairs, and note what they have slipped."""
+        around = (state.start, self._moved, state.position, state.velocity, state.spin, state.turn, self._own(state))
+        grips.rub(*around, *self._rubbing(state), state.real(h), state.real(mu), spent)
+
+    def _own(self, state: Slots) -> Array:
+        return state.friction if state.most_friction >= 0 else state.friction[:0]
+
+    def _rubbing(self, state: Slots) -> tuple[Any, ...]:
+        if not self._body.shape[1]:
+            self._body = np.empty((6, len(self.lane_i) if self._varied else LANES), self._dtype)
+            alike = (np.zeros(1, np.int64), np.full(1, LANES), *np.zeros((2, LANES), np.uint32))
+            grips.weigh(*(self.listed() if self._varied else alike), state.radius, state.inverse_mass, self._body)
+        where = (self._parts(), self.begin, self.lanes, self.lane_i, self.lane_j, self._body, self._varied)
+        return (*where, self.normal, self._depths, self.slip, self._held)
 
     def mark_resting(self, state: Slots) -> None:
         """Set `state.resting` for particles that touch another."""

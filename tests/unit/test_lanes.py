@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 
@@ -91,6 +92,8 @@ def test_rows_are_copied_whole(dtype: Any) -> None:
     to = np.empty_like(source)
     _copy(to, source, index)
     assert to.tobytes() == source[index].tobytes()
+    with pytest.raises(numba.TypingError):  # bits of one dtype are nothing in another
+        _copy(to.astype(np.float32 if dtype is np.float64 else np.float64), source, index)
 
 
 @kernel

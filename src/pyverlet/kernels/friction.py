@@ -175,6 +175,12 @@ def rub(
 
 
 @kernel
+def _again(k, begin, pair_i, pair_j):
+    """Whether pair k is the one before once more: packs repeat their last pair to be full."""
+    return k > begin and pair_i[k] == pair_i[k - 1] and pair_j[k] == pair_j[k - 1]
+
+
+@kernel
 def take_slips(first, count, pair_i, pair_j, slip, owner, begin, low, high, value):
     """List the slips that are not NEW, by the lower of their two particles; owner (slots,): who they are, -1 if no more.
 
@@ -184,14 +190,14 @@ def take_slips(first, count, pair_i, pair_j, slip, owner, begin, low, high, valu
     for s in range(first.shape[0]):
         for k in range(first[s], first[s] + count[s]):
             p, q = owner[pair_i[k]], owner[pair_j[k]]
-            if slip[k] < NEW and min(p, q) >= 0:
+            if slip[k] < NEW and min(p, q) >= 0 and not _again(k, first[s], pair_i, pair_j):
                 begin[min(p, q) + 1] += 1
     for p in range(begin.shape[0] - 1):
         begin[p + 1] += begin[p]
     for s in range(first.shape[0]):
         for k in range(first[s], first[s] + count[s]):
             p, q = owner[pair_i[k]], owner[pair_j[k]]
-            if slip[k] < NEW and min(p, q) >= 0:
+            if slip[k] < NEW and min(p, q) >= 0 and not _again(k, first[s], pair_i, pair_j):
                 place = begin[min(p, q)]
                 begin[min(p, q)] += 1
                 low[place], high[place], value[place] = min(p, q), max(p, q), slip[k]

@@ -148,7 +148,8 @@ def share_out(begin, lanes, lane_i, lane_j, radius, inverse_mass, reach, share):
 
 
 @kernel
-def _project_strip(moved, close, lane_i, lane_j, gap_x, gap_y, reach, share, varied, most, normal_x, normal_y):
+def _project_strip(moved, close, lane_i, lane_j, gap_x, gap_y, reach, share, varied, most, normal_x, normal_y, depths):
+    noted = depths.shape[0] > 0
     zero, one = spread(most - most), spread(most / most)
     pushed, most = spread(moved.dtype.type(PUSHED)), spread(most)
     for k in range(0, lane_i.shape[0], LANES):
@@ -160,6 +161,8 @@ def _project_strip(moved, close, lane_i, lane_j, gap_x, gap_y, reach, share, var
         if k >= close and which_above(r, distance) == 0:
             store(normal_x, k, zero)
             store(normal_y, k, zero)
+            if noted:
+                store(depths, k, zero)
             continue
         depth = smaller(larger(r - distance, zero), most * r)
         dx = where_zero(distance, r, dx)
@@ -172,6 +175,8 @@ def _project_strip(moved, close, lane_i, lane_j, gap_x, gap_y, reach, share, var
         put(moved, lane_j, k, xj + cx * (one - part), yj + cy * (one - part))
         store(normal_x, k, where_zero(depth, zero, nx))
         store(normal_y, k, where_zero(depth, zero, ny))
+        if noted:
+            store(depths, k, depth)
 
 
 # Two passes over all particles, as 2 n numbers one after the other: so they are vectorised.
@@ -197,11 +202,13 @@ def _arrive(position, velocity, origin, moved, feed):
 
 @parallel_kernel
 def project(
-    position, velocity, origin, moved, cut, begin, lanes, close, lane_i, lane_j, gap, reach, share, varied, feed, most, normal
+    position, velocity, origin, moved, cut, begin, lanes, close, lane_i, lane_j, gap, reach, share, varied, feed, most, normal,
+    depths,
 ):  # fmt: skip
     """Move overlapping pairs apart, feed their velocities, and note the normals of those that touch.
 
-    varied: 1; or 0 if reach and share are the same for all and have one pack only. feed: FED_SMOOTH / PUSHED / h, 1/s.
+    varied: 1; or 0 if reach and share are the same for all and have one pack only. feed: FED / PUSHED / h, 1/s. depths: (lanes,)
+    for the overlaps, m, of pairs at their turn, 0 for those that do not touch; or (0,) if nobody asks.
     cut: (2, threads + 1), which half s // 2 of the strips s with s % 2 = 0, and 1, each thread begins with. moved: (n, 2) to work
     with. normal: (2, lanes).
     """
@@ -216,7 +223,7 @@ def project(
                 a, b = begin[2 * half + parity], begin[2 * half + parity] + lanes[2 * half + parity]
                 _project_strip(
                     moved, close[2 * half + parity], lane_i[a:b], lane_j[a:b], gap[0, a:b], gap[1, a:b], reach[a * varied :],
-                    share[a * varied :], varied, most, normal[0, a:b], normal[1, a:b],
+                    share[a * varied :], varied, most, normal[0, a:b], normal[1, a:b], depths[a:b],
                 )  # fmt: skip
     for c in prange(chunks):
         a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
