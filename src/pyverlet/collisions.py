@@ -102,7 +102,7 @@ class ContactSolver:
             np.minimum(state.grown + growth * real(h), 1, out=state.grown)
             state.resize()
         if self._rubs(state):
-            state.start[:] = state.position
+            state.note_start()
         else:
             self._slips.forget()
 
@@ -116,6 +116,8 @@ class ContactSolver:
             self._events.listen(state, self.broad_phase.list, lag)
 
     def _list(self, state: Slots) -> None:
+        if self._packed and not self._slides(state):  # they did a frame ago, and the pairs may have gone
+            self.broad_phase.forget()
         self.broad_phase.update(state)
         if self._seen != self.broad_phase.rebuilds:
             self._seen = self.broad_phase.rebuilds
@@ -128,6 +130,8 @@ class ContactSolver:
         if not self._packed:
             self._packs.take(self.broad_phase.list, self.broad_phase.built, state.radius)
             self._packed = True
+            if self._events is None and self._sleep is None:
+                self.broad_phase.release()
         return self._packs
 
     def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
@@ -156,8 +160,7 @@ class ContactSolver:
             refine.refine(*moving, *bodies, *which, *push, *notes)
         if self._rubs(state):
             self._slips.start(pairs, state.particle)
-            state.turn = state.spin * real(h)
-            state.lift[:] = 0
+            state.note_turn(h)
             leaning = (state.drop - PUSHED / FED) * h
             where = (*moving, state.spin, state.turn, state.lift, state.radius, state.inverse_mass, state.friction)
             numbers = (real(h), real(self.settings.friction), real(leaning))
@@ -186,6 +189,7 @@ class ContactSolver:
     def restore(self, saved: tuple[Any, Kept] | None, state: Slots) -> None:
         """Back to what `save` returned, or to nothing; `state` already has the order and radii of then."""
         phase, slips = saved or (None, None)
+        self._packed = False
         self.broad_phase.forget()
         if phase is not None:  # None: collisions were off, or of a kind that remembers nothing
             self.broad_phase.restore(phase, state)

@@ -124,7 +124,7 @@ def test_warm_up_reports_progress_and_leaves_nothing_to_compile(tmp_path: Path) 
 def test_float32_stays_float32() -> None:
     # A stray float64 constant would widen the arithmetic: 1 + 2^-24 is 1 in float32.
     out = np.zeros((1, 2), np.float32)
-    from pyverlet.state import advance
+    from pyverlet.moves import advance
 
     advance(out, np.ones((1, 2), np.float32), np.ones((1, 2), np.float32), 2.0**-25)
     assert out[0, 0] == 1.0
