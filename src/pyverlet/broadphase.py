@@ -15,7 +15,8 @@ from pyverlet._lanes import LANES
 from pyverlet.constants import REBUILD_PAIRS, SAMPLE, SKIN, SKIN_HOLD, SKIN_LEAST, SKIN_MOST, SKIN_STEP, UNSORTED, WORTH_LOOKING
 from pyverlet.grids import Grids
 from pyverlet.kernels import pairs as kernels
-from pyverlet.state import Slots, strayed
+from pyverlet.moves import strayed
+from pyverlet.state import Slots
 
 Array = NDArray[Any]
 
@@ -107,6 +108,9 @@ class BroadPhase(ABC):
     @abstractmethod
     def forget(self) -> None:
         """The list is no longer valid (particles, radii or masses changed)."""
+
+    def release(self) -> None:
+        """Nobody needs the pairs themselves until the list is made anew: their memory may go."""
 
     def save(self) -> Any:
         """What `restore` needs to bring the same list back."""
@@ -203,6 +207,10 @@ class _SortedCells(BroadPhase):
     def forget(self) -> None:
         self._allowed = -1.0
         self._mean_radius = 0.0
+
+    def release(self) -> None:
+        self.list.count.fill(0)
+        self.list.make_room(0)
 
     def save(self) -> tuple[Any, ...]:
         kept = (self.built.copy(), self._checked.copy(), self._allowed) if self._allowed >= 0 else None

@@ -102,7 +102,7 @@ class ContactSolver:
             np.minimum(state.grown + growth * real(h), 1, out=state.grown)
             state.resize()
         if self._rubs(state):
-            state.start[:] = state.position
+            state.note_start()
         else:
             self._slips.forget()
             self._packs.drop_slips()
@@ -117,6 +117,8 @@ class ContactSolver:
             self._events.listen(state, self.broad_phase.list, lag)
 
     def _list(self, state: Slots) -> None:
+        if self._packed and not self._eight(state):  # they were a frame ago, and the pairs may have gone
+            self.broad_phase.forget()
         self.broad_phase.update(state)
         if self._seen != self.broad_phase.rebuilds:
             self._seen = self.broad_phase.rebuilds
@@ -129,6 +131,8 @@ class ContactSolver:
         if not self._packed:
             self._packs.take(self.broad_phase.list, self.broad_phase.built, state.radius)
             self._packed = True
+            if self._events is None and self._sleep is None:
+                self.broad_phase.release()
         return self._packs
 
     def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
@@ -163,8 +167,7 @@ class ContactSolver:
             refine.refine(*moving, *bodies, *which, *push, *notes)
         if self._rubs(state):
             self._slips.start(pairs, state.particle)
-            state.turn = state.spin * real(h)
-            state.lift[:] = 0
+            state.note_turn(h)
             where = (*moving, state.spin, state.turn, state.lift, state.radius, state.inverse_mass, state.friction)
             numbers = (real(h), real(self.settings.friction), real(self._leaning(state, h)))
             friction.grip(*where, *which, *numbers, *notes, pairs.slip, pairs.slipped, pairs.held, pairs.spent)
@@ -195,6 +198,7 @@ class ContactSolver:
     def restore(self, saved: tuple[Any, Kept] | None, state: Slots) -> None:
         """Back to what `save` returned, or to nothing; `state` already has the order and radii of then."""
         phase, slips = saved or (None, None)
+        self._packed = False
         self.broad_phase.forget()
         if phase is not None:  # None: collisions were off, or of a kind that remembers nothing
             self.broad_phase.restore(phase, state)
@@ -207,12 +211,15 @@ class ContactSolver:
         self._slips.renumber(now)
 
     def _slides(self, state: Slots) -> bool:
-        """Whether contacts are of the simple kind that is solved eight at a time."""
-        return not (self._bounces(state) or self._rubs(state) or self._uneven)
+        """Whether contacts are solved eight at a time, without friction."""
+        return self._eight(state) and not self._rubs(state)
 
     def _grips(self, state: Slots) -> bool:
-        """Whether they are solved so, too, and rub."""
-        return self._rubs(state) and not (self._bounces(state) or self._uneven)
+        """Whether they are, with friction."""
+        return self._eight(state) and self._rubs(state)
+
+    def _eight(self, state: Slots) -> bool:
+        return not (self._bounces(state) or self._uneven)
 
     def _leaning(self, state: Slots, h: float) -> float:
         """s; times -a it is the velocity that a circle at rest against others ends a substep with."""
@@ -232,7 +239,7 @@ class ContactSolver:
 
     def _mark_resting(self, state: Slots) -> None:
         """Set `state.resting` for particles that touch another without bouncing off it."""
-        if self._slides(state) or self._grips(state):
+        if self._eight(state):
             self._packs.mark_resting(state)
             return
         pairs = self.broad_phase.list

@@ -112,7 +112,7 @@ class Events:
 
     def _sleeping(self, slots: Slots, state: State) -> Array:
         """Those of the contacts of the frame before whose circles sleep."""
-        numbers = np.sort(state.number[slots.particle[slots.island >= 0]])
+        numbers = np.sort(state.number[slots.particle[slots.asleep]])
         b = (self._touching & _LOWER) - 1
         return self._touching[_among(self._touching >> 32, numbers) & ((b < 0) | _among(b, numbers))]
 

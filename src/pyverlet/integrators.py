@@ -17,7 +17,8 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from pyverlet.kernels import motion
-from pyverlet.state import Slots, advance
+from pyverlet.moves import advance
+from pyverlet.state import Slots
 
 
 class Forces(Protocol):
@@ -144,8 +145,7 @@ class _Stormer(Integrator):
         if motion.any_nan(state.acceleration):
             fresh = np.isnan(state.acceleration[:, 0])
             # x_prev = x - v h + a h^2 / 2 makes u = v - a h / 2: order 2. The naive x_prev = x - v h makes u = v: order 1.
-            _swap_acceleration(state)
-            known = state.scratch(0)
+            known = state.acceleration.copy()
             if self.naive_start:
                 state.acceleration[fresh] = 0
             else:
@@ -193,11 +193,9 @@ class TimeCorrectedVerlet(_Stormer):
         varies = h_last is not None and h_last != h
         if varies:
             # u' = u + a (h + h_prev) / 2 differs from the constant step's u + a h by a (h_prev - h) / 2, with the a of time t.
-            _swap_acceleration(state)
+            kept, state.acceleration = state.acceleration, np.empty_like(state.acceleration)
             forces(state, t)
-            now = state.scratch(1)
-            now[:] = state.acceleration
-            _swap_acceleration(state)
+            now, state.acceleration = state.acceleration, kept
         super().begin(state, forces, t, h, h_last)
         if varies:
             assert h_last is not None

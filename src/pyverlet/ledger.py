@@ -98,6 +98,7 @@ class _Frame:
     def __call__(self, stage: str) -> None:
         self._done(stage)
         if stage == "gather":
+            self._state.keep_account()
             self._now = self._look(0.0)
             self._open.outside += self._now.energy - self._books._energy
         elif stage == "integrate":

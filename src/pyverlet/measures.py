@@ -52,7 +52,7 @@ class Measures(Particles):
     def asleep(self) -> Array:
         """(n,) bool, which particles sleep; nobody does unless the world was built with World(sleep=True). A copy."""
         asleep = np.zeros(len(self), bool)
-        asleep[self._slots.particle] = self._slots.island >= 0
+        asleep[self._slots.particle[self._slots.asleep]] = True
         return asleep
 
     @property

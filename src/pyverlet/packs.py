@@ -32,6 +32,7 @@ class Packs:
         self._make_room(0)
         self._cut = np.zeros((2, 2), np.int64)
         self.origin = self._moved = np.empty((0, 2), dtype)
+        self._spare = COLOURS * LANES  # lanes of a strip beyond its pairs: twice as many as any needed in the last list
         self._size: Array | None = None
         self._varied = 0
 
@@ -46,19 +47,19 @@ class Packs:
 
     def take(self, pairs: PairList, origin: Array, radius: Array) -> None:
         """Pack a new list; origin: (n, 2) positions it was made from; radius: (n,) m."""
-        # A sixteenth more than there are pairs, and a pack for each colour, is nearly always enough.
-        need = pairs.count + pairs.count // 16 + COLOURS * LANES
+        need = pairs.count + self._spare
         self.lanes, self.close = (np.empty(len(pairs.count), np.int64) for _ in range(2))
         used = np.empty(len(origin), np.int64)
         which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
         while True:
             self.begin = np.concatenate(([0], np.cumsum(need)))
-            if not self.begin[-1] <= len(self.lane_i) <= 1.5 * self.begin[-1]:
-                self._make_room(int(1.1 * self.begin[-1]))
+            if not self.begin[-1] <= len(self.lane_i) <= 1.1 * self.begin[-1]:
+                self._make_room(int(self.begin[-1]))
             packs.pack(origin, radius, *which, used, self.begin, self.lanes, self.close, self.lane_i, self.lane_j, self.gap)
             if (self.lanes <= need).all():
                 break
             need = np.maximum(need, self.lanes)
+        self._spare = 2 * max(int((self.lanes - pairs.count).max(initial=0)), LANES)
         self._cut = np.empty((2, 0), np.int64)
         self.origin = origin
         self._moved = np.empty_like(origin)
@@ -77,6 +78,12 @@ class Packs:
                 middle = 0.5 * (before[1:] + before[:-1])
                 self._cut[parity] = np.searchsorted(middle, np.linspace(0, before[-1], threads + 1))
         return self._cut
+
+    def pairs(self) -> Array:
+        """(k, 2) slots of the pairs in all lanes; a copy, for tests and measurements. The last pair of a pack may come twice."""
+        lanes = [slice(a, a + n) for a, n in zip(self.begin, self.lanes, strict=False)]
+        rows = [np.column_stack((self.lane_i[part], self.lane_j[part])) for part in lanes]
+        return np.concatenate([np.empty((0, 2), np.uint32), *rows]).astype(np.int64)
 
     def _share_out(self, state: Slots) -> None:
         """Bring reach and share up to date with the sizes of now."""
@@ -121,7 +128,7 @@ class Packs:
 
     def grip(self, state: Slots, h: float, mu: float, leaning: float, spent: Array) -> None:
         """Answer what touching pairs have slipped."""
-        state.turn = np.empty_like(state.spin)
+        state.note_turn(h)
         around = (state.position, state.velocity, state.spin, state.turn, state.lift, self._own(state))
         before = (self._moved, np.empty_like(state.spin))
         real = state.real

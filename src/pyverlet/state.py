@@ -7,14 +7,12 @@ space are neighbours in memory, and ends by scattering the result back; nobody o
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet._jit import Kernel
-from pyverlet.constants import SERIAL_BELOW
 from pyverlet.kernels import motion
 
 Array = NDArray[Any]
@@ -135,6 +133,7 @@ class State:
 
 # What a slot remembers from frame to frame beside the user's arrays: dtype, and value for a new particle.
 _REMEMBERED: dict[str, tuple[Any, Any]] = {"fed": (np.uint8, 0), "island": (np.int64, -1), "calm": (np.float32, 0)}
+_OF_SLEEP = ("island", "calm")
 
 
 class Slots:
@@ -149,21 +148,27 @@ class Slots:
         size: (n,) grown * radius, m: what contacts between particles take as the radius.
         inverse_mass: (n,) 1/kg; 0 for a pinned particle.
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
-        start: (n, 2) positions before the integration of this substep, m. Kept only if circles rub, or meet obstacles.
+        start: (n, 2) positions before the integration of this substep, m; empty unless circles rub each other, or meet obstacles.
         turn: (n,) rad by which each circle turns in this substep; empty unless circles rub each other.
-        lift: (n,) s; times -a it is the velocity with which circles at rest against others end a substep, for others 0.
+        lift: (n,) s; times -a it is the velocity with which circles at rest against others end a substep, for others 0. Kept
+            only if circles rub each other.
         drop: a circle that starts at rest falls drop * a h^2 in a substep; depends on the integrator.
         fed: (n,) bits: CARRIES where a contact at rest fed the velocity in the last substep, AT_WALL where a wall was touched
             in it, CARRIED and WAS_AT_WALL the same in the one before. Kept only if circles bounce.
         island: (n,) number of the island a sleeping particle belongs to, -1 for those awake. calm: (n,) seconds it has been so.
+            Both are empty where nobody may sleep.
         resting: (n,) 1 where a contact without bounce held the particle in the last substep.
         hits: (n,) largest speed with which the circle met a wall in this frame, m/s; negative: none.
         spent: (n, 2) energy that impacts on walls, and friction there, have taken in this frame, J, negative: to be summed, for
-            rows stay where they are when slots are reordered.
+            rows stay where they are when slots are reordered. Empty unless somebody keeps account.
+
+    Args:
+        sleeps: whether particles may sleep.
     """
 
-    def __init__(self, dtype: np.dtype[Any]) -> None:
+    def __init__(self, dtype: np.dtype[Any], *, sleeps: bool = False) -> None:
         self.dtype = dtype
+        self._sleeps = sleeps
         self.real = lru_cache(64)(dtype.type)
         self._kept: dict[str, Array] = {}
         self.drop = 1.0
@@ -177,21 +182,22 @@ class Slots:
         order = self._kept.pop("particle", np.zeros(0, np.int32))
         self.particle = np.concatenate((order, np.arange(len(order), count, dtype=np.int32)))
         for name, (dtype, value) in _REMEMBERED.items():
-            column = np.full(count, value, dtype)
+            column = np.full(count if self._sleeps or name not in _OF_SLEEP else 0, value, dtype)
             column[: len(order)] = self._kept.pop(name, column[: len(order)])
             setattr(self, name, column)
-        for name in (*_ROWS, "force"):
+        for name in _ROWS:
             setattr(self, name, np.zeros((count, 2), self.dtype))
         for name in (*_COLUMNS, "inverse_mass"):
             setattr(self, name, np.zeros(count, self.dtype))
-        self.start = np.zeros((count, 2), self.dtype)
-        self.turn, self.lift = np.zeros(0, self.dtype), np.zeros(count, self.dtype)
+        self.__dict__.pop("force", None)
+        self.start = np.empty((0, 2), self.dtype)
+        self.turn = self.lift = np.empty(0, self.dtype)
         self.size = self.radius
         self.resting = np.zeros(count, np.uint8)
-        self._given: dict[str, Any] = {name: np.zeros(count, np.uint32 if name in _MARKS else self.dtype) for name in _GIVEN}
+        self._given: dict[str, Any] = {name: np.zeros(0, np.uint32 if name in _MARKS else self.dtype) for name in _GIVEN}
         self._changed = self._grows = True
         self.hits = np.full(count, -1, self.dtype)
-        self.spent = np.zeros((count, 2))
+        self.spent = np.empty((0, 2))
         self.category = self.mask = np.empty(0, np.uint32)
         self.most_restitution = self.most_friction = -1.0
         self._scratch: list[Array] = []
@@ -200,8 +206,6 @@ class Slots:
     position: Array
     velocity: Array
     acceleration: Array
-    force: Array
-    start: Array
     spin: Array
     radius: Array
     mass: Array
@@ -212,6 +216,16 @@ class Slots:
     fed: Array
     island: Array
     calm: Array
+
+    @cached_property
+    def force(self) -> Array:
+        """(n, 2) N; made when it is first asked for."""
+        return np.zeros_like(self.position)
+
+    @property
+    def asleep(self) -> Array:
+        """Slots of the particles that sleep."""
+        return np.flatnonzero(self.island >= 0)
 
     @property
     def is_new(self) -> bool:
@@ -240,7 +254,7 @@ class Slots:
             given, now = self._given[name], getattr(state, name)
             if name not in ("restitution", "friction"):
                 changed |= motion.differs(given, now)
-            given[:] = now
+            self._given[name] = (now[:1] if (now == now[:1]).all() else now).copy()
         for name in (*_SET, "grown"):
             np.take(getattr(state, name), self.particle, out=getattr(self, name))
         self.weigh()
@@ -256,11 +270,30 @@ class Slots:
         """Bring `inverse_mass` up to date with `mass` and who sleeps."""
         with np.errstate(divide="ignore"):  # a mass of 0 is refused by the world, with a sentence
             np.divide(1, self.mass, out=self.inverse_mass)
-        self.inverse_mass[self.island >= 0] = 0
+        self.inverse_mass[self.asleep] = 0
 
     def _keep(self, slots: Any) -> None:
         """Remember what outlives a change of size, of these slots."""
-        self._kept = {name: getattr(self, name)[slots] for name in ("particle", *_REMEMBERED)}
+        kept = ((name, getattr(self, name)) for name in ("particle", *_REMEMBERED))
+        self._kept = {name: column[slots] for name, column in kept if len(column)}
+
+    def note_start(self) -> None:
+        """Keep the positions of now as `start`."""
+        if len(self.start) != len(self):
+            self.start = np.empty_like(self.position)
+        self.start[:] = self.position
+
+    def note_turn(self, h: float) -> None:
+        """Circles rub each other in a substep of h seconds: `turn` is what their spin makes it, nobody's `lift` is known yet."""
+        self.turn = self.spin * self.real(h)
+        if len(self.lift) != len(self):
+            self.lift = np.empty_like(self.spin)
+        self.lift.fill(0)
+
+    def keep_account(self) -> None:
+        """From now on walls are to note what they take."""
+        if len(self.spent) != len(self):
+            self.spent = np.zeros((len(self), 2))
 
     def clear_notes(self) -> None:
         """Forget what walls and friction have noted in the last frame."""
@@ -302,14 +335,15 @@ class Slots:
 
     def reorder(self, order: Array) -> None:
         """Put the particle of slot order[k] into slot k."""
+        spare = np.empty_like(self.position)
         for name in _ROWS:
             old = getattr(self, name)
-            new = self.scratch(0)
-            motion.take_rows(new, old, order)
-            setattr(self, name, new)
-            self._scratch[0] = old
+            motion.take_rows(spare, old, order)
+            setattr(self, name, spare)
+            spare = old
         for name in (*_COLUMNS, "inverse_mass", "particle", "resting", *_REMEMBERED, "start", "hits"):
-            setattr(self, name, getattr(self, name)[order])
+            if len(column := getattr(self, name)):
+                setattr(self, name, column[order])
         if len(self.category):
             self.category, self.mask = self.category[order], self.mask[order]
         self.resize()
@@ -355,31 +389,3 @@ class Slots:
         if len(particles):
             self.slot_of(0)
         return np.zeros(0, np.int32) if self._slot_of is None else self._slot_of[particles]
-
-
-def advance(out: Array, base: Array, slope: Array, h: float) -> None:
-    """out = base + h * slope on (n, 2) arrays; the move every integrator is made of. out may be base."""
-    _light(motion.advance, out)(out, base, slope, out.dtype.type(h))
-
-
-def newton(state: Slots, force: Array, gravity: tuple[float, float]) -> float:
-    """acceleration = gravity + force / mass; force: (n, 2), or (0, 2) for none. Returns the largest of them, m/s^2."""
-    numbers = state.real(gravity[0]), state.real(gravity[1])
-    return float(_light(motion.newton, state.position)(state.acceleration, force, state.inverse_mass, *numbers))
-
-
-def newton_kick_drift(state: Slots, force: Array, gravity: tuple[float, float], h: float, ahead: float) -> float:
-    """Take back a kick of `ahead` seconds; `newton`; velocity += h * acceleration; position += h * velocity."""
-    where = state.position, state.velocity, state.acceleration, force, state.inverse_mass
-    numbers = state.real(gravity[0]), state.real(gravity[1]), state.real(h), state.real(ahead)
-    return float(_light(motion.newton_kick_drift, state.position)(*where, *numbers))
-
-
-def strayed(position: Array, reference: Array, distance: float) -> bool:
-    """Whether any particle has moved by more than this, m, from its row of `reference`."""
-    return bool(_light(motion.strayed, position)(position, reference, position.dtype.type(distance * distance)))
-
-
-def _light(kernel: Kernel, particles: Array) -> Kernel:
-    """For loops so light that a meeting of the threads costs more in all but the largest worlds."""
-    return kernel if len(particles) >= SERIAL_BELOW else kernel.alone

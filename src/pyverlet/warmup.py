@@ -33,8 +33,8 @@ def warm_up(world: World, progress: Progress | None = None) -> float:
     """Compile or load every kernel this world may need, without touching it.
 
     The first time on a machine all kernels that circles of the world's dtype need are compiled, so that nothing stalls when a
-    setting is changed later: for one thread, or for several if the world uses several. Those of links, obstacles and the ledger
-    are compiled when a world has them first. The compiled code is kept on disk, and later only what is in use is loaded.
+    setting is changed later: for one thread, or for several if the world uses several. Those of links, obstacles, the ledger and
+    sleep are compiled when a world has them first. The compiled code is kept on disk, and later only what is in use is loaded.
 
     Args:
         world: the world about to be stepped.
@@ -59,6 +59,8 @@ def warm_up(world: World, progress: Progress | None = None) -> float:
             _remember_compiled(world.dtype, world.threads)
         _rehearse(world)
         _rehearse_forces(world)
+        if world._sleep:
+            _rehearse_sleep(world.dtype)
     if done and progress:
         progress(total, total)
     return perf_counter() - start
@@ -97,6 +99,16 @@ def _rehearse_forces(world: World) -> None:
             force.apply(slots, world.time)
             if isinstance(force, Conservative):
                 force.potential(world._state)
+
+
+def _rehearse_sleep(dtype: np.dtype[Any]) -> None:
+    """Two circles fall asleep, are looked at, and are woken by a third."""
+    small = World(gravity=(0, 0), substeps=1, dtype=dtype, sleep=True)
+    small.add(position=[(0, 0), (1, 0)], radius=0.5)
+    small.step(1.0)
+    small.step(1.0)
+    small.add(position=(3, 0), velocity=(-2, 0), radius=0.5)
+    small.step(1.0)
 
 
 def _enough(threads: int) -> int:

@@ -72,7 +72,7 @@ class World(Measures, Queries, Doors):
     ) -> None:
         self._state = State(checks.floating("dtype", dtype))
         self._h_last: float | None = None  # substep of the frame before; None: the integrator starts anew
-        self._slots = Slots(self._state.dtype)
+        self._slots = Slots(self._state.dtype, sleeps=sleep)
         self.links = Links(self._state)
         self._events = Events() if events else None
         self._sleep = Sleep() if sleep else None
@@ -180,7 +180,8 @@ class World(Measures, Queries, Doors):
             checks.positive("mass", self._state.mass, infinite_is="pinned")
             self.boundary.check(self._state.radius)
         except InputError:
-            self._slots = Slots(self.dtype)  # so that the next frame sees them as new, and refuses them again
+            # So that the next frame sees them as new, and refuses them again.
+            self._slots = Slots(self.dtype, sleeps=self._sleep is not None)
             raise
         if self._contacts:
             self._contacts.broad_phase.forget()

@@ -14,7 +14,7 @@ from pyverlet.cli import main
 
 MINE = """
 import pyverlet as pv
-from pyverlet.state import advance
+from pyverlet.moves import advance
 
 
 class Leapfrog(pv.Integrator):

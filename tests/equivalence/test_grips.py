@@ -41,7 +41,7 @@ def test_a_pair_alone_gets_the_same(dtype: Any, rounding: float, varied: bool, m
     before = one._state.spin.copy()
     for _ in range(4):
         eight.step(1 / 60)
-    monkeypatch.setattr(ContactSolver, "_grips", lambda self, state: False)
+    monkeypatch.setattr(ContactSolver, "_eight", lambda self, state: False)
     for _ in range(4):
         one.step(1 / 60)
     assert (np.abs(one._state.spin - before) > 1e-3).mean() > 0.5  # they have met, and rubbed

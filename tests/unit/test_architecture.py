@@ -16,7 +16,7 @@ ROOT = Path(pyverlet.__file__).parent
 # From the ground up. A module may import from its own layer only within its own package (the first part of its name).
 LAYERS = (
     {"_loading", "errors", "constants", "_entry", "_jit", "_lanes", "_native", "checks", "progress"},
-    {"state", "group", "kernels"},
+    {"state", "group", "moves", "kernels"},
     {
         "integrators",
         "forces",
@@ -59,6 +59,7 @@ BESIDE = {
     "_jit": {"_entry"},
     "state": {"kernels"},
     "group": {"state"},
+    "moves": {"state", "kernels"},
     "broadphase": {"grids"},
     "collisions": {"broadphase", "events", "packs", "sleep", "slips"},
     "slips": {"broadphase"},

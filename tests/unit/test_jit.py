@@ -117,6 +117,12 @@ def test_warm_up_reports_progress_and_leaves_nothing_to_compile(tmp_path: Path) 
         "world.add(position=rng.uniform(1, 19, (200, 2)), velocity=rng.normal(0, 20, (200, 2)), radius=size)\n"
         "with _jit.watch_compiling(lambda: late.append(1)): world.run(seconds=0.5)\n"
         "assert world.rebuilds > 3 and not late, (world.rebuilds, late)\n"
+        "world = pv.World(gravity=(0, 0), sleep=True); world.add(position=[(0, 0), (1, 0)], radius=0.5)\n"
+        "before = len(late); pv.warm_up(world, lambda done, total: late.append(2)); assert late[before:]\n"
+        "with _jit.watch_compiling(lambda: late.append(1)):\n"
+        "    world.run(seconds=1); assert world.asleep.all()\n"
+        "    world.add(position=(2, 0), velocity=(-1, 0), radius=0.5); world.run(seconds=1); assert not world.asleep.any()\n"
+        "assert 1 not in late\n"
     )
     subprocess.run([sys.executable, "-c", code], env={**os.environ, "PYVERLET_CACHE_DIR": str(tmp_path)}, check=True, timeout=300)
 
@@ -124,7 +130,7 @@ def test_warm_up_reports_progress_and_leaves_nothing_to_compile(tmp_path: Path) 
 def test_float32_stays_float32() -> None:
     # A stray float64 constant would widen the arithmetic: 1 + 2^-24 is 1 in float32.
     out = np.zeros((1, 2), np.float32)
-    from pyverlet.state import advance
+    from pyverlet.moves import advance
 
     advance(out, np.ones((1, 2), np.float32), np.ones((1, 2), np.float32), 2.0**-25)
     assert out[0, 0] == 1.0

@@ -6,7 +6,8 @@ from typing import Any, Protocol, runtime_checkable
 
 from numpy.typing import NDArray
 
-from pyverlet.state import Slots, State, newton, newton_kick_drift
+from pyverlet.moves import newton, newton_kick_drift
+from pyverlet.state import Slots, State
 
 
 @runtime_checkable
@@ -64,7 +65,7 @@ class ForceSum:
     def _summed(self, state: Slots, t: float) -> NDArray[Any]:
         """The sum of all forces but gravity (n, 2), N; (0, 2) if there are none."""
         if not self.forces:
-            return state.force[:0]
+            return state.acceleration[:0]
         state.force.fill(0)
         for force in self.forces:
             force.apply(state, t)

@@ -62,12 +62,14 @@ def look(
 ):  # fmt: skip
     """Circle i."""
     zero = radius[i] - radius[i]
-    rubs = turn.shape[0] > 0
+    rubs, accounted = turn.shape[0] > 0, spent.shape[0] > 0
+    from_x, from_y = (start[i, 0], start[i, 1]) if rubs else (zero, zero)
     share = position.dtype.type(PUSHED / FED) if rubs else zero
     return Body(
         position[i, 0], position[i, 1], velocity[i, 0], velocity[i, 1], acceleration[i, 0], acceleration[i, 1], spin[i],
-        radius[i], inverse_mass[i], restitution[i], friction[i], np.int64(fed[i]), np.int64(resting[i]), hits[i], spent[i, 0],
-        spent[i, 1], start[i, 0], start[i, 1], share, turn[i] if rubs else zero, lift[i],
+        radius[i], inverse_mass[i], restitution[i], friction[i], np.int64(fed[i]), np.int64(resting[i]), hits[i],
+        spent[i, 0] if accounted else 0.0, spent[i, 1] if accounted else 0.0, from_x, from_y, share, turn[i] if rubs else zero,
+        lift[i] if rubs else zero,
     )  # fmt: skip
 
 
@@ -82,8 +84,9 @@ def put(i, body, position, velocity, spin, fed, resting, hits, spent, turn):
     fed[i] = body.fed
     resting[i] = body.resting
     hits[i] = body.hit
-    spent[i, 0] = body.to_impact
-    spent[i, 1] = body.to_friction
+    if spent.shape[0] > 0:
+        spent[i, 0] = body.to_impact
+        spent[i, 1] = body.to_friction
     if body.share > 0:
         turn[i] = body.turn
 

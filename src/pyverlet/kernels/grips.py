@@ -170,8 +170,6 @@ def grip(
         a, b = c * _CHUNK, min((c + 1) * _CHUNK, count)
         velocity_before[a:b] = velocity[a:b]
         spin_before[a:b] = spin[a:b]
-        turn[a:b] = spin[a:b] * h
-        lift[a:b] = 0
     for parity in range(2):
         for part in prange(cut.shape[1] - 1):
             for half in range(cut[parity, part], cut[parity, part + 1]):

@@ -112,7 +112,7 @@ def strayed(position, reference, square):
 
 @parallel_kernel
 def take_rows(out, source, index):
-    """out[k] = source[index[k]] for (n, 2) arrays, perhaps of another dtype."""
+    """out[k] = source[index[k]] for (n, 2) arrays, of one dtype or two: links take float32 to float64."""
     for k in prange(index.shape[0]):
         out[k, 0] = source[index[k], 0]
         out[k, 1] = source[index[k], 1]
@@ -142,10 +142,14 @@ def put_motion(position, velocity, acceleration, spin, to_position, to_velocity,
 
 @kernel
 def differs(one, other):
-    """Whether two (n,) arrays differ anywhere; a NaN differs from itself."""
-    found = False
-    for k in range(one.shape[0]):
-        found |= one[k] != other[k]
+    """Whether two (n,) arrays differ anywhere; a NaN differs from itself. `one` may be one number in place of n equal ones."""
+    found = one.shape[0] not in (1, other.shape[0])
+    if one.shape[0] == 1:
+        for k in range(other.shape[0]):
+            found |= other[k] != one[0]
+    elif not found:
+        for k in range(one.shape[0]):
+            found |= one[k] != other[k]
     return found
 
 

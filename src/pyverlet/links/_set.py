@@ -153,7 +153,7 @@ class Links:
 
     def _know_apart(self) -> None:
         """Bring the pairs that are no contacts up to date, and note if they are others than before."""
-        if not self._apart_stale and len(self._partners[0]) == len(self._state) + 1:
+        if not self._apart_stale and (not self._links or len(self._partners[0]) == len(self._state) + 1):
             return
         before, self._apart, self._apart_stale = self._apart, self.apart(), False
         both = np.concatenate((self._apart, self._apart[:, ::-1]))

@@ -54,7 +54,7 @@ class Course:
 
     def before(self, state: Slots, h: float) -> None:
         """Before a substep: note where everybody comes from."""
-        state.start[:] = state.position
+        state.note_start()
 
     def collide(self, state: Slots, time: float, h: float, lag: float, rest_speed: float) -> None:
         """Let everybody meet what was on the way; `time`: seconds from the beginning of the frame to that of the substep."""

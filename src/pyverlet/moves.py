@@ -1,0 +1,42 @@
+"""The moves integrators are made of, on slots: each a call of a kernel in `kernels.motion`, on as many threads as pay off."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numpy.typing import NDArray
+
+from pyverlet._jit import Kernel
+from pyverlet.constants import SERIAL_BELOW
+from pyverlet.kernels import motion
+from pyverlet.state import Slots
+
+Array = NDArray[Any]
+
+
+def advance(out: Array, base: Array, slope: Array, h: float) -> None:
+    """out = base + h * slope on (n, 2) arrays; the move every integrator is made of. out may be base."""
+    _light(motion.advance, out)(out, base, slope, out.dtype.type(h))
+
+
+def newton(state: Slots, force: Array, gravity: tuple[float, float]) -> float:
+    """acceleration = gravity + force / mass; force: (n, 2), or (0, 2) for none. Returns the largest of them, m/s^2."""
+    numbers = state.real(gravity[0]), state.real(gravity[1])
+    return float(_light(motion.newton, state.position)(state.acceleration, force, state.inverse_mass, *numbers))
+
+
+def newton_kick_drift(state: Slots, force: Array, gravity: tuple[float, float], h: float, ahead: float) -> float:
+    """Take back a kick of `ahead` seconds; `newton`; velocity += h * acceleration; position += h * velocity."""
+    where = state.position, state.velocity, state.acceleration, force, state.inverse_mass
+    numbers = state.real(gravity[0]), state.real(gravity[1]), state.real(h), state.real(ahead)
+    return float(_light(motion.newton_kick_drift, state.position)(*where, *numbers))
+
+
+def strayed(position: Array, reference: Array, distance: float) -> bool:
+    """Whether any particle has moved by more than this, m, from its row of `reference`."""
+    return bool(_light(motion.strayed, position)(position, reference, position.dtype.type(distance * distance)))
+
+
+def _light(kernel: Kernel, particles: Array) -> Kernel:
+    """For loops so light that a meeting of the threads costs more in all but the largest worlds."""
+    return kernel if len(particles) >= SERIAL_BELOW else kernel.alone
