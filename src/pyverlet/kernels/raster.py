@@ -86,12 +86,36 @@ def over(pixel, ground, colour, cover, kept, shift):
 
 
 @kernel
+def apart(pixel):
+    """R, G and B with 20 bits each, so that one multiplication serves all three."""
+    p = np.uint64(pixel)
+    return (p & np.uint64(0xFF)) | ((p & np.uint64(0xFF00)) << np.uint64(12)) | ((p & np.uint64(0xFF0000)) << np.uint64(24))
+
+
+@kernel
+def over_full(pixel, colour, cover):
+    """`over` where no ground is left to see: (255 - cover) / 255 of the pixel and the rest of `colour`, in whole numbers.
+
+    x / 255, rounded, is y + 1 + (y >> 8) >> 8 with y = x + 127 for x up to 255^2, and never half way between two.
+    """
+    c = np.uint64(cover)
+    ones = np.uint64(0x10000100001)
+    y = apart(pixel) * (np.uint64(255) - c) + apart(colour) * c + np.uint64(127) * ones
+    y += ones + ((y >> np.uint64(8)) & np.uint64(0xFF000FF000FF))
+    y = (y >> np.uint64(8)) & np.uint64(0xFF000FF000FF)
+    rgb = (y & np.uint64(0xFF)) | ((y >> np.uint64(12)) & np.uint64(0xFF00)) | ((y >> np.uint64(24)) & np.uint64(0xFF0000))
+    return np.uint32(rgb) | np.uint32(0xFF000000)
+
+
+@kernel
 def blend(pixel, ground, colour, cover):
     """The pixel once `cover` / 255 of it shows `colour`: on bare ground as long as there is some, then over what is there.
 
     Rims that meet in a pixel add up in any order, as the discs do; the last comer hides only what there is no room beside.
     """
     covered = np.int32(pixel >> np.uint32(24))
+    if covered == 255:
+        return over_full(pixel, colour, cover)
     excess = covered + cover - np.int32(255)
     if excess <= 0:
         rgb = beside(pixel, ground, colour, cover, 0) | beside(pixel, ground, colour, cover, 8)
