@@ -39,7 +39,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   let pending = []; // newer ones, not drawn yet: two at most
   let radiusPx = new Float32Array(0), radiusFor = 0; // radii in pixels of the stage, at how many pixels a metre
   let arrived = 0, newest = 0; // messages so far, and which of them is on show or about to be
-  let lookSent = "", placed = "", stale = true, numbersDue = 0, numbersStale = false, ticked = 0, measured = false, awake = false, alarm = 0;
+  let lookSent = "", placed = "", stale = true, numbersDue = 0, numbersStale = false, ticked = 0, beat = QUICK_MS, measured = false, awake = false, alarm = 0;
   let open = false, begun = false, linking = false, stopped = false;
 
   // -- the connection -------------------------------------------------------------------------------------------------
@@ -151,11 +151,11 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   function tick(now) {
     awake = false;
     if (stopped) return;
-    const quick = now - ticked < QUICK_MS;
+    beat += (Math.min(now - ticked, 100) - beat) / 5; // a mean of the last few: one late tick is none of a slow page
     ticked = now;
     if (pending.length && shape) {
       const before = frame;
-      frame = next(quick);
+      frame = next(beat < QUICK_MS);
       last = frame.status;
       camera.room = frame.room;
       if (!begun) arrive();
