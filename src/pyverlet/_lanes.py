@@ -248,6 +248,8 @@ def put(typing: Any, array: Any, index: Any, k: Any, x: Any, y: Any) -> Any:
 @intrinsic  # type: ignore[untyped-decorator]
 def copy_row(typing: Any, array: Any, k: Any, source: Any, i: Any) -> Any:
     """array[k] = source[i] for two (n, 2) arrays of one type: one load and one store."""
+    if array.dtype != source.dtype:
+        return None  # no such function: the bytes of one mean nothing to the other
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         row = ir.VectorType(context.get_value_type(array.dtype), 2)

@@ -104,12 +104,14 @@ def test_a_look_is_what_a_shorter_frame_would_end_with() -> None:
 
 def test_what_was_seen_stays_as_it_was() -> None:
     """Nobody writes later into what a look returned, though circles are sorted anew."""
-    world, kept = falling_heap(), []
+    world = falling_heap()
+    kept: list[tuple[tuple[NDArray[Any], ...], list[NDArray[Any]]]] = []
 
     def keep(moment: Moment) -> None:
         kept.append((moment.look(), [array.copy() for array in moment.look()]))
 
     world.onlooker = keep
+    world.velocity[:] = np.random.default_rng(3).normal(0, 20, (len(world), 2))
     for _ in range(30):
         world.step(DT)
     assert any((seen[2] != kept[0][0][2]).any() for seen, _ in kept)

@@ -112,9 +112,10 @@ def strayed(position, reference, square):
 
 @parallel_kernel
 def take_rows(out, source, index):
-    """out[k] = source[index[k]] for (n, 2) arrays."""
+    """out[k] = source[index[k]] for (n, 2) arrays, which may be of different types: links work in double precision."""
     for k in prange(index.shape[0]):
-        copy_row(out, k, source, np.int64(index[k]))
+        out[k, 0] = source[index[k], 0]
+        out[k, 1] = source[index[k], 1]
 
 
 @parallel_kernel
