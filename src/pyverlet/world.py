@@ -91,7 +91,7 @@ class World(Measures, Queries, Doors):
         self.profile = Profile()
         self._books = Bookkeeper() if ledger else None
         self.onlooker: Callable[[Moment], None] | None = None
-        """Called between the substeps of a frame. It may look, and must not touch."""
+        """Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins."""
 
     # ---- one frame -----------------------------------------------------------------------------------------------------
 

@@ -102,6 +102,23 @@ def test_a_look_is_what_a_shorter_frame_would_end_with() -> None:
         np.testing.assert_allclose(position, world.position, atol=1e-6)
 
 
+def test_what_was_seen_stays_as_it_was() -> None:
+    """Nobody writes later into what a look returned, though circles are sorted anew."""
+    world = falling_heap()
+    kept: list[tuple[tuple[NDArray[Any], ...], list[NDArray[Any]]]] = []
+
+    def keep(moment: Moment) -> None:
+        kept.append((moment.look(), [array.copy() for array in moment.look()]))
+
+    world.onlooker = keep
+    world.velocity[:] = np.random.default_rng(3).normal(0, 20, (len(world), 2))
+    for _ in range(30):
+        world.step(DT)
+    assert any((seen[2] != kept[0][0][2]).any() for seen, _ in kept)
+    for seen, then in kept:
+        assert all((a == b).all() for a, b in zip(seen, then, strict=True))
+
+
 def test_an_onlooker_that_fails_ends_the_frame_and_leaves_the_world_as_it_was() -> None:
     world = falling_heap()
     before = world.state_hash()

@@ -219,3 +219,45 @@ def test_links_are_drawn_in_the_colour_of_their_pull() -> None:
     assert links.intact.tolist() == [True, False]
     assert (between(1.0) == bare).all()
     assert (between(-1.0) != bare).any()
+
+
+def test_a_crowd_narrower_than_pixels_covers_their_sum_and_has_their_mean_colour_in_any_order() -> None:
+    """A pixel has A = sum of 255 pi r^2, at most 255, and beside that its ground; the colour of what covers it is the mean."""
+    rng = np.random.default_rng(3)
+    count, size, r = 3000, 40, 0.4
+    place = rng.uniform(0, size, (count, 2))
+    colour = rng.integers(0, 1 << 24, count).astype(np.uint32)
+    ground = np.full((size, size), 0x405060, dtype=np.uint32)
+    pictures = []
+    for order in (np.arange(count), rng.permutation(count)):
+        pixels = ground.copy()
+        raster.circles(pixels, ground, place[order], np.full(count, r), colour[order], 0.0, float(size), 1.0)
+        pictures.append(pixels)
+    assert (pictures[0] == pictures[1]).all()
+    column, row = place[:, 0].astype(int), (size - place[:, 1]).astype(int)
+    each = int(255 * np.pi * r * r + 0.5)
+    covered = np.zeros((size, size))
+    np.add.at(covered, (row, column), each)
+    rgba = pictures[0].view(np.uint8).reshape(size, size, 4).astype(int)
+    assert (rgba[..., 3] == np.minimum(covered, 255)).all()
+    bare = np.maximum(1 - covered / 255, 0)
+    for k, old in enumerate((0x60, 0x50, 0x40)):
+        total = np.zeros((size, size))
+        np.add.at(total, (row, column), each * ((colour >> (8 * k)) & 255).astype(float))
+        expected = total * np.minimum(1 / np.maximum(covered, 1), 1 / 255) + bare * old
+        assert np.abs(rgba[..., k] - expected).max() <= 0.5 + 1e-9
+
+
+def test_a_few_narrow_discs_cover_what_a_crowd_would() -> None:
+    """The same discs, one by one and together with many far away: the same pixels, each rounded once more."""
+    rng = np.random.default_rng(4)
+    place, colour = np.column_stack((np.arange(10) + 0.5, np.full(10, 0.5))), np.full(10, 0x3060C0, dtype=np.uint32)
+    ground = np.full((20, 20), 0x202020, dtype=np.uint32)
+    alone, crowd = ground.copy(), ground.copy()
+    raster.circles(alone, ground, place, np.full(10, 0.3), colour, 0.0, 20.0, 1.0)
+    others = rng.uniform((0, 10), (20, 20), (500, 2))
+    all_of_them, colours = np.concatenate((place, others)), np.concatenate((colour, np.zeros(500, np.uint32)))
+    raster.circles(crowd, ground, all_of_them, np.full(510, 0.3), colours, 0.0, 20.0, 1.0)
+    few = [picture.view(np.uint8).reshape(20, 20, 4)[-1].astype(int) for picture in (alone, crowd)]
+    assert (few[0][:10, 3] > 0).all()
+    assert np.abs(few[0] - few[1]).max() <= 1

@@ -13,7 +13,7 @@ from matplotlib import image
 from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page, Playwright, expect
 
-from .browser import FLAGS, Serve, chromium, comes_true, everywhere, number, pause, status, visit, where
+from .browser import FLAGS, NOTHING, Serve, chromium, comes_true, everywhere, number, pause, status, visit, where
 
 
 def reads(page: Page, name: str, value: Any) -> bool:
@@ -188,10 +188,15 @@ def test_slow_motion(page: Page, program: Serve) -> None:
     page.wait_for_timeout(2000)
     assert 0.1 < status(page)["time"] - before < 0.5
     assert number(page, "fps") > 15  # smooth all the same: eight frames a second are made
+    assert 0.06 < number(page, "pace") < 0.2
+    expect(page.locator("#link")).to_have_text(re.compile(r"^live at 0\.\d+\W speed$"))
     page.keyboard.press("s")
     assert reads(page, "speed", 0.03125)
     page.keyboard.press("s")
     assert reads(page, "speed", 1)
+    pause(page)
+    expect(page.locator("#link")).to_have_text("paused")
+    expect(page.get_by_test_id("pace")).to_have_text(NOTHING)
 
 
 def test_pin_and_let_go(page: Page, program: Serve) -> None:

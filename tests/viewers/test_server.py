@@ -239,6 +239,41 @@ def test_a_stalled_tab_has_few_frames_in_flight_and_then_gets_the_newest(server:
     assert tab.frame()["seq"] >= now  # none of those in between
 
 
+class Treacle:
+    """A force of nothing that takes its time: four times in a frame of as many substeps."""
+
+    velocity_dependent = False
+
+    def apply(self, state: pv.state.Slots, t: float) -> None:
+        time.sleep(0.02)
+
+
+def test_a_slow_world_makes_pictures_between_substeps_for_tabs_that_draw_them_only(
+    server: Server, tab: Tab, world: pv.World, wait_until: WaitUntil
+) -> None:
+    def between(frame: dict[str, Any]) -> bool:
+        return bool(abs(frame["status"]["time"] * 60 - round(frame["status"]["time"] * 60)) > 1e-3)
+
+    world.forces.append(Treacle())
+    wait_until(lambda: server.session.latest.status.physics_ms > 60)
+    frames = [tab.frame()]
+    while len(frames) < 40:
+        tab.ack(frames[-1])
+        frames.append(tab.frame())
+    assert sum(map(between, frames[10:])) > 15  # of every four pictures three
+    times = [frame["status"]["time"] for frame in frames]
+    assert times == sorted(times)
+    sent = []  # from here on it draws nothing
+    with contextlib.suppress(TimeoutError):
+        while True:
+            sent.append(tab.frame(timeout=0.7))
+    assert len(sent) <= MAX_IN_FLIGHT <= 3
+    before = server.session.latest
+    wait_until(lambda: world.frames >= before.status.frames + 5)
+    now = server.session.latest
+    assert now.seq - before.seq <= now.status.frames - before.status.frames + 1
+
+
 def test_an_acknowledgement_of_a_frame_never_sent_is_refused(tab: Tab) -> None:
     frame = tab.frame()
     for seq in (frame["seq"] + 1_000_000, -1):

@@ -5,12 +5,13 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.viewers.commands import Drag, Pause, Poke, Release, Reset, SetGravity, SetSubsteps, Step
+from pyverlet.viewers.commands import Command, Drag, Pause, Poke, Release, Reset, SetGravity, SetSubsteps, Step
 from pyverlet.viewers.hands import LEASH
 from pyverlet.viewers.session import MAX_CATCH_UP, Session
 
@@ -213,8 +214,8 @@ def test_a_slow_world_is_seen_between_its_substeps_if_somebody_asks(wait_until: 
     assert session.latest.status.stages["pictures"] > 0
 
 
-def falling() -> pv.World:
-    world = pv.World(collisions=None)
+def falling(**options: Any) -> pv.World:
+    world = pv.World(collisions=None, **options)
     world.add(position=np.column_stack((np.arange(12.0)[::-1], np.full(12, 20.0))), radius=0.3)
     return world
 
@@ -228,6 +229,53 @@ def test_a_slow_world_that_nobody_asks_for_pictures_makes_one_a_frame(wait_until
     with session:
         wait_until(lambda: world.frames > 4)
     assert len(seen) <= world.frames + 1  # and the last, for the pause
+
+
+class Diary(Treacle):
+    """Treacle that writes down when it was asked and which gravity there was."""
+
+    def __init__(self, world: pv.World) -> None:
+        self.world = world
+        self.seen: list[tuple[int, float]] = []
+
+    def apply(self, state: pv.state.Slots, t: float) -> None:
+        super().apply(state, t)
+        self.seen.append((self.world.frames, self.world.gravity[1]))
+
+
+@pytest.mark.parametrize(
+    ("commands", "ledger", "at_once"),
+    [
+        ([SetGravity(0, 5)], False, True),
+        ([SetGravity(0, 5)], True, False),  # which measures heights by what gravity was
+        ([SetSubsteps(7), SetGravity(0, 5)], False, False),  # in the order asked
+    ],
+)
+def test_a_slow_world_takes_another_gravity_between_substeps(
+    wait_until: WaitUntil, commands: list[Command], ledger: bool, at_once: bool
+) -> None:
+    world = falling(ledger=ledger)
+    diary = Diary(world)
+    world.forces.append(diary)
+    session = Session(world)
+    asked: list[int] = []
+
+    def ask() -> None:
+        frame = session.latest
+        session.take(frame)
+        if not asked and 0.01 < frame.status.time * 60 - frame.status.frames < 0.6:
+            asked.append(world.frames)
+            for command in commands:
+                session.submit(command)
+
+    session.subscribe(ask)
+    with session:
+        wait_until(lambda: bool(asked) and world.frames > asked[0] + 2)
+    after = [frame for frame, gravity in diary.seen if gravity == 5]
+    assert after[0] == asked[0] + (not at_once)
+    assert session.latest.status.gravity == (0.0, 5.0)
+    order = [gravity for _, gravity in diary.seen]
+    assert order == sorted(order)  # once changed it stays
 
 
 def test_the_pace_is_that_of_the_wall(wait_until: WaitUntil) -> None:

@@ -8,10 +8,9 @@ frames go.
 from __future__ import annotations
 
 import logging
-import queue
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -30,6 +29,7 @@ from pyverlet.viewers.commands import Command
 from pyverlet.viewers.exhibit import Exhibit, Repertoire
 from pyverlet.viewers.frames import Frame, Shape, Status
 from pyverlet.viewers.gauges import Gauges
+from pyverlet.viewers.inbox import Inbox
 from pyverlet.viewers.stage import Stage
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ class Session:
         self._dt = checks.number("dt", dt, above=0.0)
         self._budget_ms = checks.number("budget_ms", budget_ms, above=0.0)
         self._repertoire = repertoire
-        self._commands: queue.SimpleQueue[Command | None] = queue.SimpleQueue()
+        self._commands = Inbox()
         self._listeners: tuple[Callable[[], None], ...] = ()
         self._listeners_lock = threading.Lock()
         self._thread: threading.Thread | None = None
@@ -100,7 +100,10 @@ class Session:
     # -- for viewers, from any thread ---------------------------------------------------------------------------------
 
     def submit(self, command: Command) -> None:
-        """Ask for something. Returns at once; the physics thread does it between two frames, in the order asked."""
+        """Ask for something. Returns at once; the physics thread does it between two frames, in the order asked.
+
+        A world that is slow is given another gravity between two substeps.
+        """
         self._commands.put(command)
 
     def take(self, frame: Frame) -> None:
@@ -216,23 +219,19 @@ class Session:
 
     def _obey_next(self) -> None:
         """Wait for a command and obey it and all behind it."""
-        try:
-            self._obey(self._commands.get(timeout=IDLE_S))
-        except queue.Empty:
-            return
-        self._obey_all()
-        self._publish()
+        if self._obey_each(self._commands.waiting(IDLE_S)):
+            self._publish()
 
     def _obey_all(self) -> bool:
         """Whether there was anything to obey."""
+        return self._obey_each(self._commands.all())
+
+    def _obey_each(self, commands: Iterator[Command | None]) -> bool:
         any_at_all = False
-        while True:
-            try:
-                command = self._commands.get_nowait()
-            except queue.Empty:
-                return any_at_all
+        for command in commands:
             self._obey(command)
             any_at_all = True
+        return any_at_all
 
     def _obey(self, command: Command | None) -> None:
         try:
@@ -346,6 +345,8 @@ class Session:
 
     def _look_on(self, moment: Moment) -> None:
         """Between two substeps of a frame that takes longer than a picture may."""
+        if not self._paused:  # a step asked for is as it was when it was asked for
+            self._obey_each(self._commands.while_(self._stage.takes_at_once))
         if self._wanted() and self._due() and self._shape_of == self._stage.version:
             self._publish(moment)
 

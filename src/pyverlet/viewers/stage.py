@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pyverlet.moments import Moment
 from pyverlet.state import EVERYONE
 from pyverlet.viewers import levers
-from pyverlet.viewers.commands import Setting
+from pyverlet.viewers.commands import Command, SetGravity, Setting
 from pyverlet.viewers.exhibit import Exhibit
 from pyverlet.viewers.frames import Camera, PanelShape, Shape, outline
 from pyverlet.viewers.hands import HandsOnPanels
@@ -90,6 +90,13 @@ class Stage:
         if levers.NAMES[type(command)] not in self.differing:
             for world in self.worlds:
                 levers.pull(world, command)
+
+    def takes_at_once(self, command: Command | None) -> bool:
+        """Whether this may be done between two substeps: gravity is asked for in each of them, all else is gathered once a frame.
+
+        Not in worlds with a ledger, which measures heights by what gravity was at the beginning.
+        """
+        return command is None or (isinstance(command, SetGravity) and not self.worlds[0].keeps_ledger)
 
     @property
     def version(self) -> tuple[Any, ...]:

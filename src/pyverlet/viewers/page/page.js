@@ -14,7 +14,8 @@ import { read, written } from "./permalink.js";
 import { Pointer } from "./pointer.js";
 import { unpack } from "./wire.js";
 
-const NUMBERS_EVERY_MS = 120; // nobody reads faster
+const NUMBERS_EVERY_MS = 200; // nobody reads faster
+const QUICK_MS = 25; // between two ticks of a page that keeps up with the screen
 const SLOW = 0.95; // of real time: less is said
 const HEADER_PX = 62; // names of panels stay clear of the title
 const STEP_ZOOM = 1.25, STEP_TURN = 15; // of a key: times as large, degrees
@@ -35,10 +36,10 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   let shape = null; // the last shape message
   let frame = null; // the frame on screen
   let last = null; // its numbers, or those of the frame before while there is none
-  let pending = null; // a newer one, not drawn yet
+  let pending = []; // newer ones, not drawn yet: two at most
   let radiusPx = new Float32Array(0), radiusFor = 0; // radii in pixels of the stage, at how many pixels a metre
   let arrived = 0, newest = 0; // messages so far, and which of them is on show or about to be
-  let lookSent = "", placed = "", stale = true, numbersDue = 0, numbersStale = false;
+  let lookSent = "", placed = "", stale = true, numbersDue = 0, numbersStale = false, ticked = 0, beat = QUICK_MS, measured = false, awake = false, alarm = 0;
   let open = false, begun = false, linking = false, stopped = false;
 
   // -- the connection -------------------------------------------------------------------------------------------------
@@ -46,6 +47,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   const write = connect({ receive, state: (is) => {
     open = is;
     lookSent = ""; // a new server does not know it
+    wake();
     if (!open) link("lost", "the server has stopped; waiting for it");
   } });
   const send = (type, fields = {}) => write({ type, ...fields });
@@ -57,20 +59,34 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
       newShape(message);
     } else if (message.kind === "frame") {
       newest = order;
-      pending = message;
+      wait(message);
     } else if (message.kind === "picture") {
       const bitmap = await createImageBitmap(message.jpeg);
       if (order < newest) return bitmap.close(); // while it was decoded, something newer has come
       newest = order;
-      pending?.bitmap?.close();
-      pending = { ...message, bitmap };
+      wait({ ...message, bitmap });
     } else if (message.kind === "refused") console.warn(message.reason);
+  }
+
+  /** To be drawn in one of the next ticks. */
+  function wait(message) {
+    wake();
+    pending.push(message);
+    if (pending.length > 2) pending.shift().bitmap?.close();
+  }
+
+  /** The next to be drawn. Two that came between two ticks are drawn in two: a screen as fast as the server misses none. */
+  function next(quick) {
+    while (pending.length > 1 && !quick) pending.shift().bitmap?.close();
+    return pending.shift();
   }
 
   function newShape(message) {
     const other = !shape || shape.scene !== message.scene || shape.title !== message.title || shape.panels.length !== message.panels.length;
     shape = message;
-    frame = pending = null;
+    measured = false; // panels have a header
+    frame = null;
+    pending = [];
     radiusFor = 0;
     Object.assign(camera, { bounded: shape.bounded && !shape.parted, parted: shape.parted });
     if (other) begin();
@@ -120,13 +136,26 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   const ratio = () => Math.min(window.devicePixelRatio || 1, 2);
   const size = () => ({ width: root.clientWidth, height: root.clientHeight });
 
-  function tick(now) {
-    if (stopped) return;
+  /** Have a tick with the next picture of the screen: there are none while nothing is new, which spares a slow machine. */
+  function wake() {
+    if (awake || stopped) return;
+    awake = true;
     requestAnimationFrame(tick);
-    if (pending && shape) {
+  }
+
+  function refresh() {
+    stale = true;
+    wake();
+  }
+
+  function tick(now) {
+    awake = false;
+    if (stopped) return;
+    beat += (Math.min(now - ticked, 100) - beat) / 5; // a mean of the last few: one late tick is none of a slow page
+    ticked = now;
+    if (pending.length && shape) {
       const before = frame;
-      frame = pending;
-      pending = null;
+      frame = next(beat < QUICK_MS);
       last = frame.status;
       camera.room = frame.room;
       if (!begun) arrive();
@@ -145,12 +174,16 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
       numbersDue = now + NUMBERS_EVERY_MS;
       showNumbers(now);
     }
+    if (pending.length) wake();
+    clearTimeout(alarm);
+    if (numbersStale) alarm = setTimeout(wake, Math.max(numbersDue - now, 0));
   }
 
   /** The circles, onto a canvas just as large as the part of the world that the frame shows. */
   function drawCircles() {
     if (frame.bitmap) {
-      Object.assign(photo, { width: frame.bitmap.width, height: frame.bitmap.height });
+      const { width, height } = frame.bitmap;
+      if (photo.width !== width || photo.height !== height) Object.assign(photo, { width, height });
       photographs.transferFromImageBitmap(frame.bitmap);
       return;
     }
@@ -187,6 +220,8 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
 
   /** The part of the page that the controls leave free. */
   function measure() {
+    if (measured) return; // asking the browser has it lay the page out
+    measured = true;
     const whole = root.getBoundingClientRect(), aside = root.querySelector("aside").getBoundingClientRect();
     const below = aside.left - whole.left <= 1; // on a narrow page the controls are at its foot
     const above = shape.panels.length ? HEADER_PX : 0;
@@ -221,7 +256,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     if (!frame) return;
     if (frame.grid) inks.follow(frame.velocity, frame.unit, frame.status.time);
     if (frame.grid) drawCircles();
-    stale = true;
+    refresh();
   }
 
   /** How fast the world goes, unless that is as fast as the clock: wished so, or more the machine cannot do. */
@@ -297,7 +332,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     fold() {
       const folded = root.classList.toggle("folded");
       $("fold").setAttribute("aria-expanded", String(!folded));
-      stale = true;
+      refresh();
     },
   };
   for (const id of ["pause", "step", "reset", "fit", "copy", "help", "fold"]) {
@@ -314,16 +349,13 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
       numbersStale = true;
     });
   }
-  for (const id of ["velocities", "contacts"]) $(id).addEventListener("change", () => (stale = true, $(id).blur()));
+  for (const id of ["velocities", "contacts"]) $(id).addEventListener("change", () => (refresh(), $(id).blur()));
   for (const tool of tools()) tool.addEventListener("change", () => ((root.dataset.tool = tool.value), tool.blur()));
   $("sheet-close").addEventListener("click", () => $("sheet").close());
   fillSheet($("sheet").querySelector("tbody"));
   listen(address ? document : root, root, act);
 
-  function zoomed() {
-    stale = true;
-    numbersStale = true;
-  }
+  const zoomed = () => ((numbersStale = true), refresh());
 
   new Pointer(root, $("backdrop"), {
     camera, send, zoomed,
@@ -334,11 +366,13 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     panelSize: () => panels.cell(camera.room),
   });
 
-  const resized = new ResizeObserver(() => (stale = true));
-  resized.observe(root);
+  const resized = new ResizeObserver(() => {
+    measured = false;
+    refresh();
+  });
+  for (const each of [root, root.querySelector("aside")]) resized.observe(each);
   darkness.addEventListener("change", paint);
   paint();
-  requestAnimationFrame(tick);
 
   return {
     /** Where particle `i` is on screen, CSS pixels, and in the world, metres. */
