@@ -15,6 +15,7 @@ from pyverlet.errors import InputError
 from pyverlet.events import Events
 from pyverlet.kernels import contacts, friction, impacts, refine
 from pyverlet.kernels.bounds import AT_WALL, CARRIED, CARRIES
+from pyverlet.loans import Lent, Loans
 from pyverlet.packs import Packs
 from pyverlet.sleep import Sleep
 from pyverlet.slips import Kept, Slips
@@ -73,10 +74,11 @@ class ContactSolver:
         self._seen = 0
         self._packs = Packs(dtype)
         self._packed = False
-        self._uneven = False  # whether masses differ so much that contacts need to be refined
+        self._uneven = False  # whether masses differ so much that contacts need loans of inertia, and to be refined
         self._events = events
         self._sleep = sleep
         self._slips = Slips(dtype)
+        self._loans = Loans(dtype)
         self.broad_phase.replacing = self._slips.stop
         if events is not None:
             self.broad_phase.list.listen()
@@ -148,29 +150,42 @@ class ContactSolver:
             return
         pairs, real = self.broad_phase.list, state.real
         pairs.hold_notes()
-        moving, bodies = (state.position, state.velocity), (state.size, state.inverse_mass)
+        moving, lends = (state.position, state.velocity), self._uneven and strongest > 0
+        self._lighter = self._loans.begin(state) if lends else state.inverse_mass
+        bodies = (state.size, self._lighter)
         which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
         fed = FED if self._rubs(state) or self._bounces(state) else FED_SMOOTH
         push = (real(fed / h), real(LARGEST_PUSH))
         notes = (pairs.touching, pairs.impulse, pairs.touches)
+        if self._bounces(state):
+            self._bounce(state, h, lag, REST_ACCELERATIONS * strongest * h)
+            if lends:
+                self._loans.recall(state, pairs)
+        if lends:
+            self._loans.keep_weight(state, h, fed)
         if not self._bounces(state):
             contacts.project(*moving, *bodies, *which, *push, *notes)
         else:
-            rest_speed = REST_ACCELERATIONS * strongest * h
-            settings = (real(h), real(lag), real(self.settings.restitution), real(rest_speed))
-            found = (state.fed, pairs.meeting, pairs.impulse, pairs.spent)
-            impacts.impacts(*moving, state.acceleration, *bodies, state.restitution, *which, *settings, *found)
-            state.fed[:] = (state.fed & (CARRIES | AT_WALL)) * CARRIED
             slow = real(1 / h if strongest > 0 else 0.0)
             contacts.project_resting(*moving, *bodies, *which, *push, slow, pairs.meeting, state.fed, *notes)
         if self._uneven:
             refine.refine(*moving, *bodies, *which, *push, *notes)
+        if lends:
+            self._loans.settle(state, pairs, h)
         if self._rubs(state):
             self._slips.start(pairs, state.particle)
             state.note_turn(h)
-            where = (*moving, state.spin, state.turn, state.lift, state.radius, state.inverse_mass, state.friction)
+            where = (*moving, state.spin, state.turn, state.lift, state.radius, self._lighter, state.friction)
             numbers = (real(h), real(self.settings.friction), real(self._leaning(state, h)))
             friction.grip(*where, *which, *numbers, *notes, pairs.slip, pairs.slipped, pairs.held, pairs.spent)
+
+    def _bounce(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
+        pairs, real = self.broad_phase.list, state.real
+        moving, bodies = (state.position, state.velocity, state.acceleration), (state.size, state.inverse_mass, state.restitution)
+        which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
+        settings = (real(h), real(lag), real(self.settings.restitution), real(rest_speed))
+        impacts.impacts(*moving, *bodies, *which, *settings, state.fed, pairs.meeting, pairs.impulse, pairs.spent)
+        state.fed[:] = (state.fed & (CARRIES | AT_WALL)) * CARRIED
 
     def still(self, state: Slots, h: float) -> None:
         """Take from touching circles the velocity that projection has put in, and rub them."""
@@ -185,19 +200,19 @@ class ContactSolver:
         moving = (state.position, state.velocity)
         notes = (pairs.touching, pairs.impulse, pairs.touches)
         if self._rubs(state):
-            where = (state.start, *moving, state.spin, state.turn, state.radius, state.inverse_mass, state.friction)
+            where = (state.start, *moving, state.spin, state.turn, state.radius, self._lighter, state.friction)
             numbers = (real(h), real(self.settings.friction))
             friction.rub(*where, *which, *numbers, *notes, pairs.slip, pairs.slipped, pairs.held, pairs.spent)
         else:
-            contacts.still_resting(*moving, state.inverse_mass, *which, *notes)
+            contacts.still_resting(*moving, self._lighter, *which, *notes)
 
-    def save(self) -> tuple[Any, Kept]:
-        """What outlives a frame here: what the broad phase says, and what friction remembers."""
-        return self.broad_phase.save(), self._slips.save()
+    def save(self) -> tuple[Any, Kept, Lent]:
+        """What outlives a frame here: what the broad phase says, what friction remembers, and who has lent what."""
+        return self.broad_phase.save(), self._slips.save(), self._loans.save()
 
-    def restore(self, saved: tuple[Any, Kept] | None, state: Slots) -> None:
+    def restore(self, saved: tuple[Any, Kept, Lent] | None, state: Slots) -> None:
         """Back to what `save` returned, or to nothing; `state` already has the order and radii of then."""
-        phase, slips = saved or (None, None)
+        phase, slips, lent = saved or (None, None, None)
         self._packed = False
         self.broad_phase.forget()
         if phase is not None:  # None: collisions were off, or of a kind that remembers nothing
@@ -205,10 +220,14 @@ class ContactSolver:
         self._slips.forget()
         if slips is not None:
             self._slips.restore(slips)
+        self._loans.forget()
+        if lent is not None:
+            self._loans.restore(lent)
 
     def renumber(self, now: np.ndarray[Any, Any]) -> None:
         """The particles are now at `now` (n,), or no more (-1)."""
         self._slips.renumber(now)
+        self._loans.renumber(now)
 
     def _slides(self, state: Slots) -> bool:
         """Whether contacts are solved eight at a time, without friction."""

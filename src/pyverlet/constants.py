@@ -108,7 +108,16 @@ GRIP: Final = 0.8
 friction stood still from 0.8 on; at 0.5 single circles crept; at 1 a few in a box had a spin that turned nobody, at 1.6 many."""
 
 UNEVEN: Final = 10.0
-"""Ratio of masses from which on contacts are refined: the overlap that a light circle needs to carry a heavy one goes with it."""
+"""Ratio of masses from which on circles lend each other inertia, and contacts are refined: the overlap that a light circle needs
+to carry a heavy one goes with it."""
+
+LENT: Final = 0.5
+"""Part of its mass that a circle lends at most to those it rests against. With 0.75 their overlaps are a half, and who is hit in
+that moment jumps away four times as fast instead of twice."""
+
+LOAN_S: Final = 0.1
+"""s within which loans of inertia go back, and for which who has bounced has none. At 0.02 they come and go with contacts that
+tremble, and piles that bounce do not come to rest."""
 
 REFINED_FROM: Final = 0.01
 REFINED: Final = 0.25

@@ -21,7 +21,7 @@ from pyverlet.obstacles import Segment
 from pyverlet.state import Slots
 from pyverlet.world import World
 
-OF_CIRCLES = ("bounds", "contacts", "friction", "grid", "impacts", "measure", "motion", "packs", "pairs", "refine")
+OF_CIRCLES = ("bounds", "contacts", "friction", "grid", "impacts", "loans", "measure", "motion", "packs", "pairs", "refine")
 """Modules of the kernels that every world of circles may need: how many there are is what progress is measured by."""
 
 _ROOMS = (Open, Circle, Box)
