@@ -144,6 +144,9 @@ GROWTH: Final = 0.2
 """1/s: circles added on top of each other count as smaller at first, so that they just touch, and grow by this part of their
 radius a second. That bounds the speed they part with: pushed out in a frame they flew apart at hundreds of metres a second."""
 
+SURPLUS: Final = 8e-5
+"""x"""
+
 SMALLEST: Final = 1e-3
 """Part of its radius a circle starts with at least, however near another centre: coincident ones need something to part by."""
 

@@ -33,6 +33,7 @@ LAYERS = (
         "energy",
         "ledger",
         "links",
+        "passivity",
     },
     {
         "world",
@@ -68,6 +69,7 @@ BESIDE = {
     "ledger": {"forces", "links"},
     "energy": {"forces"},
     "naive": {"bounds"},
+    "passivity": {"broadphase", "forces", "links"},
     "links": {"broadphase"},
     "world": {"profile", "doors", "measures", "moments", "actors", "queries", "saved", "sleep"},
     "saved": {"actors"},
