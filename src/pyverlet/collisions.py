@@ -10,9 +10,10 @@ import numpy as np
 
 from pyverlet import checks
 from pyverlet.broadphase import BruteForce, Fast, PairList
-from pyverlet.constants import FED, FED_SMOOTH, GROWTH, LARGEST_PUSH, PUSHED, REST_ACCELERATIONS, SMALLEST, UNEVEN
+from pyverlet.constants import FED, FED_SMOOTH, LARGEST_PUSH, PUSHED, REST_ACCELERATIONS, UNEVEN
 from pyverlet.errors import InputError
 from pyverlet.events import Events
+from pyverlet.growth import Growth
 from pyverlet.kernels import contacts, friction, impacts, refine
 from pyverlet.kernels.bounds import AT_WALL, CARRIED, CARRIES
 from pyverlet.packs import Packs
@@ -77,6 +78,7 @@ class ContactSolver:
         self._events = events
         self._sleep = sleep
         self._slips = Slips(dtype)
+        self.growth = Growth()
         self.broad_phase.replacing = self._slips.stop
         if events is not None:
             self.broad_phase.list.listen()
@@ -87,20 +89,12 @@ class ContactSolver:
         fresh = np.isnan(state.acceleration[:, 0])
         if fresh.any():
             self._list(state)
-            fresh = np.isnan(state.acceleration[:, 0])  # in the order of the list
-            pairs = self.broad_phase.list
-            which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
-            contacts.fit(state.position, state.radius, *which, fresh, state.real(SMALLEST), state.grown)
-            state.resize()
+            self.growth.fit(state, self.broad_phase.list, np.isnan(state.acceleration[:, 0]))  # in the order of the list
 
     def before(self, state: Slots, h: float) -> None:
         """Let those that are not full-grown grow; note where the substep starts, for friction measures slip from there."""
         if state.size is not state.radius:
-            real = state.real
-            # In proportion at first: a crowd in one point would otherwise double its size in every substep.
-            growth = np.minimum(real(GROWTH), real(10 * GROWTH) * state.grown)
-            np.minimum(state.grown + growth * real(h), 1, out=state.grown)
-            state.resize()
+            self.growth.grow(state, h)
         if self._rubs(state):
             state.start[:] = state.position
         else:
@@ -179,13 +173,14 @@ class ContactSolver:
         else:
             contacts.still_resting(*moving, state.inverse_mass, *which, *notes)
 
-    def save(self) -> tuple[Any, Kept]:
-        """What outlives a frame here: what the broad phase says, and what friction remembers."""
-        return self.broad_phase.save(), self._slips.save(self.broad_phase.list)
+    def save(self) -> tuple[Any, Kept, tuple[float, float]]:
+        """What outlives a frame here: what the broad phase says, what friction remembers, and the pace of growth."""
+        return self.broad_phase.save(), self._slips.save(self.broad_phase.list), self.growth.save()
 
-    def restore(self, saved: tuple[Any, Kept] | None, state: Slots) -> None:
+    def restore(self, saved: tuple[Any, Kept, tuple[float, float]] | None, state: Slots) -> None:
         """Back to what `save` returned, or to nothing; `state` already has the order and radii of then."""
-        phase, slips = saved or (None, None)
+        phase, slips, pace = saved or (None, None, (1.0, 0.0))
+        self.growth.restore(pace)
         self.broad_phase.forget()
         if phase is not None:  # None: collisions were off, or of a kind that remembers nothing
             self.broad_phase.restore(phase, state)

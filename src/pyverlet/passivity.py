@@ -47,14 +47,18 @@ class Watch:
             energy += sum(force.potential(state) for force in kept) + self._links.energy(state)
         return energy
 
-    def close(self, slots: Slots, pairs: PairList, extent: Extent | None) -> None:
-        """The frame is over: take back what has been gained too much. extent: of the room; None without walls."""
+    def close(self, slots: Slots, pairs: PairList, extent: Extent | None) -> float:
+        """The frame is over: take back what has been gained too much. extent: of the room; None without walls.
+
+        Returns what had been gained, as a part of what is allowed.
+        """
         gained = self._look(slots) - self._energy
         room = SURPLUS * fall(slots.total_mass, self._forces.gravity, extent)
         if room < gained < np.inf:
             surplus = gained - max(room, SURPLUS * self._kinetic().sum())
             if surplus > 0.0:
                 self._take_back(slots, pairs, surplus)
+        return gained / room if room > 0.0 else 0.0
 
     def _kinetic(self) -> Array:
         """(n,) J, at the start of the frame, in the user's order."""

@@ -193,7 +193,7 @@ class World(Measures, Queries, Doors):
             contacts.end(self._slots, self.substeps * h, self.gravity)
         self.integrator.end(self._slots, h)
         if contacts and watch:
-            watch.close(self._slots, contacts.broad_phase.list, self.boundary.extent())
+            contacts.growth.heed(watch.close(self._slots, contacts.broad_phase.list, self.boundary.extent()))
 
     def _accept(self, dt: float, h: float, books: Any) -> None:
         """The frame has gone well: what it made of the state is the truth now."""

@@ -104,7 +104,7 @@ def test_a_crowd_grows_as_fast_as_its_energy_may(taken: list[float]) -> None:
         assert world.time < 60
     rise = float(world.position[:, 1].mean()) - low
     least = rise / (60 * SURPLUS * 20)
-    assert 0.9 * least < world.time - start < 2 * least + 1 / pv.constants.GROWTH
+    assert 0.9 * least < world.time - start < 2 * least
     world.run(seconds=2)
     assert world.overlap().max < 0.01
 
@@ -116,9 +116,9 @@ def test_a_driven_world_is_left_alone(taken: list[float]) -> None:
         def apply(self, state: pv.state.Slots, t: float) -> None:
             state.force += 5 * state.velocity
 
-    for world in (crowd(), crowd(integrator=pv.ExplicitEuler()), crowd()):
-        if world.integrator.symplectic:
-            world.forces.append(Pump())
+    pumped, gaining = crowd(), crowd(integrator=pv.ExplicitEuler())
+    pumped.forces.append(Pump())
+    for world in (pumped, gaining):
         world.run(seconds=0.5)
     assert not taken
 
