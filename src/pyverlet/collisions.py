@@ -10,9 +10,10 @@ import numpy as np
 
 from pyverlet import checks
 from pyverlet.broadphase import BruteForce, Fast, PairList
-from pyverlet.constants import FED, FED_SMOOTH, GROWTH, LARGEST_PUSH, PUSHED, REST_ACCELERATIONS, SMALLEST, UNEVEN
+from pyverlet.constants import FED, FED_SMOOTH, LARGEST_PUSH, PUSHED, REST_ACCELERATIONS, UNEVEN
 from pyverlet.errors import InputError
 from pyverlet.events import Events
+from pyverlet.growth import Growth
 from pyverlet.kernels import contacts, friction, impacts, refine
 from pyverlet.kernels.bounds import AT_WALL, CARRIED, CARRIES
 from pyverlet.loans import Lent, Loans
@@ -79,6 +80,7 @@ class ContactSolver:
         self._sleep = sleep
         self._slips = Slips(dtype)
         self._loans = Loans(dtype)
+        self.growth = Growth()
         self.broad_phase.replacing = self._slips.stop
         if events is not None:
             self.broad_phase.list.listen()
@@ -89,20 +91,12 @@ class ContactSolver:
         fresh = np.isnan(state.acceleration[:, 0])
         if fresh.any():
             self._list(state)
-            fresh = np.isnan(state.acceleration[:, 0])  # in the order of the list
-            pairs = self.broad_phase.list
-            which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
-            contacts.fit(state.position, state.radius, *which, fresh, state.real(SMALLEST), state.grown)
-            state.resize()
+            self.growth.fit(state, self.broad_phase.list, np.isnan(state.acceleration[:, 0]))  # in the order of the list
 
     def before(self, state: Slots, h: float) -> None:
         """Let those that are not full-grown grow; note where the substep starts, for friction measures slip from there."""
         if state.size is not state.radius:
-            real = state.real
-            # In proportion at first: a crowd in one point would otherwise double its size in every substep.
-            growth = np.minimum(real(GROWTH), real(10 * GROWTH) * state.grown)
-            np.minimum(state.grown + growth * real(h), 1, out=state.grown)
-            state.resize()
+            self.growth.grow(state, h)
         if self._rubs(state):
             state.note_start()
         else:
@@ -206,13 +200,18 @@ class ContactSolver:
         else:
             contacts.still_resting(*moving, self._lighter, *which, *notes)
 
-    def save(self) -> tuple[Any, Kept, Lent]:
-        """What outlives a frame here: what the broad phase says, what friction remembers, and who has lent what."""
-        return self.broad_phase.save(), self._slips.save(), self._loans.save()
+    def listed(self) -> tuple[Any, Any, Any, Any]:
+        """first, count, pair_i, pair_j of the pairs of now."""
+        return self._packs.listed() if self._packed else self.broad_phase.list.listed()
 
-    def restore(self, saved: tuple[Any, Kept, Lent] | None, state: Slots) -> None:
+    def save(self) -> tuple[Any, Kept, Lent, tuple[float, float]]:
+        """What outlives a frame: the list, what friction remembers, who has lent what, the pace of growth."""
+        return self.broad_phase.save(), self._slips.save(), self._loans.save(), self.growth.save()
+
+    def restore(self, saved: tuple[Any, Kept, Lent, tuple[float, float]] | None, state: Slots) -> None:
         """Back to what `save` returned, or to nothing; `state` already has the order and radii of then."""
-        phase, slips, lent = saved or (None, None, None)
+        phase, slips, lent, pace = saved or (None, None, None, (1.0, 0.0))
+        self.growth.restore(pace)
         self._packed = False
         self.broad_phase.forget()
         if phase is not None:  # None: collisions were off, or of a kind that remembers nothing

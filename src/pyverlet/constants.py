@@ -151,7 +151,17 @@ LINK_COLOURS: Final = 64
 
 GROWTH: Final = 0.2
 """1/s: circles added on top of each other count as smaller at first, so that they just touch, and grow by this part of their
-radius a second. That bounds the speed they part with: pushed out in a frame they flew apart at hundreds of metres a second."""
+radius a second, at most. That bounds the speed they part with: pushed out in a frame they flew apart at hundreds of metres a
+second."""
+
+SURPLUS: Final = 8e-5
+"""Part of the scale of a world's energy, that of a fall through its room, that contacts may add in a frame. Promised is 1e-4."""
+
+SURPLUS_SOUGHT: Final = 2.0
+PACE_FRAMES: Final = 10
+"""Circles grow at such a pace that the energy would rise by so many times SURPLUS in a frame, averaged over PACE_FRAMES, if
+nothing was taken back. With 1 growing takes a third longer; with 3 a pile stands still in half of the frames, since all its
+motion is taken to pay for it, and without a pace in all of them."""
 
 SMALLEST: Final = 1e-3
 """Part of its radius a circle starts with at least, however near another centre: coincident ones need something to part by."""

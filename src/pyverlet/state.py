@@ -146,7 +146,7 @@ class Slots:
         category, mask: as in State, or empty while every circle collides with every other.
         most_restitution, most_friction: the largest of their columns; negative if no circle has values of its own.
         size: (n,) grown * radius, m: what contacts between particles take as the radius.
-        inverse_mass: (n,) 1/kg; 0 for a pinned particle.
+        inverse_mass: (n,) 1/kg; 0 for a pinned particle. total_mass: of all others, kg.
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
         start: (n, 2) positions before the integration of this substep, m; empty unless circles rub each other, or meet obstacles.
         turn: (n,) rad by which each circle turns in this substep; empty unless circles rub each other.
@@ -172,6 +172,7 @@ class Slots:
         self.real = lru_cache(64)(dtype.type)
         self._kept: dict[str, Array] = {}
         self.drop = 1.0
+        self.total_mass = 0.0
         self._resize(0)
 
     def __len__(self) -> int:
@@ -271,6 +272,7 @@ class Slots:
         with np.errstate(divide="ignore"):  # a mass of 0 is refused by the world, with a sentence
             np.divide(1, self.mass, out=self.inverse_mass)
         self.inverse_mass[self.asleep] = 0
+        self.total_mass = float(self.mass.sum(dtype=float, where=np.isfinite(self.mass)))
 
     def _keep(self, slots: Any) -> None:
         """Remember what outlives a change of size, of these slots."""

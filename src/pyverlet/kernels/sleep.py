@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet._jit import kernel
+from pyverlet.kernels.clusters import find_root, join
 
 
 @kernel
@@ -16,14 +17,6 @@ def count_calm(velocity, spin, radius, island, limit, dt, calm):
             rim = spin[i] * radius[i]
             square = velocity[i, 0] * velocity[i, 0] + velocity[i, 1] * velocity[i, 1] + rim * rim
             calm[i] = calm[i] + dt if square <= limit * radius[i] else zero
-
-
-@kernel
-def _root(root, i):
-    while root[i] != i:
-        root[i] = root[root[i]]
-        i = root[i]
-    return i
 
 
 @kernel
@@ -43,14 +36,13 @@ def find_islands(position, size, inverse_mass, calm, first, count, pair_i, pair_
                 dx, dy = position[j, 0] - position[i, 0], position[j, 1] - position[i, 1]
                 reach = near * (size[i] + size[j])
                 if dx * dx + dy * dy < reach * reach:
-                    a, b = _root(root, np.int64(i)), _root(root, np.int64(j))
-                    root[max(a, b)] = min(a, b)
+                    join(root, i, j)
     restless = np.zeros(root.shape[0], np.uint8)
     for i in range(root.shape[0]):
         if calm[i] < after or inverse_mass[i] <= zero:
-            restless[_root(root, i)] = 1
+            restless[find_root(root, i)] = 1
     for i in range(root.shape[0] - 1, -1, -1):  # from above: roots are below what they are the roots of
-        r = _root(root, i)
+        r = find_root(root, i)
         root[i] = -1 if restless[r] else r
 
 
