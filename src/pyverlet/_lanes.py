@@ -151,6 +151,17 @@ def where_above(typing: Any, test: Any, limit: Any, a: Any, b: Any) -> Any:
 
 
 @intrinsic  # type: ignore[untyped-decorator]
+def widen(typing: Any, a: Any) -> Any:
+    """The same numbers in float64."""
+    wide = LanesType(types.float64)
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return args[0] if a == wide else builder.fpext(args[0], context.get_value_type(wide))
+
+    return wide(a), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
 def add_lanes(typing: Any, a: Any, lanes: Any) -> Any:
     """The sum, in float64, of the first so many lanes, one after the other."""
 

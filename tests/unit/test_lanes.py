@@ -11,6 +11,7 @@ import pytest
 from pyverlet._jit import kernel
 from pyverlet._lanes import (
     LANES,
+    add_lanes,
     copy_row,
     count_bits,
     larger,
@@ -25,8 +26,10 @@ from pyverlet._lanes import (
     square_root,
     store,
     take,
+    where_above,
     where_zero,
     which_above,
+    widen,
     write_all,
     write_chosen,
 )
@@ -140,3 +143,30 @@ def test_lanes_are_chosen_by_bits() -> None:
     assert lowest[rows.any(axis=1)].tolist() == rows[rows.any(axis=1)].argmax(axis=1).tolist()
     assert found[: len(expected)].tolist() == expected.tolist()
     assert of[: len(expected)].tolist() == (expected // LANES * LANES).tolist()
+
+
+@kernel
+def _sum(numbers: Any, count: Any) -> Any:
+    return add_lanes(load(numbers, 0), count) + add_lanes(widen(load(numbers, 0)), LANES)
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_lanes_are_added_in_float64(dtype: Any) -> None:
+    numbers = (np.arange(1, LANES + 1) / 3).astype(dtype)
+    for count in range(LANES + 1):
+        expected = sum(map(float, numbers[:count])) + sum(map(float, numbers))
+        assert _sum(numbers, count) == pytest.approx(expected, rel=1e-15)
+
+
+@kernel
+def _where(a: Any, b: Any, out: Any) -> None:
+    store(out, 0, where_above(load(a, 0), load(b, 0), load(a, 0) + load(a, 0), load(b, 0)))
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_where_above(dtype: Any) -> None:
+    a, b = np.random.default_rng(5).normal(0, 1, (2, LANES)).astype(dtype)
+    a[0], a[1], b[2] = np.nan, np.inf, np.inf  # NaN is above nothing
+    out = np.empty(LANES, dtype)
+    _where(a, b, out)
+    assert out.tobytes() == np.where(a > b, a + a, b).tobytes()
