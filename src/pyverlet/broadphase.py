@@ -229,7 +229,7 @@ class _SortedCells(BroadPhase):
 
     def _still_good(self, state: Slots) -> bool:
         """Whether no pair that is not listed can touch: a cheap test, then a closer look that says how long that will do."""
-        if not strayed(state.position, self._checked, self._allowed):
+        if not strayed(state, self._checked, self._allowed):
             return True
         slack = self._grids.slack(state.position, self.built, 2.0 * self._half_skin)
         if not slack > WORTH_LOOKING * self._half_skin:

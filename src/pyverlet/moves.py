@@ -21,20 +21,19 @@ def advance(out: Array, base: Array, slope: Array, h: float) -> None:
 
 def newton(state: Slots, force: Array, gravity: tuple[float, float]) -> float:
     """acceleration = gravity + force / mass; force: (n, 2), or (0, 2) for none. Returns the largest of them, m/s^2."""
-    numbers = state.real(gravity[0]), state.real(gravity[1])
-    return float(_light(motion.newton, state.position)(state.acceleration, force, state.inverse_mass, *numbers))
+    where = state.acceleration, force, state.inverse_mass
+    return float(_light(motion.newton, state.position)(*where, *state.reals(*gravity)))
 
 
 def newton_kick_drift(state: Slots, force: Array, gravity: tuple[float, float], h: float, ahead: float) -> float:
     """Take back a kick of `ahead` seconds; `newton`; velocity += h * acceleration; position += h * velocity."""
     where = state.position, state.velocity, state.acceleration, force, state.inverse_mass
-    numbers = state.real(gravity[0]), state.real(gravity[1]), state.real(h), state.real(ahead)
-    return float(_light(motion.newton_kick_drift, state.position)(*where, *numbers))
+    return float(_light(motion.newton_kick_drift, state.position)(*where, *state.reals(*gravity, h, ahead)))
 
 
-def strayed(position: Array, reference: Array, distance: float) -> bool:
+def strayed(state: Slots, reference: Array, distance: float) -> bool:
     """Whether any particle has moved by more than this, m, from its row of `reference`."""
-    return bool(_light(motion.strayed, position)(position, reference, position.dtype.type(distance * distance)))
+    return bool(_light(motion.strayed, reference)(state.position, reference, state.real(distance * distance)))
 
 
 def _light(kernel: Kernel, particles: Array) -> Kernel:

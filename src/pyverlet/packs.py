@@ -102,12 +102,12 @@ class Packs:
         if self._size is not state.size:
             self._share_out(state)
         where = (self._parts(), self.begin, self.lanes, self.close, self.lane_i, self.lane_j, self.gap)
-        settings = (self.reach, self.share, self._varied, state.real(fed / PUSHED / h), state.real(LARGEST_PUSH))
+        settings = (self.reach, self.share, self._varied, *state.reals(fed / PUSHED / h, LARGEST_PUSH))
         packs.project(state.position, state.velocity, self.origin, self._moved, *where, *settings, self.normal, self._depths)
 
     def still(self, state: Slots) -> None:
         """Take from touching circles the velocity that projection has put in."""
-        where = (self._parts(), self.begin, self.lanes, self.close, self.lane_i, self.lane_j)
+        where = (self._cut, self.begin, self.lanes, self.close, self.lane_i, self.lane_j)
         packs.still(state.velocity, *where, self.share, self._varied, self.normal)
 
     # ---- friction ------------------------------------------------------------------------------------------------------

@@ -37,13 +37,14 @@ class Slips:
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self._dtype = dtype
+        self._none = Kept(np.empty(0, np.int32), np.empty(0, np.int32), np.empty(0, dtype))
         self.forget()
 
     def forget(self) -> None:
         """Nobody has slipped."""
         self._holder: Holder | None = None
-        self._owner = np.empty(0, np.int32)  # (n,) the particle in each slot of the list, as long as that holds the slips
-        self._kept = Kept(np.empty(0, np.int32), np.empty(0, np.int32), np.empty(0, self._dtype))
+        self._owner = self._none.low  # (n,) the particle in each slot of the list, as long as that holds the slips
+        self._kept = self._none
 
     def start(self, holder: Holder, particle: Array) -> None:
         """Have this list hold the slips, if it does not."""

@@ -141,6 +141,7 @@ class Slots:
 
     Attributes:
         real: rounds a number to the dtype; it remembers some, for NumPy takes longer to round one than a kernel to be called.
+        reals: the same of several at once.
         particle: (n,) the user's index of the particle in each slot.
         position, velocity, acceleration, spin, radius, mass, grown, restitution, friction: as in State.
         category, mask: as in State, or empty while every circle collides with every other.
@@ -170,6 +171,7 @@ class Slots:
         self.dtype = dtype
         self._sleeps = sleeps
         self.real = lru_cache(64)(dtype.type)
+        self.reals = lru_cache(64)(lambda *numbers: tuple(map(dtype.type, numbers)))
         self._kept: dict[str, Array] = {}
         self.drop = 1.0
         self.total_mass = 0.0
