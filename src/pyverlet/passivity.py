@@ -59,7 +59,7 @@ class Watch:
         if room < gained < np.inf:
             surplus = gained - max(room, SURPLUS * self._kinetic().sum())
             if surplus > 0.0:
-                self._take_back(slots, listed, surplus)
+                self.take_back(slots, listed, surplus)
         return gained / room if room > 0.0 else 0.0
 
     def _kinetic(self) -> Array:
@@ -68,7 +68,8 @@ class Watch:
         mass = np.where(np.isfinite(then.mass), then.mass, 0).astype(float)
         return _kinetic(mass, then.velocity.astype(float), then.radius, then.spin)
 
-    def _take_back(self, slots: Slots, listed: Listed, surplus: float) -> None:
+    def take_back(self, slots: Slots, listed: Listed, surplus: float) -> None:
+        """Take so many J from those who have gained in this frame."""
         g, start, order = np.array(self._forces.gravity), self._start, slots.particle
         mass = np.where(slots.inverse_mass > 0, slots.mass, 0).astype(float)
         x, v = slots.position.astype(float), slots.velocity.astype(float)

@@ -18,10 +18,14 @@ from pyverlet.forces import Conservative, Drag
 from pyverlet.group import Group
 from pyverlet.links import Angle, Area, Pin, Spring, Stick
 from pyverlet.obstacles import Segment
+from pyverlet.passivity import Watch
 from pyverlet.state import Slots
 from pyverlet.world import World
 
-OF_CIRCLES = ("bounds", "contacts", "friction", "grid", "impacts", "loans", "measure", "motion", "packs", "pairs", "refine")
+OF_CIRCLES = (
+    "bounds", "cage", "clusters", "contacts", "friction", "grid", "grips", "impacts", "loans", "measure", "motion", "packs",
+    "pairs", "refine",
+)  # fmt: skip
 """Modules of the kernels that every world of circles may need: how many there are is what progress is measured by."""
 
 _ROOMS = (Open, Circle, Box)
@@ -143,6 +147,8 @@ def _link(world: World) -> None:
 def _use(world: World) -> None:
     world.step(1e-3)
     world.step(1e-3)  # by now somebody has moved far enough for a closer look at the list of pairs
+    if world._contacts:
+        Watch(world._state, world._force_sum, world.links).take_back(world._slots, world._contacts.listed(), 0.0)
     world.energy()
     world.momentum()
     world.overlap()

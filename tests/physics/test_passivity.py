@@ -17,13 +17,13 @@ G = 9.81
 def taken(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """J that were taken back, frame by frame."""
     amounts: list[float] = []
-    real = passivity.Watch._take_back
+    real = passivity.Watch.take_back
 
     def noted(self: passivity.Watch, slots: object, pairs: object, surplus: float) -> None:
         amounts.append(surplus)
         real(self, slots, pairs, surplus)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(passivity.Watch, "_take_back", noted)
+    monkeypatch.setattr(passivity.Watch, "take_back", noted)
     return amounts
 
 
@@ -62,7 +62,7 @@ def test_momentum_and_angular_momentum_stay(monkeypatch: pytest.MonkeyPatch) -> 
     rng = np.random.default_rng(2)
     circles = world.add(position=rng.uniform(-0.3, 0.3, (60, 2)), velocity=(3.0, -1.0), radius=0.5, mass=rng.uniform(1, 5, 60))
     circles.velocity += 0.5 * np.column_stack((-circles.position[:, 1], circles.position[:, 0]))
-    real, times = passivity.Watch._take_back, 0
+    real, times = passivity.Watch.take_back, 0
 
     def momenta(slots: pv.state.Slots) -> np.ndarray:
         (x, y), (vx, vy), m = slots.position.T, slots.velocity.T, slots.mass
@@ -76,7 +76,7 @@ def test_momentum_and_angular_momentum_stay(monkeypatch: pytest.MonkeyPatch) -> 
         size = float((slots.mass * np.hypot(*slots.velocity.T) * (1 + np.hypot(*slots.position.T))).sum())
         assert momenta(slots) == pytest.approx(before, abs=1e-14 * size)
 
-    monkeypatch.setattr(passivity.Watch, "_take_back", compared)
+    monkeypatch.setattr(passivity.Watch, "take_back", compared)
     world.run(seconds=1)
     assert times > 10
 
