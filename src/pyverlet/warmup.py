@@ -128,6 +128,9 @@ def _compile_all(dtype: np.dtype[Any], threads: int) -> None:
     ):
         small = _lattice(_enough(threads), dtype, boundary, 0.5, collisions, threads=threads)
         small.step(1e-3)
+        small.friction[:] = 0.5
+        small.step(1e-3)
+        small.friction[:] = -1
         small.mass[0] *= 2 * UNEVEN
         small.save()
         small.forces.append(Drag(linear=0.1))
