@@ -86,6 +86,13 @@ class Served:
                     status: dict[str, Any] = head["status"]
                     return status
 
+    def start_anew(self) -> None:
+        """Reset, and wait until it is done: a million circles first end their frame."""
+        before = self.ask()["time"]
+        self.ask({"type": "reset"})
+        while before > 0.0 and self.ask()["time"] >= before:
+            time.sleep(0.05)
+
     def end(self) -> None:
         """Ctrl-C."""
         self.process.send_signal(signal.SIGINT)
@@ -194,7 +201,7 @@ def measure(scene: str, particles: int, seconds: float) -> None:
 
 def passed(served: Served, seconds: float) -> str:
     """A world starts anew and runs for so long."""
-    served.ask({"type": "reset"})
+    served.start_anew()
     time.sleep(seconds / 4)
     began, before = time.perf_counter(), served.ask()
     spent = processor_ms(served.process.pid)
@@ -213,7 +220,7 @@ def pace(before: dict[str, Any], after: dict[str, Any], wall: float) -> str:
 
 def watch(served: Served, tab: Tab, particles: int, seconds: float) -> None:
     """The same with the page open."""
-    served.ask({"type": "reset"})
+    served.start_anew()
     time.sleep(seconds / 4)
     began, before = time.perf_counter(), tab.evaluate("window.pyverlet.status()")
     spent = processor_ms(served.process.pid)
