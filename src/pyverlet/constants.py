@@ -66,8 +66,8 @@ COLOURS: Final = 12
 choosing; only speed depends on it, never correctness."""
 
 CLOSE: Final = 1.05
-"""Of the contact distance: listed pairs nearer than this are solved first, the others, of which hardly any touches while the list
-lasts, apart from them. Among falling circles these are most, in a settled pile a tenth."""
+"""Of the contact distance: listed pairs nearer than this are solved last, apart from the others: hardly any of these touches
+while the list lasts. Among falling circles these others are most, in a settled pile a tenth."""
 
 SERIAL_BELOW: Final = 32768
 """Worlds with fewer particles run the simple loops on one thread: over 32,768 of them that takes 22 us, 15 on two threads, and

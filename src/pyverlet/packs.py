@@ -20,7 +20,7 @@ Array = NDArray[Any]
 class Packs:
     """The pairs of one list, packed each time the list is made anew.
 
-    `lane_i`, `lane_j` slots, those of strip s from begin[s] to begin[s] + lanes[s], the first close[s] of them likely to touch;
+    `lane_i`, `lane_j` slots, those of strip s from begin[s] to begin[s] + lanes[s], the first apart[s] unlikely to touch soon;
     `gap` (2, room) from i to j when the list was made, m; `reach`, `share` one for each lane, or (LANES,) if they are the same
     for all; `normal` (2, room) of touching pairs.
     """
@@ -28,7 +28,7 @@ class Packs:
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self._dtype = dtype
         self.begin = np.zeros(1, np.int64)
-        self.lanes = self.close = np.zeros(0, np.int64)
+        self.lanes = self.apart = np.zeros(0, np.int64)
         self._make_room(0)
         self._cut = np.zeros((2, 2), np.int64)
         self.origin = self._moved = np.empty((0, 2), dtype)
@@ -48,14 +48,14 @@ class Packs:
     def take(self, pairs: PairList, origin: Array, radius: Array) -> None:
         """Pack a new list; origin: (n, 2) positions it was made from; radius: (n,) m."""
         need = pairs.count + self._spare
-        self.lanes, self.close = (np.empty(len(pairs.count), np.int64) for _ in range(2))
+        self.lanes, self.apart = (np.empty(len(pairs.count), np.int64) for _ in range(2))
         used = np.empty(len(origin), np.int64)
         which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
         while True:
             self.begin = np.concatenate(([0], np.cumsum(need)))
             if not self.begin[-1] <= len(self.lane_i) <= 1.1 * self.begin[-1]:
                 self._make_room(int(self.begin[-1]))
-            packs.pack(origin, radius, *which, used, self.begin, self.lanes, self.close, self.lane_i, self.lane_j, self.gap)
+            packs.pack(origin, radius, *which, used, self.begin, self.lanes, self.apart, self.lane_i, self.lane_j, self.gap)
             if (self.lanes <= need).all():
                 break
             need = np.maximum(need, self.lanes)
@@ -101,13 +101,13 @@ class Packs:
         """Move overlapping circles apart and feed their velocities."""
         if self._size is not state.size:
             self._share_out(state)
-        where = (self._parts(), self.begin, self.lanes, self.close, self.lane_i, self.lane_j, self.gap)
+        where = (self._parts(), self.begin, self.lanes, self.apart, self.lane_i, self.lane_j, self.gap)
         settings = (self.reach, self.share, self._varied, *state.reals(fed / PUSHED / h, LARGEST_PUSH))
         packs.project(state.position, state.velocity, self.origin, self._moved, *where, *settings, self.normal, self._depths)
 
     def still(self, state: Slots) -> None:
         """Take from touching circles the velocity that projection has put in."""
-        where = (self._cut, self.begin, self.lanes, self.close, self.lane_i, self.lane_j)
+        where = (self._cut, self.begin, self.lanes, self.apart, self.lane_i, self.lane_j)
         packs.still(state.velocity, *where, self.share, self._varied, self.normal)
 
     # ---- friction ------------------------------------------------------------------------------------------------------

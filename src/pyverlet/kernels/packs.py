@@ -8,7 +8,7 @@ What is computed for each pair, and why, is in kernels.contacts; here it is arra
   the sum of their radii, how they share a push. Such small numbers keep their digits in float32, so that the velocities need not
   be carried along: FED_SMOOTH / PUSHED / h times what a circle has been moved is what it is fed.
 - The second pass finds the normals where the first has left them, 0 for pairs that do not touch.
-- Nothing is decided for a single pair, only, behind the last pack with a pair that was close, whether any of the eight touches.
+- Nothing is decided for a single pair, only, before the first pack with a pair that was close, whether any of the eight touches.
 
 Everything runs strip by strip as kernels.pairs explains: even strips in parallel, then odd ones.
 """
@@ -96,9 +96,12 @@ def _choose(pair_i, pair_j, used, number, lane_i, lane_j):
 
 @kernel
 def _measure(origin, radius, lane_i, lane_j, gap_x, gap_y):
-    """From i to j of every lane, m; of coincident ones a hair in a direction of their own. Returns how many lanes are close."""
+    """From i to j of every lane, m; of coincident ones a hair in a direction of their own.
+
+    Returns in how many, at first, no pair is close.
+    """
     zero, factor = spread(origin.dtype.type(0)), spread(origin.dtype.type(CLOSE))
-    close = 0
+    apart = lane_i.shape[0]
     for k in range(0, lane_i.shape[0], LANES):
         xi, yi = take(origin, lane_i, k)
         xj, yj = take(origin, lane_j, k)
@@ -106,24 +109,24 @@ def _measure(origin, radius, lane_i, lane_j, gap_x, gap_y):
         store(gap_x, k, dx)
         store(gap_y, k, dy)
         soon = factor * (pick(radius, lane_i, k) + pick(radius, lane_j, k))
-        if which_above(soon * soon, dx * dx + dy * dy) != 0:
-            close = k + LANES
+        if apart > k and which_above(soon * soon, dx * dx + dy * dy) != 0:
+            apart = k
         if which_above(larger(dx * dx, dy * dy), zero) != ALL:
             for lane in range(k, k + LANES):
                 if gap_x[lane] == 0 and gap_y[lane] == 0:
                     angle = _GOLDEN_ANGLE * (lane_i[lane] + lane_j[lane])
                     gap_x[lane] = _ASIDE * np.cos(angle)
                     gap_y[lane] = _ASIDE * np.sin(angle)
-    return close
+    return apart
 
 
 @parallel_kernel
-def pack(origin, radius, first, count, pair_i, pair_j, used, begin, lanes, close, lane_i, lane_j, gap):
+def pack(origin, radius, first, count, pair_i, pair_j, used, begin, lanes, apart, lane_i, lane_j, gap):
     """Pack the pairs of every strip s into the lanes from begin[s] up to begin[s + 1] at most; lanes[s]: how many they take.
 
-    A strip that needs more room than it has reports how much, and its packs are not complete: the caller makes room. close[s]:
-    those up to the last pair that is close. origin: (n, 2) positions at which the list was made. used: (n,) scratch. gap:
-    (2, lanes), m.
+    A strip that needs more room than it has reports how much, and its packs are not complete: the caller makes room. apart[s]:
+    those before the first pack with a pair that is close. origin: (n, 2) positions the list was made from. used: (n,) scratch.
+    gap: (2, lanes), m.
     """
     used[:] = -1
     for parity in range(2):
@@ -134,7 +137,7 @@ def pack(origin, radius, first, count, pair_i, pair_j, used, begin, lanes, close
             lanes[s] = _choose(pair_i[a:b], pair_j[a:b], used, low, lane_i[low:high], lane_j[low:high])
             if lanes[s] <= high - low:
                 high = low + lanes[s]
-                close[s] = _measure(origin, radius, lane_i[low:high], lane_j[low:high], gap[0, low:high], gap[1, low:high])
+                apart[s] = _measure(origin, radius, lane_i[low:high], lane_j[low:high], gap[0, low:high], gap[1, low:high])
 
 
 @parallel_kernel
@@ -148,7 +151,7 @@ def share_out(begin, lanes, lane_i, lane_j, radius, inverse_mass, reach, share):
 
 
 @kernel
-def _project_strip(moved, close, lane_i, lane_j, gap_x, gap_y, reach, share, varied, most, normal_x, normal_y, depths):
+def _project_strip(moved, apart, lane_i, lane_j, gap_x, gap_y, reach, share, varied, most, normal_x, normal_y, depths):
     noted = depths.shape[0] > 0
     zero, one = spread(most - most), spread(most / most)
     pushed, most = spread(moved.dtype.type(PUSHED)), spread(most)
@@ -158,7 +161,7 @@ def _project_strip(moved, close, lane_i, lane_j, gap_x, gap_y, reach, share, var
         dx, dy = load(gap_x, k) + (xj - xi), load(gap_y, k) + (yj - yi)
         r, part = load(reach, k * varied), load(share, k * varied)
         distance = square_root(dx * dx + dy * dy)
-        if k >= close and which_above(r, distance) == 0:
+        if k < apart and which_above(r, distance) == 0:
             store(normal_x, k, zero)
             store(normal_y, k, zero)
             if noted:
@@ -202,7 +205,7 @@ def _arrive(position, velocity, origin, moved, feed):
 
 @parallel_kernel
 def project(
-    position, velocity, origin, moved, cut, begin, lanes, close, lane_i, lane_j, gap, reach, share, varied, feed, most, normal,
+    position, velocity, origin, moved, cut, begin, lanes, apart, lane_i, lane_j, gap, reach, share, varied, feed, most, normal,
     depths,
 ):  # fmt: skip
     """Move overlapping pairs apart, feed their velocities, and note the normals of those that touch.
@@ -222,7 +225,7 @@ def project(
             for half in range(cut[parity, part], cut[parity, part + 1]):
                 a, b = begin[2 * half + parity], begin[2 * half + parity] + lanes[2 * half + parity]
                 _project_strip(
-                    moved, close[2 * half + parity], lane_i[a:b], lane_j[a:b], gap[0, a:b], gap[1, a:b], reach[a * varied :],
+                    moved, apart[2 * half + parity], lane_i[a:b], lane_j[a:b], gap[0, a:b], gap[1, a:b], reach[a * varied :],
                     share[a * varied :], varied, most, normal[0, a:b], normal[1, a:b], depths[a:b],
                 )  # fmt: skip
     for c in prange(chunks):
@@ -231,11 +234,11 @@ def project(
 
 
 @kernel
-def _still_strip(velocity, close, lane_i, lane_j, share, varied, one, normal_x, normal_y):
+def _still_strip(velocity, apart, lane_i, lane_j, share, varied, one, normal_x, normal_y):
     zero, whole = spread(one - one), spread(one)
     for k in range(0, lane_i.shape[0], LANES):
         nx, ny, part = load(normal_x, k), load(normal_y, k), load(share, k * varied)
-        if k >= close and which_above(nx * nx + ny * ny, zero) == 0:
+        if k < apart and which_above(nx * nx + ny * ny, zero) == 0:
             continue
         xi, yi = take(velocity, lane_i, k)
         xj, yj = take(velocity, lane_j, k)
@@ -246,7 +249,7 @@ def _still_strip(velocity, close, lane_i, lane_j, share, varied, one, normal_x, 
 
 
 @parallel_kernel
-def still(velocity, cut, begin, lanes, close, lane_i, lane_j, share, varied, normal):
+def still(velocity, cut, begin, lanes, apart, lane_i, lane_j, share, varied, normal):
     """Set the normal velocity of touching pairs to 0."""
     one = velocity.dtype.type(1)
     for parity in range(2):
@@ -255,7 +258,7 @@ def still(velocity, cut, begin, lanes, close, lane_i, lane_j, share, varied, nor
                 a, b = begin[2 * half + parity], begin[2 * half + parity] + lanes[2 * half + parity]
                 _still_strip(
                     velocity,
-                    close[2 * half + parity],
+                    apart[2 * half + parity],
                     lane_i[a:b],
                     lane_j[a:b],
                     share[a * varied :],

@@ -4,9 +4,10 @@ Rows of level 0 of the grids are cut into strips, and each strip lists its candi
 radii plus a skin. Every pair belongs to the strip of the circle in the lower row of level 0, so a strip writes only to its own
 particles and to the lowest row of the next strip: even strips may be solved in parallel, then odd ones.
 
-Inside a strip those come first that are close enough to touch soon: the solver makes short work of others that stand together.
-Both kinds are ordered by colour: no two pairs of a colour share a particle, so that the processor can overlap them.
-A circle with more pairs than there are colours has them spread over all colours.
+Inside a strip those come last that are close enough to touch soon: the solver makes short work of the others where they stand
+together, and those that touch already pass on the impact of one that arrives, in the same substep. Both kinds are ordered by
+colour: no two pairs of a colour share a particle, so that the processor can overlap them. A circle with more pairs than there
+are colours has them spread over all colours.
 """
 
 from __future__ import annotations
@@ -20,10 +21,10 @@ from pyverlet.kernels.grid import before_row, cell_number
 
 _ALL = (1 << COLOURS) - 1
 
-_LATER = 1 << 31
+_APART = 1 << 31
 """Set in the second place of a pair that is not close."""
 
-_PLACE = np.uint32(_LATER - 1)
+_PLACE = np.uint32(_APART - 1)
 
 
 @kernel
@@ -118,7 +119,7 @@ def _list_strip(spot, order, row0, row1, levels, start, skin, picky, category, m
                         if picky:
                             near = _accepted(near, category, mask, inverse_mass, order, a, b)
                         soon_bits = near & which_above(soon * soon, square)
-                        for bits, mark in ((soon_bits, 0), (near - soon_bits, _LATER)):
+                        for bits, mark in ((soon_bits, 0), (near - soon_bits, _APART)):
                             if found + LANES <= raw_i.shape[0]:
                                 write_all(raw_i, found, a)
                                 write_chosen(raw_j, found, bits, b + mark)
@@ -137,7 +138,7 @@ def _forget_colours(used, row0, row1, levels, start):
 def _colour_strip(used, raw_i, raw_j, found, colour, begin):
     """Give each pair the lowest colour that neither of its circles has; begin[c]: pairs of the colours before c.
 
-    Those that are not close have the colours from COLOURS on.
+    Those that are close have the colours from COLOURS on.
     """
     begin[:] = 0
     for p in range(found):
@@ -146,7 +147,7 @@ def _colour_strip(used, raw_i, raw_j, found, colour, begin):
         lowest = free & -free
         used[i] |= lowest
         used[j] |= lowest
-        c = (lowest_bit(free) if free != 0 else p % COLOURS) + (COLOURS if raw_j[p] > _PLACE else 0)
+        c = (lowest_bit(free) if free != 0 else p % COLOURS) + (0 if raw_j[p] > _PLACE else COLOURS)
         colour[p] = c
         begin[c + 1] += np.uint32(1)
     for c in range(2 * COLOURS):
