@@ -115,7 +115,7 @@ LENT: Final = 0.5
 """Part of its mass that a circle lends at most to those it rests against. With 0.75 their overlaps are a half, and who is hit in
 that moment jumps away four times as fast instead of twice."""
 
-LOAN_S: Final = 0.1
+LOAN_S: Final = 0.2
 """s within which loans of inertia go back, and for which who has bounced has none. At 0.02 they come and go with contacts that
 tremble, and piles that bounce do not come to rest."""
 
