@@ -16,8 +16,6 @@ from pyverlet.lab.physics import energy, friction, gas, lost
 
 # Promises that do not hold yet. Strict: the first run in which one holds fails until its line here is removed.
 BROKEN = {
-    "masses": "20 s are not enough for every pile: 2e-5 to 9e-4 m g R, as it happened to fall",
-    "radii-masses": "small heavy circles on large light ones tremble: 1e-4 to 3e-3 m g R",
 }
 
 
