@@ -15,13 +15,11 @@ from pyverlet.lab import physics
 from pyverlet.lab.physics import energy, friction, gas, lost
 
 # Promises that do not hold yet. Strict: the first run in which one holds fails until its line here is removed.
-BROKEN = {
-}
+BROKEN: dict[str, str] = {}
 
 
 def parameters() -> list[Any]:
-    # How the circles of `masses` lie is chance; all others fail for certain until mended.
-    marks = {name: pytest.mark.xfail(strict=name != "masses", reason=f"{name}: {reason}") for name, reason in BROKEN.items()}
+    marks = {name: pytest.mark.xfail(strict=True, reason=f"{name}: {reason}") for name, reason in BROKEN.items()}
     return [pytest.param(check, id=check.name, marks=marks.get(check.name, ())) for check in physics.CHECKS]
 
 
