@@ -107,17 +107,17 @@ GRIP: Final = 0.8
 """Part of the slip of a contact that friction at rest feeds, divided by h, into the velocities: the tangential FED. Piles with
 friction stood still from 0.8 on; at 0.5 single circles crept; at 1 a few in a box had a spin that turned nobody, at 1.6 many."""
 
-UNEVEN: Final = 10.0
+UNEVEN: Final = 20.0
 """Ratio of masses from which on circles lend each other inertia, and contacts are refined: the overlap that a light circle needs
-to carry a heavy one goes with it."""
+to carry a heavy one goes with it. Up to 20, piles do without; radii of 1:4 and equal density are 16."""
 
-LENT: Final = 0.5
-"""Part of its mass that a circle lends at most to those it rests against. With 0.75 their overlaps are a half, and who is hit in
-that moment jumps away four times as fast instead of twice."""
+LENT: Final = 0.75
+"""Part of its mass that a circle lends at most to those it rests against. At 0.5 small circles between large ones overlapped
+twice as much; at 0.9 the frame of a crash gained twice as much energy."""
 
 LOAN_S: Final = 0.1
 """s within which loans of inertia go back, and for which who has bounced has none. At 0.02 they come and go with contacts that
-tremble, and piles that bounce do not come to rest."""
+tremble; at 0.02 and at 0.2 unequal circles with e = 0.5 still trembled after 40 s."""
 
 REFINED_FROM: Final = 0.01
 REFINED: Final = 0.25

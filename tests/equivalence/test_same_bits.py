@@ -19,15 +19,17 @@ import json, sys
 import numpy as np
 import pyverlet as pv
 hashes = {}
+kinds = (0, 0, 1, 1), (0.5, 0.3, 1, 1), (0, 0, 30, 1), (0, 0, 1, 1000), (0.5, 0.3, 1, 1000)
 for threads in (1, 2, 4, 8):
-    for restitution, friction, spread in ((0.0, 0.0, 1), (0.5, 0.3, 1), (0.0, 0.0, 30)):
+    for restitution, friction, spread, heavy in kinds:
         world = pv.World(boundary=pv.Circle(radius=45, restitution=restitution, friction=friction),
                          collisions=pv.Collisions(restitution=restitution, friction=friction), threads=threads)
         x, y = np.meshgrid(np.arange(-30, 30, 1.05), np.arange(-30, 30, 1.05))
         position = np.column_stack((x.ravel(), y.ravel())) + np.random.default_rng(0).uniform(-0.02, 0.02, (x.size, 2))
-        world.add(position=position, radius=0.5 * spread ** -np.random.default_rng(1).random(x.size))
+        rng = np.random.default_rng(1)
+        world.add(position=position, radius=0.5 * spread ** -rng.random(x.size), mass=heavy ** rng.random(x.size))
         world.run(seconds=2)
-        hashes.setdefault(f"{restitution} {friction} {spread}", []).append(world.state_hash())
+        hashes.setdefault(f"{restitution} {friction} {spread} {heavy}", []).append(world.state_hash())
 json.dump(hashes, sys.stdout)
 """
 
@@ -42,7 +44,7 @@ def test_threads_do_not_change_a_bit() -> None:
         timeout=300,
     )
     hashes = json.loads(run.stdout)
-    assert len(hashes) == 3
+    assert len(hashes) == 5
     for values in hashes.values():
         assert len(values) == 4
         assert len(set(values)) == 1

@@ -15,15 +15,11 @@ from pyverlet.lab import physics
 from pyverlet.lab.physics import energy, friction, gas, lost
 
 # Promises that do not hold yet. Strict: the first run in which one holds fails until its line here is removed.
-BROKEN = {
-    "masses": "20 s are not enough for every pile: 2e-5 to 9e-4 m g R, as it happened to fall",
-    "radii-masses": "small heavy circles on large light ones tremble: 1e-4 to 3e-3 m g R",
-}
+BROKEN: dict[str, str] = {}
 
 
 def parameters() -> list[Any]:
-    # How the circles of `masses` lie is chance; all others fail for certain until mended.
-    marks = {name: pytest.mark.xfail(strict=name != "masses", reason=f"{name}: {reason}") for name, reason in BROKEN.items()}
+    marks = {name: pytest.mark.xfail(strict=True, reason=f"{name}: {reason}") for name, reason in BROKEN.items()}
     return [pytest.param(check, id=check.name, marks=marks.get(check.name, ())) for check in physics.CHECKS]
 
 

@@ -30,7 +30,7 @@ CHECKS: tuple[Check, ...] = (
     Check("masses", sizes.pile, {"particles": 500, "seconds": 20, "radius_ratio": 1, "mass_ratio": 1000}, full={"seconds": 60}),
     Check("radii", sizes.pile, {"particles": 500, "seconds": 20, "radius_ratio": 50, "mass_ratio": 1000}, full={"seconds": 60}),
     Check("radii-masses", sizes.pile,
-          {"particles": 500, "seconds": 20, "radius_ratio": 50, "mass_ratio": 1000, "independent": True}, full={"seconds": 60}),
+          {"particles": 500, "seconds": 40, "radius_ratio": 50, "mass_ratio": 1000, "independent": True}, full={"seconds": 60}),
     Check("heavy-on-column", sizes.heavy_on_column),
     Check("heavy-on-rough-bed", sizes.heavy_on_bed, {"friction": 0.5, "particles": 1000}),
     Check("heavy-on-smooth-bed", sizes.heavy_on_bed, {"friction": 0.0, "particles": 1000}),

@@ -1,0 +1,106 @@
+"""Circles of unequal masses at rest lend each other inertia (kernels.loans): what must not change by that."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet.constants import FED_SMOOTH, LENT
+
+G = 9.81
+H = 1 / 480
+
+
+def column(count: int, heavy: float, **options: object) -> tuple[pv.World, pv.Group]:
+    """A circle of `heavy` kg on `count` of 1 kg in a slot one diameter wide."""
+    world = pv.World(boundary=pv.Box((0, 0), (1, 100)), **options)  # type: ignore[arg-type]
+    y = 0.5 + np.arange(count + 1)
+    return world, world.add(position=np.column_stack((np.full(count + 1, 0.5), y)), radius=0.5, mass=[1.0] * count + [heavy])
+
+
+@pytest.mark.parametrize("times", [50.0, 1000.0])
+@pytest.mark.parametrize("substeps", [4, 8, 16])
+def test_a_heavy_circle_on_a_column_of_light_ones_soon_rests(times: float, substeps: int) -> None:
+    # Without loans the column is a spring: 10 contacts, each compressed by times g h^2 / FED_SMOOTH for masses of 1 kg, 4 cm at
+    # 1000 kg and 8 substeps, on which the heavy circle bounced for minutes. Evened out, masses are as in a column of equal ones.
+    world, circles = column(10, times, substeps=substeps)
+    world.run(seconds=5)
+    h = 1 / 60 / substeps
+    weight = (times + 10) * G
+    # The heavy one lends the part LENT, and 10 light ones share it: depth = weight h^2 W / FED_SMOOTH with W = 2 / m'.
+    depth = weight * h * h * 2 / (1 + LENT * times / 10) / FED_SMOOTH
+    assert world.overlap().max < 2 * depth
+    # What remains of the velocity carries the weight: at most g h upwards.
+    assert np.abs(circles.velocity).max() < 2 * G * h
+
+
+def test_who_rests_on_a_scale_weighs_what_it_weighs() -> None:
+    # A pan of 200 kg on a spring, on it ten circles of 1 kg, and one of 1000 kg: k x = (sum of m) g, whoever has the inertia.
+    world = pv.World(boundary=pv.Box((0, 0), (1, 100)), dtype=np.float64)
+    mass = [200.0] + [1.0] * 10 + [1000.0]
+    circles = world.add(position=np.column_stack((np.full(12, 0.5), 1.5 + np.arange(12))), radius=0.5, mass=mass)
+    world.forces.append(Scale(1e5, 4e3))
+    world.run(seconds=20)
+    # At rest a substep begins with a velocity of up to g h, which the damper takes for one.
+    assert 1.5 - circles.position[0, 1] == pytest.approx(sum(mass) * G / 1e5, abs=4e3 * G * H / 1e5)
+
+
+class Scale:
+    """A damped spring that holds particle 0 at a height of 1.5 m."""
+
+    def __init__(self, stiffness: float, damping: float) -> None:
+        self.stiffness, self.damping = stiffness, damping
+
+    def apply(self, state: object, t: float) -> None:
+        k = int(np.flatnonzero(state.particle == 0)[0])  # type: ignore[attr-defined]
+        x, v = state.position[k, 1], state.velocity[k, 1]  # type: ignore[attr-defined]
+        state.force[k, 1] += self.stiffness * (1.5 - x) - self.damping * v  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("which", [0, 10])
+def test_who_has_lent_or_borrowed_falls_like_everybody(which: int) -> None:
+    # Taken off the column, the heavy circle and a light one fall by g t^2 / 2 from the first substep on.
+    world, circles = column(10, 1000.0, dtype=np.float64)
+    world.run(seconds=2)
+    circles.position[which] = 0.5, 90.0
+    circles.velocity[which] = 0.0
+    world.run(seconds=1)
+    assert 90.0 - circles.position[which, 1] == pytest.approx(G / 2, rel=2 * H)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.4])
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_loans_survive_saving_and_removal(restitution: float, friction: float) -> None:
+    world, circles = heap(pv.Collisions(restitution=restitution, friction=friction))
+    world.run(seconds=1.5)
+    world.remove(circles.index[3:20])
+    world.run(seconds=0.5)
+    saved = world.save()
+    world.run(seconds=0.5)
+    there = world.state_hash()
+    world.restore(saved)
+    world.run(seconds=0.5)
+    assert world.state_hash() == there
+
+
+def heap(collisions: pv.Collisions) -> tuple[pv.World, pv.Group]:
+    rng = np.random.default_rng(0)
+    world = pv.World(boundary=pv.Box((0, 0), (10, 60)), collisions=collisions)
+    x, y = np.meshgrid(np.arange(0.6, 9.5, 1.05), np.arange(0.6, 14.0, 1.05))
+    radius = 0.5 * 10 ** -rng.random(x.size)
+    position = np.column_stack((x.ravel(), y.ravel())) + rng.uniform(-0.02, 0.02, (x.size, 2))
+    return world, world.add(position=position, radius=radius, mass=1000 ** rng.random(x.size))
+
+
+def test_without_weight_nothing_is_lent() -> None:
+    # Momentum and energy of collisions without gravity are exact, however unequal the masses: sum of m v, and e = 0 only loses.
+    world = pv.World(gravity=(0, 0), dtype=np.float64)
+    rng = np.random.default_rng(0)
+    group = world.add(position=rng.uniform(0, 12, (100, 2)), radius=0.5, mass=1000 ** rng.random(100))
+    world.run(seconds=6)  # until they are full-grown
+    group.velocity[:] = rng.uniform(-3, 3, (100, 2))
+    scale = float((group.mass[:, None] * np.abs(group.velocity)).sum())
+    before = world.momentum()
+    world.run(seconds=3)
+    assert world.momentum() == pytest.approx(before, abs=1e-9 * scale)
