@@ -14,7 +14,7 @@ from typing import Any
 import av
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageSequence
 
 import pyverlet as pv
 from pyverlet import record
@@ -39,9 +39,8 @@ def durations_ms(path: Path) -> list[int]:
     """Milliseconds each picture of a GIF or WebP is shown, by decoding all of it."""
     with Image.open(path) as film:
         result = []
-        for k in range(film.n_frames):  # type: ignore[attr-defined]
-            film.seek(k)
-            film.load()
+        for picture in ImageSequence.Iterator(film):
+            picture.load()
             result.append(int(film.info["duration"]))
         return result
 
