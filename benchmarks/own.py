@@ -196,7 +196,7 @@ def resting(particles: int = 20_000) -> Iterator[Row]:
         row, column = np.divmod(np.arange(particles), side)
         shaken = np.random.default_rng(0).uniform(0, 0.02, (particles, 2))
         world.add(position=np.column_stack((1 + 1.05 * column, 1 + 1.05 * row)) + shaken, radius=RADIUS)
-        world.run(seconds=40, dt=DT)
+        world.run(seconds=60, dt=DT)
         world.add(position=(1.2 * side, 2 * side - 2), radius=RADIUS)
         worlds.append(world)
     awake, asleep = in_turn([stepping(world, 1) for world in worlds], 4)

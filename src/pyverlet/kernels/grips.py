@@ -11,6 +11,7 @@ from pyverlet._jit import kernel, parallel_kernel, prange
 from pyverlet._lanes import (
     LANES,
     add_lanes,
+    copy_row,
     larger,
     load,
     pick,
@@ -26,6 +27,7 @@ from pyverlet._lanes import (
 )
 from pyverlet.constants import FED, GRIP, PUSHED
 from pyverlet.kernels.friction import NEW
+from pyverlet.kernels.packs import set_out
 
 # Particles one thread takes at a time where each is on its own.
 _CHUNK = 1024
@@ -168,8 +170,9 @@ def grip(
     fed, feed, share = real(FED) / h, real(GRIP) / h, real(PUSHED / FED) * h
     for c in prange((count + _CHUNK - 1) // _CHUNK):
         a, b = c * _CHUNK, min((c + 1) * _CHUNK, count)
-        velocity_before[a:b] = velocity[a:b]
-        spin_before[a:b] = spin[a:b]
+        for i in range(a, b):  # not slice by slice: NumPy's checks of shapes take seconds to compile
+            copy_row(velocity_before, i, velocity, i)
+            spin_before[i] = spin[i]
     for parity in range(2):
         for part in prange(cut.shape[1] - 1):
             for half in range(cut[parity, part], cut[parity, part + 1]):
@@ -197,7 +200,7 @@ def rub(
     real = velocity.dtype.type
     for c in prange((count + _CHUNK - 1) // _CHUNK):
         a, b = c * _CHUNK, min((c + 1) * _CHUNK, count)
-        moved[a:b] = position[a:b] - start[a:b]
+        set_out(position[a:b], start[a:b], moved[a:b])
     for parity in range(2):
         for part in prange(cut.shape[1] - 1):
             for half in range(cut[parity, part], cut[parity, part + 1]):

@@ -186,7 +186,7 @@ def _project_strip(moved, apart, lane_i, lane_j, gap_x, gap_y, reach, share, var
 
 
 @kernel
-def _set_out(position, origin, moved):
+def set_out(position, origin, moved):
     """moved = position - origin."""
     x, start, way = position.reshape(-1), origin.reshape(-1), moved.reshape(-1)
     for k in range(x.shape[0]):
@@ -219,7 +219,7 @@ def project(
     chunks = (n + _CHUNK - 1) // _CHUNK
     for c in prange(chunks):
         a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
-        _set_out(position[a:b], origin[a:b], moved[a:b])
+        set_out(position[a:b], origin[a:b], moved[a:b])
     for parity in range(2):
         for part in prange(cut.shape[1] - 1):
             for half in range(cut[parity, part], cut[parity, part + 1]):
