@@ -77,9 +77,14 @@ class PairList:
 
     def pairs(self) -> Array:
         """(k, 2) slots of all candidate pairs; a copy, for tests and measurements."""
-        parts = [slice(a, a + n) for a, n in zip(self.first, self.count, strict=True)]
-        rows = [np.column_stack((self.pair_i[part], self.pair_j[part])) for part in parts]
-        return np.concatenate([np.empty((0, 2), np.uint32), *rows]).astype(np.int64)
+        return rows_of(*self.listed())
+
+
+def rows_of(first: Array, count: Array, pair_i: Array, pair_j: Array) -> Array:
+    """(k, 2) slots of listed pairs, strip after strip; a copy."""
+    parts = [slice(a, a + n) for a, n in zip(first, count, strict=True)]
+    rows = [np.column_stack((pair_i[part], pair_j[part])) for part in parts]
+    return np.concatenate([np.empty((0, 2), np.uint32), *rows]).astype(np.int64)
 
 
 class BroadPhase(ABC):
@@ -91,7 +96,7 @@ class BroadPhase(ABC):
     rebuilds: int = 0
     renewing: Callable[[Slots, PairList], None] | None = None
     """Called when the list is about to be made anew."""
-    replacing: Callable[[PairList], None] | None = None
+    replacing: Callable[[], None] | None = None
     """The same, but also when the list was no longer valid: slots may hold other particles by now."""
 
     @abstractmethod
@@ -136,7 +141,7 @@ class _AllPairs(BroadPhase):
 
     def update(self, state: Slots) -> None:
         if self.replacing:
-            self.replacing(self.list)
+            self.replacing()
         if self.renewing:
             self.renewing(state, self.list)
         found = self._fill(state)
@@ -251,7 +256,7 @@ class _SortedCells(BroadPhase):
     def rebuild(self, state: Slots) -> None:
         """Sort the particles by cell and list the pairs."""
         if self.replacing:
-            self.replacing(self.list)
+            self.replacing()
         self.rebuilds += 1
         self._age = 0
         if not self._mean_radius:

@@ -147,7 +147,7 @@ class ContactSolver:
         moving, lends = (state.position, state.velocity), self._uneven and strongest > 0
         self._lighter = self._loans.begin(state) if lends else state.inverse_mass
         bodies = (state.size, self._lighter)
-        which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
+        which = pairs.listed()
         fed = FED if self._rubs(state) or self._bounces(state) else FED_SMOOTH
         push = (real(fed / h), real(LARGEST_PUSH))
         notes = (pairs.touching, pairs.impulse, pairs.touches)
@@ -176,7 +176,7 @@ class ContactSolver:
     def _bounce(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         pairs, real = self.broad_phase.list, state.real
         moving, bodies = (state.position, state.velocity, state.acceleration), (state.size, state.inverse_mass, state.restitution)
-        which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
+        which = pairs.listed()
         settings = (real(h), real(lag), real(self.settings.restitution), real(rest_speed))
         impacts.impacts(*moving, *bodies, *which, *settings, state.fed, pairs.meeting, pairs.impulse, pairs.spent)
         state.fed[:] = (state.fed & (CARRIES | AT_WALL)) * CARRIED
@@ -190,7 +190,7 @@ class ContactSolver:
             self._packs.rub(state, h, self.settings.friction, self.broad_phase.list.spent)
             return
         pairs, real = self.broad_phase.list, state.real
-        which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
+        which = pairs.listed()
         moving = (state.position, state.velocity)
         notes = (pairs.touching, pairs.impulse, pairs.touches)
         if self._rubs(state):
@@ -283,7 +283,7 @@ def measure_overlap(state: State, unlist: Unlist) -> Overlap:
     slots, phase = _listed(state, Fast(skin=0.0))
     pairs = phase.list
     unlist(pairs, slots.particle)
-    number, total, largest = contacts.overlaps(slots.position, slots.radius, pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
+    number, total, largest = contacts.overlaps(slots.position, slots.radius, *pairs.listed())
     return Overlap(total / number if number else 0.0, largest, number)
 
 

@@ -70,7 +70,7 @@ class Events:
 
     def listen(self, state: Slots, pairs: PairList, lag: float) -> None:
         """After the broad phase, before contacts change a velocity: who overlaps, and how fast do they meet?"""
-        which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
+        which = pairs.listed()
         kernels.listen(
             state.position, state.velocity, state.acceleration, state.size, state.real(lag), *which, pairs.closing
         )  # fmt: skip
@@ -79,7 +79,7 @@ class Events:
         """The list of pairs is about to change, or the frame ends: keep what was heard."""
         room = int(pairs.count.sum())
         keys, speeds = np.empty(room, np.int64), np.empty(room)
-        which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
+        which = pairs.listed()
         found = kernels.heard(*which, pairs.closing, state.particle, keys, speeds)
         self._keys.append(keys[:found])
         self._speeds.append(speeds[:found])

@@ -24,7 +24,7 @@ class Growth:
 
     def fit(self, state: Slots, pairs: PairList, fresh: np.ndarray) -> None:
         """Shrink those marked in `fresh` (n,), and whom they overlap, until they just touch."""
-        which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
+        which = pairs.listed()
         contacts.fit(state.position, state.radius, *which, fresh, state.real(SMALLEST), state.grown)
         state.resize()
 

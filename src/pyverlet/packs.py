@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pyverlet import _jit
 from pyverlet._lanes import LANES
-from pyverlet.broadphase import PairList
+from pyverlet.broadphase import PairList, rows_of
 from pyverlet.constants import COLOURS, FED_SMOOTH, LARGEST_PUSH, PUSHED
 from pyverlet.kernels import grips, packs
 from pyverlet.state import Slots
@@ -50,7 +50,7 @@ class Packs:
         need = pairs.count + self._spare
         self.lanes, self.apart = (np.empty(len(pairs.count), np.int64) for _ in range(2))
         used = np.empty(len(origin), np.int64)
-        which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
+        which = pairs.listed()
         while True:
             self.begin = np.concatenate(([0], np.cumsum(need)))
             if not self.begin[-1] <= len(self.lane_i) <= 1.1 * self.begin[-1]:
@@ -81,9 +81,7 @@ class Packs:
 
     def pairs(self) -> Array:
         """(k, 2) slots of the pairs in all lanes; a copy, for tests and measurements. The last pair of a pack may come twice."""
-        lanes = [slice(a, a + n) for a, n in zip(self.begin, self.lanes, strict=False)]
-        rows = [np.column_stack((self.lane_i[part], self.lane_j[part])) for part in lanes]
-        return np.concatenate([np.empty((0, 2), np.uint32), *rows]).astype(np.int64)
+        return rows_of(*self.listed())
 
     def _share_out(self, state: Slots) -> None:
         """Bring reach and share up to date with the sizes of now."""

@@ -34,7 +34,7 @@ class Watch:
 
     def __init__(self, start: State, forces: ForceSum, links: Links) -> None:
         self._start, self._forces, self._links = start, forces, links
-        self._energy = self._look(start)
+        self._gravity, self._energy = forces.gravity, self._look(start)
 
     def _look(self, now: State | Slots) -> float:
         """Energy of all, J."""
@@ -54,6 +54,8 @@ class Watch:
 
         Returns what had been gained, as a part of what is allowed.
         """
+        if self._forces.gravity != self._gravity:  # it has turned on the way, and drove the world
+            return 0.0
         gained = self._look(slots) - self._energy
         room = SURPLUS * fall(slots.total_mass, self._forces.gravity, extent)
         if room < gained < np.inf:

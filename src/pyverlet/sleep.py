@@ -70,7 +70,7 @@ class Sleep:
         if not self._members:
             return False
         touched = np.zeros(len(slots), np.uint8)
-        which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
+        which = pairs.listed()
         if not kernels.touch(slots.position, slots.size, slots.island, *which, touched):
             return False
         return self._wake(slots, np.isin(slots.island, slots.island[touched == 1]))
@@ -84,7 +84,7 @@ class Sleep:
         if self._laws is None or not tired.any():
             return False
         root = np.empty(len(slots), np.int64)
-        which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j)
+        which = pairs.listed()
         kernels.find_islands(
             slots.position, slots.size, slots.inverse_mass, slots.calm, *which, real(SLEEP_NEAR), np.float32(SLEEP_AFTER_S), root
         )

@@ -56,7 +56,7 @@ class Slips:
             begin = np.concatenate((np.zeros(1, np.int64), np.cumsum(np.bincount(low, minlength=len(particle)))))
             friction.give_slips(*holder.listed(), holder.slip, self._owner, begin, high, slip)
 
-    def stop(self, _: Any = None) -> None:
+    def stop(self) -> None:
         """The list is about to be made anew, or another is to hold the slips: keep them."""
         if self._holder is not None:
             self._kept = self._taken(self._holder)

@@ -75,12 +75,10 @@ def test_circles_that_bounce_or_rub_go_the_long_way(change: str) -> None:
     if change == "bouncy circle":
         slots.restitution[:] = slots.most_restitution = 0.5
     if change == "circles that rub":
-        slots.turn = slots.spin * H
+        slots.note_turn(H)
+        slots.lift[:] = 0.1
     smooth = crowd(0, 100, 3.0, np.float64)
     cage.confine(slots, H, 0.0, 0.08)
     Circle(center=(1, 2), radius=10).confine(smooth, H, 0.0, 0.08)
-    assert np.isfinite(slots.position).all()
-    if change == "circles that rub":  # nothing rubs at a smooth wall; the angles are kept
-        assert slots.position == pytest.approx(smooth.position)
-    else:
-        assert np.abs(slots.velocity - smooth.velocity).max() > 1e-3
+    # They bounce; or rub; or, at rest against others that rub, leave with the velocity that gravity takes again.
+    assert np.abs(slots.velocity - smooth.velocity).max() > 1e-3

@@ -43,12 +43,6 @@ def packed(slots: Slots, method: Fast | BruteForce) -> tuple[Any, Packs]:
     return phase.list, packs
 
 
-def used_lanes(packs: Packs) -> Any:
-    """(lanes, 2) slots, strip after strip."""
-    where = np.concatenate([np.arange(a, a + n) for a, n in zip(packs.begin, packs.lanes, strict=False)])
-    return np.column_stack((packs.lane_i, packs.lane_j))[where].astype(np.int64)
-
-
 cases = given(
     seed=st.integers(0, 2**32 - 1),
     n=st.integers(1, 900),
@@ -62,7 +56,7 @@ cases = given(
 @cases
 def test_packs_hold_every_pair_and_share_no_particle(seed: int, n: int, spread: float, dtype: Any, method: Any) -> None:
     pairs, packs = packed(crowd(seed, n, spread, dtype), method)
-    lanes = used_lanes(packs)
+    lanes = packs.pairs()
     assert set(map(tuple, lanes.tolist())) == set(map(tuple, pairs.pairs().tolist()))
     for pack in lanes.reshape(-1, LANES, 2):
         alone = np.unique(pack, axis=0)  # a pair repeated to fill a pack writes the same twice
@@ -137,7 +131,7 @@ def test_a_circle_with_hundreds_of_neighbours() -> None:
     world.add(position=np.vstack(([0, 0], 10.04 * np.column_stack((np.cos(angle), np.sin(angle))))), radius=[10, *[0.05] * 300])
     slots.gather(world._state)
     pairs, packs = packed(slots, Fast())
-    lanes = used_lanes(packs)
+    lanes = packs.pairs()
     assert set(map(tuple, lanes.tolist())) == set(map(tuple, pairs.pairs().tolist()))
     for pack in lanes.reshape(-1, LANES, 2):
         alone = np.unique(pack, axis=0)
