@@ -15,6 +15,7 @@ from __future__ import annotations
 import ctypes
 import itertools
 import sys
+import threading
 from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
@@ -94,13 +95,23 @@ def _call(typing: Any, address: Any, words: Any, release: Any) -> Any:
 
 
 _as_int = types.ExternalFunction("PyLong_AsLongLong", types.int64(types.int64))
+_append = types.ExternalFunction("PyList_Append", types.int32(types.int64, types.int64))
+_this_thread = types.ExternalFunction("PyThread_get_thread_ident", types.int64())
 _clear_error = types.ExternalFunction("PyErr_Clear", types.void())
 _vectorcall = types.ExternalFunction("PyObject_Vectorcall", types.int64(types.int64, types.int64, types.int64, types.int64))
 _threads = types.ExternalFunction("get_num_threads", types.int32())
 
 # Words of an entry's table, and of each argument in it.
-_OTHERWISE, _STUB, _WHEN, _COUNT, _FIRST = (8 * k for k in range(5))
+_OTHERWISE, _STUB, _WHEN, _COUNT, _LENGTH, _RECORDER, _FIRST = (8 * k for k in range(7))
 _WANT, _KIND, _IS, _DIMENSIONS, _BYTES, _STEP = (8 * k for k in range(6))
+
+# Words of the recorder: the thread whose calls are recorded, or 0; where the next goes, and the end of the room for them; the
+# list that holds what they were given; True and False.
+_THREAD, _NEXT, _END, _HELD, _TRUE, _FALSE = (8 * k for k in range(6))
+RECORDER = np.array([0, 0, 0, 0, id(True), id(False)], np.int64)
+
+# Words of a recorded call: what is called, what it answered if that was yes or no, and how many words it takes, which follow.
+CALLED, ANSWER, TAKEN, CALL = (8 * k for k in range(4))
 
 
 def _unpack(arguments: int, count: int, want: int, words: int) -> int:
@@ -153,19 +164,46 @@ def _enter(table_object: int, arguments: int, count: int) -> int:
         words = _buffer()
         longest = unpack(arguments, count, table + _FIRST, words)
         if longest >= 0:
+            recorder = _word(table + _RECORDER)
+            if _word(recorder) != 0 and _word(recorder) == _this_thread():
+                return record(recorder, table, arguments, words)
             return _call(_word(table + _STUB), words, np.int64(longest >= RELEASE_FROM))
     return _vectorcall(_word(table + _OTHERWISE), arguments, count, 0)
 
 
+def _record(recorder: int, table: int, arguments: int, words: int) -> int:
+    """Call a kernel, and keep what it was called with, for `_trace`."""
+    at, length = _word(recorder + _NEXT), _word(table + _LENGTH)
+    _put(recorder + _NEXT, at + CALL + 8 * length)  # beyond the end, if it does not fit
+    result = _call(_word(table + _STUB), words, 0)
+    if _word(recorder + _NEXT) <= _word(recorder + _END):
+        for k in range(_word(table + _COUNT)):
+            _append(_word(recorder + _HELD), _word(arguments + 8 * k))
+        for k in range(length):
+            _put(at + CALL + 8 * k, _word(words + 8 * k))
+        _put(at + CALLED, _word(table + _STUB))
+        _put(at + ANSWER, result if result == _word(recorder + _TRUE) or result == _word(recorder + _FALSE) else 0)
+        _put(at + TAKEN, length)
+    return result
+
+
+def miss() -> None:
+    """A kernel is called another way: what this thread records is not all."""
+    if RECORDER[0] == threading.get_ident():
+        RECORDER[1] = RECORDER[2] + 1
+
+
 unpack: Any = None
+record: Any = None
 
 
 @cache
 def _door(cached: bool) -> Any:
     """`_enter`, compiled for all kernels once, to be declared where its cache is to be."""
-    global unpack
+    global unpack, record
     numba.get_num_threads()  # makes the function of this name known
-    unpack = numba.njit(_unpack, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    inner = numba.njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    unpack, record = inner(_unpack), inner(_record)
     return numba.cfunc(types.int64(types.int64, types.int64, types.int64), error_model="numpy", cache=cached)(_enter)
 
 
@@ -267,11 +305,19 @@ def entry(compiled: Any, arguments: Sequence[Any], when: int, otherwise: Callabl
             rows.append((id(np.ndarray), _ARRAY, id(a.dtype), a.ndim, a.itemsize))
         else:
             rows.append((id(type(a)), _SCALARS[type(a)], id(True), 0, 0))
-    table = np.array([id(otherwise), _stub(compiled), when, len(rows), *itertools.chain(*rows)], np.int64)
-    method = _Method(compiled.fndesc.qualname.encode(), _door(cached).address, _FASTCALL, None)
+    length = sum(5 + 2 * a.ndim if type(a) is np.ndarray else 1 for a in arguments)
+    head = (id(otherwise), _stub(compiled), when, len(rows), length, RECORDER.ctypes.data)
+    table = np.array([*head, *itertools.chain(*rows)], np.int64)
+    _KEPT.append((otherwise, compiled, [a.dtype for a in arguments if type(a) is np.ndarray]))
+    return built_in(compiled.fndesc.qualname, _door(cached).address, table)
+
+
+def built_in(name: str, address: int, table: Any) -> Callable[..., Any]:
+    """What Python takes for a built-in function: machine code like `_enter`, with a table of its own."""
+    method = _Method(name.encode(), address, _FASTCALL, None)
     make = ctypes.pythonapi.PyCFunction_NewEx
     make.argtypes, make.restype = (ctypes.c_void_p, ctypes.py_object, ctypes.c_void_p), ctypes.py_object
-    _KEPT.append((method, otherwise, compiled, [a.dtype for a in arguments if type(a) is np.ndarray]))
+    _KEPT.append(method)
     return make(ctypes.addressof(method), table, None)
 
 

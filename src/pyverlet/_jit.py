@@ -27,7 +27,7 @@ from pyverlet import _entry
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-_COMPILED_FROM = ("_jit.py", "_entry.py", "_lanes.py", "constants.py")
+_COMPILED_FROM = ("_jit.py", "_entry.py", "_trace.py", "_lanes.py", "constants.py")
 
 _STALE_AFTER_S = 30 * 24 * 3600.0
 
@@ -82,7 +82,7 @@ def _forget_stale(current: Path) -> None:
 
 
 @contextlib.contextmanager
-def _caching(variant: str) -> Iterator[bool]:
+def caching(variant: str) -> Iterator[bool]:
     """Declare functions whose compiled code is kept in the folder of this name; False if it cannot be kept."""
     folder = cache_dir()
     previous = numba.config.CACHE_DIR
@@ -129,7 +129,7 @@ class Kernel(functools.partial[Any]):
         """Numba's own: its loops over threads or not; `wrapped` for calls from Python with any arguments."""
         if self._made.get((parallel, wrapped)) is None:
             name = ("parallel" if parallel else "alone") + ("-wrapped" if wrapped else "")
-            with _caching(name) as kept:
+            with caching(name) as kept:
                 # No fastmath: it would break NaN checks and equal bits. error_model: a division is a division, not a branch and a
                 # raise. Wrappers take as long to compile as the kernel.
                 self._made[parallel, wrapped] = numba.njit(
@@ -140,6 +140,7 @@ class Kernel(functools.partial[Any]):
 
     def _learn(self, *arguments: Any) -> Any:
         """Called with arguments of kinds that no entry knows."""
+        _entry.miss()
         parallel = self.parallel and numba.get_num_threads() > 1
         kinds = tuple(map(numba.typeof, arguments)) if _entry.takes(arguments) and _entry.usable() else ()
         if not kinds or (parallel, kinds) in self._met:
@@ -150,7 +151,7 @@ class Kernel(functools.partial[Any]):
         compiled = lean.overloads[kinds]
         if _entry.gives(compiled):
             when = _entry.ANY if not self.parallel else _entry.TOGETHER if parallel else _entry.ALONE
-            with _caching("entry") as kept:
+            with caching("entry") as kept:
                 self._lead_to(_entry.entry(compiled, arguments, when, self.func, kept))
         return self(*arguments)
 

@@ -29,6 +29,10 @@ class Boundary(ABC):
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         """Bounce or hold every circle that reaches beyond a wall. `lag`: seconds the velocity is behind the position."""
 
+    def repeats(self) -> tuple[Any, ...] | None:
+        """What `confine` depends on beside its arguments, if it is but calls of kernels; None: it may be anything."""
+        return None
+
     @abstractmethod
     def extent(self) -> Extent | None:
         """(x0, y0, x1, y1) of the room, m; None if it has no walls."""
@@ -100,6 +104,9 @@ class Circle(_Walls):
         self.center = checks.vector("center", center)
         self.radius = checks.number("radius", radius, above=0.0)
 
+    def repeats(self) -> tuple[Any, ...] | None:
+        return (self, *self.center, self.radius, self.restitution, self.friction) if type(self) is Circle else None
+
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         shape: Sequence[float] = (*self.center, self.radius)
         if self.restitution == 0.0 == self.friction and state.smooth:
@@ -144,6 +151,9 @@ class Box(_Walls):
         self.upper = checks.vector("upper", upper)
         if not (self.lower[0] < self.upper[0] and self.lower[1] < self.upper[1]):
             raise InputError(f"upper is {self.upper}; allowed is a corner above and to the right of lower, {self.lower}")
+
+    def repeats(self) -> tuple[Any, ...] | None:
+        return (self, *self.lower, *self.upper, self.restitution, self.friction) if type(self) is Box else None
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         self._confine(bounds.box, (*self.lower, *self.upper), state, h, lag, rest_speed)

@@ -114,6 +114,13 @@ class BroadPhase(ABC):
     def forget(self) -> None:
         """The list is no longer valid (particles, radii or masses changed)."""
 
+    def lasts(self) -> tuple[Any, ...] | None:
+        """What `update` depends on, if as long as it does nothing it is but calls of kernels; None: there is more to it."""
+        return None
+
+    def aged(self, substeps: int) -> None:
+        """So many have gone by in which `update` would have done nothing."""
+
     def release(self) -> None:
         """Nobody needs the pairs themselves until the list is made anew: their memory may go."""
 
@@ -208,6 +215,12 @@ class _SortedCells(BroadPhase):
             if self.renewing:
                 self.renewing(state, self.list)
         self.rebuild(state)
+
+    def lasts(self) -> tuple[Any, ...] | None:
+        return (self.rebuilds, id(self._checked)) if self._allowed >= 0 else None
+
+    def aged(self, substeps: int) -> None:
+        self._age += substeps
 
     def forget(self) -> None:
         self._allowed = -1.0

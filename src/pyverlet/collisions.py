@@ -131,6 +131,14 @@ class ContactSolver:
                 self.broad_phase.release()
         return self._packs
 
+    def repeats(self, state: Slots) -> tuple[Any, ...] | None:
+        """What a substep's contacts depend on beside h, if they are but calls of kernels; None: there is more to them."""
+        alone = self._events is None and self._sleep is None and state.size is state.radius
+        if not (alone and self._packed and self._packs.fits(state) and self._slides(state)):
+            return None
+        lasts = self.broad_phase.lasts()
+        return lasts and (self, *lasts)
+
     def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
         """Move overlapping circles apart, let impacts bounce, note who touches, and let those grip each other."""
         if self._slides(state):

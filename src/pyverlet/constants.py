@@ -76,6 +76,10 @@ each meeting of the threads, 1.4 us at best, waits for the slowest when the mach
 ONE_THREAD_BELOW: Final = 2048
 """Worlds with fewer particles run on one thread altogether: at 2,000 a second one gained a tenth, and only on a quiet machine."""
 
+REPEAT_BELOW: Final = 512
+"""In smaller worlds the kernels of a substep are called by `_trace`: there Python would take as long as they do, or longer. In
+larger ones the time of each stage is worth more than what is left to gain."""
+
 ALL_THREADS_FROM: Final = 10_000
 """Unless the user says how many, worlds use all threads from this many particles on. Threads wait for each other several times a
 substep; on a busy machine (a browser drawing the world, say) each wait may last a time slice. At 5,000 two threads gain 0.3 ms of

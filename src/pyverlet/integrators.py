@@ -46,12 +46,18 @@ class Integrator(ABC):
         symplectic: whether the map preserves phase space volume (for forces that do not depend on velocity).
         velocity_lag: the velocity seen by contacts during a frame belongs to this fraction of h before the position.
         drop: from rest, under a constant acceleration a, a step moves a particle by drop * a h^2.
+        repeats: whether every step of a frame is the same calls of kernels, if no force is but gravity. A class with a `step` of
+            its own says so anew.
     """
 
     order: ClassVar[int]
     symplectic: ClassVar[bool]
     velocity_lag: ClassVar[float] = 0.0
     drop: ClassVar[float] = 0.5
+    repeats: ClassVar[bool] = False
+
+    def __init_subclass__(cls) -> None:
+        cls.repeats = vars(cls).get("repeats", "step" not in vars(cls) and cls.repeats)
 
     def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
         """Before the substeps of a frame. `h_last`: the substep of the frame before, None after a restart."""
@@ -97,6 +103,7 @@ class ExplicitEuler(Integrator):
     order = 1
     symplectic = False
     drop = 0.0
+    repeats = True
 
     def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
         forces(state, t)
@@ -113,6 +120,7 @@ class SemiImplicitEuler(Integrator):
     order = 1
     symplectic = True
     drop = 1.0
+    repeats = True
 
     def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
         forces.kick_drift(state, t, h)
@@ -130,6 +138,7 @@ class _Stormer(Integrator):
     symplectic = True
     drop = 1.0
     velocity_lag = 0.5
+    repeats = True
 
     def __init__(self, *, naive_start: bool = False) -> None:
         self.naive_start = naive_start

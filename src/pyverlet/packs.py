@@ -83,6 +83,10 @@ class Packs:
         """(k, 2) slots of the pairs in all lanes; a copy, for tests and measurements. The last pair of a pack may come twice."""
         return rows_of(*self.listed())
 
+    def fits(self, state: Slots) -> bool:
+        """Whether nothing is left to be prepared before `project`."""
+        return self._size is state.size
+
     def _share_out(self, state: Slots) -> None:
         """Bring reach and share up to date with the sizes of now."""
         self._size = state.size

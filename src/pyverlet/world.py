@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from pyverlet import _jit, checks
+from pyverlet._trace import Trace
 from pyverlet.actors import Actor
 from pyverlet.bounds import Boundary, Open
 from pyverlet.collisions import Collisions, ContactSolver
-from pyverlet.constants import ALL_THREADS_FROM, ONE_THREAD_BELOW, REST_ACCELERATIONS, STANDARD_GRAVITY
+from pyverlet.constants import ALL_THREADS_FROM, ONE_THREAD_BELOW, REPEAT_BELOW, REST_ACCELERATIONS, STANDARD_GRAVITY
 from pyverlet.doors import Doors
 from pyverlet.errors import InputError, NonFiniteError
 from pyverlet.events import Events
@@ -91,6 +93,7 @@ class World(Measures, Queries, Doors):
         self.frames = 0
         self.profile = Profile()
         self._books = Bookkeeper() if ledger else None
+        self._trace = Trace()
         self.onlooker: Callable[[Moment], None] | None = None
         """Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins."""
 
@@ -127,10 +130,11 @@ class World(Measures, Queries, Doors):
             return
         watch = Watch(self._state, forces, self.links) if contacts and undriven(self, h, self._h_last) else None
         integrator.begin(state, forces, self.time, h, self._h_last)
-        for substep in range(self.substeps):
-            for part in parts:
-                part.before(state, h)
-            integrator.step(state, forces, self.time + substep * h, h)
+        for substep, moved in self._trace.turns(self.substeps, partial(self._repeats, h, done), self._repeated):
+            if not moved:
+                for part in parts:
+                    part.before(state, h)
+                integrator.step(state, forces, self.time + substep * h, h)
             strongest = forces.strongest
             done("integrate")
             if contacts:
@@ -155,6 +159,21 @@ class World(Measures, Queries, Doors):
             self._show(substep + 1, h, lag)
         self._finish(contacts, watch, h)
         done("finish")
+
+    def _repeats(self, h: float, done: Callable[[str], None]) -> Hashable:
+        """What a substep depends on, if it is the same calls of kernels as the next and they are short; None: otherwise."""
+        if len(self) >= REPEAT_BELOW or self.forces or self.links or self.onlooker or self._course or done != self.profile.mark:
+            return None
+        state, contacts = self._slots, self._contacts if len(self) > 1 else None
+        parts = self.integrator.repeats or None, self.boundary.repeats(), contacts.repeats(state) if contacts else ()
+        if None in parts:
+            return None
+        return h, self.gravity, self.integrator, *parts, *map(id, (state.position, state.acceleration, state.radius))
+
+    def _repeated(self, substeps: int) -> None:
+        if self._contacts:
+            self._contacts.broad_phase.aged(substeps)
+        self.profile.mark("repeats")
 
     def run(self, *, seconds: float, dt: float = 1 / 60) -> None:
         """Advance by as many frames of dt as come nearest to `seconds`."""

@@ -15,7 +15,7 @@ ROOT = Path(pyverlet.__file__).parent
 
 # From the ground up. A module may import from its own layer only within its own package (the first part of its name).
 LAYERS = (
-    {"_loading", "errors", "constants", "_entry", "_jit", "_lanes", "_native", "checks", "progress"},
+    {"_loading", "errors", "constants", "_entry", "_jit", "_lanes", "_native", "_trace", "checks", "progress"},
     {"state", "group", "moves", "kernels"},
     {
         "integrators",
@@ -60,6 +60,7 @@ LAYERS = (
 BESIDE = {
     "checks": {"errors"},
     "_jit": {"_entry"},
+    "_trace": {"_entry", "_jit"},
     "state": {"kernels"},
     "group": {"state"},
     "moves": {"state", "kernels"},
@@ -132,7 +133,7 @@ def test_kernels_stand_on_the_compiler_alone(path: Path) -> None:
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda p: p.relative_to(ROOT).as_posix())
 def test_few_places_compile(path: Path) -> None:
-    compiles = path.name in ("_jit.py", "_entry.py", "_native.py")
+    compiles = path.name in ("_jit.py", "_entry.py", "_trace.py", "_native.py")
     assert ("import numba" in path.read_text(encoding="utf-8")) == compiles
 
 
