@@ -84,7 +84,7 @@ class Trace:
                 turn, begun = turn + done, more > 0
                 replayed(done)
                 if turn == count:
-                    return
+                    break
             recording = now is not None and not begun and self._begin()
             try:
                 yield turn, begun

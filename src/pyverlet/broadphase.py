@@ -217,7 +217,7 @@ class _SortedCells(BroadPhase):
         self.rebuild(state)
 
     def lasts(self) -> tuple[Any, ...] | None:
-        return (self.rebuilds, id(self._checked)) if self._allowed >= 0 else None
+        return (self, self.rebuilds, id(self._checked)) if self._allowed >= 0 else None
 
     def aged(self, substeps: int) -> None:
         self._age += substeps

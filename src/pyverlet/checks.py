@@ -14,19 +14,23 @@ from pyverlet.errors import InputError
 
 def number(name: str, value: SupportsFloat, *, above: float | None = None, least: float | None = None) -> float:
     """A finite float, greater than `above` or at least `least` where given."""
+    try:
+        result = float(value)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} is {value!r}; allowed is {_allowed(above, least)}") from None
+    low = (above is not None and result <= above) or (least is not None and result < least)
+    if not math.isfinite(result) or low:
+        raise InputError(f"{name} is {result:g}; allowed is {_allowed(above, least)}")
+    return result
+
+
+def _allowed(above: float | None, least: float | None) -> str:
     allowed = "a finite number"
     if above is not None:
         allowed += f" greater than {above:g}"
     if least is not None:
         allowed += f" of at least {least:g}"
-    try:
-        result = float(value)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} is {value!r}; allowed is {allowed}") from None
-    low = (above is not None and result <= above) or (least is not None and result < least)
-    if not math.isfinite(result) or low:
-        raise InputError(f"{name} is {result:g}; allowed is {allowed}")
-    return result
+    return allowed
 
 
 def whole(name: str, value: Any, *, least: int = 1, most: int | None = None, most_is: str = "") -> int:

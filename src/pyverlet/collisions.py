@@ -136,8 +136,7 @@ class ContactSolver:
         alone = self._events is None and self._sleep is None and state.size is state.radius
         if not (alone and self._packed and self._packs.fits(state) and self._slides(state)):
             return None
-        lasts = self.broad_phase.lasts()
-        return lasts and (self, *lasts)
+        return self.broad_phase.lasts()
 
     def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
         """Move overlapping circles apart, let impacts bounce, note who touches, and let those grip each other."""

@@ -39,8 +39,9 @@ class Growth:
     def heed(self, risen: float) -> None:
         """What the energy has risen by in this frame, as a part of what is allowed; beyond 4 it says no more, nor a loss."""
         self._risen += (min(max(risen, -1.0), 4.0) - self._risen) / PACE_FRAMES
-        change = min(max(1.0 - self._risen / SURPLUS_SOUGHT, -2.0), 1.0) / PACE_FRAMES
-        self.pace = min(max(self.pace * math.exp(change), 1e-3), 1.0)
+        if self.pace < 1.0 or self._risen > SURPLUS_SOUGHT:
+            change = min(max(1.0 - self._risen / SURPLUS_SOUGHT, -2.0), 1.0) / PACE_FRAMES
+            self.pace = min(max(self.pace * math.exp(change), 1e-3), 1.0)
 
     def save(self) -> tuple[float, float]:
         """What `restore` needs."""

@@ -40,7 +40,7 @@ class Watch:
         """Energy of all, J."""
         look = measure.mechanical if len(now) >= SERIAL_BELOW else measure.mechanical.alone
         gravity = self._forces.gravity
-        energy = float(look(now.position, now.velocity, now.velocity, 0.0, now.spin, now.radius, now.mass, *gravity))
+        energy: float = look(now.position, now.velocity, now.velocity, 0.0, now.spin, now.radius, now.mass, *gravity)
         if self._forces.forces or self._links:
             state = now.in_users_order() if isinstance(now, Slots) else now
             kept = (force for force in self._forces.forces if isinstance(force, Conservative))
@@ -143,9 +143,11 @@ def undriven(world: Any, h: float, h_last: float | None) -> bool:
     Forces have a potential or are drag, no obstacle moves, and the integrator does not raise it either: of order 2 or more, and
     with a constant step, which `PositionVerlet` needs.
     """
-    kept = all(isinstance(force, Conservative | Drag) for force in world.forces)
-    moving = any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
-    return kept and not moving and world.integrator.order > 1 and h_last in (None, h)
+    if world.integrator.order < 2 or h_last not in (None, h):
+        return False
+    if world.forces and not all(isinstance(force, Conservative | Drag) for force in world.forces):
+        return False
+    return not world.obstacles or not any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
 
 
 def _ratio(a: Array, b: Array) -> Array:

@@ -302,9 +302,11 @@ class Slots:
     def clear_notes(self) -> None:
         """Forget what walls and friction have noted in the last frame."""
         self.hits.fill(-1)
-        self.spent.fill(0)
-        self.lift.fill(0)
-        self.turn = self.turn[:0]
+        if len(self.spent):
+            self.spent.fill(0)
+        if len(self.turn):
+            self.lift.fill(0)
+            self.turn = self.turn[:0]
 
     def forget(self, now: Array) -> None:
         """The user's particles are now at `now` (n,), or no more (-1): let those go, keep the order of the others."""

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
-from functools import partial
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from pyverlet import _jit, checks
-from pyverlet._trace import Trace
 from pyverlet.actors import Actor
 from pyverlet.bounds import Boundary, Open
 from pyverlet.collisions import Collisions, ContactSolver
-from pyverlet.constants import ALL_THREADS_FROM, ONE_THREAD_BELOW, REPEAT_BELOW, REST_ACCELERATIONS, STANDARD_GRAVITY
+from pyverlet.constants import ALL_THREADS_FROM, ONE_THREAD_BELOW, REST_ACCELERATIONS, STANDARD_GRAVITY
 from pyverlet.doors import Doors
 from pyverlet.errors import InputError, NonFiniteError
 from pyverlet.events import Events
@@ -29,6 +27,7 @@ from pyverlet.obstacles import Course, Obstacles
 from pyverlet.passivity import Watch, undriven
 from pyverlet.profile import Profile
 from pyverlet.queries import Queries
+from pyverlet.repeats import Repeats
 from pyverlet.saved import Saved
 from pyverlet.sleep import Sleep, laws
 from pyverlet.state import Slots, State
@@ -93,7 +92,7 @@ class World(Measures, Queries, Doors):
         self.frames = 0
         self.profile = Profile()
         self._books = Bookkeeper() if ledger else None
-        self._trace = Trace()
+        self._repeats = Repeats()
         self.onlooker: Callable[[Moment], None] | None = None
         """Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins."""
 
@@ -111,7 +110,7 @@ class World(Measures, Queries, Doors):
             actor.act(self, dt)
         _jit.use_threads(self.threads)
         self.profile.begin()
-        books = self._open_books(h)
+        books = self._books and self._open_books(h)
         self._frame(h, books or self.profile.mark)
         if self._first_non_finite() >= 0:
             self._explain_non_finite(h)
@@ -130,25 +129,24 @@ class World(Measures, Queries, Doors):
             return
         watch = Watch(self._state, forces, self.links) if contacts and undriven(self, h, self._h_last) else None
         integrator.begin(state, forces, self.time, h, self._h_last)
-        for substep, moved in self._trace.turns(self.substeps, partial(self._repeats, h, done), self._repeated):
+        for substep, moved in self._repeats.turns(self, h, contacts, done):
             if not moved:
                 for part in parts:
                     part.before(state, h)
                 integrator.step(state, forces, self.time + substep * h, h)
-            strongest = forces.strongest
             done("integrate")
             if contacts:
                 contacts.find(state, lag)
                 done("broad phase")
-                contacts.project(state, h, lag, strongest)
+                contacts.project(state, h, lag, forces.strongest)
                 done("contacts")
             if links:
                 links.solve(state, h)
                 done("links")
-            self.boundary.confine(state, h, lag, REST_ACCELERATIONS * strongest * h)
+            self.boundary.confine(state, h, lag, REST_ACCELERATIONS * forces.strongest * h)
             done("bounds")
             if course:
-                course.collide(state, substep * h, h, lag, REST_ACCELERATIONS * strongest * h)
+                course.collide(state, substep * h, h, lag, REST_ACCELERATIONS * forces.strongest * h)
                 done("obstacles")
             if contacts:
                 contacts.still(state, h)
@@ -159,21 +157,6 @@ class World(Measures, Queries, Doors):
             self._show(substep + 1, h, lag)
         self._finish(contacts, watch, h)
         done("finish")
-
-    def _repeats(self, h: float, done: Callable[[str], None]) -> Hashable:
-        """What a substep depends on, if it is the same calls of kernels as the next and they are short; None: otherwise."""
-        if len(self) >= REPEAT_BELOW or self.forces or self.links or self.onlooker or self._course or done != self.profile.mark:
-            return None
-        state, contacts = self._slots, self._contacts if len(self) > 1 else None
-        parts = self.integrator.repeats or None, self.boundary.repeats(), contacts.repeats(state) if contacts else ()
-        if None in parts:
-            return None
-        return h, self.gravity, self.integrator, *parts, *map(id, (state.position, state.acceleration, state.radius))
-
-    def _repeated(self, substeps: int) -> None:
-        if self._contacts:
-            self._contacts.broad_phase.aged(substeps)
-        self.profile.mark("repeats")
 
     def run(self, *, seconds: float, dt: float = 1 / 60) -> None:
         """Advance by as many frames of dt as come nearest to `seconds`."""

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet import _trace, world
+from pyverlet import _trace, repeats
 from pyverlet.group import Group
 from pyverlet.integrators import BY_NAME
 
@@ -45,15 +45,15 @@ def both(monkeypatch: pytest.MonkeyPatch) -> Any:
         replayed, plain = make(), make()
         number = 0
 
-        def count(self: pv.World, substeps: int, told: Any = world.World._repeated) -> None:
+        def count(w: pv.World, contacts: Any, substeps: int, told: Any = repeats._replayed) -> None:
             nonlocal number
             number += substeps
-            told(self, substeps)
+            told(w, contacts, substeps)
 
-        monkeypatch.setattr(world.World, "_repeated", count)
+        monkeypatch.setattr(repeats, "_replayed", count)
         for frame in range(frames):
             for w, most in ((replayed, 10_000), (plain, 0)):
-                monkeypatch.setattr(world, "REPEAT_BELOW", most)
+                monkeypatch.setattr(repeats, "REPEAT_BELOW", most)
                 meanwhile(w, frame)
                 w.step(1 / 60)
             assert told(replayed) == told(plain), frame
