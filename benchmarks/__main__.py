@@ -14,8 +14,6 @@ import platform
 import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from statistics import median
-from time import perf_counter
 
 import numpy as np
 
@@ -63,20 +61,15 @@ def overlap(position: Array) -> pv.Overlap:
 
 
 def measure(engines: list[type[Engine]], position: Array, cage: float, frames: int) -> list[Row]:
-    """Step all engines in turn, frame by frame, so that the machine's moods hit them alike."""
+    """Step all engines in turn, some frames each, so that the machine's moods hit them alike."""
     worlds = [engine(position, cage) for engine in engines]
     for world in worlds:
         for _ in range(OWN_FRAMES):
             world.step()
-    times: list[list[float]] = [[] for _ in worlds]
-    for _ in range(frames):
-        for world, spent in zip(worlds, times, strict=True):
-            start = perf_counter()
-            world.step()
-            spent.append(1e3 * (perf_counter() - start))
+    times = own.in_turn([world.step for world in worlds], max(frames // own.ROUNDS, 1))
     rows = []
-    fastest_of_ours = min(median(t) for world, t in zip(worlds, times, strict=True) if world.name.startswith("pyverlet"))
-    for world, spent in zip(worlds, times, strict=True):
+    fastest_of_ours = min(ms for world, ms in zip(worlds, times, strict=True) if world.name.startswith("pyverlet"))
+    for world, ms in zip(worlds, times, strict=True):
         now = world.position()
         found = overlap(now)
         rows.append(
@@ -84,8 +77,8 @@ def measure(engines: list[type[Engine]], position: Array, cage: float, frames: i
                 particles=len(position),
                 engine=world.name,
                 settings=world.settings,
-                ms_per_frame=median(spent),
-                ratio=median(spent) / fastest_of_ours,
+                ms_per_frame=ms,
+                ratio=ms / fastest_of_ours,
                 overlap_mean=found.mean,
                 overlap_max=found.max,
                 outside=int((np.hypot(*now.astype(float).T) > cage).sum()),

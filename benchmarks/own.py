@@ -28,6 +28,9 @@ MIXED_SECONDS = 25.0
 ROUNDS = 5
 """Worlds that are compared take turns this often, so that the machine's moods hit them alike."""
 
+TURN_SECONDS = 0.25
+"""A turn takes at least so long: a core that had nothing to do meanwhile, the second one, needs some time to be lent again."""
+
 
 @dataclass(frozen=True)
 class Row:
@@ -61,12 +64,13 @@ def place(world: pv.World, rng: np.random.Generator, radius: Any, size: float) -
 
 
 def in_turn(steps: list[Callable[[], object]], frames: int) -> list[float]:
-    """Median milliseconds of each, called in turns of `frames` calls."""
+    """Median milliseconds of each, called in turns of so many calls at least, and of TURN_SECONDS at least."""
     times: list[list[float]] = [[] for _ in steps]
     for _ in range(ROUNDS):
         for step, spent in zip(steps, times, strict=True):
             step()  # memory of the one before is still in the caches
-            for _ in range(frames):
+            begin, enough = perf_counter(), len(spent) + frames
+            while len(spent) < enough or perf_counter() - begin < TURN_SECONDS:
                 start = perf_counter()
                 step()
                 spent.append(1e3 * (perf_counter() - start))
