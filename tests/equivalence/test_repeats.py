@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import sys
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -164,6 +166,21 @@ def test_calls_the_long_way_are_not_left_out(both: Any) -> None:
         return w
 
     assert both(strange, 10) == 0
+
+
+def test_worlds_of_several_python_threads_record_their_own_calls() -> None:
+    worlds = [pour(boundary=pv.Circle(radius=8), gravity=(0, -g)) for g in (3, 5, 7, 9)]
+    alone = [copy.deepcopy(w) for w in worlds]
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(len(worlds)) as pool:
+            list(pool.map(lambda w: w.run(seconds=4), worlds))
+    finally:
+        sys.setswitchinterval(before)
+    for w, other in zip(worlds, alone, strict=True):
+        other.run(seconds=4)
+        assert told(w) == told(other)
 
 
 def test_a_world_that_turns_not_a_number_says_who_and_where() -> None:
