@@ -138,12 +138,15 @@ def dust(pixels, ground, position, radius, colour, left, top, scale):
     height, width = pixels.shape
     low, byte = np.uint64(0xFFFFFFFF), np.uint64(0xFF)
     sums = np.zeros((height * width, 2), np.uint64)  # R and G, B and cover, of 32 bits each
+    real = position.dtype.type  # in which pixel a centre is: as exactly as it is known
+    x0, y0, unit, wide, high = real(left), real(top), real(scale), real(width), real(height)
+    zero, half, least, whole = real(0.0), real(0.5), real(LEAST_DRAWN_RADIUS), real(255.0 * np.pi)
     for i in range(radius.shape[0]):
-        x, y = (position[i, 0] - left) * scale, (top - position[i, 1]) * scale
-        r = max(radius[i] * scale, LEAST_DRAWN_RADIUS)
-        if 0.0 <= x < width and 0.0 <= y < height and r < 0.5:
-            at = np.int64(np.int32(y)) * width + np.int64(np.int32(x))
-            c, cover = np.uint64(colour[i]), np.uint64(np.int32(255.0 * np.pi * r * r + 0.5))
+        x, y = (position[i, 0] - x0) * unit, (y0 - position[i, 1]) * unit
+        r = max(real(radius[i]) * unit, least)
+        if zero <= x < wide and zero <= y < high and r < half:
+            at = np.uint64(np.int64(np.int32(y)) * width + np.int64(np.int32(x)))
+            c, cover = np.uint64(colour[i]), np.uint64(np.int32(whole * r * r + half))
             sums[at, 0] += cover * ((c & byte) | ((c & np.uint64(0xFF00)) << np.uint64(24)))
             sums[at, 1] += cover * (((c >> np.uint64(16)) & byte) | np.uint64(1 << 32))
     for row in range(height):
@@ -176,6 +179,8 @@ def circles(pixels, ground, position, radius, colour, left, top, scale):
     dusty = DUST * narrow >= height * width
     if dusty:
         dust(pixels, ground, position, radius, colour, left, top, scale)
+        if narrow == radius.shape[0]:
+            return
     for i in range(radius.shape[0]):
         x, y = (position[i, 0] - left) * scale, (top - position[i, 1]) * scale
         r = max(radius[i] * scale, LEAST_DRAWN_RADIUS)

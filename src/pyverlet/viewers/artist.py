@@ -133,11 +133,9 @@ class Artist:
             self._colouring_of = (name, shape)
             self._colouring = Fixed(shape.colours) if shape.colours is not None and name == "picture" else COLOURINGS[name]()
             self._still = None
-        seen = _Seen(frame.velocity, shape.mass, shape.group, frame.status.time)
-        if name in ("speed", "energy"):
-            return self._colouring.colours(seen, theme)
-        # The others say the same in every frame.
-        if self._still is None or self._still[0] is not theme:
+        # Most say the same in every frame. Velocities have to be sorted, which takes as long as all the drawing.
+        if name in ("speed", "energy") or self._still is None or self._still[0] is not theme:
+            seen = _Seen(frame.velocity, shape.mass, shape.group, frame.status.time)
             self._still = (theme, self._colouring.colours(seen, theme))
         return self._still[1]
 

@@ -30,6 +30,7 @@ from pyverlet.viewers.exhibit import Exhibit, Repertoire
 from pyverlet.viewers.frames import Frame, Shape, Status
 from pyverlet.viewers.gauges import Gauges
 from pyverlet.viewers.inbox import Inbox
+from pyverlet.viewers.rhythm import PICTURE_S, Rhythm
 from pyverlet.viewers.stage import Stage
 
 if TYPE_CHECKING:
@@ -37,9 +38,6 @@ if TYPE_CHECKING:
     from pyverlet.world import World
 
 _log = logging.getLogger(__name__)
-
-PICTURE_S = 0.9 / 60
-"""Least seconds between two pictures of a slow world: a little less than a screen takes, or the screen would miss some."""
 
 MAX_CATCH_UP = 4
 """Late frames made up for at once; more are dropped and counted. A world that is too slow runs slow, smoothly."""
@@ -91,7 +89,7 @@ class Session:
         self._before: list[NDArray[np.float32]] | None = None
         self._shape: Shape
         self._seq = 0
-        self._shown, self._last = 0.0, time.perf_counter()
+        self._rhythm, self._last = Rhythm(), time.perf_counter()
         self._enter(Exhibit.of(world, title))
         self.latest: Frame = self._picture()
         """The newest frame. Replaced, never changed; read it from any thread."""
@@ -331,7 +329,7 @@ class Session:
 
     def _publish(self, moment: Moment | None = None) -> None:
         self._seq += 1
-        self._shown = time.perf_counter()
+        self._rhythm.made(time.perf_counter())
         self.latest = self._picture() if moment is None else self._picture_of(moment)
         for listener in self._listeners:
             listener()
@@ -355,7 +353,7 @@ class Session:
         return self._late and self._taken == self._seq
 
     def _due(self) -> bool:
-        return time.perf_counter() - self._shown >= PICTURE_S
+        return self._rhythm.due(time.perf_counter())
 
     def _picture_of(self, moment: Moment) -> Frame:
         """As `_picture`; what is read off the world only once a frame is that of the last."""

@@ -12,6 +12,8 @@ export class Chart {
     this.limit = null; // a dashed line that stays in range
     this.mark = null; // a dashed line that does not change the scale
     this.range = null; // the scale, where others share it
+    this.size = null; // (width, height) on the page, where known: asking has the browser lay the page out
+    new ResizeObserver(() => (this.size = null)).observe(canvas);
     this.clear();
   }
 
@@ -26,7 +28,8 @@ export class Chart {
 
   draw() {
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
-    const width = Math.round(this.canvas.clientWidth * ratio), height = Math.round(this.canvas.clientHeight * ratio);
+    this.size ??= [this.canvas.clientWidth, this.canvas.clientHeight];
+    const [width, height] = this.size.map((pixels) => Math.round(pixels * ratio));
     if (!width || !height) return;
     if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, { width, height });
     const context = this.canvas.getContext("2d"), style = getComputedStyle(this.canvas);

@@ -1,5 +1,7 @@
 // Sliders, fields and switches. The server has the truth: another tab may have moved a slider, and a world may lack it.
 
+import { tell } from "./text.js";
+
 const HELD_MS = 400; // a slider in the user's hand does not follow the server
 
 /** How each setting of the world is read off a status, shown, and sent. */
@@ -140,7 +142,7 @@ export class Controls {
 
   #label(id) {
     const value = this.get(id);
-    this.#id(`${id}-value`).textContent = SLIDERS[id].text(value);
+    tell(this.#id(`${id}-value`), SLIDERS[id].text(value));
     if (id === "angle") this.#id("angle-arrow").style.transform = `rotate(${-value}deg)`;
   }
 

@@ -67,14 +67,12 @@ export class Numbers {
 
   /** Milliseconds by stage, each with the colour of its area. */
   #legend(stages) {
-    const rows = Object.entries(stages).filter(([, ms]) => ms >= 0.005).map(([name, ms]) => {
-      const k = STAGES.indexOf(name), row = document.createElement("span"), key = document.createElement("i");
-      key.className = "key";
-      key.style.background = `var(--stage-${k < 0 ? STAGES.length : k})`;
-      row.append(key, `${name} ${ms.toFixed(2)}`);
-      return row;
-    });
-    this.#id("stages").replaceChildren(...rows);
+    const shown = Object.entries(stages).filter(([, ms]) => ms >= 0.005), names = shown.map(([name]) => name), legend = this.#id("stages");
+    if (names.join() !== this.named) {
+      this.named = names.join();
+      legend.replaceChildren(...names.map(entry));
+    }
+    for (const [k, [name, ms]] of shown.entries()) legend.children[k].lastChild.data = `${name} ${ms.toFixed(2)}`;
   }
 
   #id(id) {
@@ -93,6 +91,15 @@ export class Numbers {
     const groups = whole.length > 4 ? whole.replace(/\B(?=(\d{3})+$)/g, " ").split(" ") : [whole];
     element.replaceChildren(sign + groups[0], ...groups.slice(1).map((digits) => Object.assign(document.createElement("span"), { className: "group", textContent: digits })), rest);
   }
+}
+
+/** A row of the legend: its key, and room for a text. */
+function entry(name) {
+  const k = STAGES.indexOf(name), row = document.createElement("span"), key = document.createElement("i");
+  key.className = "key";
+  key.style.background = `var(--stage-${k < 0 ? STAGES.length : k})`;
+  row.append(key, "");
+  return row;
 }
 
 const joules = (value) => (value === null ? NOTHING : value.toFixed(Math.abs(value) < 100 ? 2 : 0).replace(/^-0(\.0*)?$/, "0$1"));

@@ -14,7 +14,7 @@ const ARROW_S = 0.08; // a velocity is drawn as the way of so many seconds
 export class Overlay {
   constructor(canvas) {
     this.canvas = canvas;
-    this.clean = true;
+    this.clean = canvas.hidden = true; // else the browser would lay it over every picture
     this.contacts = 0; // pairs on show
     this.links = 0;
     this.arrows = 0;
@@ -26,7 +26,7 @@ export class Overlay {
     const busy = shape.lines.length || frame.obstacles.length || frame.links || pinned.length || wants.velocities || wants.contacts;
     this.contacts = this.arrows = this.links = 0;
     if (!busy && this.clean) return;
-    this.clean = !busy;
+    this.clean = this.canvas.hidden = !busy;
     resizeCanvas(this.canvas, size, ratio);
     const context = this.canvas.getContext("2d");
     context.setTransform(ratio, 0, 0, ratio, 0, 0);

@@ -12,6 +12,7 @@ import { MOST_CONTACTS, Overlay } from "./overlay.js";
 import { Panels } from "./panels.js";
 import { read, written } from "./permalink.js";
 import { Pointer } from "./pointer.js";
+import { tell } from "./text.js";
 import { unpack } from "./wire.js";
 
 const NUMBERS_EVERY_MS = 200; // nobody reads faster
@@ -36,7 +37,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   let shape = null; // the last shape message
   let frame = null; // the frame on screen
   let last = null; // its numbers, or those of the frame before while there is none
-  let pending = []; // newer ones, not drawn yet: two at most
+  let pending = []; // newer ones, not drawn yet: the server sends no more than three
   let radiusPx = new Float32Array(0), radiusFor = 0; // radii in pixels of the stage, at how many pixels a metre
   let arrived = 0, newest = 0; // messages so far, and which of them is on show or about to be
   let lookSent = "", placed = "", stale = true, numbersDue = 0, numbersStale = false, ticked = 0, beat = QUICK_MS, measured = false, awake = false, alarm = 0;
@@ -72,7 +73,6 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   function wait(message) {
     wake();
     pending.push(message);
-    if (pending.length > 2) pending.shift().bitmap?.close();
   }
 
   /** The next to be drawn. Two that came between two ticks are drawn in two: a screen as fast as the server misses none. */
@@ -121,12 +121,12 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
 
   function link(state, text) {
     $("link").className = state;
-    $("link").lastElementChild.textContent = text;
+    tell($("link").lastElementChild, text);
   }
 
   function notice(text) {
     $("notice").hidden = !text;
-    if (text) $("notice").textContent = text;
+    if (text) tell($("notice"), text);
   }
 
   // -- drawing --------------------------------------------------------------------------------------------------------
@@ -269,10 +269,10 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     numbers.show(status, shape.drawnHere ? "pictures (JPEG)" : NAMES[renderer.name], now);
     panels.push(status.energies);
     panels.draw();
-    $("pause").textContent = status.paused ? "Resume" : "Pause";
+    tell($("pause"), status.paused ? "Resume" : "Pause");
     if (open) link(status.error ? "lost" : status.paused ? "held" : "live", status.error ? "stopped" : status.paused ? "paused" : pace(status));
     $("busy").hidden = !status.busy;
-    $("busy").textContent = status.busy ?? "";
+    tell($("busy"), status.busy ?? "");
     notice(status.error ? `${status.error}. Reset starts over.` : shape.note);
     controls.follow(status);
     if (linking && address) history.replaceState(null, "", `#${settings()}`);
