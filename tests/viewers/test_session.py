@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
+from pyverlet.forces import Push
 from pyverlet.viewers.commands import Command, Drag, Pause, Poke, Release, Reset, SetGravity, SetSubsteps, Step
 from pyverlet.viewers.hands import LEASH
 from pyverlet.viewers.session import MAX_CATCH_UP, Session
@@ -276,6 +277,43 @@ def test_a_slow_world_takes_another_gravity_between_substeps(
     assert session.latest.status.gravity == (0.0, 5.0)
     order = [gravity for _, gravity in diary.seen]
     assert order == sorted(order)  # once changed it stays
+
+
+class Witness(Treacle):
+    """Treacle that writes down in which frame it was asked, and where the first poke was."""
+
+    def __init__(self, world: pv.World) -> None:
+        self.world = world
+        self.seen: list[tuple[int, float]] = []
+
+    def apply(self, state: pv.state.Slots, t: float) -> None:
+        super().apply(state, t)
+        pushes = [force for force in self.world.forces if isinstance(force, Push)]
+        self.seen += [(self.world.frames, push.center[0]) for push in pushes]
+
+
+def test_a_hand_that_is_down_in_a_slow_world_moves_between_substeps(wait_until: WaitUntil) -> None:
+    world = falling()
+    witness = Witness(world)
+    world.forces.append(witness)
+    session = Session(world)
+    asked: list[int] = []
+
+    def ask() -> None:
+        frame = session.latest
+        session.take(frame)
+        if not asked and witness.seen and 0.01 < frame.status.time * 60 - frame.status.frames < 0.6:
+            asked.append(world.frames)
+            session.submit(Poke(hand=1, x=7.0, y=0.0))
+
+    session.submit(Poke(hand=1, x=3.0, y=0.0))
+    session.subscribe(ask)
+    with session:
+        wait_until(lambda: bool(asked) and world.frames > asked[0] + 1)
+    places = [x for _, x in witness.seen]
+    assert places == sorted(places)
+    assert next(frame for frame, x in witness.seen if x == 7.0) == asked[0]  # in the midst of it
+    assert (asked[0], 3.0) in witness.seen
 
 
 def test_the_pace_is_that_of_the_wall(wait_until: WaitUntil) -> None:

@@ -120,6 +120,10 @@ class HandsOnPanels:
         panel, x, y = self._take(hand, x, y, layout)
         self._hands[panel].poke(hand, x, y, view_size)
 
+    def hold(self, hand: int) -> bool:
+        """Whether this hand has come down already: then it only aims anew."""
+        return hand in self._panel
+
     def pin(self, x: float, y: float, reach: float, layout: Layout) -> bool:
         """As `Pins.pin`."""
         panel, x, y = _within(x, y, layout)

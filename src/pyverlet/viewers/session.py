@@ -88,7 +88,7 @@ class Session:
         self._error: str | None = None
         self._before: list[NDArray[np.float32]] | None = None
         self._shape: Shape
-        self._seq = 0
+        self._seq = self._begun = 0
         self._rhythm, self._last = Rhythm(), time.perf_counter()
         self._enter(Exhibit.of(world, title))
         self.latest: Frame = self._picture()
@@ -100,7 +100,7 @@ class Session:
     def submit(self, command: Command) -> None:
         """Ask for something. Returns at once; the physics thread does it between two frames, in the order asked.
 
-        A world that is slow is given another gravity between two substeps.
+        A world that is slow takes another gravity, or where a hand that is down moves, between two substeps.
         """
         self._commands.put(command)
 
@@ -200,7 +200,7 @@ class Session:
 
     def _advance(self) -> None:
         """One frame. An error stops the stepping, not the session: the page stays readable and Reset works."""
-        began = time.perf_counter()
+        began, self._begun = time.perf_counter(), self._seq
         # With the frame before in mind: what is late by more than a picture is shown on its way.
         self._late = self._gauges.budget.last_ms * self._speed > 1000.0 * max(self._dt, PICTURE_S)
         self._before = self._stage.look()[0] if self._speed < 1.0 and not self._late else None
@@ -336,7 +336,7 @@ class Session:
 
     def _publish_if_due(self) -> None:
         """At the end of a frame."""
-        if self._wanted() and not self._due():  # the last was made just now, on the way through this frame
+        if self._seq > self._begun and self._wanted() and not self._due():  # the last was made just now, on the way through it
             self._status = self._read()
         else:
             self._publish()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from pyverlet.moments import Moment
 from pyverlet.state import EVERYONE
 from pyverlet.viewers import levers
-from pyverlet.viewers.commands import Command, SetGravity, Setting
+from pyverlet.viewers.commands import Command, Drag, Poke, SetGravity, Setting
 from pyverlet.viewers.exhibit import Exhibit
 from pyverlet.viewers.frames import Camera, PanelShape, Shape, outline
 from pyverlet.viewers.hands import HandsOnPanels
@@ -79,11 +80,15 @@ class Stage:
         self.hands.move(self.view_size)
         world = self.worlds[0]
         if len(self.worlds) == 1 and not any(obstacle.moves for obstacle in world.obstacles):
-            world.onlooker = onlooker
+            world.onlooker = onlooker and partial(self._between, onlooker)
         try:
             self.panels.step(dt)
         finally:
             world.onlooker = None
+
+    def _between(self, onlooker: Callable[[Moment], None], moment: Moment) -> None:
+        onlooker(moment)
+        self.hands.move(self.view_size)  # where they aim may be new
 
     def pull(self, command: Setting) -> None:
         """Change a setting of all worlds, unless they are side by side because they differ in it."""
@@ -92,11 +97,12 @@ class Stage:
                 levers.pull(world, command)
 
     def takes_at_once(self, command: Command | None) -> bool:
-        """Whether this may be done between two substeps: gravity is asked for in each of them, all else is gathered once a frame.
+        """Whether this may be done between two substeps: gravity and hands that hold something are asked for in each of them.
 
-        Not in worlds with a ledger, which measures heights by what gravity was at the beginning.
+        All else is gathered once a frame. Not in worlds with a ledger: it measures heights by what gravity was at the beginning.
         """
-        return command is None or (isinstance(command, SetGravity) and not self.worlds[0].keeps_ledger)
+        asked_for = isinstance(command, SetGravity) or (isinstance(command, Drag | Poke) and self.hands.hold(command.hand))
+        return command is None or (asked_for and not self.worlds[0].keeps_ledger)
 
     @property
     def version(self) -> tuple[Any, ...]:

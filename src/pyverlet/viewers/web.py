@@ -28,8 +28,9 @@ from pyverlet.viewers.looks import Look
 from pyverlet.viewers.protocol import Ack, decode, encode_frame, encode_picture, encode_refusal, encode_shape
 from pyverlet.viewers.session import Session
 
-MAX_IN_FLIGHT = 2
-"""Frames sent to a tab and not drawn yet. One would halve the rate; three add a frame of lag and nothing else."""
+MAX_IN_FLIGHT = 3
+"""Frames sent to a tab and not drawn yet. One would halve the rate; with two a screen missed one in a hundred, since neither the
+frames of a world nor the ticks of a page are all of one length. The page sees to it that they do not add up to a lag."""
 
 LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
 

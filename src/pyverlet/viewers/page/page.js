@@ -12,6 +12,7 @@ import { MOST_CONTACTS, Overlay } from "./overlay.js";
 import { Panels } from "./panels.js";
 import { read, written } from "./permalink.js";
 import { Pointer } from "./pointer.js";
+import { Queue } from "./queue.js";
 import { tell } from "./text.js";
 import { unpack } from "./wire.js";
 
@@ -37,7 +38,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   let shape = null; // the last shape message
   let frame = null; // the frame on screen
   let last = null; // its numbers, or those of the frame before while there is none
-  let pending = []; // newer ones, not drawn yet: the server sends no more than three
+  const pending = new Queue(); // newer ones
   let radiusPx = new Float32Array(0), radiusFor = 0; // radii in pixels of the stage, at how many pixels a metre
   let arrived = 0, newest = 0; // messages so far, and which of them is on show or about to be
   let lookSent = "", placed = "", stale = true, numbersDue = 0, numbersStale = false, ticked = 0, beat = QUICK_MS, measured = false, awake = false, alarm = 0;
@@ -72,13 +73,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   /** To be drawn in one of the next ticks. */
   function wait(message) {
     wake();
-    pending.push(message);
-  }
-
-  /** The next to be drawn. Two that came between two ticks are drawn in two: a screen as fast as the server misses none. */
-  function next(quick) {
-    while (pending.length > 1 && !quick) pending.shift().bitmap?.close();
-    return pending.shift();
+    pending.put(message);
   }
 
   function newShape(message) {
@@ -86,7 +81,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     shape = message;
     measured = false; // panels have a header
     frame = null;
-    pending = [];
+    pending.clear();
     radiusFor = 0;
     Object.assign(camera, { bounded: shape.bounded && !shape.parted, parted: shape.parted });
     if (other) begin();
@@ -155,7 +150,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     ticked = now;
     if (pending.length && shape) {
       const before = frame;
-      frame = next(beat < QUICK_MS);
+      frame = pending.next(beat < QUICK_MS);
       last = frame.status;
       camera.room = frame.room;
       if (!begun) arrive();
