@@ -36,6 +36,29 @@ def test_fifty_frames_a_second_at_5000_circles(page: Page, program: Serve) -> No
     assert number(page, "physics-ms") > 0
 
 
+QUEUE = """async (quick) => {
+    const { Queue } = await import("/queue.js"), queue = new Queue(), drawn = [], closed = [];
+    const put = (seq) => queue.put({ seq, bitmap: { close: () => closed.push(seq) } });
+    put(1), put(2), put(3);
+    for (let seq = 4; seq < 2000; seq++) drawn.push(queue.next(quick).seq), put(seq);
+    const skipped = [...closed];
+    for (let seq = 2000; seq < 2100; seq++) put(seq); // nobody draws any more
+    return { drawn, skipped, kept: queue.length };
+}"""
+
+
+def test_a_page_as_quick_as_its_screen_draws_all_but_what_always_waits(page: Page, program: Serve) -> None:
+    visit(page, program("cage", 10).address)
+    quick = page.evaluate(QUEUE, True)  # three wait, of which one is skipped every ten seconds
+    assert quick["drawn"][:601] == [*range(1, 600), 601, 602]
+    assert quick["drawn"] == sorted(set(quick["drawn"]))
+    assert quick["skipped"] == [600, 1201]  # then only one is left that waits
+    slow = page.evaluate(QUEUE, False)
+    assert slow["drawn"] == list(range(3, 1999))  # always the newest
+    assert slow["skipped"] == [1, 2]
+    assert quick["kept"] == slow["kept"] == 3
+
+
 def test_pause_step_and_reset(page: Page, program: Serve) -> None:
     visit(page, program("cage", 500).address)
     assert comes_true(page, lambda: number(page, "time") > 0.5)

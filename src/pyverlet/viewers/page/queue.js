@@ -1,5 +1,6 @@
-// Pictures that have come and are not drawn yet. The server sends no more than three before it hears of them.
+// Pictures that have come and are not drawn yet. A server sends no more than three before it hears of them.
 
+const MOST = 3;
 const LONG = 600; // ticks: ten seconds of most screens
 
 export class Queue {
@@ -15,6 +16,7 @@ export class Queue {
 
   put(message) {
     this.waiting.push(message);
+    if (this.length > MOST) this.#skip();
   }
 
   /**
