@@ -110,7 +110,7 @@ def turn(name: str, patience: float = _turns.PATIENCE_S) -> Iterator[bool]:
 
 @contextlib.contextmanager
 def _litter() -> Iterator[None]:
-    """Leave what is thrown away where it is. Compiling makes so many objects that Python's looking through them takes a sixth of it."""
+    """Leave what is thrown away where it is: compiling makes so many objects that looking through them takes a sixth of it."""
     collected = gc.isenabled()
     gc.disable()
     try:
@@ -147,9 +147,12 @@ def _in_turn(function: Any, name: str) -> Any:
     return compile_in_turn
 
 
+_MAKERS = {"arange", "array", "copy", "empty", "empty_like", "full", "full_like", "ones", "sort", "zeros", "zeros_like"}
+
+
 def _allocates(function: Callable[..., Any]) -> bool:
-    """Whether a kernel makes arrays. Only these need Numba's counts of who refers to an array, a sixth of what the others compile."""
-    return not {"copy", "empty", "zeros"}.isdisjoint(function.__code__.co_names)
+    """Whether a kernel makes arrays. Others need no counts of who refers to an array, a sixth of what is compiled."""
+    return not _MAKERS.isdisjoint(function.__code__.co_names)
 
 
 class Kernel(functools.partial[Any]):
@@ -189,10 +192,10 @@ class Kernel(functools.partial[Any]):
             name = ("parallel" if parallel else "alone") + ("-wrapped" if wrapped else "")
             with caching(name) as kept:
                 # No fastmath: it would break NaN checks and equal bits. error_model: a division is a division, not a branch and a
-                # raise. Wrappers take as long to compile as the kernel.
+                # raise. Wrappers take as long to compile as the kernel. Loops over threads may make arrays of their own.
                 made = numba.njit(
                     nogil=True, error_model="numpy", cache=kept, parallel=parallel, fastmath=False,
-                    no_cpython_wrapper=not wrapped, no_cfunc_wrapper=True, _nrt=_allocates(self.function),
+                    no_cpython_wrapper=not wrapped, no_cfunc_wrapper=True, _nrt=parallel or _allocates(self.function),
                 )(self.function)  # fmt: skip
             made.compile = _in_turn(made, f"{name} {self.function.__module__}.{self.function.__qualname__}")
             self._made[parallel, wrapped] = made

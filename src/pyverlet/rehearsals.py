@@ -13,7 +13,7 @@ import numpy as np
 
 from pyverlet import _jit
 from pyverlet.bounds import Boundary, Box, Circle, Open
-from pyverlet.broadphase import BruteForce
+from pyverlet.broadphase import BruteForce, Fast
 from pyverlet.collisions import Collisions
 from pyverlet.constants import ONE_THREAD_BELOW, SERIAL_BELOW, UNEVEN
 from pyverlet.forces import Conservative, Drag
@@ -128,11 +128,15 @@ def _small(dtype: np.dtype[Any], threads: int, boundary: type[Boundary], elastic
 
 
 def _pairs(dtype: np.dtype[Any], threads: int) -> None:
-    """Grids and lists."""
-    world = _lattice(_enough(threads), dtype, Open, 0.0, Collisions(), threads=threads)
+    """Grids and lists: made, found too old once somebody has moved, and made anew."""
+    world = _lattice(_enough(threads), dtype, Open, 0.0, None, threads=threads)
     _jit.use_threads(world.threads)
     world.overlap()
-    _use(world)
+    slots, phase = Slots(dtype), Fast().start(dtype)
+    slots.gather(world._state)
+    for _ in range(2):
+        phase.update(slots)
+        slots.position[-1] += 10.0
 
 
 def _packs(dtype: np.dtype[Any], threads: int) -> None:
@@ -149,19 +153,23 @@ def _grips(dtype: np.dtype[Any], threads: int) -> None:
 
 
 def _impacts(dtype: np.dtype[Any], threads: int) -> None:
-    """Circles that bounce and rub; or bounce only."""
-    world = _small(dtype, threads, Circle, 0.5, restitution=0.5, friction=0.5)
-    world.step(1e-3)
-    world.collisions = Collisions(method=BruteForce(), restitution=0.5)
-    world.step(1e-3)
+    """Circles that bounce and rub."""
+    _small(dtype, threads, Circle, 0.5, restitution=0.5, friction=0.5).step(1e-3)
 
 
 def _loans(dtype: np.dtype[Any], threads: int) -> None:
-    """Circles of very different masses, that bounce or do not."""
-    world = _small(dtype, threads, Open)
+    """Circles of very different masses that bounce."""
+    _uneven(dtype, threads, restitution=0.5)
+
+
+def _refined(dtype: np.dtype[Any], threads: int) -> None:
+    """Circles of very different masses that do not."""
+    _uneven(dtype, threads)
+
+
+def _uneven(dtype: np.dtype[Any], threads: int, **collisions: float) -> None:
+    world = _small(dtype, threads, Open, **collisions)
     world.mass[0] *= 2 * UNEVEN
-    world.step(1e-3)
-    world.collisions = Collisions(method=BruteForce(), restitution=0.5)
     world.step(1e-3)
 
 
@@ -173,6 +181,6 @@ def _motion(dtype: np.dtype[Any], threads: int) -> None:
 
 
 PARTS: dict[str, Callable[[np.dtype[Any], int], None]] = {
-    part.__name__: part for part in (_pairs, _packs, _grips, _impacts, _loans, _motion)
+    part.__name__: part for part in (_pairs, _packs, _impacts, _grips, _loans, _refined, _motion)
 }
-"""By name: each compiles a part of what worlds of circles of a dtype on so many threads may need. Those first that take longest."""
+"""Each compiles a part of what circles of a dtype on so many threads may need. Those first that take longest."""

@@ -124,7 +124,7 @@ class _Helper:
         done: kernels it has begun to compile.
     """
 
-    def __init__(self, dtype: np.dtype[Any], threads: int, number: int, of: int) -> None:
+    def __init__(self, dtype: np.dtype[Any], threads: int) -> None:
         folder = _jit.cache_dir()
         assert folder is not None
         ours = str(Path(__file__).parents[1])
@@ -133,7 +133,7 @@ class _Helper:
             "PYVERLET_CACHE_DIR": str(folder.parent),
             "PYTHONPATH": os.pathsep.join(filter(None, (ours, os.environ.get("PYTHONPATH")))),
         }
-        code = f"from pyverlet.warmup import help_compiling; help_compiling({dtype.name!r}, {threads}, {number}, {of})"
+        code = f"from pyverlet.warmup import help_compiling; help_compiling({dtype.name!r}, {threads})"
         # Not multiprocessing: it would run the user's own script again. -P: nor take the user's files for modules.
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-c", code], env=env, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
@@ -160,7 +160,7 @@ class _Helper:
 
 @contextlib.contextmanager
 def _helping(dtype: np.dtype[Any], threads: int, parts: int) -> Iterator[list[_Helper]]:
-    """Helpers, as many as there are idle cores and parts for; none where they would not be Python, or could not hand anything over.
+    """Helpers, as many as there are cores and parts for; none where they would not be Python, or could not hand anything over.
 
     Only one process at a time has helpers: of many that start at once each would bring its own.
     """
@@ -170,8 +170,7 @@ def _helping(dtype: np.dtype[Any], threads: int, parts: int) -> Iterator[list[_H
         try:
             if mine and _jit.cache_dir() and _python():
                 with contextlib.suppress(OSError):
-                    for number in range(count):
-                        helpers.append(_Helper(dtype, threads, number + 1, count + 1))
+                    helpers.extend(_Helper(dtype, threads) for _ in range(count))
             yield helpers
         finally:
             for helper in helpers:
@@ -183,8 +182,8 @@ def _python() -> bool:
     return bool(sys.executable) and not getattr(sys, "frozen", False) and Path(sys.executable).stem.lower().startswith("py")
 
 
-def help_compiling(dtype: str, threads: int, number: int, of: int) -> None:
-    """What a helper does: compile parts, from another one on than the others, and write a byte whenever a kernel begins to."""
+def help_compiling(dtype: str, threads: int) -> None:
+    """What a helper does: compile parts, and write a byte whenever a kernel begins to."""
 
     def end_with_parent() -> None:
         sys.stdin.buffer.read()
@@ -192,7 +191,9 @@ def help_compiling(dtype: str, threads: int, number: int, of: int) -> None:
 
     threading.Thread(target=end_with_parent, daemon=True).start()
     kind = np.dtype(dtype)
-    parts = list(PARTS)
-    first = number * len(parts) // of
-    with _jit.watch_compiling(lambda: os.write(1, b".") and None):
-        _compile(kind, threads, [part for part in parts[first:] + parts[:first] if not _done(kind, threads, part)])
+
+    def started() -> None:
+        os.write(1, b".")
+
+    with _jit.watch_compiling(started):
+        _compile(kind, threads, _missing(kind, threads))
