@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import gc
 import hashlib
 import os
 import shutil
@@ -22,8 +23,10 @@ from typing import Any, TypeVar
 
 import numba
 from numba.core import event as numba_event
+from numba.core.codegen import CPUCodeLibrary
+from numba.core.compiler_lock import global_compiler_lock
 
-from pyverlet import _entry
+from pyverlet import _entry, _turns
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -94,6 +97,64 @@ def caching(variant: str) -> Iterator[bool]:
         numba.config.CACHE_DIR = previous
 
 
+@contextlib.contextmanager
+def turn(name: str, patience: float = _turns.PATIENCE_S) -> Iterator[bool]:
+    """The turn of this name among all processes that compile into our folder."""
+    folder = cache_dir()
+    if folder is None:
+        yield True
+        return
+    with _turns.turn(folder / "turns", name, patience=patience) as mine:
+        yield mine
+
+
+@contextlib.contextmanager
+def _litter() -> Iterator[None]:
+    """Leave what is thrown away where it is: compiling makes so many objects that looking through them takes a sixth of it."""
+    collected = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collected:
+            gc.enable()
+
+
+@contextlib.contextmanager
+def _optimised_once() -> Iterator[None]:
+    """Optimise a loop over threads only where it ends up, and not its body and two wrappers of it on the way there as well."""
+    library, optimise = CPUCodeLibrary, CPUCodeLibrary._optimize_final_module
+
+    def unless_on_the_way(self: Any) -> None:
+        if "__numba_parfor_gufunc" not in self.name and "_GufuncWrapper" not in self.name:
+            optimise(self)
+
+    library._optimize_final_module = unless_on_the_way
+    try:
+        yield
+    finally:
+        library._optimize_final_module = optimise
+
+
+def _in_turn(function: Any, name: str) -> Any:
+    """The compiler of a function: no two processes compile it at a time, and whoever comes second finds it on disk."""
+    compiling = function.compile
+
+    def compile_in_turn(kinds: Any) -> Any:
+        with global_compiler_lock, turn(name), _litter(), _optimised_once():
+            return compiling(kinds)
+
+    return compile_in_turn
+
+
+_MAKERS = {"arange", "array", "copy", "empty", "empty_like", "full", "full_like", "ones", "sort", "zeros", "zeros_like"}
+
+
+def _allocates(function: Callable[..., Any]) -> bool:
+    """Whether a kernel makes arrays. Others need no counts of who refers to an array, a sixth of what is compiled."""
+    return not _MAKERS.isdisjoint(function.__code__.co_names)
+
+
 class Kernel(functools.partial[Any]):
     """A compiled function: compiled on its first call with arguments of some kinds, then called by the short way of `_entry`.
 
@@ -131,11 +192,13 @@ class Kernel(functools.partial[Any]):
             name = ("parallel" if parallel else "alone") + ("-wrapped" if wrapped else "")
             with caching(name) as kept:
                 # No fastmath: it would break NaN checks and equal bits. error_model: a division is a division, not a branch and a
-                # raise. Wrappers take as long to compile as the kernel.
-                self._made[parallel, wrapped] = numba.njit(
+                # raise. Wrappers take as long to compile as the kernel. Loops over threads may make arrays of their own.
+                made = numba.njit(
                     nogil=True, error_model="numpy", cache=kept, parallel=parallel, fastmath=False,
-                    no_cpython_wrapper=not wrapped, no_cfunc_wrapper=True,
+                    no_cpython_wrapper=not wrapped, no_cfunc_wrapper=True, _nrt=parallel or _allocates(self.function),
                 )(self.function)  # fmt: skip
+            made.compile = _in_turn(made, f"{name} {self.function.__module__}.{self.function.__qualname__}")
+            self._made[parallel, wrapped] = made
         return self._made[parallel, wrapped]
 
     def _learn(self, *arguments: Any) -> Any:
@@ -151,7 +214,7 @@ class Kernel(functools.partial[Any]):
         compiled = lean.overloads[kinds]
         if _entry.gives(compiled):
             when = _entry.ANY if not self.parallel else _entry.TOGETHER if parallel else _entry.ALONE
-            with caching("entry") as kept:
+            with caching("entry") as kept, global_compiler_lock, turn("entry"):
                 self._lead_to(_entry.entry(compiled, arguments, when, self.func, kept))
         return self(*arguments)
 

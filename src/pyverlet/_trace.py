@@ -49,7 +49,7 @@ def _replay(table_object: int, arguments: int, count: int) -> Any:
 @cache
 def _player() -> int:
     """Address of `_replay`, compiled."""
-    with _jit.caching("entry") as kept:
+    with _jit.caching("entry") as kept, _jit.turn("replay"):
         kind = types.int64(types.int64, types.int64, types.int64)
         return int(numba.cfunc(kind, error_model="numpy", cache=kept)(_replay).address)
 

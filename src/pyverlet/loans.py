@@ -66,6 +66,7 @@ class Loans:
         """Those that touch lend each other; those that do not have fallen by themselves."""
         _, lent, busy = self._kept
         which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j, pairs.touching, pairs.impulse, pairs.touches)
+        self._touched.fill(0)
         loans.share(state.mass, state.inverse_mass, *which, lent, busy, self._touched)
         moving, masses = (state.position, state.velocity, state.acceleration), (state.mass, state.inverse_mass, self._lighter)
         loans.settle(*moving, *masses, *self._pull, self._touched, state.real(min(h / LOAN_S, 1.0)), state.real(h), lent, busy)

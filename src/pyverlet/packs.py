@@ -49,12 +49,12 @@ class Packs:
         """Pack a new list; origin: (n, 2) positions it was made from; radius: (n,) m."""
         need = pairs.count + self._spare
         self.lanes, self.apart = (np.empty(len(pairs.count), np.int64) for _ in range(2))
-        used = np.empty(len(origin), np.int64)
         which = pairs.listed()
         while True:
             self.begin = np.concatenate(([0], np.cumsum(need)))
             if not self.begin[-1] <= len(self.lane_i) <= 1.1 * self.begin[-1]:
                 self._make_room(int(self.begin[-1]))
+            used = np.full(len(origin), -1, np.int64)
             packs.pack(origin, radius, *which, used, self.begin, self.lanes, self.apart, self.lane_i, self.lane_j, self.gap)
             if (self.lanes <= need).all():
                 break
@@ -147,8 +147,9 @@ class Packs:
     def _rubbing(self, state: Slots) -> tuple[Any, ...]:
         if not self._body.shape[1]:
             self._body = np.empty((6, len(self.lane_i) if self._varied else LANES), self._dtype)
-            alike = (np.zeros(1, np.int64), np.full(1, LANES), *np.zeros((2, LANES), np.uint32))
-            grips.weigh(*(self.listed() if self._varied else alike), state.radius, state.inverse_mass, self._body)
+            lanes = np.zeros(LANES, np.uint32)
+            which = self.listed() if self._varied else (np.zeros(1, np.int64), np.full(1, LANES), lanes, lanes)
+            grips.weigh(*which, state.radius, state.inverse_mass, self._body)
         where = (self._parts(), self.begin, self.lanes, self.lane_i, self.lane_j, self._body, self._varied)
         return (*where, self.normal, self._depths, self.slip, self._held)
 

@@ -1,25 +1,22 @@
-"""Compile what a world needs before it is shown or timed, telling how far it is."""
+"""Compile what a world needs before it is shown or timed, telling how far it is, with several processes if there are cores."""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
-from time import perf_counter
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pyverlet import _jit
-from pyverlet.bounds import Boundary, Box, Circle, Open
-from pyverlet.broadphase import BruteForce
-from pyverlet.collisions import Collisions
-from pyverlet.constants import ONE_THREAD_BELOW, SERIAL_BELOW, UNEVEN
-from pyverlet.forces import Conservative, Drag
-from pyverlet.group import Group
-from pyverlet.links import Angle, Area, Pin, Spring, Stick
-from pyverlet.obstacles import Segment
-from pyverlet.passivity import Watch
-from pyverlet.state import Slots
+from pyverlet._turns import PATIENCE_S
+from pyverlet.rehearsals import PARTS, rehearse
 from pyverlet.world import World
 
 OF_CIRCLES = (
@@ -28,7 +25,8 @@ OF_CIRCLES = (
 )  # fmt: skip
 """Modules of the kernels that every world of circles may need: how many there are is what progress is measured by."""
 
-_ROOMS = (Open, Circle, Box)
+MOST_HELPERS = 3
+"""Processes that help to compile: beyond that the longest part is what takes the time."""
 
 Progress = Callable[[int, int], None]
 
@@ -37,8 +35,9 @@ def warm_up(world: World, progress: Progress | None = None) -> float:
     """Compile or load every kernel this world may need, without touching it.
 
     The first time on a machine all kernels that circles of the world's dtype need are compiled, so that nothing stalls when a
-    setting is changed later: for one thread, or for several if the world uses several. Those of links, obstacles, the ledger and
-    sleep are compiled when a world has them first. The compiled code is kept on disk, and later only what is in use is loaded.
+    setting is changed later: for one thread, or for several if the world uses several, and on all cores. Those of links,
+    obstacles, the ledger and sleep are compiled when a world has them first. The compiled code is kept on disk, and later only
+    what is in use is loaded.
 
     Args:
         world: the world about to be stepped.
@@ -47,146 +46,154 @@ def warm_up(world: World, progress: Progress | None = None) -> float:
     Returns:
         Seconds spent.
     """
-    start = perf_counter()
+    start = time.perf_counter()
     total = sum(name.split(".")[-2] in OF_CIRCLES for name in _jit.KERNELS)
     done = 0
+    helpers: list[_Helper] = []
 
     def started() -> None:
         nonlocal done
         done += 1
         if progress:
-            progress(min(done, total), total)
+            progress(min(done + sum(helper.done for helper in helpers), total), total)
 
     with _jit.watch_compiling(started):
-        if not _compiled_before(world.dtype, world.threads):
-            _compile_all(world.dtype, world.threads)
-            _remember_compiled(world.dtype, world.threads)
-        _rehearse(world)
-        _rehearse_forces(world)
-        if world._sleep:
-            _rehearse_sleep(world.dtype)
+        if missing := _missing(world.dtype, world.threads):
+            with _helping(world.dtype, world.threads, len(missing)) as helpers:
+                _compile(world.dtype, world.threads, missing)
+        rehearse(world)
     if done and progress:
         progress(total, total)
-    return perf_counter() - start
+    return time.perf_counter() - start
 
 
-def _rehearse(world: World) -> None:
-    """One frame of a small world of the same kind."""
-    small = _lattice(
-        _enough(world.threads) if len(world) < SERIAL_BELOW else SERIAL_BELOW,
-        world.dtype,
-        type(world.boundary),
-        getattr(world.boundary, "restitution", 0.0),
-        world.collisions,
-        threads=world.threads,
-        ledger=world.keeps_ledger,
-        events=world.tells_events,
-    )
-    small.integrator = world.integrator
-    if world.links:
-        _link(small)
-    if world.obstacles:
-        small.obstacles.append(Segment((0, 0), (1, 0)))
-    _use(small)
-    if len(world) and type(world.boundary) not in _ROOMS:  # one circle in the world's own room, which has kernels of its own
-        alone = World(boundary=world.boundary, collisions=None, substeps=1, dtype=world.dtype)
-        alone.add(position=world.position[0], radius=world.radius[0])
-        alone.step(1e-3)
+# ---- the first time ----------------------------------------------------------------------------------------------------
 
 
-def _rehearse_forces(world: World) -> None:
-    """Evaluate our own kinds of force once, on a copy of the particles; others may count how often they are asked."""
-    slots = Slots(world.dtype)
-    slots.gather(world._state)
-    for force in world.forces:
-        if type(force).__module__.startswith("pyverlet."):
-            force.apply(slots, world.time)
-            if isinstance(force, Conservative):
-                force.potential(world._state)
+def _compile(dtype: np.dtype[Any], threads: int, parts: list[str]) -> None:
+    """Compile these parts, but for those that other processes compile meanwhile."""
+    patience = 0.0
+    while parts:
+        later = []
+        for part in parts:
+            with _jit.turn(f"{_kind(dtype, threads)} {part}", patience) as mine:
+                if _done(dtype, threads, part):
+                    continue
+                if not (mine or patience):
+                    later.append(part)
+                    continue
+                PARTS[part](dtype, threads)
+                _remember(dtype, threads, part)
+        # All that is left others have begun. If one of them gives up, its turn is free.
+        parts, patience = later, PATIENCE_S
 
 
-def _rehearse_sleep(dtype: np.dtype[Any]) -> None:
-    """Two circles fall asleep, are looked at, and are woken by a third."""
-    small = World(gravity=(0, 0), substeps=1, dtype=dtype, sleep=True)
-    small.add(position=[(0, 0), (1, 0)], radius=0.5)
-    small.step(1.0)
-    small.step(1.0)
-    small.add(position=(3, 0), velocity=(-2, 0), radius=0.5)
-    small.step(1.0)
+def _kind(dtype: np.dtype[Any], threads: int) -> str:
+    return f"compiled-{dtype.name}{'-threads' if threads > 1 else ''}"
 
 
-def _enough(threads: int) -> int:
-    """Particles for a world to use so many threads."""
-    return 9 if threads == 1 else ONE_THREAD_BELOW
-
-
-def _compile_all(dtype: np.dtype[Any], threads: int) -> None:
-    for boundary, collisions in (
-        (Circle, Collisions()),
-        (Box, Collisions(restitution=0.5, friction=0.5)),
-        (Open, Collisions(method=BruteForce())),
-    ):
-        small = _lattice(_enough(threads), dtype, boundary, 0.5, collisions, threads=threads)
-        small.step(1e-3)
-        small.friction[:] = 0.5
-        small.step(1e-3)
-        small.friction[:] = -1
-        small.mass[0] *= 2 * UNEVEN
-        small.save()
-        small.forces.append(Drag(linear=0.1))
-        _use(small)
-
-
-def _link(world: World) -> None:
-    """One link of every kind."""
-    group = Group(world._state, slice(0, 4), world.remove)
-    world.links.append(Stick(group, [0, 1], [1, 2], collide=False, breaking_force=1e9))
-    world.links.append(Spring(group, 0, 2, stiffness=1.0))
-    world.links.append(Angle(group, 0, 1, 2, compliance=1.0))
-    world.links.append(Area(group, [0, 1, 2], area=1.0, compliance=1.0))
-    world.links.append(Pin(group, 3))
-
-
-def _use(world: World) -> None:
-    world.step(1e-3)
-    world.step(1e-3)  # by now somebody has moved far enough for a closer look at the list of pairs
-    if world._contacts:
-        Watch(world._state, world._force_sum, world.links).take_back(world._slots, world._contacts.listed(), 0.0)
-    world.energy()
-    world.momentum()
-    world.overlap()
-
-
-def _lattice(
-    count: int, dtype: np.dtype[Any], boundary: type[Boundary], restitution: float, collisions: Collisions | None,
-    *, threads: int, ledger: bool = False, events: bool = False,
-) -> World:  # fmt: skip
-    side = int(np.ceil(np.sqrt(count)))
-    room: Boundary = Open()
-    if boundary is Circle:
-        room = Circle(radius=2.0 * side, restitution=restitution)
-    elif boundary is Box:
-        room = Box((-side, -side), (side, side), restitution=restitution)
-    world = World(boundary=room, collisions=collisions, substeps=1, dtype=dtype, threads=threads, ledger=ledger, events=events)
-    row, column = np.divmod(np.arange(count), side)
-    # Small ones for a second grid, and one fast enough to pass through the skin in a step.
-    group = world.add(position=np.column_stack((column, row)) - 0.5 * side, radius=np.where(np.arange(count) % 4, 0.5, 0.05))
-    group.velocity[-1] = (500.0, 0.0)
-    return world
-
-
-def _marker(dtype: np.dtype[Any], threads: int) -> Any:
+def _marker(dtype: np.dtype[Any], threads: int, part: str) -> Path | None:
     folder = _jit.cache_dir()
-    return folder / f"compiled-{dtype.name}{'-threads' if threads > 1 else ''}" if folder else None
+    return folder / _kind(dtype, threads) / part if folder else None
 
 
-def _compiled_before(dtype: np.dtype[Any], threads: int) -> bool:
-    marker = _marker(dtype, threads)
+def _done(dtype: np.dtype[Any], threads: int, part: str) -> bool:
+    marker = _marker(dtype, threads, part)
     return marker is not None and marker.exists()
 
 
-def _remember_compiled(dtype: np.dtype[Any], threads: int) -> None:
-    marker = _marker(dtype, threads)
+def _missing(dtype: np.dtype[Any], threads: int) -> list[str]:
+    return [part for part in PARTS if not _done(dtype, threads, part)]
+
+
+def _remember(dtype: np.dtype[Any], threads: int, part: str) -> None:
+    marker = _marker(dtype, threads, part)
     if marker is not None:
         with contextlib.suppress(OSError):
+            marker.parent.mkdir(exist_ok=True)
             marker.touch()
+
+
+# ---- other processes -----------------------------------------------------------------------------------------------------
+
+
+class _Helper:
+    """A process that compiles parts into the same folder, and ends with us. Whatever becomes of it, we compile the rest.
+
+    Attributes:
+        done: kernels it has begun to compile.
+    """
+
+    def __init__(self, dtype: np.dtype[Any], threads: int) -> None:
+        folder = _jit.cache_dir()
+        assert folder is not None
+        ours = str(Path(__file__).parents[1])
+        env = {
+            **os.environ,
+            "PYVERLET_CACHE_DIR": str(folder.parent),
+            "PYTHONPATH": os.pathsep.join(filter(None, (ours, os.environ.get("PYTHONPATH")))),
+        }
+        code = f"from pyverlet.warmup import help_compiling; help_compiling({dtype.name!r}, {threads})"
+        # Not multiprocessing: it would run the user's own script again. -P: nor take the user's files for modules.
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-c", code], env=env, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL, creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+        )  # fmt: skip
+        self.done = 0
+        self._reader = threading.Thread(target=self._count, daemon=True)
+        self._reader.start()
+
+    def _count(self) -> None:
+        assert self._process.stdout is not None
+        while self._process.stdout.read(1):
+            self.done += 1
+
+    def end(self) -> None:
+        """Nothing is left to do."""
+        self._process.kill()
+        self._process.wait()
+        self._reader.join()
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe:
+                pipe.close()
+
+
+@contextlib.contextmanager
+def _helping(dtype: np.dtype[Any], threads: int, parts: int) -> Iterator[list[_Helper]]:
+    """Helpers, as many as there are cores and parts for; none where they would not be Python, or could not hand anything over.
+
+    Only one process at a time has helpers: of many that start at once each would bring its own.
+    """
+    count = min(_jit.max_threads() - 1, parts - 1, MOST_HELPERS)
+    helpers: list[_Helper] = []
+    with _jit.turn("helpers", 0.0) as mine:
+        try:
+            if mine and _jit.cache_dir() and _python():
+                with contextlib.suppress(OSError):
+                    helpers.extend(_Helper(dtype, threads) for _ in range(count))
+            yield helpers
+        finally:
+            for helper in helpers:
+                helper.end()
+
+
+def _python() -> bool:
+    """Whether `sys.executable` is Python, and not a program that Python was built into."""
+    return bool(sys.executable) and not getattr(sys, "frozen", False) and Path(sys.executable).stem.lower().startswith("py")
+
+
+def help_compiling(dtype: str, threads: int) -> None:
+    """What a helper does: compile parts, and write a byte whenever a kernel begins to."""
+
+    def end_with_parent() -> None:
+        sys.stdin.buffer.read()
+        os._exit(1)
+
+    threading.Thread(target=end_with_parent, daemon=True).start()
+    kind = np.dtype(dtype)
+
+    def started() -> None:
+        os.write(1, b".")
+
+    with _jit.watch_compiling(started):
+        _compile(kind, threads, _missing(kind, threads))

@@ -15,7 +15,7 @@ ROOT = Path(pyverlet.__file__).parent
 
 # From the ground up. A module may import from its own layer only within its own package (the first part of its name).
 LAYERS = (
-    {"_loading", "errors", "constants", "_entry", "_jit", "_lanes", "_native", "_trace", "checks", "progress"},
+    {"_loading", "errors", "constants", "_entry", "_jit", "_lanes", "_native", "_turns", "_trace", "checks", "progress"},
     {"state", "group", "moves", "kernels"},
     {
         "integrators",
@@ -50,6 +50,7 @@ LAYERS = (
         "profile",
         "clock",
         "warmup",
+        "rehearsals",
         "panels",
         "builders",
     },
@@ -60,7 +61,7 @@ LAYERS = (
 # Steps within a layer: module -> what it may use beside it.
 BESIDE = {
     "checks": {"errors"},
-    "_jit": {"_entry"},
+    "_jit": {"_entry", "_turns"},
     "_trace": {"_entry", "_jit"},
     "state": {"kernels"},
     "group": {"state"},
@@ -83,7 +84,8 @@ BESIDE = {
     "measures": {"particles"},
     "actors": {"world"},
     "doors": {"world"},
-    "warmup": {"world"},
+    "warmup": {"world", "rehearsals"},
+    "rehearsals": {"world"},
     "panels": {"world", "saved"},
     "builders": {"world"},
     "report": {"scenes"},

@@ -225,7 +225,7 @@ def bound_displacements(position, built, order, levels, start, first, own, small
     those in levels with smaller cells.
     """
     for top in prange((levels.height[0] + BLOCK_ROWS - 1) // BLOCK_ROWS):
-        _bound_rows(position, built, order, levels, start, first, own, smaller, top)
+        _bound_rows(position, built, order, levels, start, first, own, smaller, np.int64(top))
 
 
 @kernel

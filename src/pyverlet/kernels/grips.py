@@ -33,13 +33,13 @@ from pyverlet.kernels.packs import set_out
 _CHUNK = 1024
 
 
-@parallel_kernel
+@kernel
 def weigh(begin, lanes, lane_i, lane_j, radius, inverse_mass, body):
     """body (6, lanes): w_i, w_j, r_i, r_j, 2 w_i / r_i, 2 w_j / r_j of each pair. An impulse on the rim of a disc, I = m r^2 / 2,
     changes its spin by the latter.
     """
     two = body.dtype.type(2)
-    for s in prange(lanes.shape[0]):
+    for s in range(lanes.shape[0]):
         for k in range(begin[s], begin[s] + lanes[s]):
             i, j = lane_i[k], lane_j[k]
             body[0, k], body[1, k], body[2, k], body[3, k] = inverse_mass[i], inverse_mass[j], radius[i], radius[j]

@@ -30,19 +30,19 @@ def _inertia(mass, lent, i):
     return max(mass[i] + lent[i], mass.dtype.type(1 - LENT) * mass[i])
 
 
-@parallel_kernel
+@kernel
 def weigh(mass, inverse_mass, lent, lighter):
     """lighter: 1 / m' of each circle, 1/kg."""
-    for i in prange(mass.shape[0]):
+    for i in range(mass.shape[0]):
         w = inverse_mass[i]
         lighter[i] = w if w == w - w or lent[i] == w - w else w / w / _inertia(mass, lent, i)
 
 
-@parallel_kernel
+@kernel
 def recall(inverse_mass, first, count, pair_i, pair_j, meeting, impulse, wait, lent, busy, lighter):
     """After `impacts`: give those that have bounced their own inertia, and let them lend none for `wait` seconds."""
     for parity in range(2):
-        for half in prange((first.shape[0] + 1 - parity) // 2):
+        for half in range((first.shape[0] + 1 - parity) // 2):
             s = 2 * half + parity
             for k in range(first[s], first[s] + count[s]):
                 if meeting[k] == PARTING and impulse[k] > 0:
@@ -64,10 +64,10 @@ def _pull(position, velocity, acceleration, inverse_mass, lighter, kick, fall, i
         position[i, 1] += more * fall * acceleration[i, 1]
 
 
-@parallel_kernel
+@kernel
 def keep_weight(position, velocity, acceleration, inverse_mass, lighter, kick, fall):
     """Let each circle's weight be that of its own mass."""
-    for i in prange(position.shape[0]):
+    for i in range(position.shape[0]):
         _pull(position, velocity, acceleration, inverse_mass, lighter, kick, fall, i)
 
 
@@ -93,9 +93,8 @@ def _share_strip(mass, inverse_mass, pair_i, pair_j, touching, impulse, lent, bu
 def share(mass, inverse_mass, first, count, pair_i, pair_j, touching, impulse, touches, lent, busy, touched):
     """Even out the inertia of each touching pair that has not bounced; nobody lends more than the part LENT of the own mass.
 
-    touched[i] becomes 1 for who is in such a pair, 0 for the others.
+    touched[i], 0 before, becomes 1 for who is in such a pair.
     """
-    touched[:] = 0
     for parity in range(2):
         for half in prange((first.shape[0] + 1 - parity) // 2):
             s = 2 * half + parity
@@ -104,10 +103,10 @@ def share(mass, inverse_mass, first, count, pair_i, pair_j, touching, impulse, t
             _share_strip(mass, inverse_mass, pair_i[a:b], pair_j[a:b], touching[a:t], impulse[a:t], lent, busy, touched)
 
 
-@parallel_kernel
+@kernel
 def settle(position, velocity, acceleration, mass, inverse_mass, lighter, kick, fall, touched, back, h, lent, busy):
     """Let those that touch nobody fall as they would have, and give the part `back` of every loan back."""
-    for i in prange(position.shape[0]):
+    for i in range(position.shape[0]):
         if not touched[i]:
             _pull(position, velocity, acceleration, inverse_mass, lighter, -kick, -fall, i)
         busy[i] = max(busy[i] - h, h - h)

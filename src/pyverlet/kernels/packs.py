@@ -125,10 +125,9 @@ def pack(origin, radius, first, count, pair_i, pair_j, used, begin, lanes, apart
     """Pack the pairs of every strip s into the lanes from begin[s] up to begin[s + 1] at most; lanes[s]: how many they take.
 
     A strip that needs more room than it has reports how much, and its packs are not complete: the caller makes room. apart[s]:
-    those before the first pack with a pair that is close. origin: (n, 2) positions the list was made from. used: (n,) scratch.
+    those before the first pack with a pair that is close. origin: (n, 2) positions the list was made from. used: (n,), -1.
     gap: (2, lanes), m.
     """
-    used[:] = -1
     for parity in range(2):
         for half in prange((first.shape[0] + 1 - parity) // 2):
             s = 2 * half + parity
@@ -140,10 +139,10 @@ def pack(origin, radius, first, count, pair_i, pair_j, used, begin, lanes, apart
                 apart[s] = _measure(origin, radius, lane_i[low:high], lane_j[low:high], gap[0, low:high], gap[1, low:high])
 
 
-@parallel_kernel
+@kernel
 def share_out(begin, lanes, lane_i, lane_j, radius, inverse_mass, reach, share):
     """reach: r_i + r_j. share: the part of a push that moves i, w_i / (w_i + w_j); j has the rest."""
-    for s in prange(lanes.shape[0]):
+    for s in range(lanes.shape[0]):
         for k in range(begin[s], begin[s] + lanes[s]):
             i, j = lane_i[k], lane_j[k]
             reach[k] = radius[i] + radius[j]
@@ -281,11 +280,11 @@ def _mark_strip(flag, lane_i, lane_j, normal_x, normal_y):
             flag[lane_j[k + lane]] |= bit
 
 
-@parallel_kernel
+@kernel
 def mark_touching(cut, begin, lanes, lane_i, lane_j, normal, flag):
     """flag[i] = 1 for every particle of a touching pair."""
     for parity in range(2):
-        for part in prange(cut.shape[1] - 1):
+        for part in range(cut.shape[1] - 1):
             for half in range(cut[parity, part], cut[parity, part + 1]):
                 a, b = begin[2 * half + parity], begin[2 * half + parity] + lanes[2 * half + parity]
                 _mark_strip(flag, lane_i[a:b], lane_j[a:b], normal[0, a:b], normal[1, a:b])

@@ -1,0 +1,198 @@
+"""The first start: several processes compile, each kernel once, and whatever becomes of a helper, nothing is missing."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet import _jit, _turns, rehearsals, warmup
+
+
+def run(code: str, cache: Path, **environment: str) -> str:
+    env = {**os.environ, "PYVERLET_CACHE_DIR": str(cache), **environment}
+    return subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True, timeout=300).stdout
+
+
+# Parts that are compiled in seconds, of a few kernels each.
+SHORT = """
+import os, subprocess, sys, numpy as np, pyverlet as pv
+from pyverlet import _jit, rehearsals, warmup
+for name in list(rehearsals.PARTS):
+    if name not in ("_motion", "_loans"): del rehearsals.PARTS[name]
+"""
+
+
+def test_two_processes_share_the_work_and_compile_nothing_twice(tmp_path: Path) -> None:
+    # Without the pipes of `_Helper`, to see both: whatever begins to compile is written to disk once, under a name of its own.
+    code = SHORT + (
+        "counted = os.open(os.environ['COUNTED'], os.O_WRONLY | os.O_APPEND | os.O_CREAT)\n"
+        "with _jit.watch_compiling(lambda: os.write(counted, b'.') and None):\n"
+        "    warmup._compile(np.dtype(np.float32), 1, list(rehearsals.PARTS))\n"
+    )
+    env = {**os.environ, "PYVERLET_CACHE_DIR": str(tmp_path), "COUNTED": str(tmp_path / "counted")}
+    both = [subprocess.Popen([sys.executable, "-c", code], env=env) for _ in range(2)]
+    assert [process.wait(timeout=300) for process in both] == [0, 0]
+    kept = [path for path in tmp_path.rglob("*.nbc") if not path.name.startswith("_entry.")]
+    assert len((tmp_path / "counted").read_text()) == len(kept) > 20
+    assert {path.name for path in tmp_path.rglob("compiled-float32/*")} == {"_motion", "_loans"}
+
+
+def test_what_is_compiled_by_many_has_the_bits_of_what_one_has(tmp_path: Path) -> None:
+    code = (
+        "world = pv.World(collisions=None); world.add(position=np.arange(20.0).reshape(10, 2)); pv.warm_up(world)\n"
+        "world.step(0.1); print(world.state_hash())"
+    )
+    here = run("import numpy as np, pyverlet as pv; " + code, _jit.cache_dir().parent)  # type: ignore[union-attr]
+    assert run(SHORT + code, tmp_path, NUMBA_NUM_THREADS="2") == here
+
+
+# Two parts of a kernel each.
+TINY = """
+import os, subprocess, sys, numpy as np, pyverlet as pv
+from pyverlet import _jit, rehearsals, warmup
+from pyverlet.kernels import motion
+rehearsals.PARTS.clear()
+rehearsals.PARTS["one"] = lambda dtype, threads: motion.any_nan(np.zeros((1, 2), dtype))
+rehearsals.PARTS["two"] = lambda dtype, threads: motion.clear_pinned(np.zeros((1, 2), dtype), np.zeros(1, dtype))
+warmup.rehearse = lambda world: None
+"""
+COUNTED = """
+ours = []
+pv.warm_up(pv.World(), lambda done, total: ours.append(done))
+print(len(ours), len(list(_jit.cache_dir().rglob("compiled-float32/*"))) if _jit.cache_dir() else 2)
+"""
+
+
+@pytest.mark.parametrize(
+    "accident",
+    [
+        "def fails(*a, **k): raise OSError('no more processes')\nsubprocess.Popen = fails",
+        "os.environ['PYTHONHOME'] = '/nowhere'",
+        "start = warmup._Helper.__init__\ndef killed(self, *a): start(self, *a); self._process.kill()\n"
+        "warmup._Helper.__init__ = killed",
+        "warmup._Helper = None; sys.frozen = True",
+        "warmup._Helper = None; sys.executable = ''",
+        "warmup._Helper = None; _jit.max_threads = lambda: 1",
+        "warmup._Helper = None; _jit.cache_dir = lambda: None",
+    ],
+    ids=["not started", "starts and fails", "killed", "frozen", "no Python", "one core", "nothing can be kept"],
+)
+def test_without_a_helper_everything_is_compiled_all_the_same(accident: str, tmp_path: Path) -> None:
+    began, parts = run(f"{TINY}{accident}\n{COUNTED}", tmp_path, NUMBA_NUM_THREADS="2").split()
+    assert parts == "2"
+    assert began == "3"  # each kernel, and the end of the line
+
+
+def test_one_core_has_no_helper(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_jit, "max_threads", lambda: 1)
+    with warmup._helping(np.dtype(np.float32), 1, 7) as helpers:
+        assert helpers == []
+
+
+def test_a_helper_ends_with_its_parent() -> None:
+    parent = (
+        "import os, numpy as np; from pyverlet import warmup\n"
+        "helper = warmup._Helper(np.dtype(np.float64), 1); print(helper._process.pid, flush=True); os._exit(0)"
+    )
+    pid = int(subprocess.run([sys.executable, "-c", parent], capture_output=True, text=True, check=True).stdout)
+    for _ in range(600):
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            return
+        if Path(f"/proc/{pid}/stat").exists() and Path(f"/proc/{pid}/stat").read_text().split(") ")[1][0] == "Z":
+            return
+        time.sleep(0.1)
+    raise AssertionError("it still runs")
+
+
+def test_ctrl_c_ends_helpers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_jit, "max_threads", lambda: 2)
+    with pytest.raises(KeyboardInterrupt), warmup._helping(np.dtype(np.float64), 1, 7) as helpers:
+        raise KeyboardInterrupt
+    assert len(helpers) == 1
+    assert helpers[0]._process.poll() is not None
+
+
+def test_helpers_are_counted_in_the_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Busy:
+        done = 1000
+
+        def end(self) -> None:
+            pass
+
+    monkeypatch.setattr(_jit, "max_threads", lambda: 2)
+    monkeypatch.setattr(warmup, "_Helper", lambda *_: Busy())
+    monkeypatch.setattr(warmup, "_missing", lambda *_: ["_motion", "_loans"])
+    monkeypatch.setattr(warmup, "_compile", lambda *_: None)
+    seen: list[tuple[int, int]] = []
+    monkeypatch.setattr(warmup, "rehearse", lambda _: None)
+
+    @contextlib.contextmanager
+    def watching(started: Callable[[], None]) -> Iterator[None]:
+        yield
+        started()
+
+    monkeypatch.setattr(_jit, "watch_compiling", watching)
+    pv.warm_up(pv.World(), lambda done, total: seen.append((done, total)))
+    assert seen[0][0] == seen[0][1] > 20
+
+
+def test_parts_cover_what_a_world_of_circles_needs() -> None:
+    for part in rehearsals.PARTS.values():
+        part(np.dtype(np.float32), 1)
+    for friction, restitution in ((0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5)):
+        for room in (pv.Circle(radius=10), pv.Box((-10, -10), (10, 10)), pv.Open()):
+            world = pv.World(boundary=room, collisions=pv.Collisions(friction=friction, restitution=restitution))
+            world.add(position=np.random.default_rng(0).uniform(-5, 5, (60, 2)), radius=0.5)
+            late: list[str] = []
+            with _jit.watch_compiling(lambda late=late: late.append("late")):  # type: ignore[misc]
+                world.run(seconds=0.3)
+                world.energy(), world.overlap(), world.momentum()
+                world.mass[0] *= 100
+                world.run(seconds=0.1)
+            assert late == [], (friction, restitution, room)
+
+
+# ---- turns -------------------------------------------------------------------------------------------------------------
+
+KEEP = """
+import pathlib, sys
+from pyverlet._turns import turn
+with turn(pathlib.Path(sys.argv[1]), "a"):
+    print("mine", flush=True)
+    sys.stdin.read()
+"""
+
+
+def test_a_turn_is_one_process_s_at_a_time(tmp_path: Path) -> None:
+    path = tmp_path / "turns"
+    with subprocess.Popen([sys.executable, "-c", KEEP, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+        assert other.stdout is not None
+        assert other.stdin is not None
+        assert other.stdout.readline().strip() == b"mine"
+        with _turns.turn(path, "a", patience=0.0) as mine:
+            assert not mine
+        with _turns.turn(path, "b", patience=0.0) as mine:
+            assert mine
+        timer = threading.Timer(0.3, other.kill)  # however it ends
+        timer.start()
+        with _turns.turn(path, "a") as mine:
+            assert mine
+        timer.join()
+        other.stdin.close()
+
+
+def test_where_files_cannot_be_opened_everybody_has_every_turn(tmp_path: Path) -> None:
+    with _turns.turn(tmp_path / "no such folder" / "turns", "a") as mine:
+        assert mine
