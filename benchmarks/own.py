@@ -236,16 +236,22 @@ def small(machine_limit_ms: float = 0.15) -> Iterator[Row]:
 
 def memory(particles: int = 200_000) -> Iterator[Row]:
     """What the engine keeps beyond the arrays a user sees."""
-    world = pv.scenes.get("cage").world(particles=2_000)
-    world.run(seconds=0.1)
+    pv.warm_up(pv.scenes.get("cage").world(particles=particles))  # compiled code is as large for one particle
     tracemalloc.start()
     world = pv.scenes.get("cage").world(particles=particles)
-    world.run(seconds=2.0)
-    held = tracemalloc.get_traced_memory()[0]
-    tracemalloc.stop()
     seen = sum(array.nbytes for _, array in world._state.arrays())
-    each = (held - seen) / particles
-    yield Row("memory", "<= 200 bytes a particle beyond the arrays a user sees", f"{each:.0f} bytes", each <= 200)
+    held = []
+    for _ in range(8):
+        world.run(seconds=0.5)
+        held.append((tracemalloc.get_traced_memory()[0] - seen) / particles)
+    tracemalloc.stop()
+    most = max(held)
+    yield Row(
+        "memory",
+        "<= 200 bytes a particle beyond the arrays a user sees",
+        f"{most:.0f} bytes at most in a fall of 4 s",
+        most <= 200,
+    )
 
 
 def start() -> Iterator[Row]:

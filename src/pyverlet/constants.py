@@ -27,7 +27,7 @@ SKIN_HOLD: Final = 16
 WORTH_LOOKING: Final = 0.3
 """With less than this part of half the skin left the list is rebuilt: looking again and again would cost as much."""
 
-REBUILD_PAIRS: Final = 30.0
+REBUILD_PAIRS: Final = 20.0
 """Candidate pairs that contacts solve in a substep in the time in which the list is built anew; all for each particle."""
 
 SAMPLE: Final = 64

@@ -147,11 +147,9 @@ class Packs:
     def _rubbing(self, state: Slots) -> tuple[Any, ...]:
         if not self._body.shape[1]:
             self._body = np.empty((6, len(self.lane_i) if self._varied else LANES), self._dtype)
-            lanes = np.zeros(LANES, np.uint32)
-            which: tuple[Array, Array, Array, Array] = (
-                self.listed() if self._varied else (np.zeros(1, np.int64), np.full(1, LANES), lanes, lanes)
-            )
-            grips.weigh(*which, state.radius, state.inverse_mass, self._body)
+            lane = np.zeros(LANES, np.uint32)
+            begin, lanes, i, j = self.listed() if self._varied else (np.zeros(1, np.int64), np.full(1, LANES), lane, lane)
+            grips.weigh(begin, lanes, i, j, state.radius, state.inverse_mass, self._body)
         where = (self._parts(), self.begin, self.lanes, self.lane_i, self.lane_j, self._body, self._varied)
         return (*where, self.normal, self._depths, self.slip, self._held)
 
