@@ -35,10 +35,13 @@ class Packs:
         self._spare = COLOURS * LANES  # lanes of a strip beyond its pairs: twice as many as any needed in the last list
         self._size: Array | None = None
         self._varied = 0
+        self._deeps = np.zeros(0, np.int64)  # packs of each strip that overlap deeply
+        self._fresh = np.ones(1, np.uint8)  # 1: they are to be noted, once a frame; a kernel says when it has
 
     def _make_room(self, lanes: int) -> None:
         self.lane_i, self.lane_j = np.empty(lanes, np.uint32), np.empty(lanes, np.uint32)
         self.gap, self.normal = np.empty((2, lanes), self._dtype), np.empty((2, lanes), self._dtype)
+        self._deep = np.empty(lanes // LANES, np.int64)
         self._hold(0)
 
     def _hold(self, lanes: int) -> None:
@@ -64,6 +67,7 @@ class Packs:
         self.origin = origin
         self._moved = np.empty_like(origin)
         self._size = None
+        self._deeps, self._fresh[0] = np.zeros(len(pairs.count), np.int64), 1
 
     def _parts(self) -> Array:
         """(2, threads + 1): even and odd strips, each cut into as many parts of as nearly the same number of lanes as can be.
@@ -105,7 +109,8 @@ class Packs:
             self._share_out(state)
         where = (self._parts(), self.begin, self.lanes, self.apart, self.lane_i, self.lane_j, self.gap)
         settings = (self.reach, self.share, self._varied, *state.reals(fed / PUSHED / h, LARGEST_PUSH))
-        packs.project(state.position, state.velocity, self.origin, self._moved, *where, *settings, self.normal, self._depths)
+        notes = (self.normal, self._depths, self._deep, self._deeps, self._fresh)
+        packs.project(state.position, state.velocity, self.origin, self._moved, *where, *settings, *notes)
 
     def still(self, state: Slots) -> None:
         """Take from touching circles the velocity that projection has put in."""
@@ -155,4 +160,5 @@ class Packs:
 
     def mark_resting(self, state: Slots) -> None:
         """Set `state.resting` for particles that touch another."""
+        self._fresh[0] = 1
         packs.mark_touching(self._parts(), self.begin, self.lanes, self.lane_i, self.lane_j, self.normal, state.resting)

@@ -8,7 +8,8 @@ cluster is what hangs together by contacts in this frame, and by links. In this 
 1. The velocities within the cluster, beside those with which it moves and turns as a whole: that keeps its momentum and its
    angular momentum. Kinetic energy goes with the square, so all are multiplied by sqrt(1 - taken / energy).
 2. The velocities and spins of all in it: it was not alone, for nothing thrusts itself off nothing.
-3. What circles have been raised in this frame: they are lowered by a part of that, and have grown by that part less.
+3. What circles have been raised in this frame: they are lowered by a part of that, and have grown by that part less. Not those
+   that a wall has raised because they were beyond it: it would do so again.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.bounds import Boundary
 from pyverlet.constants import SERIAL_BELOW, SLEEP_NEAR, STANDARD_GRAVITY, SURPLUS
 from pyverlet.forces import Conservative, Drag, ForceSum
 from pyverlet.kernels import clusters, measure
@@ -28,12 +30,15 @@ Array = NDArray[Any]
 Listed = tuple[Array, Array, Array, Array]
 Extent = tuple[float, float, float, float]
 
+_INSIDE = 0.99
+"""Of its radius: a circle was inside the room if the point so far below its centre was, the way gravity points."""
+
 
 class Watch:
     """Looks after the energy of one frame. `start`: the user's arrays, which stay as they are until the frame is accepted."""
 
-    def __init__(self, start: State, forces: ForceSum, links: Links) -> None:
-        self._start, self._forces, self._links = start, forces, links
+    def __init__(self, start: State, forces: ForceSum, links: Links, room: Boundary) -> None:
+        self._start, self._forces, self._links, self._room = start, forces, links, room
         self._gravity, self._energy = forces.gravity, self._look(start)
 
     def _look(self, now: State | Slots) -> float:
@@ -47,8 +52,8 @@ class Watch:
             energy += sum(force.potential(state) for force in kept) + self._links.energy(state)
         return energy
 
-    def close(self, slots: Slots, listed: Listed, extent: Extent | None) -> float:
-        """The frame is over: take back what has been gained too much. extent: of the room; None without walls.
+    def close(self, slots: Slots, listed: Listed) -> float:
+        """The frame is over: take back what has been gained too much.
 
         listed: first, count, pair_i, pair_j of the pairs that may touch.
 
@@ -57,7 +62,7 @@ class Watch:
         if self._forces.gravity != self._gravity:  # it has turned on the way, and drove the world
             return 0.0
         gained = self._look(slots) - self._energy
-        room = SURPLUS * fall(slots.total_mass, self._forces.gravity, extent)
+        room = SURPLUS * fall(slots.total_mass, self._forces.gravity, self._room.extent())
         if room < gained < np.inf:
             surplus = gained - max(room, SURPLUS * self._kinetic().sum())
             if surplus > 0.0:
@@ -97,12 +102,18 @@ class Watch:
         slots.velocity[taken_from] = (slower[:, None] * v)[taken_from]
         slots.spin *= slower.astype(slots.dtype)
         # 3. What has been raised.
-        lift = np.where(slots.hits < 0, np.maximum(lift, 0), 0)  # whoever is at a wall stays there
+        lift = np.where((slots.hits < 0) | self._was_inside()[order], np.maximum(lift, 0), 0)
         part = np.minimum(_ratio(left, add(lift)), 1)[cluster]
         slots.position += ((part * _ratio(lift, mass * (g @ g)))[:, None] * g).astype(slots.dtype)
         if slots.size is not slots.radius:
             slots.grown -= (part * (slots.grown - start.grown[order])).astype(slots.dtype)
             slots.resize()
+
+    def _was_inside(self) -> Array:
+        """(n,) bool, who was above the wall when the frame began, in the user's order."""
+        g, start = np.array(self._forces.gravity), self._start
+        down = g / max(float(np.hypot(*g)), 1e-300)
+        return ~self._room.outside(start.position.astype(float) + _INSIDE * start.radius[:, None] * down)
 
     def _clusters(self, slots: Slots, listed: Listed, moved: Array) -> Array:
         """(n,) lowest slot of the cluster that each slot belongs to."""

@@ -94,7 +94,7 @@ def _use(world: World) -> None:
     world.step(1e-3)
     world.step(1e-3)  # by now somebody has moved far enough for a closer look at the list of pairs
     if world._contacts:
-        Watch(world._state, world._force_sum, world.links).take_back(world._slots, world._contacts.listed(), 0.0)
+        Watch(world._state, world._force_sum, world.links, world.boundary).take_back(world._slots, world._contacts.listed(), 0.0)
     world.energy()
     world.momentum()
     world.overlap()

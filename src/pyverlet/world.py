@@ -127,7 +127,7 @@ class World(Measures, Queries, Doors):
         done("gather")
         if self._sleep and self._sleep.all_asleep(state):
             return
-        watch = Watch(self._state, forces, self.links) if contacts and undriven(self, h, self._h_last) else None
+        watch = Watch(self._state, forces, self.links, self.boundary) if contacts and undriven(self, h, self._h_last) else None
         integrator.begin(state, forces, self.time, h, self._h_last)
         for substep, moved in self._repeats.turns(self, h, contacts, done):
             if not moved:
@@ -196,7 +196,7 @@ class World(Measures, Queries, Doors):
             contacts.end(self._slots, self.substeps * h, self.gravity)
         self.integrator.end(self._slots, h)
         if contacts and watch:
-            contacts.growth.heed(watch.close(self._slots, contacts.listed(), self.boundary.extent()))
+            contacts.growth.heed(watch.close(self._slots, contacts.listed()))
 
     def _accept(self, dt: float, h: float, books: Any) -> None:
         """The frame has gone well: what it made of the state is the truth now."""

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import pyverlet as pv
 from pyverlet._lanes import LANES
 from pyverlet.broadphase import BruteForce, Fast
-from pyverlet.constants import FED_SMOOTH, LARGEST_PUSH, PUSHED
+from pyverlet.constants import DEEP, DEEP_PART, DEEP_SWEEPS, FED_SMOOTH, LARGEST_PUSH, PUSHED
 from pyverlet.packs import Packs
 from pyverlet.state import Slots
 
@@ -63,26 +63,57 @@ def test_packs_hold_every_pair_and_share_no_particle(seed: int, n: int, spread: 
         assert len(np.unique(alone)) == alone.size
 
 
+def refine(slots: Slots, packs: Packs, moved: Any, shares: dict[int, Any], deep: list[range]) -> None:
+    """What kernels.packs does with the packs of a strip that overlap by more than DEEP."""
+    real = slots.real
+    for sweep in range(DEEP_SWEEPS):
+        left = []
+        for pack in deep[::-1] if sweep % 2 else deep:
+            pushes = []
+            for k in (k for k in pack if k in shares):
+                i, j = packs.lane_i[k], packs.lane_j[k]
+                d = packs.gap[:, k] + (moved[j] - moved[i])
+                distance = np.sqrt(d[0] * d[0] + d[1] * d[1])
+                reach = slots.size[i] + slots.size[j]
+                excess = max(real(1 - DEEP) * reach - distance, real(0))
+                if distance <= real(1 - LARGEST_PUSH) * reach:
+                    excess, distance = real(0), reach
+                pushes.append((k, i, j, d * (real(DEEP_PART * PUSHED) * excess / distance), excess))
+            if any(excess > 0 for *_, excess in pushes):
+                left.append(pack)
+                for k, i, j, c, _ in pushes:
+                    moved[i] = moved[i] - c * shares[k]
+                    moved[j] = moved[j] + c * (real(1) - shares[k])
+        if sweep == 0:
+            deep = left
+
+
 def one_by_one(slots: Slots, packs: Packs) -> None:
     """kernels.packs.project and still, in NumPy's scalars of the same dtype, pair after pair."""
     real = slots.real
     moved = slots.position - packs.origin
     strips = [range(a, a + n) for a, n in zip(packs.begin, packs.lanes, strict=False)]
-    lanes = [(k, packs.lane_i[k], packs.lane_j[k]) for strip in (*strips[::2], *strips[1::2]) for k in strip]
+    strips = [*strips[::2], *strips[1::2]]
+    lanes = [(k, packs.lane_i[k], packs.lane_j[k]) for strip in strips for k in strip]
     lanes = [lane for a, lane in enumerate(lanes) if a % LANES == 0 or lane[1:] != lanes[a - 1][1:]]
     normals = {}
     shares = {}
+    deep = set()
     for k, i, j in lanes:
         shares[k] = slots.inverse_mass[i] / (slots.inverse_mass[i] + slots.inverse_mass[j])
         reach = slots.size[i] + slots.size[j]
         d = packs.gap[:, k] + (moved[j] - moved[i])
         distance = np.sqrt(d[0] * d[0] + d[1] * d[1])
         depth = min(max(reach - distance, real(0)), real(LARGEST_PUSH) * reach)
+        if depth > real(DEEP) * reach:
+            deep.add(k)
         n = d * (real(1) / distance)
         normals[k] = n if depth > 0 else 0 * n
         c = n * (real(PUSHED) * depth)
         moved[i] = moved[i] - c * shares[k]
         moved[j] = moved[j] + c * (real(1) - shares[k])
+    for strip in strips:
+        refine(slots, packs, moved, shares, [range(k, k + LANES) for k in strip[::LANES] if deep & set(range(k, k + LANES))])
     by = moved - (slots.position - packs.origin)
     slots.position += by
     slots.velocity += real(FED_SMOOTH / PUSHED / H) * by

@@ -9,6 +9,8 @@ What is computed for each pair, and why, is in kernels.contacts; here it is arra
   be carried along: FED_SMOOTH / PUSHED / h times what a circle has been moved is what it is fed.
 - The second pass finds the normals where the first has left them, 0 for pairs that do not touch.
 - Nothing is decided for a single pair, only, before the first pack with a pair that was close, whether any of the eight touches.
+- The few packs with a pair that overlaps by more than DEEP are noted once a frame. What the sweep leaves of them beyond that is
+  treated again, as kernels.refine does.
 
 Everything runs strip by strip as kernels.pairs explains: even strips in parallel, then odd ones.
 """
@@ -33,7 +35,7 @@ from pyverlet._lanes import (
     where_zero,
     which_above,
 )
-from pyverlet.constants import CLOSE, PUSHED
+from pyverlet.constants import CLOSE, DEEP, DEEP_PART, DEEP_SWEEPS, LARGEST_PUSH, PUSHED
 
 # Golden angle, rad: coincident centres part in directions spread evenly over the circle.
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
@@ -150,9 +152,12 @@ def share_out(begin, lanes, lane_i, lane_j, radius, inverse_mass, reach, share):
 
 
 @kernel
-def _project_strip(moved, apart, lane_i, lane_j, gap_x, gap_y, reach, share, varied, most, normal_x, normal_y, depths):
-    noted = depths.shape[0] > 0
-    zero, one = spread(most - most), spread(most / most)
+def _project_strip(
+    moved, apart, lane_i, lane_j, gap_x, gap_y, reach, share, varied, most, normal_x, normal_y, depths, deep, looks
+):  # fmt: skip
+    """Returns how many packs with a pair that overlaps by more than DEEP it has noted in `deep`."""
+    noted, count = depths.shape[0] > 0, 0
+    zero, one, limit = spread(most - most), spread(most / most), spread(moved.dtype.type(DEEP))
     pushed, most = spread(moved.dtype.type(PUSHED)), spread(most)
     for k in range(0, lane_i.shape[0], LANES):
         xi, yi = take(moved, lane_i, k)
@@ -179,6 +184,43 @@ def _project_strip(moved, apart, lane_i, lane_j, gap_x, gap_y, reach, share, var
         store(normal_y, k, where_zero(depth, zero, ny))
         if noted:
             store(depths, k, depth)
+        elif looks and which_above(depth, limit * r) != 0:
+            deep[count] = k
+            count += 1
+    return count
+
+
+@kernel
+def _refine_strip(moved, lane_i, lane_j, gap_x, gap_y, reach, share, varied, deep, count):
+    """Part again, there and back, the packs in deep[:count] that still overlap by more than DEEP; returns how many those are.
+
+    Beyond LARGEST_PUSH it is no weight but a mistake, and has been pushed enough.
+    """
+    real = moved.dtype.type
+    zero, one, near, nearest = spread(real(0)), spread(real(1)), spread(real(1 - DEEP)), spread(real(1 - LARGEST_PUSH))
+    pushed = spread(real(DEEP_PART * PUSHED))
+    for sweep in range(DEEP_SWEEPS):
+        left = 0
+        for m in range(count):
+            k = deep[count - 1 - m if sweep % 2 else m]
+            xi, yi = take(moved, lane_i, k)
+            xj, yj = take(moved, lane_j, k)
+            dx, dy = load(gap_x, k) + (xj - xi), load(gap_y, k) + (yj - yi)
+            r, part = load(reach, k * varied), load(share, k * varied)
+            distance = square_root(dx * dx + dy * dy)
+            excess = where_zero(larger(distance - nearest * r, zero), zero, larger(near * r - distance, zero))
+            if which_above(excess, zero) == 0:
+                continue
+            if sweep == 0:
+                deep[left] = k
+                left += 1
+            push = pushed * excess / larger(distance, nearest * r)
+            cx, cy = dx * push, dy * push
+            put(moved, lane_i, k, xi - cx * part, yi - cy * part)
+            put(moved, lane_j, k, xj + cx * (one - part), yj + cy * (one - part))
+        if sweep == 0:
+            count = left
+    return count
 
 
 # Two passes over all particles, as 2 n numbers one after the other: so they are vectorised.
@@ -205,16 +247,17 @@ def _arrive(position, velocity, origin, moved, feed):
 @parallel_kernel
 def project(
     position, velocity, origin, moved, cut, begin, lanes, apart, lane_i, lane_j, gap, reach, share, varied, feed, most, normal,
-    depths,
+    depths, deep, deeps, fresh,
 ):  # fmt: skip
     """Move overlapping pairs apart, feed their velocities, and note the normals of those that touch.
 
     varied: 1; or 0 if reach and share are the same for all and have one pack only. feed: FED / PUSHED / h, 1/s. depths: (lanes,)
-    for the overlaps, m, of pairs at their turn, 0 for those that do not touch; or (0,) if nobody asks.
+    for the overlaps, m, of pairs at their turn, 0 for those that do not touch; or (0,) if nobody asks. deep: (lanes / LANES,)
+    where in its strip s each of the deeps[s] packs begins that are treated again; noted anew if fresh[0], which is then 0.
     cut: (2, threads + 1), which half s // 2 of the strips s with s % 2 = 0, and 1, each thread begins with. moved: (n, 2) to work
     with. normal: (2, lanes).
     """
-    n = position.shape[0]
+    n, looks = position.shape[0], fresh[0] != 0
     chunks = (n + _CHUNK - 1) // _CHUNK
     for c in prange(chunks):
         a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
@@ -222,14 +265,25 @@ def project(
     for parity in range(2):
         for part in prange(cut.shape[1] - 1):
             for half in range(cut[parity, part], cut[parity, part + 1]):
-                a, b = begin[2 * half + parity], begin[2 * half + parity] + lanes[2 * half + parity]
-                _project_strip(
-                    moved, apart[2 * half + parity], lane_i[a:b], lane_j[a:b], gap[0, a:b], gap[1, a:b], reach[a * varied :],
-                    share[a * varied :], varied, most, normal[0, a:b], normal[1, a:b], depths[a:b],
-                )  # fmt: skip
+                s = 2 * half + parity
+                a, b = begin[s], begin[s] + lanes[s]
+                pairs = (lane_i[a:b], lane_j[a:b], gap[0, a:b], gap[1, a:b], reach[a * varied :], share[a * varied :], varied)
+                noted = (most, normal[0, a:b], normal[1, a:b], depths[a:b], deep[a // LANES : b // LANES], looks)
+                count = _project_strip(moved, apart[s], *pairs, *noted)
+                if looks:
+                    deeps[s] = count
+    for parity in range(2):
+        for part in prange(cut.shape[1] - 1):
+            for half in range(cut[parity, part], cut[parity, part + 1]):
+                s = 2 * half + parity
+                if deeps[s] > 0:
+                    a, b = begin[s], begin[s] + lanes[s]
+                    pairs = (lane_i[a:b], lane_j[a:b], gap[0, a:b], gap[1, a:b], reach[a * varied :], share[a * varied :], varied)
+                    deeps[s] = _refine_strip(moved, *pairs, deep[a // LANES : b // LANES], deeps[s])
     for c in prange(chunks):
         a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
         _arrive(position[a:b], velocity[a:b], origin[a:b], moved[a:b], feed)
+    fresh[0] = 0
 
 
 @kernel
