@@ -77,7 +77,7 @@ BESIDE = {
     "energy": {"forces"},
     "growth": {"broadphase"},
     "naive": {"bounds"},
-    "passivity": {"forces", "links"},
+    "passivity": {"bounds", "forces", "links"},
     "links": {"broadphase"},
     "world": {"profile", "doors", "measures", "moments", "actors", "queries", "repeats", "saved", "sleep"},
     "saved": {"actors"},
