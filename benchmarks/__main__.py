@@ -66,11 +66,11 @@ def measure(engines: list[type[Engine]], position: Array, cage: float, frames: i
     for world in worlds:
         for _ in range(OWN_FRAMES):
             world.step()
+    settled = [world.position().copy() for world in worlds]  # all after the same time, whoever makes more frames when timed
     times = own.in_turn([world.step for world in worlds], max(frames // own.ROUNDS, 1))
     rows = []
     fastest_of_ours = min(ms for world, ms in zip(worlds, times, strict=True) if world.name.startswith("pyverlet"))
-    for world, ms in zip(worlds, times, strict=True):
-        now = world.position()
+    for world, ms, now in zip(worlds, times, settled, strict=True):
         found = overlap(now)
         rows.append(
             Row(

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+import numpy as np
 from numba.core import event as numba_event
 from numba.core.codegen import CPUCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
@@ -147,11 +148,17 @@ def _in_turn(function: Any, name: str) -> Any:
     return compile_in_turn
 
 
-_MAKERS = {"arange", "array", "copy", "empty", "empty_like", "full", "full_like", "ones", "sort", "zeros", "zeros_like"}
+_VIEWS = {"T", "dtype", "fill", "flat", "itemsize", "nbytes", "ndim", "reshape", "shape", "size", "strides"}
+_MAKERS = {"arange", "array", "empty", "empty_like", "full", "full_like", "ones", "zeros", "zeros_like"} | {
+    name for name in vars(np.ndarray) if not name.startswith("_") and name not in _VIEWS
+}
 
 
 def _allocates(function: Callable[..., Any]) -> bool:
-    """Whether a kernel makes arrays. Others need no counts of who refers to an array, a sixth of what is compiled."""
+    """Whether a kernel may make arrays: with NumPy's functions for it, or by a method, for even `min` makes one.
+
+    Others need no counts of who refers to an array, a sixth of what is compiled.
+    """
     return not _MAKERS.isdisjoint(function.__code__.co_names)
 
 
