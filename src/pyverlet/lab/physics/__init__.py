@@ -26,7 +26,7 @@ CHECKS: tuple[Check, ...] = (
     Check("rest-substeps", rest.substeps, {"particles": 1000, "seconds": 15}, full={"particles": 20_000, "seconds": 30}),
     Check("rest-column", rest.column, {"particles": 100, "seconds": 60}),
     Check("left-alone", rest.left_alone, {"particles": 500, "seconds": 30, "friction": 0.0}, full={"seconds": 600}),
-    Check("left-alone-rough", rest.left_alone, {"particles": 500, "seconds": 30, "friction": 0.5}, full={"seconds": 600}),
+    Check("left-alone-rough", rest.left_alone, {"particles": 500, "seconds": 60, "friction": 0.5}, full={"seconds": 600}),
     Check("masses", sizes.pile, {"particles": 500, "seconds": 20, "radius_ratio": 1, "mass_ratio": 1000}, full={"seconds": 60}),
     Check("radii", sizes.pile, {"particles": 500, "seconds": 20, "radius_ratio": 50, "mass_ratio": 1000}, full={"seconds": 60}),
     Check("radii-masses", sizes.pile,

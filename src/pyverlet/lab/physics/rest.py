@@ -112,7 +112,8 @@ def left_alone(particles: int, seconds: float, friction: float, creep: float = 0
 
     With friction the circles may turn by `turn` a minute. In float32 a position of 14 m is rounded by up to 5e-7 m in each
     substep, 480 times a second: what friction sees as a speed of 2e-4 m/s, and answers with a spin of some 5e-4 rad/s. In
-    float64 they do not.
+    float64 they do not. And a circle that lies loose at the bottom of the cage rolls to and fro, which nothing stops: by 0.06 rad
+    in one pile. So less than a minute is too short to tell a turn from a swing.
     """
     world = scenes.get("cage").world(particles=particles, friction=friction)
     world.run(seconds=30)
