@@ -105,10 +105,10 @@ _threads = types.ExternalFunction("get_num_threads", types.int32())
 _OTHERWISE, _STUB, _WHEN, _COUNT, _LENGTH, _RECORDER, _FIRST = (8 * k for k in range(7))
 _WANT, _KIND, _IS, _DIMENSIONS, _BYTES, _STEP = (8 * k for k in range(6))
 
-# Words of the recorder: the thread whose calls are recorded, or 0; where the next goes, and the end of the room for them; the
-# list that holds what they were given; True and False.
-_THREAD, _NEXT, _END, _HELD, _TRUE, _FALSE = (8 * k for k in range(6))
-RECORDER = np.array([0, 0, 0, 0, id(True), id(False)], np.int64)
+# Words of the recorder: the thread whose calls are recorded, or 0; how many there are; where the next goes, and the end of the
+# room for them; the list that holds what they were given; True and False.
+_THREAD, _MADE, _NEXT, _END, _HELD, _TRUE, _FALSE = (8 * k for k in range(7))
+_recorder = np.array([0, 0, 0, 0, 0, id(True), id(False)], np.int64)
 
 # Words of a recorded call: what is called, what it answered if that was yes or no, and how many words it takes, which follow.
 CALLED, ANSWER, TAKEN, CALL = (8 * k for k in range(4))
@@ -174,6 +174,7 @@ def _enter(table_object: int, arguments: int, count: int) -> int:
 def _record(recorder: int, table: int, arguments: int, words: int) -> int:
     """Call a kernel, and keep what it was called with, for `_trace`."""
     at, length = _word(recorder + _NEXT), _word(table + _LENGTH)
+    _put(recorder + _MADE, _word(recorder + _MADE) + 1)
     _put(recorder + _NEXT, at + CALL + 8 * length)  # beyond the end, if it does not fit
     result = _call(_word(table + _STUB), words, 0)
     if _word(recorder + _NEXT) <= _word(recorder + _END):
@@ -187,10 +188,23 @@ def _record(recorder: int, table: int, arguments: int, words: int) -> int:
     return result
 
 
+def record_calls(words: Any, held: list[Any]) -> None:
+    """Record the kernels that this thread calls from now on; `held` will hold what they are given."""
+    start = words.ctypes.data
+    _recorder[:5] = threading.get_ident(), 0, start, start + words.nbytes, id(held)
+
+
+def recorded_calls() -> tuple[int, int]:
+    """Stop. Returns how many calls there were, 0 if some are missing, and the address behind the last."""
+    _recorder[_THREAD // 8] = 0
+    made, after, end = map(int, _recorder[1:4])
+    return made if after <= end else 0, after
+
+
 def miss() -> None:
     """A kernel is called another way: what this thread records is not all."""
-    if RECORDER[0] == threading.get_ident():
-        RECORDER[1] = RECORDER[2] + 1
+    if _recorder[_THREAD // 8] == threading.get_ident():
+        _recorder[_NEXT // 8] = _recorder[_END // 8] + 1
 
 
 unpack: Any = None
@@ -306,7 +320,7 @@ def entry(compiled: Any, arguments: Sequence[Any], when: int, otherwise: Callabl
         else:
             rows.append((id(type(a)), _SCALARS[type(a)], id(True), 0, 0))
     length = sum(5 + 2 * a.ndim if type(a) is np.ndarray else 1 for a in arguments)
-    head = (id(otherwise), _stub(compiled), when, len(rows), length, RECORDER.ctypes.data)
+    head = (id(otherwise), _stub(compiled), when, len(rows), length, _recorder.ctypes.data)
     table = np.array([*head, *itertools.chain(*rows)], np.int64)
     _KEPT.append((otherwise, compiled, [a.dtype for a in arguments if type(a) is np.ndarray]))
     return built_in(compiled.fndesc.qualname, _door(cached).address, table)

@@ -18,7 +18,7 @@ import numpy as np
 from numba.core import types
 
 from pyverlet import _entry, _jit
-from pyverlet._entry import ANSWER, CALL, CALLED, RECORDER, TAKEN
+from pyverlet._entry import ANSWER, CALL, CALLED, TAKEN
 
 _ROOM = 1024
 """Words of 8 bytes for the calls of a substep; a smooth world in a cage takes 500."""
@@ -58,63 +58,60 @@ _one_at_a_time = threading.Lock()
 
 
 class Trace:
-    """The calls of one turn of a loop, and what they are good for."""
+    """The calls of one round of a loop, and what they are good for."""
 
     def __init__(self) -> None:
         self._key: Hashable = None  # what the recorded calls are good for; None: there are none
         self._held: list[Any] = []  # what they were given
-        self._number = 0
+        self._number = 0  # how many
         self._words = np.empty(0, np.int64)
+        self._where = np.zeros(2, np.int64)  # addresses: of the first call, and behind the last
 
     def __deepcopy__(self, memo: Any) -> Trace:
         return Trace()  # the calls are about the arrays of another
 
-    def turns(self, count: int, key: Callable[[], Hashable], replayed: Callable[[int], None]) -> Iterator[tuple[int, bool]]:
-        """Those of `count` turns that are left to Python, each with whether the calls before its first guard are made already.
+    def rounds(self, count: int, key: Callable[[], Hashable], replayed: Callable[[int], None]) -> Iterator[tuple[int, bool]]:
+        """Those of `count` rounds that are left to Python, each with whether the calls before its first guard are made already.
 
         Args:
-            key: asked before a turn what its calls depend on; None if they may not be recorded.
-            replayed: told how many turns have gone by without Python.
+            key: asked before a round what its calls depend on; None if they may not be recorded.
+            replayed: told how many rounds have gone by without Python.
         """
-        turn = 0
-        while turn < count:
+        done = 0
+        while done < count:
             now, begun = key(), False
             if now is not None and now == self._key:
-                done, more = divmod(self._play(count - turn), self._number)
-                turn, begun = turn + done, more > 0
-                replayed(done)
-                if turn == count:
+                rounds, more = divmod(self._play(count - done), self._number)
+                done, begun = done + rounds, more > 0
+                replayed(rounds)
+                if done == count:
                     break
             recording = now is not None and not begun and self._begin()
+            whole = False
             try:
-                yield turn, begun
+                yield done, begun
+                whole = True  # nobody has broken it off
             finally:
-                if recording and self._end() and key() == now:
+                if recording and self._end() and whole and key() == now:
                     self._key = now
-            turn += 1
+            done += 1
 
     def _begin(self) -> bool:
         """Record the kernels that this thread calls; False if another does."""
-        if not _entry.usable() or not _one_at_a_time.acquire(blocking=False):
+        if not _entry.usable():
             return False
         if not len(self._words):
-            self._words, self._table = np.empty(_ROOM, np.int64), np.zeros(2, np.int64)
-            self._play = _entry.built_in("replay", _player(), self._table)
+            self._words = np.empty(_ROOM, np.int64)
+            self._where[0] = self._words.ctypes.data
+            self._play = _entry.built_in("replay", _player(), self._where)
+        if not _one_at_a_time.acquire(blocking=False):
+            return False
         self._key, self._held = None, []
-        self._table[0] = start = self._words.ctypes.data
-        RECORDER[:4] = threading.get_ident(), start, start + self._words.nbytes, id(self._held)
+        _entry.record_calls(self._words, self._held)
         return True
 
     def _end(self) -> bool:
-        """No more; False if there was too much for the room, or calls were missed."""
-        RECORDER[0] = 0
-        self._table[1] = end = RECORDER[1]
+        """No more; False if they are not all."""
+        self._number, self._where[1] = _entry.recorded_calls()
         _one_at_a_time.release()
-        at, number, begin = 0, 0, self._table[0]
-        if end > begin + self._words.nbytes:
-            return False
-        while begin + 8 * at < end:
-            at += (CALL + 8 * int(self._words[at + TAKEN // 8])) // 8
-            number += 1
-        self._number = number
-        return number > 0
+        return self._number > 0

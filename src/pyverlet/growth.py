@@ -39,7 +39,7 @@ class Growth:
     def heed(self, risen: float) -> None:
         """What the energy has risen by in this frame, as a part of what is allowed; beyond 4 it says no more, nor a loss."""
         self._risen += (min(max(risen, -1.0), 4.0) - self._risen) / PACE_FRAMES
-        if self.pace < 1.0 or self._risen > SURPLUS_SOUGHT:
+        if self.pace < 1.0 or self._risen > SURPLUS_SOUGHT:  # else the pace stays 1
             change = min(max(1.0 - self._risen / SURPLUS_SOUGHT, -2.0), 1.0) / PACE_FRAMES
             self.pace = min(max(self.pace * math.exp(change), 1e-3), 1.0)
 

@@ -21,14 +21,14 @@ class Repeats:
     def __init__(self) -> None:
         self._trace = Trace()
 
-    def turns(
+    def substeps(
         self, world: Any, h: float, contacts: ContactSolver | None, done: Callable[[str], None]
     ) -> Iterator[tuple[int, bool]]:
         """The substeps of a frame that are left to Python, each with whether the particles have moved already."""
         plain = not (world.forces or world.links or world.obstacles or world.onlooker) and done == world.profile.mark
         if not plain or len(world) >= REPEAT_BELOW or not world.integrator.repeats:
             return ((substep, False) for substep in range(world.substeps))
-        return self._trace.turns(world.substeps, partial(_key, world, h, contacts), partial(_replayed, world, contacts))
+        return self._trace.rounds(world.substeps, partial(_key, world, h, contacts), partial(_replayed, world, contacts))
 
 
 def _key(world: Any, h: float, contacts: ContactSolver | None) -> Hashable:

@@ -129,7 +129,7 @@ class World(Measures, Queries, Doors):
             return
         watch = Watch(self._state, forces, self.links, self.boundary) if contacts and undriven(self, h, self._h_last) else None
         integrator.begin(state, forces, self.time, h, self._h_last)
-        for substep, moved in self._repeats.turns(self, h, contacts, done):
+        for substep, moved in self._repeats.substeps(self, h, contacts, done):
             if not moved:
                 for part in parts:
                     part.before(state, h)

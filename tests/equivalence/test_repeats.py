@@ -6,6 +6,7 @@ import copy
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -181,6 +182,20 @@ def test_worlds_of_several_python_threads_record_their_own_calls() -> None:
     for w, other in zip(worlds, alone, strict=True):
         other.run(seconds=4)
         assert told(w) == told(other)
+
+
+def test_a_substep_that_was_broken_off_is_not_replayed(both: Any) -> None:
+    # Ctrl-C before the walls: a substep without them must not be what the next frames are made of.
+    def interrupt(w: pv.World, frame: int) -> None:
+        if frame == 5:
+            w.gravity = (0, -5)
+            room = w.boundary
+            room.confine = mock.Mock(side_effect=KeyboardInterrupt)  # type: ignore[method-assign]
+            with pytest.raises(KeyboardInterrupt):
+                w.step(1 / 60)
+            del room.confine
+
+    assert both(lambda: pour(boundary=ROOMS["cage"]()), 60, interrupt) > 0
 
 
 def test_a_world_that_turns_not_a_number_says_who_and_where() -> None:
