@@ -29,6 +29,10 @@ class Boundary(ABC):
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         """Bounce or hold every circle that reaches beyond a wall. `lag`: seconds the velocity is behind the position."""
 
+    def held(self, state: Slots, h: float, lag: float, rest_speed: float) -> tuple[Any, ...] | None:
+        """x, y, radius, h, lag and rest_speed as `kernels.cage.hold` takes them, if `confine` is but that."""
+        return None
+
     def repeats(self) -> tuple[Any, ...] | None:
         """What `confine` depends on beside its arguments, if it is but calls of kernels; None: it may be anything."""
         return None
@@ -107,14 +111,18 @@ class Circle(_Walls):
     def repeats(self) -> tuple[Any, ...] | None:
         return (self, *self.center, self.radius, self.restitution, self.friction) if type(self) is Circle else None
 
+    def held(self, state: Slots, h: float, lag: float, rest_speed: float) -> tuple[Any, ...] | None:
+        if type(self) is Circle and self.restitution == 0.0 == self.friction and state.smooth:
+            shape, (h, lag, _, _, rest_speed) = self._rounded((*self.center, self.radius), state, h, lag, rest_speed)
+            return (*shape, h, lag, rest_speed)
+        return None
+
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
-        shape: Sequence[float] = (*self.center, self.radius)
-        if self.restitution == 0.0 == self.friction and state.smooth:
-            shape, (h, lag, _, _, rest_speed) = self._rounded(shape, state, h, lag, rest_speed)
+        if numbers := self.held(state, h, lag, rest_speed):
             bodies = (state.position, state.velocity, state.acceleration, state.radius, state.inverse_mass)
-            cage.hold(*shape, *bodies, state.resting, state.hits, h, lag, rest_speed)
+            cage.hold(*numbers[:3], *bodies, state.resting, state.hits, *numbers[3:])
         else:
-            self._confine(bounds.circle, shape, state, h, lag, rest_speed)
+            self._confine(bounds.circle, (*self.center, self.radius), state, h, lag, rest_speed)
 
     def extent(self) -> Extent:
         (x, y), r = self.center, self.radius

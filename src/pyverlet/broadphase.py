@@ -5,14 +5,25 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet import checks
 from pyverlet._lanes import LANES
-from pyverlet.constants import REBUILD_PAIRS, SAMPLE, SKIN, SKIN_HOLD, SKIN_LEAST, SKIN_MOST, SKIN_STEP, UNSORTED, WORTH_LOOKING
+from pyverlet.constants import (
+    FUSED_FROM,
+    REBUILD_PAIRS,
+    SAMPLE,
+    SKIN,
+    SKIN_HOLD,
+    SKIN_LEAST,
+    SKIN_MOST,
+    SKIN_STEP,
+    UNSORTED,
+    WORTH_LOOKING,
+)
 from pyverlet.grids import Grids
 from pyverlet.kernels import pairs as kernels
 from pyverlet.moves import strayed
@@ -87,6 +98,17 @@ def rows_of(first: Array, count: Array, pair_i: Array, pair_j: Array) -> Array:
     return np.concatenate([np.empty((0, 2), np.uint32), *rows]).astype(np.int64)
 
 
+class Strips(NamedTuple):
+    """Slots in the order of the cells: those of strip s from held[s] to held[s + 1].
+
+    The list is good as long as nobody is farther than `allowed`, m, from where `checked` (n, 2) says.
+    """
+
+    held: Array
+    checked: Array
+    allowed: float
+
+
 class BroadPhase(ABC):
     """Keeps `list` good for the current positions."""
 
@@ -120,6 +142,13 @@ class BroadPhase(ABC):
 
     def aged(self, substeps: int) -> None:
         """So many have gone by in which `update` would have done nothing."""
+
+    def strips(self) -> Strips | None:
+        """Where the particles of each strip of the list stand; None if they stand anywhere."""
+        return None
+
+    def spare_look(self) -> None:
+        """The next `update` need not look: whoever moved the particles has found that the list is still good."""
 
     def release(self) -> None:
         """Nobody needs the pairs themselves until the list is made anew: their memory may go."""
@@ -204,11 +233,14 @@ class _SortedCells(BroadPhase):
         self._allowed = -1.0  # distance anyone may move from `_checked` before we look closer, m; negative: rebuild now
         self._mean_radius = 0.0  # m; 0: not known. Its last bit depends on the order of the slots, so it is saved, too
         self.built = self._checked = np.empty((0, 2), dtype)
+        self._held = np.zeros(1, np.int64)  # circles in all strips before each
+        self._spared = False  # the next look at who has moved
 
     def update(self, state: Slots) -> None:
         self._age += 1
         if self._allowed >= 0:
-            if self._still_good(state):
+            spared, self._spared = self._spared, False
+            if spared or self._still_good(state):
                 return
             if self._adapts:
                 self._adapt()
@@ -222,9 +254,18 @@ class _SortedCells(BroadPhase):
     def aged(self, substeps: int) -> None:
         self._age += substeps
 
+    def strips(self) -> Strips | None:
+        if self._allowed < 0 or self._grids.falls or len(self._grids.levels.base) > 1:
+            return None
+        return Strips(self._held, self._checked, self._allowed)
+
+    def spare_look(self) -> None:
+        self._spared = True
+
     def forget(self) -> None:
         self._allowed = -1.0
         self._mean_radius = 0.0
+        self._spared = False
 
     def release(self) -> None:
         self.list.count.fill(0)
@@ -277,7 +318,8 @@ class _SortedCells(BroadPhase):
         skin = self.skin_diameters * 2.0 * self._mean_radius
         self._half_skin = 0.5 * skin
         self._grids = Grids(state.position, state.radius, skin)
-        if self._grids.falls > UNSORTED * len(state):
+        # Strip by strip all slots are gone through, and those of a strip must stand together.
+        if self._grids.falls > (UNSORTED * len(state) if len(state) < FUSED_FROM else 0):
             state.reorder(self._grids.order)
             self._grids.renumber()
         self._fill(state, state.real(skin))
@@ -290,6 +332,7 @@ class _SortedCells(BroadPhase):
     def _fill(self, state: Slots, skin: Any) -> None:
         pairs, cells = self.list, self._grids
         rows, held = cells.strips()
+        self._held = held
         picky = len(state.category) > 0 or not state.inverse_mass.all()
         pairs.set_strips(len(rows) - 1)
         if len(pairs.pair_i) != self._room * len(state):

@@ -133,10 +133,16 @@ class ContactSolver:
 
     def repeats(self, state: Slots) -> tuple[Any, ...] | None:
         """What a substep's contacts depend on beside h, if they are but calls of kernels; None: there is more to them."""
-        alone = self._events is None and self._sleep is None and state.size is state.radius
-        if not (alone and self._packed and self._packs.fits(state) and self._slides(state)):
+        if not (self._alone(state) and self._packed and self._packs.fits(state)):
             return None
         return self.broad_phase.lasts()
+
+    def packs(self, state: Slots) -> Packs | None:
+        """The packs of now, if a substep's contacts are but `project` and `still` of these; None: there is more to them."""
+        return self._pack(state) if self._alone(state) else None
+
+    def _alone(self, state: Slots) -> bool:
+        return self._events is None and self._sleep is None and state.size is state.radius and self._slides(state)
 
     def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
         """Move overlapping circles apart, let impacts bounce, note who touches, and let those grip each other."""

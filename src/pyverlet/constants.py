@@ -54,7 +54,7 @@ BLOCK_ROWS: Final = 2
 GRID_SPREAD: Final = 4.0
 """Standard deviations about the mean that the grid covers when a few outliers would stretch it; those share its rim cells."""
 
-STRIPS: Final = 1024
+STRIPS: Final = 4096
 """Strips of grid rows a large world is cut into at most: thin ones stay in the cache while their colours are gone through.
 Fixed, never derived from the number of threads, so that any number gives the same bits."""
 
@@ -72,6 +72,10 @@ while the list lasts. Among falling circles these others are most, in a settled 
 SERIAL_BELOW: Final = 32768
 """Worlds with fewer particles run the simple loops on one thread: over 32,768 of them that takes 22 us, 15 on two threads, and
 each meeting of the threads, 1.4 us at best, waits for the slowest when the machine is busy."""
+
+FUSED_FROM: Final = 150_000
+"""Circles from which on a substep is done strip by strip rather than stage by stage (`kernels.fused`): fewer fit into the caches
+of a processor, and there it gains nothing."""
 
 ONE_THREAD_BELOW: Final = 2048
 """Worlds with fewer particles run on one thread altogether: at 2,000 a second one gained a tenth, and only on a quiet machine."""

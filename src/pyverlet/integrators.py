@@ -48,6 +48,7 @@ class Integrator(ABC):
         drop: from rest, under a constant acceleration a, a step moves a particle by drop * a h^2.
         repeats: whether every step of a frame is the same calls of kernels, if no force is but gravity. A class with a `step` of
             its own says so anew.
+        leaps: whether it then is v += h a, x += h v, and no more. The same.
     """
 
     order: ClassVar[int]
@@ -55,9 +56,11 @@ class Integrator(ABC):
     velocity_lag: ClassVar[float] = 0.0
     drop: ClassVar[float] = 0.5
     repeats: ClassVar[bool] = False
+    leaps: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
-        cls.repeats = vars(cls).get("repeats", "step" not in vars(cls) and cls.repeats)
+        for claim in ("repeats", "leaps"):
+            setattr(cls, claim, vars(cls).get(claim, "step" not in vars(cls) and getattr(cls, claim)))
 
     def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
         """Before the substeps of a frame. `h_last`: the substep of the frame before, None after a restart."""
@@ -120,7 +123,7 @@ class SemiImplicitEuler(Integrator):
     order = 1
     symplectic = True
     drop = 1.0
-    repeats = True
+    repeats = leaps = True
 
     def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
         forces.kick_drift(state, t, h)
@@ -138,7 +141,7 @@ class _Stormer(Integrator):
     symplectic = True
     drop = 1.0
     velocity_lag = 0.5
-    repeats = True
+    repeats = leaps = True
 
     def __init__(self, *, naive_start: bool = False) -> None:
         self.naive_start = naive_start

@@ -21,8 +21,8 @@ class Packs:
     """The pairs of one list, packed each time the list is made anew.
 
     `lane_i`, `lane_j` slots, those of strip s from begin[s] to begin[s] + lanes[s], the first apart[s] unlikely to touch soon;
-    `gap` (2, room) from i to j when the list was made, m; `reach`, `share` one for each lane, or (LANES,) if they are the same
-    for all; `normal` (2, room) of touching pairs.
+    `gap` (2, room) from i to j when the list was made, m; `moved` (n, 2) how far circles have moved since; `reach`, `share` one
+    for each lane, or (LANES,) if they are the same for all; `normal` (2, room) of touching pairs.
     """
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
@@ -31,12 +31,13 @@ class Packs:
         self.lanes = self.apart = np.zeros(0, np.int64)
         self._make_room(0)
         self._cut = np.zeros((2, 2), np.int64)
-        self.origin = self._moved = np.empty((0, 2), dtype)
+        self.origin = self.moved = np.empty((0, 2), dtype)
         self._spare = COLOURS * LANES  # lanes of a strip beyond its pairs: twice as many as any needed in the last list
         self._size: Array | None = None
         self._varied = 0
         self._deeps = np.zeros(0, np.int64)  # packs of each strip that overlap deeply
         self._fresh = np.ones(1, np.uint8)  # 1: they are to be noted, once a frame; a kernel says when it has
+        self._marked = False  # whether `resting` has been set by `kernels.fused`
 
     def _make_room(self, lanes: int) -> None:
         self.lane_i, self.lane_j = np.empty(lanes, np.uint32), np.empty(lanes, np.uint32)
@@ -65,7 +66,7 @@ class Packs:
         self._spare = 2 * max(int((self.lanes - pairs.count).max(initial=0)), LANES)
         self._cut = np.empty((2, 0), np.int64)
         self.origin = origin
-        self._moved = np.empty_like(origin)
+        self.moved = np.empty_like(origin)
         self._size = None
         self._deeps, self._fresh[0] = np.zeros(len(pairs.count), np.int64), 1
 
@@ -110,12 +111,24 @@ class Packs:
         where = (self._parts(), self.begin, self.lanes, self.apart, self.lane_i, self.lane_j, self.gap)
         settings = (self.reach, self.share, self._varied, *state.reals(fed / PUSHED / h, LARGEST_PUSH))
         notes = (self.normal, self._depths, self._deep, self._deeps, self._fresh)
-        packs.project(state.position, state.velocity, self.origin, self._moved, *where, *settings, *notes)
+        self._marked = False
+        packs.project(state.position, state.velocity, self.origin, self.moved, *where, *settings, *notes)
 
     def still(self, state: Slots) -> None:
         """Take from touching circles the velocity that projection has put in."""
         where = (self._cut, self.begin, self.lanes, self.apart, self.lane_i, self.lane_j)
         packs.still(state.velocity, *where, self.share, self._varied, self.normal)
+
+    def for_fused(self, state: Slots, *, marks: bool) -> tuple[tuple[Any, ...], bool]:
+        """The pairs as `kernels.fused` takes them, up to `deeps`, and whether it is to note the deep ones.
+
+        marks: it marks who rests, too.
+        """
+        if self._size is not state.size:
+            self._share_out(state)
+        looks, self._fresh[0], self._marked = bool(self._fresh[0]), 0, marks
+        where = (self.begin, self.lanes, self.apart, self.lane_i, self.lane_j, self.gap)
+        return (*where, self.reach, self.share, self._varied, self._deep, self._deeps), looks
 
     # ---- friction ------------------------------------------------------------------------------------------------------
 
@@ -137,13 +150,13 @@ class Packs:
         """Answer what touching pairs have slipped."""
         state.note_turn(h)
         around = (state.position, state.velocity, state.spin, state.turn, state.lift, self._own(state))
-        before = (self._moved, np.empty_like(state.spin))
+        before = (self.moved, np.empty_like(state.spin))
         real = state.real
         grips.grip(*around, *before, *self._rubbing(state), real(h), real(mu), real(leaning), spent)
 
     def rub(self, state: Slots, h: float, mu: float, spent: Array) -> None:
         """Stop the slip and the approach of touching pairs, and note what they have slipped."""
-        around = (state.start, self._moved, state.position, state.velocity, state.spin, state.turn, self._own(state))
+        around = (state.start, self.moved, state.position, state.velocity, state.spin, state.turn, self._own(state))
         grips.rub(*around, *self._rubbing(state), state.real(h), state.real(mu), spent)
 
     def _own(self, state: Slots) -> Array:
@@ -161,4 +174,6 @@ class Packs:
     def mark_resting(self, state: Slots) -> None:
         """Set `state.resting` for particles that touch another."""
         self._fresh[0] = 1
+        if self._marked:
+            return
         packs.mark_touching(self._parts(), self.begin, self.lanes, self.lane_i, self.lane_j, self.normal, state.resting)

@@ -15,7 +15,7 @@ from pyverlet import _jit
 from pyverlet.bounds import Boundary, Box, Circle, Open
 from pyverlet.broadphase import BruteForce, Fast
 from pyverlet.collisions import Collisions
-from pyverlet.constants import ONE_THREAD_BELOW, SERIAL_BELOW, UNEVEN
+from pyverlet.constants import FUSED_FROM, ONE_THREAD_BELOW, SERIAL_BELOW, UNEVEN
 from pyverlet.forces import Conservative, Drag
 from pyverlet.group import Group
 from pyverlet.links import Angle, Area, Pin, Spring, Stick
@@ -45,6 +45,8 @@ def rehearse(world: World) -> None:
     if world.obstacles:
         small.obstacles.append(Segment((0, 0), (1, 0)))
     _use(small)
+    if len(world) >= FUSED_FROM:
+        _fuse(world)
     if len(world) and type(world.boundary) not in _ROOMS:  # one circle in the world's own room, which has kernels of its own
         alone = World(boundary=world.boundary, collisions=None, substeps=1, dtype=world.dtype)
         alone.add(position=world.position[0], radius=world.radius[0])
@@ -52,6 +54,15 @@ def rehearse(world: World) -> None:
     _forces(world)
     if world._sleep:
         _sleep(world.dtype)
+
+
+def _fuse(world: World) -> None:
+    """A frame of equal circles in a cage, of which none touches another, so many that their substeps are fused."""
+    side = int(np.ceil(np.sqrt(FUSED_FROM)))
+    small = World(boundary=Circle(radius=2.0 * side), substeps=1, dtype=world.dtype, threads=world.threads)
+    row, column = np.divmod(np.arange(side * side), side)
+    small.add(position=2.0 * np.column_stack((column, row)) - side, radius=0.5)
+    small.step(1e-3)
 
 
 def _forces(world: World) -> None:

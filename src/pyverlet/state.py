@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.kernels import motion
+from pyverlet.unchanged import Unchanged
 
 Array = NDArray[Any]
 
@@ -182,6 +183,7 @@ class Slots:
 
     def _resize(self, count: int) -> None:
         """Room for `count` particles: those of `_kept`, as they stood, and behind them the new ones."""
+        self._given_back = Unchanged()
         order = self._kept.pop("particle", np.zeros(0, np.int32))
         self.particle = np.concatenate((order, np.arange(len(order), count, dtype=np.int32)))
         for name, (dtype, value) in _REMEMBERED.items():
@@ -240,10 +242,9 @@ class Slots:
         if len(state) != len(self):
             self._keep(slice(None))
             self._resize(len(state))
-        motion.take_motion(
-            self.position, self.velocity, self.acceleration, self.spin,
-            state.position, state.velocity, state.acceleration, state.spin, self.particle,
-        )  # fmt: skip
+        given = (state.position, state.velocity, state.acceleration, state.spin)
+        if not self._given_back.recall(given):  # a user who has changed nothing need not wait for it to be copied again
+            motion.take_motion(self.position, self.velocity, self.acceleration, self.spin, *given, self.particle)
         # What seldom changes is compared in the user's order, where neighbours in memory need no index.
         now = (state.radius, state.mass, state.restitution, state.friction, state.category, state.mask)
         if self._grows or self.size is not self.radius or motion.any_differs(*(*self._given.values(), *now)):
@@ -322,10 +323,9 @@ class Slots:
 
     def scatter(self, state: State) -> None:
         """Copy what a frame changes back to the user's arrays."""
-        motion.put_motion(
-            self.position, self.velocity, self.acceleration, self.spin,
-            state.position, state.velocity, state.acceleration, state.spin, self.particle,
-        )  # fmt: skip
+        given = (state.position, state.velocity, state.acceleration, state.spin)
+        motion.put_motion(self.position, self.velocity, self.acceleration, self.spin, *given, self.particle)
+        self._given_back.remember(given)
         self._grows |= self.size is not self.radius  # some may have been found on top of others since the gathering
         if self._grows:
             state.grown[self.particle] = self.grown

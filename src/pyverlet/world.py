@@ -17,6 +17,7 @@ from pyverlet.doors import Doors
 from pyverlet.errors import InputError, NonFiniteError
 from pyverlet.events import Events
 from pyverlet.forces import Force, ForceSum
+from pyverlet.fused import Fused
 from pyverlet.integrators import Integrator, PositionVerlet
 from pyverlet.kernels import motion
 from pyverlet.ledger import Bookkeeper
@@ -93,6 +94,7 @@ class World(Measures, Queries, Doors):
         self.profile = Profile()
         self._books = Bookkeeper() if ledger else None
         self._repeats = Repeats()
+        self._fused = Fused()
         self.onlooker: Callable[[Moment], None] | None = None
         """Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins."""
 
@@ -112,17 +114,16 @@ class World(Measures, Queries, Doors):
         self.profile.begin()
         books = self._books and self._open_books(h)
         self._frame(h, books or self.profile.mark)
-        if self._first_non_finite() >= 0:
-            self._explain_non_finite(h)
+        self._refuse_non_finite(h)
         self._accept(dt, h, books)
         self.profile.end()
 
     def _frame(self, h: float, done: Callable[[str], None]) -> None:
         """The table of contents of the engine. `done` is told the name of each stage as it ends."""
-        state, forces, integrator = self._slots, self._force_sum, self.integrator
+        state, forces, integrator, fused = self._slots, self._force_sum, self.integrator, self._fused.begin()
         contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course or None
-        parts: list[Any] = [part for part in (contacts, links, course) if part]
         lag, state.drop = integrator.velocity_lag * h, integrator.drop
+        parts: list[Any] = [part for part in (contacts, links, course) if part]
         self._gather()
         done("gather")
         if self._sleep and self._sleep.all_asleep(state):
@@ -130,7 +131,8 @@ class World(Measures, Queries, Doors):
         watch = Watch(self._state, forces, self.links, self.boundary) if contacts and undriven(self, h, self._h_last) else None
         integrator.begin(state, forces, self.time, h, self._h_last)
         for substep, moved in self._repeats.substeps(self, h, contacts, done):
-            if not moved:
+            self._show(substep, h, lag)
+            if not (moved or fused.leapt):
                 for part in parts:
                     part.before(state, h)
                 integrator.step(state, forces, self.time + substep * h, h)
@@ -138,6 +140,9 @@ class World(Measures, Queries, Doors):
             if contacts:
                 contacts.find(state, lag)
                 done("broad phase")
+                if done == self.profile.mark and fused.substep(self, contacts, h, lag, last=substep + 1 == self.substeps):
+                    done("fused")
+                    continue
                 contacts.project(state, h, lag, forces.strongest)
                 done("contacts")
             if links:
@@ -154,9 +159,7 @@ class World(Measures, Queries, Doors):
             if links:
                 links.after(state)
                 done("links")
-            self._show(substep + 1, h, lag)
-        self._finish(contacts, watch, h)
-        done("finish")
+        self._finish(contacts, watch, h, done)
 
     def run(self, *, seconds: float, dt: float = 1 / 60) -> None:
         """Advance by as many frames of dt as come nearest to `seconds`."""
@@ -190,13 +193,14 @@ class World(Measures, Queries, Doors):
             if len(self) > 1:
                 self._contacts.fit(self._slots)
 
-    def _finish(self, contacts: ContactSolver | None, watch: Watch | None, h: float) -> None:
+    def _finish(self, contacts: ContactSolver | None, watch: Watch | None, h: float, done: Callable[[str], None]) -> None:
         """The substeps are done: who rests, the velocities of now, and no more energy than there may be."""
         if contacts:
             contacts.end(self._slots, self.substeps * h, self.gravity)
         self.integrator.end(self._slots, h)
         if contacts and watch:
             contacts.growth.heed(watch.close(self._slots, contacts.listed()))
+        done("finish")
 
     def _accept(self, dt: float, h: float, books: Any) -> None:
         """The frame has gone well: what it made of the state is the truth now."""
@@ -215,7 +219,7 @@ class World(Measures, Queries, Doors):
         self._h_last = h
 
     def _show(self, done: int, h: float, lag: float) -> None:
-        if self.onlooker and done < self.substeps:
+        if self.onlooker and done:
             self.onlooker(Moment(self._slots, self.time + done * h, lag))
             self.profile.mark("pictures")
 
@@ -238,8 +242,10 @@ class World(Measures, Queries, Doors):
                 return int(self._slots.particle[slot])
         return -1
 
-    def _explain_non_finite(self, h: float) -> None:
-        """Run the frame again from the last good state, looking after every stage: normal frames pay nothing for it."""
+    def _refuse_non_finite(self, h: float) -> None:
+        """Run a bad frame again from the last good state, looking after every stage: normal frames pay nothing for it."""
+        if self._first_non_finite() < 0:
+            return
 
         def look(stage: str) -> None:
             particle = self._first_non_finite()

@@ -16,7 +16,7 @@ ROOT = Path(pyverlet.__file__).parent
 # From the ground up. A module may import from its own layer only within its own package (the first part of its name).
 LAYERS = (
     {"_loading", "errors", "constants", "_entry", "_jit", "_lanes", "_native", "_turns", "_trace", "checks", "progress"},
-    {"state", "group", "moves", "kernels"},
+    {"unchanged", "state", "group", "moves", "kernels"},
     {
         "integrators",
         "forces",
@@ -45,6 +45,7 @@ LAYERS = (
         "queries",
         "moments",
         "repeats",
+        "fused",
         "saved",
         "doors",
         "profile",
@@ -63,7 +64,8 @@ BESIDE = {
     "checks": {"errors"},
     "_jit": {"_entry", "_turns"},
     "_trace": {"_entry", "_jit"},
-    "state": {"kernels"},
+    "unchanged": {"kernels"},
+    "state": {"kernels", "unchanged"},
     "group": {"state"},
     "moves": {"state", "kernels"},
     "broadphase": {"grids"},
@@ -79,7 +81,7 @@ BESIDE = {
     "naive": {"bounds"},
     "passivity": {"bounds", "forces", "links"},
     "links": {"broadphase"},
-    "world": {"profile", "doors", "measures", "moments", "actors", "queries", "repeats", "saved", "sleep"},
+    "world": {"fused", "profile", "doors", "measures", "moments", "actors", "queries", "repeats", "saved", "sleep"},
     "saved": {"actors"},
     "measures": {"particles"},
     "actors": {"world"},

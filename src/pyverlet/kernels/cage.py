@@ -108,14 +108,15 @@ def _hold(which, x0, y0, size, position, velocity, acceleration, radius, hits, h
         put(velocity, which, k, vx + away * nx, vy + away * ny)
 
 
-@parallel_kernel
-def hold(x0, y0, size, position, velocity, acceleration, radius, inverse_mass, resting, hits, h, lag, rest_speed):
-    """All circles stay inside the cage of radius `size` about (x0, y0); `resting` is 1 for those that were beyond."""
-    count = radius.shape[0]
-    for chunk in prange((count + _CHUNK - 1) // _CHUNK):
-        first, stop = chunk * _CHUNK, min((chunk + 1) * _CHUNK, count)
+@kernel
+def hold_some(
+    x0, y0, size, position, velocity, acceleration, radius, inverse_mass, resting, hits, h, lag, rest_speed, begin, end
+):
+    """What `hold` does, for the circles from `begin` up to `end`."""
+    found = np.empty(_CHUNK + 2 * LANES, np.uint32)
+    for first in range(begin, end, _CHUNK):
+        stop = min(first + _CHUNK, end)
         resting[first:stop] = 0
-        found = np.empty(_CHUNK + 2 * LANES, np.uint32)
         number = _find(x0, y0, size, position, radius, inverse_mass, first, stop, found)
         if number > 0:
             for k in range(number):
@@ -123,3 +124,12 @@ def hold(x0, y0, size, position, velocity, acceleration, radius, inverse_mass, r
             lanes = (number + LANES - 1) // LANES * LANES
             found[number:lanes] = found[number - 1]
             _hold(found[:lanes], x0, y0, size, position, velocity, acceleration, radius, hits, h, lag, rest_speed)
+
+
+@parallel_kernel
+def hold(x0, y0, size, position, velocity, acceleration, radius, inverse_mass, resting, hits, h, lag, rest_speed):
+    """All circles stay inside the cage of radius `size` about (x0, y0); `resting` is 1 for those that were beyond."""
+    count = radius.shape[0]
+    for chunk in prange((count + _CHUNK - 1) // _CHUNK):
+        bodies = (position, velocity, acceleration, radius, inverse_mass, resting, hits)
+        hold_some(x0, y0, size, *bodies, h, lag, rest_speed, chunk * _CHUNK, min((chunk + 1) * _CHUNK, count))

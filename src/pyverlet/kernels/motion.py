@@ -26,7 +26,7 @@ def advance(out, base, slope, h):
 
 
 @kernel
-def _kick_drift(position, velocity, acceleration, h):
+def kick_drift(position, velocity, acceleration, h):
     """v += h a, then x += h v: both moves in one pass over the memory."""
     x, v, a = position.reshape(-1), velocity.reshape(-1), acceleration.reshape(-1)
     for k in range(x.shape[0]):
@@ -82,12 +82,13 @@ def newton_kick_drift(position, velocity, acceleration, force, inverse_mass, gx,
         if ahead != 0:
             advance(velocity[a:b], velocity[a:b], acceleration[a:b], -ahead)
         largest = max(largest, _newton(acceleration[a:b], force[a:b], inverse_mass[a:b], gx, gy))
-        _kick_drift(position[a:b], velocity[a:b], acceleration[a:b], h)
+        kick_drift(position[a:b], velocity[a:b], acceleration[a:b], h)
     return np.sqrt(largest)
 
 
 @kernel
-def _strayed(x, start, first, stop, square):
+def any_strayed(x, start, first, stop, square):
+    """What `strayed` does, of the particles from first up to stop; x, start: (2 n,), rows one after the other."""
     found = False
     for k in range(first, stop):
         i = np.uint64(2 * k)
@@ -106,7 +107,7 @@ def strayed(position, reference, square):
     found = 0
     for block in prange((position.shape[0] + _BLOCK - 1) // _BLOCK):
         first = block * _BLOCK
-        found += int(_strayed(x, start, first, min(first + _BLOCK, position.shape[0]), square))
+        found += int(any_strayed(x, start, first, min(first + _BLOCK, position.shape[0]), square))
     return found > 0
 
 

@@ -152,7 +152,7 @@ def share_out(begin, lanes, lane_i, lane_j, radius, inverse_mass, reach, share):
 
 
 @kernel
-def _project_strip(
+def project_strip(
     moved, apart, lane_i, lane_j, gap_x, gap_y, reach, share, varied, most, normal_x, normal_y, depths, deep, looks
 ):  # fmt: skip
     """Returns how many packs with a pair that overlaps by more than DEEP it has noted in `deep`."""
@@ -191,7 +191,7 @@ def _project_strip(
 
 
 @kernel
-def _refine_strip(moved, lane_i, lane_j, gap_x, gap_y, reach, share, varied, deep, count):
+def refine_strip(moved, lane_i, lane_j, gap_x, gap_y, reach, share, varied, deep, count):
     """Part again, there and back, the packs in deep[:count] that still overlap by more than DEEP; returns how many those are.
 
     Beyond LARGEST_PUSH it is no weight but a mistake, and has been pushed enough.
@@ -235,7 +235,7 @@ def set_out(position, origin, moved):
 
 
 @kernel
-def _arrive(position, velocity, origin, moved, feed):
+def arrive(position, velocity, origin, moved, feed):
     """Add to positions what has been added to `moved`, and feed the velocities."""
     x, v, start, way = position.reshape(-1), velocity.reshape(-1), origin.reshape(-1), moved.reshape(-1)
     for k in range(x.shape[0]):
@@ -269,7 +269,7 @@ def project(
                 a, b = begin[s], begin[s] + lanes[s]
                 pairs = (lane_i[a:b], lane_j[a:b], gap[0, a:b], gap[1, a:b], reach[a * varied :], share[a * varied :], varied)
                 noted = (most, normal[0, a:b], normal[1, a:b], depths[a:b], deep[a // LANES : b // LANES], looks)
-                count = _project_strip(moved, apart[s], *pairs, *noted)
+                count = project_strip(moved, apart[s], *pairs, *noted)
                 if looks:
                     deeps[s] = count
     for parity in range(2):
@@ -279,15 +279,16 @@ def project(
                 if deeps[s] > 0:
                     a, b = begin[s], begin[s] + lanes[s]
                     pairs = (lane_i[a:b], lane_j[a:b], gap[0, a:b], gap[1, a:b], reach[a * varied :], share[a * varied :], varied)
-                    deeps[s] = _refine_strip(moved, *pairs, deep[a // LANES : b // LANES], deeps[s])
+                    deeps[s] = refine_strip(moved, *pairs, deep[a // LANES : b // LANES], deeps[s])
     for c in prange(chunks):
         a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
-        _arrive(position[a:b], velocity[a:b], origin[a:b], moved[a:b], feed)
+        arrive(position[a:b], velocity[a:b], origin[a:b], moved[a:b], feed)
     fresh[0] = 0
 
 
 @kernel
-def _still_strip(velocity, apart, lane_i, lane_j, share, varied, one, normal_x, normal_y):
+def still_strip(velocity, apart, lane_i, lane_j, share, varied, one, normal_x, normal_y):
+    """What `still` does, of one strip."""
     zero, whole = spread(one - one), spread(one)
     for k in range(0, lane_i.shape[0], LANES):
         nx, ny, part = load(normal_x, k), load(normal_y, k), load(share, k * varied)
@@ -309,7 +310,7 @@ def still(velocity, cut, begin, lanes, apart, lane_i, lane_j, share, varied, nor
         for part in prange(cut.shape[1] - 1):
             for half in range(cut[parity, part], cut[parity, part + 1]):
                 a, b = begin[2 * half + parity], begin[2 * half + parity] + lanes[2 * half + parity]
-                _still_strip(
+                still_strip(
                     velocity,
                     apart[2 * half + parity],
                     lane_i[a:b],
@@ -323,7 +324,8 @@ def still(velocity, cut, begin, lanes, apart, lane_i, lane_j, share, varied, nor
 
 
 @kernel
-def _mark_strip(flag, lane_i, lane_j, normal_x, normal_y):
+def mark_strip(flag, lane_i, lane_j, normal_x, normal_y):
+    """What `mark_touching` does, of one strip."""
     zero = spread(normal_x.dtype.type(0))
     for k in range(0, lane_i.shape[0], LANES):
         nx, ny = load(normal_x, k), load(normal_y, k)
@@ -341,4 +343,4 @@ def mark_touching(cut, begin, lanes, lane_i, lane_j, normal, flag):
         for part in range(cut.shape[1] - 1):
             for half in range(cut[parity, part], cut[parity, part + 1]):
                 a, b = begin[2 * half + parity], begin[2 * half + parity] + lanes[2 * half + parity]
-                _mark_strip(flag, lane_i[a:b], lane_j[a:b], normal[0, a:b], normal[1, a:b])
+                mark_strip(flag, lane_i[a:b], lane_j[a:b], normal[0, a:b], normal[1, a:b])
