@@ -19,6 +19,7 @@ import numpy as np
 
 import pyverlet as pv
 from benchmarks.engines import DT, RADIUS, Engine, Pymunk, PyverletOneThread
+from pyverlet._memory import mapped
 
 SUBSTEPS = 8
 SETTLE_SECONDS = 10.0
@@ -238,12 +239,13 @@ def memory(particles: int = 200_000) -> Iterator[Row]:
     """What the engine keeps beyond the arrays a user sees."""
     pv.warm_up(pv.scenes.get("cage").world(particles=particles))  # compiled code is as large for one particle
     tracemalloc.start()
+    before = mapped()
     world = pv.scenes.get("cage").world(particles=particles)
     seen = sum(array.nbytes for _, array in world._state.arrays())
     held = []
     for _ in range(8):
         world.run(seconds=0.5)
-        held.append((tracemalloc.get_traced_memory()[0] - seen) / particles)
+        held.append((tracemalloc.get_traced_memory()[0] + mapped() - before - seen) / particles)
     tracemalloc.stop()
     most = max(held)
     yield Row(

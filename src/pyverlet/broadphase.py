@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet import checks
+from pyverlet import _memory, checks
 from pyverlet._lanes import LANES
 from pyverlet.constants import (
     FUSED_FROM,
@@ -293,7 +293,7 @@ class _SortedCells(BroadPhase):
         slack = self._grids.slack(state.position, self.built, 2.0 * self._half_skin)
         if not slack > WORTH_LOOKING * self._half_skin:
             return False
-        self._checked, self._allowed = state.position.copy(), 0.5 * slack
+        self._checked, self._allowed = _memory.copy(state.position), 0.5 * slack
         return True
 
     def _adapt(self) -> None:
@@ -323,7 +323,7 @@ class _SortedCells(BroadPhase):
             state.reorder(self._grids.order)
             self._grids.renumber()
         self._fill(state, state.real(skin))
-        self.built = self._checked = state.position.copy()
+        self.built = self._checked = _memory.copy(state.position)
         self._allowed = self._half_skin
         which = (self.list.first, self.list.count, self.list.pair_i, self.list.pair_j)
         looked, far = kernels.count_far(state.position, state.radius, *which, state.real(skin / SKIN_STEP), SAMPLE)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet import _jit
+from pyverlet import _jit, _memory
 from pyverlet._lanes import LANES
 from pyverlet.broadphase import PairList, rows_of
 from pyverlet.constants import COLOURS, FED_SMOOTH, LARGEST_PUSH, PUSHED
@@ -40,8 +40,8 @@ class Packs:
         self._marked = False  # whether `resting` has been set by `kernels.fused`
 
     def _make_room(self, lanes: int) -> None:
-        self.lane_i, self.lane_j = np.empty(lanes, np.uint32), np.empty(lanes, np.uint32)
-        self.gap, self.normal = np.empty((2, lanes), self._dtype), np.empty((2, lanes), self._dtype)
+        self.lane_i, self.lane_j = (_memory.empty(lanes, np.uint32) for _ in range(2))
+        self.gap, self.normal = (_memory.empty((2, lanes), self._dtype) for _ in range(2))
         self._deep = np.empty(lanes // LANES, np.int64)
         self._hold(0)
 
@@ -66,7 +66,7 @@ class Packs:
         self._spare = 2 * max(int((self.lanes - pairs.count).max(initial=0)), LANES)
         self._cut = np.empty((2, 0), np.int64)
         self.origin = origin
-        self.moved = np.empty_like(origin)
+        self.moved = _memory.empty(origin.shape, origin.dtype)
         self._size = None
         self._deeps, self._fresh[0] = np.zeros(len(pairs.count), np.int64), 1
 
@@ -99,7 +99,7 @@ class Packs:
         self._varied = int(any((values != values[0]).any() for values in (size, state.radius, inverse_mass)))
         self._body = np.empty((6, 0), self._dtype)
         if self._varied:
-            self.reach, self.share = (np.empty(len(self.lane_i), self._dtype) for _ in range(2))
+            self.reach, self.share = (_memory.empty(len(self.lane_i), self._dtype) for _ in range(2))
             packs.share_out(self.begin, self.lanes, self.lane_i, self.lane_j, size, inverse_mass, self.reach, self.share)
         else:
             self.reach, self.share = np.full(LANES, size[0] + size[0]), np.full(LANES, self._dtype.type(0.5))

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet import _memory
 from pyverlet.kernels import motion
 from pyverlet.unchanged import Unchanged
 
@@ -90,7 +91,7 @@ class State:
             # Doubling: adding one by one costs O(1) each on average.
             capacity = max(stop, 2 * capacity)
             for name, old in self._store.items():
-                self._store[name] = np.empty((capacity, *old.shape[1:]), old.dtype)
+                self._store[name] = _memory.empty((capacity, *old.shape[1:]), old.dtype)
                 self._store[name][:start] = old[:start]
         self._show(stop)
         for name, value in (_DEFAULTS | values).items():
@@ -191,9 +192,9 @@ class Slots:
             column[: len(order)] = self._kept.pop(name, column[: len(order)])
             setattr(self, name, column)
         for name in _ROWS:
-            setattr(self, name, np.zeros((count, 2), self.dtype))
+            setattr(self, name, _memory.zeros((count, 2), self.dtype))
         for name in (*_COLUMNS, "inverse_mass"):
-            setattr(self, name, np.zeros(count, self.dtype))
+            setattr(self, name, _memory.zeros(count, self.dtype))
         self.__dict__.pop("force", None)
         self.start = np.empty((0, 2), self.dtype)
         self.turn = self.lift = np.empty(0, self.dtype)
@@ -341,7 +342,7 @@ class Slots:
 
     def reorder(self, order: Array) -> None:
         """Put the particle of slot order[k] into slot k."""
-        spare = np.empty_like(self.position)
+        spare = _memory.empty(self.position.shape, self.dtype)
         for name in _ROWS:
             old = getattr(self, name)
             motion.take_rows(spare, old, order)
@@ -349,7 +350,7 @@ class Slots:
             spare = old
         for name in (*_COLUMNS, "inverse_mass", "particle", "resting", *_REMEMBERED, "start", "hits"):
             if len(column := getattr(self, name)):
-                setattr(self, name, column[order])
+                setattr(self, name, _memory.taken(column, order))
         if len(self.category):
             self.category, self.mask = self.category[order], self.mask[order]
         self.resize()
