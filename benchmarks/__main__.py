@@ -123,7 +123,7 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=60, help="frames measured for each engine")
     parser.add_argument("--csv", type=Path, help="write the rows to this file too")
     parser.add_argument("--plot", type=Path, help="draw the cost against the number of discs into this file")
-    parser.add_argument("--million", action="store_true", help="own: a million discs too, some minutes")
+    parser.add_argument("--million", action="store_true", help="own: a million discs too, half an hour")
     parser.add_argument("--scene", default="cage", help="page: what is shown")
     parser.add_argument("--seconds", type=float, default=12.0, help="page: how long each is watched")
     arguments = parser.parse_args()

@@ -339,14 +339,11 @@ class _SortedCells(BroadPhase):
             pairs.make_room(self._room * len(state))
         while True:
             first = held * self._room
-            # Not kept: half as much again as the list itself, which is made anew less than once a frame.
-            raw_i, raw_j = (np.empty(int(first[-1]) + LANES * len(rows), np.uint32) for _ in range(2))
-            colour = np.empty(int(first[-1]), np.uint8)
             spot, used = np.empty((3, len(state) + LANES), state.dtype), np.empty(len(state), np.int32)
             kernels.list_pairs(
                 state.position, state.radius, cells.order, cells.levels, cells.start, rows, first, skin,
                 picky, state.category, state.mask, state.inverse_mass,
-                spot, raw_i, raw_j, colour, used, pairs.pair_i, pairs.pair_j, pairs.count,
+                spot, used, pairs.pair_i, pairs.pair_j, pairs.count,
             )  # fmt: skip
             if (pairs.count <= np.diff(first)).all():
                 pairs.first[:] = first[:-1]

@@ -156,12 +156,14 @@ def _colour_strip(used, raw_i, raw_j, found, colour, begin):
 
 @kernel
 def _fill_strip(
-    order, levels, start, row0, row1, skin, picky, category, mask, inverse_mass,
-    spot, raw_i, raw_j, colour, used, pair_i, pair_j,
+    order, levels, start, row0, row1, skin, picky, category, mask, inverse_mass, spot, used, pair_i, pair_j,
 ):  # fmt: skip
     """What `list_pairs` does, for a strip of the rows row0 to row1, into its own part of the arrays."""
+    # Made anew for each strip: it stays in the cache, where scratch for all of the strips would be fetched from memory.
+    room = pair_i.shape[0]
+    raw_i, raw_j, colour = np.empty(room + LANES, np.uint32), np.empty(room + LANES, np.uint32), np.empty(room, np.uint8)
     found = _list_strip(spot, order, row0, row1, levels, start, skin, picky, category, mask, inverse_mass, raw_i, raw_j)
-    if found <= pair_i.shape[0]:
+    if found <= room:
         _forget_colours(used, row0, row1 + 1, levels, start)
         begin = np.empty(2 * COLOURS + 1, np.uint32)
         _colour_strip(used, raw_i, raw_j, found, colour, begin)
@@ -176,13 +178,13 @@ def _fill_strip(
 @parallel_kernel
 def list_pairs(
     position, radius, order, levels, start, strip_row, first, skin, picky, category, mask, inverse_mass,
-    spot, raw_i, raw_j, colour, used, pair_i, pair_j, count,
+    spot, used, pair_i, pair_j, count,
 ):  # fmt: skip
     """Fill the pair list of every strip: pair_i, pair_j[first[s] : first[s] + count[s]], slots.
 
     first has one entry more than there are strips. A strip that needs more room than up to the next reports its full count and
     lists nothing: the caller makes room and calls again, so that no pair is ever dropped. Not `picky`: everyone collides.
-    spot (3, n + LANES), raw_i, raw_j (LANES a strip more than there is room), colour, used: scratch.
+    spot (3, n + LANES), used: scratch.
     """
     for k in prange(order.shape[0]):
         i = order[k]
@@ -193,10 +195,9 @@ def list_pairs(
         for half in prange((strip_row.shape[0] - parity) // 2):
             s = 2 * half + parity
             a, b = first[s], first[s + 1]
-            c, d = a + LANES * s, b + LANES * (s + 1)
             count[s] = _fill_strip(
                 order, levels, start, strip_row[s], strip_row[s + 1], skin, picky, category, mask, inverse_mass,
-                spot, raw_i[c:d], raw_j[c:d], colour[a:b], used, pair_i[a:b], pair_j[a:b],
+                spot, used, pair_i[a:b], pair_j[a:b],
             )  # fmt: skip
 
 
