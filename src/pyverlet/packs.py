@@ -22,7 +22,7 @@ class Packs:
 
     `lane_i`, `lane_j` slots, those of strip s from begin[s] to begin[s] + lanes[s], the first apart[s] unlikely to touch soon;
     `gap` (2, room) from i to j when the list was made, m; `moved` (n, 2) how far circles have moved since; `reach`, `share` one
-    for each lane, or (LANES,) if they are the same for all; `normal` (2, room) of touching pairs.
+    for each lane, or (LANES,) if they are the same for all; `normal` (2, room) of touching pairs, if noted here.
     """
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
@@ -41,7 +41,7 @@ class Packs:
 
     def _make_room(self, lanes: int) -> None:
         self.lane_i, self.lane_j = (_memory.empty(lanes, np.uint32) for _ in range(2))
-        self.gap, self.normal = (_memory.empty((2, lanes), self._dtype) for _ in range(2))
+        self.gap, self.normal = _memory.empty((2, lanes), self._dtype), np.empty((2, 0), self._dtype)
         self._deep = np.empty(lanes // LANES, np.int64)
         self._hold(0)
 
@@ -108,6 +108,8 @@ class Packs:
         """Move overlapping circles apart and feed their velocities."""
         if self._size is not state.size:
             self._share_out(state)
+        if self.normal.shape != self.gap.shape:
+            self.normal = _memory.empty(self.gap.shape, self._dtype)
         where = (self._parts(), self.begin, self.lanes, self.apart, self.lane_i, self.lane_j, self.gap)
         settings = (self.reach, self.share, self._varied, *state.reals(fed / PUSHED / h, LARGEST_PUSH))
         notes = (self.normal, self._depths, self._deep, self._deeps, self._fresh)
