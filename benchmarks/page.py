@@ -1,7 +1,7 @@
 """How fast the live page is, and what it costs the physics: `python -m benchmarks page`.
 
 A server as `pyverlet run` starts it and a Chromium without a screen, WebGL off, both on this machine's cores. A world starts
-anew for every line and runs once unwatched and once with the page open, for the same time. A picture counts once it is drawn.
+anew and is watched for so long, then starts anew and goes the same way unwatched. A picture counts once it is drawn.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ FLAGS = [
 ]  # fmt: skip
 
 POLL_S = 0.02
+"""Between two looks at how far a world is."""
 
 OPENING_S = 2.0
 """The page gets this long to be loaded and compiled."""
