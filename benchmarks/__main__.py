@@ -126,6 +126,7 @@ def main() -> None:
     parser.add_argument("--million", action="store_true", help="own: a million discs too, half an hour")
     parser.add_argument("--scene", default="cage", help="page: what is shown")
     parser.add_argument("--seconds", type=float, default=12.0, help="page: how long each is watched")
+    parser.add_argument("--threads", type=int, help="page: that the physics may use")
     arguments = parser.parse_args()
     if arguments.table == "physics":
         print(machine())
@@ -133,7 +134,7 @@ def main() -> None:
         return
     print(machine())
     if arguments.table == "page":
-        page.main(arguments.scene, arguments.particles or [20_000, 100_000, 1_000_000], arguments.seconds)
+        page.main(arguments.scene, arguments.particles or [20_000, 100_000, 1_000_000], arguments.seconds, arguments.threads)
         return
     if arguments.table == "own":
         if not own.main(report.triad()["ns_per_element"], arguments.million):

@@ -1,7 +1,7 @@
 """How fast the live page is, and what it costs the physics: `python -m benchmarks page`.
 
 A server as `pyverlet run` starts it and a Chromium without a screen, WebGL off, both on this machine's cores. A world starts
-anew for every line and runs once unwatched and once with the page open, for the same time. A picture counts once it is drawn.
+anew and is watched for so long, then starts anew and goes the same way unwatched. A picture counts once it is drawn.
 """
 
 from __future__ import annotations
@@ -17,14 +17,20 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
+
+from benchmarks.accounts import Account, account
 
 FLAGS = [
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-3d-apis", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync", "--window-size=1000,700",
 ]  # fmt: skip
+
+POLL_S = 0.02
+"""Between two looks at how far a world is."""
 
 OPENING_S = 2.0
 """The page gets this long to be loaded and compiled."""
@@ -33,7 +39,11 @@ INPUTS = 12
 """How often gravity is turned to see when a picture says so."""
 
 COUNT_ACKS = """{
-    window.acks = [];
+    window.acks = [], window.came = [];
+    const set = Object.getOwnPropertyDescriptor(WebSocket.prototype, "onmessage").set;
+    Object.defineProperty(WebSocket.prototype, "onmessage", { set(receive) {
+        set.call(this, (event) => (window.came.push(performance.now()), receive(event)));
+    } });
     const send = WebSocket.prototype.send;
     WebSocket.prototype.send = function (text) {
         if (text.startsWith('{"type":"ack"')) window.acks.push(performance.now());
@@ -54,44 +64,65 @@ TURN_GRAVITY = """(degrees) => new Promise((told) => {
 })"""
 
 
+@dataclass(frozen=True)
+class Moment:
+    """How far a world is, and who has had the processor by then."""
+
+    wall: float
+    time: float
+    frames: int
+    physics_ms: float
+    spent: Account
+
+
 class Served:
     """A scene on the air, in a process of its own."""
 
-    def __init__(self, scene: str, particles: int) -> None:
-        command = [sys.executable, "-m", "pyverlet", "run", scene, "--particles", str(particles), "--port", "0", "--no-open"]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    def __init__(self, scene: str, particles: int, threads: int | None) -> None:
+        command = [
+            sys.executable,
+            "-m",
+            "benchmarks.served",
+            "run",
+            scene,
+            "--particles",
+            str(particles),
+            "--port",
+            "0",
+            "--no-open",
+        ]
+        command += ["--threads", str(threads)] if threads else []
+        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.address = re.findall(r"http://\S+", self._line("http://"))[0]
+
+    def _line(self, holding: str) -> str:
+        """The next line that holds this."""
         assert self.process.stdout is not None
-        found = None
-        while not found:
-            line = self.process.stdout.readline()
-            if not line:
-                raise RuntimeError("the server has not started")
-            found = re.search(r"http://\S+", line)
-        self.address = found[0]
+        for line in self.process.stdout:
+            if holding in line:
+                return line
+        raise RuntimeError("the server has ended")
 
-    def ask(self, *messages: dict[str, Any]) -> dict[str, Any]:
-        """Say this; the numbers of the newest picture."""
-        from websockets.sync.client import connect
-
-        with connect(self.address.replace("http", "ws") + "socket", max_size=None, compression=None) as socket:
-            # A small picture costs next to nothing.
-            look = {"type": "look", "part": None, "width": 16, "height": 16, "colour": "order", "dark": True, "velocity": False}
-            for message in (look, *messages):
-                socket.send(json.dumps(message))
-            while True:
-                data = socket.recv()
-                assert isinstance(data, bytes)
-                head: dict[str, Any] = json.loads(data[4 : 4 + int.from_bytes(data[:4], "little")])
-                if head["kind"] in ("frame", "picture"):
-                    status: dict[str, Any] = head["status"]
-                    return status
+    def now(self, wish: str = "") -> Moment:
+        """How far it is; "reset" has it start anew first."""
+        assert self.process.stdin is not None
+        self.process.stdin.write(f"{wish}\n")
+        self.process.stdin.flush()
+        said = json.loads(self._line('"threads"'))
+        spent = account(self.process.pid, {int(number): name for number, name in said["threads"].items()})
+        return Moment(time.perf_counter(), said["time"], said["frames"], said["physics_median_ms"], spent)
 
     def start_anew(self) -> None:
         """Reset, and wait until it is done: a million circles first end their frame."""
-        before = self.ask()["time"]
-        self.ask({"type": "reset"})
-        while before > 0.0 and self.ask()["time"] >= before:
-            time.sleep(0.05)
+        before = self.now("reset").time
+        while before > 0.0 and self.now().time >= before:
+            time.sleep(POLL_S)
+
+    def when(self, moment: float) -> Moment:
+        """As soon as the world is so far, s."""
+        while (now := self.now()).time < moment:
+            time.sleep(POLL_S)
+        return now
 
     def end(self) -> None:
         """Ctrl-C."""
@@ -155,93 +186,75 @@ class Tab:
         self._folder.cleanup()
 
 
-def processor_ms(server: int) -> dict[str, float]:
-    """Milliseconds of processor time so far of the server and, by kind, of the browser's processes. Linux only, else empty."""
-    if sys.platform != "linux":
-        return {}
-    tick = 1000.0 / os.sysconf("SC_CLK_TCK")
-    parent, spent, kinds = {}, {}, {}
-    for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            fields = (folder / "stat").read_text().rpartition(")")[2].split()
-            kinds[int(folder.name)] = (folder / "cmdline").read_text()
-        except OSError:
-            continue  # it has just ended
-        parent[int(folder.name)] = int(fields[1])
-        spent[int(folder.name)] = tick * (int(fields[11]) + int(fields[12]))
-    total: dict[str, float] = {}
-    for pid, ms in spent.items():
-        above = pid
-        while above > 1 and above != os.getpid():
-            above = parent.get(above, 0)
-        found = re.search(r"--type=([a-z]+)", kinds[pid])
-        if pid == server:
-            total["server"] = total.get("server", 0.0) + ms
-        elif above == os.getpid() and pid != above and "chrom" in kinds[pid]:
-            name = found[1] if found else "browser"
-            total[name] = total.get(name, 0.0) + ms
-    return total
-
-
-def measure(scene: str, particles: int, seconds: float) -> None:
-    """Print a few lines: unwatched and watched."""
-    served = Served(scene, particles)
+def measure(scene: str, particles: int, seconds: float, threads: int | None) -> None:
+    """Print a few lines: watched, and the same stretch of the world's time unwatched."""
+    served = Served(scene, particles, threads)
     try:
-        time.sleep(1.0)
-        print(f"{particles:>9,}  {'unwatched':<10}{passed(served, seconds)}")
         tab = Tab(served.address)
         try:
             time.sleep(OPENING_S)
-            watch(served, tab, particles, seconds)
+            began, ended, lines = watch(served, tab, seconds)
         finally:
             tab.close()
+        served.start_anew()
+        alone = (served.when(began.time), served.when(ended.time))
     finally:
         served.end()
+    print(f"{particles:>9,}  unwatched  {pace(*alone)}")
+    print(f"{particles:>9,}  watched    {pace(began, ended)}")
+    for line in lines:
+        print(f"{'':>11}{line}", flush=True)
 
 
-def passed(served: Served, seconds: float) -> str:
-    """A world starts anew and runs for so long."""
+def pace(began: Moment, ended: Moment) -> str:
+    """How fast the world went, and what became of the time of a frame."""
+    frames, wall, spent = max(ended.frames - began.frames, 1), ended.wall - began.wall, ended.spent - began.spent
+    speed = (ended.time - began.time) / wall
+    line = f"{speed:.3f} s a second, physics {ended.physics_ms:.2f} ms, a frame every {1000 * wall / frames:.2f}"
+    if not spent.ran:
+        return line
+    parts = []
+    for who in ("physics", "workers"):
+        ran, queued = spent.ran.get(who, 0.0), spent.queued.get(who, 0.0)
+        waited = f", waited {(1000 * wall - ran - queued) / frames:.2f}" if who == "physics" else ""
+        parts.append(f"{who} ran {ran / frames:.2f}, queued {queued / frames:.2f}{waited}")
+    return f"{line}\n{'':>11}ms a frame: {'; '.join(parts)}; {spent.idle / (10 * wall):.0f} % of a core idle"
+
+
+def watch(served: Served, tab: Tab, seconds: float) -> tuple[Moment, Moment, list[str]]:
+    """Start anew and watch for so long: from when to when, and what there is to say of the page."""
     served.start_anew()
     time.sleep(seconds / 4)
-    began, before = time.perf_counter(), served.ask()
-    spent = processor_ms(served.process.pid)
+    tab.evaluate("window.acks = [], window.came = []")
+    began = served.now()
     time.sleep(seconds)
-    after, ended = served.ask(), time.perf_counter()
-    server = processor_ms(served.process.pid).get("server", 0.0) - spent.get("server", 0.0)
-    return pace(before, after, ended - began) + f"   server {server / (10 * (ended - began)):.0f} % of a core"
-
-
-def pace(before: dict[str, Any], after: dict[str, Any], wall: float) -> str:
-    """How fast the world goes."""
-    frames = max(after["frames"] - before["frames"], 1)
-    speed = (after["time"] - before["time"]) / wall
-    return f"{speed:6.3f} s a second, physics {after['physics_median_ms']:7.2f} ms, a frame every {1000 * wall / frames:6.1f} ms"
-
-
-def watch(served: Served, tab: Tab, particles: int, seconds: float) -> None:
-    """The same with the page open."""
-    served.start_anew()
-    time.sleep(seconds / 4)
-    began, before = time.perf_counter(), tab.evaluate("window.pyverlet.status()")
-    spent = processor_ms(served.process.pid)
-    opened = tab.evaluate("(window.acks = [], performance.now())")
-    time.sleep(seconds)
-    closed, acks = tab.evaluate("[performance.now(), window.acks]")
-    after, ended = tab.evaluate("window.pyverlet.status()"), time.perf_counter()
-    now = processor_ms(served.process.pid)
-    gaps = [b - a for a, b in pairwise(acks)]
-    rate = 1000.0 * len(acks) / (closed - opened)  # by the page's own clock: asking it takes time too
-    slowest = min((sum(a <= ack < a + 1000.0 for ack in acks) for a in acks if a + 1000.0 <= closed), default=0)
-    worst = statistics.quantiles(gaps, n=20)[-1] if len(gaps) > 1 else float("nan")
-    costs = ", ".join(f"{what} {(ms - spent.get(what, 0.0)) / max(len(acks), 1):.1f}" for what, ms in sorted(now.items()))
-    print(f"{particles:>9,}  {'watched':<10}{pace(before, after, ended - began)}")
-    print(f"{'':>11}{rate:.1f} pictures a second, {slowest} in the slowest (95 % of the gaps under {worst:.0f} ms)")
-    print(f"{'':>11}processor ms a picture: {costs}")
+    ended = served.now()
+    acks, came = tab.evaluate("[window.acks, window.came]")
     late = sorted(tab.evaluate(f"({TURN_GRAVITY})({degrees})") for degrees in range(5, 5 + 5 * INPUTS, 5))
-    print(f"{'':>11}input to picture {statistics.median(late):.0f} ms (worst of {INPUTS}: {late[-1]:.0f})", flush=True)
+    spent, wall = ended.spent - began.spent, ended.wall - began.wall
+    costs = ", ".join(f"{who} {ms / len(acks):.1f}" for who, ms in spent.ran.items() if who not in ("physics", "workers"))
+    rate = 1000.0 * (len(acks) - 1) / (acks[-1] - acks[0])
+    lines = [
+        f"{rate:.1f} pictures a second, {slowest(acks)} in the slowest; {spread('drawn', acks)}; {spread('came', came)}",
+        f"processor ms a picture: {costs}: in all {spent.page / len(acks):.1f}, {spent.page / (10 * wall):.0f} % of a core",
+        f"input to picture {statistics.median(late):.0f} ms (worst of {INPUTS}: {late[-1]:.0f})",
+    ]
+    return began, ended, lines
 
 
-def main(scene: str, particles: list[int], seconds: float) -> None:
-    """A line for each number of circles."""
+def slowest(acks: list[float]) -> int:
+    """Pictures in the second that had the fewest."""
+    return min((sum(a <= ack < a + 1000.0 for ack in acks) for a in acks if a + 1000.0 <= acks[-1]), default=0)
+
+
+def spread(what: str, times: list[float]) -> str:
+    """How even these are."""
+    gaps = sorted(b - a for a, b in pairwise(times))
+    shares = [gaps[min(int(share * len(gaps)), len(gaps) - 1)] for share in (0.5, 0.95, 0.99)]
+    return f"{what} {shares[0]:.1f} ms apart, 95 % under {shares[1]:.0f}, 99 % {shares[2]:.0f}, all {gaps[-1]:.0f}"
+
+
+def main(scene: str, particles: list[int], seconds: float, threads: int | None) -> None:
+    """Some lines for each number of circles."""
     for count in particles:
-        measure(scene, count, seconds)
+        measure(scene, count, seconds, threads)

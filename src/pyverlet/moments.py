@@ -32,6 +32,10 @@ class Moment:
     def __len__(self) -> int:
         return len(self._slots)
 
+    def positions(self) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """Copies of positions (n, 2) in m, in the engine's order, and whose each row is: less than half the work of `look`."""
+        return np.array(self._slots.position, dtype=np.float32), self._slots.particle
+
     def look(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
         """Copies of positions (n, 2) in m and velocities (n, 2) in m/s, in the engine's order, and whose each row is."""
         slots: Any = self._slots

@@ -30,6 +30,10 @@ class Looks:
     def __call__(self, moment: Moment) -> None:
         position, velocity, whose = moment.look()
         assert len(moment) == len(whose)
+        rows, same = moment.positions()
+        assert (rows == position).all()
+        assert same is whose
+        assert not np.shares_memory(rows, position)
         self.seen.append((moment.time, in_users_order(position, whose), in_users_order(velocity, whose)))
 
 

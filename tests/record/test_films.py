@@ -252,6 +252,7 @@ def test_an_error_on_the_way_leaves_a_film_that_plays(tmp_path: Path) -> None:
         ("a", {}, "allowed is a name that ends in"),
         ("{}{}.png", {}, r"one number, such as frame-\{:04d\}.png"),
         ("{x}.png", {}, "one number"),
+        ("frame-%04d.png", {}, r"one number, such as frame-\{:04d\}.png"),
         ("{{}}.png", {}, "one number"),
         ("none/a.mp4", {}, "none/a.mp4', which cannot be written: No such file"),
         ("none/a.png", {}, "none/a.png', which cannot be written: No such file"),

@@ -30,7 +30,8 @@ def frame() -> Frame:
 def shuffled(frame: Frame, seed: int) -> Frame:
     """The same, as it would come from between two substeps."""
     whose = np.random.default_rng(seed).permutation(len(frame.rows)).astype(np.int32)
-    return replace(frame, seq=frame.seq + seed, rows=frame.rows[whose], moving=frame.moving[whose], whose=whose)
+    rows, moving = frame.rows[whose], frame.moving[whose]
+    return replace(frame, seq=frame.seq + seed, rows=rows, moving=moving, whose=whose, whose_moving=whose)
 
 
 def test_the_users_order_comes_back(frame: Frame) -> None:

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 
-from pyverlet.viewers.rhythm import PICTURE_S, Rhythm
+from pyverlet.viewers.rhythm import KEEN, PICTURE_S, Audience, Rhythm
 
 
 def made(rhythm: Rhythm, ends: list[float]) -> list[float]:
@@ -36,3 +36,14 @@ def test_a_world_of_long_substeps_has_one_after_each() -> None:
 def test_of_what_was_missed_one_is_made_up_for() -> None:
     rhythm = Rhythm()
     assert made(rhythm, [1.0, 3.0, 3.001, 3.002, 3.003, 3.0167]) == [1.0, 3.0, 3.001, 3.0167]
+
+
+def test_velocities_are_looked_at_for_a_while_after_somebody_has_asked() -> None:
+    audience = Audience()
+    audience.take(1, velocity=False)
+    assert audience.has(1)
+    assert not audience.has(2)
+    assert not audience.looks_at_velocity(2)
+    audience.take(2, velocity=True)
+    audience.take(3, velocity=False)  # another tab
+    assert [audience.looks_at_velocity(seq) for seq in (3, 2 + KEEN, 3 + KEEN)] == [True, True, False]

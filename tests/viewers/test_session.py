@@ -186,16 +186,19 @@ class Treacle:
         time.sleep(0.012)
 
 
-def test_a_slow_world_is_seen_between_its_substeps_if_somebody_asks(wait_until: WaitUntil) -> None:
+@pytest.mark.parametrize("velocity", [True, False])
+def test_a_slow_world_is_seen_between_its_substeps_if_somebody_asks(wait_until: WaitUntil, velocity: bool) -> None:
     watched, alone = falling(), falling()
     watched.forces.append(Treacle())
     session = Session(watched)
     seen: list[tuple[float, int, float]] = []
+    speeds: list[float] = []
 
     def take() -> None:
         frame = session.latest
         seen.append((frame.status.time, frame.status.frames, float(frame.position[7, 1])))
-        session.take(frame)
+        speeds.append(float(frame.velocity[7, 1]))
+        session.take(frame, velocity=velocity)
 
     session.subscribe(take)
     with session:
@@ -212,6 +215,9 @@ def test_a_slow_world_is_seen_between_its_substeps_if_somebody_asks(wait_until: 
     assert len(between) > 2 * frames
     for t, y in between:  # y0 - g t^2 / 2, in float32
         assert y == pytest.approx(20 - 0.5 * 9.80665 * t * t, abs=2e-3)
+    for (t, frames, _), v in zip(seen, speeds, strict=True):  # v = -g t; unless asked for, that of the end of some frame before
+        then = t if velocity else min(round(v / -9.80665 * 60), frames) / 60
+        assert v == pytest.approx(-9.80665 * then, abs=1e-3)  # float32: 20 m 2^-24 / h
     assert session.latest.status.stages["pictures"] > 0
 
 

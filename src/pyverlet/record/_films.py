@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import struct
 from abc import ABC, abstractmethod
 from fractions import Fraction
@@ -227,7 +228,7 @@ def film_for(path: Path) -> type[_Stream | Frames]:
     if suffix != PICTURE:
         known = ", ".join((*FILMS, PICTURE))
         raise InputError(f"path is '{path}'; allowed is a name that ends in {known}")
-    if "{" in str(path):
+    if "{" in str(path) or re.search(r"%\d*d", path.name):  # the latter is how other programs write it
         try:
             numbered = str(path).format(0) != str(path).format(1)
         except (IndexError, KeyError, ValueError):

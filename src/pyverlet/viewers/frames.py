@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, singledispatch
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ from pyverlet.picture.colour import USUAL_MULTIPLE
 from pyverlet.viewers.sketch import NOTHING, Sketch
 
 if TYPE_CHECKING:
+    from pyverlet.moments import Moment
     from pyverlet.world import World
 
 Rect = tuple[float, float, float, float]
@@ -146,7 +147,7 @@ class Frame:
     rows: NDArray[np.float32]
     """(n, 2) positions in metres, read-only copy, in the order the particles were added or that of `whose`."""
     moving: NDArray[np.float32]
-    """(n, 2) velocities in m/s, likewise."""
+    """(n, 2) velocities in m/s, likewise by `whose_moving`; of an earlier moment unless somebody asks for them."""
     obstacles: Sketch = NOTHING
     """Those that move."""
     joined: NDArray[np.uint32] = field(default_factory=lambda: np.empty((0, 2), np.uint32))
@@ -155,24 +156,28 @@ class Frame:
     """(m,) what it pulls with, N; negative if it pushes."""
     whose: NDArray[np.int32] | None = None
     """(n,) which particle each row is of, between the substeps of a frame; None: row k is particle k."""
+    whose_moving: NDArray[np.int32] | None = None
+
+    def moved(self, moment: Moment, seq: int, status: Status, *, velocity: bool) -> Frame:
+        """The same a little later, between two substeps; its velocities are those of this frame unless they are asked for."""
+        moving, whose_moving = self.moving, self.whose_moving
+        if velocity:
+            rows, moving, whose = moment.look()
+            moving.flags.writeable, whose_moving = False, whose
+        else:
+            rows, whose = moment.positions()
+        rows.flags.writeable = False
+        return replace(self, seq=seq, status=status, rows=rows, moving=moving, whose=whose, whose_moving=whose_moving)
 
     @cached_property
     def position(self) -> NDArray[np.float32]:
         """(n, 2) metres, read-only, in the order the particles were added. Sorted by whoever asks first, as in `grid`."""
-        return self._sorted(self.rows)
+        return _sorted(self.rows, self.whose)
 
     @cached_property
     def velocity(self) -> NDArray[np.float32]:
         """(n, 2) m/s, likewise."""
-        return self._sorted(self.moving)
-
-    def _sorted(self, rows: NDArray[np.float32]) -> NDArray[np.float32]:
-        if self.whose is not None:
-            result = np.empty_like(rows)
-            wire.put_rows(result, rows, self.whose)
-            rows = result
-        rows.flags.writeable = False
-        return rows
+        return _sorted(self.moving, self.whose_moving)
 
     @cached_property
     def strain(self) -> NDArray[np.uint8]:
@@ -201,6 +206,15 @@ class Frame:
         """(n, 2) velocities in whole `velocity_unit`."""
         counts = np.nan_to_num(self.velocity * np.float32(1.0 / self.velocity_unit), posinf=0.0, neginf=0.0)
         return np.asarray(np.rint(counts), dtype=np.int16)
+
+
+def _sorted(rows: NDArray[np.float32], whose: NDArray[np.int32] | None) -> NDArray[np.float32]:
+    if whose is not None:
+        result = np.empty_like(rows)
+        wire.put_rows(result, rows, whose)
+        rows = result
+    rows.flags.writeable = False
+    return rows
 
 
 def quantise(position: NDArray[np.float32], view: Rect) -> NDArray[np.uint16]:

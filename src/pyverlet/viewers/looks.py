@@ -41,6 +41,11 @@ class Look:
     dark: bool = True
     velocity: bool = False
 
+    @property
+    def moving(self) -> bool:
+        """Whether what is drawn depends on velocities."""
+        return self.velocity or self.colour in ("speed", "energy")
+
     def __post_init__(self) -> None:
         checks.whole("width", self.width, most=LARGEST_SIDE)
         checks.whole("height", self.height, most=LARGEST_SIDE)

@@ -1,9 +1,12 @@
-"""When the next picture of a slow world is due."""
+"""When the next picture of a slow world is due, and for whom."""
 
 from __future__ import annotations
 
 PICTURE_S = 1 / 60
 """Seconds between two pictures of a slow world, on the mean: what a screen shows."""
+
+KEEN = 10
+"""Pictures that have velocities of their own after a viewer has asked for some."""
 
 
 class Rhythm:
@@ -23,3 +26,24 @@ class Rhythm:
     def made(self, now: float) -> None:
         """There is one."""
         self._next = max(self._next + PICTURE_S, now)
+
+
+class Audience:
+    """What viewers have taken, and what they look at. Told from any thread."""
+
+    def __init__(self) -> None:
+        self._newest = self._velocity_until = 0
+
+    def take(self, seq: int, *, velocity: bool) -> None:
+        """A viewer has this picture, and looks at velocities or does not."""
+        self._newest = max(self._newest, seq)
+        if velocity:
+            self._velocity_until = max(self._velocity_until, seq + KEEN)
+
+    def has(self, seq: int) -> bool:
+        """Whether anybody has this picture."""
+        return self._newest >= seq
+
+    def looks_at_velocity(self, seq: int) -> bool:
+        """Whether this picture needs velocities."""
+        return seq <= self._velocity_until

@@ -30,7 +30,7 @@ from pyverlet.viewers.exhibit import Exhibit, Repertoire
 from pyverlet.viewers.frames import Frame, Shape, Status
 from pyverlet.viewers.gauges import Gauges
 from pyverlet.viewers.inbox import Inbox
-from pyverlet.viewers.rhythm import PICTURE_S, Rhythm
+from pyverlet.viewers.rhythm import PICTURE_S, Audience, Rhythm
 from pyverlet.viewers.stage import Stage
 
 if TYPE_CHECKING:
@@ -89,11 +89,10 @@ class Session:
         self._before: list[NDArray[np.float32]] | None = None
         self._shape: Shape
         self._seq = self._begun = 0
-        self._rhythm, self._last = Rhythm(), time.perf_counter()
+        self._rhythm, self._audience, self._last = Rhythm(), Audience(), time.perf_counter()
         self._enter(Exhibit.of(world, title))
         self.latest: Frame = self._picture()
         """The newest frame. Replaced, never changed; read it from any thread."""
-        self._taken = 0
 
     # -- for viewers, from any thread ---------------------------------------------------------------------------------
 
@@ -104,9 +103,14 @@ class Session:
         """
         self._commands.put(command)
 
-    def take(self, frame: Frame) -> None:
-        """Say that a viewer has this frame and would like the next: a world that is slow makes some between its substeps then."""
-        self._taken = max(self._taken, frame.seq)
+    def take(self, frame: Frame, *, velocity: bool = False) -> None:
+        """Say that a viewer has this frame and would like the next: a world that is slow makes some between its substeps then.
+
+        Args:
+            frame: that it has.
+            velocity: whether it looks at velocities. Frames made between substeps have new ones only if somebody does.
+        """
+        self._audience.take(frame.seq, velocity=velocity)
 
     def subscribe(self, listener: Callable[[], None]) -> Callable[[], None]:
         """Have `listener()` called on the physics thread after every new frame; it must return at once and not raise.
@@ -350,17 +354,15 @@ class Session:
 
     def _wanted(self) -> bool:
         """Whether the world is slow, and somebody has the last picture and waits for more."""
-        return self._late and self._taken == self._seq
+        return self._late and self._audience.has(self._seq)
 
     def _due(self) -> bool:
         return self._rhythm.due(time.perf_counter())
 
     def _picture_of(self, moment: Moment) -> Frame:
         """As `_picture`; what is read off the world only once a frame is that of the last."""
-        rows, moving, whose = moment.look()
-        rows.flags.writeable = moving.flags.writeable = False
         status = replace(self._status, time=moment.time, **levers.read(self._stage.worlds[0]))
-        return replace(self.latest, seq=self._seq, status=status, rows=rows, moving=moving, whose=whose)
+        return self.latest.moved(moment, self._seq, status, velocity=self._audience.looks_at_velocity(self._seq))
 
     def _picture(self) -> Frame:
         stage = self._stage

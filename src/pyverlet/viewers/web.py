@@ -205,7 +205,7 @@ class Tab:
             if frame.shape is not shape:
                 shape = frame.shape
                 await self._websocket.send_bytes(self._encoder.shape(shape))
-            self._session.take(frame)
+            self._session.take(frame, velocity=look.moving)
             sent = (frame.seq, look)
             self._in_flight.append(frame.seq)
             await self._websocket.send_bytes(await self._encode(frame, look))

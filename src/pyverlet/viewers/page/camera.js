@@ -44,6 +44,14 @@ export class Camera {
     return { left, top, width: (x1 - x0) * this.scale, height: (y1 - y0) * this.scale };
   }
 
+  /** Whether a place on the screen is inside one of these closed lines, [[x, y], ...] in metres, when all is fitted. */
+  encloses(lines, left, top) {
+    const { x: cx, y: cy, scale } = this.fitted, { free } = this;
+    const x = cx + (left - free.left - free.width / 2) / scale, y = cy - (top - free.top - free.height / 2) / scale;
+    const crosses = ([x0, y0], [x1, y1]) => y0 > y !== y1 > y && x < x0 + ((y - y0) / (y1 - y0)) * (x1 - x0);
+    return lines.some((line) => line.filter((point, k) => crosses(line.at(k - 1), point)).length % 2);
+  }
+
   /** Zoom about a point of the screen, which stays where it is. */
   zoom(factor, left, top) {
     const [x, y] = this.toWorld(left, top), least = this.fitted.scale, now = this.now;
@@ -57,10 +65,10 @@ export class Camera {
     this.own = this.#near({ x: x - dx / scale, y: y + dy / scale, scale });
   }
 
-  /** The part of the world to ask for, metres; null leaves it to the server. */
+  /** The part of the world to ask for, metres, behind the title too; null leaves it to the server. */
   get part() {
     if (!this.room || (!this.own && !this.parted)) return null;
-    const { left, top, width, height } = this.free, [x0, y1] = this.toWorld(left, top), [x1, y0] = this.toWorld(left + width, top + height);
+    const { left, top, width, height } = this.free, [x0, y1] = this.toWorld(left, 0), [x1, y0] = this.toWorld(left + width, top + height);
     if (!this.bounded) return [x0, y0, x1, y1];
     const [rx0, ry0, rx1, ry1] = this.room;
     return [Math.max(x0, rx0), Math.max(y0, ry0), Math.min(x1, rx1), Math.min(y1, ry1)];

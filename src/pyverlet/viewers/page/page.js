@@ -19,7 +19,7 @@ import { unpack } from "./wire.js";
 const NUMBERS_EVERY_MS = 200; // nobody reads faster
 const QUICK_MS = 25; // between two ticks of a page that keeps up with the screen
 const SLOW = 0.95; // of real time: less is said
-const HEADER_PX = 62; // names of panels stay clear of the title
+const HEADER_PX = 62; // names of panels, and walls, stay clear of the title
 const STEP_ZOOM = 1.25, STEP_TURN = 15; // of a key: times as large, degrees
 const NAMES = { canvas: "Canvas2D", webgl2: "WebGL2" };
 
@@ -219,17 +219,19 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     measured = true;
     const whole = root.getBoundingClientRect(), aside = root.querySelector("aside").getBoundingClientRect();
     const below = aside.left - whole.left <= 1; // on a narrow page the controls are at its foot
-    const above = shape.panels.length ? HEADER_PX : 0;
-    const free = { left: 0, top: above, width: below ? whole.width : aside.left - whole.left, height: (below ? aside.top - whole.top : whole.height) - above };
-    camera.free = { ...free, width: Math.max(free.width, 1), height: Math.max(free.height, 1) };
+    const width = Math.max(below ? whole.width : aside.left - whole.left, 1), height = below ? aside.top - whole.top : whole.height;
+    const leave = (top) => (camera.free = { left: 0, top, width, height: Math.max(height - top, 1) });
+    leave(0);
+    const title = root.querySelector("header").getBoundingClientRect();
+    if (shape.panels.length || (!shape.parted && camera.encloses(shape.outlines, title.right - whole.left, title.bottom - whole.top))) leave(HEADER_PX);
   }
 
   /** Tell the server what is looked at, if that has changed. */
   function look() {
     measure();
-    const { width, height } = camera.free, by = $("colour").value, pixels = ratio();
+    const { part, free } = camera, { width } = free, height = free.height + (part ? free.top : 0), by = $("colour").value, pixels = ratio();
     const wish = {
-      part: camera.part,
+      part,
       width: Math.min(Math.max(Math.round(width * pixels), 1), 4096),
       height: Math.min(Math.max(Math.round(height * pixels), 1), 4096),
       colour: by,
