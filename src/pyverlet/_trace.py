@@ -85,28 +85,15 @@ class Trace:
         self._key = None  # what happens once a frame, and is not as it was, is to be recorded anew
         return False
 
-    def rounds(self, count: int, key: Callable[[], Hashable], replayed: Callable[[int], None]) -> Iterator[tuple[int, bool]]:
-        """Those of `count` rounds that are left to Python, each with whether the calls before its first guard are made already.
+    def ahead(self, count: int, key: Hashable) -> tuple[int, bool]:
+        """Make the calls of `count` rounds, or until a guard answers otherwise.
 
-        Args:
-            key: asked before a round what its calls depend on; None if they may not be recorded.
-            replayed: told how many rounds have gone by without Python.
+        Returns how many rounds have gone by without Python, and whether the calls before the first guard of the next are made.
         """
-        done = 0
-        while done < count:
-            now, begun = key(), False
-            if now is not None and now == self._key:
-                rounds, more = divmod(self._play(count - done), self._number)
-                done, begun = done + rounds, more > 0
-                replayed(rounds)
-                if done == count:
-                    break
-            if now is None or begun:
-                yield done, begun
-            else:
-                with self.recording(key):
-                    yield done, begun
-            done += 1
+        if not count or key is None or key != self._key:
+            return 0, False
+        rounds, more = divmod(self._play(count), self._number)
+        return rounds, more > 0
 
     @contextlib.contextmanager
     def recording(self, key: Callable[[], Hashable]) -> Iterator[None]:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Hashable, Iterator
-from functools import partial
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from typing import Any
 
 from pyverlet._trace import Trace
@@ -28,9 +27,7 @@ class Repeats:
     def frame(self, world: Any, h: float, contacts: ContactSolver | None, done: Callable[[str], None]) -> Frame:
         """A frame begins. `contacts`: those of the world, if it has more than one particle."""
         plain = not (world.forces or world.links or world.obstacles or world.onlooker) and done == world.profile.mark
-        if not plain or len(world) >= REPEAT_BELOW or not world.integrator.repeats:
-            return Frame(self._traces, None, _nothing)
-        return Frame(self._traces, partial(_key, world, h, contacts), partial(_replayed, world, contacts))
+        return Frame(self._traces, plain and len(world) < REPEAT_BELOW and world.integrator.repeats, world, h, contacts)
 
 
 class Frame:
@@ -39,13 +36,13 @@ class Frame:
     What they depend on is asked anew only after Python has been there.
     """
 
-    def __init__(self, traces: tuple[Trace, ...], key: Callable[[], Hashable] | None, replayed: Callable[[int], None]) -> None:
-        self._traces, self._key, self._replayed = traces, key, replayed
+    def __init__(self, traces: tuple[Trace, ...], plain: bool, world: Any, h: float, contacts: ContactSolver | None) -> None:
+        self._traces, self._plain, self._world, self._h, self._contacts = traces, plain, world, h, contacts
         self._known: Hashable = None
 
     def _ask(self) -> Hashable:
-        if self._known is None and self._key is not None:
-            self._known = self._key()
+        if self._known is None and self._plain:
+            self._known = _key(self._world, self._h, self._contacts)
         return self._known
 
     def made(self, part: int) -> bool:
@@ -54,19 +51,39 @@ class Frame:
 
     @contextlib.contextmanager
     def noted(self, part: int) -> Iterator[None]:
-        """Python makes the opening or the closing: record that, if it may be."""
+        """Python makes a part: record that, if it may be."""
         with self._traces[part].recording(self._ask):
             yield
             self._known = None
 
-    def substeps(self, count: int) -> Iterator[tuple[int, bool]]:
+    def substeps(self, count: int) -> Iterable[tuple[int, bool]]:
         """The substeps that are left to Python, each with whether the particles have moved already."""
-        if self._key is None:
-            yield from ((substep, False) for substep in range(count))
-            return
-        for substep in self._traces[SUBSTEP].rounds(count, self._ask, self._replayed):
-            yield substep
-            self._known = None
+        if not self._plain:
+            return ((substep, False) for substep in range(count))
+        done, begun = self._ahead(count)
+        return self._left(done, begun, count) if done < count else ()
+
+    def _left(self, done: int, begun: bool, count: int) -> Iterator[tuple[int, bool]]:
+        while done < count:
+            if begun or self._ask() is None:
+                yield done, begun
+                self._known = None
+            else:
+                with self.noted(SUBSTEP):
+                    yield done, False
+            rounds, begun = self._ahead(count - done - 1)
+            done += 1 + rounds
+
+    def _ahead(self, count: int) -> tuple[int, bool]:
+        rounds, begun = self._traces[SUBSTEP].ahead(count, self._ask())
+        if rounds or begun:
+            self._replayed(rounds)
+        return rounds, begun
+
+    def _replayed(self, substeps: int) -> None:
+        if self._contacts:
+            self._contacts.broad_phase.aged(substeps)
+        self._world.profile.mark("repeats")
 
 
 def _key(world: Any, h: float, contacts: ContactSolver | None) -> Hashable:
@@ -77,13 +94,3 @@ def _key(world: Any, h: float, contacts: ContactSolver | None) -> Hashable:
         return None
     arrays = id(state.position), id(state.acceleration), id(state.radius), id(state._given["radius"])
     return h, world.gravity, world.integrator, room, pairs, world._state.version, arrays
-
-
-def _nothing(_: int) -> None:
-    pass
-
-
-def _replayed(world: Any, contacts: ContactSolver | None, substeps: int) -> None:
-    if contacts:
-        contacts.broad_phase.aged(substeps)
-    world.profile.mark("repeats")
