@@ -24,14 +24,13 @@ from typing import Any, TypeVar
 import numba
 import numpy as np
 from numba.core import event as numba_event
-from numba.core.codegen import CPUCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
 
-from pyverlet import _entry, _turns
+from pyverlet import _entry, _lean, _turns
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-_COMPILED_FROM = ("_jit.py", "_entry.py", "_trace.py", "_lanes.py", "constants.py")
+_COMPILED_FROM = ("_jit.py", "_lean.py", "_entry.py", "_trace.py", "_lanes.py", "constants.py")
 
 _STALE_AFTER_S = 30 * 24 * 3600.0
 
@@ -121,28 +120,12 @@ def _litter() -> Iterator[None]:
             gc.enable()
 
 
-@contextlib.contextmanager
-def _optimised_once() -> Iterator[None]:
-    """Optimise a loop over threads only where it ends up, and not its body and two wrappers of it on the way there as well."""
-    library, optimise = CPUCodeLibrary, CPUCodeLibrary._optimize_final_module
-
-    def unless_on_the_way(self: Any) -> None:
-        if "__numba_parfor_gufunc" not in self.name and "_GufuncWrapper" not in self.name:
-            optimise(self)
-
-    library._optimize_final_module = unless_on_the_way
-    try:
-        yield
-    finally:
-        library._optimize_final_module = optimise
-
-
-def _in_turn(function: Any, name: str) -> Any:
+def _in_turn(function: Any, name: str, wanted: str) -> Any:
     """The compiler of a function: no two processes compile it at a time, and whoever comes second finds it on disk."""
     compiling = function.compile
 
     def compile_in_turn(kinds: Any) -> Any:
-        with global_compiler_lock, turn(name), _litter(), _optimised_once():
+        with global_compiler_lock, turn(name), _litter(), _lean.only(wanted):
             return compiling(kinds)
 
     return compile_in_turn
@@ -174,7 +157,7 @@ class Kernel(functools.partial[Any]):
     function: Callable[..., Any]
     alone: Kernel
     parallel: bool
-    _made: dict[tuple[bool, bool], Any]
+    _made: dict[str, Any]
     _met: set[Any]
 
     def __new__(cls, function: Callable[..., Any], parallel: bool = False) -> Kernel:
@@ -191,22 +174,23 @@ class Kernel(functools.partial[Any]):
     @property
     def _numba_type_(self) -> Any:
         """What other kernels call: one thread's code."""
-        return numba.types.Dispatcher(self.alone.variant(parallel=False))
+        return numba.types.Dispatcher(self.alone.variant(parallel=False, inner=True))
 
-    def variant(self, *, parallel: bool, wrapped: bool = False) -> Any:
-        """Numba's own: its loops over threads or not; `wrapped` for calls from Python with any arguments."""
-        if self._made.get((parallel, wrapped)) is None:
-            name = ("parallel" if parallel else "alone") + ("-wrapped" if wrapped else "")
+    def variant(self, *, parallel: bool, wrapped: bool = False, inner: bool = False) -> Any:
+        """Numba's own: its loops over threads or not; `wrapped` to be called with any arguments, `inner` by other kernels."""
+        name = ("inner" if inner else "parallel" if parallel else "alone") + ("-wrapped" if wrapped else "")
+        if self._made.get(name) is None:
             with caching(name) as kept:
                 # No fastmath: it would break NaN checks and equal bits. error_model: a division is a division, not a branch and a
                 # raise. Wrappers take as long to compile as the kernel. Loops over threads may make arrays of their own.
                 made = numba.njit(
-                    nogil=True, error_model="numpy", cache=kept, parallel=parallel, fastmath=False,
+                    nogil=True, error_model="numpy", cache=kept, parallel=parallel and {**_lean.PRANGE_ONLY}, fastmath=False,
                     no_cpython_wrapper=not wrapped, no_cfunc_wrapper=True, _nrt=parallel or _allocates(self.function),
                 )(self.function)  # fmt: skip
-            made.compile = _in_turn(made, f"{name} {self.function.__module__}.{self.function.__qualname__}")
-            self._made[parallel, wrapped] = made
-        return self._made[parallel, wrapped]
+            qualname = self.function.__qualname__
+            made.compile = _in_turn(made, f"{name} {self.function.__module__}.{qualname}", "" if inner else qualname)
+            self._made[name] = made
+        return self._made[name]
 
     def _learn(self, *arguments: Any) -> Any:
         """Called with arguments of kinds that no entry knows."""

@@ -8,6 +8,7 @@ the calls depend on must be known: the caller names it by a key, and what is rec
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from collections.abc import Callable, Hashable, Iterator
 from functools import cache
@@ -57,6 +58,11 @@ def _player() -> int:
 _one_at_a_time = threading.Lock()
 
 
+def more_than_calls() -> None:
+    """What this thread does now is not only calls of kernels: no trace has it."""
+    _entry.miss()
+
+
 class Trace:
     """The calls of one round of a loop, and what they are good for."""
 
@@ -70,31 +76,36 @@ class Trace:
     def __deepcopy__(self, memo: Any) -> Trace:
         return Trace()  # the calls are about the arrays of another
 
-    def rounds(self, count: int, key: Callable[[], Hashable], replayed: Callable[[int], None]) -> Iterator[tuple[int, bool]]:
-        """Those of `count` rounds that are left to Python, each with whether the calls before its first guard are made already.
+    def once(self, key: Hashable) -> bool:
+        """Make the calls of one round. False if they are not known, or a guard has answered otherwise: all are left to Python."""
+        if key is None or key != self._key:
+            return False
+        if self._play(1) == self._number:
+            return True
+        self._key = None  # what happens once a frame, and is not as it was, is to be recorded anew
+        return False
 
-        Args:
-            key: asked before a round what its calls depend on; None if they may not be recorded.
-            replayed: told how many rounds have gone by without Python.
+    def ahead(self, count: int, key: Hashable) -> tuple[int, bool]:
+        """Make the calls of `count` rounds, or until a guard answers otherwise.
+
+        Returns how many rounds have gone by without Python, and whether the calls before the first guard of the next are made.
         """
-        done = 0
-        while done < count:
-            now, begun = key(), False
-            if now is not None and now == self._key:
-                rounds, more = divmod(self._play(count - done), self._number)
-                done, begun = done + rounds, more > 0
-                replayed(rounds)
-                if done == count:
-                    break
-            recording = now is not None and not begun and self._begin()
-            whole = False
-            try:
-                yield done, begun
-                whole = True  # nobody has broken it off
-            finally:
-                if recording and self._end() and whole and key() == now:
-                    self._key = now
-            done += 1
+        if not count or key is None or key != self._key:
+            return 0, False
+        rounds, more = divmod(self._play(count), self._number)
+        return rounds, more > 0
+
+    @contextlib.contextmanager
+    def recording(self, key: Callable[[], Hashable]) -> Iterator[None]:
+        """Record the calls of a round, unless it is broken off, or what they depend on is not the same afterwards."""
+        now = key()
+        recording, whole = now is not None and self._begin(), False
+        try:
+            yield
+            whole = True
+        finally:
+            if recording and self._end() and whole and key() == now:
+                self._key = now
 
     def _begin(self) -> bool:
         """Record the kernels that this thread calls; False if another does."""

@@ -16,6 +16,7 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
+from pyverlet._trace import more_than_calls
 from pyverlet.kernels import motion
 from pyverlet.moves import advance
 from pyverlet.state import Slots
@@ -46,9 +47,9 @@ class Integrator(ABC):
         symplectic: whether the map preserves phase space volume (for forces that do not depend on velocity).
         velocity_lag: the velocity seen by contacts during a frame belongs to this fraction of h before the position.
         drop: from rest, under a constant acceleration a, a step moves a particle by drop * a h^2.
-        repeats: whether every step of a frame is the same calls of kernels, if no force is but gravity. A class with a `step` of
-            its own says so anew.
-        leaps: whether it then is v += h a, x += h v, and no more. The same.
+        repeats: whether `step`, and with the h of the frame before `begin` and `end`, are always the same calls of kernels, if no
+            force is but gravity. A class with one of these of its own says so anew.
+        leaps: whether it then is v += h a, x += h v, and no more. A class with a `step` of its own says so anew.
     """
 
     order: ClassVar[int]
@@ -59,8 +60,8 @@ class Integrator(ABC):
     leaps: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
-        for claim in ("repeats", "leaps"):
-            setattr(cls, claim, vars(cls).get(claim, "step" not in vars(cls) and getattr(cls, claim)))
+        for claim, methods in (("repeats", ("begin", "step", "end")), ("leaps", ("step",))):
+            setattr(cls, claim, vars(cls).get(claim, vars(cls).keys().isdisjoint(methods) and getattr(cls, claim)))
 
     def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
         """Before the substeps of a frame. `h_last`: the substep of the frame before, None after a restart."""
@@ -155,6 +156,7 @@ class _Stormer(Integrator):
 
     def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
         if motion.any_nan(state.acceleration):
+            more_than_calls()
             fresh = np.isnan(state.acceleration[:, 0])
             # x_prev = x - v h + a h^2 / 2 makes u = v - a h / 2: order 2. The naive x_prev = x - v h makes u = v: order 1.
             known = state.acceleration.copy()
@@ -189,6 +191,8 @@ class PositionVerlet(_Stormer):
         naive_start: start from x_prev = x - v h instead of x - v h + a h^2 / 2. Drops the global order to 1; for demonstration.
     """
 
+    repeats = True
+
     def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
         super().begin(state, forces, t, h, h_last)
         if h_last is not None and h_last != h:
@@ -200,6 +204,8 @@ class TimeCorrectedVerlet(_Stormer):
 
     With a constant step it is PositionVerlet, bit for bit.
     """
+
+    repeats = True
 
     def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
         varies = h_last is not None and h_last != h

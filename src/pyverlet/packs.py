@@ -90,7 +90,7 @@ class Packs:
 
     def fits(self, state: Slots) -> bool:
         """Whether nothing is left to be prepared before `project`."""
-        return self._size is state.size
+        return self._size is state.size and not self._marked
 
     def _share_out(self, state: Slots) -> None:
         """Bring reach and share up to date with the sizes of now."""
@@ -175,7 +175,8 @@ class Packs:
 
     def mark_resting(self, state: Slots) -> None:
         """Set `state.resting` for particles that touch another."""
-        self._fresh[0] = 1
         if self._marked:
+            self._fresh[0] = 1
             return
-        packs.mark_touching(self._parts(), self.begin, self.lanes, self.lane_i, self.lane_j, self.normal, state.resting)
+        where = (self._parts(), self.begin, self.lanes, self.lane_i, self.lane_j)
+        packs.mark_touching(*where, self.normal, state.resting, self._fresh)

@@ -39,7 +39,9 @@ class Watch:
 
     def __init__(self, start: State, forces: ForceSum, links: Links, room: Boundary) -> None:
         self._start, self._forces, self._links, self._room = start, forces, links, room
-        self._gravity, self._energy = forces.gravity, self._look(start)
+        self._gravity = forces.gravity
+        self._plain = len(start) < SERIAL_BELOW and not (forces.forces or links)
+        self._energy = 0.0 if self._plain else self._look(start)  # what links hold is not known any more when the frame is over
 
     def _look(self, now: State | Slots) -> float:
         """Energy of all, J."""
@@ -52,6 +54,12 @@ class Watch:
             energy += sum(force.potential(state) for force in kept) + self._links.energy(state)
         return energy
 
+    def _gained(self, now: Slots) -> float:
+        """What `_look` finds now more than at the start, which is still there: in one call, without forces and links."""
+        then, motion = self._start, (now.position, now.velocity, now.spin, now.radius, now.mass)
+        start = (then.position, then.velocity, then.spin, then.radius, then.mass)
+        return float(measure.gained(*start, *motion, *self._gravity))
+
     def close(self, slots: Slots, listed: Listed) -> float:
         """The frame is over: take back what has been gained too much.
 
@@ -61,7 +69,7 @@ class Watch:
         """
         if self._forces.gravity != self._gravity:  # it has turned on the way, and drove the world
             return 0.0
-        gained = self._look(slots) - self._energy
+        gained = self._gained(slots) if self._plain else self._look(slots) - self._energy
         room = SURPLUS * fall(slots.total_mass, self._forces.gravity, self._room.extent())
         if room < gained < np.inf:
             surplus = gained - max(room, SURPLUS * self._kinetic().sum())
@@ -142,10 +150,10 @@ def fall(mass: float, gravity: tuple[float, float], extent: Extent | None) -> fl
 
     Without gravity g is 9.81 m/s^2 all the same: circles that start at rest on top of each other have no other scale.
     """
-    gx, gy = map(abs, gravity if any(gravity) else STANDARD_GRAVITY)
+    gx, gy = gravity if any(gravity) else STANDARD_GRAVITY
     if extent is None:
         return mass * 0.5 * (gx * gx + gy * gy)
-    return mass * (gx * (extent[2] - extent[0]) + gy * (extent[3] - extent[1]))
+    return mass * (abs(gx) * (extent[2] - extent[0]) + abs(gy) * (extent[3] - extent[1]))
 
 
 def undriven(world: Any, h: float, h_last: float | None) -> bool:

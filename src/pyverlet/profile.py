@@ -18,34 +18,35 @@ class Profile:
         self.frames = 0
         self.rebuilds = 0
         self._start = self._last = 0.0
-        self._before: dict[str, float] = {}
-        self._after: dict[str, float] = {}
-        self._sum: defaultdict[str, float] = defaultdict(float)  # s, since the start, up to now
+        self._now: dict[str, float] = {}  # s, of the frame that is under way
+        self._complete: dict[str, float] = {}  # s, of the last complete frame
+        self._total: defaultdict[str, float] = defaultdict(float)  # s, of all of them
 
     def begin(self) -> None:
         """A frame begins."""
-        self._sum = defaultdict(float, self._after)  # without what a frame that failed has left
+        self._now = {}  # without what a frame that failed has left
         self._start = self._last = perf_counter()
 
     def mark(self, stage: str) -> None:
         """Charge the time since the last mark to `stage`."""
         now = perf_counter()
-        self._sum[stage] += now - self._last
+        self._now[stage] = self._now.get(stage, 0.0) + now - self._last
         self._last = now
 
     def end(self) -> None:
         """The frame is complete."""
         self.frame_ms = (perf_counter() - self._start) * 1e3
         self.frames += 1
-        self._before, self._after = self._after, self._sum
+        self._complete = self._now
+        for stage, seconds in self._now.items():
+            self._total[stage] += seconds
 
     @property
     def stages(self) -> dict[str, float]:
         """Milliseconds of each stage that the last complete frame had."""
-        before = self._before
-        return {stage: (s - before.get(stage, 0.0)) * 1e3 for stage, s in self._after.items() if s > before.get(stage, 0.0)}
+        return {stage: seconds * 1e3 for stage, seconds in self._complete.items()}
 
     @property
     def total_ms(self) -> dict[str, float]:
         """Milliseconds of each stage in all complete frames."""
-        return {stage: seconds * 1e3 for stage, seconds in self._after.items()}
+        return {stage: seconds * 1e3 for stage, seconds in list(self._total.items())}

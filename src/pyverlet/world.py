@@ -28,7 +28,7 @@ from pyverlet.obstacles import Course, Obstacles
 from pyverlet.passivity import Watch, undriven
 from pyverlet.profile import Profile
 from pyverlet.queries import Queries
-from pyverlet.repeats import Repeats
+from pyverlet.repeats import CLOSING, OPENING, Frame, Repeats
 from pyverlet.saved import Saved
 from pyverlet.sleep import Sleep, laws
 from pyverlet.state import Slots, State
@@ -124,13 +124,11 @@ class World(Measures, Queries, Doors):
         contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course or None
         lag, state.drop = integrator.velocity_lag * h, integrator.drop
         parts: list[Any] = [part for part in (contacts, links, course) if part]
-        self._gather()
-        done("gather")
-        if self._sleep and self._sleep.all_asleep(state):
+        frame = self._repeats.frame(self, h, contacts, done)
+        if not self._open(frame, h, done):
             return
         watch = Watch(self._state, forces, self.links, self.boundary) if contacts and undriven(self, h, self._h_last) else None
-        integrator.begin(state, forces, self.time, h, self._h_last)
-        for substep, moved in self._repeats.substeps(self, h, contacts, done):
+        for substep, moved in frame.substeps(self.substeps):
             self._show(substep, h, lag)
             if not (moved or fused.leapt):
                 for part in parts:
@@ -159,7 +157,8 @@ class World(Measures, Queries, Doors):
             if links:
                 links.after(state)
                 done("links")
-        self._finish(contacts, watch, h, done)
+        self._finish(frame, contacts, watch, h)
+        done("finish")
 
     def run(self, *, seconds: float, dt: float = 1 / 60) -> None:
         """Advance by as many frames of dt as come nearest to `seconds`."""
@@ -167,13 +166,25 @@ class World(Measures, Queries, Doors):
         for _ in range(round(seconds / checks.number("dt", dt, above=0.0))):
             self.step(dt)
 
-    def _gather(self) -> None:
+    def _open(self, frame: Frame, h: float, done: Callable[[str], None]) -> bool:
+        """Take up what users have set, and begin; False if nobody is awake."""
         if self.links.begin() and self._contacts:
             self._contacts.broad_phase.forget()
-        woken = self._sleep.begin(self._slots, self._state, laws(self)) if self._sleep else False
-        changed = self._slots.gather(self._state) or woken
         self._course.begin()
         self._clear_notes()
+        if not frame.made(OPENING):
+            with frame.noted(OPENING):
+                self._gather()
+                if self._sleep and self._sleep.all_asleep(self._slots):
+                    done("gather")
+                    return False
+                self.integrator.begin(self._slots, self._force_sum, self.time, h, self._h_last)
+        done("gather")
+        return True
+
+    def _gather(self) -> None:
+        woken = self._sleep.begin(self._slots, self._state, laws(self)) if self._sleep else False
+        changed = self._slots.gather(self._state) or woken
         if not self._slots.most_restitution <= 1.0:
             checks.at_most("restitution", self._state.restitution, 1.0)
         if not self._slots.most_friction < np.inf:
@@ -193,14 +204,15 @@ class World(Measures, Queries, Doors):
             if len(self) > 1:
                 self._contacts.fit(self._slots)
 
-    def _finish(self, contacts: ContactSolver | None, watch: Watch | None, h: float, done: Callable[[str], None]) -> None:
+    def _finish(self, frame: Frame, contacts: ContactSolver | None, watch: Watch | None, h: float) -> None:
         """The substeps are done: who rests, the velocities of now, and no more energy than there may be."""
-        if contacts:
-            contacts.end(self._slots, self.substeps * h, self.gravity)
-        self.integrator.end(self._slots, h)
+        if not frame.made(CLOSING):
+            with frame.noted(CLOSING):
+                if contacts:
+                    contacts.end(self._slots, self.substeps * h, self.gravity)
+                self.integrator.end(self._slots, h)
         if contacts and watch:
             contacts.growth.heed(watch.close(self._slots, contacts.listed()))
-        done("finish")
 
     def _accept(self, dt: float, h: float, books: Any) -> None:
         """The frame has gone well: what it made of the state is the truth now."""

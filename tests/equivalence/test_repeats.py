@@ -48,12 +48,12 @@ def both(monkeypatch: pytest.MonkeyPatch) -> Any:
         replayed, plain = make(), make()
         number = 0
 
-        def count(w: pv.World, contacts: Any, substeps: int, told: Any = repeats._replayed) -> None:
+        def count(frame: repeats.Frame, substeps: int, told: Any = repeats.Frame._replayed) -> None:
             nonlocal number
             number += substeps
-            told(w, contacts, substeps)
+            told(frame, substeps)
 
-        monkeypatch.setattr(repeats, "_replayed", count)
+        monkeypatch.setattr(repeats.Frame, "_replayed", count)
         for frame in range(frames):
             for w, most in ((replayed, 10_000), (plain, 0)):
                 monkeypatch.setattr(repeats, "REPEAT_BELOW", most)

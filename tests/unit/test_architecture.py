@@ -22,6 +22,7 @@ LAYERS = (
         "_entry",
         "_jit",
         "_lanes",
+        "_lean",
         "_memory",
         "_native",
         "_turns",
@@ -75,7 +76,7 @@ LAYERS = (
 # Steps within a layer: module -> what it may use beside it.
 BESIDE = {
     "checks": {"errors"},
-    "_jit": {"_entry", "_turns"},
+    "_jit": {"_entry", "_lean", "_turns"},
     "_trace": {"_entry", "_jit"},
     "unchanged": {"kernels"},
     "state": {"kernels", "unchanged"},

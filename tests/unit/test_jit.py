@@ -25,7 +25,16 @@ def test_the_hash_sees_an_edit_in_any_kernel_and_no_other(tmp_path: Path) -> Non
     assert before == _jit.sources_hash()
     (copy / "world.py").write_text("# edited")
     assert _jit.sources_hash(copy) == before
-    for name in ("kernels/contacts.py", "kernels/motion.py", "constants.py", "_jit.py", "_entry.py", "_trace.py", "_lanes.py"):
+    for name in (
+        "kernels/contacts.py",
+        "kernels/motion.py",
+        "constants.py",
+        "_jit.py",
+        "_lean.py",
+        "_entry.py",
+        "_trace.py",
+        "_lanes.py",
+    ):
         with (copy / name).open("a") as file:
             file.write("\n# edited\n")
         after = _jit.sources_hash(copy)

@@ -75,6 +75,13 @@ def mechanical(position, velocity, acceleration, lag, spin, radius, mass, gx, gy
 
 
 @kernel
+def gained(position, velocity, spin, radius, mass, now_position, now_velocity, now_spin, now_radius, now_mass, gx, gy):
+    """How much larger `mechanical` is now, J."""
+    before = mechanical(position, velocity, velocity, 0.0, spin, radius, mass, gx, gy)
+    return mechanical(now_position, now_velocity, now_velocity, 0.0, now_spin, now_radius, now_mass, gx, gy) - before
+
+
+@kernel
 def momenta(position, velocity, spin, radius, mass):
     """(momentum x, momentum y, angular momentum about the origin, spin included); kg m/s and kg m^2/s."""
     px = py = turning = 0.0

@@ -337,8 +337,9 @@ def mark_strip(flag, lane_i, lane_j, normal_x, normal_y):
 
 
 @kernel
-def mark_touching(cut, begin, lanes, lane_i, lane_j, normal, flag):
-    """flag[i] = 1 for every particle of a touching pair."""
+def mark_touching(cut, begin, lanes, lane_i, lane_j, normal, flag, fresh):
+    """flag[i] = 1 for every particle of a touching pair. fresh[0] = 1: `project` notes anew who overlaps deeply."""
+    fresh[0] = 1
     for parity in range(2):
         for part in range(cut.shape[1] - 1):
             for half in range(cut[parity, part], cut[parity, part + 1]):
