@@ -161,7 +161,7 @@ class ContactSolver:
         self._lighter = self._loans.begin(state) if lends else state.inverse_mass
         bodies = (state.size, self._lighter)
         which = pairs.listed()
-        fed = FED if self._rubs(state) or self._bounces(state) else FED_SMOOTH
+        fed = self._fed(state)
         push = (real(fed / h), real(LARGEST_PUSH))
         notes = (pairs.touching, pairs.impulse, pairs.touches)
         if self._bounces(state):
@@ -254,7 +254,15 @@ class ContactSolver:
 
     def _leaning(self, state: Slots, h: float) -> float:
         """s; times -a it is the velocity that a circle at rest against others ends a substep with."""
-        return (state.drop - PUSHED / FED) * h
+        return self._lean(state) * h
+
+    def _lean(self, state: Slots) -> float:
+        """The same, in substeps."""
+        return state.drop - PUSHED / self._fed(state)
+
+    def _fed(self, state: Slots) -> float:
+        """What velocities are fed, of an overlap."""
+        return FED if self._rubs(state) or self._bounces(state) else FED_SMOOTH
 
     def _bounces(self, state: Slots) -> bool:
         return self.settings.restitution > 0.0 or state.most_restitution > 0.0
@@ -269,7 +277,8 @@ class ContactSolver:
             self.broad_phase.forget()  # it has no use for pairs among sleepers
 
     def _mark_resting(self, state: Slots) -> None:
-        """Set `state.resting` for particles that touch another without bouncing off it."""
+        """Note in `state.resting` who touches another without bouncing off it."""
+        state.lean = self._lean(state)
         if self._eight(state):
             self._packs.mark_resting(state)
             return

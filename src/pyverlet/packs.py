@@ -172,7 +172,7 @@ class Packs:
         return (*where, self.normal, self._depths, self.slip, self._held)
 
     def mark_resting(self, state: Slots) -> None:
-        """Set `state.resting` for particles that touch another."""
+        """Note in `state.resting` who touches another."""
         self._fresh[0] = 1
         if self._marked:
             return
