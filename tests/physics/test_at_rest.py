@@ -55,3 +55,14 @@ def test_what_is_not_reported_is_not_forgotten() -> None:
     height = circles.position.copy()
     world.run(seconds=1)
     assert circles.position == pytest.approx(height, abs=1e-9)
+
+
+@pytest.mark.parametrize("mass", [1.0, 1000.0])
+@pytest.mark.parametrize("substeps", [1, 8])
+def test_circles_that_fall_in_touch_report_how_fast_they_fall(substeps: int, mass: float) -> None:
+    # They rest against each other, but on nothing: v = -g t to rounding.
+    world = pv.World(dtype=np.float64, substeps=substeps)
+    circles = world.add(position=[(0, 0), (0.999, 0), (0.5, 0.86)], radius=0.5, mass=[1.0, mass, 1.0])
+    world.run(seconds=2)  # what they overlap moves them by up to 1e-3 m / h at first
+    speed = circles.mass @ circles.velocity / circles.mass.sum()
+    assert speed == pytest.approx([0, -2 * G], abs=1e-12)

@@ -166,6 +166,22 @@ def any_differs(a, b, c, d, e, f, a_now, b_now, c_now, d_now, e_now, f_now):
 
 
 @kernel
+def pick_falling(resting, velocity, acceleration, before, particle, lag, dt):
+    """Circles that touch others but fall as if alone rest on nobody: those whose velocity has followed half of a or more.
+
+    before: (n, 2) velocities dt seconds ago, by `particle`. lag: s, how far behind `velocity` is.
+    """
+    half = dt / (dt + dt)
+    for k in range(resting.shape[0]):
+        if resting[k] == IN_PILE:
+            i = np.int64(particle[k])
+            ax, ay = acceleration[k, 0], acceleration[k, 1]
+            gained = (velocity[k, 0] + lag * ax - before[i, 0]) * ax + (velocity[k, 1] + lag * ay - before[i, 1]) * ay
+            if gained > half * dt * (ax * ax + ay * ay):
+                resting[k] = 0
+
+
+@kernel
 def remember_rest(acceleration, velocity, resting, lean, h):
     """Scale the accelerations of those that are held, so that h / 2 of it makes of what they carry weight with no velocity.
 
