@@ -161,8 +161,7 @@ class Slots:
         island: (n,) number of the island a sleeping particle belongs to, -1 for those awake. calm: (n,) seconds it has been so.
             Both are empty where nobody may sleep.
         lean: times -a h it is the velocity with which circles at rest against others end a substep; 0 until contacts say so.
-        resting: (n,) bits of `kernels.motion`: whether a wall, and at the end of a frame another particle, held the particle
-            without a bounce in the last substep.
+        resting: (n,) bits of `kernels.motion`: who held it in the last substep, a wall or, after a frame, another particle.
         hits: (n,) largest speed with which the circle met a wall in this frame, m/s; negative: none.
         spent: (n, 2) energy that impacts on walls, and friction there, have taken in this frame, J, negative: to be summed, for
             rows stay where they are when slots are reordered. Empty unless somebody keeps account.
