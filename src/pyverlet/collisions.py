@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -14,7 +15,7 @@ from pyverlet.constants import FED, FED_SMOOTH, LARGEST_PUSH, PUSHED, REST_ACCEL
 from pyverlet.errors import InputError
 from pyverlet.events import Events
 from pyverlet.growth import Growth
-from pyverlet.kernels import contacts, friction, impacts, refine
+from pyverlet.kernels import contacts, friction, impacts, motion, refine
 from pyverlet.kernels.bounds import AT_WALL, CARRIED, CARRIES
 from pyverlet.loans import Lent, Loans
 from pyverlet.packs import Packs
@@ -76,6 +77,7 @@ class ContactSolver:
         self._packs = Packs(dtype)
         self._packed = False
         self._uneven = False  # whether masses differ so much that contacts need loans of inertia, and to be refined
+        self._lends = False  # in this substep
         self._events = events
         self._sleep = sleep
         self._slips = Slips(dtype)
@@ -158,10 +160,11 @@ class ContactSolver:
         pairs, real = self.broad_phase.list, state.real
         pairs.hold_notes()
         moving, lends = (state.position, state.velocity), self._uneven and strongest > 0
+        self._lends = lends
         self._lighter = self._loans.begin(state) if lends else state.inverse_mass
         bodies = (state.size, self._lighter)
         which = pairs.listed()
-        fed = FED if self._rubs(state) or self._bounces(state) else FED_SMOOTH
+        fed = self._fed(state)
         push = (real(fed / h), real(LARGEST_PUSH))
         notes = (pairs.touching, pairs.impulse, pairs.touches)
         if self._bounces(state):
@@ -185,6 +188,8 @@ class ContactSolver:
             where = (*moving, state.spin, state.turn, state.lift, state.radius, self._lighter, state.friction)
             numbers = (real(h), real(self.settings.friction), real(self._leaning(state, h)))
             friction.grip(*where, *which, *numbers, *notes, pairs.slip, pairs.slipped, pairs.held, pairs.spent)
+        if lends:
+            self._loans.free_of_walls(state)
 
     def _bounce(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         pairs, real = self.broad_phase.list, state.real
@@ -206,12 +211,24 @@ class ContactSolver:
         which = pairs.listed()
         moving = (state.position, state.velocity)
         notes = (pairs.touching, pairs.impulse, pairs.touches)
+        if self._lends:
+            self._loans.join(state, pairs)
         if self._rubs(state):
             where = (state.start, *moving, state.spin, state.turn, state.radius, self._lighter, state.friction)
             numbers = (real(h), real(self.settings.friction))
             friction.rub(*where, *which, *numbers, *notes, pairs.slip, pairs.slipped, pairs.held, pairs.spent)
         else:
             contacts.still_resting(*moving, self._lighter, *which, *notes)
+        if self._lends:
+            self._loans.balance(state, rubs=self._rubs(state))
+
+    @contextmanager
+    def aside(self, state: Slots) -> Iterator[None]:
+        """While others, who keep momentum by themselves, change velocities between `project` and `still`."""
+        before = state.velocity.copy() if self._lends else None
+        yield
+        if before is not None:
+            self._loans.leave_out(state.velocity - before)
 
     def listed(self) -> tuple[Any, Any, Any, Any]:
         """first, count, pair_i, pair_j of the pairs of now."""
@@ -254,7 +271,15 @@ class ContactSolver:
 
     def _leaning(self, state: Slots, h: float) -> float:
         """s; times -a it is the velocity that a circle at rest against others ends a substep with."""
-        return (state.drop - PUSHED / FED) * h
+        return self._lean(state) * h
+
+    def _lean(self, state: Slots) -> float:
+        """The same, in substeps."""
+        return state.drop - PUSHED / self._fed(state)
+
+    def _fed(self, state: Slots) -> float:
+        """What velocities are fed, of an overlap."""
+        return FED if self._rubs(state) or self._bounces(state) else FED_SMOOTH
 
     def _bounces(self, state: Slots) -> bool:
         return self.settings.restitution > 0.0 or state.most_restitution > 0.0
@@ -262,14 +287,23 @@ class ContactSolver:
     def _rubs(self, state: Slots) -> bool:
         return self.settings.friction > 0.0 or state.most_friction > 0.0
 
-    def end(self, state: Slots, dt: float, gravity: tuple[float, float]) -> None:
-        """At the end of a frame of dt seconds: note who was held by a contact, and let those fall asleep that are tired."""
+    def end(self, state: Slots, before: State, lag: float, dt: float, gravity: tuple[float, float]) -> None:
+        """At the end of a frame of dt seconds: note who was held by a contact, and let those fall asleep that are tired.
+
+        before: how the frame began. lag: seconds the velocity is behind.
+        """
         self._mark_resting(state)
+        if self._lends:
+            self._loans.let_fall(state)
+        else:
+            moving = (state.velocity, state.acceleration, before.velocity, state.particle)
+            motion.pick_falling(state.resting, *moving, *state.reals(lag, dt))
         if self._sleep and self._sleep.end(state, self.broad_phase.list, dt, float(np.hypot(*gravity))):
             self.broad_phase.forget()  # it has no use for pairs among sleepers
 
     def _mark_resting(self, state: Slots) -> None:
-        """Set `state.resting` for particles that touch another without bouncing off it."""
+        """Note in `state.resting` who touches another without bouncing off it."""
+        state.lean = self._lean(state)
         if self._eight(state):
             self._packs.mark_resting(state)
             return

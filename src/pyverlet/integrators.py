@@ -135,7 +135,8 @@ class _Stormer(Integrator):
 
     The method's memory is x - x_prev. Kept as a velocity u = (x - x_prev) / h it never subtracts large positions, and contacts
     may change it. The user sees v = u + a h / 2, the velocity at the time of x; between frames that is what is stored.
-    A particle held by a contact has no such a: its u is its velocity, and its remembered acceleration is 0.
+    A particle held by a wall has no such a: its u is its velocity, and its remembered acceleration is 0. Among others at rest
+    its u is what carries their weight, -lean a h, and its velocity is 0: the acceleration remembered is 2 lean a.
     """
 
     order = 2
@@ -177,7 +178,8 @@ class _Stormer(Integrator):
         forces.kick_drift(state, t, h, ahead)
 
     def end(self, state: Slots, h: float) -> None:
-        motion.clear_where(state.acceleration, state.resting)
+        held = (state.acceleration, state.velocity, state.resting)
+        motion.remember_rest(*held, *state.reals(state.lean, h))
         _kick(state, 0.5 * h)
 
 

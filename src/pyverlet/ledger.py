@@ -117,7 +117,7 @@ class _Frame:
             before, self._now = self._now, self._look(self._lag)
             self._contacts += self._now.energy - before.energy
         elif stage == "finish":
-            # Velocities as users see them: those of contacts at rest are means over the substep.
+            # Velocities as users see them: those of circles at rest without what carries their weight.
             before, self._now = self._now, self._look(0.0)
             self._contacts += self._now.energy - before.energy
         else:

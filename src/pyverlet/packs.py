@@ -174,7 +174,7 @@ class Packs:
         return (*where, self.normal, self._depths, self.slip, self._held)
 
     def mark_resting(self, state: Slots) -> None:
-        """Set `state.resting` for particles that touch another."""
+        """Note in `state.resting` who touches another."""
         if self._marked:
             self._fresh[0] = 1
             return

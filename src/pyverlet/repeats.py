@@ -93,4 +93,4 @@ def _key(world: Any, h: float, contacts: ContactSolver | None) -> Hashable:
     if room is None or pairs is None or world._h_last != h:
         return None
     arrays = id(state.position), id(state.acceleration), id(state.radius), id(state._given["radius"])
-    return h, world.gravity, world.integrator, room, pairs, world._state.version, arrays
+    return h, world.substeps, world.gravity, world.integrator, room, pairs, world._state.version, arrays

@@ -38,7 +38,7 @@ class State:
     Attributes:
         position: (n, 2) centres, m.
         velocity: (n, 2) m/s.
-        acceleration: (n, 2) m/s^2, of the last substep; the memory of the Verlet integrators. NaN: not evaluated yet.
+        acceleration: (n, 2) m/s^2, of the last substep; the memory of the Verlet methods, scaled at rest. NaN: none yet.
         spin: (n,) angular velocity, rad/s, counter-clockwise.
         radius: (n,) m.
         mass: (n,) kg; infinity pins the particle.
@@ -160,7 +160,8 @@ class Slots:
             in it, CARRIED and WAS_AT_WALL the same in the one before. Kept only if circles bounce.
         island: (n,) number of the island a sleeping particle belongs to, -1 for those awake. calm: (n,) seconds it has been so.
             Both are empty where nobody may sleep.
-        resting: (n,) 1 where a contact without bounce held the particle in the last substep.
+        lean: times -a h it is the velocity with which circles at rest against others end a substep; 0 until contacts say so.
+        resting: (n,) bits of `kernels.motion`: who held it in the last substep, a wall or, after a frame, another particle.
         hits: (n,) largest speed with which the circle met a wall in this frame, m/s; negative: none.
         spent: (n, 2) energy that impacts on walls, and friction there, have taken in this frame, J, negative: to be summed, for
             rows stay where they are when slots are reordered. Empty unless somebody keeps account.
@@ -176,6 +177,7 @@ class Slots:
         self.reals = lru_cache(64)(lambda *numbers: tuple(map(dtype.type, numbers)))
         self._kept: dict[str, Array] = {}
         self.drop = 1.0
+        self.lean = 0.0
         self.total_mass = 0.0
         self._resize(0)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
@@ -144,7 +145,7 @@ class World(Measures, Queries, Doors):
                 contacts.project(state, h, lag, forces.strongest)
                 done("contacts")
             if links:
-                links.solve(state, h)
+                self._solve(links, contacts, h)
                 done("links")
             self.boundary.confine(state, h, lag, REST_ACCELERATIONS * forces.strongest * h)
             done("bounds")
@@ -204,12 +205,17 @@ class World(Measures, Queries, Doors):
             if len(self) > 1:
                 self._contacts.fit(self._slots)
 
+    def _solve(self, links: Links, contacts: ContactSolver | None, h: float) -> None:
+        with contacts.aside(self._slots) if contacts else nullcontext():
+            links.solve(self._slots, h)
+
     def _finish(self, frame: Frame, contacts: ContactSolver | None, watch: Watch | None, h: float) -> None:
         """The substeps are done: who rests, the velocities of now, and no more energy than there may be."""
         if not frame.made(CLOSING):
             with frame.noted(CLOSING):
                 if contacts:
-                    contacts.end(self._slots, self.substeps * h, self.gravity)
+                    lag = self.integrator.velocity_lag * h
+                    contacts.end(self._slots, self._state, lag, self.substeps * h, self.gravity)
                 self.integrator.end(self._slots, h)
         if contacts and watch:
             contacts.growth.heed(watch.close(self._slots, contacts.listed()))

@@ -22,6 +22,7 @@ from pyverlet._jit import kernel, parallel_kernel, prange
 from pyverlet.constants import PUSHED
 from pyverlet.kernels.bounds import CARRIES
 from pyverlet.kernels.impacts import APART, PARTING, part
+from pyverlet.kernels.motion import IN_PILE
 
 # Golden angle, rad: coincident centres part in directions spread evenly over the circle.
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
@@ -202,13 +203,13 @@ def still_resting(position, velocity, inverse_mass, first, count, pair_i, pair_j
 
 @kernel
 def mark_touching(first, pair_i, pair_j, touching, impulse, touches, flag):
-    """flag[i] = 1 for every particle of a touching pair that has not bounced."""
+    """flag[i] gains IN_PILE for every particle of a touching pair that has not bounced."""
     for s in range(first.shape[0]):
         a = first[s]
         for t in range(a, a + touches[s]):
             if not impulse[t] < 0:
-                flag[pair_i[a + touching[t]]] = 1
-                flag[pair_j[a + touching[t]]] = 1
+                flag[pair_i[a + touching[t]]] |= IN_PILE
+                flag[pair_j[a + touching[t]]] |= IN_PILE
 
 
 @kernel

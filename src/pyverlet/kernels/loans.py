@@ -4,14 +4,15 @@ What one circle can do to another in a substep goes with the lighter mass of the
 light ones, late and softly. But within a heap at rest nobody can tell which of the circles has the mass, as long as each keeps
 its weight. So those that touch even out their inertia m', the sum of which stays the same, and solve contacts with it:
 
-- The weight is still m a, not m' a: before contacts are solved, the integration's a h becomes a h m / m', and of how far that has
-  moved the circle only the part PUSHED / FED, for the velocities with which circles at rest end a substep stay as they are.
+- The weight of what walls hold is still m a, not m' a: before contacts are solved, the integration's a h becomes a h m / m', and
+  of how far that has moved the circle only the part PUSHED / FED, for the velocities with which circles at rest end a substep
+  stay as they are.
 - Who touches nobody has that undone, and falls as everything does; what was lent goes back within LOAN_S.
 - Who bounces has its own mass at once, and lends and borrows nothing for LOAN_S: impacts go by the true masses.
 
 To change the masses of particles that hardly move is common in calculations of granular matter (Thornton and Antony 1998,
-Quasi-static deformation of particulate media, have more of it everywhere); here the sum is kept, and so is the momentum of
-circles that move together.
+Quasi-static deformation of particulate media, have more of it everywhere); here the sum is kept, and kernels.balance sees to it
+that momentum is.
 """
 
 from __future__ import annotations
@@ -53,10 +54,10 @@ def recall(inverse_mass, first, count, pair_i, pair_j, meeting, impulse, wait, l
 
 
 @kernel
-def _pull(position, velocity, acceleration, inverse_mass, lighter, kick, fall, i):
+def _pull(position, velocity, acceleration, inverse_mass, lighter, held, kick, fall, i):
     """Move circle i by what a (m / m' - 1) does to it: kick (s) in the velocity, fall (s^2) in the position."""
     w = inverse_mass[i]
-    if lighter[i] != w:
+    if held[i] and lighter[i] != w:
         more = lighter[i] / w - w / w
         velocity[i, 0] += more * kick * acceleration[i, 0]
         velocity[i, 1] += more * kick * acceleration[i, 1]
@@ -65,10 +66,10 @@ def _pull(position, velocity, acceleration, inverse_mass, lighter, kick, fall, i
 
 
 @kernel
-def keep_weight(position, velocity, acceleration, inverse_mass, lighter, kick, fall):
-    """Let each circle's weight be that of its own mass."""
+def keep_weight(position, velocity, acceleration, inverse_mass, lighter, held, kick, fall):
+    """Let the weight of each circle that walls hold, through others, be that of its own mass."""
     for i in range(position.shape[0]):
-        _pull(position, velocity, acceleration, inverse_mass, lighter, kick, fall, i)
+        _pull(position, velocity, acceleration, inverse_mass, lighter, held, kick, fall, i)
 
 
 @kernel
@@ -104,11 +105,11 @@ def share(mass, inverse_mass, first, count, pair_i, pair_j, touching, impulse, t
 
 
 @kernel
-def settle(position, velocity, acceleration, mass, inverse_mass, lighter, kick, fall, touched, back, h, lent, busy):
+def settle(position, velocity, acceleration, mass, inverse_mass, lighter, held, kick, fall, touched, back, h, lent, busy):
     """Let those that touch nobody fall as they would have, and give the part `back` of every loan back."""
     for i in range(position.shape[0]):
         if not touched[i]:
-            _pull(position, velocity, acceleration, inverse_mass, lighter, -kick, -fall, i)
+            _pull(position, velocity, acceleration, inverse_mass, lighter, held, -kick, -fall, i)
         busy[i] = max(busy[i] - h, h - h)
         lent[i] -= back * lent[i]
         if abs(lent[i]) < mass.dtype.type(_NOTHING) * mass[i]:

@@ -13,6 +13,9 @@ from pyverlet._lanes import copy_row, larger_finite
 
 _ONE = np.uint64(1)
 
+# What holds a particle at rest: a wall, others, or both.
+ON_WALL, IN_PILE = 1, 2
+
 _BLOCK = 4096
 """Particles that one thread looks at, at a time."""
 
@@ -163,13 +166,41 @@ def any_differs(a, b, c, d, e, f, a_now, b_now, c_now, d_now, e_now, f_now):
 
 
 @kernel
-def clear_where(vectors, flag):
-    """Set the flagged rows of an (n, 2) array to 0."""
-    zero = vectors.dtype.type(0)
-    for i in range(vectors.shape[0]):
-        if flag[i] != 0:
-            vectors[i, 0] = zero
-            vectors[i, 1] = zero
+def pick_falling(resting, velocity, acceleration, before, particle, lag, dt):
+    """Circles that touch others but fall as if alone rest on nobody: those whose velocity has followed half of a or more.
+
+    before: (n, 2) velocities dt seconds ago, by `particle`. lag: s, how far behind `velocity` is.
+    """
+    half = dt / (dt + dt)
+    for k in range(resting.shape[0]):
+        if resting[k] == IN_PILE:
+            i = np.int64(particle[k])
+            ax, ay = acceleration[k, 0], acceleration[k, 1]
+            gained = (velocity[k, 0] + lag * ax - before[i, 0]) * ax + (velocity[k, 1] + lag * ay - before[i, 1]) * ay
+            if gained > half * dt * (ax * ax + ay * ay):
+                resting[k] = 0
+
+
+@kernel
+def remember_rest(acceleration, velocity, resting, lean, h):
+    """Scale the accelerations of those that are held, so that h / 2 of it makes of what they carry weight with no velocity.
+
+    Nothing for who rests on a wall alone: it has none. Among others that is lean |a| h against a; at a wall what there is of it.
+    """
+    zero, one = h - h, h / h
+    for i in range(acceleration.shape[0]):
+        if resting[i] != 0:
+            ax, ay = acceleration[i, 0], acceleration[i, 1]
+            part = zero
+            if resting[i] & IN_PILE:
+                part = lean
+            if resting[i] == ON_WALL | IN_PILE:
+                along = -(velocity[i, 0] * ax + velocity[i, 1] * ay)
+                square = h * (ax * ax + ay * ay)
+                part = min(max(along / square, zero), lean) if square > zero else zero
+            part *= one + one
+            acceleration[i, 0] = part * ax
+            acceleration[i, 1] = part * ay
 
 
 @kernel

@@ -36,6 +36,7 @@ from pyverlet._lanes import (
     which_above,
 )
 from pyverlet.constants import CLOSE, DEEP, DEEP_PART, DEEP_SWEEPS, LARGEST_PUSH, PUSHED
+from pyverlet.kernels.motion import IN_PILE
 
 # Golden angle, rad: coincident centres part in directions spread evenly over the circle.
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
@@ -331,14 +332,14 @@ def mark_strip(flag, lane_i, lane_j, normal_x, normal_y):
         nx, ny = load(normal_x, k), load(normal_y, k)
         touches = which_above(nx * nx + ny * ny, zero)
         for lane in range(LANES):
-            bit = np.uint8((touches >> lane) & 1)
+            bit = np.uint8(((touches >> lane) & 1) * IN_PILE)
             flag[lane_i[k + lane]] |= bit
             flag[lane_j[k + lane]] |= bit
 
 
 @kernel
 def mark_touching(cut, begin, lanes, lane_i, lane_j, normal, flag, fresh):
-    """flag[i] = 1 for every particle of a touching pair. fresh[0] = 1: `project` notes anew who overlaps deeply."""
+    """flag[i] gains IN_PILE for every particle of a touching pair. fresh[0] = 1: `project` notes anew who overlaps deeply."""
     fresh[0] = 1
     for parity in range(2):
         for part in range(cut.shape[1] - 1):

@@ -15,12 +15,14 @@ MOST_OVERLAP = 0.10
 """Of the contact distance, in a pile of unequal circles."""
 
 
-def pile(particles: int, seconds: float, radius_ratio: float, mass_ratio: float, independent: bool = False) -> Result:
+def pile(
+    particles: int, seconds: float, radius_ratio: float, mass_ratio: float, independent: bool = False, seed: int = 1
+) -> Result:
     """Unequal circles settle in one pile: radii and masses uniform in their logarithm.
 
     The larger is the heavier, unless they are drawn independently: then small heavy ones lie on large light ones.
     """
-    rng = np.random.default_rng(1)
+    rng = np.random.default_rng(seed)
     size = rng.uniform(0, 1, particles)
     size[:2] = 0, 1  # both ends are there
     radius = RADIUS * radius_ratio ** (size - 1)
