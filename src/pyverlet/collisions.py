@@ -15,9 +15,10 @@ from pyverlet.constants import FED, FED_SMOOTH, LARGEST_PUSH, PUSHED, REST_ACCEL
 from pyverlet.errors import InputError
 from pyverlet.events import Events
 from pyverlet.growth import Growth
-from pyverlet.kernels import contacts, friction, impacts, motion, refine
+from pyverlet.kernels import contacts, friction, impacts, refine
 from pyverlet.kernels.bounds import AT_WALL, CARRIED, CARRIES
 from pyverlet.loans import Lent, Loans
+from pyverlet.moves import pick_falling
 from pyverlet.packs import Packs
 from pyverlet.sleep import Sleep
 from pyverlet.slips import Kept, Slips
@@ -296,8 +297,7 @@ class ContactSolver:
         if self._lends:
             self._loans.let_fall(state)
         else:
-            moving = (state.velocity, state.acceleration, before.velocity, state.particle)
-            motion.pick_falling(state.resting, *moving, *state.reals(lag, dt))
+            pick_falling(state, before.velocity, lag, dt)
         if self._sleep and self._sleep.end(state, self.broad_phase.list, dt, float(np.hypot(*gravity))):
             self.broad_phase.forget()  # it has no use for pairs among sleepers
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from pyverlet._trace import more_than_calls
 from pyverlet.kernels import motion
-from pyverlet.moves import advance
+from pyverlet.moves import advance, remember_rest
 from pyverlet.state import Slots
 
 
@@ -178,8 +178,7 @@ class _Stormer(Integrator):
         forces.kick_drift(state, t, h, ahead)
 
     def end(self, state: Slots, h: float) -> None:
-        held = (state.acceleration, state.velocity, state.resting)
-        motion.remember_rest(*held, *state.reals(state.lean, h))
+        remember_rest(state, h)
         _kick(state, 0.5 * h)
 
 

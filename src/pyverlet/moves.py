@@ -36,6 +36,21 @@ def strayed(state: Slots, reference: Array, distance: float) -> bool:
     return bool(_light(motion.strayed, reference)(state.position, reference, state.real(distance * distance)))
 
 
+def pick_falling(state: Slots, before: Array, lag: float, dt: float) -> None:
+    """Circles that touch others but fall as if alone rest on nobody: `resting` is 0 for them.
+
+    before: (n, 2) velocities dt seconds ago, m/s, in the user's order.
+    """
+    moving = state.velocity, state.acceleration, before, state.particle
+    _light(motion.pick_falling, state.position)(state.resting, *moving, *state.reals(lag, dt))
+
+
+def remember_rest(state: Slots, h: float) -> None:
+    """Scale the accelerations of those that are held, so that h / 2 of it makes of what they carry weight with no velocity."""
+    held = state.acceleration, state.velocity, state.resting
+    _light(motion.remember_rest, state.position)(*held, *state.reals(state.lean, h))
+
+
 def _light(kernel: Kernel, particles: Array) -> Kernel:
     """For loops so light that a meeting of the threads costs more in all but the largest worlds."""
     return kernel if len(particles) >= SERIAL_BELOW else kernel.alone

@@ -141,6 +141,23 @@ def test_whatever_changes_between_frames_is_seen(both: Any, first: str) -> None:
     assert both(lambda: pour(boundary=ROOMS["cage"]()), 60, meanwhile) > 0
 
 
+def test_shorter_frames_of_the_same_substeps_are_not_taken_for_the_longer_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+    # What a frame looks back on is as long as the frame.
+    def stepped(most: int) -> list[Any]:
+        monkeypatch.setattr(repeats, "REPEAT_BELOW", most)
+        world = pour(boundary=ROOMS["cage"]())
+        for _ in range(90):
+            world.step(1 / 60)
+        world.substeps = 2
+        seen = []
+        for _ in range(60):
+            world.step(1 / 240)
+            seen.append(told(world))
+        return seen
+
+    assert stepped(10_000) == stepped(0)
+
+
 def test_a_copy_has_calls_of_its_own() -> None:
     one = pour(boundary=ROOMS["cage"]())
     one.run(seconds=5)

@@ -165,14 +165,14 @@ def any_differs(a, b, c, d, e, f, a_now, b_now, c_now, d_now, e_now, f_now):
     )
 
 
-@kernel
+@parallel_kernel
 def pick_falling(resting, velocity, acceleration, before, particle, lag, dt):
     """Circles that touch others but fall as if alone rest on nobody: those whose velocity has followed half of a or more.
 
     before: (n, 2) velocities dt seconds ago, by `particle`. lag: s, how far behind `velocity` is.
     """
     half = dt / (dt + dt)
-    for k in range(resting.shape[0]):
+    for k in prange(resting.shape[0]):
         if resting[k] == IN_PILE:
             i = np.int64(particle[k])
             ax, ay = acceleration[k, 0], acceleration[k, 1]
@@ -181,14 +181,14 @@ def pick_falling(resting, velocity, acceleration, before, particle, lag, dt):
                 resting[k] = 0
 
 
-@kernel
+@parallel_kernel
 def remember_rest(acceleration, velocity, resting, lean, h):
     """Scale the accelerations of those that are held, so that h / 2 of it makes of what they carry weight with no velocity.
 
     Nothing for who rests on a wall alone: it has none. Among others that is lean |a| h against a; at a wall what there is of it.
     """
     zero, one = h - h, h / h
-    for i in range(acceleration.shape[0]):
+    for i in prange(acceleration.shape[0]):
         if resting[i] != 0:
             ax, ay = acceleration[i, 0], acceleration[i, 1]
             part = zero
