@@ -46,6 +46,7 @@ class Fused:
 
         last: there is none after it in this frame.
         """
+        self.leapt = False
         state: Slots = world._slots
         if len(state) < FUSED_FROM or world.forces or world.links or world.obstacles:
             return False

@@ -54,6 +54,21 @@ def by_stages() -> pv.World:
     return world
 
 
+def test_a_list_out_of_order_in_the_midst_of_a_frame(monkeypatch: pytest.MonkeyPatch, small_ones_too: pytest.MonkeyPatch) -> None:
+    # The substep before has begun the next one, which then goes stage by stage; those after it must be begun anew.
+    monkeypatch.setattr(broadphase, "FUSED_FROM", 10**9)
+    world, fell_back = heap(6000, 0.1), 0
+    for _ in range(100):
+        world.step(1 / 60)
+        fell_back += is_fused(world) and "contacts" in world.profile.stages
+    assert fell_back > 3
+    small_ones_too.undo()
+    expected = heap(6000, 0.1)
+    for _ in range(100):
+        expected.step(1 / 60)
+    assert same(world, expected)
+
+
 @pytest.mark.usefixtures("small_ones_too")
 @pytest.mark.parametrize("threads", range(1, _jit.max_threads() + 1))
 def test_the_bits_are_those_of_the_stages(by_stages: pv.World, threads: int) -> None:
