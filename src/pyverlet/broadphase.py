@@ -116,6 +116,8 @@ class BroadPhase(ABC):
     built: Array
     """(n, 2) positions the list was made from, m."""
     rebuilds: int = 0
+    spared: bool = False
+    """Set if the next `update` need not look: whoever moved the particles has found that the list is still good."""
     renewing: Callable[[Slots, PairList], None] | None = None
     """Called when the list is about to be made anew."""
     replacing: Callable[[], None] | None = None
@@ -146,9 +148,6 @@ class BroadPhase(ABC):
     def strips(self) -> Strips | None:
         """Where the particles of each strip of the list stand; None if they stand anywhere."""
         return None
-
-    def spare_look(self) -> None:
-        """The next `update` need not look: whoever moved the particles has found that the list is still good."""
 
     def release(self) -> None:
         """Nobody needs the pairs themselves until the list is made anew: their memory may go."""
@@ -234,12 +233,11 @@ class _SortedCells(BroadPhase):
         self._mean_radius = 0.0  # m; 0: not known. Its last bit depends on the order of the slots, so it is saved, too
         self.built = self._checked = np.empty((0, 2), dtype)
         self._held = np.zeros(1, np.int64)  # circles in all strips before each
-        self._spared = False  # the next look at who has moved
 
     def update(self, state: Slots) -> None:
         self._age += 1
         if self._allowed >= 0:
-            spared, self._spared = self._spared, False
+            spared, self.spared = self.spared, False
             if spared or self._still_good(state):
                 return
             if self._adapts:
@@ -259,13 +257,9 @@ class _SortedCells(BroadPhase):
             return None
         return Strips(self._held, self._checked, self._allowed)
 
-    def spare_look(self) -> None:
-        self._spared = True
-
     def forget(self) -> None:
         self._allowed = -1.0
         self._mean_radius = 0.0
-        self._spared = False
 
     def release(self) -> None:
         self.list.count.fill(0)

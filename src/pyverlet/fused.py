@@ -31,14 +31,16 @@ class Fused:
     """
 
     def __init__(self) -> None:
-        self.begin()
+        self.leapt = False
         self._held: Array | None = None
         self._cut = self._place = np.zeros(0, np.int64)
         self._normal = np.empty((2, 0))
 
-    def begin(self) -> Fused:
-        """A frame begins."""
+    def begin(self, contacts: ContactSolver | None) -> Fused:
+        """A frame begins. That before may have been broken off, and the user may have changed everything since."""
         self.leapt = False
+        if contacts:
+            contacts.broad_phase.spared = False
         return self
 
     def substep(self, world: Any, contacts: ContactSolver, h: float, lag: float, *, last: bool) -> bool:
@@ -71,8 +73,7 @@ class Fused:
             kernels.Rules._make((int(looks), int(leaps), int(last), *push, *room, far)),
         )
         self.leapt = leaps
-        if leaps and not strayed:
-            phase.spare_look()
+        phase.spared = leaps and not strayed
         return True
 
     def _share_out(self, strips: Strips, lanes: Array, dtype: np.dtype[Any]) -> None:

@@ -121,9 +121,9 @@ class World(Measures, Queries, Doors):
 
     def _frame(self, h: float, done: Callable[[str], None]) -> None:
         """The table of contents of the engine. `done` is told the name of each stage as it ends."""
-        state, forces, integrator, fused = self._slots, self._force_sum, self.integrator, self._fused.begin()
+        state, forces, integrator = self._slots, self._force_sum, self.integrator
         contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course or None
-        lag, state.drop = integrator.velocity_lag * h, integrator.drop
+        fused, lag, state.drop = self._fused.begin(contacts), integrator.velocity_lag * h, integrator.drop
         parts: list[Any] = [part for part in (contacts, links, course) if part]
         frame = self._repeats.frame(self, h, contacts, done)
         if not self._open(frame, h, done):
