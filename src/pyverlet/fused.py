@@ -52,12 +52,9 @@ class Fused:
         state: Slots = world._slots
         if len(state) < FUSED_FROM or world.forces or world.links or world.obstacles:
             return False
-        room, phase = (
-            world.boundary.held(state, h, lag, REST_ACCELERATIONS * world._force_sum.strongest * h),
-            contacts.broad_phase,
-        )
+        rest_speed, phase = REST_ACCELERATIONS * world._force_sum.strongest * h, contacts.broad_phase
+        room, strips = world.boundary.held(state, h, lag, rest_speed), phase.strips()
         packs = contacts.packs(state) if room else None
-        strips = phase.strips()
         if not (packs and strips):
             return False
         leaps = world.integrator.leaps and not world.onlooker and not last  # who looks on may turn gravity

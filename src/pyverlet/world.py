@@ -173,14 +173,15 @@ class World(Measures, Queries, Doors):
             self._contacts.broad_phase.forget()
         self._course.begin()
         self._clear_notes()
-        if not frame.made(OPENING):
-            with frame.noted(OPENING):
-                self._gather()
-                if self._sleep and self._sleep.all_asleep(self._slots):
-                    done("gather")
-                    return False
-                self.integrator.begin(self._slots, self._force_sum, self.time, h, self._h_last)
-        done("gather")
+        if frame.made(OPENING):
+            done("gather")
+            return True
+        with frame.noted(OPENING):
+            self._gather()
+            done("gather")  # before the velocities are those of the integrator
+            if self._sleep and self._sleep.all_asleep(self._slots):
+                return False
+            self.integrator.begin(self._slots, self._force_sum, self.time, h, self._h_last)
         return True
 
     def _gather(self) -> None:

@@ -99,8 +99,8 @@ def test_verlet_and_semi_implicit_euler_reach_the_same_heights(name: str) -> Non
 
 
 def test_more_substeps_make_a_firmer_heap() -> None:
-    # Overlap at rest goes with h^2: 6 substeps leave a 36th of 1, give or take what still moves.
-    overlaps = [world.overlap().max for _, _, world in heights("cage-brute-force", 10)]
+    # Overlap at rest goes with h^2: 6 substeps leave a 36th of 1, give or take what still moves. The largest of 400 is luck.
+    overlaps = [world.overlap().mean for _, _, world in heights("cage-brute-force", 10)]
     assert overlaps[0] > 2 * overlaps[1] > 8 * overlaps[2]
 
 

@@ -337,12 +337,12 @@ def mark_strip(flag, lane_i, lane_j, normal_x, normal_y):
             flag[lane_j[k + lane]] |= bit
 
 
-@kernel
+@parallel_kernel
 def mark_touching(cut, begin, lanes, lane_i, lane_j, normal, flag, fresh):
     """flag[i] gains IN_PILE for every particle of a touching pair. fresh[0] = 1: `project` notes anew who overlaps deeply."""
     fresh[0] = 1
     for parity in range(2):
-        for part in range(cut.shape[1] - 1):
+        for part in prange(cut.shape[1] - 1):
             for half in range(cut[parity, part], cut[parity, part + 1]):
                 a, b = begin[2 * half + parity], begin[2 * half + parity] + lanes[2 * half + parity]
                 mark_strip(flag, lane_i[a:b], lane_j[a:b], normal[0, a:b], normal[1, a:b])

@@ -36,7 +36,7 @@ CHECKS: tuple[Check, ...] = (
     Check("heavy-on-smooth-bed", sizes.heavy_on_bed, {"friction": 0.0, "particles": 1000}),
     Check("sliding-disc", friction.sliding_disc),
     Check("slope", friction.slope),
-    Check("repose", friction.repose, {"heaps": 6}, full={"heaps": 12}),
+    Check("repose", friction.repose, {"heaps": 12}),
     Check("free-spin", friction.free_spin),
     Check("energy-scenes", energy.in_scenes, {"seconds": 4}, full={"seconds": 30}),
     Check("energy-gas", energy.in_gas, {"seconds": 4}, full={"seconds": 30}),
