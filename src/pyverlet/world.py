@@ -215,8 +215,7 @@ class World(Measures, Queries, Doors):
         if not frame.made(CLOSING):
             with frame.noted(CLOSING):
                 if contacts:
-                    lag = self.integrator.velocity_lag * h
-                    contacts.end(self._slots, self._state, lag, self.substeps * h, self.gravity)
+                    contacts.end(self._slots, self._state, self.integrator.velocity_lag * h, self.substeps * h, self.gravity)
                 self.integrator.end(self._slots, h)
         if contacts and watch:
             contacts.growth.heed(watch.close(self._slots, contacts.listed()))
