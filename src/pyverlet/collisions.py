@@ -124,6 +124,7 @@ class ContactSolver:
             self._unlist(self.broad_phase.list, state.particle)
             free = state.inverse_mass[state.inverse_mass > 0]
             self._uneven = bool(len(free)) and float(free.max()) > UNEVEN * float(free.min())
+            self._lends &= self._uneven
             self._packed = False
 
     def _pack(self, state: Slots) -> Packs:

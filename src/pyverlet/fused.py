@@ -44,13 +44,13 @@ class Fused:
         return self
 
     def substep(self, world: Any, contacts: ContactSolver, h: float, lag: float, *, last: bool) -> bool:
-        """After the broad phase of this substep; False if nothing has been done, and it must be gone through stage by stage.
+        """After the broad phase of a substep of a plain frame; False if nothing has been done: it must go stage by stage.
 
         last: there is none after it in this frame.
         """
         self.leapt = False
         state: Slots = world._slots
-        if len(state) < FUSED_FROM or world.forces or world.links or world.obstacles:
+        if len(state) < FUSED_FROM:
             return False
         rest_speed, phase = REST_ACCELERATIONS * world._force_sum.strongest * h, contacts.broad_phase
         room, strips = world.boundary.held(state, h, lag, rest_speed), phase.strips()

@@ -26,22 +26,27 @@ class Repeats:
 
     def frame(self, world: Any, h: float, contacts: ContactSolver | None, done: Callable[[str], None]) -> Frame:
         """A frame begins. `contacts`: those of the world, if it has more than one particle."""
-        plain = not (world.forces or world.links or world.obstacles or world.onlooker) and done == world.profile.mark
-        return Frame(self._traces, plain and len(world) < REPEAT_BELOW and world.integrator.repeats, world, h, contacts)
+        plain = not (world.forces or world.links or world.obstacles) and done == world.profile.mark
+        return Frame(self._traces, plain, world, h, contacts)
 
 
 class Frame:
     """One frame: which of its parts are left to Python.
 
     What they depend on is asked anew only after Python has been there.
+
+    Attributes:
+        plain: whether nothing acts but gravity, contacts and the room, and nobody but the profile is told of stages.
     """
 
     def __init__(self, traces: tuple[Trace, ...], plain: bool, world: Any, h: float, contacts: ContactSolver | None) -> None:
-        self._traces, self._plain, self._world, self._h, self._contacts = traces, plain, world, h, contacts
+        self.plain = plain
+        self._repeats = plain and not world.onlooker and len(world) < REPEAT_BELOW and world.integrator.repeats
+        self._traces, self._world, self._h, self._contacts = traces, world, h, contacts
         self._known: Hashable = None
 
     def _ask(self) -> Hashable:
-        if self._known is None and self._plain:
+        if self._known is None and self._repeats:
             self._known = _key(self._world, self._h, self._contacts)
         return self._known
 
@@ -58,7 +63,7 @@ class Frame:
 
     def substeps(self, count: int) -> Iterable[tuple[int, bool]]:
         """The substeps that are left to Python, each with whether the particles have moved already."""
-        if not self._plain:
+        if not self._repeats:
             return ((substep, False) for substep in range(count))
         done, begun = self._ahead(count)
         return self._left(done, begun, count) if done < count else ()

@@ -139,7 +139,7 @@ class World(Measures, Queries, Doors):
             if contacts:
                 contacts.find(state, lag)
                 done("broad phase")
-                if done == self.profile.mark and fused.substep(self, contacts, h, lag, last=substep + 1 == self.substeps):
+                if frame.plain and fused.substep(self, contacts, h, lag, last=substep + 1 == self.substeps):
                     done("fused")
                     continue
                 contacts.project(state, h, lag, forces.strongest)

@@ -165,6 +165,17 @@ def test_sliding_on_a_floor_unequal_circles_keep_what_momentum_is_along_it(frict
         assert world.momentum()[0] == pytest.approx(start, abs=(1e-3 if friction else 1e-11) * scale)
 
 
+def test_who_lends_no_more_rests_as_others_do() -> None:
+    # Unequal ones have met in the air, where nothing holds them; equal ones then stand on a floor, and nobody among them falls.
+    world = pv.World(boundary=pv.Box((0, 0), (1, 20)))
+    circles = world.add(position=[(0.5, 15), (0.5, 15.999)], radius=0.5, mass=[1.0, 1000.0])
+    world.run(seconds=0.2)
+    circles.mass[:] = 1.0
+    world.add(position=[(0.5, 2), (0.5, 4), (0.5, 6)], radius=0.5)
+    world.run(seconds=20)
+    assert world._slots.resting.all()
+
+
 def test_a_floor_does_not_feel_what_a_heavy_circle_has_lent() -> None:
     # Light ones between it and the floor would have their own small inertia against contacts as stiff as a large one's.
     world, circles = column(10, 1000.0)
