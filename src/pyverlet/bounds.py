@@ -30,7 +30,7 @@ class Boundary(ABC):
         """Bounce or hold every circle that reaches beyond a wall. `lag`: seconds the velocity is behind the position."""
 
     def held(self, state: Slots, h: float, lag: float, rest_speed: float) -> tuple[Any, ...] | None:
-        """x, y, radius, h, lag and rest_speed as `kernels.cage.hold` takes them, if `confine` is but that."""
+        """x, y, radius, h, lag and rest_speed as `hold` takes them, if `confine` is but that."""
         return None
 
     def repeats(self) -> tuple[Any, ...] | None:
@@ -91,6 +91,16 @@ class _Walls(Boundary):
         return self._shape, self._laws
 
 
+def hold(state: Slots, numbers: tuple[Any, ...], arriving: tuple[Any, ...] | None = None) -> None:
+    """Smooth circles stay in a smooth round room; numbers: `Boundary.held`.
+
+    arriving: origin, moved and feed, if contacts have `moved` them and they have yet to arrive there (`kernels.cage.hold`).
+    """
+    bodies = (state.position, state.velocity, state.acceleration, state.radius, state.inverse_mass, state.resting, state.hits)
+    where = (1, *arriving) if arriving else (0, state.position, state.position, numbers[3])
+    cage.hold(*numbers[:3], *bodies, *numbers[3:], *where)
+
+
 class Circle(_Walls):
     """A circular cage: particles stay inside.
 
@@ -119,8 +129,7 @@ class Circle(_Walls):
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         if numbers := self.held(state, h, lag, rest_speed):
-            bodies = (state.position, state.velocity, state.acceleration, state.radius, state.inverse_mass)
-            cage.hold(*numbers[:3], *bodies, state.resting, state.hits, *numbers[3:])
+            hold(state, numbers)
         else:
             self._confine(bounds.circle, (*self.center, self.radius), state, h, lag, rest_speed)
 

@@ -99,7 +99,7 @@ def rows_of(first: Array, count: Array, pair_i: Array, pair_j: Array) -> Array:
 
 
 class Strips(NamedTuple):
-    """Slots in the order of the cells: those of strip s from held[s] to held[s + 1].
+    """If slots are in the order of the cells, those of strip s stand from held[s] to held[s + 1].
 
     The list is good as long as nobody is farther than `allowed`, m, from where `checked` (n, 2) says.
     """
@@ -107,6 +107,7 @@ class Strips(NamedTuple):
     held: Array
     checked: Array
     allowed: float
+    in_order: bool
 
 
 class BroadPhase(ABC):
@@ -146,7 +147,7 @@ class BroadPhase(ABC):
         """So many have gone by in which `update` would have done nothing."""
 
     def strips(self) -> Strips | None:
-        """Where the particles of each strip of the list stand; None if they stand anywhere."""
+        """Where the particles of each strip of the list stand; None if there is no such list."""
         return None
 
     def release(self) -> None:
@@ -253,9 +254,10 @@ class _SortedCells(BroadPhase):
         self._age += substeps
 
     def strips(self) -> Strips | None:
-        if self._allowed < 0 or self._grids.falls or len(self._grids.levels.base) > 1:
+        if self._allowed < 0:
             return None
-        return Strips(self._held, self._checked, self._allowed)
+        in_order = not self._grids.falls and len(self._grids.levels.base) == 1
+        return Strips(self._held, self._checked, self._allowed, in_order)
 
     def forget(self) -> None:
         self._allowed = -1.0

@@ -69,9 +69,9 @@ CLOSE: Final = 1.05
 """Of the contact distance: listed pairs nearer than this are solved last, apart from the others: hardly any of these touches
 while the list lasts. Among falling circles these others are most, in a settled pile a tenth."""
 
-SERIAL_BELOW: Final = 32768
-"""Worlds with fewer particles run the simple loops on one thread: over 32,768 of them that takes 22 us, 15 on two threads, and
-each meeting of the threads, 1.4 us at best, waits for the slowest when the machine is busy."""
+KNOWN_FROM: Final = 32768
+"""Arrays of so many rows are not copied when a frame begins if a digest says that nobody has changed them (`unchanged`): fewer
+are copied as fast."""
 
 FUSED_FROM: Final = 150_000
 """Circles from which on a substep is done strip by strip rather than stage by stage (`kernels.fused`): fewer fit into the caches

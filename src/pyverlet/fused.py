@@ -1,4 +1,8 @@
-"""Worlds too large for the processor's caches go through a substep strip by strip rather than stage by stage: `kernels.fused`."""
+"""Substeps under gravity with smooth inelastic contacts only: loops are fused, so that threads meet less and memory is read less.
+
+Worlds too large for the processor's caches go strip by strip (`kernels.fused`). In others the stages remain, but circles arrive
+where contacts have moved them when the wall holds them, and begin the next substep all at once.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet import _jit
+from pyverlet.bounds import hold
 from pyverlet.broadphase import Strips
 from pyverlet.collisions import ContactSolver
-from pyverlet.constants import FED_SMOOTH, FUSED_FROM, LARGEST_PUSH, PUSHED, REST_ACCELERATIONS
+from pyverlet.constants import FUSED_FROM, REPEAT_BELOW, REST_ACCELERATIONS
 from pyverlet.kernels import fused as kernels
+from pyverlet.moves import leap
+from pyverlet.packs import Packs
 from pyverlet.state import Slots
 
 Array = NDArray[Any]
@@ -24,7 +31,7 @@ _KEPT = 8
 
 
 class Fused:
-    """Contacts, bounds and velocities of smooth inelastic circles in a smooth cage, and the integration of the next substep.
+    """Contacts, bounds and velocities of smooth inelastic circles, and the integration of the next substep.
 
     Attributes:
         leapt: whether that has been done, too.
@@ -32,46 +39,66 @@ class Fused:
 
     def __init__(self) -> None:
         self.leapt = False
+        self._out = False  # whether `moved` of the packs has been set for the next substep
         self._held: Array | None = None
         self._cut = self._place = np.zeros(0, np.int64)
         self._normal = np.empty((2, 0))
 
     def begin(self, contacts: ContactSolver | None) -> Fused:
         """A frame begins. That before may have been broken off, and the user may have changed everything since."""
-        self.leapt = False
+        self.leapt = self._out = False
         if contacts:
             contacts.broad_phase.spared = False
         return self
 
     def substep(self, world: Any, contacts: ContactSolver, h: float, lag: float, *, last: bool) -> bool:
-        """After the broad phase of a substep of a plain frame; False if nothing has been done: it must go stage by stage.
+        """After the broad phase of a substep of a plain frame; False if nothing has been done: there is more to it.
 
         last: there is none after it in this frame.
         """
         self.leapt = False
-        state: Slots = world._slots
-        if len(state) < FUSED_FROM:
-            return False
-        rest_speed, phase = REST_ACCELERATIONS * world._force_sum.strongest * h, contacts.broad_phase
-        room, strips = world.boundary.held(state, h, lag, rest_speed), phase.strips()
-        packs = contacts.packs(state) if room else None
+        state, phase = world._slots, contacts.broad_phase
+        strips = phase.strips() if len(state) >= REPEAT_BELOW else None
+        packs = contacts.packs(state) if strips else None
         if not (packs and strips):
             return False
+        rest_speed = REST_ACCELERATIONS * world._force_sum.strongest * h
+        room, feed = world.boundary.held(state, h, lag, rest_speed), packs.feed(state, h)
         leaps = world.integrator.leaps and not world.onlooker and not last  # who looks on may turn gravity
+        if len(state) >= FUSED_FROM and strips.in_order and room:
+            strayed = self._strip_by_strip(state, packs, strips, (leaps, last), (*feed, *room))
+            self._out = False
+            world.profile.mark("fused")
+        else:
+            packs.project(state, h, sets_out=not self._out, arrives=not room)
+            world.profile.mark("contacts")
+            if room:
+                hold(state, room, (packs.origin, packs.moved, feed[0]))
+            else:
+                world.boundary.confine(state, h, lag, rest_speed)
+            world.profile.mark("bounds")
+            packs.still(state, marks=last)
+            world.profile.mark("velocities")
+            strayed = leaps and leap(state, h, strips.checked, strips.allowed, packs.origin, packs.moved)
+            self._out = leaps and not strayed
+            world.profile.mark("integrate")
+        self.leapt, phase.spared = leaps, leaps and not strayed
+        return True
+
+    def _strip_by_strip(
+        self, state: Slots, packs: Packs, strips: Strips, does: tuple[bool, bool], numbers: tuple[Any, ...]
+    ) -> bool:
+        """All of it at once; does: whether it leaps, and marks who rests. Returns whether anyone has strayed."""
         self._share_out(strips, packs.lanes, state.dtype)
-        pairs, looks = packs.for_fused(state, marks=last)
+        pairs, looks = packs.for_fused(state, marks=does[1])
         moving = (state.position, state.velocity, state.acceleration, state.radius, state.inverse_mass, state.resting, state.hits)
-        push = state.reals(FED_SMOOTH / PUSHED / h, LARGEST_PUSH)
-        far = state.real(strips.allowed * strips.allowed)
         strayed = kernels.substep(
             self._cut,
             kernels.Bodies(strips.held, *moving, packs.origin, packs.moved, strips.checked),
             kernels.Pairs._make((*pairs, self._place, self._normal)),
-            kernels.Rules._make((int(looks), int(leaps), int(last), *push, *room, far)),
+            kernels.Rules._make((int(looks), *map(int, does), *numbers, state.real(strips.allowed * strips.allowed))),
         )
-        self.leapt = leaps
-        phase.spared = leaps and not strayed
-        return True
+        return bool(strayed)
 
     def _share_out(self, strips: Strips, lanes: Array, dtype: np.dtype[Any]) -> None:
         """Which strips each thread does, as nearly as many lanes as can be, and where each strip keeps its normals."""

@@ -37,7 +37,7 @@ class Packs:
         self._varied = 0
         self._deeps = np.zeros(0, np.int64)  # packs of each strip that overlap deeply
         self._fresh = np.ones(1, np.uint8)  # 1: they are to be noted, once a frame; a kernel says when it has
-        self._marked = False  # whether `resting` has been set by `kernels.fused`
+        self._marked = False  # whether `resting` has been set already
 
     def _make_room(self, lanes: int) -> None:
         self.lane_i, self.lane_j = (_memory.empty(lanes, np.uint32) for _ in range(2))
@@ -104,22 +104,23 @@ class Packs:
         else:
             self.reach, self.share = np.full(LANES, size[0] + size[0]), np.full(LANES, self._dtype.type(0.5))
 
-    def project(self, state: Slots, h: float, fed: float = FED_SMOOTH) -> None:
-        """Move overlapping circles apart and feed their velocities."""
+    def project(self, state: Slots, h: float, fed: float = FED_SMOOTH, *, sets_out: bool = True, arrives: bool = True) -> None:
+        """Move overlapping circles apart and feed their velocities: all of it, or but what has `moved` to do with pairs."""
         if self._size is not state.size:
             self._share_out(state)
         if self.normal.shape != self.gap.shape:
             self.normal = _memory.empty(self.gap.shape, self._dtype)
         where = (self._parts(), self.begin, self.lanes, self.apart, self.lane_i, self.lane_j, self.gap)
-        settings = (self.reach, self.share, self._varied, *state.reals(fed / PUSHED / h, LARGEST_PUSH))
-        notes = (self.normal, self._depths, self._deep, self._deeps, self._fresh)
+        settings = (self.reach, self.share, self._varied, *self.feed(state, h, fed))
+        notes = (self.normal, self._depths, self._deep, self._deeps, self._fresh, int(sets_out), int(arrives))
         self._marked = False
         packs.project(state.position, state.velocity, self.origin, self.moved, *where, *settings, *notes)
 
-    def still(self, state: Slots) -> None:
-        """Take from touching circles the velocity that projection has put in."""
+    def still(self, state: Slots, *, marks: bool = False) -> None:
+        """Take from touching circles the velocity that projection has put in; mark them as resting, too."""
         where = (self._cut, self.begin, self.lanes, self.apart, self.lane_i, self.lane_j)
-        packs.still(state.velocity, *where, self.share, self._varied, self.normal)
+        self._marked = marks
+        packs.still(state.velocity, *where, self.share, self._varied, self.normal, state.resting, int(marks))
 
     def for_fused(self, state: Slots, *, marks: bool) -> tuple[tuple[Any, ...], bool]:
         """The pairs as `kernels.fused` takes them, up to `deeps`, and whether it is to note the deep ones.
@@ -131,6 +132,10 @@ class Packs:
         looks, self._fresh[0], self._marked = bool(self._fresh[0]), 0, marks
         where = (self.begin, self.lanes, self.apart, self.lane_i, self.lane_j, self.gap)
         return (*where, self.reach, self.share, self._varied, self._deep, self._deeps), looks
+
+    def feed(self, state: Slots, h: float, fed: float = FED_SMOOTH) -> tuple[Any, Any]:
+        """What of a move velocities are fed, 1/s, and the largest move, of the contact distance."""
+        return state.reals(fed / PUSHED / h, LARGEST_PUSH)
 
     # ---- friction ------------------------------------------------------------------------------------------------------
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.bounds import Boundary
-from pyverlet.constants import SERIAL_BELOW, SLEEP_NEAR, STANDARD_GRAVITY, SURPLUS
+from pyverlet.constants import ONE_THREAD_BELOW, SLEEP_NEAR, STANDARD_GRAVITY, SURPLUS
 from pyverlet.forces import Conservative, Drag, ForceSum
 from pyverlet.kernels import clusters, measure
 from pyverlet.links import Links
@@ -40,14 +40,13 @@ class Watch:
     def __init__(self, start: State, forces: ForceSum, links: Links, room: Boundary) -> None:
         self._start, self._forces, self._links, self._room = start, forces, links, room
         self._gravity = forces.gravity
-        self._plain = len(start) < SERIAL_BELOW and not (forces.forces or links)
+        self._plain = len(start) < ONE_THREAD_BELOW and not (forces.forces or links)
         self._energy = 0.0 if self._plain else self._look(start)  # what links hold is not known any more when the frame is over
 
     def _look(self, now: State | Slots) -> float:
         """Energy of all, J."""
-        look = measure.mechanical if len(now) >= SERIAL_BELOW else measure.mechanical.alone
-        gravity = self._forces.gravity
-        energy: float = look(now.position, now.velocity, now.velocity, 0.0, now.spin, now.radius, now.mass, *gravity)
+        moving, body = (now.position, now.velocity, now.velocity, 0.0), (now.spin, now.radius, now.mass)
+        energy: float = measure.mechanical(*moving, *body, *self._forces.gravity)
         if self._forces.forces or self._links:
             state = now.in_users_order() if isinstance(now, Slots) else now
             kept = (force for force in self._forces.forces if isinstance(force, Conservative))

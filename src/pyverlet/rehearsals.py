@@ -15,10 +15,11 @@ from pyverlet import _jit
 from pyverlet.bounds import Boundary, Box, Circle, Open
 from pyverlet.broadphase import BruteForce, Fast
 from pyverlet.collisions import Collisions
-from pyverlet.constants import FUSED_FROM, ONE_THREAD_BELOW, SERIAL_BELOW, UNEVEN
+from pyverlet.constants import FUSED_FROM, KNOWN_FROM, ONE_THREAD_BELOW, REPEAT_BELOW, UNEVEN
 from pyverlet.forces import Conservative, Drag
 from pyverlet.group import Group
 from pyverlet.links import Angle, Area, Pin, Spring, Stick
+from pyverlet.moves import leap
 from pyverlet.obstacles import Segment
 from pyverlet.passivity import Watch
 from pyverlet.state import Slots
@@ -30,7 +31,7 @@ _ROOMS = (Open, Circle, Box)
 def rehearse(world: World) -> None:
     """What this world needs: frames of a small one of the same kind, its forces, and sleep."""
     small = _lattice(
-        _enough(world.threads) if len(world) < SERIAL_BELOW else SERIAL_BELOW,
+        max(_enough(world.threads), *(least for least in (0, REPEAT_BELOW, KNOWN_FROM) if len(world) >= least)),
         world.dtype,
         type(world.boundary),
         getattr(world.boundary, "restitution", 0.0),
@@ -39,7 +40,7 @@ def rehearse(world: World) -> None:
         ledger=world.keeps_ledger,
         events=world.tells_events,
     )
-    small.integrator = world.integrator
+    small.integrator, small.substeps = world.integrator, 2  # the first may begin the second
     if world.links:
         _link(small)
     if world.obstacles:
@@ -189,6 +190,8 @@ def _motion(dtype: np.dtype[Any], threads: int) -> None:
     world = _lattice(_enough(threads), dtype, Open, 0.0, None, threads=threads)
     world.forces.append(Drag(linear=0.1))
     _use(world)
+    _jit.use_threads(world.threads)
+    leap(world._slots, 1e-3, world._slots.position.copy(), 1.0, *(np.empty_like(world.position) for _ in range(2)))
 
 
 PARTS: dict[str, Callable[[np.dtype[Any], int], None]] = {

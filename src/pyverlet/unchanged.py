@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.constants import SERIAL_BELOW
+from pyverlet.constants import KNOWN_FROM
 from pyverlet.kernels.digest import digest
 
 Array = NDArray[Any]
@@ -25,7 +25,7 @@ class Unchanged:
 
     def remember(self, arrays: Sequence[Array]) -> None:
         """Know these arrays again once."""
-        self._digests = [_digest(array) for array in arrays] if len(arrays[0]) >= SERIAL_BELOW else []
+        self._digests = [_digest(array) for array in arrays] if len(arrays[0]) >= KNOWN_FROM else []
 
     def recall(self, arrays: Sequence[Array]) -> bool:
         """Whether these are what was remembered last, and not asked for since."""

@@ -140,7 +140,6 @@ class World(Measures, Queries, Doors):
                 contacts.find(state, lag)
                 done("broad phase")
                 if frame.plain and fused.substep(self, contacts, h, lag, last=substep + 1 == self.substeps):
-                    done("fused")
                     continue
                 contacts.project(state, h, lag, forces.strongest)
                 done("contacts")

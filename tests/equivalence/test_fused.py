@@ -1,8 +1,7 @@
-"""A substep strip by strip is, to the last bit, a substep stage by stage."""
+"""A substep with its loops fused, strip by strip or stage by stage, is to the last bit one that goes the long way."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -20,13 +19,38 @@ def slots_in_order(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(broadphase, "FUSED_FROM", 2)
 
 
+class Fusing:
+    """What worlds are fused, and how often, until `undo`: then none is. One of their own way may be small for once."""
+
+    def __init__(self, patch: pytest.MonkeyPatch, *, by_strips: bool) -> None:
+        self._patch, self._by_strips, self.substeps, self.leaps = patch, by_strips, 0, 0
+        patch.setattr(fused, "FUSED_FROM", 2 if by_strips else 10**9)
+        substep = fused.Fused.substep
+
+        def counted(way: fused.Fused, *arguments: Any, **options: Any) -> bool:
+            done = substep(way, *arguments, **options)
+            self.substeps += done
+            self.leaps += way.leapt
+            return done
+
+        patch.setattr(fused.Fused, "substep", counted)
+
+    def undo(self) -> None:
+        self._patch.setattr(fused, "REPEAT_BELOW", 10**9)
+
+    def has(self, world: pv.World) -> bool:
+        """Whether this world has gone this way."""
+        return "fused" in world.profile.stages if self._by_strips else self.substeps > 0
+
+
+@pytest.fixture(params=["strips", "stages"])
+def fusing(request: pytest.FixtureRequest, slots_in_order: None, monkeypatch: pytest.MonkeyPatch) -> Fusing:
+    return Fusing(monkeypatch, by_strips=request.param == "strips")
+
+
 @pytest.fixture
-def small_ones_too(slots_in_order: None) -> Iterator[pytest.MonkeyPatch]:
-    """Fused worlds need not be large for once; until `undo`."""
-    patch = pytest.MonkeyPatch()
-    patch.setattr(fused, "FUSED_FROM", 2)
-    yield patch
-    patch.undo()
+def by_strips(slots_in_order: None, monkeypatch: pytest.MonkeyPatch) -> Fusing:
+    return Fusing(monkeypatch, by_strips=True)
 
 
 def heap(particles: int = 6000, seconds: float = SECONDS, **options: Any) -> pv.World:
@@ -37,54 +61,46 @@ def heap(particles: int = 6000, seconds: float = SECONDS, **options: Any) -> pv.
     return world
 
 
-def is_fused(world: pv.World) -> bool:
-    return "fused" in world.profile.stages
-
-
 def same(one: pv.World, other: pv.World) -> bool:
     return one.state_hash() == other.state_hash() and np.array_equal(one._slots.resting, other._slots.resting)
 
 
 @pytest.fixture(scope="module")
-def by_stages() -> pv.World:
+def expected() -> pv.World:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(broadphase, "FUSED_FROM", 2)
-        world = heap()
-    assert not is_fused(world)
-    return world
+        patch.setattr(fused, "REPEAT_BELOW", 10**9)
+        return heap()
 
 
-def test_a_list_out_of_order_in_the_midst_of_a_frame(monkeypatch: pytest.MonkeyPatch, small_ones_too: pytest.MonkeyPatch) -> None:
-    # The substep before has begun the next one, which then goes stage by stage; those after it must be begun anew.
+def test_a_list_out_of_order_in_the_midst_of_a_frame(monkeypatch: pytest.MonkeyPatch, by_strips: Fusing) -> None:
+    # The substep before has begun the next one, which then goes stage by stage.
     monkeypatch.setattr(broadphase, "FUSED_FROM", 10**9)
     world, fell_back = heap(6000, 0.1), 0
     for _ in range(100):
         world.step(1 / 60)
-        fell_back += is_fused(world) and "contacts" in world.profile.stages
+        fell_back += by_strips.has(world) and "contacts" in world.profile.stages
     assert fell_back > 3
-    small_ones_too.undo()
+    by_strips.undo()
     expected = heap(6000, 0.1)
     for _ in range(100):
         expected.step(1 / 60)
     assert same(world, expected)
 
 
-@pytest.mark.usefixtures("small_ones_too")
 @pytest.mark.parametrize("threads", range(1, _jit.max_threads() + 1))
-def test_the_bits_are_those_of_the_stages(by_stages: pv.World, threads: int) -> None:
+def test_the_bits_are_those_of_the_long_way(expected: pv.World, threads: int, fusing: Fusing) -> None:
     # Contacts, wall, deep pairs, lists made anew: 1.5 s of falling and crashing has them all.
     world = heap(threads=threads)
-    assert is_fused(world)
-    assert same(world, by_stages)
+    assert fusing.has(world)
+    assert same(world, expected)
     assert world.overlap().contacts > 1000
     assert world._contacts is not None
     assert world._contacts.broad_phase.rebuilds > 50
 
 
 @pytest.mark.parametrize("parts", [2, 3, 5])
-def test_borders_between_threads_change_no_bit(
-    parts: int, monkeypatch: pytest.MonkeyPatch, small_ones_too: pytest.MonkeyPatch
-) -> None:
+def test_borders_between_threads_change_no_bit(parts: int, monkeypatch: pytest.MonkeyPatch, by_strips: Fusing) -> None:
     # As many parts as a machine with more cores would have; those of two threads may be done by one.
     monkeypatch.setattr(grids, "STRIP_PARTICLES", 32)  # rows enough for as many
     shared: set[int] = set()
@@ -96,22 +112,22 @@ def test_borders_between_threads_change_no_bit(
             shares_out(self, strips, lanes, dtype)
         shared.add(len(self._cut) - 1)
 
-    small_ones_too.setattr(fused.Fused, "_share_out", among_more)
+    monkeypatch.setattr(fused.Fused, "_share_out", among_more)
     world = heap(20_000, 0.7)
-    small_ones_too.undo()
+    by_strips.undo()
     assert shared == {parts}
     assert same(world, heap(20_000, 0.7))
 
 
 @pytest.mark.parametrize("integrator", [pv.SemiImplicitEuler(), pv.VelocityVerlet(), pv.TimeCorrectedVerlet()], ids=repr)
-def test_with_any_integrator(integrator: pv.Integrator, small_ones_too: pytest.MonkeyPatch) -> None:
+def test_with_any_integrator(integrator: pv.Integrator, fusing: Fusing) -> None:
     world = heap(3000, 0.7, integrator=integrator)
-    assert is_fused(world)
-    small_ones_too.undo()
+    assert fusing.has(world)
+    fusing.undo()
     assert same(world, heap(3000, 0.7, integrator=integrator))
 
 
-def test_who_looks_on_sees_the_same(small_ones_too: pytest.MonkeyPatch) -> None:
+def test_who_looks_on_sees_the_same(fusing: Fusing) -> None:
     def watched() -> tuple[pv.World, list[Any]]:
         world, seen = heap(3000, 0.7), []
         world.onlooker = lambda moment: seen.append((moment.time, [array.sum() for array in moment.look()]))
@@ -119,15 +135,15 @@ def test_who_looks_on_sees_the_same(small_ones_too: pytest.MonkeyPatch) -> None:
         return world, seen
 
     world, seen = watched()
-    assert is_fused(world)
-    small_ones_too.undo()
+    assert fusing.has(world)
+    fusing.undo()
     expected, seen_then = watched()
     assert same(world, expected)
     assert seen == seen_then
     assert len(seen) == 6 * 7
 
 
-def test_radii_that_differ_and_pinned_circles(small_ones_too: pytest.MonkeyPatch) -> None:
+def test_radii_that_differ_and_pinned_circles(fusing: Fusing) -> None:
     def uneven() -> pv.World:
         world = pv.World(boundary=pv.Circle(radius=40))
         x, y = np.meshgrid(np.arange(-25, 25, 1.05), np.arange(-25, 25, 1.05))
@@ -137,39 +153,59 @@ def test_radii_that_differ_and_pinned_circles(small_ones_too: pytest.MonkeyPatch
         return world
 
     world = uneven()
-    assert is_fused(world)
-    small_ones_too.undo()
+    assert fusing.has(world)
+    fusing.undo()
     assert same(world, uneven())
+
+
+def changed(change: Any, fusing: Fusing) -> pv.World:
+    world = heap(2000, 0.2)
+    change(world)
+    fusing.substeps = fusing.leaps = 0
+    world.run(seconds=0.1)
+    return world
 
 
 @pytest.mark.parametrize(
     "change",
     [
         lambda world: world.forces.append(pv.Drag(linear=0.1)),
-        lambda world: setattr(world, "boundary", pv.Circle(radius=world.boundary.radius, friction=0.5)),
-        lambda world: setattr(world, "boundary", pv.Open()),
         lambda world: setattr(world, "collisions", pv.Collisions(friction=0.5)),
         lambda world: setattr(world, "collisions", pv.Collisions(restitution=0.5)),
         lambda world: setattr(world, "collisions", pv.Collisions(method=pv.BruteForce())),
         lambda world: world.links.append(pv.Stick(world.add(position=[(0, 99), (1, 99)], radius=0.1), 0, 1)),
-        lambda world: world.add(position=(0, 0), radius=0.02),
     ],
-    ids=["force", "rough cage", "open", "friction", "bounces", "brute force", "link", "many sizes"],
+    ids=["force", "friction", "bounces", "brute force", "link"],
 )
-def test_whatever_more_there_is_goes_stage_by_stage(change: Any, small_ones_too: pytest.MonkeyPatch) -> None:
-    def changed() -> pv.World:
-        world = heap(2000, 0.2)
-        change(world)
-        world.run(seconds=0.1)
-        return world
-
-    world = changed()
-    assert not is_fused(world)
-    small_ones_too.undo()
-    assert same(world, changed())
+def test_whatever_more_there_is_goes_the_long_way(change: Any, fusing: Fusing) -> None:
+    world = changed(change, fusing)
+    assert not fusing.has(world)
+    assert not fusing.substeps
+    fusing.undo()
+    assert same(world, changed(change, fusing))
 
 
-def test_a_frame_that_was_broken_off_leaves_nothing_behind(small_ones_too: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda world: setattr(world, "boundary", pv.Circle(radius=world.boundary.radius, friction=0.5)),
+        lambda world: setattr(world, "boundary", pv.Circle(radius=world.boundary.radius, restitution=0.5)),
+        lambda world: setattr(world, "boundary", pv.Box((-99, -99), (99, 99))),
+        lambda world: setattr(world, "boundary", pv.Open()),
+        lambda world: world.radius.__setitem__(slice(None, None, 2), 0.15),
+    ],
+    ids=["rough cage", "bouncy cage", "box", "open", "many sizes"],
+)
+def test_other_rooms_and_sizes_go_stage_by_stage(change: Any, fusing: Fusing, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(grids, "CELLS_PER_PARTICLE", 99)  # so few, so thinly spread, would have no second grid
+    world = changed(change, fusing)
+    assert "fused" not in world.profile.stages
+    assert fusing.leaps == 6 * (world.substeps - 1)  # the first substep of a frame is begun by nobody
+    fusing.undo()
+    assert same(world, changed(change, fusing))
+
+
+def test_a_frame_that_was_broken_off_leaves_nothing_behind(fusing: Fusing) -> None:
     def interrupted(at: int) -> pv.World:
         world, calls = heap(3000, 0.7), 0
         assert world._contacts is not None
@@ -191,5 +227,5 @@ def test_a_frame_that_was_broken_off_leaves_nothing_behind(small_ones_too: pytes
         return world
 
     world = interrupted(20)
-    small_ones_too.undo()
+    fusing.undo()
     assert same(world, interrupted(20))

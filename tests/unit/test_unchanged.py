@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.constants import SERIAL_BELOW
+from pyverlet.constants import KNOWN_FROM
 from pyverlet.unchanged import Unchanged
 
 
-def rows(dtype: type = np.float32, count: int = SERIAL_BELOW + 7) -> Any:
+def rows(dtype: type = np.float32, count: int = KNOWN_FROM + 7) -> Any:
     return np.random.default_rng(0).normal(size=(count, 2)).astype(dtype)
 
 
@@ -58,11 +58,11 @@ def test_columns_of_an_odd_number_and_small_arrays() -> None:
 
 @pytest.mark.parametrize("name", ["position", "velocity", "spin"])
 def test_a_large_world_heeds_what_the_user_changes(name: str) -> None:
-    side = 182  # more than SERIAL_BELOW
+    side = 182  # more than KNOWN_FROM
     world = pv.World(gravity=(0, 0), collisions=None)
     y, x = np.mgrid[:side, :side]
     world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.4)
-    assert len(world) > SERIAL_BELOW
+    assert len(world) > KNOWN_FROM
     for _ in range(3):
         world.step(0.1)
     assert not (getattr(world, name)[777] == 3.0).any()

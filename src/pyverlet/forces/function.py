@@ -11,7 +11,6 @@ from typing import Any, NoReturn, overload
 import numpy as np
 
 from pyverlet._native import Native, NotCompiled
-from pyverlet.constants import SERIAL_BELOW
 from pyverlet.errors import InputError, NonFiniteError
 from pyverlet.kernels import forces
 from pyverlet.state import Slots, State
@@ -41,8 +40,7 @@ class FunctionForce:
             InputError: it does not compile, or returns something other than two numbers.
             NonFiniteError: it returned NaN or infinity.
         """
-        call = forces.call if len(state) >= SERIAL_BELOW else forces.call.alone
-        if call(self._code.native().force(state.dtype), state.force, state.position, state.velocity, state.mass, float(t)):
+        if forces.call(self._code.native().force(state.dtype), state.force, state.position, state.velocity, state.mass, float(t)):
             self._blame(state, t)
 
     def _blame(self, state: Slots, t: float) -> None:

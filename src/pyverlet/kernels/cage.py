@@ -24,6 +24,7 @@ from pyverlet._lanes import (
     where_zero,
     which_above,
 )
+from pyverlet.kernels.motion import arrive
 
 # Circles one thread takes at a time.
 _CHUNK = 2048
@@ -127,9 +128,18 @@ def hold_some(
 
 
 @parallel_kernel
-def hold(x0, y0, size, position, velocity, acceleration, radius, inverse_mass, resting, hits, h, lag, rest_speed):
-    """All circles stay inside the cage of radius `size` about (x0, y0); `resting` is 1 for those that were beyond."""
+def hold(
+    x0, y0, size, position, velocity, acceleration, radius, inverse_mass, resting, hits, h, lag, rest_speed,
+    arrives, origin, moved, feed,
+):  # fmt: skip
+    """All circles stay inside the cage of radius `size` about (x0, y0); `resting` is 1 for those that were beyond.
+
+    arrives: 1 if contacts have `moved` them and they have yet to `arrive` there; or 0, and nobody looks at what comes after.
+    """
     count = radius.shape[0]
     for chunk in prange((count + _CHUNK - 1) // _CHUNK):
+        a, b = chunk * _CHUNK, min((chunk + 1) * _CHUNK, count)
+        if arrives:
+            arrive(position[a:b], velocity[a:b], origin[a:b], moved[a:b], feed)
         bodies = (position, velocity, acceleration, radius, inverse_mass, resting, hits)
-        hold_some(x0, y0, size, *bodies, h, lag, rest_speed, chunk * _CHUNK, min((chunk + 1) * _CHUNK, count))
+        hold_some(x0, y0, size, *bodies, h, lag, rest_speed, a, b)

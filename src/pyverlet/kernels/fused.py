@@ -24,8 +24,8 @@ from typing import Any, NamedTuple
 from pyverlet._jit import kernel, parallel_kernel, prange
 from pyverlet._lanes import LANES
 from pyverlet.kernels.cage import hold_some
-from pyverlet.kernels.motion import any_strayed, kick_drift
-from pyverlet.kernels.packs import arrive, mark_strip, project_strip, refine_strip, set_out, still_strip
+from pyverlet.kernels.motion import any_strayed, arrive, kick_drift, set_out
+from pyverlet.kernels.packs import mark_strip, project_strip, refine_strip, still_strip
 
 BEHIND = 5
 """Strips by which the last stage is behind the first, and that a border leaves for later on both of its sides."""

@@ -27,7 +27,7 @@ from pyverlet._lanes import (
 )
 from pyverlet.constants import FED, GRIP, PUSHED
 from pyverlet.kernels.friction import NEW
-from pyverlet.kernels.packs import set_out
+from pyverlet.kernels.motion import set_out
 
 # Particles one thread takes at a time where each is on its own.
 _CHUNK = 1024

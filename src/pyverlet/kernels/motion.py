@@ -16,16 +16,24 @@ _ONE = np.uint64(1)
 # What holds a particle at rest: a wall, others, or both.
 ON_WALL, IN_PILE = 1, 2
 
-_BLOCK = 4096
+_BLOCK = 2048
 """Particles that one thread looks at, at a time."""
 
 
 @parallel_kernel
 def advance(out, base, slope, h):
-    """out = base + h * slope, on (n, 2) arrays; out may be base."""
+    """out = base + h * slope, on (n, 2) arrays. If out is base `move` is faster: this looks whether they are apart."""
     to, start, rate = out.reshape(-1), base.reshape(-1), slope.reshape(-1)
     for k in prange(to.shape[0]):
         to[k] = start[k] + h * rate[k]
+
+
+@parallel_kernel
+def move(what, slope, h):
+    """what += h * slope, on (n, 2) arrays."""
+    to, rate = what.reshape(-1), slope.reshape(-1)
+    for k in prange(to.shape[0]):
+        to[k] = to[k] + h * rate[k]
 
 
 @kernel
@@ -83,10 +91,28 @@ def newton_kick_drift(position, velocity, acceleration, force, inverse_mass, gx,
     for block in prange((inverse_mass.shape[0] + _BLOCK - 1) // _BLOCK):
         a, b = block * _BLOCK, min((block + 1) * _BLOCK, inverse_mass.shape[0])
         if ahead != 0:
-            advance(velocity[a:b], velocity[a:b], acceleration[a:b], -ahead)
+            move(velocity[a:b], acceleration[a:b], -ahead)
         largest = max(largest, _newton(acceleration[a:b], force[a:b], inverse_mass[a:b], gx, gy))
         kick_drift(position[a:b], velocity[a:b], acceleration[a:b], h)
     return np.sqrt(largest)
+
+
+@kernel
+def set_out(position, origin, moved):
+    """moved = position - origin."""
+    x, start, way = position.reshape(-1), origin.reshape(-1), moved.reshape(-1)
+    for k in range(x.shape[0]):
+        way[k] = x[k] - start[k]
+
+
+@kernel
+def arrive(position, velocity, origin, moved, feed):
+    """Add to positions what has been added to `moved`, and feed the velocities."""
+    x, v, start, way = position.reshape(-1), velocity.reshape(-1), origin.reshape(-1), moved.reshape(-1)
+    for k in range(x.shape[0]):
+        by = way[k] - (x[k] - start[k])
+        x[k] = x[k] + by
+        v[k] = v[k] + feed * by
 
 
 @kernel
@@ -111,6 +137,19 @@ def strayed(position, reference, square):
     for block in prange((position.shape[0] + _BLOCK - 1) // _BLOCK):
         first = block * _BLOCK
         found += int(any_strayed(x, start, first, min(first + _BLOCK, position.shape[0]), square))
+    return found > 0
+
+
+@parallel_kernel
+def leap(position, velocity, acceleration, h, reference, square, origin, moved):
+    """`kick_drift`, whether anyone has `strayed` by it, and `set_out` for the contacts: block by block, for the caches' sake."""
+    x, start = position.reshape(-1), reference.reshape(-1)
+    found = 0
+    for block in prange((position.shape[0] + _BLOCK - 1) // _BLOCK):
+        a, b = block * _BLOCK, min((block + 1) * _BLOCK, position.shape[0])
+        kick_drift(position[a:b], velocity[a:b], acceleration[a:b], h)
+        found += int(any_strayed(x, start, a, b, square))
+        set_out(position[a:b], origin[a:b], moved[a:b])
     return found > 0
 
 

@@ -36,13 +36,16 @@ from pyverlet._lanes import (
     which_above,
 )
 from pyverlet.constants import CLOSE, DEEP, DEEP_PART, DEEP_SWEEPS, LARGEST_PUSH, PUSHED
-from pyverlet.kernels.motion import IN_PILE
+from pyverlet.kernels.motion import IN_PILE, arrive, set_out
 
 # Golden angle, rad: coincident centres part in directions spread evenly over the circle.
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 
 # Particles one thread takes at a time where each is on its own.
 _CHUNK = 1024
+
+# Deep packs that are too few to be worth a meeting of the threads.
+_FEW = 64
 
 # Pairs that are looked at again for each new pack.
 _WAITING = 32
@@ -224,45 +227,37 @@ def refine_strip(moved, lane_i, lane_j, gap_x, gap_y, reach, share, varied, deep
     return count
 
 
-# Two passes over all particles, as 2 n numbers one after the other: so they are vectorised.
-
-
 @kernel
-def set_out(position, origin, moved):
-    """moved = position - origin."""
-    x, start, way = position.reshape(-1), origin.reshape(-1), moved.reshape(-1)
-    for k in range(x.shape[0]):
-        way[k] = x[k] - start[k]
-
-
-@kernel
-def arrive(position, velocity, origin, moved, feed):
-    """Add to positions what has been added to `moved`, and feed the velocities."""
-    x, v, start, way = position.reshape(-1), velocity.reshape(-1), origin.reshape(-1), moved.reshape(-1)
-    for k in range(x.shape[0]):
-        by = way[k] - (x[k] - start[k])
-        x[k] = x[k] + by
-        v[k] = v[k] + feed * by
+def _refine_some(first, stop, parity, moved, begin, lanes, lane_i, lane_j, gap, reach, share, varied, deep, deeps):
+    """`refine_strip` for the strips 2 half + parity, half from `first` up to `stop`."""
+    for half in range(first, stop):
+        s = 2 * half + parity
+        if deeps[s] > 0:
+            a, b = begin[s], begin[s] + lanes[s]
+            pairs = (lane_i[a:b], lane_j[a:b], gap[0, a:b], gap[1, a:b], reach[a * varied :], share[a * varied :], varied)
+            deeps[s] = refine_strip(moved, *pairs, deep[a // LANES : b // LANES], deeps[s])
 
 
 @parallel_kernel
 def project(
     position, velocity, origin, moved, cut, begin, lanes, apart, lane_i, lane_j, gap, reach, share, varied, feed, most, normal,
-    depths, deep, deeps, fresh,
+    depths, deep, deeps, fresh, sets_out, arrives,
 ):  # fmt: skip
     """Move overlapping pairs apart, feed their velocities, and note the normals of those that touch.
 
     varied: 1; or 0 if reach and share are the same for all and have one pack only. feed: FED / PUSHED / h, 1/s. depths: (lanes,)
     for the overlaps, m, of pairs at their turn, 0 for those that do not touch; or (0,) if nobody asks. deep: (lanes / LANES,)
     where in its strip s each of the deeps[s] packs begins that are treated again; noted anew if fresh[0], which is then 0.
-    cut: (2, threads + 1), which half s // 2 of the strips s with s % 2 = 0, and 1, each thread begins with. moved: (n, 2) to work
-    with. normal: (2, lanes).
+    cut: (2, threads + 1), which half s // 2 of the strips s with s % 2 = 0, and 1, each thread begins with. normal: (2, lanes).
+    moved: (n, 2) to work with. sets_out: 1 if it is yet to be set to position - origin. arrives: 1 if what becomes of it is to be
+    added to positions and fed to velocities, 0 if others do that.
     """
-    n, looks = position.shape[0], fresh[0] != 0
+    n, looks, listed = position.shape[0], fresh[0] != 0, (lane_i, lane_j, gap, reach, share, varied)
     chunks = (n + _CHUNK - 1) // _CHUNK
-    for c in prange(chunks):
-        a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
-        set_out(position[a:b], origin[a:b], moved[a:b])
+    if sets_out != 0:
+        for c in prange(chunks):
+            a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
+            set_out(position[a:b], origin[a:b], moved[a:b])
     for parity in range(2):
         for part in prange(cut.shape[1] - 1):
             for half in range(cut[parity, part], cut[parity, part + 1]):
@@ -273,17 +268,19 @@ def project(
                 count = project_strip(moved, apart[s], *pairs, *noted)
                 if looks:
                     deeps[s] = count
+    left = 0
+    for s in range(deeps.shape[0]):
+        left += deeps[s]
     for parity in range(2):
-        for part in prange(cut.shape[1] - 1):
-            for half in range(cut[parity, part], cut[parity, part + 1]):
-                s = 2 * half + parity
-                if deeps[s] > 0:
-                    a, b = begin[s], begin[s] + lanes[s]
-                    pairs = (lane_i[a:b], lane_j[a:b], gap[0, a:b], gap[1, a:b], reach[a * varied :], share[a * varied :], varied)
-                    deeps[s] = refine_strip(moved, *pairs, deep[a // LANES : b // LANES], deeps[s])
-    for c in prange(chunks):
-        a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
-        arrive(position[a:b], velocity[a:b], origin[a:b], moved[a:b], feed)
+        if left < _FEW:
+            _refine_some(0, cut[parity, -1], parity, moved, begin, lanes, *listed, deep, deeps)
+        else:
+            for part in prange(cut.shape[1] - 1):
+                _refine_some(cut[parity, part], cut[parity, part + 1], parity, moved, begin, lanes, *listed, deep, deeps)
+    if arrives != 0:
+        for c in prange(chunks):
+            a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
+            arrive(position[a:b], velocity[a:b], origin[a:b], moved[a:b], feed)
     fresh[0] = 0
 
 
@@ -304,24 +301,18 @@ def still_strip(velocity, apart, lane_i, lane_j, share, varied, one, normal_x, n
 
 
 @parallel_kernel
-def still(velocity, cut, begin, lanes, apart, lane_i, lane_j, share, varied, normal):
-    """Set the normal velocity of touching pairs to 0."""
+def still(velocity, cut, begin, lanes, apart, lane_i, lane_j, share, varied, normal, resting, marks):
+    """Set the normal velocity of touching pairs to 0; if `marks` is 1, `resting` gains IN_PILE for their circles."""
     one = velocity.dtype.type(1)
     for parity in range(2):
         for part in prange(cut.shape[1] - 1):
             for half in range(cut[parity, part], cut[parity, part + 1]):
-                a, b = begin[2 * half + parity], begin[2 * half + parity] + lanes[2 * half + parity]
-                still_strip(
-                    velocity,
-                    apart[2 * half + parity],
-                    lane_i[a:b],
-                    lane_j[a:b],
-                    share[a * varied :],
-                    varied,
-                    one,
-                    normal[0, a:b],
-                    normal[1, a:b],
-                )
+                s = 2 * half + parity
+                a, b = begin[s], begin[s] + lanes[s]
+                pairs, normals = (lane_i[a:b], lane_j[a:b]), (normal[0, a:b], normal[1, a:b])
+                still_strip(velocity, apart[s], *pairs, share[a * varied :], varied, one, *normals)
+                if marks != 0:
+                    mark_strip(resting, *pairs, *normals)
 
 
 @kernel
