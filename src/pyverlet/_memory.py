@@ -55,6 +55,11 @@ def copy(array: Array) -> Array:
     return result
 
 
+def room(worn: Array, count: int) -> Array:
+    """(count or more,) numbers of the kind of `worn`, whatever they are: that itself, if neither too small nor too large."""
+    return worn if count <= len(worn) <= 2 * count + 64 else empty(count + count // 8, worn.dtype)
+
+
 def taken(array: Array, index: Array) -> Array:
     """As array[index], of rows."""
     result = empty((len(index), *array.shape[1:]), array.dtype)

@@ -234,6 +234,8 @@ class _SortedCells(BroadPhase):
         self._mean_radius = 0.0  # m; 0: not known. Its last bit depends on the order of the slots, so it is saved, too
         self.built = self._checked = np.empty((0, 2), dtype)
         self._held = np.zeros(1, np.int64)  # circles in all strips before each
+        self._worn: Grids | None = None
+        self._spot, self._used = np.empty(0, dtype), np.empty(0, np.int32)  # scratch
 
     def update(self, state: Slots) -> None:
         self._age += 1
@@ -308,12 +310,12 @@ class _SortedCells(BroadPhase):
         if self.replacing:
             self.replacing()
         self.rebuilds += 1
-        self._age = 0
+        self._age, self._allowed = 0, -1.0  # until it is done: somebody may break it off
         if not self._mean_radius:
             self._mean_radius = float(state.radius.mean(dtype=np.float64))
         skin = self.skin_diameters * 2.0 * self._mean_radius
         self._half_skin = 0.5 * skin
-        self._grids = Grids(state.position, state.radius, skin)
+        self._grids = self._worn = Grids(state.position, state.radius, skin, worn=self._worn)
         # Strip by strip all slots are gone through, and those of a strip must stand together.
         if self._grids.falls > (UNSORTED * len(state) if len(state) < FUSED_FROM else 0):
             state.reorder(self._grids.order)
@@ -335,7 +337,9 @@ class _SortedCells(BroadPhase):
             pairs.make_room(self._room * len(state))
         while True:
             first = held * self._room
-            spot, used = np.empty((3, len(state) + LANES), state.dtype), np.empty(len(state), np.int32)
+            self._spot = _memory.room(self._spot, size := 3 * (len(state) + LANES))
+            self._used = _memory.room(self._used, len(state))
+            spot, used = self._spot[:size].reshape(3, -1), self._used[: len(state)]
             kernels.list_pairs(
                 state.position, state.radius, cells.order, cells.levels, cells.start, rows, first, skin,
                 picky, state.category, state.mask, state.inverse_mass,

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet import _memory
 from pyverlet.constants import (
     BLOCK_ROWS,
     CELLS_PER_PARTICLE,
@@ -28,26 +29,36 @@ class Grids:
 
     Any two whose rims are nearer than `skin` stand in neighbouring cells of the level of the larger one.
 
+    Args:
+        worn: grids that nobody needs any more: their memory is taken over.
+
     Attributes:
         levels: the grids, as kernels take them.
-        start: (cells + 1,) circles in all cells before each.
+        start: (cells + 2,) circles in all cells before each, and all of them.
         order: (n,) the row of `position` of each circle, in the order of the cells.
         falls: how often `order` falls: 0 if the positions are in that order already, n / 2 if they are in none.
     """
 
-    def __init__(self, position: Array, radius: Array, skin: float) -> None:
+    def __init__(self, position: Array, radius: Array, skin: float, worn: Grids | None = None) -> None:
         self.levels = _fit(position, radius, skin)
-        self.start = np.empty(int((self.levels.width * self.levels.height).sum()) + 1, np.int32)
-        cell = np.empty(len(position), np.int32)
-        grid.count_level_cells(position, radius, self.levels, cell, self.start)
-        self.order = np.empty(len(position), np.int32)
-        self.falls = int(grid.sort_by_cell(cell, self.start, self.order))
+        cells, count = int((self.levels.width * self.levels.height).sum()), len(position)
+        # Of a million circles these are 24 MB, and the system takes as long to give them anew as they take to be filled.
+        none = np.empty(0, np.int32)
+        old = (worn._start, worn._cell, worn._order, worn._sorted) if worn else (none, none, none, none)
+        self._start: Array = _memory.room(old[0], cells + 2)
+        self._cell: Array = _memory.room(old[1], count)
+        self._order: Array = _memory.room(old[2], count)
+        self._sorted: Array = old[3]
+        self.start, self.order = self._start[: cells + 2], self._order[:count]
+        grid.count_level_cells(position, radius, self.levels, self._cell[:count], self.start)
+        self.falls = int(grid.sort_by_cell(self._cell[:count], self.start, self.order))
         self._first: Any = None
 
     def renumber(self) -> None:
         """The rows of `position` are in the order of the cells now."""
-        self.order = np.arange(len(self.order), dtype=np.int32)
-        self.falls = 0
+        if len(self._sorted) != len(self.order):
+            self._sorted = np.arange(len(self.order), dtype=np.int32)
+        self.order, self.falls = self._sorted, 0
 
     def strips(self) -> tuple[Array, Array]:
         """(strips + 1,) first row of each strip, and how many circles stand in all before it."""

@@ -161,7 +161,7 @@ def _cells(state: State, questions: int) -> tuple[Any, ...]:
     count = max(len(member), 1)
     cell = max(np.sqrt(width * height / count), max(width, height) / count) or 1.0
     columns, rows = int(width / cell) + 1, int(height / cell) + 1
-    number, start = np.empty(len(member), np.int32), np.empty(columns * rows + 1, np.int64)
+    number, start = np.empty(len(member), np.int32), np.empty(columns * rows + 2, np.int64)
     # In float64, as the questions are: rounded another way, a particle might not be found in its cell.
     _grid.count_cells(position.astype(np.float64), x0, y0, 1 / cell, columns, rows, number, start)
     order = np.empty(len(member), np.int32)

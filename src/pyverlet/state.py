@@ -350,11 +350,11 @@ class Slots:
             motion.take_rows(spare, old, order)
             setattr(self, name, spare)
             spare = old
-        for name in (*_COLUMNS, "inverse_mass", "particle", "resting", *_REMEMBERED, "start", "hits"):
-            if len(column := getattr(self, name)):
+        alike = {name for name, given in self._given.items() if len(given) == 1}  # for all: any order is as good
+        alike |= {"inverse_mass"} if "mass" in alike and not len(self.island) else set()
+        for name in (*_COLUMNS, *_MARKS, "inverse_mass", "particle", "resting", *_REMEMBERED, "start", "hits"):
+            if name not in alike and len(column := getattr(self, name)):
                 setattr(self, name, _memory.taken(column, order))
-        if len(self.category):
-            self.category, self.mask = self.category[order], self.mask[order]
         self.resize()
         self._slot_of = None
 

@@ -293,7 +293,7 @@ def test_velocities_and_contacts_are_drawn(page: Page, program: Serve) -> None:
     assert comes_true(page, lambda: number(page, "time") > 0.5)
     page.get_by_test_id("velocities").check()
     assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.overlay.arrows") > 50)
-    assert comes_true(page, lambda: number(page, "time") > 8)
+    assert comes_true(page, lambda: number(page, "time") > 4)
     pause(page)
     page.get_by_test_id("contacts").check()
     assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.overlay.contacts") > 100)

@@ -66,7 +66,8 @@ def server(session: Session, wait_until: WaitUntil) -> Iterator[Server]:
 
 def dial(server: Server, origin: str | None = None, headers: dict[str, str] | None = None) -> ClientConnection:
     """A WebSocket to the server, by default with the origin of its own page."""
-    return connect(server.socket, origin=Origin(origin or server.http), additional_headers=headers)
+    # Whoever has stopped reading would wait for the server's farewell for ten seconds.
+    return connect(server.socket, origin=Origin(origin or server.http), additional_headers=headers, close_timeout=0.5)
 
 
 class Tab:

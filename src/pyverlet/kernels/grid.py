@@ -71,16 +71,16 @@ def cell_number(value, cells):
 
 @kernel
 def count_cells(position, x0, y0, per_length, columns, rows, cell, start):
-    """Cell of each particle, and for each cell the number of particles in all cells before it (start has one more entry)."""
+    """Cell of each particle; start[k + 1]: the number of particles in all cells before cell k, as `sort_by_cell` takes it."""
     start[:] = 0
     for i in range(position.shape[0]):
         column = cell_number((position[i, 0] - x0) * per_length, columns)
         row = cell_number((position[i, 1] - y0) * per_length, rows)
         k = row * columns + column
         cell[i] = k
-        start[k + 1] += 1
+        start[k + 2] += 1
     for k in range(columns * rows):
-        start[k + 1] += start[k]
+        start[k + 2] += start[k + 1]
 
 
 @kernel
@@ -109,19 +109,22 @@ def count_level_cells(position, radius, levels, cell, start):
         row = cell_number((position[i, 1] - levels.y0) * levels.along[level], levels.height[level])
         k = levels.base[level] + row * levels.width[level] + column
         cell[i] = k
-        start[k + 1] += 1
-    for k in range(start.shape[0] - 1):
+        start[k + 2] += 1
+    for k in range(1, start.shape[0] - 1):
         start[k + 1] += start[k]
 
 
 @kernel
 def sort_by_cell(cell, start, order):
-    """Stable counting sort: order[k] is the particle that belongs into slot k. Returns how often order falls."""
-    following = start[:-1].copy()
+    """Stable counting sort: order[k] is the particle that belongs into slot k. Returns how often order falls.
+
+    start: (cells + 2,). start[k + 1] is where the next particle of cell k goes, in the end behind the last; so that in the end
+    start[k] is the number of particles in all cells before cell k, and start[cells] of all.
+    """
     for i in range(cell.shape[0]):
-        k = cell[i]
-        order[following[k]] = i
-        following[k] += 1
+        following = cell[i] + 1
+        order[start[following]] = i
+        start[following] += 1
     falls = 0
     for k in range(1, order.shape[0]):
         falls += order[k] < order[k - 1]

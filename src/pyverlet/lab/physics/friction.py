@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -57,25 +58,35 @@ def slope(mu: float = 0.3, seconds: float = 2.0, within: float = 0.01) -> Result
     )
 
 
-def heap_angle(mu: float, particles: int, seed: int = 0) -> float:
-    """Angle of repose in degrees of a heap poured on a plate of pinned circles, from whose ends the rest falls off.
+def heap_angles(mu: float, heaps: int, particles: int) -> list[float]:
+    """Angles of repose in degrees of heaps poured on plates of pinned circles, from whose ends the rest falls off.
 
-    Radii vary by 1:1.5, so that the heap does not crystallise. A few circles at a time are let go a little above the top.
+    Radii vary by 1:1.5, so that the heaps do not crystallise. A few circles at a time are let go a little above each top. The
+    plates are far apart, so that the heaps know nothing of each other.
     """
-    rng = np.random.default_rng(seed)
-    small, half = 0.1, 4.0
-    world = World(boundary=Box((-12, -8), (12, 40), friction=mu), collisions=Collisions(friction=mu))
-    plate = np.arange(-half, half + small, 2 * small)
-    world.add(position=np.column_stack((plate, np.zeros(len(plate)))), radius=small, mass=np.inf)
-    top = 0.0
+    small, half, apart = 0.1, 4.0, 24.0
+    middle = apart * np.arange(heaps)
+    room = Box((-apart / 2, -8), (apart * (heaps - 0.5), 40), friction=mu)
+    world = World(boundary=room, collisions=Collisions(friction=mu))
+    x = np.add.outer(middle, np.arange(-half, half + small, 2 * small)).ravel()
+    plates = len(world.add(position=np.column_stack((x, np.zeros(len(x)))), radius=small, mass=np.inf))
+    chance = [np.random.default_rng(seed) for seed in range(heaps)]
+    top = np.zeros(heaps)
     for _ in range(particles // 3):
-        x = np.array([-0.5, 0.0, 0.5]) + rng.uniform(-0.1, 0.1, 3)
-        world.add(position=np.column_stack((x, np.full(3, top + 0.5))), velocity=(0, -1), radius=small * rng.uniform(0.8, 1.2, 3))
+        x = middle[:, None] + np.array([-0.5, 0.0, 0.5]) + [rng.uniform(-0.1, 0.1, 3) for rng in chance]
+        start = np.stack((x, np.broadcast_to(top[:, None] + 0.5, x.shape)), axis=-1).reshape(-1, 2)
+        radius = small * np.concatenate([rng.uniform(0.8, 1.2, 3) for rng in chance])
+        world.add(position=start, velocity=(0, -1), radius=radius)
         world.run(seconds=0.1)
-        heap = world.position[len(plate) :]
-        top = float(heap[np.abs(world.velocity[len(plate) :, 1]) < 0.5, 1].max(initial=0.0))
+        held = np.abs(world.velocity[plates:, 1]) < 0.5
+        height = np.where(held, world.position[plates:, 1], 0).reshape(-1, heaps, 3)
+        top = np.maximum(height.max(axis=(0, 2)), 0)
     world.run(seconds=10)
-    heap = world.position[len(plate) :].astype(float)
+    circles = world.position[plates:].astype(float).reshape(-1, heaps, 3, 2)
+    return [_repose_angle(circles[:, k].reshape(-1, 2) - (middle[k], 0), half) for k in range(heaps)]
+
+
+def _repose_angle(heap: np.ndarray[Any, np.dtype[np.float64]], half: float) -> float:
     return surface_angle(heap[(heap[:, 1] > 0) & (np.abs(heap[:, 0]) < half)], half)
 
 
@@ -99,7 +110,7 @@ def repose(heaps: int, particles: int = 450, frictions: tuple[float, ...] = (0.0
 
     One heap differs from another by a degree or two, so that angles are compared by their means and standard errors.
     """
-    angles = np.array([[heap_angle(mu, particles, seed) for seed in range(heaps)] for mu in frictions])
+    angles = np.array([heap_angles(mu, heaps, particles) for mu in frictions])
     mean, error = angles.mean(axis=1), angles.std(axis=1, ddof=1) / np.sqrt(heaps)
     apart = np.hypot(error[1:], error[:-1])
     grows = bool((np.diff(mean)[:-1] > apart[:-1]).all() and np.diff(mean)[-1] > -2 * apart[-1])
