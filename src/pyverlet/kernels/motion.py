@@ -197,11 +197,24 @@ def differs(one, other):
 
 
 @kernel
+def _differ(then, now, first, stop):
+    """`differs`, of the rows from first up to stop, where there are as many now as then."""
+    if then.shape[0] not in (1, now.shape[0]):
+        return True
+    return differs(then if then.shape[0] == 1 else then[first:stop], now[first:stop])
+
+
+@parallel_kernel
 def any_differs(a, b, c, d, e, f, a_now, b_now, c_now, d_now, e_now, f_now):
-    """Whether any of six arrays differs from what it is now."""
-    return (
-        differs(a, a_now) or differs(b, b_now) or differs(c, c_now) or differs(d, d_now) or differs(e, e_now) or differs(f, f_now)
-    )
+    """Whether any of six arrays differs from what it is now; they are equally long now."""
+    found = 0
+    for block in prange((a_now.shape[0] + _BLOCK - 1) // _BLOCK):
+        x, y = block * _BLOCK, min((block + 1) * _BLOCK, a_now.shape[0])
+        found += int(
+            _differ(a, a_now, x, y) or _differ(b, b_now, x, y) or _differ(c, c_now, x, y)
+            or _differ(d, d_now, x, y) or _differ(e, e_now, x, y) or _differ(f, f_now, x, y)
+        )  # fmt: skip
+    return found > 0
 
 
 @parallel_kernel
