@@ -9,7 +9,7 @@ from pyverlet._jit import kernel, parallel_kernel, prange
 _LANES = 64
 """Words taken at a time, each into a sum of its own: so the loop is vectorised."""
 
-_BLOCK = 1 << 15
+_BLOCK = 1 << 13
 """Words that one thread takes at a time."""
 
 # Odd, with ones and zeros in no order: the fractional part of the golden ratio, and that of the root of 3.

@@ -275,13 +275,21 @@ def any_nan(vectors):
 
 
 @kernel
+def _any_non_finite(numbers, first, stop):
+    found = False
+    for k in range(first, stop):
+        found |= numbers[k] - numbers[k] != 0  # x - x is 0 for finite numbers, NaN for others
+    return found
+
+
+@parallel_kernel
 def first_non_finite(vectors):
     """Index of the first row that is NaN or infinite; -1 if all are finite."""
     numbers = vectors.reshape(-1)
-    found = False
-    for k in range(numbers.shape[0]):
-        found |= numbers[k] - numbers[k] != 0  # x - x is 0 for finite numbers, NaN for others
-    if found:
+    found = 0
+    for block in prange((numbers.shape[0] + _BLOCK - 1) // _BLOCK):
+        found += int(_any_non_finite(numbers, block * _BLOCK, min((block + 1) * _BLOCK, numbers.shape[0])))
+    if found > 0:
         for i in range(vectors.shape[0]):
             if not (np.isfinite(vectors[i, 0]) and np.isfinite(vectors[i, 1])):
                 return i
