@@ -145,14 +145,15 @@ def threads(triad: float) -> Iterator[Row]:
     )
     world = cage(100_000)
     settle(world)
+    # In turns all the same, for the pace of the cores changes within seconds; a thread spins for a millisecond of a turn.
     times = times_in_turn([stepping(world, 1), stepping(world, 2)], 100)
     one, two = map(median, times)
     gain = quiet(times[0]) / quiet(times[1])
     yield Row(
         "100,000 circles",
-        "a frame <= 16.7 ms on two threads, and where nothing disturbs them at least 1.8 times as fast as on one",
-        f"{two:.1f} ms; {gain:.2f} times as fast in the fastest tenth of frames, {one / two:.2f} by medians; {heap(world)}",
-        two <= 16.7 and gain >= 1.8,
+        "a frame <= 16.7 ms on two threads, and at least 1.8 times as fast as on one",
+        f"{two:.1f} ms, {one / two:.2f} times as fast, {gain:.2f} in the fastest tenth of frames; {heap(world)}",
+        two <= 16.7 and one / two >= 1.8,
     )
 
 

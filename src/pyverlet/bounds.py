@@ -97,6 +97,7 @@ def hold(state: Slots, numbers: tuple[Any, ...], arriving: tuple[Any, ...] | Non
     arriving: origin, moved and feed, if contacts have `moved` them and they have yet to arrive there (`kernels.cage.hold`).
     """
     bodies = (state.position, state.velocity, state.acceleration, state.radius, state.inverse_mass, state.resting, state.hits)
+    # One kernel for both, for it takes two seconds to compile.
     where = (1, *arriving) if arriving else (0, state.position, state.position, numbers[3])
     cage.hold(*numbers[:3], *bodies, *numbers[3:], *where)
 

@@ -117,8 +117,8 @@ class BroadPhase(ABC):
     built: Array
     """(n, 2) positions the list was made from, m."""
     rebuilds: int = 0
-    spared: bool = False
-    """Set if the next `update` need not look: whoever moved the particles has found that the list is still good."""
+    strayed: bool | None = None
+    """Whether anyone has gone too far for the list, if whoever moved the particles has looked: the next `update` need not."""
     renewing: Callable[[Slots, PairList], None] | None = None
     """Called when the list is about to be made anew."""
     replacing: Callable[[], None] | None = None
@@ -239,9 +239,9 @@ class _SortedCells(BroadPhase):
 
     def update(self, state: Slots) -> None:
         self._age += 1
+        known, self.strayed = self.strayed, None
         if self._allowed >= 0:
-            spared, self.spared = self.spared, False
-            if spared or self._still_good(state):
+            if self._still_good(state, known):
                 return
             if self._adapts:
                 self._adapt()
@@ -284,9 +284,9 @@ class _SortedCells(BroadPhase):
             self._checked, self._allowed = checked.copy(), allowed
         self._age = age
 
-    def _still_good(self, state: Slots) -> bool:
-        """Whether no pair that is not listed can touch: a cheap test, then a closer look that says how long that will do."""
-        if not strayed(state, self._checked, self._allowed):
+    def _still_good(self, state: Slots, known: bool | None) -> bool:
+        """Whether no pair that is not listed can touch: nobody has strayed, as may be `known`, or not far at a closer look."""
+        if not (strayed(state, self._checked, self._allowed) if known is None else known):
             return True
         slack = self._grids.slack(state.position, self.built, 2.0 * self._half_skin)
         if not slack > WORTH_LOOKING * self._half_skin:

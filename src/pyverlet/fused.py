@@ -39,16 +39,16 @@ class Fused:
 
     def __init__(self) -> None:
         self.leapt = False
-        self._out = False  # whether `moved` of the packs has been set for the next substep
+        self._out: Array | None = None  # `moved` of the packs that has been set out for the next substep
         self._held: Array | None = None
         self._cut = self._place = np.zeros(0, np.int64)
         self._normal = np.empty((2, 0))
 
     def begin(self, contacts: ContactSolver | None) -> Fused:
         """A frame begins. That before may have been broken off, and the user may have changed everything since."""
-        self.leapt = self._out = False
+        self.leapt, self._out = False, None
         if contacts:
-            contacts.broad_phase.spared = False
+            contacts.broad_phase.strayed = None
         return self
 
     def substep(self, world: Any, contacts: ContactSolver, h: float, lag: float, *, last: bool) -> bool:
@@ -56,7 +56,7 @@ class Fused:
 
         last: there is none after it in this frame.
         """
-        self.leapt = False
+        out, self._out, self.leapt = self._out, None, False
         state, phase = world._slots, contacts.broad_phase
         strips = phase.strips() if len(state) >= REPEAT_BELOW else None
         packs = contacts.packs(state) if strips else None
@@ -67,10 +67,9 @@ class Fused:
         leaps = world.integrator.leaps and not world.onlooker and not last  # who looks on may turn gravity
         if len(state) >= FUSED_FROM and strips.in_order and room:
             strayed = self._strip_by_strip(state, packs, strips, (leaps, last), (*feed, *room))
-            self._out = False
             world.profile.mark("fused")
         else:
-            packs.project(state, h, sets_out=not self._out, arrives=not room)
+            packs.project(state, h, sets_out=out is not packs.moved, arrives=not room)  # another after a new list
             world.profile.mark("contacts")
             if room:
                 hold(state, room, (packs.origin, packs.moved, feed[0]))
@@ -80,9 +79,9 @@ class Fused:
             packs.still(state, marks=last)
             world.profile.mark("velocities")
             strayed = leaps and leap(state, h, strips.checked, strips.allowed, packs.origin, packs.moved)
-            self._out = leaps and not strayed
+            self._out = packs.moved if leaps else None
             world.profile.mark("integrate")
-        self.leapt, phase.spared = leaps, leaps and not strayed
+        self.leapt, phase.strayed = leaps, strayed if leaps else None
         return True
 
     def _strip_by_strip(

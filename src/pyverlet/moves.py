@@ -15,7 +15,7 @@ Array = NDArray[Any]
 def advance(out: Array, base: Array, slope: Array, h: float) -> None:
     """out = base + h * slope on (n, 2) arrays; the move every integrator is made of. out may be base."""
     if out is base:
-        motion.move(out, slope, out.dtype.type(h))
+        motion.add_scaled(out, slope, out.dtype.type(h))
     else:
         motion.advance(out, base, slope, out.dtype.type(h))
 

@@ -229,3 +229,22 @@ def test_a_frame_that_was_broken_off_leaves_nothing_behind(fusing: Fusing) -> No
     world = interrupted(20)
     fusing.undo()
     assert same(world, interrupted(20))
+
+
+def test_a_list_that_was_broken_off_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = heap(3000, 0.7)
+    assert world._contacts is not None
+    phase = world._contacts.broad_phase
+    assert phase.strips() is not None
+
+    def interrupt(*arguments: Any) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("pyverlet.kernels.pairs.list_pairs", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            world.run(seconds=1)
+    assert phase.strips() is None
+    world.run(seconds=0.5)
+    assert world.overlap().max < 0.2
+    assert not world.escaped()

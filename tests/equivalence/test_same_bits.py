@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
+from pyverlet import _jit
+from pyverlet.constants import DEEP
 
 # Threads of the pool are fixed when Numba starts, so a process of its own gets eight, whatever this machine has.
 RUN_WITH_THREADS = """
@@ -130,3 +132,21 @@ def test_the_hash_sees_one_bit() -> None:
     before = world.state_hash()
     world.position[17, 0] = np.nextafter(world.position[17, 0], np.float32(1e9))
     assert world.state_hash() != before
+
+
+def test_deep_contacts_are_treated_again_alike_on_any_number_of_threads() -> None:
+    # Every pair of neighbours overlaps by 4 %: more deep packs than one thread is left alone with.
+    def pressed(threads: int) -> pv.World:
+        side = 64
+        world = pv.World(gravity=(0, 0), boundary=pv.Circle(radius=float(side)), threads=threads)
+        y, x = np.mgrid[:side, :side] - side / 2
+        world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.5)
+        world.step(1 / 60)
+        world.radius[:] *= 1.04
+        assert world.overlap().contacts > 8 * 64
+        assert world.overlap().mean > DEEP
+        world.step(1 / 60)
+        return world
+
+    hashes = {pressed(threads).state_hash() for threads in range(1, _jit.max_threads() + 1)}
+    assert len(hashes) == 1

@@ -22,14 +22,14 @@ _BLOCK = 2048
 
 @parallel_kernel
 def advance(out, base, slope, h):
-    """out = base + h * slope, on (n, 2) arrays. If out is base `move` is faster: this looks whether they are apart."""
+    """out = base + h * slope, on (n, 2) arrays. If out is base `add_scaled` is faster: always vectorised."""
     to, start, rate = out.reshape(-1), base.reshape(-1), slope.reshape(-1)
     for k in prange(to.shape[0]):
         to[k] = start[k] + h * rate[k]
 
 
 @parallel_kernel
-def move(what, slope, h):
+def add_scaled(what, slope, h):
     """what += h * slope, on (n, 2) arrays."""
     to, rate = what.reshape(-1), slope.reshape(-1)
     for k in prange(to.shape[0]):
@@ -91,7 +91,7 @@ def newton_kick_drift(position, velocity, acceleration, force, inverse_mass, gx,
     for block in prange((inverse_mass.shape[0] + _BLOCK - 1) // _BLOCK):
         a, b = block * _BLOCK, min((block + 1) * _BLOCK, inverse_mass.shape[0])
         if ahead != 0:
-            move(velocity[a:b], acceleration[a:b], -ahead)
+            add_scaled(velocity[a:b], acceleration[a:b], -ahead)
         largest = max(largest, _newton(acceleration[a:b], force[a:b], inverse_mass[a:b], gx, gy))
         kick_drift(position[a:b], velocity[a:b], acceleration[a:b], h)
     return np.sqrt(largest)
@@ -197,7 +197,7 @@ def differs(one, other):
 
 
 @kernel
-def _differ(then, now, first, stop):
+def _rows_differ(then, now, first, stop):
     """`differs`, of the rows from first up to stop, where there are as many now as then."""
     if then.shape[0] not in (1, now.shape[0]):
         return True
@@ -211,8 +211,8 @@ def any_differs(a, b, c, d, e, f, a_now, b_now, c_now, d_now, e_now, f_now):
     for block in prange((a_now.shape[0] + _BLOCK - 1) // _BLOCK):
         x, y = block * _BLOCK, min((block + 1) * _BLOCK, a_now.shape[0])
         found += int(
-            _differ(a, a_now, x, y) or _differ(b, b_now, x, y) or _differ(c, c_now, x, y)
-            or _differ(d, d_now, x, y) or _differ(e, e_now, x, y) or _differ(f, f_now, x, y)
+            _rows_differ(a, a_now, x, y) or _rows_differ(b, b_now, x, y) or _rows_differ(c, c_now, x, y)
+            or _rows_differ(d, d_now, x, y) or _rows_differ(e, e_now, x, y) or _rows_differ(f, f_now, x, y)
         )  # fmt: skip
     return found > 0
 
