@@ -110,8 +110,9 @@ _WANT, _KIND, _IS, _DIMENSIONS, _BYTES, _STEP = (8 * k for k in range(6))
 _THREAD, _MADE, _NEXT, _END, _HELD, _TRUE, _FALSE = (8 * k for k in range(7))
 _recorder = np.array([0, 0, 0, 0, 0, id(True), id(False)], np.int64)
 
-# Words of a recorded call: what is called, what it answered if that was yes or no, and how many words it takes, which follow.
-CALLED, ANSWER, TAKEN, CALL = (8 * k for k in range(4))
+# Words of a recorded call: what is called, what it answered if that was yes or no, how many words it takes, and whether other
+# Python threads may run meanwhile; then those words.
+CALLED, ANSWER, TAKEN, RELEASE, CALL = (8 * k for k in range(5))
 
 
 def _unpack(arguments: int, count: int, want: int, words: int) -> int:
@@ -166,17 +167,17 @@ def _enter(table_object: int, arguments: int, count: int) -> int:
         if longest >= 0:
             recorder = _word(table + _RECORDER)
             if _word(recorder) != 0 and _word(recorder) == _this_thread():
-                return record(recorder, table, arguments, words)
+                return record(recorder, table, arguments, words, np.int64(longest >= RELEASE_FROM))
             return _call(_word(table + _STUB), words, np.int64(longest >= RELEASE_FROM))
     return _vectorcall(_word(table + _OTHERWISE), arguments, count, 0)
 
 
-def _record(recorder: int, table: int, arguments: int, words: int) -> int:
+def _record(recorder: int, table: int, arguments: int, words: int, release: int) -> int:
     """Call a kernel, and keep what it was called with, for `_trace`."""
     at, length = _word(recorder + _NEXT), _word(table + _LENGTH)
     _put(recorder + _MADE, _word(recorder + _MADE) + 1)
     _put(recorder + _NEXT, at + CALL + 8 * length)  # beyond the end, if it does not fit
-    result = _call(_word(table + _STUB), words, 0)
+    result = _call(_word(table + _STUB), words, release)
     if _word(recorder + _NEXT) <= _word(recorder + _END):
         for k in range(_word(table + _COUNT)):
             _append(_word(recorder + _HELD), _word(arguments + 8 * k))
@@ -185,6 +186,7 @@ def _record(recorder: int, table: int, arguments: int, words: int) -> int:
         _put(at + CALLED, _word(table + _STUB))
         _put(at + ANSWER, result if result == _word(recorder + _TRUE) or result == _word(recorder + _FALSE) else 0)
         _put(at + TAKEN, length)
+        _put(at + RELEASE, release)
     return result
 
 
@@ -199,6 +201,19 @@ def recorded_calls() -> tuple[int, int]:
     _recorder[_THREAD // 8] = 0
     made, after, end = map(int, _recorder[1:4])
     return made if after <= end else 0, after
+
+
+def pause() -> bool:
+    """Record nothing until `go_on`; False if it is not this thread whose calls are recorded."""
+    ours = bool(_recorder[_THREAD // 8] == threading.get_ident())
+    if ours:
+        _recorder[_THREAD // 8] = 0
+    return ours
+
+
+def go_on() -> None:
+    """Record this thread's calls again."""
+    _recorder[_THREAD // 8] = threading.get_ident()
 
 
 def miss() -> None:

@@ -30,7 +30,7 @@ from pyverlet import _entry, _lean, _turns
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-_COMPILED_FROM = ("_jit.py", "_lean.py", "_entry.py", "_trace.py", "_lanes.py", "constants.py")
+_COMPILED_FROM = ("_jit.py", "_lean.py", "_entry.py", "_trace.py", "_lanes.py", "_claims.py", "_stopwatch.py", "constants.py")
 
 _STALE_AFTER_S = 30 * 24 * 3600.0
 
@@ -38,8 +38,8 @@ _STALE_AFTER_S = 30 * 24 * 3600.0
 def sources_hash(root: Path | None = None) -> str:
     """Hash, 16 hex digits, of every source that compiled code can come from, and of the compiler's version.
 
-    Kernels live in `kernels/` and may use `constants.py`, `_lanes.py` and this file, nothing else (a test checks that). An edit
-    elsewhere, in a viewer say, need not compile anything anew.
+    Kernels live in `kernels/` and may use `constants.py`, `_claims.py`, `_lanes.py` and this file, nothing else: a test looks. An
+    edit elsewhere, in a viewer say, need not compile anything anew.
     """
     root = Path(__file__).parent if root is None else root
     digest = hashlib.blake2b(f"{numba.__version__} {sys.version_info[:2]}".encode(), digest_size=8)

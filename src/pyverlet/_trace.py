@@ -19,7 +19,7 @@ import numpy as np
 from numba.core import types
 
 from pyverlet import _entry, _jit
-from pyverlet._entry import ANSWER, CALL, CALLED, TAKEN
+from pyverlet._entry import ANSWER, CALL, CALLED, RELEASE, TAKEN
 
 _ROOM = 1024
 """Words of 8 bytes for the calls of a substep; a smooth world in a cage takes 500."""
@@ -35,7 +35,7 @@ def _replay(table_object: int, arguments: int, count: int) -> Any:
     for _ in range(_entry._as_int(_entry._word(arguments))):
         at, end = _entry._word(table), _entry._word(table + 8)
         while at < end:
-            result = _entry._call(_entry._word(at + CALLED), at + CALL, 0)
+            result = _entry._call(_entry._word(at + CALLED), at + CALL, _entry._word(at + RELEASE))
             if result == 0:
                 return 0
             made += 1
@@ -90,10 +90,15 @@ class Trace:
 
         Returns how many rounds have gone by without Python, and whether the calls before the first guard of the next are made.
         """
-        if not count or key is None or key != self._key:
+        if key is None or key != self._key:
             return 0, False
         rounds, more = divmod(self._play(count), self._number)
         return rounds, more > 0
+
+    def forget(self, *, but: Hashable) -> None:
+        """Hold the calls no longer, but for those that are good for this."""
+        if self._key != but or but is None:
+            self._key, self._held = None, []
 
     @contextlib.contextmanager
     def recording(self, key: Callable[[], Hashable]) -> Iterator[None]:

@@ -99,7 +99,7 @@ def hold(state: Slots, numbers: tuple[Any, ...], arriving: tuple[Any, ...] | Non
     bodies = (state.position, state.velocity, state.acceleration, state.radius, state.inverse_mass, state.resting, state.hits)
     # One kernel for both, for it takes two seconds to compile.
     where = (1, *arriving) if arriving else (0, state.position, state.position, numbers[3])
-    cage.hold(*numbers[:3], *bodies, *numbers[3:], *where)
+    cage.hold(*numbers[:3], *bodies, *numbers[3:], *where, state.claims())
 
 
 class Circle(_Walls):

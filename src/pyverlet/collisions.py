@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pyverlet import checks
-from pyverlet.broadphase import BruteForce, Fast, PairList
+from pyverlet.broadphase import BruteForce, Fast, PairList, Strips
 from pyverlet.constants import FED, FED_SMOOTH, LARGEST_PUSH, PUSHED, REST_ACCELERATIONS, UNEVEN
 from pyverlet.errors import InputError
 from pyverlet.events import Events
@@ -141,9 +141,10 @@ class ContactSolver:
             return None
         return self.broad_phase.lasts()
 
-    def packs(self, state: Slots) -> Packs | None:
-        """The packs of now, if a substep's contacts are but `project` and `still` of these; None: there is more to them."""
-        return self._pack(state) if self._alone(state) else None
+    def packs(self, state: Slots) -> tuple[Packs, Strips] | None:
+        """Packs and strips, if a substep's contacts are but `project` and `still` of these; None: there is more to them."""
+        strips = self.broad_phase.strips() if self._alone(state) else None
+        return (self._pack(state), strips) if strips else None
 
     def _alone(self, state: Slots) -> bool:
         return self._events is None and self._sleep is None and state.size is state.radius and self._slides(state)
@@ -289,12 +290,16 @@ class ContactSolver:
     def _rubs(self, state: Slots) -> bool:
         return self.settings.friction > 0.0 or state.most_friction > 0.0
 
-    def end(self, state: Slots, before: State, lag: float, dt: float, gravity: tuple[float, float]) -> None:
+    def end(
+        self, state: Slots, before: State, lag: float, dt: float, gravity: tuple[float, float], *, marked: bool = False
+    ) -> None:
         """At the end of a frame of dt seconds: note who was held by a contact, and let those fall asleep that are tired.
 
-        before: how the frame began. lag: seconds the velocity is behind.
+        before: how the frame began. lag: seconds the velocity is behind. marked: who touches another is known to rest already.
         """
-        self._mark_resting(state)
+        state.lean = self._lean(state)
+        if not marked:
+            self._mark_resting(state)
         if self._lends:
             self._loans.let_fall(state)
         else:
@@ -304,7 +309,6 @@ class ContactSolver:
 
     def _mark_resting(self, state: Slots) -> None:
         """Note in `state.resting` who touches another without bouncing off it."""
-        state.lean = self._lean(state)
         if self._eight(state):
             self._packs.mark_resting(state)
             return

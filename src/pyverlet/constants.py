@@ -80,9 +80,9 @@ of a processor, and there it gains nothing."""
 ONE_THREAD_BELOW: Final = 2048
 """Worlds with fewer particles run on one thread altogether: at 2,000 a second one gained a tenth, and only on a quiet machine."""
 
-REPEAT_BELOW: Final = 512
-"""In smaller worlds the kernels of a substep are called by `_trace`: there Python would take as long as they do, or longer. In
-larger ones the time of each stage is worth more than what is left to gain."""
+STAGES_FROM: Final = 512
+"""In smaller worlds what is replayed without Python (`repeats`) is one stage: looking what time it is at the end of each stage
+would take a tenth as long as all of them."""
 
 ALL_THREADS_FROM: Final = 10_000
 """Unless the user says how many, worlds use all threads from this many particles on. Threads wait for each other several times a

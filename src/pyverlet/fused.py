@@ -6,6 +6,7 @@ where contacts have moved them when the wall holds them, and begin the next subs
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,10 +16,11 @@ from pyverlet import _jit
 from pyverlet.bounds import hold
 from pyverlet.broadphase import Strips
 from pyverlet.collisions import ContactSolver
-from pyverlet.constants import FUSED_FROM, REPEAT_BELOW, REST_ACCELERATIONS
+from pyverlet.constants import FUSED_FROM, REST_ACCELERATIONS
 from pyverlet.kernels import fused as kernels
 from pyverlet.moves import leap
 from pyverlet.packs import Packs
+from pyverlet.repeats import FIRST, LAST, NEXT
 from pyverlet.state import Slots
 
 Array = NDArray[Any]
@@ -31,57 +33,65 @@ _KEPT = 8
 
 
 class Fused:
-    """Contacts, bounds and velocities of smooth inelastic circles, and the integration of the next substep.
+    """Contacts, bounds and velocities of smooth inelastic circles, and the integration of a substep that is not the first.
 
     Attributes:
-        leapt: whether that has been done, too.
+        leapt: whether the integration of the next substep has been done already.
     """
 
     def __init__(self) -> None:
         self.leapt = False
-        self._out: Array | None = None  # `moved` of the packs that has been set out for the next substep
+        self._gravity: tuple[float, float] | None = None  # what accelerates in all substeps of the frame; None: not the same
+        self._out: Array | None = None  # `moved` of the packs that has been set out for this substep
         self._held: Array | None = None
         self._cut = self._place = np.zeros(0, np.int64)
         self._normal = np.empty((2, 0))
 
-    def begin(self, contacts: ContactSolver | None) -> Fused:
+    def begin(self, gravity: tuple[float, float], contacts: ContactSolver | None) -> Fused:
         """A frame begins. That before may have been broken off, and the user may have changed everything since."""
-        self.leapt, self._out = False, None
+        self.leapt, self._gravity, self._out = False, gravity, None
         if contacts:
             contacts.broad_phase.strayed = None
         return self
 
-    def substep(self, world: Any, contacts: ContactSolver, h: float, lag: float, *, last: bool) -> bool:
-        """After the broad phase of a substep of a plain frame; False if nothing has been done: there is more to it.
-
-        last: there is none after it in this frame.
-        """
-        out, self._out, self.leapt = self._out, None, False
-        state, phase = world._slots, contacts.broad_phase
-        strips = phase.strips() if len(state) >= REPEAT_BELOW else None
-        packs = contacts.packs(state) if strips else None
-        if not (packs and strips):
+    def leap(self, world: Any, contacts: ContactSolver | None, h: float, kind: int) -> bool:
+        """Integrate a substep of this kind, and set out for its contacts; False if that cannot be done in one loop."""
+        if world.gravity != self._gravity:  # who looks on has turned it
+            self._gravity = None
+        if kind not in (NEXT, LAST) or not (self._gravity and world.integrator.leaps and contacts):
             return False
+        if not (pairs := contacts.packs(world._slots)):
+            return False
+        packs, strips = pairs
+        where = strips.checked, strips.allowed, packs.origin, packs.moved
+        contacts.broad_phase.strayed, self._out = leap(world._slots, h, *where), packs.moved
+        return True
+
+    def substep(self, world: Any, contacts: ContactSolver, h: float, lag: float, done: Callable[[str], None], kind: int) -> bool:
+        """After the broad phase of a substep of a plain frame; False if nothing has been done: there is more to it."""
+        out, self._out, self.leapt = self._out, None, False
+        state = world._slots
+        pairs = contacts.packs(state)
+        if not pairs:
+            return False
+        packs, strips = pairs
         rest_speed = REST_ACCELERATIONS * world._force_sum.strongest * h
         room, feed = world.boundary.held(state, h, lag, rest_speed), packs.feed(state, h)
-        leaps = world.integrator.leaps and not world.onlooker and not last  # who looks on may turn gravity
         if len(state) >= FUSED_FROM and strips.in_order and room:
-            strayed = self._strip_by_strip(state, packs, strips, (leaps, last), (*feed, *room))
-            world.profile.mark("fused")
+            self.leapt = kind in (FIRST, NEXT) and world.integrator.leaps and not world.onlooker  # who looks on may turn gravity
+            strayed = self._strip_by_strip(state, packs, strips, (self.leapt, kind == LAST), (*feed, *room))
+            contacts.broad_phase.strayed = strayed if self.leapt else None
+            done("fused")
+            return True
+        packs.project(state, h, sets_out=out is not packs.moved, arrives=not room)  # another after a new list
+        done("contacts")
+        if room:
+            hold(state, room, (packs.origin, packs.moved, feed[0]))
         else:
-            packs.project(state, h, sets_out=out is not packs.moved, arrives=not room)  # another after a new list
-            world.profile.mark("contacts")
-            if room:
-                hold(state, room, (packs.origin, packs.moved, feed[0]))
-            else:
-                world.boundary.confine(state, h, lag, rest_speed)
-            world.profile.mark("bounds")
-            packs.still(state, marks=last)
-            world.profile.mark("velocities")
-            strayed = leaps and leap(state, h, strips.checked, strips.allowed, packs.origin, packs.moved)
-            self._out = packs.moved if leaps else None
-            world.profile.mark("integrate")
-        self.leapt, phase.strayed = leaps, strayed if leaps else None
+            world.boundary.confine(state, h, lag, rest_speed)
+        done("bounds")
+        packs.still(state, marks=kind == LAST)
+        done("velocities")
         return True
 
     def _strip_by_strip(

@@ -40,7 +40,7 @@ def strayed(state: Slots, reference: Array, distance: float) -> bool:
 def leap(state: Slots, h: float, reference: Array, distance: float, origin: Array, moved: Array) -> bool:
     """Velocity += h * acceleration, position += h * velocity, moved = position - origin; whether anyone has then strayed."""
     where, square = (state.position, state.velocity, state.acceleration, state.real(h)), state.real(distance * distance)
-    return bool(motion.leap(*where, reference, square, origin, moved))
+    return bool(motion.leap(*where, reference, square, origin, moved, state.claims()))
 
 
 def pick_falling(state: Slots, before: Array, lag: float, dt: float) -> None:

@@ -37,7 +37,6 @@ class Packs:
         self._varied = 0
         self._deeps = np.zeros(0, np.int64)  # packs of each strip that overlap deeply
         self._fresh = np.ones(1, np.uint8)  # 1: they are to be noted, once a frame; a kernel says when it has
-        self._marked = False  # whether `resting` has been set already
 
     def _make_room(self, lanes: int) -> None:
         self.lane_i, self.lane_j = (_memory.empty(lanes, np.uint32) for _ in range(2))
@@ -90,7 +89,7 @@ class Packs:
 
     def fits(self, state: Slots) -> bool:
         """Whether nothing is left to be prepared before `project`."""
-        return self._size is state.size and not self._marked
+        return self._size is state.size
 
     def _share_out(self, state: Slots) -> None:
         """Bring reach and share up to date with the sizes of now."""
@@ -112,15 +111,15 @@ class Packs:
             self.normal = _memory.empty(self.gap.shape, self._dtype)
         where = (self._parts(), self.begin, self.lanes, self.apart, self.lane_i, self.lane_j, self.gap)
         settings = (self.reach, self.share, self._varied, *self.feed(state, h, fed))
-        notes = (self.normal, self._depths, self._deep, self._deeps, self._fresh, int(sets_out), int(arrives))
-        self._marked = False
+        notes = (self.normal, self._depths, self._deep, self._deeps, self._fresh, int(sets_out), int(arrives), state.claims())
         packs.project(state.position, state.velocity, self.origin, self.moved, *where, *settings, *notes)
 
     def still(self, state: Slots, *, marks: bool = False) -> None:
         """Take from touching circles the velocity that projection has put in; mark them as resting, too."""
         where = (self._cut, self.begin, self.lanes, self.apart, self.lane_i, self.lane_j)
-        self._marked = marks
-        packs.still(state.velocity, *where, self.share, self._varied, self.normal, state.resting, int(marks))
+        packs.still(
+            state.velocity, *where, self.share, self._varied, self.normal, state.resting, self._fresh, int(marks), state.claims()
+        )
 
     def for_fused(self, state: Slots, *, marks: bool) -> tuple[tuple[Any, ...], bool]:
         """The pairs as `kernels.fused` takes them, up to `deeps`, and whether it is to note the deep ones.
@@ -129,7 +128,7 @@ class Packs:
         """
         if self._size is not state.size:
             self._share_out(state)
-        looks, self._fresh[0], self._marked = bool(self._fresh[0]), 0, marks
+        looks, self._fresh[0] = bool(self._fresh[0]), marks
         where = (self.begin, self.lanes, self.apart, self.lane_i, self.lane_j, self.gap)
         return (*where, self.reach, self.share, self._varied, self._deep, self._deeps), looks
 
@@ -180,8 +179,5 @@ class Packs:
 
     def mark_resting(self, state: Slots) -> None:
         """Note in `state.resting` who touches another."""
-        if self._marked:
-            self._fresh[0] = 1
-            return
         where = (self._parts(), self.begin, self.lanes, self.lane_i, self.lane_j)
         packs.mark_touching(*where, self.normal, state.resting, self._fresh)

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from time import perf_counter
+
+import numpy as np
+
+from pyverlet._stopwatch import CLOCK, keep, note
+
+_ROOM = 64
+"""Stages that have a place at most, and one more."""
 
 
 class Profile:
@@ -17,36 +23,40 @@ class Profile:
         self.frame_ms = 0.0
         self.frames = 0
         self.rebuilds = 0
-        self._start = self._last = 0.0
-        self._now: dict[str, float] = {}  # s, of the frame that is under way
-        self._complete: dict[str, float] = {}  # s, of the last complete frame
-        self._total: defaultdict[str, float] = defaultdict(float)  # s, of all of them
+        self._start = 0.0
+        self._broken_off = False
+        self._places: dict[str, int] = {}
+        self._spent = np.zeros(_ROOM)  # s, of the frame that is under way, by place; the first is when the last stage ended
+        self._complete = np.zeros(_ROOM)  # of the last complete frame
+        self._total = np.zeros(_ROOM)  # of all of them
 
     def begin(self) -> None:
         """A frame begins."""
-        self._now = {}  # without what a frame that failed has left
-        self._start = self._last = perf_counter()
+        if self._broken_off:
+            self._spent.fill(0.0)
+        self._broken_off = True  # unless it comes to its end
+        self._start = self._spent[0] = perf_counter()
 
     def mark(self, stage: str) -> None:
         """Charge the time since the last mark to `stage`."""
-        now = perf_counter()
-        self._now[stage] = self._now.get(stage, 0.0) + now - self._last
-        self._last = now
+        note(self._spent, self._places.get(stage) or self._places.setdefault(stage, len(self._places) + 1), CLOCK)
 
     def end(self) -> None:
         """The frame is complete."""
         self.frame_ms = (perf_counter() - self._start) * 1e3
         self.frames += 1
-        self._complete = self._now
-        for stage, seconds in self._now.items():
-            self._total[stage] += seconds
+        self._broken_off = False
+        keep(self._spent, self._complete, self._total)
 
     @property
     def stages(self) -> dict[str, float]:
         """Milliseconds of each stage that the last complete frame had."""
-        return {stage: seconds * 1e3 for stage, seconds in self._complete.items()}
+        return self._told(self._complete)
 
     @property
     def total_ms(self) -> dict[str, float]:
         """Milliseconds of each stage in all complete frames."""
-        return {stage: seconds * 1e3 for stage, seconds in list(self._total.items())}
+        return self._told(self._total)
+
+    def _told(self, seconds: np.ndarray[tuple[int], np.dtype[np.float64]]) -> dict[str, float]:
+        return {stage: 1e3 * float(seconds[place]) for stage, place in self._places.copy().items() if seconds[place] > 0}

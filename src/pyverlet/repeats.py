@@ -1,4 +1,4 @@
-"""What of the frames of a small world is replayed (`_trace`) rather than gone through in Python, and what it depends on."""
+"""What of the frames of a plain world is replayed (`_trace`) rather than gone through in Python, and what it depends on."""
 
 from __future__ import annotations
 
@@ -6,28 +6,31 @@ import contextlib
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from typing import Any
 
+from pyverlet._entry import go_on, pause
+from pyverlet._jit import threads_in_use
 from pyverlet._trace import Trace
 from pyverlet.collisions import ContactSolver
-from pyverlet.constants import REPEAT_BELOW
+from pyverlet.constants import STAGES_FROM
 
-OPENING, SUBSTEP, CLOSING = range(3)
-"""Parts of a frame: gathering until the integrator has begun, a substep, who rests until the integrator has ended."""
+OPENING, ALIKE, FIRST, NEXT, LAST, CLOSING = range(6)
+"""Parts of a frame: gathering until the integrator has begun; substeps, of one kind or three; who rests until the integrator has
+ended."""
 
 
 class Repeats:
     """The parts of a frame of one world, recorded. Whatever may do more than call kernels has it gone through in Python instead.
 
     Replayed are: integrators and rooms that say so, gravity as the only force, smooth inelastic contacts. Not replayed: links,
-    obstacles, events, sleep, a ledger, a look between substeps.
+    obstacles, events, sleep, a ledger, a look between substeps, substeps strip by strip.
     """
 
     def __init__(self) -> None:
-        self._traces = Trace(), Trace(), Trace()
+        self._traces = tuple(Trace() for _ in range(6))
 
     def frame(self, world: Any, h: float, contacts: ContactSolver | None, done: Callable[[str], None]) -> Frame:
         """A frame begins. `contacts`: those of the world, if it has more than one particle."""
         plain = not (world.forces or world.links or world.obstacles) and done == world.profile.mark
-        return Frame(self._traces, plain, world, h, contacts)
+        return Frame(self._traces, plain, world, h, contacts, done)
 
 
 class Frame:
@@ -37,13 +40,34 @@ class Frame:
 
     Attributes:
         plain: whether nothing acts but gravity, contacts and the room, and nobody but the profile is told of stages.
+        leans: whether its substeps then differ: in those but the first accelerations are known, the last has more to do.
+        done: to be told of the end of the stages of substeps. In a small world that is not recorded: to see what time it is would
+            take longer than to call a kernel, and what is replayed there is one stage, `repeats`.
     """
 
-    def __init__(self, traces: tuple[Trace, ...], plain: bool, world: Any, h: float, contacts: ContactSolver | None) -> None:
+    def __init__(
+        self,
+        traces: tuple[Trace, ...],
+        plain: bool,
+        world: Any,
+        h: float,
+        contacts: ContactSolver | None,
+        done: Callable[[str], None],
+    ) -> None:
         self.plain = plain
-        self._repeats = plain and not world.onlooker and len(world) < REPEAT_BELOW and world.integrator.repeats
+        self._repeats = plain and not world.onlooker and world.integrator.repeats
         self._traces, self._world, self._h, self._contacts = traces, world, h, contacts
         self._known: Hashable = None
+        small = len(world) < STAGES_FROM
+        self.leans = plain and not small and world.substeps > 1
+        self._mark, self._whole = done, self._repeats and small
+        self.done = self._done_aside if self._whole else done
+
+    def _done_aside(self, stage: str) -> None:
+        recorded = pause()
+        self._mark(stage)
+        if recorded:
+            go_on()
 
     def _ask(self) -> Hashable:
         if self._known is None and self._repeats:
@@ -61,34 +85,39 @@ class Frame:
             yield
             self._known = None
 
-    def substeps(self, count: int) -> Iterable[tuple[int, bool]]:
-        """The substeps that are left to Python, each with whether the particles have moved already."""
-        if not self._repeats:
-            return ((substep, False) for substep in range(count))
-        done, begun = self._ahead(count)
-        return self._left(done, begun, count) if done < count else ()
+    def substeps(self, count: int) -> Iterable[tuple[int, int, bool]]:
+        """The substeps that are left to Python, each with its kind and whether the particles have moved already."""
+        if self._repeats:
+            return self._left(count)
+        return ((substep, self._kind(substep, count), False) for substep in range(count))
 
-    def _left(self, done: int, begun: bool, count: int) -> Iterator[tuple[int, bool]]:
-        while done < count:
+    def _kind(self, substep: int, count: int) -> int:
+        if not self.leans:
+            return ALIKE
+        return FIRST if substep == 0 else LAST if substep == count - 1 else NEXT
+
+    def _left(self, count: int) -> Iterator[tuple[int, int, bool]]:
+        substep = 0
+        while substep < count:
+            kind = self._kind(substep, count)
+            same = count - substep if kind == ALIKE else count - 1 - substep if kind == NEXT else 1
+            rounds, begun = self._traces[kind].ahead(same, self._ask())
+            if (rounds or begun) and self._whole:
+                self._mark("repeats")
+            substep += rounds
+            if rounds and self._contacts:
+                self._contacts.broad_phase.aged(rounds)
+            if rounds == same:
+                continue
+            for trace in self._traces:  # what they are about may be replaced now, and need not be held meanwhile
+                trace.forget(but=None if begun else self._ask())
             if begun or self._ask() is None:
-                yield done, begun
+                yield substep, kind, begun
                 self._known = None
             else:
-                with self.noted(SUBSTEP):
-                    yield done, False
-            rounds, begun = self._ahead(count - done - 1)
-            done += 1 + rounds
-
-    def _ahead(self, count: int) -> tuple[int, bool]:
-        rounds, begun = self._traces[SUBSTEP].ahead(count, self._ask())
-        if rounds or begun:
-            self._replayed(rounds)
-        return rounds, begun
-
-    def _replayed(self, substeps: int) -> None:
-        if self._contacts:
-            self._contacts.broad_phase.aged(substeps)
-        self._world.profile.mark("repeats")
+                with self.noted(kind):
+                    yield substep, kind, False
+            substep += 1
 
 
 def _key(world: Any, h: float, contacts: ContactSolver | None) -> Hashable:
@@ -98,4 +127,4 @@ def _key(world: Any, h: float, contacts: ContactSolver | None) -> Hashable:
     if room is None or pairs is None or world._h_last != h:
         return None
     arrays = id(state.position), id(state.acceleration), id(state.radius), id(state._given["radius"])
-    return h, world.substeps, world.gravity, world.integrator, room, pairs, world._state.version, arrays
+    return h, world.substeps, world.gravity, world.integrator, room, pairs, world._state.version, arrays, threads_in_use()

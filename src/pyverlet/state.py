@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet import _memory
+from pyverlet._claims import Claims
 from pyverlet.kernels import motion
 from pyverlet.unchanged import Unchanged
 
@@ -143,7 +144,7 @@ class Slots:
 
     Attributes:
         real: rounds a number to the dtype; it remembers some, for NumPy takes longer to round one than a kernel to be called.
-        reals: the same of several at once.
+        reals: the same of several at once. claims: for kernels whose threads claim what they do.
         particle: (n,) the user's index of the particle in each slot.
         position, velocity, acceleration, spin, radius, mass, grown, restitution, friction: as in State.
         category, mask: as in State, or empty while every circle collides with every other.
@@ -176,9 +177,8 @@ class Slots:
         self.real = lru_cache(64)(dtype.type)
         self.reals = lru_cache(64)(lambda *numbers: tuple(map(dtype.type, numbers)))
         self._kept: dict[str, Array] = {}
-        self.drop = 1.0
-        self.lean = 0.0
-        self.total_mass = 0.0
+        self.drop, self.lean, self.total_mass = 1.0, 0.0, 0.0
+        self.claims = Claims()
         self._resize(0)
 
     def __len__(self) -> int:

@@ -94,8 +94,7 @@ class World(Measures, Queries, Doors):
         self.frames = 0
         self.profile = Profile()
         self._books = Bookkeeper() if ledger else None
-        self._repeats = Repeats()
-        self._fused = Fused()
+        self._repeats, self._fused = Repeats(), Fused()
         self.onlooker: Callable[[Moment], None] | None = None
         """Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins."""
 
@@ -119,19 +118,20 @@ class World(Measures, Queries, Doors):
         self._accept(dt, h, books)
         self.profile.end()
 
-    def _frame(self, h: float, done: Callable[[str], None]) -> None:
-        """The table of contents of the engine. `done` is told the name of each stage as it ends."""
+    def _frame(self, h: float, told: Callable[[str], None]) -> None:
+        """The table of contents of the engine. `told` is the name of each stage as it ends."""
         state, forces, integrator = self._slots, self._force_sum, self.integrator
         contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course or None
-        fused, lag, state.drop = self._fused.begin(contacts), integrator.velocity_lag * h, integrator.drop
+        fused, lag, state.drop = self._fused.begin(self.gravity, contacts), integrator.velocity_lag * h, integrator.drop
         parts: list[Any] = [part for part in (contacts, links, course) if part]
-        frame = self._repeats.frame(self, h, contacts, done)
-        if not self._open(frame, h, done):
+        frame = self._repeats.frame(self, h, contacts, told)
+        done = frame.done
+        if not self._open(frame, h, told):
             return
         watch = Watch(self._state, forces, self.links, self.boundary) if contacts and undriven(self, h, self._h_last) else None
-        for substep, moved in frame.substeps(self.substeps):
+        for substep, kind, moved in frame.substeps(self.substeps):
             self._show(substep, h, lag)
-            if not (moved or fused.leapt):
+            if not (moved or fused.leapt or fused.leap(self, contacts, h, kind)):
                 for part in parts:
                     part.before(state, h)
                 integrator.step(state, forces, self.time + substep * h, h)
@@ -139,7 +139,7 @@ class World(Measures, Queries, Doors):
             if contacts:
                 contacts.find(state, lag)
                 done("broad phase")
-                if frame.plain and fused.substep(self, contacts, h, lag, last=substep + 1 == self.substeps):
+                if frame.plain and fused.substep(self, contacts, h, lag, done, kind):
                     continue
                 contacts.project(state, h, lag, forces.strongest)
                 done("contacts")
@@ -158,7 +158,7 @@ class World(Measures, Queries, Doors):
                 links.after(state)
                 done("links")
         self._finish(frame, contacts, watch, h)
-        done("finish")
+        told("finish")
 
     def run(self, *, seconds: float, dt: float = 1 / 60) -> None:
         """Advance by as many frames of dt as come nearest to `seconds`."""
@@ -214,7 +214,8 @@ class World(Measures, Queries, Doors):
         if not frame.made(CLOSING):
             with frame.noted(CLOSING):
                 if contacts:
-                    contacts.end(self._slots, self._state, self.integrator.velocity_lag * h, self.substeps * h, self.gravity)
+                    lag, marked = self.integrator.velocity_lag * h, frame.leans and contacts.packs(self._slots) is not None
+                    contacts.end(self._slots, self._state, lag, self.substeps * h, self.gravity, marked=marked)
                 self.integrator.end(self._slots, h)
         if contacts and watch:
             contacts.growth.heed(watch.close(self._slots, contacts.listed()))

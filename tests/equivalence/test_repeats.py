@@ -13,6 +13,7 @@ import pytest
 
 import pyverlet as pv
 from pyverlet import _trace, repeats
+from pyverlet.collisions import ContactSolver
 from pyverlet.group import Group
 from pyverlet.integrators import BY_NAME
 
@@ -40,25 +41,38 @@ def told(w: pv.World) -> list[Any]:
     return [w.time, *arrays, w._slots.resting.tobytes(), w._slots.hits.tobytes(), w.energy()]
 
 
-@pytest.fixture
-def both(monkeypatch: pytest.MonkeyPatch) -> Any:
+def take_the_long_way(patch: pytest.MonkeyPatch) -> None:
+    """Nothing is replayed, no substep leans on another."""
+    patch.setattr(repeats, "_key", lambda *arguments: None)
+    patch.setattr(ContactSolver, "packs", lambda contacts, state: None)
+
+
+@pytest.fixture(params=["alike", "of three kinds"])
+def both(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Any:
     """Do the same to two worlds, one of which Python goes through, and compare after every frame. Returns replayed substeps."""
+    monkeypatch.setattr(repeats, "STAGES_FROM", 10_000 if request.param == "alike" else 0)
+    number = 0
+    ahead = _trace.Trace.ahead
+
+    def count(trace: _trace.Trace, substeps: int, key: Any) -> tuple[int, bool]:
+        nonlocal number
+        rounds, begun = ahead(trace, substeps, key)
+        number += rounds
+        return rounds, begun
+
+    monkeypatch.setattr(_trace.Trace, "ahead", count)
 
     def go(make: Any, frames: int, meanwhile: Any = lambda w, frame: None) -> int:
+        nonlocal number
         replayed, plain = make(), make()
         number = 0
-
-        def count(frame: repeats.Frame, substeps: int, told: Any = repeats.Frame._replayed) -> None:
-            nonlocal number
-            number += substeps
-            told(frame, substeps)
-
-        monkeypatch.setattr(repeats.Frame, "_replayed", count)
         for frame in range(frames):
-            for w, most in ((replayed, 10_000), (plain, 0)):
-                monkeypatch.setattr(repeats, "REPEAT_BELOW", most)
-                meanwhile(w, frame)
-                w.step(1 / 60)
+            meanwhile(replayed, frame)
+            replayed.step(1 / 60)
+            with pytest.MonkeyPatch.context() as patch:
+                take_the_long_way(patch)
+                meanwhile(plain, frame)
+                plain.step(1 / 60)
             assert told(replayed) == told(plain), frame
             if replayed._contacts:
                 assert replayed.save().contacts[0][1:] == plain.save().contacts[0][1:]
@@ -143,8 +157,7 @@ def test_whatever_changes_between_frames_is_seen(both: Any, first: str) -> None:
 
 def test_shorter_frames_of_the_same_substeps_are_not_taken_for_the_longer_ones(monkeypatch: pytest.MonkeyPatch) -> None:
     # What a frame looks back on is as long as the frame.
-    def stepped(most: int) -> list[Any]:
-        monkeypatch.setattr(repeats, "REPEAT_BELOW", most)
+    def stepped() -> list[Any]:
         world = pour(boundary=ROOMS["cage"]())
         for _ in range(90):
             world.step(1 / 60)
@@ -155,7 +168,9 @@ def test_shorter_frames_of_the_same_substeps_are_not_taken_for_the_longer_ones(m
             seen.append(told(world))
         return seen
 
-    assert stepped(10_000) == stepped(0)
+    replayed = stepped()
+    take_the_long_way(monkeypatch)
+    assert replayed == stepped()
 
 
 def test_a_copy_has_calls_of_its_own() -> None:
@@ -207,10 +222,10 @@ def test_a_substep_that_was_broken_off_is_not_replayed(both: Any) -> None:
         if frame == 5:
             w.gravity = (0, -5)
             room = w.boundary
-            room.confine = mock.Mock(side_effect=KeyboardInterrupt)  # type: ignore[method-assign]
+            room.held = mock.Mock(side_effect=KeyboardInterrupt)  # type: ignore[method-assign]
             with pytest.raises(KeyboardInterrupt):
                 w.step(1 / 60)
-            del room.confine
+            del room.held
 
     assert both(lambda: pour(boundary=ROOMS["cage"]()), 60, interrupt) > 0
 

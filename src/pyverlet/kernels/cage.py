@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pyverlet._claims import claim_evenly, none_claimed
 from pyverlet._jit import kernel, parallel_kernel, prange
 from pyverlet._lanes import (
     LANES,
@@ -130,16 +131,22 @@ def hold_some(
 @parallel_kernel
 def hold(
     x0, y0, size, position, velocity, acceleration, radius, inverse_mass, resting, hits, h, lag, rest_speed,
-    arrives, origin, moved, feed,
+    arrives, origin, moved, feed, claims,
 ):  # fmt: skip
     """All circles stay inside the cage of radius `size` about (x0, y0); `resting` is 1 for those that were beyond.
 
-    arrives: 1 if contacts have `moved` them and they have yet to `arrive` there; or 0, and nobody looks at what comes after.
+    arrives: 1 if contacts have `moved` them and they have yet to `arrive` there; or 0, and nobody looks at origin, moved and
+    feed. claims: `_claims.Claims`.
     """
     count = radius.shape[0]
-    for chunk in prange((count + _CHUNK - 1) // _CHUNK):
-        a, b = chunk * _CHUNK, min((chunk + 1) * _CHUNK, count)
-        if arrives:
-            arrive(position[a:b], velocity[a:b], origin[a:b], moved[a:b], feed)
-        bodies = (position, velocity, acceleration, radius, inverse_mass, resting, hits)
-        hold_some(x0, y0, size, *bodies, h, lag, rest_speed, a, b)
+    chunks = (count + _CHUNK - 1) // _CHUNK
+    none_claimed(claims)
+    for part in prange(claims.shape[0]):
+        chunk = claim_evenly(claims, chunks, part)
+        while chunk >= 0:
+            a, b = chunk * _CHUNK, min((chunk + 1) * _CHUNK, count)
+            if arrives:
+                arrive(position[a:b], velocity[a:b], origin[a:b], moved[a:b], feed)
+            bodies = (position, velocity, acceleration, radius, inverse_mass, resting, hits)
+            hold_some(x0, y0, size, *bodies, h, lag, rest_speed, a, b)
+            chunk = claim_evenly(claims, chunks, part)

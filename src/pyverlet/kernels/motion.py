@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pyverlet._claims import claim_evenly, none_claimed
 from pyverlet._jit import kernel, parallel_kernel, prange
 from pyverlet._lanes import copy_row, larger_finite
 
@@ -141,15 +142,19 @@ def strayed(position, reference, square):
 
 
 @parallel_kernel
-def leap(position, velocity, acceleration, h, reference, square, origin, moved):
+def leap(position, velocity, acceleration, h, reference, square, origin, moved, claims):
     """`kick_drift`, whether anyone has `strayed` by it, and `set_out` for the contacts: block by block, for the caches' sake."""
     x, start = position.reshape(-1), reference.reshape(-1)
-    found = 0
-    for block in prange((position.shape[0] + _BLOCK - 1) // _BLOCK):
-        a, b = block * _BLOCK, min((block + 1) * _BLOCK, position.shape[0])
-        kick_drift(position[a:b], velocity[a:b], acceleration[a:b], h)
-        found += int(any_strayed(x, start, a, b, square))
-        set_out(position[a:b], origin[a:b], moved[a:b])
+    blocks, found = (position.shape[0] + _BLOCK - 1) // _BLOCK, 0
+    none_claimed(claims)
+    for part in prange(claims.shape[0]):
+        block = claim_evenly(claims, blocks, part)
+        while block >= 0:
+            a, b = block * _BLOCK, min((block + 1) * _BLOCK, position.shape[0])
+            kick_drift(position[a:b], velocity[a:b], acceleration[a:b], h)
+            found += int(any_strayed(x, start, a, b, square))
+            set_out(position[a:b], origin[a:b], moved[a:b])
+            block = claim_evenly(claims, blocks, part)
     return found > 0
 
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pyverlet._claims import claim, none_claimed
 from pyverlet._jit import kernel, parallel_kernel, prange
 from pyverlet._lanes import (
     ALL,
@@ -241,7 +242,7 @@ def _refine_some(first, stop, parity, moved, begin, lanes, lane_i, lane_j, gap, 
 @parallel_kernel
 def project(
     position, velocity, origin, moved, cut, begin, lanes, apart, lane_i, lane_j, gap, reach, share, varied, feed, most, normal,
-    depths, deep, deeps, fresh, sets_out, arrives,
+    depths, deep, deeps, fresh, sets_out, arrives, claims,
 ):  # fmt: skip
     """Move overlapping pairs apart, feed their velocities, and note the normals of those that touch.
 
@@ -250,7 +251,7 @@ def project(
     where in its strip s each of the deeps[s] packs begins that are treated again; noted anew if fresh[0], which is then 0.
     cut: (2, threads + 1), which half s // 2 of the strips s with s % 2 = 0, and 1, each thread begins with. normal: (2, lanes).
     moved: (n, 2) to work with. sets_out: 1 if it is yet to be set to position - origin. arrives: 1 if what becomes of it is to be
-    added to positions and fed to velocities, 0 if others do that.
+    added to positions and fed to velocities, 0 if others do that. claims: `_claims.Claims`.
     """
     n, looks, listed = position.shape[0], fresh[0] != 0, (lane_i, lane_j, gap, reach, share, varied)
     chunks = (n + _CHUNK - 1) // _CHUNK
@@ -259,8 +260,10 @@ def project(
             a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
             set_out(position[a:b], origin[a:b], moved[a:b])
     for parity in range(2):
-        for part in prange(cut.shape[1] - 1):
-            for half in range(cut[parity, part], cut[parity, part + 1]):
+        none_claimed(claims)
+        for part in prange(claims.shape[0]):
+            half = claim(claims, cut[parity], part)
+            while half >= 0:
                 s = 2 * half + parity
                 a, b = begin[s], begin[s] + lanes[s]
                 pairs = (lane_i[a:b], lane_j[a:b], gap[0, a:b], gap[1, a:b], reach[a * varied :], share[a * varied :], varied)
@@ -268,6 +271,7 @@ def project(
                 count = project_strip(moved, apart[s], *pairs, *noted)
                 if looks:
                     deeps[s] = count
+                half = claim(claims, cut[parity], part)
     left = 0
     for s in range(deeps.shape[0]):
         left += deeps[s]
@@ -301,18 +305,23 @@ def still_strip(velocity, apart, lane_i, lane_j, share, varied, one, normal_x, n
 
 
 @parallel_kernel
-def still(velocity, cut, begin, lanes, apart, lane_i, lane_j, share, varied, normal, resting, marks):
-    """Set the normal velocity of touching pairs to 0; if `marks` is 1, `resting` gains IN_PILE for their circles."""
+def still(velocity, cut, begin, lanes, apart, lane_i, lane_j, share, varied, normal, resting, fresh, marks, claims):
+    """Set the normal velocity of touching pairs to 0; if `marks` is 1, do what `mark_touching` does, too."""
     one = velocity.dtype.type(1)
     for parity in range(2):
-        for part in prange(cut.shape[1] - 1):
-            for half in range(cut[parity, part], cut[parity, part + 1]):
+        none_claimed(claims)
+        for part in prange(claims.shape[0]):
+            half = claim(claims, cut[parity], part)
+            while half >= 0:
                 s = 2 * half + parity
                 a, b = begin[s], begin[s] + lanes[s]
                 pairs, normals = (lane_i[a:b], lane_j[a:b]), (normal[0, a:b], normal[1, a:b])
                 still_strip(velocity, apart[s], *pairs, share[a * varied :], varied, one, *normals)
                 if marks != 0:
                     mark_strip(resting, *pairs, *normals)
+                half = claim(claims, cut[parity], part)
+    if marks != 0:
+        fresh[0] = 1
 
 
 @kernel
