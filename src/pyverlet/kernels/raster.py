@@ -25,6 +25,21 @@ def _sliver_series():
 DUST = 4
 """Discs narrower than a pixel are drawn together, by `dust`, if there is one to so many pixels."""
 
+CROWD = 1024
+"""Small discs from which on they are drawn from stamps: as many stamps cost as much as so many discs."""
+
+STAMPED = 8
+"""Radius of the largest disc that is, in pixels."""
+
+FINE = 16
+"""Places within a pixel that stamps tell apart, along each axis."""
+
+SIZES = 128
+"""Stamps of sizes that differ by a factor e: one is within half a hundredth of what it stands for."""
+
+ROOM = 1 << 20
+"""Pixels of stamps there is room for. What does not fit is drawn without."""
+
 C0, C1, C2, C3, C4, C5 = _sliver_series()
 
 
@@ -165,22 +180,103 @@ def dust(pixels, ground, position, radius, colour, left, top, scale):
 
 
 @kernel
+def spread_rows(cover, x, y, r, top, foot):
+    """Cover of the rows from `top` up to `foot` by a disc, each into its row of `cover` from the column floor(x - r) on."""
+    first = math.floor(x - r)
+    for row in range(top, foot):
+        above, below = y - row, row + 1 - y  # from the centre up to the top of the row, and down to its foot
+        if above > 0.0 and below > 0.0:  # the centre's own row has a band of either half
+            add_band(cover[row - top], first, x, 0.0, min(above, r), r)
+            add_band(cover[row - top], first, x, 0.0, min(below, r), r)
+        else:
+            add_band(cover[row - top], first, x, max(-above, -below), min(max(above, below), r), r)
+
+
+@kernel
+def put_disc(pixels, ground, colour, x, y, r, cover):
+    """Draw one disc, row by row; cover: (2 r + 2 or more,) of 0."""
+    height, width = pixels.shape
+    first, last = math.floor(x - r), math.floor(x + r) + 1
+    for row in range(np.uint64(max(math.floor(y - r), 0.0)), np.uint64(min(math.ceil(y + r), float(height)))):
+        spread_rows(cover.reshape(1, -1), x, y, r, np.int64(row), np.int64(row) + 1)
+        for k in range(np.uint64(last - first)):
+            amount = np.int32(255.0 * cover[k] + 0.5)
+            cover[k] = 0.0
+            column = first + k
+            if 0 <= column < width:
+                column = np.uint64(column)
+                if amount >= 255:
+                    pixels[row, column] = colour
+                elif amount > 0:
+                    pixels[row, column] = blend(pixels[row, column], ground[row, column], colour, amount)
+
+
+@kernel
+def make_stamp(where, amount, at, width, x, y, r, cover):
+    """Note which pixels a disc covers, and how much of 255; x, y: where in its own pixel the centre is.
+
+    From `at` on: the number of pixels that it covers whole, that of its rim, and where these and those are, counted from its own
+    pixel on in a picture of this width. Returns where the next may begin. cover: of as many rows and columns, or more.
+    """
+    left, top = math.floor(x - r), math.floor(y - r)
+    columns, rows = math.floor(x + r) + 1 - left, math.ceil(y + r) - top
+    cover[:rows, :columns] = 0.0
+    spread_rows(cover, x, y, r, top, top + rows)
+    end = at + 2
+    for whole in (True, False):
+        begin = end
+        for row in range(rows):
+            for column in range(columns):
+                part = np.int32(255.0 * cover[row, column] + 0.5)
+                if part > 0 and (part >= 255) == whole:
+                    where[end], amount[end] = (top + row) * width + left + column, part
+                    end += 1
+        where[at if whole else at + 1] = end - begin
+    return end
+
+
+@kernel
+def put_stamp(pixels, ground, colour, centre, where, amount):
+    """Draw a disc, all of it on the picture; pixels, ground: (h w,); centre: which of them its centre is in."""
+    rim = 2 + where[0]
+    for k in range(np.uint64(2), np.uint64(rim)):
+        pixels[np.uint64(centre + where[k])] = colour
+    for k in range(np.uint64(rim), np.uint64(rim + where[1])):
+        at = np.uint64(centre + where[k])
+        pixel, cover = pixels[at], np.int32(amount[k])
+        if pixel >> np.uint32(24) == 0:
+            pixels[at] = (over_full(ground[at], colour, cover) & np.uint32(0xFFFFFF)) | (np.uint32(cover) << np.uint32(24))
+        else:
+            pixels[at] = blend(pixel, ground[at], colour, cover)
+
+
+@kernel
 def circles(pixels, ground, position, radius, colour, left, top, scale):
     """Draw discs on `pixels`, (h, w) uint32, in the order given; where a crowd of them is narrower than a pixel, those first.
+
+    Small ones of a crowd are drawn from stamps, which are made when first asked for: at the next of FINE x FINE places within a
+    pixel, all those as large as the first of nearly their size. Each has its area, and is a sixteenth of a pixel aside at most.
 
     `ground`: what the pixels were before the first. `position` (n, 2), `radius` (n,): metres. `colour`: (n,) uint32.
     `left`, `top`: metres at the upper left corner of the picture; `scale`: pixels a metre.
     """
     height, width = pixels.shape
     cover = np.zeros(16)
-    narrow = 0
+    narrow, small = 0, 0
     for i in range(radius.shape[0]):
-        narrow += max(radius[i] * scale, LEAST_DRAWN_RADIUS) < 0.5
+        r = max(radius[i] * scale, LEAST_DRAWN_RADIUS)
+        narrow += r < 0.5
+        small += 0.5 <= r <= STAMPED
     dusty = DUST * narrow >= height * width
     if dusty:
         dust(pixels, ground, position, radius, colour, left, top, scale)
         if narrow == radius.shape[0]:
             return
+    crowd = small >= CROWD
+    sizes = np.int64(math.log(2.0 * STAMPED) * SIZES) + 2 if crowd else 0
+    stamps, of_size, free, largest = np.zeros(sizes * FINE * FINE, np.int64), np.zeros(sizes), 1, (2 * STAMPED + 3) ** 2 + 2
+    where, amount = np.empty(ROOM if crowd else 0, np.int32), np.empty(ROOM if crowd else 0, np.uint8)
+    spare, flat, flat_ground = np.empty((2 * STAMPED + 3, 2 * STAMPED + 3)), pixels.reshape(-1), ground.reshape(-1)
     for i in range(radius.shape[0]):
         x, y = (position[i, 0] - left) * scale, (top - position[i, 1]) * scale
         r = max(radius[i] * scale, LEAST_DRAWN_RADIUS)
@@ -192,26 +288,24 @@ def circles(pixels, ground, position, radius, colour, left, top, scale):
                 row, column = np.uint64(y), np.uint64(x)
                 pixels[row, column] = blend(pixels[row, column], ground[row, column], c, np.int32(255.0 * np.pi * r * r + 0.5))
             continue
-        first, last = math.floor(x - r), math.floor(x + r) + 1
-        if last - first > cover.shape[0]:
-            cover = np.zeros(2 * (last - first))
-        for row in range(np.uint64(max(math.floor(y - r), 0.0)), np.uint64(min(math.ceil(y + r), float(height)))):
-            above, below = y - row, row + 1 - y  # from the centre up to the top of the row, and down to its foot
-            if above > 0.0 and below > 0.0:  # the centre's own row has a band of either half
-                add_band(cover, first, x, 0.0, min(above, r), r)
-                add_band(cover, first, x, 0.0, min(below, r), r)
-            else:
-                add_band(cover, first, x, max(-above, -below), min(max(above, below), r), r)
-            for k in range(np.uint64(last - first)):
-                amount = np.int32(255.0 * cover[k] + 0.5)
-                cover[k] = 0.0
-                column = first + k
-                if 0 <= column < width:
-                    column = np.uint64(column)
-                    if amount >= 255:
-                        pixels[row, column] = c
-                    elif amount > 0:
-                        pixels[row, column] = blend(pixels[row, column], ground[row, column], c, amount)
+        reach = r + 2.0
+        if crowd and r <= STAMPED and x > reach and y > reach and x < width - reach and y < height - reach:
+            column, row = np.int64(x), np.int64(y)
+            fine_x, fine_y = np.int64(FINE * (x - column)), np.int64(FINE * (y - row))
+            size = np.int64(math.log(2.0 * r) * SIZES + 0.5)
+            stamp = (size * FINE + fine_y) * FINE + fine_x
+            if stamps[stamp] == 0 and free + largest <= ROOM:
+                if of_size[size] == 0.0:
+                    of_size[size] = r
+                stamps[stamp], place = free, ((fine_x + 0.5) / FINE, (fine_y + 0.5) / FINE)
+                free = make_stamp(where, amount, free, width, *place, of_size[size], spare)
+            if stamps[stamp] > 0:
+                put_stamp(flat, flat_ground, c, row * width + column, where[stamps[stamp] :], amount[stamps[stamp] :])
+                continue
+        columns = math.floor(x + r) + 1 - math.floor(x - r)
+        if columns > cover.shape[0]:
+            cover = np.zeros(2 * columns)
+        put_disc(pixels, ground, c, x, y, r, cover)
 
 
 @kernel
