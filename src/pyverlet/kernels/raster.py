@@ -35,7 +35,7 @@ FINE = 16
 """Places within a pixel that stamps tell apart, along each axis."""
 
 SIZES = 128
-"""Stamps of sizes that differ by a factor e: one is within half a hundredth of what it stands for."""
+"""Sizes of stamps within a factor e: each is within a hundredth of what it stands for."""
 
 ROOM = 1 << 20
 """Pixels of stamps there is room for. What does not fit is drawn without."""
@@ -277,6 +277,7 @@ def circles(pixels, ground, position, radius, colour, left, top, scale):
     stamps, of_size, free, largest = np.zeros(sizes * FINE * FINE, np.int64), np.zeros(sizes), 1, (2 * STAMPED + 3) ** 2 + 2
     where, amount = np.empty(ROOM if crowd else 0, np.int32), np.empty(ROOM if crowd else 0, np.uint8)
     spare, flat, flat_ground = np.empty((2 * STAMPED + 3, 2 * STAMPED + 3)), pixels.reshape(-1), ground.reshape(-1)
+    same, size = 0.0, 0
     for i in range(radius.shape[0]):
         x, y = (position[i, 0] - left) * scale, (top - position[i, 1]) * scale
         r = max(radius[i] * scale, LEAST_DRAWN_RADIUS)
@@ -292,7 +293,8 @@ def circles(pixels, ground, position, radius, colour, left, top, scale):
         if crowd and r <= STAMPED and x > reach and y > reach and x < width - reach and y < height - reach:
             column, row = np.int64(x), np.int64(y)
             fine_x, fine_y = np.int64(FINE * (x - column)), np.int64(FINE * (y - row))
-            size = np.int64(math.log(2.0 * r) * SIZES + 0.5)
+            if r != same:
+                same, size = r, np.int64(math.log(2.0 * r) * SIZES + 0.5)
             stamp = (size * FINE + fine_y) * FINE + fine_x
             if stamps[stamp] == 0 and free + largest <= ROOM:
                 if of_size[size] == 0.0:
