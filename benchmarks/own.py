@@ -168,8 +168,8 @@ def threads(triad: float) -> Iterator[Row]:
     yield Row(
         "100,000 circles",
         "a frame <= 16.7 ms on two threads, and at least 1.8 times as fast as on one",
-        f"{two:.1f} ms, {one / two:.2f} times as fast, {gain:.2f} in the fastest tenth of frames; {heap(world)}; two worlds of half "
-        f"as many, a thread each, that never meet: {most:.2f} and {most_quiet:.2f} times as fast at once as one by one",
+        f"{two:.1f} ms, {one / two:.2f} times as fast, {gain:.2f} in the fastest tenth of frames; {heap(world)}; two worlds of "
+        f"half as many, a thread each, that never meet: {most:.2f} and {most_quiet:.2f} times as fast at once as one by one",
         two <= 16.7 and one / two >= 1.8,
     )
 
