@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import pyverlet as pv
-from pyverlet.kernels import lines, raster
+from pyverlet.kernels import lines, raster, stamps
 from pyverlet.picture import DARK, LIGHT, ByOrigin, BySpeed, Raster, View
 from pyverlet.picture.palette import swapped
 from pyverlet.viewers.frames import outline
@@ -265,7 +265,7 @@ def test_a_few_narrow_discs_cover_what_a_crowd_would() -> None:
 
 def one_by_one(position: Any, radius: Any, size: tuple[int, int]) -> NDArray[np.float64]:
     """`covered`, in parts too small to be a crowd."""
-    part = raster.CROWD // 2
+    part = stamps.CROWD // 2
     parts = [slice(k, k + part) for k in range(0, len(radius), part)]
     return np.asarray(sum(covered(position[part], radius[part], size) for part in parts))
 
@@ -283,39 +283,39 @@ def test_discs_of_a_crowd_are_as_large_as_others_and_nearly_where_they_are(radiu
     # A stamp is aside by 1 / 2 FINE at most along each axis, so that the rim within a pixel, no longer than 2, shifts by no more
     # than its diagonal: sqrt(2) / 32 * 2, and rounding on both sides.
     rng = np.random.default_rng(5)
-    radii = np.full(4 * raster.CROWD, radius)
+    radii = np.full(4 * stamps.CROWD, radius)
     place, size = on_a_lattice(radii, 2 * radius + 4, rng)
     crowd, others = covered(place, radii, size), one_by_one(place, radii, size)
     assert (crowd != others).any()
-    assert np.abs(crowd - others).max() <= np.sqrt(2) / raster.FINE + 1 / 255
+    assert np.abs(crowd - others).max() <= np.sqrt(2) / stamps.FINE + 1 / 255
     # Of those that are on the picture as a whole: the mean error of their areas is that of the rounding, as for single discs, but
     # of the FINE x FINE places eight at a time are mirror images with the same errors.
     whole = np.all((place > radius) & (place < np.array(size) - radius), axis=1)
     area = covered(place[whole], radii[whole], size).sum() / whole.sum()
     deviation = np.sqrt((8 * radius + 8) / 12) / 255
-    assert abs(area - np.pi * radius**2) < 4 * deviation / np.sqrt(raster.FINE**2 / 8) + 2e-6 * (8 * radius + 8)
+    assert abs(area - np.pi * radius**2) < 4 * deviation / np.sqrt(stamps.FINE**2 / 8) + 2e-6 * (8 * radius + 8)
 
 
 def test_discs_of_a_crowd_of_many_sizes_are_nearly_as_large_as_others() -> None:
     # One stamp serves radii within a factor exp(1 / 128), more stamps than there is room for: areas are within two of these.
     rng = np.random.default_rng(6)
-    radii = rng.uniform(0.4, 9.0, 30 * raster.CROWD)
+    radii = rng.uniform(0.4, 9.0, 30 * stamps.CROWD)
     place, size = on_a_lattice(radii, 22, rng)
     crowd, others = covered(place, radii, size), one_by_one(place, radii, size)
     corner = (22 * np.arange(int(np.ceil(np.sqrt(len(radii))))) - 10).clip(0)
     sums = [np.add.reduceat(np.add.reduceat(picture[::-1], corner, 0), corner, 1) for picture in (crowd, others)]
     assert np.abs(sums[0] - sums[1]).max() > 0
-    assert (np.abs(sums[0] - sums[1]) <= 2 / raster.SIZES * sums[1] + rounding(9.0)).all()
+    assert (np.abs(sums[0] - sums[1]) <= 2 / stamps.SIZES * sums[1] + rounding(9.0)).all()
 
 
 def test_a_crowd_has_the_colours_of_others() -> None:
     # Centres are where stamps have them, so that each pixel is covered alike: A is one level off at most, R, G, B one more.
     rng = np.random.default_rng(7)
-    count, size, radius = 3 * raster.CROWD, 200, 2.3
-    place = rng.integers(8, size - 8, (count, 2)) + (rng.integers(0, raster.FINE, (count, 2)) + 0.5) / raster.FINE
+    count, size, radius = 3 * stamps.CROWD, 200, 2.3
+    place = rng.integers(8, size - 8, (count, 2)) + (rng.integers(0, stamps.FINE, (count, 2)) + 0.5) / stamps.FINE
     colour, ground = rng.integers(0, 1 << 24, count).astype(np.uint32), np.full((size, size), 0x405060, dtype=np.uint32)
     crowd, others = ground.copy(), ground.copy()
-    for pixels, part in ((crowd, count), (others, raster.CROWD - 1)):
+    for pixels, part in ((crowd, count), (others, stamps.CROWD - 1)):
         for k in range(0, count, part):
             some = slice(k, k + part)
             radii = np.full(len(place[some]), radius)

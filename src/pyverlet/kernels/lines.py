@@ -1,4 +1,4 @@
-"""Straight lines to pixels, with smooth rims and round ends. Pixels as in kernels.raster, whose A stays as it is."""
+"""Straight lines to pixels, with smooth rims and round ends. Pixels as in kernels.cover, whose A stays as it is."""
 
 from __future__ import annotations
 
