@@ -1,7 +1,7 @@
 """Substeps under gravity with smooth inelastic contacts only: loops are fused, so that threads meet less and memory is read less.
 
 Worlds too large for the processor's caches go strip by strip (`kernels.fused`). In others the stages remain, but circles arrive
-where contacts have moved them when the wall holds them, and begin the next substep all at once.
+where contacts have moved them when the wall holds them, and from the second substep on are integrated and set out all at once.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ from pyverlet import _jit
 from pyverlet.bounds import Boundary, Box, Circle, Open
 from pyverlet.broadphase import BruteForce, Fast
 from pyverlet.collisions import Collisions
-from pyverlet.constants import FUSED_FROM, KNOWN_FROM, ONE_THREAD_BELOW, UNEVEN
+from pyverlet.constants import FUSED_FROM, KNOWN_FROM, ONE_THREAD_BELOW, STAGES_FROM, UNEVEN
 from pyverlet.forces import Conservative, Drag
 from pyverlet.group import Group
 from pyverlet.links import Angle, Area, Pin, Spring, Stick
@@ -31,7 +31,7 @@ _ROOMS = (Open, Circle, Box)
 def rehearse(world: World) -> None:
     """What this world needs: frames of a small one of the same kind, its forces, and sleep."""
     small = _lattice(
-        max(_enough(world.threads), KNOWN_FROM if len(world) >= KNOWN_FROM else 0),
+        max(_enough(world.threads), *(least for least in (0, STAGES_FROM, ONE_THREAD_BELOW, KNOWN_FROM) if len(world) >= least)),
         world.dtype,
         type(world.boundary),
         getattr(world.boundary, "restitution", 0.0),
@@ -40,7 +40,7 @@ def rehearse(world: World) -> None:
         ledger=world.keeps_ledger,
         events=world.tells_events,
     )
-    small.integrator, small.substeps = world.integrator, 2  # the first may begin the second
+    small.integrator, small.substeps = world.integrator, 2  # the second leans on the first
     if world.links:
         _link(small)
     if world.obstacles:

@@ -119,7 +119,7 @@ class World(Measures, Queries, Doors):
         self.profile.end()
 
     def _frame(self, h: float, told: Callable[[str], None]) -> None:
-        """The table of contents of the engine. `told` is the name of each stage as it ends."""
+        """The table of contents of the engine. `told` is called with the name of each stage as it ends."""
         state, forces, integrator = self._slots, self._force_sum, self.integrator
         contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course or None
         fused, lag, state.drop = self._fused.begin(self.gravity, contacts), integrator.velocity_lag * h, integrator.drop

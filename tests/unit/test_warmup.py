@@ -10,12 +10,13 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet import _jit, _turns, rehearsals, warmup
+from pyverlet import _jit, _turns, fused, passivity, rehearsals, warmup
 
 
 def run(code: str, cache: Path, **environment: str) -> str:
@@ -162,6 +163,29 @@ def test_parts_cover_what_a_world_of_circles_needs() -> None:
                 world.mass[0] *= 100
                 world.run(seconds=0.1)
             assert late == [], (friction, restitution, room)
+
+
+def test_rehearsals_of_larger_worlds_do_what_these_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From some numbers of circles on a frame calls other kernels, which would be compiled when the first is shown."""
+    done: set[str] = set()
+
+    def spy(owner: type, name: str) -> None:
+        method = getattr(owner, name)
+
+        def spied(*given: Any) -> Any:
+            result = method(*given)
+            if result:
+                done.add(name)
+            return result
+
+        monkeypatch.setattr(owner, name, spied)
+
+    spy(fused.Fused, "leap")
+    spy(passivity.Watch, "_look")
+    for count, expected in ((100, set()), (600, {"leap"}), (3000, {"leap", "_look"})):
+        done.clear()
+        rehearsals.rehearse(pv.scenes.get("cage").world(particles=count, threads=1))
+        assert done == expected, count
 
 
 # ---- turns -------------------------------------------------------------------------------------------------------------
