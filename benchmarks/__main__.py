@@ -20,7 +20,7 @@ import numpy as np
 import pyverlet as pv
 from benchmarks import own, page, physics
 from benchmarks.engines import CAREFUL, DT, ENGINES, RADIUS, Array, Engine
-from pyverlet import report
+from pyverlet.scenes import report
 
 SETTLE_SECONDS = 10.0
 """Simulated before anything is measured, by pyverlet: one settled heap for all."""

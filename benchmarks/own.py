@@ -19,7 +19,7 @@ import numpy as np
 
 import pyverlet as pv
 from benchmarks.engines import DT, RADIUS, Engine, Pymunk, PyverletOneThread
-from pyverlet._memory import mapped
+from pyverlet.ground.memory import mapped
 
 SUBSTEPS = 8
 SETTLE_SECONDS = 10.0

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from typing import Any
 
-from pyverlet import _loading  # noqa: F401  (first: all that follows takes a second)
+from pyverlet.ground import loading  # noqa: F401  (first: all that follows takes a second)
 
 # isort: split
-from pyverlet import builders, errors, forces, integrators, scenes
-from pyverlet.actors import Actor, Emitter, Sink
-from pyverlet.bounds import Boundary, Box, Circle, Open
-from pyverlet.broadphase import BruteForce, Fast
-from pyverlet.builders import bridge, chain, cloth, net, rope, soft_body
-from pyverlet.clock import Clock, FrameBudget
-from pyverlet.collisions import Collisions, Overlap
-from pyverlet.energy import Energy
-from pyverlet.errors import InputError, NonFiniteError, PyverletError
-from pyverlet.events import Events
-from pyverlet.forces import Attractor, ConstantForce, Drag, Gravitation, PointSpring, Wind, force
-from pyverlet.group import Group
-from pyverlet.integrators import (
+from pyverlet import scenes
+from pyverlet.ground import errors
+from pyverlet.ground.errors import InputError, NonFiniteError, PyverletError
+from pyverlet.laws import forces, integrators
+from pyverlet.laws.contacts.broadphase import BruteForce, Fast
+from pyverlet.laws.contacts.collisions import Collisions, Overlap
+from pyverlet.laws.energy import Energy
+from pyverlet.laws.events import Events
+from pyverlet.laws.forces import Attractor, ConstantForce, Drag, Gravitation, PointSpring, Wind, force
+from pyverlet.laws.integrators import (
     RK4,
     ExplicitEuler,
     Integrator,
@@ -29,13 +26,19 @@ from pyverlet.integrators import (
     VelocityVerlet,
     Yoshida4,
 )
-from pyverlet.ledger import Ledger
-from pyverlet.links import Angle, Area, Pin, Rope, Spring, Stick
-from pyverlet.naive import ClampAndFlip, ProjectOnly
-from pyverlet.obstacles import Capsule, Chain, Disc, Obstacle, Polygon, Segment
-from pyverlet.panels import Panel, Panels
-from pyverlet.warmup import warm_up
-from pyverlet.world import World
+from pyverlet.laws.ledger import Ledger
+from pyverlet.laws.links import Angle, Area, Pin, Rope, Spring, Stick
+from pyverlet.laws.naive import ClampAndFlip, ProjectOnly
+from pyverlet.laws.obstacles import Capsule, Chain, Disc, Obstacle, Polygon, Segment
+from pyverlet.laws.rooms import Boundary, Box, Circle, Open
+from pyverlet.state.group import Group
+from pyverlet.world import builders
+from pyverlet.world.actors import Actor, Emitter, Sink
+from pyverlet.world.builders import bridge, chain, cloth, net, rope, soft_body
+from pyverlet.world.clock import Clock, FrameBudget
+from pyverlet.world.panels import Panel, Panels
+from pyverlet.world.warmup import warm_up
+from pyverlet.world.world import World
 
 __version__ = "0.1.0"
 

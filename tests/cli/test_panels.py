@@ -14,7 +14,7 @@ from pyverlet.cli import main
 
 MINE = """
 import pyverlet as pv
-from pyverlet.moves import advance
+from pyverlet.state.moves import advance
 
 
 class Leapfrog(pv.Integrator):

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import pyverlet as pv
-from pyverlet import _jit
-from pyverlet.bounds import Circle
+from pyverlet.compile import jit
 from pyverlet.kernels import bounds
-from pyverlet.state import Slots
+from pyverlet.laws.rooms import Circle
+from pyverlet.state.state import Slots
 
 H = 1 / 480
 CHANGED = ("position", "velocity", "resting", "hits")
@@ -54,16 +54,16 @@ def test_eight_at_a_time_are_one_after_the_other(seed: int, n: int, speed: float
         assert getattr(one, name).tobytes() == getattr(eight, name).tobytes(), name
 
 
-@pytest.mark.skipif(_jit.max_threads() < 2, reason="one core")
+@pytest.mark.skipif(jit.max_threads() < 2, reason="one core")
 def test_any_number_of_threads_gives_the_same() -> None:
     results = []
     for count in (1, 2):
         slots = crowd(0, 10_000, 3.0, np.float32)
-        _jit.use_threads(count)
+        jit.use_threads(count)
         try:
             Circle(center=(1, 2), radius=10).confine(slots, H, 0.0, 0.08)
         finally:
-            _jit.use_threads(1)
+            jit.use_threads(1)
         results.append([getattr(slots, name).tobytes() for name in CHANGED])
     assert results[0] == results[1]
 

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet import _jit, broadphase, fused, grids, repeats
-from pyverlet.collisions import ContactSolver
+from pyverlet.compile import jit
+from pyverlet.laws.contacts import broadphase, grids
+from pyverlet.laws.contacts.collisions import ContactSolver
+from pyverlet.world import fused, repeats
 
 SECONDS = 1.5
 
@@ -101,7 +103,7 @@ def test_a_list_out_of_order_in_the_midst_of_a_frame(monkeypatch: pytest.MonkeyP
     assert same(world, expected)
 
 
-@pytest.mark.parametrize("threads", range(1, _jit.max_threads() + 1))
+@pytest.mark.parametrize("threads", range(1, jit.max_threads() + 1))
 def test_the_bits_are_those_of_the_long_way(expected: pv.World, threads: int, fusing: Fusing) -> None:
     # Contacts, wall, deep pairs, lists made anew: 1.5 s of falling and crashing has them all.
     world = heap(threads=threads)
@@ -121,7 +123,7 @@ def test_borders_between_threads_change_no_bit(parts: int, monkeypatch: pytest.M
 
     def among_more(self: Any, strips: Any, lanes: Any, dtype: Any) -> None:
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(_jit, "threads_in_use", lambda: parts)
+            patch.setattr(jit, "threads_in_use", lambda: parts)
             shares_out(self, strips, lanes, dtype)
         shared.add(len(self._cut) - 1)
 

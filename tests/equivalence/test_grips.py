@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.collisions import ContactSolver
+from pyverlet.laws.contacts.collisions import ContactSolver
 
 N = 203
 

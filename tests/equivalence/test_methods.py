@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import pyverlet as pv
-from pyverlet.broadphase import BruteForce, Fast
-from pyverlet.collisions import find_contacts
-from pyverlet.state import Slots, State
+from pyverlet.laws.contacts.broadphase import BruteForce, Fast
+from pyverlet.laws.contacts.collisions import find_contacts
+from pyverlet.state.state import Slots, State
 
 
 def random_state(seed: int, n: int, room: float, spread: float, dtype: np.dtype[Any]) -> State:

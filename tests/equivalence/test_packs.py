@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import pyverlet as pv
-from pyverlet._lanes import LANES
-from pyverlet.broadphase import BruteForce, Fast
-from pyverlet.constants import DEEP, DEEP_PART, DEEP_SWEEPS, FED_SMOOTH, LARGEST_PUSH, PUSHED
-from pyverlet.packs import Packs
-from pyverlet.state import Slots
+from pyverlet.compile.lanes import LANES
+from pyverlet.ground.constants import DEEP, DEEP_PART, DEEP_SWEEPS, FED_SMOOTH, LARGEST_PUSH, PUSHED
+from pyverlet.laws.contacts.broadphase import BruteForce, Fast
+from pyverlet.laws.contacts.packs import Packs
+from pyverlet.state.state import Slots
 
 H = 1 / 480
 

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet import _trace, repeats
-from pyverlet.collisions import ContactSolver
-from pyverlet.group import Group
-from pyverlet.integrators import BY_NAME
+from pyverlet.compile import trace
+from pyverlet.laws.contacts.collisions import ContactSolver
+from pyverlet.laws.integrators import BY_NAME
+from pyverlet.state.group import Group
+from pyverlet.world import repeats
 
 ROOMS = {
     "cage": lambda: pv.Circle(radius=8),
@@ -52,15 +53,15 @@ def both(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Any
     """Do the same to two worlds, one of which Python goes through, and compare after every frame. Returns replayed substeps."""
     monkeypatch.setattr(repeats, "STAGES_FROM", 10_000 if request.param == "alike" else 0)
     number = 0
-    ahead = _trace.Trace.ahead
+    ahead = trace.Trace.ahead
 
-    def count(trace: _trace.Trace, substeps: int, key: Any) -> tuple[int, bool]:
+    def count(trace: trace.Trace, substeps: int, key: Any) -> tuple[int, bool]:
         nonlocal number
         rounds, begun = ahead(trace, substeps, key)
         number += rounds
         return rounds, begun
 
-    monkeypatch.setattr(_trace.Trace, "ahead", count)
+    monkeypatch.setattr(trace.Trace, "ahead", count)
 
     def go(make: Any, frames: int, meanwhile: Any = lambda w, frame: None) -> int:
         nonlocal number
@@ -185,7 +186,7 @@ def test_a_copy_has_calls_of_its_own() -> None:
 
 
 def test_too_many_calls_for_the_room_are_not_recorded(monkeypatch: pytest.MonkeyPatch, both: Any) -> None:
-    monkeypatch.setattr(_trace, "_ROOM", 100)
+    monkeypatch.setattr(trace, "_ROOM", 100)
     assert both(lambda: pour(boundary=ROOMS["cage"]()), 10) == 0
 
 

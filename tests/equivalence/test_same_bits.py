@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet import _jit
-from pyverlet.constants import DEEP
+from pyverlet.compile import jit
+from pyverlet.ground.constants import DEEP
 
 # Threads of the pool are fixed when Numba starts, so a process of its own gets eight, whatever this machine has.
 RUN_WITH_THREADS = """
@@ -148,5 +148,5 @@ def test_deep_contacts_are_treated_again_alike_on_any_number_of_threads() -> Non
         world.step(1 / 60)
         return world
 
-    hashes = {pressed(threads).state_hash() for threads in range(1, _jit.max_threads() + 1)}
+    hashes = {pressed(threads).state_hash() for threads in range(1, jit.max_threads() + 1)}
     assert len(hashes) == 1

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.constants import PUSHED
+from pyverlet.ground.constants import PUSHED
 
 G = 9.81
 RADIUS = 0.5

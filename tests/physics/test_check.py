@@ -10,7 +10,7 @@ import pytest
 import scipy.stats
 
 from pyverlet.cli import main
-from pyverlet.errors import InputError, NonFiniteError
+from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.lab import physics
 from pyverlet.lab.physics import energy, friction, gas, lost
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.state import Slots, State
+from pyverlet.state.state import Slots, State
 
 DT, SUBSTEPS = 1 / 60, 8
 H = DT / SUBSTEPS

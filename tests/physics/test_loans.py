@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.constants import FED_SMOOTH, LENT
+from pyverlet.ground.constants import FED_SMOOTH, LENT
 
 G = 9.81
 H = 1 / 480

@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 import pyverlet as pv
-from pyverlet.integrators import BY_NAME
-from pyverlet.moments import Moment
+from pyverlet.laws.integrators import BY_NAME
+from pyverlet.world.moments import Moment
 
 DT = 1 / 60
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.constants import FED_SMOOTH, GROWTH, PUSHED
+from pyverlet.ground.constants import FED_SMOOTH, GROWTH, PUSHED
 
 G = 9.81
 RADIUS = 0.5

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyverlet.grids import Grids
 from pyverlet.kernels import motion
+from pyverlet.laws.contacts.grids import Grids
 
 ROWS = 2 * motion._BLOCK + 7
 AT = [0, motion._BLOCK - 1, motion._BLOCK, ROWS - 1]

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.builders.outline import inside
-from pyverlet.links.area import signed_area
+from pyverlet.laws.links.area import signed_area
+from pyverlet.world.builders.outline import inside
 
 DT = 1 / 60
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyverlet import _jit
-from pyverlet._claims import Claims, claim, claim_evenly, none_claimed
-from pyverlet._jit import parallel_kernel, prange
+from pyverlet.compile import jit
+from pyverlet.compile.jit import parallel_kernel, prange
+from pyverlet.compile.stealing import Claims, claim, claim_evenly, none_claimed
 
 WORK = 2_000_000
 
@@ -46,7 +46,7 @@ def do(parts: int, pieces: int, cut: Any = None, work: Any = 0, kernel: Any = _d
 @pytest.mark.parametrize("pieces", [0, 1, 2, 7, 100])
 @pytest.mark.parametrize("parts", [1, 2, 3, 8])
 def test_every_piece_is_done_once(parts: int, pieces: int) -> None:
-    _jit.use_threads(_jit.max_threads())
+    jit.use_threads(jit.max_threads())
     who, _ = do(parts, pieces)
     assert set(who) <= set(range(parts))
     do(parts, pieces, cut=[0] * parts + [pieces])  # all in the share of the last
@@ -60,10 +60,10 @@ def test_a_thread_goes_through_its_own_share_from_the_front_and_helps_others_fro
     assert order == [[0, 1, 2, 5, 4, 3, 8, 7, 6], [], []]
 
 
-@pytest.mark.skipif(_jit.max_threads() < 2, reason="needs two threads")
+@pytest.mark.skipif(jit.max_threads() < 2, reason="needs two threads")
 def test_a_slow_thread_is_helped() -> None:
     # A piece takes the first thread some milliseconds, the second one next to nothing.
-    _jit.use_threads(2)
+    jit.use_threads(2)
     who, order = do(2, 40, cut=[0, 20, 40], work=(WORK, 0))
     assert (who[20:] == 1).all()
     assert (who[:20] == 1).sum() >= 10
@@ -72,7 +72,7 @@ def test_a_slow_thread_is_helped() -> None:
 
 def test_there_is_a_row_for_each_thread_in_use() -> None:
     claims = Claims()
-    for threads in (1, _jit.max_threads(), 1):
-        _jit.use_threads(threads)
+    for threads in (1, jit.max_threads(), 1):
+        jit.use_threads(threads)
         assert claims().shape == (threads, 8)
         assert claims() is claims()

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from pyverlet import _entry, _jit
-from pyverlet._jit import kernel, parallel_kernel, prange
+from pyverlet.compile import entry, jit
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
 
 
 @kernel
@@ -35,7 +35,7 @@ def spread(out: Any, value: Any) -> None:
 
 def test_objects_lie_in_memory_as_expected() -> None:
     # If this fails with a new Python or NumPy, everything still works, by the long way.
-    assert _entry.usable()
+    assert entry.usable()
 
 
 def test_kernels_are_built_in_functions_after_their_first_call() -> None:
@@ -78,17 +78,17 @@ def test_wrong_arguments_are_refused_not_read() -> None:
 
 def test_one_thread_takes_the_plain_loop_and_several_the_parallel_one() -> None:
     out = np.zeros(1000)
-    _jit.use_threads(1)
+    jit.use_threads(1)
     spread(out, 1.0)
     assert [*spread._made] == ["alone"]
     expected = out.copy()
-    if _jit.max_threads() > 1:
-        _jit.use_threads(2)
+    if jit.max_threads() > 1:
+        jit.use_threads(2)
         out[:] = 0
         spread(out, 1.0)
         assert "parallel" in spread._made
         assert np.array_equal(out, expected)
-        _jit.use_threads(1)
+        jit.use_threads(1)
         spread(out, 2.0)
         assert np.array_equal(out, expected + 1)
 

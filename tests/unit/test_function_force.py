@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet import _jit
+from pyverlet.compile import jit
 from pyverlet.kernels import forces as kernels
 
 
@@ -56,7 +56,7 @@ def test_another_force_compiles_none_of_the_engine() -> None:
     world.step(1 / 60)
     before = len(kernels.call.alone.variant(parallel=False, wrapped=True).overloads)
     compiled: list[int] = []
-    with _jit.watch_compiling(lambda: compiled.append(1)):
+    with jit.watch_compiling(lambda: compiled.append(1)):
         for k in (1.0, 2.0, 3.0):
             world.forces[:] = [sine(k)]
             world.step(1 / 60)

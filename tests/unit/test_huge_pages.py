@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyverlet import _memory
+from pyverlet.ground import memory
 
 LARGE = 1 << 20  # of 4 bytes: 4 MB
 
@@ -17,34 +17,34 @@ LARGE = 1 << 20  # of 4 bytes: 4 MB
 @pytest.mark.parametrize("shape", [10, (10, 2), LARGE, (LARGE, 2), (2, LARGE + 3), 0])
 @pytest.mark.parametrize("dtype", [np.float32, np.float64, np.uint32])
 def test_arrays_are_what_numpy_makes(shape: int | tuple[int, ...], dtype: type) -> None:
-    array = _memory.empty(shape, dtype)
+    array = memory.empty(shape, dtype)
     same: np.ndarray[Any, Any] = np.empty(shape, dtype)
     assert (array.shape, array.dtype, array.strides) == (same.shape, same.dtype, same.strides)
     assert array.flags.writeable
     assert array.flags.aligned
     assert array.flags.c_contiguous
     array[...] = 7
-    assert (_memory.copy(array) == 7).all()
-    assert not _memory.zeros(shape, dtype).any()
+    assert (memory.copy(array) == 7).all()
+    assert not memory.zeros(shape, dtype).any()
 
 
 def test_rows_taken_are_those_of_numpy() -> None:
     rng = np.random.default_rng(0)
     array, order = rng.normal(size=(LARGE, 2)), rng.permutation(LARGE)
-    assert np.array_equal(_memory.taken(array, order), array[order])
-    assert np.array_equal(_memory.taken(array[:, 0], order[:9]), array[order[:9], 0])
+    assert np.array_equal(memory.taken(array, order), array[order])
+    assert np.array_equal(memory.taken(array[:, 0], order[:9]), array[order[:9], 0])
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere they come from NumPy")
 def test_memory_is_counted_and_goes_back() -> None:
     gc.collect()
-    before = _memory.mapped()
-    array = _memory.empty(LARGE, np.float32)
+    before = memory.mapped()
+    array = memory.empty(LARGE, np.float32)
     part = array[:5]
-    assert _memory.mapped() - before == array.nbytes
+    assert memory.mapped() - before == array.nbytes
     del array
-    assert _memory.mapped() > before  # a view is left
+    assert memory.mapped() > before  # a view is left
     del part
-    assert _memory.mapped() == before
-    assert _memory.empty(10, np.float32).base is None
-    assert _memory.mapped() == before
+    assert memory.mapped() == before
+    assert memory.empty(10, np.float32).base is None
+    assert memory.mapped() == before

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet import _jit
+from pyverlet.compile import jit
 
 SOURCES = Path(pv.__file__).parent
 
@@ -21,25 +21,20 @@ SOURCES = Path(pv.__file__).parent
 def test_the_hash_sees_an_edit_in_any_kernel_and_no_other(tmp_path: Path) -> None:
     copy = tmp_path / "pyverlet"
     shutil.copytree(SOURCES, copy)
-    before = _jit.sources_hash(copy)
-    assert before == _jit.sources_hash()
-    (copy / "world.py").write_text("# edited")
-    assert _jit.sources_hash(copy) == before
+    before = jit.sources_hash(copy)
+    assert before == jit.sources_hash()
+    (copy / "world" / "world.py").write_text("# edited")
+    assert jit.sources_hash(copy) == before
     for name in (
         "kernels/contacts.py",
         "kernels/motion.py",
-        "constants.py",
-        "_jit.py",
-        "_lean.py",
-        "_entry.py",
-        "_trace.py",
-        "_lanes.py",
-        "_claims.py",
-        "_stopwatch.py",
+        "ground/constants.py",
+        "compile/jit.py",
+        "compile/lanes.py",
     ):
         with (copy / name).open("a") as file:
             file.write("\n# edited\n")
-        after = _jit.sources_hash(copy)
+        after = jit.sources_hash(copy)
         assert after != before
         before = after
 
@@ -47,7 +42,7 @@ def test_the_hash_sees_an_edit_in_any_kernel_and_no_other(tmp_path: Path) -> Non
 CALL_A_KERNEL = """
 import numpy as np
 from pyverlet.kernels import motion
-from pyverlet import _jit
+from pyverlet.compile import jit
 out = np.zeros((1, 2))
 motion.advance.alone(out, out, np.ones((1, 2)), 1.0)
 print(out[0, 0], sum(motion.advance.alone.variant(parallel=False).stats.cache_hits.values()))
@@ -59,7 +54,7 @@ def test_an_edited_helper_is_not_served_from_the_cache(tmp_path: Path) -> None:
     copy = tmp_path / "site" / "pyverlet"
     shutil.copytree(SOURCES, copy)
     kernels = copy / "kernels"
-    (kernels / "_helper.py").write_text("from pyverlet._jit import kernel\n\n\n@kernel\ndef gain():\n    return 1.0\n")
+    (kernels / "_helper.py").write_text("from pyverlet.compile.jit import kernel\n\n\n@kernel\ndef gain():\n    return 1.0\n")
     motion = (kernels / "motion.py").read_text()
     motion = motion.replace("import numpy as np\n", "import numpy as np\nfrom pyverlet.kernels._helper import gain\n", 1)
     motion = motion.replace("to[k] = start[k] + h * rate[k]", "to[k] = start[k] + gain() * h * rate[k]", 1)
@@ -84,7 +79,7 @@ def test_caches_nobody_used_for_a_month_go(tmp_path: Path) -> None:
         folder.mkdir()
     long_ago = time.time() - 40 * 24 * 3600
     os.utime(stale, (long_ago, long_ago))
-    _jit._forget_stale(current)
+    jit._forget_stale(current)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["current", "recent"]
 
 
@@ -92,7 +87,7 @@ def test_without_a_writable_folder_it_still_runs(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("")
     env = {**os.environ, "PYVERLET_CACHE_DIR": str(blocked), "TMPDIR": str(tmp_path)}
-    code = "from pyverlet import _jit; print(_jit.cache_dir())"
+    code = "from pyverlet.compile import jit; print(jit.cache_dir())"
     run = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True)
     assert Path(run.stdout.strip()).is_relative_to(tmp_path)
 
@@ -108,7 +103,7 @@ def test_warm_up_leaves_the_world_alone_and_nothing_to_compile(boundary: pv.Boun
     assert pv.warm_up(world) > 0
     assert world.state_hash() == before
     compiled: list[int] = []
-    with _jit.watch_compiling(lambda: compiled.append(1)):
+    with jit.watch_compiling(lambda: compiled.append(1)):
         world.step(1 / 60)
         world.energy(), world.overlap(), world.momentum(), world.escaped()
     assert compiled == []
@@ -122,15 +117,15 @@ def test_warm_up_reports_progress_and_leaves_nothing_to_compile(tmp_path: Path) 
         "assert [d for d, _ in seen] == sorted(d for d, _ in seen)\n"
         "pv.warm_up(world, lambda done, total: exit('compiled twice'))\n"
         # The look at how neighbours have moved, and the second grid for small circles, are needed late, not in the first frame.
-        "import numpy as np; from pyverlet import _jit; rng = np.random.default_rng(0); late = []\n"
+        "import numpy as np; from pyverlet.compile import jit; rng = np.random.default_rng(0); late = []\n"
         "world = pv.World(boundary=pv.Box((0, 0), (20, 20)))\n"
         "size = 0.5 * 20.0 ** -rng.random(200)\n"
         "world.add(position=rng.uniform(1, 19, (200, 2)), velocity=rng.normal(0, 20, (200, 2)), radius=size)\n"
-        "with _jit.watch_compiling(lambda: late.append(1)): world.run(seconds=0.5)\n"
+        "with jit.watch_compiling(lambda: late.append(1)): world.run(seconds=0.5)\n"
         "assert world.rebuilds > 3 and not late, (world.rebuilds, late)\n"
         "world = pv.World(gravity=(0, 0), sleep=True); world.add(position=[(0, 0), (1, 0)], radius=0.5)\n"
         "before = len(late); pv.warm_up(world, lambda done, total: late.append(2)); assert late[before:]\n"
-        "with _jit.watch_compiling(lambda: late.append(1)):\n"
+        "with jit.watch_compiling(lambda: late.append(1)):\n"
         "    world.run(seconds=1); assert world.asleep.all()\n"
         "    world.add(position=(2, 0), velocity=(-1, 0), radius=0.5); world.run(seconds=1); assert not world.asleep.any()\n"
         "assert 1 not in late\n"
@@ -141,7 +136,7 @@ def test_warm_up_reports_progress_and_leaves_nothing_to_compile(tmp_path: Path) 
 def test_float32_stays_float32() -> None:
     # A stray float64 constant would widen the arithmetic: 1 + 2^-24 is 1 in float32.
     out = np.zeros((1, 2), np.float32)
-    from pyverlet.moves import advance
+    from pyverlet.state.moves import advance
 
     advance(out, np.ones((1, 2), np.float32), np.ones((1, 2), np.float32), 2.0**-25)
     assert out[0, 0] == 1.0

@@ -8,8 +8,8 @@ import numba
 import numpy as np
 import pytest
 
-from pyverlet._jit import kernel
-from pyverlet._lanes import (
+from pyverlet.compile.jit import kernel
+from pyverlet.compile.lanes import (
     LANES,
     add_lanes,
     copy_row,

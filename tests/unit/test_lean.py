@@ -13,16 +13,16 @@ import numba
 import numpy as np
 import pytest
 
-from pyverlet import _lean
+from pyverlet.compile import lean
 
 COMPILE = """
 import numpy as np, numba
 from numba.core.codegen import CPUCodeLibrary, JITCodeLibrary
-from pyverlet import _jit
+from pyverlet.compile import jit
 from pyverlet.kernels import motion
 made, finalise = [], JITCodeLibrary._finalize_specific
 JITCodeLibrary._finalize_specific = lambda self: (made.append(self.name), finalise(self))[1]
-_jit.use_threads(THREADS)
+jit.use_threads(THREADS)
 x, y, f = np.zeros((3, 2)), np.zeros((3, 2)), np.ones(3)
 x[1] = 2.0
 motion.newton_kick_drift(x, y, np.zeros((3, 2)), np.zeros((0, 2)), f, 0.0, -1.0, 0.5, 0.25)
@@ -50,19 +50,19 @@ def test_a_helper_found_on_disk_serves_another_kernel(tmp_path: Path) -> None:
 
 def test_numba_is_as_it_was_afterwards() -> None:
     def methods() -> list[Any]:
-        return [vars(owner)[method] for owner, method, _ in _lean._CHANGES]
+        return [vars(owner)[method] for owner, method, _ in lean._CHANGES]
 
     def fail() -> None:
         raise ValueError
 
     before = methods()
-    with contextlib.suppress(ValueError), _lean.only("a"):
-        with _lean.only(""):
-            assert _lean._wanted == ""
+    with contextlib.suppress(ValueError), lean.only("a"):
+        with lean.only(""):
+            assert lean._wanted == ""
         assert not set(methods()) & set(before)
         fail()
     assert methods() == before
-    assert _lean._wanted is None
+    assert lean._wanted is None
 
 
 def test_another_numba_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -72,8 +72,8 @@ def test_another_numba_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     def never(*_: Any) -> None:
         raise AssertionError
 
-    monkeypatch.setattr(_lean, "_CHANGES", ((Other, "finish", never),))
-    with _lean.only("a"):
+    monkeypatch.setattr(lean, "_CHANGES", ((Other, "finish", never),))
+    with lean.only("a"):
         assert not hasattr(Other, "finish")
 
 
@@ -84,7 +84,7 @@ def test_options_are_equal_that_were() -> None:
     other.release_gil = True
     same.release_gil = False  # set, to what it is by default
     before = [hash(flags) for flags in (plain, other, same)]
-    with _lean.only("a"):
+    with lean.only("a"):
         assert [hash(flags) for flags in (plain, other, same)] == before
         assert plain == same
         assert plain != other

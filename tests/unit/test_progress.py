@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from pyverlet import progress
-from pyverlet.progress import Progress
+from pyverlet.ground import progress
+from pyverlet.ground.progress import Progress
 
 
 def test_the_time_left_ignores_what_came_before_the_first_call(

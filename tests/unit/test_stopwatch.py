@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet import _entry, _stopwatch
-from pyverlet._stopwatch import CLOCK
-from pyverlet.profile import Profile
+from pyverlet.compile import entry, stopwatch
+from pyverlet.compile.stopwatch import CLOCK
+from pyverlet.world.profile import Profile
 
 
-@pytest.mark.parametrize("note", [_stopwatch.note, _stopwatch._note_in_python])
+@pytest.mark.parametrize("note", [stopwatch.note, stopwatch._note_in_python])
 def test_a_note_adds_what_has_gone_by(note: Any) -> None:
     spent = np.zeros(3)
     before = spent[0] = perf_counter()
@@ -71,8 +71,8 @@ def released(count: int) -> list[bool]:
     for trace in world._repeats._traces:
         at = 0
         for _ in range(trace._number if trace._key is not None else 0):
-            found.append(bool(trace._words[at + _entry.RELEASE // 8]))
-            at += _entry.CALL // 8 + int(trace._words[at + _entry.TAKEN // 8])
+            found.append(bool(trace._words[at + entry.RELEASE // 8]))
+            at += entry.CALL // 8 + int(trace._words[at + entry.TAKEN // 8])
     assert found
     return found
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.constants import KNOWN_FROM
-from pyverlet.unchanged import Unchanged
+from pyverlet.ground.constants import KNOWN_FROM
+from pyverlet.state.unchanged import Unchanged
 
 
 def rows(dtype: type = np.float32, count: int = KNOWN_FROM + 7) -> Any:

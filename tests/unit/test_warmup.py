@@ -16,7 +16,10 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet import _jit, _turns, fused, passivity, rehearsals, warmup
+from pyverlet.compile import jit
+from pyverlet.ground import file_lock
+from pyverlet.laws import limiter
+from pyverlet.world import fused, rehearsals, warmup
 
 
 def run(code: str, cache: Path, **environment: str) -> str:
@@ -27,7 +30,8 @@ def run(code: str, cache: Path, **environment: str) -> str:
 # Parts that are compiled in seconds, of a few kernels each.
 SHORT = """
 import os, subprocess, sys, numpy as np, pyverlet as pv
-from pyverlet import _jit, rehearsals, warmup
+from pyverlet.compile import jit
+from pyverlet.world import rehearsals, warmup
 for name in list(rehearsals.PARTS):
     if name not in ("_motion", "_loans"): del rehearsals.PARTS[name]
 """
@@ -37,13 +41,13 @@ def test_two_processes_share_the_work_and_compile_nothing_twice(tmp_path: Path) 
     # Without the pipes of `_Helper`, to see both: whatever begins to compile is written to disk once, under a name of its own.
     code = SHORT + (
         "counted = os.open(os.environ['COUNTED'], os.O_WRONLY | os.O_APPEND | os.O_CREAT)\n"
-        "with _jit.watch_compiling(lambda: os.write(counted, b'.') and None):\n"
+        "with jit.watch_compiling(lambda: os.write(counted, b'.') and None):\n"
         "    warmup._compile(np.dtype(np.float32), 1, list(rehearsals.PARTS))\n"
     )
     env = {**os.environ, "PYVERLET_CACHE_DIR": str(tmp_path), "COUNTED": str(tmp_path / "counted")}
     both = [subprocess.Popen([sys.executable, "-c", code], env=env) for _ in range(2)]
     assert [process.wait(timeout=300) for process in both] == [0, 0]
-    kept = [path for path in tmp_path.rglob("*.nbc") if not path.name.startswith("_entry.")]
+    kept = [path for path in tmp_path.rglob("*.nbc") if not path.name.startswith("entry.")]
     assert len((tmp_path / "counted").read_text()) == len(kept) > 20
     assert {path.name for path in tmp_path.rglob("compiled-float32/*")} == {"_motion", "_loans"}
 
@@ -53,14 +57,15 @@ def test_what_is_compiled_by_many_has_the_bits_of_what_one_has(tmp_path: Path) -
         "world = pv.World(collisions=None); world.add(position=np.arange(20.0).reshape(10, 2)); pv.warm_up(world)\n"
         "world.step(0.1); print(world.state_hash())"
     )
-    here = run("import numpy as np, pyverlet as pv; " + code, _jit.cache_dir().parent)  # type: ignore[union-attr]
+    here = run("import numpy as np, pyverlet as pv; " + code, jit.cache_dir().parent)  # type: ignore[union-attr]
     assert run(SHORT + code, tmp_path, NUMBA_NUM_THREADS="2") == here
 
 
 # Two parts of a kernel each.
 TINY = """
 import os, subprocess, sys, numpy as np, pyverlet as pv
-from pyverlet import _jit, rehearsals, warmup
+from pyverlet.compile import jit
+from pyverlet.world import rehearsals, warmup
 from pyverlet.kernels import motion
 rehearsals.PARTS.clear()
 rehearsals.PARTS["one"] = lambda dtype, threads: motion.any_nan(np.zeros((1, 2), dtype))
@@ -70,7 +75,7 @@ warmup.rehearse = lambda world: None
 COUNTED = """
 ours = []
 pv.warm_up(pv.World(), lambda done, total: ours.append(done))
-print(len(ours), len(list(_jit.cache_dir().rglob("compiled-float32/*"))) if _jit.cache_dir() else 2)
+print(len(ours), len(list(jit.cache_dir().rglob("compiled-float32/*"))) if jit.cache_dir() else 2)
 """
 
 
@@ -83,8 +88,8 @@ print(len(ours), len(list(_jit.cache_dir().rglob("compiled-float32/*"))) if _jit
         "warmup._Helper.__init__ = killed",
         "warmup._Helper = None; sys.frozen = True",
         "warmup._Helper = None; sys.executable = ''",
-        "warmup._Helper = None; _jit.max_threads = lambda: 1",
-        "warmup._Helper = None; _jit.cache_dir = lambda: None",
+        "warmup._Helper = None; jit.max_threads = lambda: 1",
+        "warmup._Helper = None; jit.cache_dir = lambda: None",
     ],
     ids=["not started", "starts and fails", "killed", "frozen", "no Python", "one core", "nothing can be kept"],
 )
@@ -95,7 +100,7 @@ def test_without_a_helper_everything_is_compiled_all_the_same(accident: str, tmp
 
 
 def test_one_core_has_no_helper(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_jit, "max_threads", lambda: 1)
+    monkeypatch.setattr(jit, "max_threads", lambda: 1)
     with warmup._helping(np.dtype(np.float32), 1, 7) as helpers:
         assert helpers == []
 
@@ -118,7 +123,7 @@ def test_a_helper_ends_with_its_parent() -> None:
 
 
 def test_ctrl_c_ends_helpers(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_jit, "max_threads", lambda: 2)
+    monkeypatch.setattr(jit, "max_threads", lambda: 2)
     with pytest.raises(KeyboardInterrupt), warmup._helping(np.dtype(np.float64), 1, 7) as helpers:
         raise KeyboardInterrupt
     assert len(helpers) == 1
@@ -132,7 +137,7 @@ def test_helpers_are_counted_in_the_progress(monkeypatch: pytest.MonkeyPatch) ->
         def end(self) -> None:
             pass
 
-    monkeypatch.setattr(_jit, "max_threads", lambda: 2)
+    monkeypatch.setattr(jit, "max_threads", lambda: 2)
     monkeypatch.setattr(warmup, "_Helper", lambda *_: Busy())
     monkeypatch.setattr(warmup, "_missing", lambda *_: ["_motion", "_loans"])
     monkeypatch.setattr(warmup, "_compile", lambda *_: None)
@@ -144,7 +149,7 @@ def test_helpers_are_counted_in_the_progress(monkeypatch: pytest.MonkeyPatch) ->
         yield
         started()
 
-    monkeypatch.setattr(_jit, "watch_compiling", watching)
+    monkeypatch.setattr(jit, "watch_compiling", watching)
     pv.warm_up(pv.World(), lambda done, total: seen.append((done, total)))
     assert seen[0][0] == seen[0][1] > 20
 
@@ -157,7 +162,7 @@ def test_parts_cover_what_a_world_of_circles_needs() -> None:
             world = pv.World(boundary=room, collisions=pv.Collisions(friction=friction, restitution=restitution))
             world.add(position=np.random.default_rng(0).uniform(-5, 5, (60, 2)), radius=0.5)
             late: list[str] = []
-            with _jit.watch_compiling(lambda late=late: late.append("late")):  # type: ignore[misc]
+            with jit.watch_compiling(lambda late=late: late.append("late")):  # type: ignore[misc]
                 world.run(seconds=0.3)
                 world.energy(), world.overlap(), world.momentum()
                 world.mass[0] *= 100
@@ -181,7 +186,7 @@ def test_rehearsals_of_larger_worlds_do_what_these_do(monkeypatch: pytest.Monkey
         monkeypatch.setattr(owner, name, spied)
 
     spy(fused.Fused, "leap")
-    spy(passivity.Watch, "_look")
+    spy(limiter.Watch, "_look")
     for count, expected in ((100, set()), (600, {"leap"}), (3000, {"leap", "_look"})):
         done.clear()
         rehearsals.rehearse(pv.scenes.get("cage").world(particles=count, threads=1))
@@ -192,7 +197,7 @@ def test_rehearsals_of_larger_worlds_do_what_these_do(monkeypatch: pytest.Monkey
 
 KEEP = """
 import pathlib, sys
-from pyverlet._turns import turn
+from pyverlet.ground.file_lock import turn
 with turn(pathlib.Path(sys.argv[1]), "a"):
     print("mine", flush=True)
     sys.stdin.read()
@@ -205,18 +210,18 @@ def test_a_turn_is_one_process_s_at_a_time(tmp_path: Path) -> None:
         assert other.stdout is not None
         assert other.stdin is not None
         assert other.stdout.readline().strip() == b"mine"
-        with _turns.turn(path, "a", patience=0.0) as mine:
+        with file_lock.turn(path, "a", patience=0.0) as mine:
             assert not mine
-        with _turns.turn(path, "b", patience=0.0) as mine:
+        with file_lock.turn(path, "b", patience=0.0) as mine:
             assert mine
         timer = threading.Timer(0.3, other.kill)  # however it ends
         timer.start()
-        with _turns.turn(path, "a") as mine:
+        with file_lock.turn(path, "a") as mine:
             assert mine
         timer.join()
         other.stdin.close()
 
 
 def test_where_files_cannot_be_opened_everybody_has_every_turn(tmp_path: Path) -> None:
-    with _turns.turn(tmp_path / "no such folder" / "turns", "a") as mine:
+    with file_lock.turn(tmp_path / "no such folder" / "turns", "a") as mine:
         assert mine

@@ -24,6 +24,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
 import pyverlet as pv
+from pyverlet.state.state import Slots
 from pyverlet.viewers.launch import server_config
 from pyverlet.viewers.looks import Look
 from pyverlet.viewers.protocol import MAX_MESSAGE
@@ -245,7 +246,7 @@ class Treacle:
 
     velocity_dependent = False
 
-    def apply(self, state: pv.state.Slots, t: float) -> None:
+    def apply(self, state: Slots, t: float) -> None:
         time.sleep(0.02)
 
 

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.forces import Push
+from pyverlet.laws.forces import Push
+from pyverlet.state.state import Slots
 from pyverlet.viewers.commands import Command, Drag, Pause, Poke, Release, Reset, SetGravity, SetSubsteps, Step
 from pyverlet.viewers.hands import LEASH
 from pyverlet.viewers.session import MAX_CATCH_UP, Session
@@ -125,7 +126,7 @@ def test_non_finite_stops_the_stepping_and_reset_cures_it(session: Session, worl
     class Poison:
         velocity_dependent = False
 
-        def apply(self, state: pv.state.Slots, t: float) -> None:
+        def apply(self, state: Slots, t: float) -> None:
             state.force[:] = np.nan
 
     wait_until(lambda: session.latest.status.frames > 3)
@@ -150,7 +151,7 @@ def test_an_error_in_a_users_force_is_shown_and_logged(
     class Broken:
         velocity_dependent = False
 
-        def apply(self, state: pv.state.Slots, t: float) -> None:
+        def apply(self, state: Slots, t: float) -> None:
             raise KeyError("wind")
 
     world.forces.append(Broken())
@@ -182,7 +183,7 @@ class Treacle:
 
     velocity_dependent = False
 
-    def apply(self, state: pv.state.Slots, t: float) -> None:
+    def apply(self, state: Slots, t: float) -> None:
         time.sleep(0.012)
 
 
@@ -245,7 +246,7 @@ class Diary(Treacle):
         self.world = world
         self.seen: list[tuple[int, float]] = []
 
-    def apply(self, state: pv.state.Slots, t: float) -> None:
+    def apply(self, state: Slots, t: float) -> None:
         super().apply(state, t)
         self.seen.append((self.world.frames, self.world.gravity[1]))
 
@@ -292,7 +293,7 @@ class Witness(Treacle):
         self.world = world
         self.seen: list[tuple[int, float]] = []
 
-    def apply(self, state: pv.state.Slots, t: float) -> None:
+    def apply(self, state: Slots, t: float) -> None:
         super().apply(state, t)
         pushes = [force for force in self.world.forces if isinstance(force, Push)]
         self.seen += [(self.world.frames, push.center[0]) for push in pushes]

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 
 import typer
 
-from pyverlet import _loading
 from pyverlet.cli import _lab, _record  # noqa: F401  (they register their commands)
 from pyverlet.cli._app import app
-from pyverlet.errors import InputError, Interrupted, PyverletError
+from pyverlet.ground import loading
+from pyverlet.ground.errors import InputError, Interrupted, PyverletError
 
 __all__ = ["app", "main"]
 
@@ -27,7 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Whatever goes wrong is told in one sentence on standard error. With PYVERLET_TRACEBACK=1 in the environment the
     traceback of an unexpected error comes along.
     """
-    _loading.done()
+    loading.done()
     try:
         code = app(args=arguments, prog_name="pyverlet", standalone_mode=False)
         sys.stdout.flush()

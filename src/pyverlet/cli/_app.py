@@ -8,19 +8,19 @@ from typing import Annotated
 
 import typer
 
-from pyverlet import __version__, report, scenes, warm_up
+from pyverlet import __version__, scenes, warm_up
 from pyverlet.cli import _check
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.cli import _show as show
 from pyverlet.cli._integrators import integrators
-from pyverlet.errors import InputError
-from pyverlet.panels import Panel, Panels
-from pyverlet.progress import Progress
-from pyverlet.report import Report
-from pyverlet.scenes import Scene, Settings
+from pyverlet.ground.errors import InputError
+from pyverlet.ground.progress import Progress
+from pyverlet.scenes import Scene, Settings, report
+from pyverlet.scenes.report import Report
 from pyverlet.viewers import DEFAULT_PORT
-from pyverlet.world import World
+from pyverlet.world.panels import Panel, Panels
+from pyverlet.world.world import World
 
 DEFAULT_DT = 1 / 60
 DEFAULT_SECONDS = 5.0

@@ -10,8 +10,8 @@ import typer
 
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
+from pyverlet.ground.progress import Progress
 from pyverlet.lab import physics
-from pyverlet.progress import Progress
 
 FAILED = 1
 

@@ -8,8 +8,8 @@ import inspect
 import sys
 from pathlib import Path
 
-from pyverlet.errors import InputError
-from pyverlet.integrators import BY_NAME, Integrator
+from pyverlet.ground.errors import InputError
+from pyverlet.laws.integrators import BY_NAME, Integrator
 
 
 def integrators(names: str | None) -> tuple[Integrator, ...]:

@@ -7,14 +7,16 @@ from typing import Annotated
 
 import typer
 
-from pyverlet import checks, report, scenes
+from pyverlet import scenes
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.cli._app import DEFAULT_DT, app
 from pyverlet.cli._integrators import integrators
-from pyverlet.errors import InputError
-from pyverlet.integrators import BY_NAME
-from pyverlet.progress import Progress
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
+from pyverlet.ground.progress import Progress
+from pyverlet.laws.integrators import BY_NAME
+from pyverlet.scenes import report
 
 __all__ = ["app"]
 

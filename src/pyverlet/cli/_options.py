@@ -9,9 +9,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import typer
 
-from pyverlet import integrators
-from pyverlet.broadphase import BruteForce, Fast
-from pyverlet.errors import InputError
+from pyverlet.ground.errors import InputError
+from pyverlet.laws import integrators
+from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.picture import DARK, LIGHT, ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Groups, Theme
 
 DType = Literal["float32", "float64"]

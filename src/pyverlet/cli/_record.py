@@ -13,9 +13,9 @@ from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.cli._app import app, compile_kernels
 from pyverlet.cli._integrators import integrators
-from pyverlet.errors import InputError
+from pyverlet.ground.errors import InputError
+from pyverlet.ground.progress import Progress
 from pyverlet.picture import Fixed
-from pyverlet.progress import Progress
 
 DEFAULT_SECONDS = 10.0
 DEFAULT_SIZE = "1280x720"

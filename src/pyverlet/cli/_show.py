@@ -7,8 +7,8 @@ from functools import partial
 from typing import Any
 
 from pyverlet.cli import _print as out
-from pyverlet.integrators import Integrator
-from pyverlet.progress import Progress
+from pyverlet.ground.progress import Progress
+from pyverlet.laws.integrators import Integrator
 from pyverlet.scenes import Scene, Settings
 
 

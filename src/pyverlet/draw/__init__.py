@@ -11,7 +11,7 @@ from pyverlet.picture import View
 from pyverlet.viewers.frames import Camera
 
 if TYPE_CHECKING:
-    from pyverlet.world import World
+    from pyverlet.world.world import World
 
 __all__ = ["View", "fit"]
 

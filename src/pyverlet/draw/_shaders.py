@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pyverlet.picture import ByOrigin, Colouring, Theme, View
 
 if TYPE_CHECKING:
-    from pyverlet.world import World
+    from pyverlet.world.world import World
 
 VERTEX = """#version 330
 in vec2 place;

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pygame
 
-from pyverlet.errors import InputError
+from pyverlet.ground.errors import InputError
 from pyverlet.kernels import lines, raster
 from pyverlet.picture import DARK, ByOrigin, Colouring, Theme, View
 from pyverlet.picture.colour import by_force
@@ -16,7 +16,7 @@ from pyverlet.picture.raster import LINK_PX
 from pyverlet.viewers.frames import outline
 
 if TYPE_CHECKING:
-    from pyverlet.world import World
+    from pyverlet.world.world import World
 
 __all__ = ["draw"]
 

@@ -13,7 +13,7 @@ from pyverlet.draw._shaders import FRAGMENT, VERTEX, Arrays, window
 from pyverlet.picture import DARK, Colouring, Theme, View
 
 if TYPE_CHECKING:
-    from pyverlet.world import World
+    from pyverlet.world.world import World
 
 __all__ = ["Circles"]
 

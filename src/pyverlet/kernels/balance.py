@@ -12,7 +12,7 @@ between a wall and a heavy one have their own small inertia against it, and cont
 
 from __future__ import annotations
 
-from pyverlet._jit import kernel
+from pyverlet.compile.jit import kernel
 from pyverlet.kernels.clusters import join, settle
 from pyverlet.kernels.motion import IN_PILE
 

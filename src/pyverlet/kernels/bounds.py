@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet.constants import FED, PUSHED
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.ground.constants import FED, PUSHED
 
 BLOCK = 64
 """Circles looked at together for whether any of them is at a wall: hardly any is."""

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet._claims import claim_evenly, none_claimed
-from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet._lanes import (
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.compile.lanes import (
     LANES,
     larger,
     load,
@@ -25,6 +24,7 @@ from pyverlet._lanes import (
     where_zero,
     which_above,
 )
+from pyverlet.compile.stealing import claim_evenly, none_claimed
 from pyverlet.kernels.motion import arrive
 
 # Circles one thread takes at a time.

@@ -17,8 +17,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet.constants import LINK_COLOURS, LINK_ROUNDS, LINK_TAUT, LINK_TURN
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.ground.constants import LINK_COLOURS, LINK_ROUNDS, LINK_TAUT, LINK_TURN
 from pyverlet.kernels.shapes import measure_distance
 
 _SWEEPS = 4

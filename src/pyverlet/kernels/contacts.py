@@ -18,8 +18,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet.constants import PUSHED
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.ground.constants import PUSHED
 from pyverlet.kernels.bounds import CARRIES
 from pyverlet.kernels.impacts import APART, PARTING, part
 from pyverlet.kernels.motion import IN_PILE

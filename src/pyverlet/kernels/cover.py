@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from pyverlet._jit import kernel
+from pyverlet.compile.jit import kernel
 
 
 def _sliver_series():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet._jit import kernel, parallel_kernel, prange
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
 
 _LANES = 64
 """Words taken at a time, each into a sum of its own: so the loop is vectorised."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet._jit import kernel, parallel_kernel, prange
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
 
 _BLOCK = 4096
 """Particles that one thread takes at a time."""
@@ -84,7 +84,7 @@ def gravitational_potential(position, mass, softening):
 
 @parallel_kernel
 def call(function, force, position, velocity, mass, t):
-    """Have the user's function, as `pyverlet._native` makes it, add to `force`; for how many particles that is not finite."""
+    """Have the user's function, as `compile.native` makes it, add to `force`; for how many particles that is not finite."""
     wrong = 0
     for block in prange((mass.shape[0] + _BLOCK - 1) // _BLOCK):
         a, b = block * _BLOCK, min((block + 1) * _BLOCK, mass.shape[0])

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet.constants import FED, GRIP, PUSHED
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.ground.constants import FED, GRIP, PUSHED
 
 # The slip of a pair that did not touch in the substep before. What it slips in its first one, it may have slipped before it met.
 NEW = np.inf

@@ -21,8 +21,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet._lanes import LANES
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.compile.lanes import LANES
 from pyverlet.kernels.cage import hold_some
 from pyverlet.kernels.motion import any_strayed, arrive, kick_drift, set_out
 from pyverlet.kernels.packs import mark_strip, project_strip, refine_strip, still_strip

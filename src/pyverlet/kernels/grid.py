@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet.constants import BLOCK_ROWS, COLUMNS
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.ground.constants import BLOCK_ROWS, COLUMNS
 
 
 class Levels(NamedTuple):

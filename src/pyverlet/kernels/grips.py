@@ -7,8 +7,8 @@ position, so that a pass over all circles does it at the end.
 
 from __future__ import annotations
 
-from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet._lanes import (
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.compile.lanes import (
     LANES,
     add_lanes,
     copy_row,
@@ -25,7 +25,7 @@ from pyverlet._lanes import (
     where_above,
     which_above,
 )
-from pyverlet.constants import FED, GRIP, PUSHED
+from pyverlet.ground.constants import FED, GRIP, PUSHED
 from pyverlet.kernels.friction import NEW
 from pyverlet.kernels.motion import set_out
 

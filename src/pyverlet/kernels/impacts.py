@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet._jit import kernel, parallel_kernel, prange
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.kernels.bounds import CARRIES, impact_time
 
 # How a candidate pair stands at the end of the integration, before contacts have changed a velocity.

@@ -19,8 +19,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet.constants import LINK_GIVE, LINK_MEMORY_S, LINK_RESOLVED
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.ground.constants import LINK_GIVE, LINK_MEMORY_S, LINK_RESOLVED
 
 
 @kernel

@@ -17,8 +17,8 @@ that momentum is.
 
 from __future__ import annotations
 
-from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet.constants import LENT
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.ground.constants import LENT
 from pyverlet.kernels.impacts import PARTING
 
 # Of the own mass: less than this is no loan but the rounding of one.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet._lanes import LANES, add_lanes, load, load_rows, spread, where_above, widen
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.compile.lanes import LANES, add_lanes, load, load_rows, spread, where_above, widen
 
 
 @kernel

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet._claims import claim_evenly, none_claimed
-from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet._lanes import copy_row, larger_finite
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.compile.lanes import copy_row, larger_finite
+from pyverlet.compile.stealing import claim_evenly, none_claimed
 
 _ONE = np.uint64(1)
 

@@ -19,9 +19,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet._claims import claim, none_claimed
-from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet._lanes import (
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.compile.lanes import (
     ALL,
     LANES,
     larger,
@@ -36,7 +35,8 @@ from pyverlet._lanes import (
     where_zero,
     which_above,
 )
-from pyverlet.constants import CLOSE, DEEP, DEEP_PART, DEEP_SWEEPS, LARGEST_PUSH, PUSHED
+from pyverlet.compile.stealing import claim, none_claimed
+from pyverlet.ground.constants import CLOSE, DEEP, DEEP_PART, DEEP_SWEEPS, LARGEST_PUSH, PUSHED
 from pyverlet.kernels.motion import IN_PILE, arrive, set_out
 
 # Golden angle, rad: coincident centres part in directions spread evenly over the circle.

@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet._lanes import LANES, count_bits, load, lowest_bit, spread, which_above, write_all, write_chosen
-from pyverlet.constants import CLOSE, COLOURS, COLUMNS, ROUNDING
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.compile.lanes import LANES, count_bits, load, lowest_bit, spread, which_above, write_all, write_chosen
+from pyverlet.ground.constants import CLOSE, COLOURS, COLUMNS, ROUNDING
 from pyverlet.kernels.grid import before_row, cell_number
 
 _ALL = (1 << COLOURS) - 1

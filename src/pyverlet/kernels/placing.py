@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pyverlet._jit import kernel
+from pyverlet.compile.jit import kernel
 
 
 @kernel

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet._jit import kernel
+from pyverlet.compile.jit import kernel
 
 
 @kernel

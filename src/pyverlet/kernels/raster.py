@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
-from pyverlet._jit import kernel
-from pyverlet.constants import LEAST_DRAWN_RADIUS
+from pyverlet.compile.jit import kernel
+from pyverlet.ground.constants import LEAST_DRAWN_RADIUS
 from pyverlet.kernels.cover import blend, channel, spread_rows
 from pyverlet.kernels.stamps import CROWD, FINE, ROOM, SIZES, STAMPED, make_stamp, put_stamp
 

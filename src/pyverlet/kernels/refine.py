@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet._jit import kernel, parallel_kernel, prange
-from pyverlet.constants import PUSHED, REFINED, REFINED_FROM, REFINEMENTS
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.ground.constants import PUSHED, REFINED, REFINED_FROM, REFINEMENTS
 from pyverlet.kernels.impacts import part
 
 

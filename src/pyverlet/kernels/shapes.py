@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from pyverlet._jit import kernel, parallel_kernel, prange
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
 
 
 @kernel

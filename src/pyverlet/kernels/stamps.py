@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pyverlet._jit import kernel
+from pyverlet.compile.jit import kernel
 from pyverlet.kernels.cover import blend, over_full, spread_rows
 
 CROWD = 1024

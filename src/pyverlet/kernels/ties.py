@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet._jit import kernel
-from pyverlet.constants import LINK_GIVE
+from pyverlet.compile.jit import kernel
+from pyverlet.ground.constants import LINK_GIVE
 from pyverlet.kernels.links import blend
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pyverlet._jit import kernel, parallel_kernel, prange
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
 
 
 @parallel_kernel

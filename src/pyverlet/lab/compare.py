@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.errors import InputError
-from pyverlet.integrators import Integrator
+from pyverlet.ground.errors import InputError
 from pyverlet.lab.problems import Floats
+from pyverlet.laws.integrators import Integrator
 from pyverlet.scenes import Scene
-from pyverlet.warmup import warm_up
+from pyverlet.world.warmup import warm_up
 
 Progress = Callable[[int, int], None]
 

@@ -6,7 +6,7 @@ import importlib.util
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pyverlet.errors import InputError
+from pyverlet.ground.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pyverlet.integrators import Integrator, PositionVerlet, TimeCorrectedVerlet
 from pyverlet.lab import figures
 from pyverlet.lab.problems import PROBLEMS, Floats, Problem
+from pyverlet.laws.integrators import Integrator, PositionVerlet, TimeCorrectedVerlet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.forces import Drag, PointSpring
-from pyverlet.integrators import Integrator
-from pyverlet.state import Slots, State
-from pyverlet.world import World
+from pyverlet.laws.forces import Drag, PointSpring
+from pyverlet.laws.integrators import Integrator
+from pyverlet.state.state import Slots, State
+from pyverlet.world.world import World
 
 Floats = NDArray[np.float64]
 Phase = tuple[Floats, Floats]

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pyverlet.errors import InputError
+from pyverlet.ground.errors import InputError
 from pyverlet.lab import figures
 from pyverlet.scenes import Scene, Settings
 from pyverlet.scenes._scene import Floats
-from pyverlet.world import World
+from pyverlet.world.world import World
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,10 +8,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet import checks
-from pyverlet.errors import InputError
-from pyverlet.group import Group
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
 from pyverlet.picture.palette import STEPS, TONES, Packed, Theme, heat, hues, packed, shade
+from pyverlet.state.group import Group
 
 USUAL_S = 1 / 3
 """Simulated seconds over which the scale follows what is usual: no flicker, and the same for any number of pictures a second."""

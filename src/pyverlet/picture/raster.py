@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet import checks
-from pyverlet.errors import InputError
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
 from pyverlet.kernels import lines, raster
-from pyverlet.obstacles import Outline
+from pyverlet.laws.obstacles import Outline
 from pyverlet.picture.colour import by_force
 from pyverlet.picture.palette import DARK, Packed, Theme, swapped
 from pyverlet.picture.view import View
 
 if TYPE_CHECKING:
-    from pyverlet.world import World
+    from pyverlet.world.world import World
 
 Lines = Sequence[Sequence[tuple[float, float]]]
 """Closed lines, metres."""

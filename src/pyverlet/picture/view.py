@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet import checks
-from pyverlet.errors import InputError
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
 
 if TYPE_CHECKING:
-    from pyverlet.world import World
+    from pyverlet.world.world import World
 
 Rect = tuple[float, float, float, float]
 """x0, y0, x1, y1 in metres."""

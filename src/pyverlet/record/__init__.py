@@ -18,17 +18,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet import checks
-from pyverlet.errors import InputError, Interrupted, PyverletError
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError, Interrupted, PyverletError
 from pyverlet.picture import DARK, Colouring, Theme
 from pyverlet.picture.raster import check_size
 from pyverlet.record import _films
-from pyverlet.report import frame_count
+from pyverlet.scenes.report import frame_count
 from pyverlet.viewers.frames import Rect
 from pyverlet.viewers.painter import Painter
 
 if TYPE_CHECKING:
-    from pyverlet.world import World
+    from pyverlet.world.world import World
 
 __all__ = ["FilmPlan", "Recorded", "plan", "to_image", "to_video"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from pyverlet.errors import InputError
+from pyverlet.ground.errors import InputError
 
 
 class Disk:

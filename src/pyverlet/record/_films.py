@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.errors import InputError
+from pyverlet.ground.errors import InputError
 from pyverlet.record._disk import Disk
 
 Pixels = NDArray[np.uint8]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 
-from pyverlet.errors import InputError
+from pyverlet.ground.errors import InputError
 from pyverlet.scenes import (
     bounce_euler,
     bounce_order,

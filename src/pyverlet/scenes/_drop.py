@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.bounds import Boundary, Box
-from pyverlet.integrators import Integrator
-from pyverlet.naive import ClampAndFlip
+from pyverlet.laws.integrators import Integrator
+from pyverlet.laws.naive import ClampAndFlip
+from pyverlet.laws.rooms import Boundary, Box
 from pyverlet.scenes._scene import Settings
-from pyverlet.world import World
+from pyverlet.world.world import World
 
 RADIUS = 0.25
 """Of every ball, m."""

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.errors import InputError
+from pyverlet.ground.errors import InputError
 
 Pixels = NDArray[np.uint8]
 """(height, width, 3) bytes R, G, B."""

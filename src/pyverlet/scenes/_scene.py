@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet import checks
-from pyverlet.broadphase import BruteForce, Fast
-from pyverlet.collisions import Collisions
-from pyverlet.errors import InputError
-from pyverlet.integrators import Integrator, PositionVerlet
-from pyverlet.panels import Pace, Panel, Panels, every_frame
-from pyverlet.world import World
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
+from pyverlet.laws.contacts.broadphase import BruteForce, Fast
+from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.integrators import Integrator, PositionVerlet
+from pyverlet.world.panels import Pace, Panel, Panels, every_frame
+from pyverlet.world.world import World
 
 Floats = NDArray[np.float64]
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from pyverlet.integrators import ExplicitEuler
+from pyverlet.laws.integrators import ExplicitEuler
 from pyverlet.scenes import _drop
 from pyverlet.scenes._scene import Scene, Settings
-from pyverlet.world import World
+from pyverlet.world.world import World
 
 
 def build(settings: Settings) -> World:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.integrators import SemiImplicitEuler
+from pyverlet.laws.integrators import SemiImplicitEuler
 from pyverlet.scenes import _drop
 from pyverlet.scenes._scene import Scene, Settings
-from pyverlet.world import World
+from pyverlet.world.world import World
 
 SPEED = 2.0
 """Standard deviation of each component of the starting velocity, m/s."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from pyverlet.integrators import SemiImplicitEuler
+from pyverlet.laws.integrators import SemiImplicitEuler
 from pyverlet.scenes import _drop
 from pyverlet.scenes._scene import Scene, Settings
-from pyverlet.world import World
+from pyverlet.world.world import World
 
 GRAVITY = -2857 / 2**20 * 3600
 """9.8087 m/s^2: g h^2 is a whole number of 2^-20 m at 60 steps a second, so that nothing is rounded."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from pyverlet.bounds import Box
-from pyverlet.integrators import PositionVerlet
-from pyverlet.naive import ProjectOnly
+from pyverlet.laws.integrators import PositionVerlet
+from pyverlet.laws.naive import ProjectOnly
+from pyverlet.laws.rooms import Box
 from pyverlet.scenes import _drop
 from pyverlet.scenes._scene import Scene, Settings, Variant
-from pyverlet.world import World
+from pyverlet.world.world import World
 
 
 def build(settings: Settings) -> World:

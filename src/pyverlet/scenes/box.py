@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.bounds import Box
+from pyverlet.laws.rooms import Box
 from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings
-from pyverlet.world import World
+from pyverlet.world.world import World
 
 RADIUS = 0.5
 """Root mean square radius of the circles, m."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.bounds import Circle
+from pyverlet.laws.rooms import Circle
 from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings
-from pyverlet.world import World
+from pyverlet.world.world import World
 
 RADIUS = 0.5
 """Root mean square radius of the circles, m. With a radius_spread of 1 it is the radius of each."""

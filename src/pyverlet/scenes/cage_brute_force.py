@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from pyverlet.broadphase import BruteForce
+from pyverlet.laws.contacts.broadphase import BruteForce
 from pyverlet.scenes import cage
 from pyverlet.scenes._scene import Scene, Settings, Variant
-from pyverlet.world import World
+from pyverlet.world.world import World
 
 
 def build(settings: Settings) -> World:

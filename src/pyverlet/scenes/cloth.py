@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet import builders
-from pyverlet.bounds import Box
-from pyverlet.errors import InputError
+from pyverlet.ground.errors import InputError
+from pyverlet.laws.rooms import Box
 from pyverlet.scenes._scene import Scene, Settings
-from pyverlet.world import World
+from pyverlet.world import builders
+from pyverlet.world.world import World
 
 SPACING = 0.25
 """Between the threads, m."""

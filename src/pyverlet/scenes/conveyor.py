@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.bounds import Box
-from pyverlet.obstacles import Capsule, Segment
+from pyverlet.laws.obstacles import Capsule, Segment
+from pyverlet.laws.rooms import Box
 from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings
-from pyverlet.world import World
+from pyverlet.world.world import World
 
 RADIUS = 0.25
 """Root mean square radius of the grains, m."""

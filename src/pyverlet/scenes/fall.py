@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.bounds import Open
+from pyverlet.laws.rooms import Open
 from pyverlet.scenes._scene import Floats, Scene, Settings
-from pyverlet.world import World
+from pyverlet.world.world import World
 
 RADIUS = 0.5
 """Radius of every circle, m."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pyverlet.clock import Clock
-from pyverlet.integrators import SemiImplicitEuler
+from pyverlet.laws.integrators import SemiImplicitEuler
 from pyverlet.scenes import _drop
 from pyverlet.scenes._scene import Scene, Settings, Variant
-from pyverlet.world import World
+from pyverlet.world.clock import Clock
+from pyverlet.world.world import World
 
 SLOW = 6
 """Frames of the fast screen for one of the slow: 60 and 10 a second at the usual dt."""

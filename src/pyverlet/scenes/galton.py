@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.bounds import Box
-from pyverlet.obstacles import Capsule, Disc, Segment
+from pyverlet.laws.obstacles import Capsule, Disc, Segment
+from pyverlet.laws.rooms import Box
 from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Floats, Scene, Settings, Show
-from pyverlet.world import World
+from pyverlet.world.world import World
 
 ROWS = 12
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.bounds import Open
-from pyverlet.obstacles import Chain
+from pyverlet.laws.obstacles import Chain
+from pyverlet.laws.rooms import Open
 from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings, Show
-from pyverlet.world import World
+from pyverlet.world.world import World
 
 RADIUS = 0.5
 """Root mean square radius of the grains, m."""

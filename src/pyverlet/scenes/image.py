@@ -12,11 +12,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.bounds import Box
-from pyverlet.forces import Drag
+from pyverlet.laws.forces import Drag
+from pyverlet.laws.rooms import Box
 from pyverlet.scenes import _picture, _start
 from pyverlet.scenes._scene import Floats, Scene, Settings, Show
-from pyverlet.world import World
+from pyverlet.world.world import World
 
 RADIUS = 0.5
 """Root mean square radius of the circles, m."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.bounds import Open
-from pyverlet.errors import InputError
-from pyverlet.links import Stick
+from pyverlet.ground.errors import InputError
+from pyverlet.laws.links import Stick
+from pyverlet.laws.rooms import Open
 from pyverlet.scenes._scene import Scene, Settings
-from pyverlet.world import World
+from pyverlet.world.world import World
 
 RADIUS, LENGTH = 0.5, 4.0
 """Of the balls and of their threads, m."""

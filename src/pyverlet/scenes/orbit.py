@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.bounds import Open
-from pyverlet.forces import Attractor
+from pyverlet.laws.forces import Attractor
+from pyverlet.laws.rooms import Open
 from pyverlet.scenes._scene import Scene, Settings
-from pyverlet.world import World
+from pyverlet.world.world import World
 
 STRENGTH = 200.0
 """G M of the star, m^3/s^2: at 10 m an orbit takes 14 s."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet import builders
-from pyverlet.bounds import Box
-from pyverlet.errors import InputError
+from pyverlet.ground.errors import InputError
+from pyverlet.laws.rooms import Box
 from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings
-from pyverlet.world import World
+from pyverlet.world import builders
+from pyverlet.world.world import World
 
 PLANKS = 40
 """Of the bridge; fewer with few particles."""

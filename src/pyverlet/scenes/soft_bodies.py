@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet import builders
-from pyverlet.bounds import Box
+from pyverlet.laws.rooms import Box
 from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings
-from pyverlet.world import World
+from pyverlet.world import builders
+from pyverlet.world.world import World
 
 SKIN = 40
 """Particles of a soft body."""

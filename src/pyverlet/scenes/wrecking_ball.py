@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet import builders
-from pyverlet.bounds import Box
-from pyverlet.errors import InputError
-from pyverlet.links import Stick
+from pyverlet.ground.errors import InputError
+from pyverlet.laws.links import Stick
+from pyverlet.laws.rooms import Box
 from pyverlet.scenes._scene import Scene, Settings
-from pyverlet.world import World
+from pyverlet.world import builders
+from pyverlet.world.world import World
 
 BRICK, BALL = 0.25, 1.2
 """Radii, m."""

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pyverlet.panels import Panels
     from pyverlet.viewers.exhibit import Exhibit, Repertoire
-    from pyverlet.world import World
+    from pyverlet.world.panels import Panels
+    from pyverlet.world.world import World
 
 __all__ = ["serve", "view", "widget"]
 
@@ -90,7 +90,7 @@ def widget(world: World | Panels, *, title: str = "pyverlet", dt: float = 1 / 60
     """
     import importlib.util
 
-    from pyverlet.errors import InputError
+    from pyverlet.ground.errors import InputError
 
     for module in ("anywidget", "PIL"):
         if importlib.util.find_spec(module) is None:

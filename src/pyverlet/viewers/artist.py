@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.obstacles import Outline
+from pyverlet.laws.obstacles import Outline
 from pyverlet.picture import DARK, LIGHT, ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Fixed, Groups, Raster, Theme, View
 from pyverlet.picture.palette import Packed
 from pyverlet.viewers.frames import Frame, Shape

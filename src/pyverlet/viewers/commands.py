@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pyverlet import checks, integrators, scenes
-from pyverlet.errors import InputError
+from pyverlet import scenes
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
+from pyverlet.laws import integrators
 
 MAX_SUBSTEPS = 64
 """More substeps than this a frame help no scene and would let a slip of the mouse freeze it."""

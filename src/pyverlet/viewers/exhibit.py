@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet import scenes
-from pyverlet.integrators import Integrator
-from pyverlet.panels import Panels
+from pyverlet.laws.integrators import Integrator
 from pyverlet.scenes import Scene
 from pyverlet.viewers.frames import Rect
-from pyverlet.world import World
+from pyverlet.world.panels import Panels
+from pyverlet.world.world import World
 
 Progress = Callable[[int, int], None]
 

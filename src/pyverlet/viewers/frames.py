@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.bounds import Circle
 from pyverlet.kernels import wire
+from pyverlet.laws.rooms import Circle
 from pyverlet.picture.colour import USUAL_MULTIPLE
 from pyverlet.viewers.sketch import NOTHING, Sketch
 
 if TYPE_CHECKING:
-    from pyverlet.moments import Moment
-    from pyverlet.world import World
+    from pyverlet.world.moments import Moment
+    from pyverlet.world.world import World
 
 Rect = tuple[float, float, float, float]
 """x0, y0, x1, y1 in metres."""

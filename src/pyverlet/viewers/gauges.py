@@ -6,9 +6,9 @@ import time
 from collections import deque
 from typing import TYPE_CHECKING
 
-from pyverlet.clock import FrameBudget
 from pyverlet.viewers import levers
 from pyverlet.viewers.frames import Status
+from pyverlet.world.clock import FrameBudget
 
 if TYPE_CHECKING:
     from pyverlet.viewers.stage import Stage

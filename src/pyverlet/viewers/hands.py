@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pyverlet.forces import Grip, Push
+from pyverlet.laws.forces import Grip, Push
 from pyverlet.picture.view import nearest
 from pyverlet.viewers.tools import Pins, delete, spawn
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from pyverlet.viewers.layout import Layout
-    from pyverlet.world import World
+    from pyverlet.world.world import World
 
 GRIP_FREQUENCY = 4.0
 """Hz of the spring between mouse and particle: it follows a hand within a quarter of a second."""

@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING
 
 import uvicorn
 
-from pyverlet import checks
-from pyverlet.errors import InputError
-from pyverlet.progress import Progress
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
+from pyverlet.ground.progress import Progress
 from pyverlet.viewers.artist import Artist, draws_here
 from pyverlet.viewers.exhibit import Exhibit, Repertoire
 from pyverlet.viewers.looks import Look
@@ -29,8 +29,8 @@ from pyverlet.viewers.session import Session
 from pyverlet.viewers.web import LOOPBACK_NAMES, make_app
 
 if TYPE_CHECKING:
-    from pyverlet.panels import Panels
-    from pyverlet.world import World
+    from pyverlet.world.panels import Panels
+    from pyverlet.world.world import World
 
 GOODBYE_S = 1
 """Whole seconds open tabs get to hang up."""

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from pyverlet import integrators
+from pyverlet.laws import integrators
 from pyverlet.viewers.commands import (
     MAX_FRICTION,
     MAX_GRAVITY,
@@ -20,7 +20,7 @@ from pyverlet.viewers.commands import (
 )
 
 if TYPE_CHECKING:
-    from pyverlet.world import World
+    from pyverlet.world.world import World
 
 NAMES: dict[type[Setting], str] = {
     SetGravity: "gravity",

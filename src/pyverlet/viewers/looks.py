@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pyverlet import checks
-from pyverlet.errors import InputError
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
 from pyverlet.viewers.commands import FARTHEST
 from pyverlet.viewers.frames import Rect
 

@@ -15,8 +15,8 @@ import anywidget
 import traitlets
 from PIL import Image
 
-from pyverlet import checks
-from pyverlet.errors import InputError
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
 from pyverlet.viewers import bundle
 from pyverlet.viewers.artist import Artist, draws_here
 from pyverlet.viewers.commands import Release
@@ -28,8 +28,8 @@ from pyverlet.viewers.protocol import Ack, decode, encode_frame, encode_picture,
 from pyverlet.viewers.session import Session
 
 if TYPE_CHECKING:
-    from pyverlet.panels import Panels
-    from pyverlet.world import World
+    from pyverlet.world.panels import Panels
+    from pyverlet.world.world import World
 
 LONGEST_S = 0.1
 """Most seconds the world makes up for at once: after a cell that took minutes it goes on where it was."""
@@ -136,7 +136,7 @@ class Widget(anywidget.AnyWidget):
 
     def _repr_png_(self) -> bytes:
         """The first of the worlds as it is now."""
-        from pyverlet.panels import Panels
+        from pyverlet.world.panels import Panels
 
         world = Panels.of(self.world).worlds[0]
         pixels = Painter(world, size=(STILL_WIDTH, self.height)).paint()

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.errors import InputError
+from pyverlet.ground.errors import InputError
 from pyverlet.picture import DARK, ByOrigin, Colouring, Raster, Theme, View
 from pyverlet.viewers.frames import Camera, Rect, outline
 
 if TYPE_CHECKING:
-    from pyverlet.world import World
+    from pyverlet.world.world import World
 
 
 class Painter:

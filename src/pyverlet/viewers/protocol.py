@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet import integrators
-from pyverlet.errors import InputError
+from pyverlet.ground.errors import InputError
+from pyverlet.laws import integrators
 from pyverlet.viewers.commands import (
     MAX_PARTICLES,
     MAX_SUBSTEPS,

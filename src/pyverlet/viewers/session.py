@@ -18,11 +18,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet import checks
-from pyverlet.clock import Clock, FrameBudget
-from pyverlet.constants import FRAME_BUDGET_MS
-from pyverlet.errors import PyverletError
-from pyverlet.moments import Moment
+from pyverlet.ground import checks
+from pyverlet.ground.constants import FRAME_BUDGET_MS
+from pyverlet.ground.errors import PyverletError
 from pyverlet.viewers import commands as asked
 from pyverlet.viewers import levers
 from pyverlet.viewers.commands import Command
@@ -32,10 +30,12 @@ from pyverlet.viewers.gauges import Gauges
 from pyverlet.viewers.inbox import Inbox
 from pyverlet.viewers.rhythm import PICTURE_S, Audience, Rhythm
 from pyverlet.viewers.stage import Stage
+from pyverlet.world.clock import Clock, FrameBudget
+from pyverlet.world.moments import Moment
 
 if TYPE_CHECKING:
-    from pyverlet.panels import Panels
-    from pyverlet.world import World
+    from pyverlet.world.panels import Panels
+    from pyverlet.world.world import World
 
 _log = logging.getLogger(__name__)
 

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pyverlet.obstacles import Outline
+from pyverlet.laws.obstacles import Outline
 
 if TYPE_CHECKING:
     from pyverlet.viewers.layout import Layout
-    from pyverlet.world import World
+    from pyverlet.world.world import World
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.moments import Moment
-from pyverlet.state import EVERYONE
+from pyverlet.state.state import EVERYONE
 from pyverlet.viewers import levers
 from pyverlet.viewers.commands import Command, Drag, Poke, SetGravity, Setting
 from pyverlet.viewers.exhibit import Exhibit
@@ -18,6 +17,7 @@ from pyverlet.viewers.frames import Camera, PanelShape, Shape, outline
 from pyverlet.viewers.hands import HandsOnPanels
 from pyverlet.viewers.layout import Layout
 from pyverlet.viewers.sketch import Sketch, Sketcher
+from pyverlet.world.moments import Moment
 
 GREY = 0x9A
 """R, G and B of circles that joined a picture later."""

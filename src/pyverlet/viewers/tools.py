@@ -9,7 +9,7 @@ import numpy as np
 from pyverlet.picture.view import nearest
 
 if TYPE_CHECKING:
-    from pyverlet.world import World
+    from pyverlet.world.world import World
 
 SPAWNED_RADIUS = 0.5
 """m, in a world that is empty."""

@@ -20,7 +20,7 @@ from starlette.responses import Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from pyverlet.errors import InputError
+from pyverlet.ground.errors import InputError
 from pyverlet.viewers.artist import Artist, advice, draws_here
 from pyverlet.viewers.commands import Release
 from pyverlet.viewers.frames import Frame, Rect, Shape

@@ -9,17 +9,17 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from pyverlet import checks
-from pyverlet.clock import Clock, FrameBudget
-from pyverlet.errors import InputError, PyverletError
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError, PyverletError
 from pyverlet.picture import DARK, Colouring, Theme, View
 from pyverlet.picture.raster import check_size
 from pyverlet.viewers.frames import Rect
 from pyverlet.viewers.hands import Hands
 from pyverlet.viewers.painter import Painter
+from pyverlet.world.clock import Clock, FrameBudget
 
 if TYPE_CHECKING:
-    from pyverlet.world import World
+    from pyverlet.world.world import World
 
 HAND = 0
 """There is one mouse."""
@@ -226,7 +226,7 @@ def check_extra() -> None:
 def show(build: Callable[[], World], **options: Any) -> None:
     """Build a world, compile what it needs and show it until the window is closed. Options as for `Window`."""
     from pyverlet import warm_up
-    from pyverlet.progress import Progress
+    from pyverlet.ground.progress import Progress
 
     check_extra()
     world = build()

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import difflib
 
-from pyverlet.errors import InputError
+from pyverlet.ground.errors import InputError
 from pyverlet.lab.physics import bounce, energy, friction, gas, lost, rest, sizes
 from pyverlet.lab.physics._check import Check, Result, Row
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any
 
-from pyverlet.errors import NonFiniteError
+from pyverlet.ground.errors import NonFiniteError
 
 
 @dataclass(frozen=True)

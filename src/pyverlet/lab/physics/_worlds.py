@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.world import World
+from pyverlet.world.world import World
 
 Array = NDArray[Any]
 

@@ -7,12 +7,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import DTypeLike
 
-from pyverlet.bounds import Boundary, Box, Circle, Open
-from pyverlet.collisions import Collisions
-from pyverlet.integrators import VelocityVerlet
 from pyverlet.lab.physics._check import Result
 from pyverlet.lab.physics._worlds import DT, RADIUS, G
-from pyverlet.world import World
+from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.integrators import VelocityVerlet
+from pyverlet.laws.rooms import Boundary, Box, Circle, Open
+from pyverlet.world.world import World
 
 RESTITUTIONS = (0.0, 0.3, 0.5, 0.8, 0.95, 1.0)
 DROPS = (0.5, 2.0, 10.0)

@@ -8,13 +8,13 @@ from functools import partial
 import numpy as np
 
 from pyverlet import scenes
-from pyverlet.bounds import Box, Circle
-from pyverlet.collisions import Collisions
-from pyverlet.forces import Conservative
 from pyverlet.lab.physics._check import Result
 from pyverlet.lab.physics._worlds import RADIUS, G, fastest, frames, in_disc
-from pyverlet.naive import Naive
-from pyverlet.world import World
+from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.forces import Conservative
+from pyverlet.laws.naive import Naive
+from pyverlet.laws.rooms import Box, Circle
+from pyverlet.world.world import World
 
 MOST = 1e-4
 """Rise in one frame, over the scale."""

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from pyverlet import scenes
-from pyverlet.bounds import Box
-from pyverlet.collisions import Collisions
 from pyverlet.lab.physics._check import Result
 from pyverlet.lab.physics._worlds import RADIUS, G, frames
-from pyverlet.world import World
+from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.rooms import Box
+from pyverlet.world.world import World
 
 
 def sliding_disc(within: float = 0.001) -> Result:

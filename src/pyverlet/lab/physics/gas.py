@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.bounds import Circle
-from pyverlet.collisions import Collisions
 from pyverlet.lab.physics._check import Result
 from pyverlet.lab.physics._worlds import RADIUS, frames, in_disc
-from pyverlet.world import World
+from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.rooms import Circle
+from pyverlet.world.world import World
 
 AREA_FRACTION = 0.3
 SPEED = 5.0

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.bounds import Boundary, Box, Circle
-from pyverlet.collisions import Collisions
 from pyverlet.lab.physics._check import Result
 from pyverlet.lab.physics._worlds import DT, RADIUS, Array, fastest, frames
-from pyverlet.world import World
+from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.rooms import Boundary, Box, Circle
+from pyverlet.world.world import World
 
 SPEEDS = (1, 3, 10, 30, 100, 300, 1000, 3000, 10_000)
 """Radii a substep."""

@@ -7,10 +7,10 @@ from itertools import pairwise
 import numpy as np
 
 from pyverlet import scenes
-from pyverlet.bounds import Box
 from pyverlet.lab.physics._check import Result
 from pyverlet.lab.physics._worlds import RADIUS, Array, G, agitation, frames
-from pyverlet.world import World
+from pyverlet.laws.rooms import Box
+from pyverlet.world.world import World
 
 STILL = 1e-4
 """Kinetic energy per particle over m g R, at rest."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.bounds import Box
-from pyverlet.collisions import Collisions
 from pyverlet.lab.physics._check import Result
 from pyverlet.lab.physics._worlds import DT, RADIUS, agitation, columns, frames
 from pyverlet.lab.physics.rest import STILL
-from pyverlet.world import World
+from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.rooms import Box
+from pyverlet.world.world import World
 
 MOST_OVERLAP = 0.10
 """Of the contact distance, in a pile of unequal circles."""

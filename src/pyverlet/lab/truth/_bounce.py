@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.bounds import Boundary, Box, Open
-from pyverlet.group import Group
-from pyverlet.integrators import Integrator
 from pyverlet.lab.problems import Floats
-from pyverlet.naive import ClampAndFlip
-from pyverlet.world import World
+from pyverlet.laws.integrators import Integrator
+from pyverlet.laws.naive import ClampAndFlip
+from pyverlet.laws.rooms import Boundary, Box, Open
+from pyverlet.state.group import Group
+from pyverlet.world.world import World
 
 G = 9.81
 H = 1 / 60

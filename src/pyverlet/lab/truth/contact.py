@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.bounds import Box
-from pyverlet.collisions import Collisions
-from pyverlet.integrators import PositionVerlet
 from pyverlet.lab.truth._bounce import HEIGHT, RADIUS, H, ball, path
 from pyverlet.lab.truth._claim import Number, experiment
-from pyverlet.naive import ProjectOnly
-from pyverlet.world import World
+from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.integrators import PositionVerlet
+from pyverlet.laws.naive import ProjectOnly
+from pyverlet.laws.rooms import Box
+from pyverlet.world.world import World
 
 
 @experiment(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.integrators import ExplicitEuler, PositionVerlet, SemiImplicitEuler
 from pyverlet.lab.truth._bounce import FLIP, HEIGHT, MINUTE, OPEN, RADIUS, G, H, ball, path, tops
 from pyverlet.lab.truth._claim import Number, experiment
+from pyverlet.laws.integrators import ExplicitEuler, PositionVerlet, SemiImplicitEuler
 
 
 @experiment(

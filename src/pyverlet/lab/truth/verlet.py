@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.integrators import PositionVerlet, TimeCorrectedVerlet
 from pyverlet.lab import order
 from pyverlet.lab.problems import FREQUENCY, PROBLEMS, oscillation
 from pyverlet.lab.truth._bounce import G, H
 from pyverlet.lab.truth._claim import Number, experiment
-from pyverlet.world import World
+from pyverlet.laws.integrators import PositionVerlet, TimeCorrectedVerlet
+from pyverlet.world.world import World
 
 OSCILLATOR = PROBLEMS["oscillator"]
 

@@ -1,0 +1,1 @@
+"""The only place that calls Numba: flags, cache, threads, lanes."""

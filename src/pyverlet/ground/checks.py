@@ -1,0 +1,173 @@
+"""Checks of arguments: each returns the value in the engine's form or raises InputError with one sentence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, SupportsFloat
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from pyverlet.ground.errors import InputError
+
+
+def number(name: str, value: SupportsFloat, *, above: float | None = None, least: float | None = None) -> float:
+    """A finite float, greater than `above` or at least `least` where given."""
+    try:
+        result = float(value)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} is {value!r}; allowed is {_allowed(above, least)}") from None
+    low = (above is not None and result <= above) or (least is not None and result < least)
+    if not math.isfinite(result) or low:
+        raise InputError(f"{name} is {result:g}; allowed is {_allowed(above, least)}")
+    return result
+
+
+def _allowed(above: float | None, least: float | None) -> str:
+    allowed = "a finite number"
+    if above is not None:
+        allowed += f" greater than {above:g}"
+    if least is not None:
+        allowed += f" of at least {least:g}"
+    return allowed
+
+
+def whole(name: str, value: Any, *, least: int = 1, most: int | None = None, most_is: str = "") -> int:
+    """An int of at least `least` and at most `most` (`most_is` says where that limit comes from)."""
+    allowed = f"a whole number of at least {least}"
+    if most is not None:
+        allowed = f"a whole number from {least} to {most}{most_is}"
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise InputError(f"{name} is {value!r}; allowed is {allowed}")
+    if value < least or (most is not None and value > most):
+        raise InputError(f"{name} is {value}; allowed is {allowed}")
+    return int(value)
+
+
+def fraction(name: str, value: SupportsFloat) -> float:
+    """A float from 0 to 1."""
+    result = number(name, value)
+    if not 0.0 <= result <= 1.0:
+        raise InputError(f"{name} is {result:g}; allowed is a number from 0 to 1")
+    return result
+
+
+def vector(name: str, value: Sequence[SupportsFloat] | NDArray[Any]) -> tuple[float, float]:
+    """Two finite floats (x, y)."""
+    try:
+        x, y = value
+        result = (float(x) + 0.0, float(y) + 0.0)  # of two zeros that are equal but not in their bits, one
+    except (TypeError, ValueError):
+        raise InputError(f"{name} is {value!r}; allowed are two numbers (x, y)") from None
+    if not all(map(math.isfinite, result)):
+        raise InputError(f"{name} is {result}; allowed are two finite numbers (x, y)")
+    return result
+
+
+def floating(name: str, value: DTypeLike) -> np.dtype[Any]:
+    """float32 or float64 as a dtype."""
+    try:
+        result = np.dtype(value)
+    except TypeError:
+        raise InputError(f"{name} is {value!r}; allowed are float32 and float64") from None
+    if result not in (np.dtype(np.float32), np.dtype(np.float64)):
+        raise InputError(f"{name} is {result}; allowed are float32 and float64")
+    return result
+
+
+def rows(name: str, value: ArrayLike, dtype: np.dtype[Any], count: int | None = None) -> NDArray[Any]:
+    """A finite (n, 2) array; one row (2,) is spread over `count` rows, as is a scalar 0."""
+    array = _array(name, value, dtype)
+    if count is None and array.shape == (2,):
+        array = array[None, :]
+    elif count is not None and array.shape in ((), (2,)):
+        array = np.broadcast_to(array, (count, 2))
+    wanted = "(n, 2)" if count is None else f"({count}, 2)"
+    if array.ndim != 2 or array.shape[1] != 2 or (count is not None and array.shape[0] != count):
+        raise InputError(f"{name} has shape {array.shape}; allowed is {wanted}, one row (x, y) for each particle")
+    _finite(name, array)
+    return array
+
+
+def column(name: str, value: ArrayLike, dtype: np.dtype[Any], count: int) -> NDArray[Any]:
+    """A (n,) array from `count` values or one scalar for all, each finite and greater than 0."""
+    array = _array(name, value, dtype)
+    if array.ndim == 0:
+        array = np.broadcast_to(array, (count,))
+    if array.shape != (count,):
+        raise InputError(f"{name} has shape {array.shape}; allowed is one number or ({count},), one for each particle")
+    return array
+
+
+def positive(name: str, array: NDArray[Any], *, infinite_is: str = "") -> None:
+    """Refuse values that are not greater than 0, NaN, or infinite (unless `infinite_is` says what infinity means)."""
+    wrong = ~(array > 0)
+    allowed = "a number greater than 0"
+    if infinite_is:
+        allowed += f" (infinity: {infinite_is})"
+    else:
+        wrong |= np.isinf(array)
+        allowed = "a finite number greater than 0"
+    if wrong.any():
+        first = int(np.flatnonzero(wrong)[0])
+        raise InputError(f"{name}[{first}] is {array[first]:g}; allowed is {allowed}")
+
+
+def within(name: str, array: NDArray[Any], least: float, most: float) -> None:
+    """Refuse values outside [least, most], NaN and infinity."""
+    wrong = ~((array >= least) & (array <= most) & np.isfinite(array))
+    if wrong.any():
+        first = int(np.flatnonzero(wrong)[0])
+        allowed = f"a number from {least:g} to {most:g}" if math.isfinite(most) else f"a finite number of at least {least:g}"
+        raise InputError(f"{name}[{first}] is {array[first]:g}; allowed is {allowed}")
+
+
+def at_most(name: str, array: NDArray[Any], most: float) -> None:
+    """Refuse values above `most`, and NaN."""
+    wrong = ~(array <= most)
+    if wrong.any():
+        first = int(np.flatnonzero(wrong)[0])
+        raise InputError(f"{name}[{first}] is {array[first]:g}; allowed is a number up to {most:g}")
+
+
+def bits(name: str, value: ArrayLike, count: int) -> NDArray[np.uint32]:
+    """A (n,) array of 32 bits each, from whole numbers of 0 to 2^32 - 1: `count` of them or one for all."""
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        raise InputError(f"{name} is not an array of numbers; allowed are whole numbers of 32 bits, 0 to 4294967295") from None
+    if array.dtype.kind not in "iu" or (array.size and not (int(array.min()) >= 0 and int(array.max()) < 2**32)):
+        raise InputError(f"{name} is {value!r}; allowed are whole numbers of 32 bits, 0 to 4294967295")
+    return column(name, array, np.dtype(np.uint32), count)
+
+
+def indices(name: str, value: ArrayLike, count: int) -> NDArray[np.int64]:
+    """Sorted indices without repetition from an index, several, or a mask of `count` bools."""
+    allowed = f"are whole numbers from 0 to {count - 1}, or {count} bools"
+    try:
+        array = np.atleast_1d(np.asarray(value))
+    except ValueError:
+        raise InputError(f"{name} is {value!r}; allowed {allowed}") from None
+    if array.dtype == bool and array.shape == (count,):
+        return np.flatnonzero(array)
+    if array.ndim != 1 or (array.size and array.dtype.kind not in "iu"):
+        raise InputError(f"{name} is {value!r}; allowed {allowed}")
+    wrong = (array < 0) | (array >= count)
+    if wrong.any():
+        raise InputError(f"{name} has {array[wrong][0]}; allowed {allowed}")
+    return np.unique(array).astype(np.int64)
+
+
+def _array(name: str, value: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
+    try:
+        return np.asarray(value, dtype=dtype)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} is not an array of numbers; allowed are numbers in the shape the docs give") from None
+
+
+def _finite(name: str, array: NDArray[Any]) -> None:
+    good = np.isfinite(array).all(axis=1)
+    if not good.all():
+        first = int(np.flatnonzero(~good)[0])
+        raise InputError(f"{name}[{first}] is {tuple(map(float, array[first]))}; allowed are finite numbers (x, y)")

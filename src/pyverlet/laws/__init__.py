@@ -1,0 +1,1 @@
+"""What particles follow: one small class an idea."""

@@ -1,0 +1,1 @@
+"""Circles that touch: who may, and what happens to them."""

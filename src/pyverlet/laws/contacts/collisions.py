@@ -1,0 +1,347 @@
+"""Collisions between particles: what a user sets (`Collisions`) and the solver that runs it (`ContactSolver`)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pyverlet.ground import checks
+from pyverlet.ground.constants import FED, FED_SMOOTH, LARGEST_PUSH, PUSHED, REST_ACCELERATIONS, UNEVEN
+from pyverlet.ground.errors import InputError
+from pyverlet.kernels import contacts, friction, impacts, refine
+from pyverlet.kernels.bounds import AT_WALL, CARRIED, CARRIES
+from pyverlet.laws.contacts.broadphase import BruteForce, Fast, PairList, Strips
+from pyverlet.laws.contacts.growth import Growth
+from pyverlet.laws.contacts.loans import Lent, Loans
+from pyverlet.laws.contacts.packs import Packs
+from pyverlet.laws.contacts.slips import Kept, Slips
+from pyverlet.laws.events import Events
+from pyverlet.laws.sleep import Sleep
+from pyverlet.state.moves import pick_falling
+from pyverlet.state.state import Slots, State
+
+Unlist = Callable[[PairList, Any], None]
+"""Takes pairs that are no contacts, since a link says so, from a list; the second argument is the user's index in each slot."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Collisions:
+    """How particles collide with each other.
+
+    Both numbers are for circles added without values of their own. Of two that differ the larger restitution counts, and the
+    geometric mean of the frictions, as in Box2D; of a circle with values of its own and a wall likewise.
+
+    Args:
+        restitution: e, 0 to 1. An impact leaves with e times the normal speed it came with; contact at rest never bounces.
+        friction: mu of Coulomb, 0 or more. 0 leaves spin alone.
+        method: how pairs are found, Fast() or the O(n^2) reference BruteForce(). Both find the same contacts.
+    """
+
+    restitution: float = 0.0
+    friction: float = 0.0
+    method: Fast | BruteForce = field(default_factory=Fast)
+
+    def __post_init__(self) -> None:
+        checks.fraction("restitution", self.restitution)
+        checks.number("friction", self.friction, least=0.0)
+        if not isinstance(self.method, Fast | BruteForce):
+            raise InputError(f"method is {self.method!r}; allowed are pyverlet.Fast() and pyverlet.BruteForce()")
+
+
+class Overlap(NamedTuple):
+    """Overlap of the touching pairs, as a fraction of the contact distance r_i + r_j."""
+
+    mean: float
+    max: float
+    contacts: int
+
+
+class ContactSolver:
+    """The contact stages of a substep, in the order `World.step` calls them."""
+
+    def __init__(
+        self,
+        settings: Collisions,
+        dtype: np.dtype[Any],
+        unlist: Unlist,
+        events: Events | None = None,
+        sleep: Sleep | None = None,
+    ) -> None:
+        self.settings = settings
+        self.broad_phase = settings.method.start(dtype)
+        self._unlist = unlist
+        self._seen = 0
+        self._packs = Packs(dtype)
+        self._packed = False
+        self._uneven = False  # whether masses differ so much that contacts need loans of inertia, and to be refined
+        self._lends = False  # in this substep
+        self._events = events
+        self._sleep = sleep
+        self._slips = Slips(dtype)
+        self._loans = Loans(dtype)
+        self.growth = Growth()
+        self.broad_phase.replacing = self._slips.stop
+        if events is not None:
+            self.broad_phase.list.listen()
+            self.broad_phase.renewing = events.collect
+
+    def fit(self, state: Slots) -> None:
+        """Let particles that were added on top of others start smaller."""
+        fresh = np.isnan(state.acceleration[:, 0])
+        if fresh.any():
+            self._list(state)
+            self.growth.fit(state, self.broad_phase.list, np.isnan(state.acceleration[:, 0]))  # in the order of the list
+
+    def before(self, state: Slots, h: float) -> None:
+        """Let those that are not full-grown grow; note where the substep starts, for friction measures slip from there."""
+        if state.size is not state.radius:
+            self.growth.grow(state, h)
+        if self._rubs(state):
+            state.note_start()
+        else:
+            self._slips.forget()
+            self._packs.drop_slips()
+
+    def find(self, state: Slots, lag: float) -> None:
+        """Broad phase: bring the list of candidate pairs up to date, and note events before contacts change a velocity."""
+        self._list(state)
+        while self._sleep and self._sleep.touched(state, self.broad_phase.list):
+            self.broad_phase.renew(state)
+            self._list(state)
+        if self._events is not None:
+            self._events.listen(state, self.broad_phase.list, lag)
+
+    def _list(self, state: Slots) -> None:
+        if self._packed and not self._eight(state):  # they were a frame ago, and the pairs may have gone
+            self.broad_phase.forget()
+        self.broad_phase.update(state)
+        if self._seen != self.broad_phase.rebuilds:
+            self._seen = self.broad_phase.rebuilds
+            self._unlist(self.broad_phase.list, state.particle)
+            free = state.inverse_mass[state.inverse_mass > 0]
+            self._uneven = bool(len(free)) and float(free.max()) > UNEVEN * float(free.min())
+            self._lends &= self._uneven
+            self._packed = False
+
+    def _pack(self, state: Slots) -> Packs:
+        if not self._packed:
+            self._packs.take(self.broad_phase.list, self.broad_phase.built, state.radius)
+            self._packed = True
+            if self._events is None and self._sleep is None:
+                self.broad_phase.release()
+        return self._packs
+
+    def repeats(self, state: Slots) -> tuple[Any, ...] | None:
+        """What a substep's contacts depend on beside h, if they are but calls of kernels; None: there is more to them."""
+        if not (self._alone(state) and self._packed and self._packs.fits(state)):
+            return None
+        return self.broad_phase.lasts()
+
+    def packs(self, state: Slots) -> tuple[Packs, Strips] | None:
+        """Packs and strips, if a substep's contacts are but `project` and `still` of these; None: there is more to them."""
+        strips = self.broad_phase.strips() if self._alone(state) else None
+        return (self._pack(state), strips) if strips else None
+
+    def _alone(self, state: Slots) -> bool:
+        return self._events is None and self._sleep is None and state.size is state.radius and self._slides(state)
+
+    def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
+        """Move overlapping circles apart, let impacts bounce, note who touches, and let those grip each other."""
+        if self._slides(state):
+            self._pack(state).project(state, h)
+            return
+        if self._grips(state):
+            packs = self._pack(state)
+            self._slips.start(packs, state.particle)
+            packs.project(state, h, FED)
+            packs.grip(state, h, self.settings.friction, self._leaning(state, h), self.broad_phase.list.spent)
+            return
+        pairs, real = self.broad_phase.list, state.real
+        pairs.hold_notes()
+        moving, lends = (state.position, state.velocity), self._uneven and strongest > 0
+        self._lends = lends
+        self._lighter = self._loans.begin(state) if lends else state.inverse_mass
+        bodies = (state.size, self._lighter)
+        which = pairs.listed()
+        fed = self._fed(state)
+        push = (real(fed / h), real(LARGEST_PUSH))
+        notes = (pairs.touching, pairs.impulse, pairs.touches)
+        if self._bounces(state):
+            self._bounce(state, h, lag, REST_ACCELERATIONS * strongest * h)
+            if lends:
+                self._loans.recall(state, pairs)
+        if lends:
+            self._loans.keep_weight(state, h, fed)
+        if not self._bounces(state):
+            contacts.project(*moving, *bodies, *which, *push, *notes)
+        else:
+            slow = real(1 / h if strongest > 0 else 0.0)
+            contacts.project_resting(*moving, *bodies, *which, *push, slow, pairs.meeting, state.fed, *notes)
+        if self._uneven:
+            refine.refine(*moving, *bodies, *which, *push, *notes)
+        if lends:
+            self._loans.settle(state, pairs, h)
+        if self._rubs(state):
+            self._slips.start(pairs, state.particle)
+            state.note_turn(h)
+            where = (*moving, state.spin, state.turn, state.lift, state.radius, self._lighter, state.friction)
+            numbers = (real(h), real(self.settings.friction), real(self._leaning(state, h)))
+            friction.grip(*where, *which, *numbers, *notes, pairs.slip, pairs.slipped, pairs.held, pairs.spent)
+        if lends:
+            self._loans.free_of_walls(state)
+
+    def _bounce(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
+        pairs, real = self.broad_phase.list, state.real
+        moving, bodies = (state.position, state.velocity, state.acceleration), (state.size, state.inverse_mass, state.restitution)
+        which = pairs.listed()
+        settings = (real(h), real(lag), real(self.settings.restitution), real(rest_speed))
+        impacts.impacts(*moving, *bodies, *which, *settings, state.fed, pairs.meeting, pairs.impulse, pairs.spent)
+        state.fed[:] = (state.fed & (CARRIES | AT_WALL)) * CARRIED
+
+    def still(self, state: Slots, h: float) -> None:
+        """Take from touching circles the velocity that projection has put in, and rub them."""
+        if self._slides(state):
+            self._packs.still(state)
+            return
+        if self._grips(state):
+            self._packs.rub(state, h, self.settings.friction, self.broad_phase.list.spent)
+            return
+        pairs, real = self.broad_phase.list, state.real
+        which = pairs.listed()
+        moving = (state.position, state.velocity)
+        notes = (pairs.touching, pairs.impulse, pairs.touches)
+        if self._lends:
+            self._loans.join(state, pairs)
+        if self._rubs(state):
+            where = (state.start, *moving, state.spin, state.turn, state.radius, self._lighter, state.friction)
+            numbers = (real(h), real(self.settings.friction))
+            friction.rub(*where, *which, *numbers, *notes, pairs.slip, pairs.slipped, pairs.held, pairs.spent)
+        else:
+            contacts.still_resting(*moving, self._lighter, *which, *notes)
+        if self._lends:
+            self._loans.balance(state, rubs=self._rubs(state))
+
+    @contextmanager
+    def aside(self, state: Slots) -> Iterator[None]:
+        """While others, who keep momentum by themselves, change velocities between `project` and `still`."""
+        before = state.velocity.copy() if self._lends else None
+        yield
+        if before is not None:
+            self._loans.leave_out(state.velocity - before)
+
+    def listed(self) -> tuple[Any, Any, Any, Any]:
+        """first, count, pair_i, pair_j of the pairs of now."""
+        return self._packs.listed() if self._packed else self.broad_phase.list.listed()
+
+    def save(self) -> tuple[Any, Kept, Lent, tuple[float, float]]:
+        """What outlives a frame: the list, what friction remembers, who has lent what, the pace of growth."""
+        return self.broad_phase.save(), self._slips.save(), self._loans.save(), self.growth.save()
+
+    def restore(self, saved: tuple[Any, Kept, Lent, tuple[float, float]] | None, state: Slots) -> None:
+        """Back to what `save` returned, or to nothing; `state` already has the order and radii of then."""
+        phase, slips, lent, pace = saved or (None, None, None, (1.0, 0.0))
+        self.growth.restore(pace)
+        self._packed = False
+        self.broad_phase.forget()
+        if phase is not None:  # None: collisions were off, or of a kind that remembers nothing
+            self.broad_phase.restore(phase, state)
+        self._slips.forget()
+        if slips is not None:
+            self._slips.restore(slips)
+        self._loans.forget()
+        if lent is not None:
+            self._loans.restore(lent)
+
+    def renumber(self, now: np.ndarray[Any, Any]) -> None:
+        """The particles are now at `now` (n,), or no more (-1)."""
+        self._slips.renumber(now)
+        self._loans.renumber(now)
+
+    def _slides(self, state: Slots) -> bool:
+        """Whether contacts are solved eight at a time, without friction."""
+        return self._eight(state) and not self._rubs(state)
+
+    def _grips(self, state: Slots) -> bool:
+        """Whether they are, with friction."""
+        return self._eight(state) and self._rubs(state)
+
+    def _eight(self, state: Slots) -> bool:
+        return not (self._bounces(state) or self._uneven)
+
+    def _leaning(self, state: Slots, h: float) -> float:
+        """s; times -a it is the velocity that a circle at rest against others ends a substep with."""
+        return self._lean(state) * h
+
+    def _lean(self, state: Slots) -> float:
+        """The same, in substeps."""
+        return state.drop - PUSHED / self._fed(state)
+
+    def _fed(self, state: Slots) -> float:
+        """What velocities are fed, of an overlap."""
+        return FED if self._rubs(state) or self._bounces(state) else FED_SMOOTH
+
+    def _bounces(self, state: Slots) -> bool:
+        return self.settings.restitution > 0.0 or state.most_restitution > 0.0
+
+    def _rubs(self, state: Slots) -> bool:
+        return self.settings.friction > 0.0 or state.most_friction > 0.0
+
+    def end(
+        self, state: Slots, before: State, lag: float, dt: float, gravity: tuple[float, float], *, marked: bool = False
+    ) -> None:
+        """At the end of a frame of dt seconds: note who was held by a contact, and let those fall asleep that are tired.
+
+        before: how the frame began. lag: seconds the velocity is behind. marked: who touches another is known to rest already.
+        """
+        state.lean = self._lean(state)
+        if not marked:
+            self._mark_resting(state)
+        if self._lends:
+            self._loans.let_fall(state)
+        else:
+            pick_falling(state, before.velocity, lag, dt)
+        if self._sleep and self._sleep.end(state, self.broad_phase.list, dt, float(np.hypot(*gravity))):
+            self.broad_phase.forget()  # it has no use for pairs among sleepers
+
+    def _mark_resting(self, state: Slots) -> None:
+        """Note in `state.resting` who touches another without bouncing off it."""
+        if self._eight(state):
+            self._packs.mark_resting(state)
+            return
+        pairs = self.broad_phase.list
+        notes = (pairs.touching, pairs.impulse, pairs.touches)
+        contacts.mark_touching(pairs.first, pairs.pair_i, pairs.pair_j, *notes, state.resting)
+
+
+def find_contacts(state: State, method: Fast | BruteForce) -> np.ndarray[Any, np.dtype[np.int64]]:
+    """(k, 2) user's indices i < j of all overlapping pairs of a state, sorted; leaves the state alone."""
+    slots, phase = _listed(state, method)
+    pairs = phase.list.pairs()
+    a, b = slots.position[pairs[:, 0]].astype(np.float64), slots.position[pairs[:, 1]].astype(np.float64)
+    reach = slots.radius[pairs].astype(np.float64).sum(axis=1)
+    touching = pairs[np.hypot(*(a - b).T) < reach]
+    named = np.sort(slots.particle[touching].astype(np.int64), axis=1)
+    return named[np.lexsort(named.T[::-1])]
+
+
+def measure_overlap(state: State, unlist: Unlist) -> Overlap:
+    """Overlap of all touching pairs of a state, but for those that `unlist` takes from a list; leaves the state alone."""
+    if len(state) < 2:
+        return Overlap(0.0, 0.0, 0)
+    slots, phase = _listed(state, Fast(skin=0.0))
+    pairs = phase.list
+    unlist(pairs, slots.particle)
+    number, total, largest = contacts.overlaps(slots.position, slots.radius, *pairs.listed())
+    return Overlap(total / number if number else 0.0, largest, number)
+
+
+def _listed(state: State, method: Fast | BruteForce) -> tuple[Slots, Any]:
+    slots = Slots(state.dtype)
+    slots.gather(state)
+    phase = method.start(state.dtype)
+    phase.update(slots)
+    return slots, phase

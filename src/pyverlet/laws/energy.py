@@ -1,0 +1,30 @@
+"""What a world's energy and momentum are."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from pyverlet.kernels import measure
+from pyverlet.laws.forces import Conservative
+from pyverlet.state.state import State
+
+
+class Energy(NamedTuple):
+    """Energy of a world, J. Pinned particles have none. Gravity's potential is 0 at the origin."""
+
+    kinetic: float
+    spin: float
+    potential: float
+    links: float
+
+    @property
+    def total(self) -> float:
+        """kinetic + potential + links; spin is part of kinetic."""
+        return self.kinetic + self.potential + self.links
+
+
+def energy(state: State, gravity: tuple[float, float], forces: list[Any], links: float) -> Energy:
+    """Energy of a state under gravity and those forces that have a potential."""
+    motion, spin, potential = measure.energies(state.position, state.velocity, state.spin, state.radius, state.mass, *gravity)
+    potential += sum(force.potential(state) for force in forces if isinstance(force, Conservative))
+    return Energy(kinetic=motion + spin, spin=spin, potential=potential, links=links)

@@ -1,0 +1,24 @@
+"""Forces besides gravity: objects with `apply(state, t)`, which add newtons to `state.force`.
+
+`state` is the engine's working copy (`state.state.Slots`): arrays in the engine's order, `state.particle` naming the user's
+index in each slot. A force that looks at the velocity says so by `velocity_dependent = True`, so that integrators
+keep their order. A conservative force adds `potential(state)` in joules, and the world's energy includes it. The work of any
+other is on the world's ledger, under `forces` or the name in the force's `account`.
+
+To add one: a class with `apply`, and a test against its closed form. Or no class: a function with `@pyverlet.force`.
+"""
+
+from __future__ import annotations
+
+from pyverlet.laws.forces._base import Conservative, Force, ForceSum, Numbered
+from pyverlet.laws.forces.attraction import Attractor, Gravitation
+from pyverlet.laws.forces.constant import ConstantForce
+from pyverlet.laws.forces.drag import Drag, Wind
+from pyverlet.laws.forces.function import FunctionForce, force
+from pyverlet.laws.forces.mouse import Grip, Push
+from pyverlet.laws.forces.spring import PointSpring
+
+__all__ = [
+    "Attractor", "Conservative", "ConstantForce", "Drag", "Force", "ForceSum", "FunctionForce", "Gravitation", "Grip", "Numbered",
+    "PointSpring", "Push", "Wind", "force",
+]  # fmt: skip

@@ -1,0 +1,72 @@
+"""What a force is, and the sum of all of them."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol, runtime_checkable
+
+from numpy.typing import NDArray
+
+from pyverlet.state.moves import newton, newton_kick_drift
+from pyverlet.state.state import Slots, State
+
+
+@runtime_checkable
+class Force(Protocol):
+    """Anything with this method is a force. One without `velocity_dependent` is taken to look at the velocity."""
+
+    def apply(self, state: Slots, t: float) -> None:
+        """Add this force to `state.force` (n, 2), in N, at time t in s."""
+
+
+@runtime_checkable
+class Conservative(Protocol):
+    """A force with a potential."""
+
+    def potential(self, state: State) -> float:
+        """Potential energy of all particles, J."""
+
+
+@runtime_checkable
+class Numbered(Protocol):
+    """Something that holds particles by their index."""
+
+    def renumber(self, now: NDArray[Any]) -> None:
+        """Particles were removed: the one that was at k is at now[k], or is no more if that is -1."""
+
+
+class ForceSum:
+    """Gravity and the world's forces together: what integrators call. Forces are summed, then a = F / m.
+
+    Args:
+        gravity: (x, y), m/s^2.
+        forces: the world's list, read anew at each evaluation.
+
+    Attributes:
+        strongest: the largest acceleration that anyone has felt in the last evaluation, m/s^2.
+    """
+
+    def __init__(self, gravity: tuple[float, float], forces: list[Any]) -> None:
+        self.gravity = gravity
+        self.forces = forces
+        self.strongest = 0.0
+
+    @property
+    def velocity_dependent(self) -> bool:
+        """Whether any of the forces may look at the velocity."""
+        return bool(self.forces) and any(getattr(force, "velocity_dependent", True) for force in self.forces)
+
+    def __call__(self, state: Slots, t: float) -> None:
+        self.strongest = newton(state, self._summed(state, t), self.gravity)
+
+    def kick_drift(self, state: Slots, t: float, h: float, ahead: float = 0.0) -> None:
+        """Evaluate, take back a kick of `ahead` seconds, then velocity += h * acceleration, then position += h * velocity."""
+        self.strongest = newton_kick_drift(state, self._summed(state, t), self.gravity, h, ahead)
+
+    def _summed(self, state: Slots, t: float) -> NDArray[Any]:
+        """The sum of all forces but gravity (n, 2), N; (0, 2) if there are none."""
+        if not self.forces:
+            return state.acceleration[:0]
+        state.force.fill(0)
+        for force in self.forces:
+            force.apply(state, t)
+        return state.force

@@ -1,0 +1,70 @@
+"""Resistance of the medium, at rest or in motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
+from pyverlet.kernels import forces
+from pyverlet.state.state import Slots
+
+Field = Callable[[NDArray[Any], NDArray[Any], float], Any]
+
+
+class Drag:
+    """Resistance of a medium at rest: F = -(linear + quadratic |v|) v.
+
+    A fall ends at m g / linear or at sqrt(m g / quadratic), m/s.
+
+    Args:
+        linear: N s/m (Stokes).
+        quadratic: N s^2/m^2 (Newton).
+    """
+
+    velocity_dependent = True
+    account = "drag"
+
+    def __init__(self, *, linear: float = 0.0, quadratic: float = 0.0) -> None:
+        self.linear = checks.number("linear", linear, least=0.0)
+        self.quadratic = checks.number("quadratic", quadratic, least=0.0)
+
+    def apply(self, state: Slots, t: float) -> None:
+        wind = self._wind(state, t)
+        forces.drag(state.force, state.velocity, wind, state.real(self.linear), state.real(self.quadratic))
+
+    def _wind(self, state: Slots, t: float) -> NDArray[Any]:
+        return np.zeros((1, 2), state.dtype)
+
+
+class Wind(Drag):
+    """Resistance of a medium that moves: F = -(linear + quadratic |u|) u with u = v - velocity.
+
+    Args:
+        velocity: (x, y) of the medium, m/s, or a function of (x, y, t) that returns its two components there: x and y are
+            arrays in metres, t is in seconds, each component is an array as long or a number.
+        linear: N s/m.
+        quadratic: N s^2/m^2.
+    """
+
+    def __init__(self, velocity: Sequence[float] | Field, *, linear: float = 0.0, quadratic: float = 0.0) -> None:
+        super().__init__(linear=linear, quadratic=quadratic)
+        self.velocity: Field | tuple[float, float] = velocity if callable(velocity) else checks.vector("velocity", velocity)
+
+    def _wind(self, state: Slots, t: float) -> NDArray[Any]:
+        if not callable(self.velocity):
+            return np.array([self.velocity], state.dtype)
+        wind = np.empty((len(state), 2), state.dtype)
+        x, y = np.ascontiguousarray(state.position.T)
+        try:
+            wind[:, 0], wind[:, 1] = self.velocity(x, y, t)
+        except (TypeError, ValueError) as error:
+            raise InputError(
+                f"velocity of the wind is a function that fails ({error}); allowed is one of (x, y, t) that returns two "
+                f"components, each a number or an array of shape {x.shape}"
+            ) from error
+        return wind

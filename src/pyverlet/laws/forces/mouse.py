@@ -1,0 +1,72 @@
+"""What a mouse does to particles: hold one, or push some away."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.ground import checks
+from pyverlet.state.state import Slots
+
+
+class Grip:
+    """The mouse: a spring that pulls one particle to a target, F = m (s w^2 (target - x) - 2 w v); critically damped for s = 1.
+
+    Args:
+        particle: the user's index of the particle.
+        target: (x, y) in m; set it anew as the mouse moves.
+        frequency: w / (2 pi) in Hz; higher pulls harder.
+        strength: s, how much harder than for a particle alone: one that is linked to others moves them too.
+    """
+
+    velocity_dependent = True
+
+    def __init__(self, particle: int, *, target: Sequence[float], frequency: float = 5.0, strength: float = 1.0) -> None:
+        self.particle = checks.whole("particle", particle, least=0)
+        self.target = checks.vector("target", target)
+        self.frequency = checks.number("frequency", frequency, above=0.0)
+        self.strength = checks.number("strength", strength, above=0.0)
+
+    def apply(self, state: Slots, t: float) -> None:
+        if self.particle < 0:
+            return
+        slot = state.slot_of(self.particle)
+        mass = state.mass[slot]
+        if not np.isfinite(mass):
+            return
+        w = 2.0 * np.pi * self.frequency
+        reach = np.asarray(self.target, state.dtype) - state.position[slot]
+        pull = reach * (self.strength * w**2) - 2.0 * w * state.velocity[slot]
+        state.force[slot] += mass * pull
+
+    def renumber(self, now: NDArray[Any]) -> None:
+        """Particles were removed: hold the same one, or none if it is among them (`particle` is -1)."""
+        if self.particle >= 0:
+            self.particle = int(now[self.particle])
+
+
+class Push:
+    """A poke: everything nearer than `radius` is accelerated away from `center`, most at the centre and not at all at the rim.
+
+    Args:
+        center: (x, y), m; set it anew as the mouse moves.
+        radius: m.
+        acceleration: m/s^2 at the centre.
+    """
+
+    velocity_dependent = False
+
+    def __init__(self, *, center: Sequence[float], radius: float, acceleration: float) -> None:
+        self.center = checks.vector("center", center)
+        self.radius = checks.number("radius", radius, above=0.0)
+        self.acceleration = checks.number("acceleration", acceleration)
+
+    def apply(self, state: Slots, t: float) -> None:
+        offset = state.position - np.asarray(self.center, state.dtype)
+        distance = np.hypot(offset[:, 0], offset[:, 1])
+        near = np.flatnonzero((distance < self.radius) & (distance > 0) & np.isfinite(state.mass))
+        strength = self.acceleration * state.mass[near] * (1 / distance[near] - 1 / self.radius)
+        state.force[near] += strength[:, None] * offset[near]

@@ -1,0 +1,162 @@
+"""Where a world's energy has gone: `Ledger` holds the accounts, `Bookkeeper` keeps them while the world steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pyverlet.kernels import measure
+from pyverlet.laws.forces import Conservative, ForceSum
+from pyverlet.laws.links import Links
+from pyverlet.state.state import Slots
+
+
+@dataclass
+class Ledger:
+    """What has changed a world's energy since it was built, J: positive is gained, negative lost.
+
+    An empty world has none, so that the sum of all accounts is `world.energy().total`, to rounding. What moving obstacles bring
+    or take is under restitution and projection.
+
+    Attributes:
+        restitution: taken by impacts: (1 - e^2) of the energy along the normal. Contacts at rest are impacts with e = 0.
+        friction: taken by Coulomb friction.
+        drag: work of forces whose `account` is "drag".
+        forces: work of all other forces without a potential, such as a user's own and the mouse.
+        links: taken by links: damping, and what stiff ones do not give back.
+        projection: put in by moving overlapping circles apart, where contacts together gained more than they took in a frame.
+        outside: brought by what was done between frames: particles added, removed or written to, gravity changed.
+        residual: what is left over: the error of the integrator and, with forces that have no potential, of the trapezoidal rule
+            their work is summed by.
+    """
+
+    restitution: float = 0.0
+    friction: float = 0.0
+    drag: float = 0.0
+    forces: float = 0.0
+    links: float = 0.0
+    projection: float = 0.0
+    outside: float = 0.0
+    residual: float = 0.0
+
+    @property
+    def total(self) -> float:
+        """Sum of all accounts, J."""
+        return sum(self.as_dict().values())
+
+    def as_dict(self) -> dict[str, float]:
+        """Account by name."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class _Instant:
+    """Energy of the world, and power of its forces without potential by account, W."""
+
+    energy: float
+    power: dict[str, float]
+
+
+class Bookkeeper:
+    """Keeps a ledger: looks at the energy after each integration and after the contacts of each substep.
+
+    What the integration changes is the work of forces, the rest its error; what contacts change is told by their kernels, as far
+    as impacts and friction go, and the rest is restitution where it is a loss, projection where it is a gain.
+    """
+
+    def __init__(self) -> None:
+        self.ledger = Ledger()
+        self._energy = 0.0  # at the end of the last frame
+
+    def copy(self) -> Bookkeeper:
+        """Another one with the same accounts."""
+        other = Bookkeeper()
+        other.ledger, other._energy = replace(self.ledger), self._energy
+        return other
+
+    def frame(
+        self, state: Slots, forces: ForceSum, links: Links, t: float, h: float, lag: float, done: Callable[[str], None]
+    ) -> _Frame:
+        """The books of one frame, to be told of each stage; it passes on what it is told to `done`."""
+        return _Frame(self, state, forces, links, t, h, lag, done)
+
+
+class _Frame:
+    def __init__(
+        self, books: Bookkeeper, state: Slots, forces: ForceSum, links: Links, t: float, h: float, lag: float,
+        done: Callable[[str], None],
+    ) -> None:  # fmt: skip
+        self._books, self._state, self._forces, self._links, self._done = books, state, forces, links, done
+        self._t, self._h, self._lag = t, h, lag
+        self._open = replace(books.ledger)
+        self._contacts = 0.0
+        self._now = _Instant(0.0, {})
+
+    def __call__(self, stage: str) -> None:
+        self._done(stage)
+        if stage == "gather":
+            self._state.keep_account()
+            self._now = self._look(0.0)
+            self._open.outside += self._now.energy - self._books._energy
+        elif stage == "integrate":
+            self._t += self._h
+            before, self._now = self._now, self._look(self._lag)
+            gained = self._now.energy - before.energy
+            for account, power in self._now.power.items():
+                work = 0.5 * self._h * (before.power[account] + power)
+                setattr(self._open, account, getattr(self._open, account) + work)
+                gained -= work
+            self._open.residual += gained
+        elif stage == "links":
+            before, self._now = self._now, self._look(self._lag)
+            self._open.links += self._now.energy - before.energy
+        elif stage == "velocities" or (stage == "contacts" and self._links):
+            before, self._now = self._now, self._look(self._lag)
+            self._contacts += self._now.energy - before.energy
+        elif stage == "finish":
+            # Velocities as users see them: those of circles at rest without what carries their weight.
+            before, self._now = self._now, self._look(0.0)
+            self._contacts += self._now.energy - before.energy
+        else:
+            return
+        self._done("ledger")
+
+    def close(self, spent: tuple[float, float]) -> None:
+        """The frame has gone well; `spent` is what the kernels of contacts say that impacts and friction have taken, J."""
+        restitution, friction = spent
+        rest = self._contacts - restitution - friction
+        self._open.restitution += restitution + min(rest, 0.0)
+        self._open.friction += friction
+        self._open.projection += max(rest, 0.0)
+        self._books.ledger, self._books._energy = self._open, self._now.energy
+
+    def _look(self, lag: float) -> _Instant:
+        s, forces = self._state, self._forces
+        kept = [force for force in forces.forces if isinstance(force, Conservative)]
+        moving = (s.position, s.velocity, s.acceleration, lag, s.spin, s.radius, s.mass)
+        energy = measure.mechanical(*moving, *forces.gravity)
+        if kept or self._links:
+            state = s.in_users_order()
+            energy += sum(force.potential(state) for force in kept) + self._links.energy(state)
+        others = [force for force in forces.forces if not isinstance(force, Conservative)]
+        return _Instant(float(energy), self._power(others, lag) if others else {})
+
+    def _power(self, forces: list[Any], lag: float) -> dict[str, float]:
+        """Power by account, at velocities of the time of the positions."""
+        s = self._state
+        carried = s.velocity.copy()
+        if lag:
+            s.velocity += s.real(lag) * s.acceleration
+        power: dict[str, float] = {}
+        free = np.isfinite(s.mass)
+        for force in forces:
+            s.force[:] = 0
+            force.apply(s, self._t)
+            account = getattr(force, "account", "forces")
+            work = np.einsum("ij,ij", s.force[free].astype(np.float64), s.velocity[free].astype(np.float64))
+            power[account] = power.get(account, 0.0) + float(work)
+        s.velocity[:] = carried
+        return power

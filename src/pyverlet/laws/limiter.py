@@ -1,0 +1,196 @@
+"""Contacts and links give no energy: what a world has gained too much in a frame is taken back from those who have it.
+
+Pushing circles apart lifts them and throws them: in a crash that a substep sees as deep overlap, and where circles grow that were
+added on top of each other. So the energy at the end of a frame is compared with that at its start. What it has gained beyond
+SURPLUS of the world's scale is taken back, cluster by cluster, in proportion to what each has gained, never more than that. A
+cluster is what hangs together by contacts in this frame, and by links. In this order:
+
+1. The velocities within the cluster, beside those with which it moves and turns as a whole: that keeps its momentum and its
+   angular momentum. Kinetic energy goes with the square, so all are multiplied by sqrt(1 - taken / energy).
+2. The velocities and spins of all in it: it was not alone, for nothing thrusts itself off nothing.
+3. What circles have been raised in this frame: they are lowered by a part of that, and have grown by that part less. Not those
+   that a wall has raised because they were beyond it: it would do so again.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.ground.constants import ONE_THREAD_BELOW, SLEEP_NEAR, STANDARD_GRAVITY, SURPLUS
+from pyverlet.kernels import clusters, measure
+from pyverlet.laws.forces import Conservative, Drag, ForceSum
+from pyverlet.laws.links import Links
+from pyverlet.laws.rooms import Boundary
+from pyverlet.state.state import Slots, State
+
+Array = NDArray[Any]
+Listed = tuple[Array, Array, Array, Array]
+Extent = tuple[float, float, float, float]
+
+_INSIDE = 0.99
+"""Of its radius: a circle was inside the room if the point so far below its centre was, the way gravity points."""
+
+
+class Watch:
+    """Looks after the energy of one frame. `start`: the user's arrays, which stay as they are until the frame is accepted."""
+
+    def __init__(self, start: State, forces: ForceSum, links: Links, room: Boundary) -> None:
+        self._start, self._forces, self._links, self._room = start, forces, links, room
+        self._gravity = forces.gravity
+        self._plain = len(start) < ONE_THREAD_BELOW and not (forces.forces or links)
+        self._energy = 0.0 if self._plain else self._look(start)  # what links hold is not known any more when the frame is over
+
+    def _look(self, now: State | Slots) -> float:
+        """Energy of all, J."""
+        moving, body = (now.position, now.velocity, now.velocity, 0.0), (now.spin, now.radius, now.mass)
+        energy: float = measure.mechanical(*moving, *body, *self._forces.gravity)
+        if self._forces.forces or self._links:
+            state = now.in_users_order() if isinstance(now, Slots) else now
+            kept = (force for force in self._forces.forces if isinstance(force, Conservative))
+            energy += sum(force.potential(state) for force in kept) + self._links.energy(state)
+        return energy
+
+    def _gained(self, now: Slots) -> float:
+        """What `_look` finds now more than at the start, which is still there: in one call, without forces and links."""
+        then, motion = self._start, (now.position, now.velocity, now.spin, now.radius, now.mass)
+        start = (then.position, then.velocity, then.spin, then.radius, then.mass)
+        return float(measure.gained(*start, *motion, *self._gravity))
+
+    def close(self, slots: Slots, listed: Listed) -> float:
+        """The frame is over: take back what has been gained too much.
+
+        listed: first, count, pair_i, pair_j of the pairs that may touch.
+
+        Returns what had been gained, as a part of what is allowed.
+        """
+        if self._forces.gravity != self._gravity:  # it has turned on the way, and drove the world
+            return 0.0
+        gained = self._gained(slots) if self._plain else self._look(slots) - self._energy
+        room = SURPLUS * fall(slots.total_mass, self._forces.gravity, self._room.extent())
+        if room < gained < np.inf:
+            surplus = gained - max(room, SURPLUS * self._kinetic().sum())
+            if surplus > 0.0:
+                self.take_back(slots, listed, surplus)
+        return gained / room if room > 0.0 else 0.0
+
+    def _kinetic(self) -> Array:
+        """(n,) J, at the start of the frame, in the user's order."""
+        then = self._start
+        mass = np.where(np.isfinite(then.mass), then.mass, 0).astype(float)
+        return _kinetic(mass, then.velocity.astype(float), then.radius, then.spin)
+
+    def take_back(self, slots: Slots, listed: Listed, surplus: float) -> None:
+        """Take so many J from those who have gained in this frame."""
+        g, start, order = np.array(self._forces.gravity), self._start, slots.particle
+        mass = np.where(slots.inverse_mass > 0, slots.mass, 0).astype(float)
+        x, v = slots.position.astype(float), slots.velocity.astype(float)
+        moved = x - start.position[order]
+        lift = -mass * (moved @ g)
+        cluster = self._clusters(slots, listed, moved)
+        add = _Sums(cluster)
+        gain = np.maximum(add(_kinetic(mass, v, slots.radius, slots.spin) - self._kinetic()[order] + lift), 0)
+        if self._forces.forces:  # what has touched nobody has its gain from a force
+            gain *= (add(np.ones(len(slots))) > 1) | (add(slots.hits >= 0) > 0)
+        # Energy that forces and links hold may be more than they ever give: it is not answered alone.
+        left = gain * min(surplus / max(gain.sum(), 1e-300), 2.0)
+        taken_from = (left > 0)[cluster] & (mass > 0)
+        # 1. Within the cluster.
+        whole = _as_a_whole(mass, x, v, add)
+        within = add(0.5 * mass * ((v - whole) ** 2).sum(axis=1))
+        v = whole + _slowed(left, within)[cluster, None] * (v - whole)
+        left = np.maximum(left - within, 0)
+        # 2. As a whole.
+        kinetic = add(_kinetic(mass, v, slots.radius, slots.spin))
+        slower = _slowed(left, kinetic)[cluster]
+        left = np.maximum(left - kinetic, 0)
+        slots.velocity[taken_from] = (slower[:, None] * v)[taken_from]
+        slots.spin *= slower.astype(slots.dtype)
+        # 3. What has been raised.
+        lift = np.where((slots.hits < 0) | self._was_inside()[order], np.maximum(lift, 0), 0)
+        part = np.minimum(_ratio(left, add(lift)), 1)[cluster]
+        slots.position += ((part * _ratio(lift, mass * (g @ g)))[:, None] * g).astype(slots.dtype)
+        if slots.size is not slots.radius:
+            slots.grown -= (part * (slots.grown - start.grown[order])).astype(slots.dtype)
+            slots.resize()
+
+    def _was_inside(self) -> Array:
+        """(n,) bool, who was above the wall when the frame began, in the user's order."""
+        g, start = np.array(self._forces.gravity), self._start
+        down = g / max(float(np.hypot(*g)), 1e-300)
+        return ~self._room.outside(start.position.astype(float) + _INSIDE * start.radius[:, None] * down)
+
+    def _clusters(self, slots: Slots, listed: Listed, moved: Array) -> Array:
+        """(n,) lowest slot of the cluster that each slot belongs to."""
+        root = np.arange(len(slots))
+        bodies = (slots.position, moved.astype(slots.dtype), slots.size, slots.inverse_mass)
+        clusters.join_met(*bodies, *listed, slots.real(SLEEP_NEAR), root)
+        if self._links:
+            rows, _ = self._links.pulls()
+            clusters.join_rows(slots.slots_of(rows.ravel()).reshape(-1, 2).astype(np.int64), slots.inverse_mass, root)
+        clusters.settle(root)
+        return root
+
+
+class _Sums:
+    """Sums over the members of each cluster, in the order of the slots, so that they never depend on threads."""
+
+    def __init__(self, cluster: Array) -> None:
+        self.cluster = cluster
+
+    def __call__(self, values: Array) -> Array:
+        return np.bincount(self.cluster, values, len(self.cluster))
+
+
+def fall(mass: float, gravity: tuple[float, float], extent: Extent | None) -> float:
+    """What a fall through the room would give, m g H, J; without walls H is a fall of a second, g t^2 / 2.
+
+    Without gravity g is 9.81 m/s^2 all the same: circles that start at rest on top of each other have no other scale.
+    """
+    gx, gy = gravity if any(gravity) else STANDARD_GRAVITY
+    if extent is None:
+        return mass * 0.5 * (gx * gx + gy * gy)
+    return mass * (abs(gx) * (extent[2] - extent[0]) + abs(gy) * (extent[3] - extent[1]))
+
+
+def undriven(world: Any, h: float, h_last: float | None) -> bool:
+    """Whether nothing but contacts and links could raise the energy of a world.
+
+    Forces have a potential or are drag, no obstacle moves, and the integrator does not raise it either: of order 2 or more, and
+    with a constant step, which `PositionVerlet` needs.
+    """
+    if world.integrator.order < 2 or h_last not in (None, h):
+        return False
+    if world.forces and not all(isinstance(force, Conservative | Drag) for force in world.forces):
+        return False
+    return not world.obstacles or not any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
+
+
+def _ratio(a: Array, b: Array) -> Array:
+    """a / b, and 0 where b is."""
+    return np.divide(a, b, out=np.zeros_like(a), where=b > 0)
+
+
+def _slowed(taken: Array, energy: Array) -> Array:
+    """What velocities are multiplied with to lose so much of their energy, or all."""
+    return np.asarray(np.sqrt(1 - np.minimum(_ratio(taken, energy), 1)))
+
+
+def _kinetic(mass: Array, velocity: Array, radius: Array, spin: Array) -> Array:
+    rim = radius.astype(float) * spin
+    return np.asarray(0.5 * mass * (velocity * velocity).sum(axis=1) + 0.25 * mass * rim * rim)
+
+
+def _as_a_whole(mass: Array, x: Array, v: Array, add: _Sums) -> Array:
+    """(n, 2) velocities, m/s, of the rigid motion of each cluster that has its momentum and its angular momentum."""
+
+    def mean(rows: Array) -> Array:
+        return np.column_stack([_ratio(add(mass * column), total) for column in rows.T])[add.cluster]
+
+    total = add(mass)
+    r, drift = x - mean(x), mean(v)
+    u = v - drift
+    turn = _ratio(add(mass * (r[:, 0] * u[:, 1] - r[:, 1] * u[:, 0])), add(mass * (r * r).sum(axis=1)))[add.cluster]
+    return np.asarray(drift + turn[:, None] * np.column_stack((-r[:, 1], r[:, 0])))

@@ -1,0 +1,71 @@
+"""Links between two particles that look at nothing but their distance: one family, so that mixed chains are solved at once."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pyverlet.ground.errors import InputError
+from pyverlet.kernels import shapes
+from pyverlet.laws.links._ends import parse
+from pyverlet.laws.links._link import Floats, Link, several, stiffness_of
+from pyverlet.laws.links._pool import Pool
+from pyverlet.laws.links._rows import ChainPool
+
+
+class Distance(Link):
+    """What sticks, ropes and springs share. See there for the arguments."""
+
+    _UPPER: ClassVar[float] = np.inf  # largest push; 0 for what only pulls
+
+    def __init__(
+        self,
+        ends: tuple[Any, ...],
+        *,
+        length: ArrayLike | None,
+        stiffness: ArrayLike | None = None,
+        compliance: ArrayLike | None = None,
+        damping: ArrayLike,
+        breaking_force: ArrayLike,
+        collide: bool,
+    ) -> None:
+        kind = type(self).__name__
+        state, particles = parse(kind, ends, ("i", "j"))
+        super().__init__(state, particles)
+        count = len(particles)
+        if length is None:
+            a, b = state.position[particles[:, 0]].astype(np.float64), state.position[particles[:, 1]].astype(np.float64)
+            self._length: Floats = np.hypot(*(b - a).T)
+        else:
+            self._length = several(kind, "length", length, count)
+        self._stiffness = stiffness_of(kind, count, stiffness, compliance)
+        self._damping = several(kind, "damping", damping, count)
+        self._strength = several(kind, "breaking_force", breaking_force, count, above=0.0, infinite=True)
+        if not isinstance(collide, bool | np.bool_):
+            raise InputError(f"{kind}: collide is {collide!r}; allowed are True and False")
+        self._collide = bool(collide)
+
+    @property
+    def length(self) -> Floats:
+        """(k,) m; assign one number or (k,) to change it while the world runs."""
+        return self._length.copy()
+
+    @length.setter
+    def length(self, value: ArrayLike) -> None:
+        self._length = several(type(self).__name__, "length", value, len(self))
+        self._change("rest", self._length)
+
+    @property
+    def _family(self) -> Any:
+        return shapes.distance
+
+    def _new_pool(self) -> Pool:
+        return ChainPool(shapes.distance, turn=0)
+
+    def _columns(self) -> dict[str, Any]:
+        return {
+            "rest": self._length, "stiffness": self._stiffness, "damping": self._damping, "upper": self._UPPER,
+            "strength": self._strength, "collide": self._collide,
+        }  # fmt: skip

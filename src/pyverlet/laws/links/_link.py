@@ -1,0 +1,107 @@
+"""What all links share. A new type is a class like `Stick` or `Angle`: what it joins, what it measures, how it is drawn."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
+from pyverlet.state.state import State
+
+if TYPE_CHECKING:
+    from pyverlet.laws.links._pool import Pool
+
+Array = NDArray[Any]
+Floats = NDArray[np.float64]
+
+
+class Link(ABC):
+    """One or more links of a kind, added to a world by `world.links.append`.
+
+    Attributes:
+        particles: (k, p) indices, among all of the world's particles, of what each of the k links joins.
+    """
+
+    def __init__(self, state: State, particles: NDArray[np.int64]) -> None:
+        self._state = state
+        self.particles = particles
+        self._pool: Pool | None = None  # where its numbers are once it is in a world
+        self._id = -1
+        self._number = state.number[particles]  # indices change when others are removed, numbers never do
+        self._where = slice(0, len(particles))
+
+    def __len__(self) -> int:
+        return len(self.particles)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__} x {len(self)}"
+
+    @abstractmethod
+    def _new_pool(self) -> Pool:
+        """An empty pool for links of this family."""
+
+    @property
+    @abstractmethod
+    def _family(self) -> Any:
+        """Links of one family, any hashable value, share a pool."""
+
+    @abstractmethod
+    def _columns(self) -> dict[str, Any]:
+        """What the pool takes for these links."""
+
+    def _find(self) -> None:
+        """Bring the indices up to date before they go into a world.
+
+        Raises:
+            InputError: one of the particles has been removed.
+        """
+        known = self._state.number
+        where = np.searchsorted(known, self._number)
+        gone = where >= len(known)
+        gone |= known[np.where(gone, 0, where)] != self._number if len(known) else True
+        if gone.any():
+            row = int(np.flatnonzero(gone.any(axis=1))[0])
+            raise InputError(f"{self!r} joins, in its row {row}, a particle that was removed; allowed are those of the world")
+        self.particles = where
+
+    def _change(self, column: str, value: Any) -> None:
+        """Write a column of the pool, if these are in a world."""
+        if self._pool is not None:
+            self._pool.rows[column][self._where] = value
+            self._pool.changed = True
+
+    @property
+    def force(self) -> Floats:
+        """(k,) what each pulls with, N (N m for an angle, N/m for an area), averaged over 1/120 s; negative: it pushes."""
+        return np.zeros(len(self)) if self._pool is None else self._pool.rows["force"][self._where].copy()
+
+    @property
+    def intact(self) -> NDArray[np.bool_]:
+        """(k,) False where a link has broken."""
+        return np.ones(len(self), bool) if self._pool is None else self._pool.rows["intact"][self._where].astype(bool)
+
+
+def several(kind: str, name: str, value: ArrayLike, count: int, *, above: float | None = None, infinite: bool = False) -> Floats:
+    """(count,) floats from one for all or one each; at least 0, or greater than `above`; infinite only if said."""
+    array: Floats = np.array(checks.column(f"{kind}: {name}", value, np.dtype(np.float64), count))
+    wrong = ~((array >= 0.0) if above is None else (array > above))
+    if not infinite:
+        wrong |= np.isinf(array)
+    if wrong.any():
+        row = int(np.flatnonzero(wrong)[0])
+        where = f"{name}[{row}]" if np.ndim(value) else name
+        limit = "of at least 0" if above is None else f"greater than {above:g}"
+        raise InputError(f"{kind}: {where} is {array[row]:g}; allowed is a {'' if infinite else 'finite '}number {limit}")
+    return array
+
+
+def stiffness_of(kind: str, count: int, stiffness: ArrayLike | None, compliance: ArrayLike | None) -> Floats:
+    """(count,) stiffness, from that or from its inverse; infinite where a compliance is 0."""
+    if compliance is None:
+        return several(kind, "stiffness", 0.0 if stiffness is None else stiffness, count)
+    with np.errstate(divide="ignore"):
+        return np.asarray(1.0 / several(kind, "compliance", compliance, count))

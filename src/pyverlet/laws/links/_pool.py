@@ -1,0 +1,106 @@
+"""Where the numbers of links live: one pool for each family, in the order they were added, and packed for the solver."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+
+from pyverlet.laws.links._link import Array
+from pyverlet.laws.links._table import Table
+from pyverlet.laws.links._work import Work
+
+MOVING = ("intact", "force", "last")
+"""Columns that a frame changes."""
+
+
+class Pool(ABC):
+    """The links of one family. The tables hold the truth between frames, as `State` does for particles.
+
+    Attributes:
+        rows: a row for each link, in the order added.
+        entries: `particle`, the user's indices of the particles, row after row.
+        turn: pools are solved in this order and then back; who comes first holds best.
+        drawn: whether its rows are lines between their particles.
+        stale: rows have come or gone since `pack`.
+        changed: numbers of rows have changed since `begin`.
+        colours: how many parts are solved one after the other, once packed.
+    """
+
+    drawn = True
+
+    def __init__(self, turn: int, **columns: Any) -> None:
+        self.turn = turn
+        self.rows = Table(
+            owner=np.int64, arity=np.int64, stiffness=np.float64, damping=np.float64, strength=np.float64, intact=np.uint8,
+            collide=np.uint8, force=np.float64, last=np.float64, **columns,
+        )  # fmt: skip
+        self.entries = Table(particle=np.int64)
+        self.colours = 0
+        self.stale = self.changed = True
+
+    def append(self, owner: int, particles: Array, columns: dict[str, Any]) -> slice:
+        """Add a row for each of the (k, p) particles, given in the user's indices."""
+        self.stale = True
+        count, arity = particles.shape
+        self.entries.append(particles.size, particle=particles.ravel())
+        return self.rows.append(count, owner=owner, arity=arity, intact=1, force=0.0, last=0.0, **columns)
+
+    def keep(self, mask: Array) -> None:
+        """Remove all other rows."""
+        self.stale = True
+        self.entries.keep(np.repeat(mask, self.rows["arity"]))
+        self.rows.keep(mask)
+
+    @property
+    def first(self) -> Array:
+        """(k + 1,) where the entries of each row begin."""
+        return np.concatenate((np.zeros(1, np.int64), np.cumsum(self.rows["arity"])))
+
+    @abstractmethod
+    def pack(self, work: Work) -> None:
+        """Rows have come or gone, or `work` is new: make the solver's copy."""
+
+    @abstractmethod
+    def begin(self) -> None:
+        """A frame begins: take up who is intact."""
+
+    @abstractmethod
+    def before(self, work: Work, h: float) -> None:
+        """Before the integrator moves: look at the start of the substep."""
+
+    def tie(self, work: Work, h: float) -> None:
+        """After the integrator, before any pool is solved: what concerns single particles."""
+
+    def ahead(self, work: Work) -> None:
+        """Then: move the particles as far as the pull of the substep before is a good guess."""
+
+    @abstractmethod
+    def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
+        """Solve one colour after the other, or back from the last; without the first on the way if `skip`."""
+
+    @abstractmethod
+    def snap(self, work: Work, h: float) -> Array:
+        """After the passes: what does each pull with? Break those beyond their strength; returns which rows did."""
+
+    @abstractmethod
+    def pulled(self) -> Array:
+        """(k,) what each row pulled with in this substep, N."""
+
+    def lines(self) -> tuple[Array, Array]:
+        """(m, 2) the particles that follow each other in rows that are intact, and (m,) which row that is."""
+        first, particle = self.first, self.entries["particle"]
+        row = np.repeat(np.arange(len(self.rows)), self.rows["arity"])
+        follows = np.repeat(self.rows["intact"] != 0, self.rows["arity"])
+        follows[first[1:] - 1] = False
+        inner = np.flatnonzero(follows)
+        return np.column_stack((particle[inner], particle[inner + 1])), row[inner]
+
+    @abstractmethod
+    def end(self) -> None:
+        """The frame is good: write force and who is intact into the table."""
+
+    @abstractmethod
+    def energy(self, position: Array) -> float:
+        """Energy stored in soft links at (n, 2) positions in the user's order, J."""

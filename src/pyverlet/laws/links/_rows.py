@@ -1,0 +1,159 @@
+"""Links that are one equation each: one function measures them, a common solver solves them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from pyverlet.ground.constants import LINK_COLOURS
+from pyverlet.kernels import chains, links, runs
+from pyverlet.laws.links._link import Array
+from pyverlet.laws.links._pool import MOVING, Pool
+from pyverlet.laws.links._work import Work
+
+Measure = Callable[..., None]
+"""A function of kernels.shapes, or one of its form."""
+
+_GIVEN = ("rest", "stiffness", "damping", "upper", "strength")
+_SCRATCH = ("value", "start", "earlier", "bend", "give", "offset", "turn", "bow", "lam")
+
+
+class RowPool(Pool):
+    """A row for each link, coloured: those of one colour share no particle and are solved beside each other.
+
+    Args:
+        measure: value and gradient of the rows.
+        turn: as in Pool.
+        drawn: as in Pool.
+    """
+
+    def __init__(self, measure: Measure, turn: int, *, drawn: bool = True) -> None:
+        super().__init__(turn, rest=np.float64, upper=np.float64)
+        self.measure = measure
+        self.drawn = drawn
+
+    def _find_runs(self, first: Array, entry: Array, particles: int) -> Array:
+        """(k,) which rows are solved together: here each for itself. Rows of a run follow each other."""
+        return np.arange(len(self.rows))
+
+    def pack(self, work: Work) -> None:
+        """By colour, and within a colour in the order added: `_run` and `_colour` say where runs and colours begin."""
+        count, first, entry = len(self.rows), self.first, work.compact[self.entries["particle"]]
+        run_of, colour = self._find_runs(first, entry, len(work)), np.zeros(count, np.int64)
+        runs.colour_runs(first, entry, run_of, len(work), LINK_COLOURS, colour)
+        self._order = np.argsort(colour[run_of], kind="stable")
+        arity = self.rows["arity"][self._order]
+        self._first = np.concatenate((np.zeros(1, np.int64), np.cumsum(arity)))
+        within = np.arange(len(entry)) - np.repeat(self._first[:-1], arity)
+        self._particle = entry[np.repeat(first[self._order], arity) + within]
+        starts = np.flatnonzero(np.diff(run_of[self._order], prepend=-1))
+        self._run = np.append(starts, count)
+        self._colour = np.searchsorted(colour[run_of[self._order[starts]]], np.arange(LINK_COLOURS + 1))
+        self.parts = list(self._together())
+        self.colours = int(np.count_nonzero(np.diff(self._colour)))
+        self._row: dict[str, Array] = {name: np.zeros(count) for name in _SCRATCH}
+        self._gradient, self._along = np.zeros((2, len(entry), 2))
+        self.stale, self.changed = False, True
+
+    def begin(self) -> None:
+        row = self._row
+        if self.changed:
+            self.changed = False
+            row |= {name: self.rows[name][self._order] for name in _GIVEN}
+            self._soft = bool(np.isfinite(row["stiffness"]).any())
+            self._brittle = bool(np.isfinite(row["strength"]).any())
+        row |= {name: self.rows[name][self._order] for name in MOVING}
+
+    def before(self, work: Work, h: float) -> None:
+        row, which = self._row, (self._first, self._particle, self._row["rest"], 0, len(self._order))
+        if self._soft:
+            self.measure(work.earlier, *which, row["earlier"], self._gradient, row["bend"])
+        self.measure(work.start, *which, row["start"], self._along, row["bend"])
+        links.prepare(
+            self._first, self._particle, work.weight, row["stiffness"], row["damping"], row["upper"], h, row["start"],
+            row["earlier"], self._along, row["bend"], row["force"], row["last"], row["give"],
+            row["offset"], row["turn"], row["bow"], row["lam"],
+        )  # fmt: skip
+
+    def ahead(self, work: Work) -> None:
+        if not self._soft:
+            return
+        which = (self._first, self._particle, work.weight, self._row["intact"], self._along, self._row["lam"])
+        for a, b in self.parts:
+            links.begin_rows(int(self._run[a]), int(self._run[b]), work.position, *which)
+
+    def _together(self) -> Iterator[tuple[int, int]]:
+        """Runs a to b that may be solved beside each other; those of the last colour may share particles and stand alone."""
+        for colour, begin in enumerate(map(int, self._colour[:-1])):
+            end = int(self._colour[colour + 1])
+            if begin == end:
+                return
+            if colour < LINK_COLOURS - 1:
+                yield begin, end
+            else:
+                yield from zip(range(begin, end), range(begin + 1, end + 1), strict=True)
+
+    def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
+        row = self._row
+        parts = self.parts[::-1] if back else self.parts
+        for a, b in parts[1:] if skip else parts:
+            begin, end = int(self._run[a]), int(self._run[b])
+            which = (self._first, self._particle, row["rest"], begin, end)
+            self.measure(work.position, *which, row["value"], self._gradient, row["bend"])
+            links.solve_rows(
+                begin, end, work.position, self._first, self._particle, work.weight, row["upper"], row["intact"], row["value"],
+                self._gradient, self._along, row["turn"], row["give"], row["offset"], row["lam"],
+            )  # fmt: skip
+
+    def snap(self, work: Work, h: float) -> Array:
+        row = self._row
+        links.note_force(row["force"], row["last"], row["lam"], h)
+        if not self._brittle:
+            return np.empty(0, np.int64)
+        before = row["intact"].copy()
+        links.snap(row["force"], row["strength"], row["intact"])
+        return np.sort(self._order[before != row["intact"]])
+
+    def pulled(self) -> Array:
+        result = np.empty_like(self._row["force"])
+        result[self._order] = self._row["force"]
+        return result
+
+    def end(self) -> None:
+        for name in MOVING:
+            self.rows[name][self._order] = np.where(self._row["intact"], self._row[name], 0)
+
+    def energy(self, position: Array) -> float:
+        rows, first, particle = self.rows, self.first, self.entries["particle"]
+        value, bend, gradient = np.empty(len(rows)), np.empty(len(rows)), np.empty((len(particle), 2))
+        self.measure(position, first, particle, rows["rest"], 0, len(rows), value, gradient, bend)
+        soft = np.isfinite(rows["stiffness"]) & (rows["intact"] != 0)
+        pulled = soft & ~((rows["upper"] <= 0.0) & (value < 0.0))
+        return 0.5 * float(np.sum(rows["stiffness"][pulled] * value[pulled] ** 2))
+
+
+class ChainPool(RowPool):
+    """Links of two particles' distance: those that follow each other are solved at once, as kernels.chains does."""
+
+    def _find_runs(self, first: Array, entry: Array, particles: int) -> Array:
+        run_of = np.empty(len(self.rows), np.int64)
+        runs.find_runs(first, entry, self.rows["intact"], particles, run_of)
+        return run_of
+
+    def pack(self, work: Work) -> None:
+        super().pack(work)
+        count = len(self.rows)
+        nodes = count + len(self._run)
+        self._active, self._inverse = np.zeros(count, np.uint8), np.zeros((nodes, 4))
+        self._carried, self._move = np.zeros((2, nodes, 2))
+        self._right, self._step = np.zeros((2, count))
+
+    def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
+        row = self._row
+        chains.sweep(
+            back, skip, self._colour[: self.colours + 1], self._run, work.position, self._first, self._particle, work.weight,
+            row["rest"], row["upper"], row["intact"], row["value"], self._gradient, self._along, row["turn"], row["bend"],
+            row["bow"], row["give"], row["offset"], self._active, self._right, self._inverse, self._carried, self._move,
+            self._step, row["lam"],
+        )  # fmt: skip

@@ -1,0 +1,289 @@
+"""The links of a world: a list for the user, the stages of a substep for the engine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.compile import jit
+from pyverlet.ground import checks
+from pyverlet.ground.constants import LINKS_ONE_THREAD_BELOW
+from pyverlet.ground.errors import InputError
+from pyverlet.kernels import links as kernels
+from pyverlet.kernels import runs
+from pyverlet.laws.contacts.broadphase import PairList
+from pyverlet.laws.links._link import Array, Link
+from pyverlet.laws.links._pool import Pool
+from pyverlet.laws.links._work import Work
+from pyverlet.state.state import Slots, State
+
+AnyLink = TypeVar("AnyLink", bound=Link)
+
+BROKEN = np.dtype([("link", np.int64), ("row", np.int64), ("i", np.int64), ("j", np.int64), ("force", np.float64)])
+"""Number of the link in `world.links`, row of it, its first and last particle, and what it pulled with when it broke, N."""
+
+
+class Links:
+    """Sticks, ropes, springs, pins and so on, in the order they were appended: `world.links`.
+
+    Attributes:
+        broken: a structured array of BROKEN, the links that broke in the last frame.
+    """
+
+    def __init__(self, state: State) -> None:
+        self._state = state
+        self._links: list[Link] = []
+        self._pools: dict[Any, Pool] = {}
+        self._order: list[Pool] = []
+        self._next_owner = 0
+        self._few = True
+        self._work = Work(np.empty(0, np.int64), 0)
+        self._iterations = 1
+        self._apart, self._apart_stale = np.empty((0, 2), np.int64), False
+        self._partners = np.zeros(1, np.int64), np.empty(0, np.int64)
+        self._apart_changed = False
+        self._broken = self.broken = np.empty(0, BROKEN)
+
+    # ---- a list --------------------------------------------------------------------------------------------------------
+
+    def append(self, link: AnyLink) -> AnyLink:
+        """Add a link, or the many that one object holds; returns it.
+
+        Raises:
+            InputError: it is no link, is in a world already, or joins particles of another world.
+        """
+        if not isinstance(link, Link):
+            raise InputError(f"link is {link!r}; allowed is an object such as pyverlet.Stick(group, 0, 1)")
+        if link._state is not self._state:
+            raise InputError(f"{link!r} joins particles of another world; allowed are links between this world's particles")
+        if link._pool is not None:
+            raise InputError(f"{link!r} is in a world already; allowed is a new one")
+        link._find()
+        family = link._family
+        if family not in self._pools:
+            self._pools[family] = link._new_pool()
+            self._order = sorted(self._pools.values(), key=lambda pool: pool.turn)
+        link._pool = self._pools[family]
+        link._id = self._next_owner
+        link._where = link._pool.append(link._id, link.particles, link._columns())
+        self._next_owner += 1
+        self._apart_stale = True
+        self._links.append(link)
+        return link
+
+    def extend(self, links: Iterable[Link]) -> None:
+        """Append each of them."""
+        for link in links:
+            self.append(link)
+
+    def remove(self, link: Link) -> None:
+        """Take a link out.
+
+        Raises:
+            InputError: it is not in this world.
+        """
+        if link._pool is None or link not in self._links:
+            raise InputError(f"{link!r} is not among this world's links; allowed is one that was appended")
+        pool = link._pool
+        pool.keep(pool.rows["owner"] != link._id)
+        self._links.remove(link)
+        link._pool = None
+        self._find_rows(pool)
+
+    def __len__(self) -> int:
+        return len(self._links)
+
+    def __iter__(self) -> Iterator[Link]:
+        return iter(self._links)
+
+    def __getitem__(self, number: int) -> Link:
+        return self._links[number]
+
+    def _find_rows(self, pool: Pool) -> None:
+        """Rows have gone: tell those that stay where theirs are now. Owners stand in the order appended."""
+        self._apart_stale = True
+        owner = pool.rows["owner"]
+        for link in self._links:
+            if link._pool is pool:
+                link._where = slice(*map(int, np.searchsorted(owner, (link._id, link._id + 1))))
+
+    def renumber(self, new: NDArray[np.int64]) -> None:
+        """Particles have been removed: new[i] is what the user's index i is now, -1 if it is gone, and its links with it."""
+        for pool in self._order:
+            particle = new[pool.entries["particle"]]
+            pool.entries["particle"][:] = particle
+            pool.keep(np.minimum.reduceat(particle, pool.first[:-1]) >= 0 if len(particle) else np.zeros(0, bool))
+            self._find_rows(pool)
+        for link in self._links:
+            moved = new[link.particles]
+            link.particles = moved[(moved >= 0).all(axis=1)]
+        self._links = [link for link in self._links if len(link)]
+
+    @property
+    def iterations(self) -> int:
+        """Passes over all links in a substep, there and back; 1 unless set. Chains that share no particle are exact in one."""
+        return self._iterations
+
+    @iterations.setter
+    def iterations(self, value: int) -> None:
+        self._iterations = checks.whole("iterations", value)
+
+    # ---- a frame -------------------------------------------------------------------------------------------------------
+
+    def begin(self) -> bool:
+        """A frame begins. True if other pairs than before are no contacts (`unlist`)."""
+        if not self._order:
+            return False
+        if any(pool.stale for pool in self._order) or len(self._work.compact) != len(self._state):
+            linked = np.zeros(len(self._state), bool)
+            for pool in self._order:
+                linked[pool.entries["particle"]] = True
+            self._work = Work(np.flatnonzero(linked), len(self._state))
+            for pool in self._order:
+                pool.pack(self._work)
+            self._few = len(self._work) < LINKS_ONE_THREAD_BELOW
+        for pool in self._order:
+            pool.begin()
+        self._broken = np.empty(0, BROKEN)
+        self._know_apart()
+        changed, self._apart_changed = self._apart_changed, False
+        return changed
+
+    def _know_apart(self) -> None:
+        """Bring the pairs that are no contacts up to date, and note if they are others than before."""
+        if not self._apart_stale and (not self._links or len(self._partners[0]) == len(self._state) + 1):
+            return
+        before, self._apart, self._apart_stale = self._apart, self.apart(), False
+        both = np.concatenate((self._apart, self._apart[:, ::-1]))
+        both = both[np.argsort(both[:, 0], kind="stable")]
+        self._partners = np.searchsorted(both[:, 0], np.arange(len(self._state) + 1)), both[:, 1].copy()
+        self._apart_changed |= not np.array_equal(before, self._apart)
+
+    def known_apart(self) -> Array:
+        """As `apart`; the same object as long as nothing has changed."""
+        self._know_apart()
+        return self._apart
+
+    def unlist(self, pairs: PairList, particle: Array) -> None:
+        """Take the pairs of `apart` from a list of candidates; particle: the user's index in each slot."""
+        self._know_apart()
+        if len(self._apart):
+            runs.drop_pairs(pairs.first, pairs.count, pairs.pair_i, pairs.pair_j, particle, *self._partners)
+
+    def before(self, state: Slots, h: float) -> None:
+        """Before the integrator: remember where the substep starts."""
+        with jit.one_thread(self._few):
+            self._work.look(state, h)
+            for pool in self._order:
+                pool.before(self._work, h)
+
+    def solve(self, state: Slots, h: float) -> None:
+        """Move the linked particles to where their links allow, and break those that pull too hard."""
+        with jit.one_thread(self._few):
+            self._solve(state, h)
+
+    def _solve(self, state: Slots, h: float) -> None:
+        work = self._work
+        work.take(state)
+        for pool in self._order:
+            pool.tie(work, h)
+        for pool in self._order:
+            pool.ahead(work)
+        # There and back: one way only, the links about a common particle throw it in a circle, faster and faster.
+        pools = [pool for pool in self._order if pool.colours]
+        several = sum(pool.colours for pool in pools) > 1
+        for _ in range(self._iterations if several else 1):
+            for pool in pools:
+                pool.sweep(work, back=False, skip=False)
+            for pool in reversed(pools) if several else ():
+                pool.sweep(work, back=True, skip=pool is pools[-1])  # its last colour has just been solved
+        for pool in self._order:
+            snapped = pool.snap(work, h)
+            if len(snapped):
+                self._broken = np.concatenate((self._broken, self._note(pool, snapped)))
+        work.give(state, h)
+
+    def after(self, state: Slots) -> None:
+        """After the contacts: what the links did is part of the acceleration, for integrators that remember it."""
+        with jit.one_thread(self._few):
+            kernels.add_rows(state.acceleration, self._work.slots(state), self._work.pull)
+
+    def scatter(self) -> None:
+        """The frame is good: what it did to the links holds."""
+        for pool in self._order:
+            pool.end()
+        self.broken = self._broken
+        self._apart_stale |= bool(len(self.broken))
+
+    def _note(self, pool: Pool, snapped: Array) -> Array:
+        """The BROKEN entries of these rows of a pool."""
+        note = np.empty(len(snapped), BROKEN)
+        number = {link._id: k for k, link in enumerate(self._links)}
+        for k, row in enumerate(snapped):
+            link = self._links[number[int(pool.rows["owner"][row])]]
+            within = int(row) - link._where.start
+            note[k] = (number[link._id], within, link.particles[within, 0], link.particles[within, -1], pool.pulled()[row])
+        return note
+
+    # ---- to look at ----------------------------------------------------------------------------------------------------
+
+    def energy(self, state: State | None = None) -> float:
+        """Energy stored in links that give, J, of the world's state or of another of the same particles."""
+        position = (self._state if state is None else state).position.astype(np.float64)
+        return sum(pool.energy(position) for pool in self._order)
+
+    def segments(self) -> tuple[Array, Array]:
+        """Links as lines, without the broken: ends (m, 2, 2) in m, and what each pulls with (m,) in N, negative if it pushes."""
+        pairs, force = self.pulls()
+        return self._state.position[pairs], force
+
+    def pulls(self) -> tuple[Array, Array]:
+        """The same by particle: (m, 2) indices in place of ends, for who has their positions of the same moment."""
+        pairs, force = [np.empty((0, 2), np.int64)], [np.empty(0)]
+        for pool in self._order:
+            if pool.drawn:
+                here, row = pool.lines()
+                pairs.append(here)
+                force.append(pool.rows["force"][row])
+        return np.concatenate(pairs), np.concatenate(force)
+
+    def hold(self, particle: int) -> bool:
+        """Whether a link that is whole joins the particle of this index to anything."""
+        return bool((self.pulls()[0] == particle).any())
+
+    def apart(self) -> Array:
+        """(k, 2) sorted pairs i < j of particles that do not collide with each other, since a link says so."""
+        pairs = [np.empty((0, 2), np.int64)]
+        for pool in self._order:
+            here, row = pool.lines()
+            pairs.append(here[pool.rows["collide"][row] == 0])
+        both, count = np.sort(np.concatenate(pairs), axis=1), max(len(self._state), 1)
+        number = np.sort(both[:, 0] * count + both[:, 1])  # one number for each pair: sorted twenty times as fast
+        return np.column_stack(np.divmod(number[np.diff(number, prepend=-1) > 0], count))
+
+    # ---- save and restore ----------------------------------------------------------------------------------------------
+
+    def save(self) -> Any:
+        """A copy of all there is about links."""
+        pools = {family: (pool, pool.rows.copy(), pool.entries.copy()) for family, pool in self._pools.items()}
+        return [(link, link.particles, link._where) for link in self._links], pools, self.broken, self._apart_changed
+
+    def restore(self, saved: Any) -> None:
+        """Go back to what `save` returned, with the links of then."""
+        links, pools, self.broken, apart_changed = saved
+        for link in self._links:
+            link._pool = None
+        for pool in self._order:
+            pool.keep(np.zeros(len(pool.rows), bool))
+        for family, (pool, rows, entries) in pools.items():
+            pool.rows, pool.entries, pool.stale = rows.copy(), entries.copy(), True
+            self._pools[family] = pool
+        self._links = [link for link, _, _ in links]
+        for link, particles, where in links:
+            link.particles, link._where, link._pool = particles, where, self._pools[link._family]
+        self._apart_stale = True
+        self._know_apart()
+        self._apart_changed = apart_changed

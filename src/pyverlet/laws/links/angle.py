@@ -1,0 +1,80 @@
+"""An angle that wants to stay: what makes a rod of particles bend like a beam."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
+from pyverlet.kernels import shapes
+from pyverlet.laws.links._ends import parse
+from pyverlet.laws.links._link import Floats, Link, several, stiffness_of
+from pyverlet.laws.links._rows import RowPool
+
+
+class Angle(Link):
+    """Keeps the angle at j between i and k. `Angle(group, i, j, k)`, or three pairs `(group, index)`.
+
+    Args:
+        ends: what it joins; i, j and k are indices in the group, or arrays of them for many angles.
+        angle: from j -> i to j -> k, counter-clockwise, rad; None takes the angle now.
+        compliance: what it gives under a torque, rad/(N m); 0 is rigid.
+        damping: N m s/rad; for angles that give.
+        breaking_torque: at which it breaks, N m.
+
+    Raises:
+        InputError: an index is outside its group, a particle comes twice, or a number is outside what is allowed.
+    """
+
+    def __init__(
+        self,
+        *ends: Any,
+        angle: ArrayLike | None = None,
+        compliance: ArrayLike = 0.0,
+        damping: ArrayLike = 0.0,
+        breaking_torque: ArrayLike = np.inf,
+    ) -> None:
+        state, particles = parse("Angle", ends, ("i", "j", "k"))
+        super().__init__(state, particles)
+        count = len(particles)
+        if angle is None:
+            i, j, k = (state.position[particles[:, n]].astype(np.float64) for n in range(3))
+            (ax, ay), (bx, by) = (i - j).T, (k - j).T
+            self._angle: Floats = np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
+        else:
+            self._angle = self._angles(angle)
+        self._stiffness = stiffness_of("Angle", count, None, compliance)
+        self._damping = several("Angle", "damping", damping, count)
+        self._strength = several("Angle", "breaking_torque", breaking_torque, count, above=0.0, infinite=True)
+
+    def _angles(self, value: ArrayLike) -> Floats:
+        array: Floats = np.array(checks.column("Angle: angle", value, np.dtype(np.float64), len(self)))
+        if not np.isfinite(array).all():
+            raise InputError(f"Angle: angle is {array[~np.isfinite(array)][0]:g}; allowed is a finite number of radians")
+        return array
+
+    @property
+    def angle(self) -> Floats:
+        """(k,) rad; assign one number or (k,) to change it while the world runs."""
+        return self._angle.copy()
+
+    @angle.setter
+    def angle(self, value: ArrayLike) -> None:
+        self._angle = self._angles(value)
+        self._change("rest", self._angle)
+
+    @property
+    def _family(self) -> Any:
+        return shapes.angle
+
+    def _new_pool(self) -> RowPool:
+        return RowPool(shapes.angle, turn=1, drawn=False)
+
+    def _columns(self) -> dict[str, Any]:
+        return {
+            "rest": self._angle, "stiffness": self._stiffness, "damping": self._damping, "upper": np.inf,
+            "strength": self._strength, "collide": 1,
+        }  # fmt: skip

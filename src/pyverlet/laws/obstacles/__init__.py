@@ -1,0 +1,12 @@
+"""Obstacles: fixed or moving shapes that particles bounce off, roll over and rest on.
+
+To add a shape: a class that says of which rounded segments it is made, `_parts`, and how it is drawn, `outlines`.
+"""
+
+from __future__ import annotations
+
+from pyverlet.laws.obstacles._base import Obstacle, Obstacles, Outline
+from pyverlet.laws.obstacles._course import Course
+from pyverlet.laws.obstacles.shapes import Capsule, Chain, Disc, Polygon, Segment
+
+__all__ = ["Capsule", "Chain", "Course", "Disc", "Obstacle", "Obstacles", "Outline", "Polygon", "Segment"]

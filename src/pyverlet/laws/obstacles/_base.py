@@ -1,0 +1,171 @@
+"""What all obstacles have: a surface, and a motion that nothing can stop."""
+
+from __future__ import annotations
+
+import itertools
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, Generic, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.ground import checks
+
+Value = TypeVar("Value")
+Points = NDArray[np.float64]
+
+_revisions = itertools.count(1)
+
+
+class Outline(NamedTuple):
+    """A line to draw, metres."""
+
+    points: Points
+    """(n, 2)"""
+    filled: bool
+    """The line is closed and what it encloses is solid."""
+
+
+class Parts(NamedTuple):
+    """The rounded segments of a shape: a line through points, about each of which it is `rounding` thick."""
+
+    points: Points
+    closed: bool
+    rounding: float
+    convex: bool
+    """A closed line, counter-clockwise, whose inside is solid."""
+    around: bool
+    """The surface, if it moves, runs counter-clockwise around the shape instead of along the line."""
+
+
+class _Checked(Generic[Value]):
+    """An attribute that is checked when it is set, and that tells the world that the obstacle has changed."""
+
+    def __init__(self, check: Callable[[str, Any], Value]) -> None:
+        self._check = check
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, obstacle: Obstacle, owner: type | None = None) -> Value:
+        if obstacle is None:
+            return self  # type: ignore[unreachable]  # for documentation tools
+        value: Value = obstacle.__dict__[self._name]
+        return value
+
+    def __set__(self, obstacle: Obstacle, value: Any) -> None:
+        obstacle.__dict__[self._name] = self._check(self._name, value)
+        obstacle.revision = next(_revisions)
+
+
+class Obstacle(ABC):
+    """Something in the way.
+
+    Args:
+        points: (n, 2) corners, m.
+        restitution: e of its surface, 0 to 1.
+        friction: mu of its surface, 0 or more.
+        surface_speed: of a conveyor belt, m/s. Segments and chains carry along their points, on both sides; discs, capsules and
+            polygons counter-clockwise around themselves.
+        velocity: (x, y) it moves with, m/s, whatever is in its way.
+        angular_velocity: rad/s it turns with about its pivot, counter-clockwise.
+        pivot: (x, y), m; None is the middle of its points.
+
+    Every one of them may be set while the world runs; `pivot` and `angle` say where it is now, and setting them puts it there
+    without hitting anybody.
+    """
+
+    restitution = _Checked(checks.fraction)
+    friction = _Checked(lambda name, value: checks.number(name, value, least=0.0))
+    surface_speed = _Checked(checks.number)
+    velocity = _Checked(checks.vector)
+    angular_velocity = _Checked(checks.number)
+    pivot = _Checked(checks.vector)
+    angle = _Checked(checks.number)
+    revision: int
+    table: Any = None
+    """Its segments as the engine has them, made when it first meets a world."""
+
+    def __init__(
+        self,
+        points: Points,
+        *,
+        restitution: float = 0.0,
+        friction: float = 0.0,
+        surface_speed: float = 0.0,
+        velocity: Sequence[float] = (0.0, 0.0),
+        angular_velocity: float = 0.0,
+        pivot: Sequence[float] | None = None,
+    ) -> None:
+        self.restitution = restitution
+        self.friction = friction
+        self.surface_speed = surface_speed
+        self.velocity = velocity
+        self.angular_velocity = angular_velocity
+        self.pivot = points.mean(axis=0) if pivot is None else pivot
+        self.angle = 0.0
+        self._local: Points = points - np.asarray(self.pivot)
+        self._drawn_at: Any = None
+        self._drawn: list[Outline] = []
+
+    @property
+    def points(self) -> Points:
+        """(n, 2) where its corners are now, m; a copy."""
+        c, s = np.cos(self.angle), np.sin(self.angle)
+        return np.asarray(self._local @ np.array([[c, s], [-s, c]]) + self.pivot)
+
+    @property
+    def moves(self) -> bool:
+        """Whether it has a velocity."""
+        return self.velocity != (0.0, 0.0) or self.angular_velocity != 0.0
+
+    @abstractmethod
+    def outlines(self) -> list[Outline]:
+        """What to draw, where it is now."""
+
+    @abstractmethod
+    def _parts(self) -> Parts:
+        """What it is made of, relative to the pivot and at an angle of 0."""
+
+    def carry(self, pivot: tuple[float, float], angle: float) -> None:
+        """Put it where its own motion has taken it: unlike setting pivot and angle, no news to the world that did so."""
+        self.__dict__.update(pivot=pivot, angle=angle)
+
+    def drawn(self) -> list[Outline]:
+        """As `outlines`; the same list as long as it has not moved."""
+        where = (self.pivot, self.angle)
+        if where != self._drawn_at:
+            self._drawn_at, self._drawn = where, self.outlines()
+        return self._drawn
+
+    def __repr__(self) -> str:
+        x, y = self.pivot
+        return f"{type(self).__name__} at ({x:g}, {y:g}) m"
+
+
+class Obstacles(list[Obstacle]):
+    """The obstacles of a world: a list."""
+
+    def __init__(self, obstacles: Iterable[Obstacle] = ()) -> None:
+        super().__init__(obstacles)
+        self._drawn: list[list[Outline]] = []
+        self._outlines: list[Outline] = []
+
+    def outlines(self) -> list[Outline]:
+        """Lines that draw all of them where they are now, metres; the same list as long as nothing has moved."""
+        drawn = [obstacle.drawn() for obstacle in self]
+        if len(drawn) != len(self._drawn) or any(a is not b for a, b in zip(drawn, self._drawn, strict=True)):
+            self._drawn = drawn
+            self._outlines = [outline for outlines in drawn for outline in outlines]
+        return self._outlines
+
+    def save(self) -> list[tuple[Obstacle, tuple[float, float], float]]:
+        """Which there are, and where."""
+        return [(obstacle, obstacle.pivot, obstacle.angle) for obstacle in self]
+
+    def restore(self, saved: list[tuple[Obstacle, tuple[float, float], float]]) -> None:
+        """The obstacles of then, where they were then."""
+        self[:] = [obstacle for obstacle, _, _ in saved]
+        for obstacle, pivot, angle in saved:
+            obstacle.pivot, obstacle.angle = pivot, angle

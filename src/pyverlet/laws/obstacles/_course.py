@@ -1,0 +1,158 @@
+"""The obstacles of one world as arrays, and the stage of a substep in which particles meet them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.ground.constants import OBSTACLE_CELLS
+from pyverlet.kernels import obstacles as kernels
+from pyverlet.laws.obstacles._base import Obstacle, Obstacles
+from pyverlet.state.state import Slots
+
+Array = NDArray[Any]
+
+
+class Course:
+    """Tables of all segments and of where their obstacles are; the obstacles themselves are the truth between frames.
+
+    Args:
+        obstacles: the world's list, looked at anew at the beginning of each frame.
+    """
+
+    def __init__(self, obstacles: Obstacles) -> None:
+        self._obstacles = obstacles
+        self._seen: list[Obstacle] = []
+        self._revision = 0
+        self._bodies = np.zeros(0, kernels.BODY)
+        self._segments = np.zeros(0, kernels.SEGMENT)
+        self._moving: list[int] = []
+        self._binned_for = -1.0  # largest radius the cells were filled for; negative: fill them anew
+        self._cells: tuple[Any, ...] = ()
+
+    def __bool__(self) -> bool:
+        return bool(self._obstacles)
+
+    def begin(self) -> None:
+        """At the beginning of a frame: look what has changed."""
+        if self._seen != self._obstacles:  # the same objects: obstacles are equal to themselves alone
+            self._build()
+        if not self._seen:
+            return
+        newest = max(obstacle.revision for obstacle in self._seen)
+        if newest <= self._revision:
+            return
+        if self._revision >= 0:
+            for k, obstacle in enumerate(self._seen):
+                if obstacle.revision > self._revision:
+                    self._refresh(k)
+        self._revision = newest
+        self._moving = [k for k, obstacle in enumerate(self._seen) if obstacle.moves]
+        self._binned_for = -1.0
+
+    def before(self, state: Slots, h: float) -> None:
+        """Before a substep: note where everybody comes from."""
+        state.note_start()
+
+    def collide(self, state: Slots, time: float, h: float, lag: float, rest_speed: float) -> None:
+        """Let everybody meet what was on the way; `time`: seconds from the beginning of the frame to that of the substep."""
+        largest = float(state.radius.max(initial=0.0))
+        if self._moving or self._binned_for != largest:
+            kernels.place(self._segments, self._bodies, time, h)
+            self._bin(largest)
+        numbers = map(state.real, (h, lag, rest_speed))
+        collide: Any = kernels.collide
+        collide(self._segments, self._bodies, time + h, *self._cells, *state.bodies(), *numbers)
+
+    def end(self, dt: float) -> None:
+        """At the end of a frame that went well: the obstacles are where they moved to."""
+        for k in self._moving:
+            body = self._bodies[k]
+            body["x"] += dt * body["vx"]
+            body["y"] += dt * body["vy"]
+            body["angle"] += dt * body["spin"]
+            self._seen[k].carry((float(body["x"]), float(body["y"])), float(body["angle"]))
+
+    def _build(self) -> None:
+        self._seen = list(self._obstacles)
+        for obstacle in self._seen:
+            if obstacle.table is None:  # shapes do not change: adding one to many costs little
+                obstacle.table = _lowered(obstacle)
+        # As bytes: putting hundreds of arrays of records together takes milliseconds.
+        parts = [obstacle.table.view(np.uint8) for obstacle in self._seen]
+        self._segments = np.concatenate([np.zeros(0, np.uint8), *parts]).view(kernels.SEGMENT)
+        count = [len(obstacle.table) for obstacle in self._seen]
+        self._first = np.concatenate(([0], np.cumsum(count, dtype=np.int64)))
+        self._segments["body"] = np.repeat(np.arange(len(count)), count)
+        self._segments["first"] = np.repeat(self._first[:-1], count)
+        self._bodies = np.array([_body(obstacle) for obstacle in self._seen], kernels.BODY)
+        surfaces = [(obstacle.restitution, obstacle.friction, obstacle.surface_speed) for obstacle in self._seen]
+        for name, column in zip(("restitution", "friction", "belt"), zip(*surfaces, strict=True), strict=bool(surfaces)):
+            self._segments[name] = np.repeat(column, count)
+        self._revision = -1
+        self._moving = []
+
+    def _refresh(self, k: int) -> None:
+        obstacle = self._seen[k]
+        self._bodies[k] = _body(obstacle)
+        part = self._segments[self._first[k] : self._first[k + 1]]
+        part["restitution"] = obstacle.restitution
+        part["friction"] = obstacle.friction
+        part["belt"] = obstacle.surface_speed
+
+    def _bin(self, largest: float) -> None:
+        """Fill cells with the segments near them, so that nobody looks at the others."""
+        s = self._segments
+        ends = np.stack((s["bx"], s["by"], s["bx"] + s["bc"] * s["length"], s["by"] + s["bs"] * s["length"]), axis=1)
+        low = np.minimum(ends[:, :2], ends[:, 2:]).min(axis=0, initial=np.inf)
+        high = np.maximum(ends[:, :2], ends[:, 2:]).max(axis=0, initial=-np.inf)
+        around = float((s["rounding"] + s["inner"] + s["sweep"]).max()) + largest
+        sides = high - low + 2 * around
+        # As wide as the largest particle, for coarser cells hold segments out of reach; wider where those would be too many.
+        cell = max(2 * largest, float(sides.max()) / OBSTACLE_CELLS, float(np.sqrt(np.prod(sides) / OBSTACLE_CELLS)))
+        low, high = low - around - 0.5 * cell, high + around + 0.5 * cell
+        columns, rows = (int(n) + 1 for n in (high - low) / cell)
+        start = np.empty(columns * rows + 1, np.int64)
+        entries = np.empty(4 * columns * rows, np.int32)
+        fill: Any = kernels.bin_segments
+        while True:
+            # Half a cell, for the middle of a piece of the way stands for all of it.
+            found = fill(s, largest + 0.5 * cell, *map(float, low), cell, columns, rows, start, entries)
+            if found <= len(entries):
+                break
+            entries = np.empty(found, np.int32)
+        self._cells = (*map(float, low), cell, columns, rows, start, entries)
+        self._binned_for = largest
+
+
+def _body(obstacle: Obstacle) -> tuple[float, ...]:
+    return (*obstacle.pivot, obstacle.angle, *obstacle.velocity, obstacle.angular_velocity)
+
+
+def _lowered(obstacle: Obstacle) -> Array:
+    """The segments of an obstacle, without its surface and place."""
+    points, closed, rounding, convex, around = obstacle._parts()
+    ends = np.roll(points, -1, axis=0) if closed else points[1:]
+    starts = points if closed else points[:-1]
+    if len(points) == 1:
+        starts = ends = points
+    table = np.zeros(len(starts), kernels.SEGMENT)
+    side = ends - starts
+    length = np.hypot(*side.T)
+    along = np.divide(side, length[:, None], out=np.tile((1.0, 0.0), (len(side), 1)), where=length[:, None] > 0)
+    table["lx"], table["ly"] = starts.T
+    table["lc"], table["ls"] = along.T
+    table["length"], table["rounding"], table["around"] = length, rounding, around
+    table["faces"] = len(starts) if convex else 0
+    if convex:
+        # Twice the area over the perimeter is at least the largest distance of anything inside from its nearest face.
+        area = 0.5 * abs(np.sum(starts[:, 0] * ends[:, 1] - starts[:, 1] * ends[:, 0]))
+        table["inner"] = 2 * area / length.sum()
+    for name, to in (("before", -np.roll(side, 1, axis=0)), ("after", np.roll(side, -1, axis=0))):
+        table[f"{name}_x"] = (to * along).sum(axis=1)
+        table[f"{name}_y"] = along[:, 0] * to[:, 1] - along[:, 1] * to[:, 0]
+    if not closed:
+        table["before_x"][0] = table["before_y"][0] = table["after_x"][-1] = table["after_y"][-1] = 0.0
+    return table

@@ -1,0 +1,199 @@
+"""Bounds: the room the particles live in.
+
+To add one: a class here or anywhere with `confine`, `extent`, `outside` and `check`, a kernel that calls `kernels.bounds.meet`
+for each wall, and a parameter in the tests of bounds.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
+from pyverlet.kernels import bounds, cage
+from pyverlet.state.state import Slots
+
+Array = NDArray[Any]
+Extent = tuple[float, float, float, float]
+
+
+class Boundary(ABC):
+    """What the world asks of its bounds."""
+
+    @abstractmethod
+    def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
+        """Bounce or hold every circle that reaches beyond a wall. `lag`: seconds the velocity is behind the position."""
+
+    def held(self, state: Slots, h: float, lag: float, rest_speed: float) -> tuple[Any, ...] | None:
+        """x, y, radius, h, lag and rest_speed as `hold` takes them, if `confine` is but that."""
+        return None
+
+    def repeats(self) -> tuple[Any, ...] | None:
+        """What `confine` depends on beside its arguments, if it is but calls of kernels; None: it may be anything."""
+        return None
+
+    @abstractmethod
+    def extent(self) -> Extent | None:
+        """(x0, y0, x1, y1) of the room, m; None if it has no walls."""
+
+    @abstractmethod
+    def outside(self, position: Array) -> Array:
+        """(n,) bool, which of these centres are outside."""
+
+    @abstractmethod
+    def check(self, radius: Array) -> None:
+        """Raise InputError if one of these circles does not fit."""
+
+
+class Open(Boundary):
+    """No walls."""
+
+    def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
+        state.resting[:] = 0
+
+    def extent(self) -> None:
+        return None
+
+    def outside(self, position: Array) -> Array:
+        return np.zeros(len(position), bool)
+
+    def check(self, radius: Array) -> None:
+        pass
+
+    def __repr__(self) -> str:
+        return "Open()"
+
+
+class _Walls(Boundary):
+    """Restitution and friction of walls."""
+
+    def __init__(self, restitution: float, friction: float) -> None:
+        self.restitution = checks.fraction("restitution", restitution)
+        self.friction = checks.number("friction", friction, least=0.0)
+        self._given: tuple[Any, ...] = ()
+        self._shape: list[Any] = []
+        self._laws: list[Any] = []
+
+    def _confine(self, kernel: Any, shape: Sequence[float], state: Slots, h: float, lag: float, rest_speed: float) -> None:
+        shape, laws = self._rounded(shape, state, h, lag, rest_speed)
+        kernel(*shape, *state.bodies(), *laws)
+
+    def _rounded(self, shape: Sequence[float], state: Slots, h: float, lag: float, rest_speed: float) -> tuple[Any, Any]:
+        """The numbers of `shape`, and h, lag, e, mu and rest_speed, in the dtype of the state."""
+        given = (state.real, shape, h, lag, self.restitution, self.friction, rest_speed)
+        if given != self._given:  # the same in all substeps of a frame, and rounding takes longer than the walls of a small world
+            self._given, self._shape, self._laws = given, [*map(state.real, shape)], [*map(state.real, given[2:])]
+        return self._shape, self._laws
+
+
+def hold(state: Slots, numbers: tuple[Any, ...], arriving: tuple[Any, ...] | None = None) -> None:
+    """Smooth circles stay in a smooth round room; numbers: `Boundary.held`.
+
+    arriving: origin, moved and feed, if contacts have `moved` them and they have yet to arrive there (`kernels.cage.hold`).
+    """
+    bodies = (state.position, state.velocity, state.acceleration, state.radius, state.inverse_mass, state.resting, state.hits)
+    # One kernel for both, for it takes two seconds to compile.
+    where = (1, *arriving) if arriving else (0, state.position, state.position, numbers[3])
+    cage.hold(*numbers[:3], *bodies, *numbers[3:], *where, state.claims())
+
+
+class Circle(_Walls):
+    """A circular cage: particles stay inside.
+
+    Args:
+        center: (x, y), m.
+        radius: of the cage, m.
+        restitution: e of the wall, 0 to 1.
+        friction: mu of the wall, 0 or more.
+    """
+
+    def __init__(
+        self, *, center: Sequence[float] = (0.0, 0.0), radius: float, restitution: float = 0.0, friction: float = 0.0
+    ) -> None:
+        super().__init__(restitution, friction)
+        self.center = checks.vector("center", center)
+        self.radius = checks.number("radius", radius, above=0.0)
+
+    def repeats(self) -> tuple[Any, ...] | None:
+        return (self, *self.center, self.radius, self.restitution, self.friction) if type(self) is Circle else None
+
+    def held(self, state: Slots, h: float, lag: float, rest_speed: float) -> tuple[Any, ...] | None:
+        if type(self) is Circle and self.restitution == 0.0 == self.friction and state.smooth:
+            shape, (h, lag, _, _, rest_speed) = self._rounded((*self.center, self.radius), state, h, lag, rest_speed)
+            return (*shape, h, lag, rest_speed)
+        return None
+
+    def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
+        if numbers := self.held(state, h, lag, rest_speed):
+            hold(state, numbers)
+        else:
+            self._confine(bounds.circle, (*self.center, self.radius), state, h, lag, rest_speed)
+
+    def extent(self) -> Extent:
+        (x, y), r = self.center, self.radius
+        return (x - r, y - r, x + r, y + r)
+
+    def outside(self, position: Array) -> Array:
+        x, y = (position.astype(np.float64) - self.center).T
+        return np.asarray(np.hypot(x, y) > self.radius)
+
+    def check(self, radius: Array) -> None:
+        _fits(radius, self.radius, f"the radius of the cage, {self.radius:g} m")
+
+    def __repr__(self) -> str:
+        return (
+            f"Circle(center={self.center}, radius={self.radius:g}, restitution={self.restitution:g}, friction={self.friction:g})"
+        )
+
+
+class Box(_Walls):
+    """A rectangle: particles stay inside.
+
+    Args:
+        lower: (x0, y0), the lower left corner, m.
+        upper: (x1, y1), the upper right corner, m.
+        restitution: e of the walls, 0 to 1.
+        friction: mu of the walls, 0 or more.
+    """
+
+    def __init__(
+        self, lower: Sequence[float], upper: Sequence[float], *, restitution: float = 0.0, friction: float = 0.0
+    ) -> None:
+        super().__init__(restitution, friction)
+        self.lower = checks.vector("lower", lower)
+        self.upper = checks.vector("upper", upper)
+        if not (self.lower[0] < self.upper[0] and self.lower[1] < self.upper[1]):
+            raise InputError(f"upper is {self.upper}; allowed is a corner above and to the right of lower, {self.lower}")
+
+    def repeats(self) -> tuple[Any, ...] | None:
+        return (self, *self.lower, *self.upper, self.restitution, self.friction) if type(self) is Box else None
+
+    def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
+        self._confine(bounds.box, (*self.lower, *self.upper), state, h, lag, rest_speed)
+
+    def extent(self) -> Extent:
+        return (*self.lower, *self.upper)
+
+    def outside(self, position: Array) -> Array:
+        inside = (position >= self.lower) & (position <= self.upper)
+        return np.asarray(~inside.all(axis=1))
+
+    def check(self, radius: Array) -> None:
+        half = 0.5 * min(self.upper[0] - self.lower[0], self.upper[1] - self.lower[1])
+        _fits(radius, half, f"half the shorter side of the box, {half:g} m")
+
+    def __repr__(self) -> str:
+        return f"Box({self.lower}, {self.upper}, restitution={self.restitution:g}, friction={self.friction:g})"
+
+
+def _fits(radius: Array, room: float, room_is: str) -> None:
+    # At this width the dtype's own rounding of an exact fit is forgiven.
+    wrong = radius > room * (1 + 1e-6)
+    if wrong.any():
+        first = int(np.flatnonzero(wrong)[0])
+        raise InputError(f"radius[{first}] is {radius[first]:g} m; allowed is at most {room_is}")

@@ -1,0 +1,123 @@
+"""Circles that have come to rest are left alone until something touches them: `World(sleep=True)`.
+
+Circles that hang together are an island. One that has been calm for a while falls asleep as a whole: its circles stop, and count
+as pinned, so that pairs among them are not even listed. It wakes as a whole, in the very substep, when somebody awake touches one
+of them; and before a frame in which the user has moved or removed one of them, or changed a law of the world.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.ground.constants import SLEEP_AFTER_S, SLEEP_NEAR, SLEEP_SPEED
+from pyverlet.kernels import sleep as kernels
+from pyverlet.laws.contacts.broadphase import PairList
+from pyverlet.laws.forces import Drag
+from pyverlet.state.state import Slots, State
+
+Array = NDArray[Any]
+
+
+class Sleep:
+    """Puts islands of one world to sleep and wakes them. Who sleeps is in `Slots.island`: a number for each island, -1 awake."""
+
+    def __init__(self) -> None:
+        self._next = 0  # number of the next island
+        self._laws: Any = None
+        self._members: dict[int, int] = {}  # of each island, when it fell asleep
+
+    def copy(self) -> Sleep:
+        """Another one that remembers the same."""
+        other = Sleep()
+        other._next, other._laws, other._members = self._next, self._laws, dict(self._members)
+        return other
+
+    def take(self, other: Sleep, laws: Any) -> None:
+        """Remember what the other does; `laws` are those of now, when the obstacles are back where they were."""
+        self._next, self._laws, self._members = other._next, other._laws, dict(other._members)
+        if laws and other._laws and laws[:-1] == other._laws[:-1]:
+            self._laws = laws
+
+    def begin(self, slots: Slots, state: State, laws: Any) -> bool:
+        """Before the slots gather the state of a new frame. Whether somebody woke."""
+        same, self._laws = laws == self._laws, laws
+        if not self._members:
+            return False
+        if not same:
+            return self._wake(slots, slots.island >= 0)
+        edited = np.zeros(len(slots), np.uint8)
+        if slots.is_new:  # some have gone, and what the slots hold of the others is not known yet
+            number, left = np.unique(slots.island, return_counts=True)
+            fewer = [k for k, n in zip(number.tolist(), left.tolist(), strict=True) if n != self._members.get(k, n)]
+            edited[np.isin(slots.island, fewer)] = 1
+            edited |= (state.velocity[slots.particle] != 0).any(axis=1)
+        else:
+            now = (state.position, state.velocity, state.spin, state.radius, state.mass)
+            before = (slots.position, slots.radius, slots.mass)
+            if not kernels.find_edited(*now, *before, slots.particle, slots.island, edited):
+                return False
+        return self._wake(slots, np.isin(slots.island, slots.island[(edited == 1) & (slots.island >= 0)]))
+
+    def all_asleep(self, slots: Slots) -> bool:
+        """Whether nothing can move."""
+        return len(self._members) > 0 and not slots.inverse_mass.any()
+
+    def touched(self, slots: Slots, pairs: PairList) -> bool:
+        """Wake islands that somebody awake overlaps. Whether there were any: then the list lacks pairs."""
+        if not self._members:
+            return False
+        touched = np.zeros(len(slots), np.uint8)
+        which = pairs.listed()
+        if not kernels.touch(slots.position, slots.size, slots.island, *which, touched):
+            return False
+        return self._wake(slots, np.isin(slots.island, slots.island[touched == 1]))
+
+    def end(self, slots: Slots, pairs: PairList, dt: float, gravity: float) -> bool:
+        """At the end of a frame: let islands that have been calm long enough fall asleep. Whether there were any."""
+        real = slots.real
+        limit = real(SLEEP_SPEED**2 * gravity)
+        kernels.count_calm(slots.velocity, slots.spin, slots.radius, slots.island, limit, np.float32(dt), slots.calm)
+        tired = (slots.calm >= SLEEP_AFTER_S) & (slots.island < 0) & (slots.inverse_mass > 0)
+        if self._laws is None or not tired.any():
+            return False
+        root = np.empty(len(slots), np.int64)
+        which = pairs.listed()
+        kernels.find_islands(
+            slots.position, slots.size, slots.inverse_mass, slots.calm, *which, real(SLEEP_NEAR), np.float32(SLEEP_AFTER_S), root
+        )
+        sleeper = root >= 0
+        if not sleeper.any():
+            return False
+        slots.island[sleeper] = self._next + root[sleeper]
+        self._next += len(slots)
+        number, members = np.unique(slots.island[sleeper], return_counts=True)
+        self._members |= dict(zip(number.tolist(), members.tolist(), strict=True))
+        for array in (slots.velocity, slots.acceleration, slots.spin):
+            array[sleeper] = 0
+        slots.weigh()
+        return True
+
+    def _wake(self, slots: Slots, who: Array) -> bool:
+        if not who.any():
+            return False
+        for island in np.unique(slots.island[who]):
+            del self._members[int(island)]
+        slots.island[who] = -1
+        slots.calm[who] = 0
+        slots.weigh()
+        return True
+
+
+def laws(world: Any) -> Any:
+    """What sleepers rely on: when it changes all wake. None where nobody may sleep.
+
+    That is so with links, with obstacles that move, and with forces that may change with time: all but gravity and drag.
+    """
+    moving = any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
+    if world.links or moving or not all(type(force) is Drag for force in world.forces):
+        return None
+    obstacles = tuple((id(obstacle), obstacle.revision) for obstacle in world.obstacles)
+    return (world.gravity, repr(world.boundary), world.boundary.extent(), world.collisions, obstacles)

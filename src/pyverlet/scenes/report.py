@@ -1,0 +1,165 @@
+"""Runs a world without showing it and says how it went: time per frame and stage, energy, overlap, state hash."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from pyverlet.ground import checks
+from pyverlet.ground.constants import FRAME_BUDGET_MS
+from pyverlet.ground.errors import InputError
+from pyverlet.world.world import World
+
+MAX_FRAMES = 10_000_000
+"""Longest run: more is almost surely a mistyped duration (46 hours of simulated time at 60 Hz)."""
+
+TRIAD_ELEMENTS = 1 << 22
+"""Elements of each array of the triad: 32 MiB each in float64, too large for most caches."""
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a run without a viewer found out. Times in milliseconds unless named otherwise, energies in joules."""
+
+    scene: str
+    particles: int
+    substeps: int
+    integrator: str
+    dtype: str
+    threads: int
+    dt: float
+    frames: int
+    seconds: float
+    compile_s: float
+    ms_per_frame: dict[str, float]
+    budget: dict[str, float]
+    ns_per_particle_substep: float
+    stages: dict[str, float]
+    energy: dict[str, float]
+    ledger: dict[str, float] | None
+    overlap: dict[str, float]
+    contacts: int
+    escaped: int
+    state_hash: str
+    extra: dict[str, Any] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The report as plain numbers, strings and dictionaries, ready for JSON."""
+        values = {name: value for name, value in vars(self).items() if name != "extra"}
+        return values | self.extra
+
+
+def frame_count(*, seconds: float | None, frames: int | None, dt: float, default_seconds: float) -> int:
+    """How many frames of `dt` seconds make up `seconds`, or `frames` where that is given.
+
+    Raises:
+        InputError: a value is not positive and finite, both are given, or the run would be longer than MAX_FRAMES.
+    """
+    checks.number("dt", dt, above=0.0)
+    if frames is not None:
+        if seconds is not None:
+            raise InputError(f"frames is {frames} and seconds is {seconds:g}; allowed is one of them, not both")
+        return checks.whole("frames", frames, most=MAX_FRAMES)
+    checks.number("seconds", default_seconds if seconds is None else seconds, above=0.0)
+    wanted = (default_seconds if seconds is None else seconds) / dt
+    if wanted > MAX_FRAMES:
+        raise InputError(f"seconds / dt is {wanted:.4g} frames; allowed are at most {MAX_FRAMES:,}")
+    return max(1, round(wanted))  # as World.run counts
+
+
+def settle_count(seconds: float, dt: float) -> int:
+    """Frames that make up `seconds` of settling before a measurement; 0 is allowed."""
+    checks.number("settle", seconds, least=0.0)
+    return 0 if seconds == 0.0 else frame_count(seconds=seconds, frames=None, dt=dt, default_seconds=seconds)
+
+
+def run(
+    world: World,
+    *,
+    scene: str,
+    frames: int,
+    dt: float,
+    compile_s: float = 0.0,
+    progress: Progress | None = None,
+    observe: Callable[[World], None] | None = None,
+    step: Callable[[float], None] | None = None,
+) -> Report:
+    """Step `world` by `frames` frames of `dt` seconds and report on them.
+
+    Args:
+        world: stepped in place.
+        scene: name to report.
+        frames: at least 1.
+        dt: seconds a frame.
+        compile_s: what compiling took before, to report.
+        progress: called with (frames done, frames) after every frame.
+        observe: called with the world after every frame, outside the measured time.
+        step: makes one frame of dt seconds; world.step unless given.
+
+    Raises:
+        NonFiniteError: the state turned NaN or infinite.
+    """
+    step = step or world.step
+    frame_ms: list[float] = []
+    stage_ms: dict[str, list[float]] = {}
+    for done in range(1, frames + 1):
+        before, start = world.frames, perf_counter()
+        step(dt)
+        frame_ms.append(1e3 * (perf_counter() - start))
+        # A panel that is drawn less often leaves its world alone in some frames.
+        for stage, ms in world.profile.stages.items() if world.frames != before else ():
+            stage_ms.setdefault(stage, []).append(ms)
+        if observe:
+            observe(world)
+        if progress:
+            progress(done, frames)
+    median = statistics.median(frame_ms)
+    energy = world.energy()
+    overlap = world.overlap()
+    return Report(
+        scene=scene,
+        particles=len(world),
+        substeps=int(world.substeps),
+        integrator=type(world.integrator).name(),
+        dtype=np.dtype(world.dtype).name,
+        threads=int(world.threads),
+        dt=dt,
+        frames=frames,
+        seconds=frames * dt,
+        compile_s=compile_s,
+        ms_per_frame={"median": median, "p95": float(np.percentile(frame_ms, 95))},
+        budget={"limit_ms": FRAME_BUDGET_MS, "frames_over": sum(ms > FRAME_BUDGET_MS for ms in frame_ms)},
+        ns_per_particle_substep=1e6 * median / (len(world) * world.substeps),
+        # A stage that did not run in a frame (a rebuild that was not needed) took 0 ms of it: mean, so that they add up.
+        stages={stage: sum(ms) / frames for stage, ms in stage_ms.items()},
+        energy={name: float(getattr(energy, name)) for name in ("kinetic", "potential", "links", "total")},
+        ledger=world.ledger.as_dict() if world.keeps_ledger else None,
+        overlap={"mean": float(overlap.mean), "max": float(overlap.max)},
+        contacts=int(overlap.contacts),
+        escaped=int(world.escaped()),
+        state_hash=world.state_hash(),
+    )
+
+
+def triad(repeats: int = 15) -> dict[str, float]:
+    """Time NumPy's a = b + s c on large arrays: what this machine's memory does, to compare other times against.
+
+    Returns:
+        ns_per_element: median over `repeats`; gb_per_s: the traffic it amounts to, five passes over float64 arrays.
+    """
+    a, b, c = (np.full(TRIAD_ELEMENTS, value) for value in (0.0, 1.0, 2.0))
+    times = []
+    for _ in range(repeats):
+        start = perf_counter()
+        np.multiply(c, 3.0, out=a)
+        np.add(a, b, out=a)
+        times.append(perf_counter() - start)
+    ns = 1e9 * statistics.median(times) / TRIAD_ELEMENTS
+    return {"ns_per_element": ns, "gb_per_s": 5 * 8 / ns}

@@ -1,0 +1,58 @@
+"""The moves integrators are made of, on slots: each a call of a kernel in `kernels.motion`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numpy.typing import NDArray
+
+from pyverlet.kernels import motion
+from pyverlet.state.state import Slots
+
+Array = NDArray[Any]
+
+
+def advance(out: Array, base: Array, slope: Array, h: float) -> None:
+    """out = base + h * slope on (n, 2) arrays; the move every integrator is made of. out may be base."""
+    if out is base:
+        motion.add_scaled(out, slope, out.dtype.type(h))
+    else:
+        motion.advance(out, base, slope, out.dtype.type(h))
+
+
+def newton(state: Slots, force: Array, gravity: tuple[float, float]) -> float:
+    """acceleration = gravity + force / mass; force: (n, 2), or (0, 2) for none. Returns the largest of them, m/s^2."""
+    where = state.acceleration, force, state.inverse_mass
+    return float(motion.newton(*where, *state.reals(*gravity)))
+
+
+def newton_kick_drift(state: Slots, force: Array, gravity: tuple[float, float], h: float, ahead: float) -> float:
+    """Take back a kick of `ahead` seconds; `newton`; velocity += h * acceleration; position += h * velocity."""
+    where = state.position, state.velocity, state.acceleration, force, state.inverse_mass
+    return float(motion.newton_kick_drift(*where, *state.reals(*gravity, h, ahead)))
+
+
+def strayed(state: Slots, reference: Array, distance: float) -> bool:
+    """Whether any particle has moved by more than this, m, from its row of `reference`."""
+    return bool(motion.strayed(state.position, reference, state.real(distance * distance)))
+
+
+def leap(state: Slots, h: float, reference: Array, distance: float, origin: Array, moved: Array) -> bool:
+    """Velocity += h * acceleration, position += h * velocity, moved = position - origin; whether anyone has then strayed."""
+    where, square = (state.position, state.velocity, state.acceleration, state.real(h)), state.real(distance * distance)
+    return bool(motion.leap(*where, reference, square, origin, moved, state.claims()))
+
+
+def pick_falling(state: Slots, before: Array, lag: float, dt: float) -> None:
+    """Circles that touch others but fall as if alone rest on nobody: `resting` is 0 for them.
+
+    before: (n, 2) velocities dt seconds ago, m/s, in the user's order.
+    """
+    moving = state.velocity, state.acceleration, before, state.particle
+    motion.pick_falling(state.resting, *moving, *state.reals(lag, dt))
+
+
+def remember_rest(state: Slots, h: float) -> None:
+    """Scale the accelerations of those that are held, so that h / 2 of it makes of what they carry weight with no velocity."""
+    held = state.acceleration, state.velocity, state.resting
+    motion.remember_rest(*held, *state.reals(state.lean, h))

@@ -1,0 +1,400 @@
+"""Where the numbers live: `State` in the order the user added particles, `Slots` in the order the engine likes.
+
+The user's arrays are the truth between frames. A frame begins by gathering them into slots, sorted so that neighbours in
+space are neighbours in memory, and ends by scattering the result back; nobody outside ever sees the engine's order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.compile.stealing import Claims
+from pyverlet.ground import memory
+from pyverlet.kernels import motion
+from pyverlet.state.unchanged import Unchanged
+
+Array = NDArray[Any]
+
+_ROWS = ("position", "velocity", "acceleration")
+_SET = ("radius", "mass", "restitution", "friction")
+_COLUMNS = ("spin", "grown", *_SET)
+_MARKS = ("category", "mask")
+_GIVEN = (*_SET, *_MARKS)
+_NUMBERS = ("number",)
+
+EVERYONE = 0xFFFFFFFF
+"""A mask of 32 bits that takes every category."""
+
+_DEFAULTS: dict[str, Any] = {"grown": 1, "restitution": -1, "friction": -1, "category": 1, "mask": EVERYONE}
+
+
+class State:
+    """Structure of arrays of n particles, in the order they were added. SI units.
+
+    Attributes:
+        position: (n, 2) centres, m.
+        velocity: (n, 2) m/s.
+        acceleration: (n, 2) m/s^2, of the last substep; the memory of the Verlet methods, scaled at rest. NaN: none yet.
+        spin: (n,) angular velocity, rad/s, counter-clockwise.
+        radius: (n,) m.
+        mass: (n,) kg; infinity pins the particle.
+        grown: (n,) part of the radius that other circles feel; less than 1 for those that were added on top of another.
+        restitution, friction: (n,) of circles that have values of their own; negative: as `Collisions` and the bounds say.
+        category, mask: (n,) 32 bits each; two circles collide if each has a bit of its category in the other's mask.
+        number: (n,) of each particle, in ascending order; no two particles of a world ever have the same.
+        begun: the number of the first particle of each `append`, ascending.
+        version: how often particles were added or removed.
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+    spin: Array
+    radius: Array
+    mass: Array
+    grown: Array
+    restitution: Array
+    friction: Array
+    category: Array
+    mask: Array
+    number: Array
+
+    def __init__(self, dtype: np.dtype[Any]) -> None:
+        self.dtype = dtype
+        self._store: dict[str, Array] = {name: np.empty((0, 2), dtype) for name in _ROWS}
+        self._store |= {name: np.empty(0, dtype) for name in _COLUMNS}
+        self._store |= {name: np.empty(0, np.uint32) for name in _MARKS}
+        self._store |= {name: np.empty(0, np.int64) for name in _NUMBERS}
+        self._numbers = 0
+        self.begun: list[int] = []
+        self.version = 0
+        self._show(0)
+
+    def __len__(self) -> int:
+        return len(self.radius)
+
+    def arrays(self) -> Iterator[tuple[str, Array]]:
+        """Names and arrays, always in the same order."""
+        for name in self._store:
+            yield name, getattr(self, name)
+
+    def append(self, values: dict[str, Array]) -> slice:
+        """Add particles; `values` holds an array for each name, but for those that have a default. Returns where they stand."""
+        start = len(self)
+        stop = start + len(values["radius"])
+        capacity = len(self._store["radius"])
+        if stop > capacity:
+            # Doubling: adding one by one costs O(1) each on average.
+            capacity = max(stop, 2 * capacity)
+            for name, old in self._store.items():
+                self._store[name] = memory.empty((capacity, *old.shape[1:]), old.dtype)
+                self._store[name][:start] = old[:start]
+        self._show(stop)
+        for name, value in (_DEFAULTS | values).items():
+            getattr(self, name)[start:stop] = value
+        self.begun.append(self._numbers)
+        self.number[start:] = np.arange(self._numbers, self._numbers + stop - start)
+        self._numbers += stop - start
+        self.version += 1
+        return slice(start, stop)
+
+    def remove(self, kept: Array) -> Array:
+        """Keep the particles marked in `kept` (n,) bool, in their order. Returns (n,) where each of the old is now, or -1."""
+        now = np.where(kept, np.cumsum(kept) - 1, -1)
+        first = int(np.argmin(kept)) if not kept.all() else len(kept)
+        left = int(np.count_nonzero(kept))
+        for array in self._store.values():
+            array[first:left] = array[first : len(kept)][kept[first:]]
+        self._show(left)
+        self.version += 1
+        return now
+
+    def restore(self, arrays: dict[str, Array]) -> None:
+        """Take up what `arrays` gave once, however many particles that were."""
+        count = len(arrays["number"])
+        if count > len(self._store["number"]):
+            self._store = {name: np.empty((count, *old.shape[1:]), old.dtype) for name, old in self._store.items()}
+        self._show(count)
+        for name in self._store:
+            getattr(self, name)[:] = arrays[name]
+        self.version += 1
+
+    def find(self, first: int, stop: int) -> slice:
+        """Where the particles with numbers from `first` up to, not including, `stop` are."""
+        a, b = np.searchsorted(self.number, (first, stop))
+        return slice(int(a), int(b))
+
+    def _show(self, count: int) -> None:
+        for name, array in self._store.items():
+            setattr(self, name, array[:count])
+
+
+# What a slot remembers from frame to frame beside the user's arrays: dtype, and value for a new particle.
+_REMEMBERED: dict[str, tuple[Any, Any]] = {"fed": (np.uint8, 0), "island": (np.int64, -1), "calm": (np.float32, 0)}
+_OF_SLEEP = ("island", "calm")
+
+
+class Slots:
+    """The engine's working copy, in an order of its own: what forces, integrators, contacts and bounds see during a frame.
+
+    Attributes:
+        real: rounds a number to the dtype; it remembers some, for NumPy takes longer to round one than a kernel to be called.
+        reals: the same of several at once. claims: for kernels whose threads claim what they do.
+        particle: (n,) the user's index of the particle in each slot.
+        position, velocity, acceleration, spin, radius, mass, grown, restitution, friction: as in State.
+        category, mask: as in State, or empty while every circle collides with every other.
+        most_restitution, most_friction: the largest of their columns; negative if no circle has values of its own.
+        size: (n,) grown * radius, m: what contacts between particles take as the radius.
+        inverse_mass: (n,) 1/kg; 0 for a pinned particle. total_mass: of all others, kg.
+        force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
+        start: (n, 2) positions before the integration of this substep, m; empty unless circles rub each other, or meet obstacles.
+        turn: (n,) rad by which each circle turns in this substep; empty unless circles rub each other.
+        lift: (n,) s; times -a it is the velocity with which circles at rest against others end a substep, for others 0. Kept
+            only if circles rub each other.
+        drop: a circle that starts at rest falls drop * a h^2 in a substep; depends on the integrator.
+        fed: (n,) bits: CARRIES where a contact at rest fed the velocity in the last substep, AT_WALL where a wall was touched
+            in it, CARRIED and WAS_AT_WALL the same in the one before. Kept only if circles bounce.
+        island: (n,) number of the island a sleeping particle belongs to, -1 for those awake. calm: (n,) seconds it has been so.
+            Both are empty where nobody may sleep.
+        lean: times -a h it is the velocity with which circles at rest against others end a substep; 0 until contacts say so.
+        resting: (n,) bits of `kernels.motion`: who held it in the last substep, a wall or, after a frame, another particle.
+        hits: (n,) largest speed with which the circle met a wall in this frame, m/s; negative: none.
+        spent: (n, 2) energy that impacts on walls, and friction there, have taken in this frame, J, negative: to be summed, for
+            rows stay where they are when slots are reordered. Empty unless somebody keeps account.
+
+    Args:
+        sleeps: whether particles may sleep.
+    """
+
+    def __init__(self, dtype: np.dtype[Any], *, sleeps: bool = False) -> None:
+        self.dtype = dtype
+        self._sleeps = sleeps
+        self.real = lru_cache(64)(dtype.type)
+        self.reals = lru_cache(64)(lambda *numbers: tuple(map(dtype.type, numbers)))
+        self._kept: dict[str, Array] = {}
+        self.drop, self.lean, self.total_mass = 1.0, 0.0, 0.0
+        self.claims = Claims()
+        self._resize(0)
+
+    def __len__(self) -> int:
+        return len(self.radius)
+
+    def _resize(self, count: int) -> None:
+        """Room for `count` particles: those of `_kept`, as they stood, and behind them the new ones."""
+        self._given_back = Unchanged()
+        order = self._kept.pop("particle", np.zeros(0, np.int32))
+        self.particle = np.concatenate((order, np.arange(len(order), count, dtype=np.int32)))
+        for name, (dtype, value) in _REMEMBERED.items():
+            column = np.full(count if self._sleeps or name not in _OF_SLEEP else 0, value, dtype)
+            column[: len(order)] = self._kept.pop(name, column[: len(order)])
+            setattr(self, name, column)
+        for name in _ROWS:
+            setattr(self, name, memory.zeros((count, 2), self.dtype))
+        for name in (*_COLUMNS, "inverse_mass"):
+            setattr(self, name, memory.zeros(count, self.dtype))
+        self.__dict__.pop("force", None)
+        self.start = np.empty((0, 2), self.dtype)
+        self.turn = self.lift = np.empty(0, self.dtype)
+        self.size = self.radius
+        self.resting = np.zeros(count, np.uint8)
+        self._given: dict[str, Any] = {name: np.zeros(0, np.uint32 if name in _MARKS else self.dtype) for name in _GIVEN}
+        self._changed = self._grows = True
+        self.hits = np.full(count, -1, self.dtype)
+        self.spent = np.empty((0, 2))
+        self.category = self.mask = np.empty(0, np.uint32)
+        self.most_restitution = self.most_friction = -1.0
+        self._scratch: list[Array] = []
+        self._slot_of: Array | None = None
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+    spin: Array
+    radius: Array
+    mass: Array
+    grown: Array
+    restitution: Array
+    friction: Array
+    inverse_mass: Array
+    fed: Array
+    island: Array
+    calm: Array
+
+    @cached_property
+    def force(self) -> Array:
+        """(n, 2) N; made when it is first asked for."""
+        return np.zeros_like(self.position)
+
+    @property
+    def asleep(self) -> Array:
+        """Slots of the particles that sleep."""
+        return np.flatnonzero(self.island >= 0)
+
+    @property
+    def is_new(self) -> bool:
+        """Whether particles have come or gone since the last frame: nothing but their order is known yet."""
+        return self._changed
+
+    def gather(self, state: State) -> bool:
+        """Copy the user's arrays in. True if particles, radii or masses are not what they were: no list survives that."""
+        if len(state) != len(self):
+            self._keep(slice(None))
+            self._resize(len(state))
+        given = (state.position, state.velocity, state.acceleration, state.spin)
+        if not self._given_back.recall(given):  # a user who has changed nothing need not wait for it to be copied again
+            motion.take_motion(self.position, self.velocity, self.acceleration, self.spin, *given, self.particle)
+        # What seldom changes is compared in the user's order, where neighbours in memory need no index.
+        now = (state.radius, state.mass, state.restitution, state.friction, state.category, state.mask)
+        if self._grows or self.size is not self.radius or motion.any_differs(*(*self._given.values(), *now)):
+            return self._take_given(state)
+        return False
+
+    def _take_given(self, state: State) -> bool:
+        """Copy in what users set and engines leave alone."""
+        changed = self._changed
+        for name in _GIVEN:
+            given, now = self._given[name], getattr(state, name)
+            if name not in ("restitution", "friction"):
+                changed |= motion.differs(given, now)
+            self._given[name] = (now[:1] if (now == now[:1]).all() else now).copy()
+        for name in (*_SET, "grown"):
+            np.take(getattr(state, name), self.particle, out=getattr(self, name))
+        self.weigh()
+        self.most_restitution, self.most_friction = (float(a.max(initial=-1.0)) for a in (self.restitution, self.friction))
+        filters = (state.category != 1).any() or (state.mask != EVERYONE).any()
+        order = self.particle if filters else self.particle[:0]
+        self.category, self.mask = state.category[order], state.mask[order]
+        self.resize()
+        self._grows, self._changed = self.size is not self.radius, False
+        return bool(changed)
+
+    def weigh(self) -> None:
+        """Bring `inverse_mass` up to date with `mass` and who sleeps."""
+        with np.errstate(divide="ignore"):  # a mass of 0 is refused by the world, with a sentence
+            np.divide(1, self.mass, out=self.inverse_mass)
+        self.inverse_mass[self.asleep] = 0
+        self.total_mass = float(self.mass.sum(dtype=float, where=np.isfinite(self.mass)))
+
+    def _keep(self, slots: Any) -> None:
+        """Remember what outlives a change of size, of these slots."""
+        kept = ((name, getattr(self, name)) for name in ("particle", *_REMEMBERED))
+        self._kept = {name: column[slots] for name, column in kept if len(column)}
+
+    def note_start(self) -> None:
+        """Keep the positions of now as `start`."""
+        if len(self.start) != len(self):
+            self.start = np.empty_like(self.position)
+        self.start[:] = self.position
+
+    def note_turn(self, h: float) -> None:
+        """Circles rub each other in a substep of h seconds: `turn` is what their spin makes it, nobody's `lift` is known yet."""
+        self.turn = self.spin * self.real(h)
+        if len(self.lift) != len(self):
+            self.lift = np.empty_like(self.spin)
+        self.lift.fill(0)
+
+    def keep_account(self) -> None:
+        """From now on walls are to note what they take."""
+        if len(self.spent) != len(self):
+            self.spent = np.zeros((len(self), 2))
+
+    def clear_notes(self) -> None:
+        """Forget what walls and friction have noted in the last frame."""
+        self.hits.fill(-1)
+        if len(self.spent):
+            self.spent.fill(0)
+        if len(self.turn):
+            self.lift.fill(0)
+            self.turn = self.turn[:0]
+
+    def forget(self, now: Array) -> None:
+        """The user's particles are now at `now` (n,), or no more (-1): let those go, keep the order of the others."""
+        order = now[self.particle].astype(np.int32)
+        kept = order >= 0
+        self._keep(kept)
+        self._kept["particle"] = order[kept]
+        self._resize(int(np.count_nonzero(kept)))
+
+    def resize(self) -> None:
+        """Bring `size` up to date with `grown`."""
+        self.size = self.radius if (self.grown >= 1).all() else self.radius * self.grown
+
+    def scatter(self, state: State) -> None:
+        """Copy what a frame changes back to the user's arrays."""
+        given = (state.position, state.velocity, state.acceleration, state.spin)
+        motion.put_motion(self.position, self.velocity, self.acceleration, self.spin, *given, self.particle)
+        self._given_back.remember(given)
+        self._grows |= self.size is not self.radius  # some may have been found on top of others since the gathering
+        if self._grows:
+            state.grown[self.particle] = self.grown
+
+    def in_users_order(self) -> State:
+        """A state with the positions, velocities, spins, radii and masses of now."""
+        state = State(self.dtype)
+        values = {name: np.empty_like(getattr(self, name)) for name in (*_ROWS, "spin", "radius", "mass")}
+        for name, array in values.items():
+            array[self.particle] = getattr(self, name)
+        state.append(values)
+        return state
+
+    def reorder(self, order: Array) -> None:
+        """Put the particle of slot order[k] into slot k."""
+        spare = memory.empty(self.position.shape, self.dtype)
+        for name in _ROWS:
+            old = getattr(self, name)
+            motion.take_rows(spare, old, order)
+            setattr(self, name, spare)
+            spare = old
+        alike = {name for name, given in self._given.items() if len(given) == 1}  # for all: any order is as good
+        alike |= {"inverse_mass"} if "mass" in alike and not len(self.island) else set()
+        for name in (*_COLUMNS, *_MARKS, "inverse_mass", "particle", "resting", *_REMEMBERED, "start", "hits"):
+            if name not in alike and len(column := getattr(self, name)):
+                setattr(self, name, memory.taken(column, order))
+        self.resize()
+        self._slot_of = None
+
+    def save(self) -> dict[str, Array]:
+        """What outlives a frame here and not in the user's arrays: the order, who carried weight, who sleeps."""
+        return {name: getattr(self, name).copy() for name in ("particle", *_REMEMBERED)}
+
+    def restore(self, saved: dict[str, Array], state: State) -> None:
+        """Take up what `save` returned and gather the state into that order."""
+        self._kept = {name: column.copy() for name, column in saved.items()}
+        self._resize(len(saved["particle"]))
+        self.gather(state)
+
+    def scratch(self, number: int) -> Array:
+        """An (n, 2) array for use within one substep; its contents are left over from whoever used it last."""
+        while len(self._scratch) <= number:
+            self._scratch.append(np.empty_like(self.position))
+        return self._scratch[number]
+
+    @property
+    def smooth(self) -> bool:
+        """Whether circles neither bounce nor rub by themselves, nor rub each other."""
+        return self.most_restitution <= 0.0 and not len(self.turn)
+
+    def bodies(self) -> tuple[Array, ...]:
+        """What walls need of the particles: the arrays that `kernels.bounds.look` takes, in that order."""
+        return (
+            self.position, self.velocity, self.acceleration, self.spin, self.radius, self.inverse_mass, self.restitution,
+            self.friction, self.fed, self.resting, self.hits, self.spent, self.start, self.turn, self.lift,
+        )  # fmt: skip
+
+    def slot_of(self, particle: int) -> int:
+        """The slot that holds the user's particle."""
+        if self._slot_of is None:
+            self._slot_of = np.empty_like(self.particle)
+            self._slot_of[self.particle] = np.arange(len(self), dtype=self.particle.dtype)
+        return int(self._slot_of[particle])
+
+    def slots_of(self, particles: Array) -> Array:
+        """(k,) slots that hold these of the user's particles."""
+        if len(particles):
+            self.slot_of(0)
+        return np.zeros(0, np.int32) if self._slot_of is None else self._slot_of[particles]

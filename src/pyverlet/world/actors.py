@@ -1,0 +1,157 @@
+"""Actors do something to a world before each frame: emitters add particles, sinks remove them.
+
+To add one: a class deriving from `Actor` with `act`; `save` and `restore` if it remembers anything.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
+from pyverlet.kernels import placing
+from pyverlet.laws.rooms import Boundary, Box, Circle
+
+if TYPE_CHECKING:
+    from pyverlet.world.world import World
+
+_TRIES = 4
+"""Places an emitter looks at for each particle that is due."""
+
+
+class Actor(ABC):
+    """Something that acts on a world once a frame; append it to `world.actors`."""
+
+    @abstractmethod
+    def act(self, world: World, dt: float) -> None:
+        """Called before a frame of dt seconds."""
+
+    def save(self) -> Any:
+        """What `restore` needs to act again as from now; part of `world.save()`."""
+        return None
+
+    def restore(self, saved: Any) -> None:
+        """Go back to what `save` returned."""
+
+
+class Emitter(Actor):
+    """Adds particles at random places of a region where nobody is; while there is no room, it waits.
+
+    Args:
+        region: Box or Circle the particles appear in, with all of their radius.
+        rate: particles a second.
+        velocity: (x, y) they start with, m/s.
+        radius: m, or (smallest, largest) to be drawn evenly.
+        mass: kg.
+        most: particles in all; None goes on for ever.
+        seed: of the places; the same seed gives the same ones.
+
+    Attributes:
+        emitted: particles so far.
+    """
+
+    def __init__(
+        self,
+        region: Box | Circle,
+        *,
+        rate: float,
+        velocity: Sequence[float] = (0.0, 0.0),
+        radius: float | tuple[float, float] = 0.5,
+        mass: float = 1.0,
+        most: int | None = None,
+        seed: int = 0,
+    ) -> None:
+        if not isinstance(region, Box | Circle):
+            raise InputError(f"region is {region!r}; allowed is a pyverlet.Box or a pyverlet.Circle")
+        self.region = region
+        self.rate = checks.number("rate", rate, least=0.0)
+        self.velocity = checks.vector("velocity", velocity)
+        low, high = radius if isinstance(radius, tuple) else (radius, radius)
+        self.radius = (checks.number("radius", low, above=0.0), checks.number("radius", high, least=low))
+        region.check(np.array([self.radius[1]]))
+        self.mass = checks.number("mass", mass, above=0.0)
+        self.most = None if most is None else checks.whole("most", most, least=0)
+        self._rng = np.random.default_rng(checks.whole("seed", seed, least=0))
+        self._due = 0.0
+        self.emitted = 0
+
+    def act(self, world: World, dt: float) -> None:
+        # What there is no room for is not made up for later: a blocked mouth does not burst when it opens.
+        self._due = min(self._due + self.rate * dt, 1.0 + self.rate * dt)
+        wanted = int(self._due) if self.most is None else min(int(self._due), self.most - self.emitted)
+        if wanted <= 0:
+            return
+        places, sizes = self._draw(_TRIES * wanted)
+        taken = np.zeros(len(places), bool)
+        near = self._near(world)
+        found = int(
+            placing.free_places(
+                places, sizes, world.position[near].astype(np.float64), world.radius[near].astype(np.float64), wanted, taken
+            )
+        )
+        if found:
+            world.add(position=places[taken], velocity=self.velocity, radius=sizes[taken], mass=self.mass)
+            self.emitted += found
+            self._due -= found
+
+    def save(self) -> Any:
+        return self._due, self.emitted, self._rng.bit_generator.state
+
+    def restore(self, saved: Any) -> None:
+        self._due, self.emitted, self._rng.bit_generator.state = saved
+
+    def _draw(self, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Random places (count, 2) in the region, m, and radii (count,)."""
+        sizes = self._rng.uniform(*self.radius, count)
+        if isinstance(self.region, Circle):
+            # Even over the area: the square of the distance from the centre is.
+            distance = np.sqrt(self._rng.uniform(0, 1, count)) * (self.region.radius - sizes)
+            angle = self._rng.uniform(0, 2 * np.pi, count)
+            offset = distance[:, None] * np.column_stack((np.cos(angle), np.sin(angle)))
+            return np.asarray(self.region.center + offset), sizes
+        lower, upper = np.asarray(self.region.lower), np.asarray(self.region.upper)
+        room = np.maximum(upper - lower - 2 * sizes[:, None], 0)
+        return lower + sizes[:, None] + self._rng.uniform(0, 1, (count, 2)) * room, sizes
+
+    def _near(self, world: World) -> NDArray[np.intp]:
+        """Indices of the world's particles that may reach into the region."""
+        x0, y0, x1, y1 = self.region.extent()
+        (x, y), r = world.position.T, world.radius
+        return np.flatnonzero((x + r > x0) & (x - r < x1) & (y + r > y0) & (y - r < y1))
+
+
+class Sink(Actor):
+    """Removes the particles whose centre is in a region.
+
+    Args:
+        region: Box, Circle or a boundary of your own.
+        outside: remove those outside it instead, such as whatever has left the scene.
+
+    Attributes:
+        removed: particles so far.
+    """
+
+    def __init__(self, region: Boundary, *, outside: bool = False) -> None:
+        if not isinstance(region, Boundary):
+            raise InputError(f"region is {region!r}; allowed is an object such as pyverlet.Box((0, 0), (1, 1))")
+        self.region = region
+        self.outside = bool(outside)
+        self.removed = 0
+
+    def act(self, world: World, dt: float) -> None:
+        outside = self.region.outside(world.position)
+        gone = np.flatnonzero(outside if self.outside else ~outside)
+        if len(gone):
+            world.remove(gone)
+            self.removed += len(gone)
+
+    def save(self) -> Any:
+        return self.removed
+
+    def restore(self, saved: Any) -> None:
+        self.removed = saved

@@ -1,0 +1,14 @@
+"""Many particles and their links in one call: `pv.rope(world, (0, 5), (4, 5))`. Each returns its group and its links."""
+
+from __future__ import annotations
+
+from pyverlet.world.builders._built import Built, Sheet
+from pyverlet.world.builders.bridge import bridge
+from pyverlet.world.builders.chain import chain
+from pyverlet.world.builders.cloth import cloth
+from pyverlet.world.builders.net import net
+from pyverlet.world.builders.outline import box, disc
+from pyverlet.world.builders.rope import rope
+from pyverlet.world.builders.soft_body import soft_body
+
+__all__ = ["Built", "Sheet", "box", "bridge", "chain", "cloth", "disc", "net", "rope", "soft_body"]

@@ -1,0 +1,68 @@
+"""What builders return, and what they share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.ground import checks
+from pyverlet.ground.constants import STANDARD_GRAVITY
+from pyverlet.ground.errors import InputError
+from pyverlet.laws.links import Link
+from pyverlet.state.group import Group
+
+if TYPE_CHECKING:
+    from pyverlet.world.world import World
+
+Point = Sequence[float] | NDArray[np.float64]
+
+RIM = 0.49
+"""Radius of linked particles in terms of their spacing: neighbours all but touch, nothing slips through."""
+
+
+@dataclass(frozen=True)
+class Built:
+    """Particles and links.
+
+    Attributes:
+        group: the particles.
+        links: what was appended to `world.links`.
+    """
+
+    group: Group
+    links: tuple[Link, ...]
+
+
+@dataclass(frozen=True)
+class Sheet(Built):
+    """Particles in rows.
+
+    Attributes:
+        grid: (rows, columns) indices in the group, row 0 on top: `sheet.group.pin(sheet.grid[0])` hangs it by its upper edge.
+    """
+
+    grid: NDArray[np.int64]
+
+
+def add(world: World, position: NDArray[np.float64], spacing: float, radius: float | None, mass: float) -> Group:
+    """Particles that weigh `mass` together; their radius unless given is RIM of the spacing."""
+    each = checks.number("mass", mass, above=0.0) / len(position)
+    return world.add(position=position, radius=RIM * spacing if radius is None else radius, mass=each)
+
+
+def ends(start: Point, end: Point) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Two different points, and how far they are apart, m."""
+    a, b = np.array(checks.vector("start", start)), np.array(checks.vector("end", end))
+    apart = float(np.hypot(*(b - a)))
+    if apart == 0.0:
+        raise InputError(f"end is {tuple(map(float, b))}, where start is; allowed is another point")
+    return a, b, apart
+
+
+def weight(world: World, mass: float) -> float:
+    """m g, N; standard gravity in a world without any."""
+    return mass * (float(np.hypot(*world.gravity)) or float(np.hypot(*STANDARD_GRAVITY)))

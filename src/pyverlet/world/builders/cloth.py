@@ -1,0 +1,71 @@
+"""A cloth: threads crosswise that do not stretch, and hold their square shape a little."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.ground import checks
+from pyverlet.laws.links import Link, Rope, Spring
+from pyverlet.world.builders._built import Point, Sheet, weight
+from pyverlet.world.builders.net import lay_grid, threads
+
+if TYPE_CHECKING:
+    from pyverlet.world.world import World
+
+
+def cloth(
+    world: World,
+    top_left: Point,
+    *,
+    width: float,
+    height: float,
+    columns: int = 20,
+    rows: int = 20,
+    mass: float = 1.0,
+    radius: float | None = None,
+    slack: float = 0.0,
+    compliance: float = 0.0,
+    shear: float | None = None,
+    breaking_force: float = np.inf,
+) -> Sheet:
+    """A sheet of particles joined by threads, with springs across. `cloth.group.pin(cloth.grid[0])` hangs it by its upper edge.
+
+    Args:
+        world: gets the particles and the links.
+        top_left: (x, y) of the first particle, m.
+        width, height: of the cloth, m.
+        columns, rows: of particles, at least 2.
+        mass: of all particles together, kg.
+        radius: of each, m; by default neighbours all but touch.
+        slack: part by which the threads along the rows are longer than the way: the cloth hangs in folds.
+        compliance: of each piece of thread, m/N.
+        shear: N/m of the springs across; 0 for none. None takes five times the weight over the height.
+        breaking_force: at which a piece of thread or a spring breaks, N. Where that is finite, a spring does so at three times
+            its length too: it would hold on to what has been torn off.
+    """
+    k = 5.0 * weight(world, mass) / height if shear is None else checks.number("shear", shear, least=0.0)
+    group, grid = lay_grid(world, top_left, width, height, columns, rows, mass, radius)
+    along = (1.0 + checks.number("slack", slack, least=0.0)) * width / (grid.shape[1] - 1)
+    (a, b), (c, d) = threads(grid)
+    links: list[Link] = [
+        Rope(group, a, b, length=along, compliance=compliance, breaking_force=breaking_force, collide=False),
+        Rope(group, c, d, compliance=compliance, breaking_force=breaking_force, collide=False),
+    ]
+    if k > 0.0:
+        diagonal = float(np.hypot(width / (grid.shape[1] - 1), height / (grid.shape[0] - 1)))
+        across = min(breaking_force, 2.0 * k * diagonal) if np.isfinite(breaking_force) else np.inf
+        for square in (grid, grid[:, ::-1]):
+            a, b = diagonals(square)
+            links.append(Spring(group, a, b, stiffness=k, breaking_force=across, collide=False))
+    world.links.extend(links)
+    return Sheet(group, tuple(links), grid)
+
+
+def diagonals(grid: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Ends of the links from each to the next on the right below, diagonal after diagonal: each is solved at once."""
+    row, column = np.indices((grid.shape[0] - 1, grid.shape[1] - 1)).reshape(2, -1)
+    order = np.lexsort((row, column - row))
+    return grid[row[order], column[order]], grid[row[order] + 1, column[order] + 1]

@@ -1,0 +1,66 @@
+"""A net: ropes crosswise."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.ground import checks
+from pyverlet.laws.links import Rope
+from pyverlet.state.group import Group
+from pyverlet.world.builders._built import Point, Sheet, add
+
+if TYPE_CHECKING:
+    from pyverlet.world.world import World
+
+
+def net(
+    world: World,
+    top_left: Point,
+    *,
+    width: float,
+    height: float,
+    columns: int = 20,
+    rows: int = 20,
+    mass: float = 1.0,
+    radius: float | None = None,
+    compliance: float = 0.0,
+    breaking_force: float = np.inf,
+) -> Sheet:
+    """Knots in rows and columns, each tied to its neighbours by ropes. `net.group.pin(net.grid[0])` hangs it by its upper edge.
+
+    Args:
+        world: gets the particles and the ropes.
+        top_left: (x, y) of the first knot, m.
+        width, height: of the net, m.
+        columns, rows: of knots, at least 2.
+        mass: of all knots together, kg.
+        radius: of each, m; by default neighbours all but touch.
+        compliance: of each piece of rope, m/N.
+        breaking_force: at which a piece breaks, N.
+    """
+    group, grid = lay_grid(world, top_left, width, height, columns, rows, mass, radius)
+    links = tuple(
+        world.links.append(Rope(group, a, b, compliance=compliance, breaking_force=breaking_force, collide=False))
+        for a, b in threads(grid)
+    )
+    return Sheet(group, links, grid)
+
+
+def lay_grid(
+    world: World, top_left: Point, width: float, height: float, columns: int, rows: int, mass: float, radius: float | None
+) -> tuple[Group, NDArray[np.int64]]:
+    """Particles in a grid, row 0 on top, and their indices (rows, columns)."""
+    x0, y0 = checks.vector("top_left", top_left)
+    across, down = checks.number("width", width, above=0.0), checks.number("height", height, above=0.0)
+    nx, ny = checks.whole("columns", columns, least=2), checks.whole("rows", rows, least=2)
+    x, y = np.meshgrid(x0 + np.linspace(0.0, across, nx), y0 - np.linspace(0.0, down, ny))
+    group = add(world, np.column_stack((x.ravel(), y.ravel())), min(across / (nx - 1), down / (ny - 1)), radius, mass)
+    return group, np.arange(nx * ny).reshape(ny, nx)
+
+
+def threads(grid: NDArray[np.int64]) -> tuple[tuple[NDArray[np.int64], NDArray[np.int64]], ...]:
+    """Ends of the links along the rows and down the columns, thread after thread: each is solved at once."""
+    return (grid[:, :-1].ravel(), grid[:, 1:].ravel()), (grid[:-1].T.ravel(), grid[1:].T.ravel())

@@ -1,0 +1,50 @@
+"""A rope: links in a line that pull and never push."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
+from pyverlet.laws.links import Rope
+from pyverlet.world.builders._built import Built, Point, add, ends
+
+if TYPE_CHECKING:
+    from pyverlet.world.world import World
+
+
+def rope(
+    world: World,
+    start: Point,
+    end: Point,
+    *,
+    length: float | None = None,
+    links: int = 20,
+    mass: float = 1.0,
+    radius: float | None = None,
+    compliance: float = 0.0,
+    breaking_force: float = np.inf,
+) -> Built:
+    """Particles from `start` to `end`, joined by ropes; `rope.group.pin([0, -1])` hangs it up at both ends.
+
+    Args:
+        world: gets the particles and the ropes.
+        start, end: (x, y) of the first and the last particle, m.
+        length: of the whole rope, m; more than the ends are apart makes it sag. None takes their distance.
+        links: how many pieces.
+        mass: of all particles together, kg.
+        radius: of each, m; by default they all but touch.
+        compliance: of each piece, m/N.
+        breaking_force: at which a piece breaks, N.
+    """
+    count = checks.whole("links", links)
+    a, b, apart = ends(start, end)
+    whole = apart if length is None else checks.number("length", length)
+    if whole < apart * (1 - 1e-6):
+        raise InputError(f"length is {whole:g} m; allowed is at least the distance from start to end, {apart:g} m")
+    group = add(world, a + np.linspace(0.0, 1.0, count + 1)[:, None] * (b - a), apart / count, radius, mass)
+    k = np.arange(count)
+    piece = Rope(group, k, k + 1, length=whole / count, compliance=compliance, breaking_force=breaking_force, collide=False)
+    return Built(group, (world.links.append(piece),))

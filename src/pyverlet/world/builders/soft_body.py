@@ -1,0 +1,123 @@
+"""A soft body: a skin of springs or sticks around something that is pressed, or a lattice of them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
+from pyverlet.laws.links import Area, Link, Spring, Stick
+from pyverlet.world.builders._built import RIM, Built, add, weight
+from pyverlet.world.builders.outline import Floats, inside, simple_polygon, walk
+
+if TYPE_CHECKING:
+    from pyverlet.world.world import World
+
+FIRMNESS = 40.0
+"""Weights that strain 1 of a skin, or of the inside across the width, takes unless said; its own is some hundredths."""
+
+
+def soft_body(
+    world: World,
+    outline: ArrayLike,
+    *,
+    spacing: float,
+    mass: float = 1.0,
+    stiffness: float | None = None,
+    damping: float | None = None,
+    bulk: float | None = None,
+    filled: bool = False,
+) -> Built:
+    """A body inside `outline`, such as `pv.builders.disc((0, 3), 1.0)`, `pv.builders.box((0, 0), (2, 1))` or corners of your own.
+
+    Hollow, it is a skin of springs that keeps its area: a balloon, which forgets its corners in time. Filled, it is a lattice of
+    springs throughout, which keeps its shape.
+
+    Args:
+        world: gets the particles and the links.
+        outline: (p, 2) corners of a polygon that does not cross itself, m. Its particles stay inside.
+        spacing: between neighbours, m.
+        mass: of the body, kg.
+        stiffness: of each spring, N/m; infinity makes them sticks. None takes 40 weights over the spacing, or over
+            the width if filled.
+        damping: of each spring, N s/m. None takes a tenth of what would stop the whole from swinging.
+        bulk: resistance of the area, N/m: a pressure of a hundredth of it takes a hundredth of the area. None takes 40 weights
+            over the width; 0 leaves the area alone. Hollow bodies only.
+        filled: a lattice instead of a skin.
+
+    Raises:
+        InputError: the outline crosses itself, there is no room for three particles, or a number is outside what is allowed.
+    """
+    corners = simple_polygon("outline", outline)
+    apart = checks.number("spacing", spacing, above=0.0)
+    width = float(np.ptp(corners[:, 0]))
+    firm = FIRMNESS * weight(world, checks.number("mass", mass, above=0.0))
+    k = firm / (width if filled else apart) if stiffness is None else _stiffness(stiffness)
+    if damping is None:
+        damping = 0.2 * float(np.sqrt(k * mass)) if np.isfinite(k) else 0.0
+    resistance = firm / width if bulk is None else checks.number("bulk", bulk, least=0.0)
+    shrunk = _shrink(corners, RIM * apart)
+    skin = walk(shrunk, apart)
+    if len(skin) < 3:
+        raise InputError(f"spacing is {apart:g} m; allowed is less, so that at least three particles fit along the outline")
+    points = np.concatenate((skin, _lattice(shrunk, skin, apart))) if filled else skin
+    nearest = float(np.sqrt(_squares(points)[np.triu_indices(len(points), 1)].min()))
+    group = add(world, points, min(apart, nearest), None, mass)
+    n = np.arange(len(skin))
+    pairs = np.column_stack((n, np.roll(n, -1))) if not filled else _neighbours(points, apart)
+    links: list[Link] = []
+    if np.isinf(k):
+        links.append(Stick(group, pairs[:, 0], pairs[:, 1], damping=0.0, collide=False))
+    else:
+        links.append(Spring(group, pairs[:, 0], pairs[:, 1], stiffness=k, damping=damping, collide=False))
+    if not filled and resistance > 0.0:
+        area = Area(group)
+        links.append(Area(group, compliance=float(area.area[0]) / resistance))
+    world.links.extend(links)
+    return Built(group, tuple(links))
+
+
+def _stiffness(value: float) -> float:
+    if value == np.inf:
+        return float(np.inf)
+    return checks.number("stiffness", value, above=0.0)
+
+
+def _shrink(corners: Floats, by: float) -> Floats:
+    """The polygon with its sides moved inward: the particles' rims stay inside the outline."""
+    along = np.roll(corners, -1, axis=0) - corners
+    along /= np.hypot(*along.T)[:, None]
+    inward = np.column_stack((-along[:, 1], along[:, 0]))
+    before = np.roll(inward, 1, axis=0)
+    # Where both moved sides meet; at very sharp corners no further than three times the shift.
+    shift = (inward + before) / np.maximum(1.0 + np.sum(inward * before, axis=1), 2 / 9)[:, None]
+    result: Floats = corners + by * shift
+    return result
+
+
+def _lattice(corners: Floats, skin: Floats, apart: float) -> Floats:
+    """Rows of a triangular lattice inside the skin, none nearer to it than 0.8 of the spacing."""
+    (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
+    rows = []
+    for r, y in enumerate(np.arange(y0, y1, apart * np.sqrt(0.75))):
+        x = np.arange(x0 + apart * (r % 2) / 2, x1, apart)
+        rows.append(np.column_stack((x, np.full_like(x, y))))
+    points = np.concatenate(rows)
+    points = points[inside(corners, points)]
+    nearest = np.array([np.min(np.sum((skin - point) ** 2, axis=1)) for point in points])
+    return np.asarray(points[nearest > (0.8 * apart) ** 2])
+
+
+def _squares(points: Floats) -> Floats:
+    """(k, k) squares of all distances."""
+    return np.asarray(np.sum((points[:, None] - points[None]) ** 2, axis=2))
+
+
+def _neighbours(points: Floats, apart: float) -> NDArray[np.int64]:
+    """(m, 2) pairs nearer than 1.5 spacings: first neighbours, the gap between skin and lattice included."""
+    square = _squares(points)
+    i, j = np.nonzero(np.triu(square < (1.5 * apart) ** 2, 1))
+    return np.column_stack((i, j))

@@ -1,0 +1,26 @@
+"""Doors up the house, for convenience: methods of a world that load what they name only when they are called."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from pyverlet.world.world import World
+
+
+class Doors:
+    """What a world offers besides physics. Nothing is loaded before it is asked for."""
+
+    def to_image(self: World, path: Any = None, **options: Any) -> NDArray[Any]:  # type: ignore[misc]
+        """A picture of the world now, (height, width, 3) bytes R, G, B; see `pyverlet.record.to_image` for path and options."""
+        from pyverlet.record import to_image
+
+        return to_image(self, path, **options)
+
+    def to_video(self: World, path: Any, **options: Any) -> Any:  # type: ignore[misc]
+        """Step the world and record it; see `pyverlet.record.to_video` for the options."""
+        from pyverlet.record import to_video
+
+        return to_video(self, path, **options)

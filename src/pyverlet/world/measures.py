@@ -1,0 +1,111 @@
+"""What can be measured about a world: energy, momentum, overlap, hash."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.ground.errors import InputError
+from pyverlet.kernels import measure
+from pyverlet.laws.contacts.collisions import ContactSolver, Overlap, measure_overlap
+from pyverlet.laws.energy import Energy, energy
+from pyverlet.laws.events import Events
+from pyverlet.laws.ledger import Bookkeeper, Ledger
+from pyverlet.world.particles import Particles
+
+Array = NDArray[Any]
+
+
+class Measures(Particles):
+    """The numbers of a world."""
+
+    time: float
+    gravity: tuple[float, float]
+    _books: Bookkeeper | None
+    _events: Events | None
+    _contacts: ContactSolver | None
+
+    def energy(self) -> Energy:
+        """Kinetic (motion and spin), potential, links and total energy, J."""
+        return energy(self._state, self.gravity, self.forces, self.links.energy())
+
+    @property
+    def keeps_ledger(self) -> bool:
+        """Whether `ledger` is there to be read."""
+        return self._books is not None
+
+    @property
+    def ledger(self) -> Ledger:
+        """Where the energy has gone since the world was built, as of the last frame.
+
+        Raises:
+            InputError: the world keeps none.
+        """
+        if self._books is None:
+            raise InputError("ledger is off in this world; allowed is a world built with World(ledger=True)")
+        return self._books.ledger
+
+    @property
+    def asleep(self) -> Array:
+        """(n,) bool, which particles sleep; nobody does unless the world was built with World(sleep=True). A copy."""
+        asleep = np.zeros(len(self), bool)
+        asleep[self._slots.particle[self._slots.asleep]] = True
+        return asleep
+
+    @property
+    def tells_events(self) -> bool:
+        """Whether `events` is there to be read."""
+        return self._events is not None
+
+    @property
+    def events(self) -> Events:
+        """Contacts that began or ended in the last frame, and hits.
+
+        Raises:
+            InputError: the world notes none.
+        """
+        if self._events is None:
+            raise InputError("events are off in this world; allowed is a world built with World(events=True)")
+        return self._events
+
+    def _spent(self) -> tuple[float, float]:
+        """What impacts and friction have taken in this frame, J, as the kernels of contacts and walls have noted."""
+        spent = self._slots.spent.sum(axis=0)
+        if self._contacts:
+            spent += self._contacts.broad_phase.list.spent.sum(axis=0)
+        return float(spent[0]), float(spent[1])
+
+    def momentum(self) -> Array:
+        """(2,) sum of m v over all free particles, kg m/s."""
+        return np.array(self._momenta()[:2])
+
+    def angular_momentum(self) -> float:
+        """Sum of m (x v_y - y v_x) + I spin about the origin, kg m^2/s."""
+        return float(self._momenta()[2])
+
+    def _momenta(self) -> tuple[float, float, float]:
+        s = self._state
+        return measure.momenta(s.position, s.velocity, s.spin, s.radius, s.mass)  # type: ignore[no-any-return]
+
+    def overlap(self) -> Overlap:
+        """Mean and largest overlap of the touching pairs, as fractions of their contact distance, and how many there are."""
+        return measure_overlap(self._state, self.links.unlist)
+
+    def escaped(self) -> int:
+        """Particles whose centre is outside the boundary."""
+        return int(np.count_nonzero(self.boundary.outside(self.position)))
+
+    def state_hash(self) -> str:
+        """16 hex digits of time and every particle's position, velocity, spin, radius and mass: equal bits, equal hash."""
+        digest = hashlib.blake2b(np.float64(self.time).tobytes(), digest_size=8)
+        for array in (self.position, self.velocity, self.spin, self.radius, self.mass):
+            digest.update(array.tobytes())
+        return digest.hexdigest()
+
+    @property
+    def rebuilds(self) -> int:
+        """How often the neighbour list has been built."""
+        return self._contacts.broad_phase.rebuilds if self._contacts else 0

@@ -1,0 +1,100 @@
+"""Worlds side by side: the same time passes in each, and each is drawn beside the others under its name."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator, Sequence
+
+from pyverlet.ground.errors import InputError
+from pyverlet.world.saved import Saved
+from pyverlet.world.world import World
+
+Pace = Callable[[World, int, float], None]
+"""How a world follows the frames of a screen: called with the world, the number of the frame (from 1) and its length dt in s."""
+
+
+def every_frame(world: World, frame: int, dt: float) -> None:
+    """One frame of the world for each of the screen: what worlds do unless said."""
+    world.step(dt)
+
+
+class Panel:
+    """A world with a name.
+
+    Args:
+        name: shown above it.
+        world: what it shows.
+        pace: how the world follows the frames of the screen.
+    """
+
+    def __init__(self, name: str, world: World, pace: Pace = every_frame) -> None:
+        self.name = name
+        self.world = world
+        self.frames = 0
+        self._pace = pace
+
+    def step(self, dt: float) -> None:
+        """One frame of the screen, dt seconds, passes."""
+        self.frames += 1
+        self._pace(self.world, self.frames, dt)
+
+
+class Panels:
+    """One or more worlds that are shown together.
+
+    Args:
+        panels: from left to right.
+        line: height y in metres of a line drawn across every panel, such as the height of the start; None draws none.
+    """
+
+    def __init__(self, panels: Sequence[Panel], *, line: float | None = None) -> None:
+        if not panels:
+            raise InputError("panels is empty; allowed is one panel or more")
+        self._panels = tuple(panels)
+        self.line = line
+
+    @classmethod
+    def of(cls, world: World | Panels) -> Panels:
+        """A single world as the only panel; panels as they are."""
+        return world if isinstance(world, Panels) else cls([Panel("", world)])
+
+    def __len__(self) -> int:
+        return len(self._panels)
+
+    def __iter__(self) -> Iterator[Panel]:
+        return iter(self._panels)
+
+    @property
+    def worlds(self) -> list[World]:
+        """The worlds, from left to right."""
+        return [panel.world for panel in self]
+
+    @property
+    def time(self) -> float:
+        """Seconds simulated in the world that is farthest."""
+        return max(world.time for world in self.worlds)
+
+    @property
+    def frames(self) -> int:
+        """Frames made by the world that made most."""
+        return max(world.frames for world in self.worlds)
+
+    def step(self, dt: float) -> None:
+        """One frame of the screen, dt seconds, passes in every panel."""
+        for panel in self:
+            panel.step(dt)
+
+    def save(self) -> list[tuple[int, Saved]]:
+        """A copy of everything that moves, for `restore`."""
+        return [(panel.frames, panel.world.save()) for panel in self]
+
+    def restore(self, saved: list[tuple[int, Saved]]) -> None:
+        """Go back to what `save` returned."""
+        for panel, (frames, state) in zip(self, saved, strict=True):
+            panel.frames = frames
+            panel.world.restore(state)
+
+    def state_hash(self) -> str:
+        """16 hex digits: the world's own for one, those of all worlds together for more."""
+        hashes = [world.state_hash() for world in self.worlds]
+        return hashes[0] if len(hashes) == 1 else hashlib.blake2b(" ".join(hashes).encode(), digest_size=8).hexdigest()

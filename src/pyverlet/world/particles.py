@@ -1,0 +1,144 @@
+"""What a world holds: its particles, how they are added and removed, and their arrays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyverlet.ground import checks
+from pyverlet.laws.contacts.collisions import ContactSolver
+from pyverlet.laws.forces import Force, Numbered
+from pyverlet.laws.links import Links
+from pyverlet.laws.rooms import Boundary
+from pyverlet.state.group import Column, Group
+from pyverlet.state.state import EVERYONE, Slots, State
+
+Array = NDArray[Any]
+
+
+class Particles:
+    """The particles of a world. Its arrays are views, in the order the particles were added."""
+
+    _state: State
+    _slots: Slots
+    _contacts: ContactSolver | None
+    forces: list[Force]
+    links: Links
+    _where = slice(None)
+    boundary: Boundary
+
+    def add(
+        self,
+        *,
+        position: ArrayLike,
+        velocity: ArrayLike = 0.0,
+        radius: ArrayLike = 0.5,
+        mass: ArrayLike = 1.0,
+        spin: ArrayLike = 0.0,
+        restitution: ArrayLike | None = None,
+        friction: ArrayLike | None = None,
+        category: ArrayLike = 1,
+        mask: ArrayLike = EVERYONE,
+    ) -> Group:
+        """Add particles.
+
+        Args:
+            position: (n, 2) or (2,), centres, m.
+            velocity: (n, 2), (2,) or 0, m/s.
+            radius: (n,) or one for all, m, greater than 0.
+            mass: (n,) or one for all, kg, greater than 0; infinity pins the particle.
+            spin: (n,) or one for all, rad/s, counter-clockwise.
+            restitution: (n,) or one for all, e from 0 to 1; None: as `Collisions` and the bounds say. The larger of two counts.
+            friction: (n,) or one for all, mu, 0 or more; None: as for restitution. The geometric mean of two counts, as in Box2D.
+            category: (n,) or one for all, 32 bits: what these circles are.
+            mask: (n,) or one for all, 32 bits: two circles collide if each has a bit of its category in the other's mask.
+
+        Returns:
+            A handle whose arrays are views on these particles, in the order given.
+
+        Raises:
+            InputError: shapes disagree, a value is not finite, or a circle does not fit into the boundary; nothing is added.
+        """
+        dtype = self._state.dtype
+        where = checks.rows("position", position, dtype)
+        count = len(where)
+        values = {
+            "position": where,
+            "velocity": checks.rows("velocity", velocity, dtype, count),
+            "acceleration": np.full((count, 2), np.nan, dtype),
+            "spin": checks.column("spin", spin, dtype, count),
+            "radius": checks.column("radius", radius, dtype, count),
+            "mass": checks.column("mass", mass, dtype, count),
+            "grown": np.ones(count, dtype),
+            "restitution": checks.column("restitution", -1.0 if restitution is None else restitution, dtype, count),
+            "friction": checks.column("friction", -1.0 if friction is None else friction, dtype, count),
+            "category": checks.bits("category", category, count),
+            "mask": checks.bits("mask", mask, count),
+        }
+        if restitution is not None:
+            checks.within("restitution", values["restitution"], 0.0, 1.0)
+        if friction is not None:
+            checks.within("friction", values["friction"], 0.0, np.inf)
+        checks.rows("spin", np.column_stack((values["spin"], values["spin"])), dtype, count)
+        checks.positive("radius", values["radius"])
+        checks.positive("mass", values["mass"], infinite_is="pinned")
+        self.boundary.check(values["radius"])
+        return Group(self._state, self._state.append(values), self.remove)
+
+    def remove(self, which: Group | ArrayLike) -> None:
+        """Remove particles. Groups keep the others, whose indices close ranks.
+
+        Args:
+            which: a group, an index, several, or (n,) bool. Many at once cost as much as one.
+
+        Raises:
+            InputError: there is no such particle; nothing is removed.
+        """
+        if isinstance(which, Group):
+            which = which.index
+        gone = checks.indices("which", which, len(self))
+        if not len(gone):
+            return
+        kept = np.ones(len(self), bool)
+        kept[gone] = False
+        now = self._state.remove(kept)
+        self._slots.forget(now)
+        if self._contacts:
+            self._contacts.broad_phase.forget()
+        self._renumber(now)
+
+    def _renumber(self, now: Array) -> None:
+        """Tell those who hold a particle by its index where it is now, or that it is no more (-1)."""
+        for holder in (self.links, self._contacts, *self.forces):
+            if isinstance(holder, Numbered):
+                holder.renumber(now)
+
+    def __len__(self) -> int:
+        return len(self._state)
+
+    position = Column("(n, 2) centres of all particles in the order they were added, m; a view.")
+    velocity = Column("(n, 2) m/s; a view.")
+    spin = Column("(n,) angular velocity, rad/s, counter-clockwise; a view.")
+    radius = Column("(n,) m; a view.")
+    mass = Column("(n,) kg, infinite where pinned; a view.")
+    restitution = Column("(n,) e of circles that have their own, negative where `Collisions` and the bounds decide; a view.")
+    friction = Column("(n,) mu of circles that have their own, negative where `Collisions` and the bounds decide; a view.")
+    category = Column("(n,) uint32, the bits of what each circle is; a view.")
+    mask = Column("(n,) uint32, the bits of the categories it collides with; a view.")
+
+    @property
+    def number(self) -> Array:
+        """(n,) a number for each particle, ascending, that it keeps while others come and go; a view, not to be written."""
+        return self._state.number
+
+    @property
+    def group_number(self) -> NDArray[np.int64]:
+        """(n,) which call of `add` brought each particle, ascending from 0; it keeps that while others come and go."""
+        return np.searchsorted(self._state.begun, self.number, side="right") - 1
+
+    @property
+    def version(self) -> int:
+        """How often particles were added or removed."""
+        return self._state.version

@@ -1,0 +1,181 @@
+"""Questions about where particles are, many at once: who covers a point, is in a box or a circle, is on a ray, is nearest."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
+from pyverlet.kernels import grid, motion, queries
+from pyverlet.state.state import State
+
+_ask: Any = queries
+_grid: Any = grid
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+FEW = 8
+"""Questions up to which looking at every particle costs less than sorting them into cells."""
+
+
+class RayHits(NamedTuple):
+    """What rays hit first."""
+
+    particle: Indices
+    """(q,) its index; -1 for none."""
+    distance: Floats
+    """(q,) from the origin to its rim, m; 0 from inside, infinity for none."""
+    normal: Floats
+    """(q, 2) of length 1, out of the particle where it is hit; 0 for none."""
+
+
+class Nearest(NamedTuple):
+    """The nearest centres, nearest first."""
+
+    particle: Indices
+    """(q, k) indices; -1 where the world has fewer than k."""
+    distance: Floats
+    """(q, k) from the point to the centre, m; infinity where there is none."""
+
+
+class Queries:
+    """What a world answers. Indices are those of its arrays; equally near ones come in their order."""
+
+    _state: State
+
+    def at_point(self, points: ArrayLike) -> Indices:
+        """(q,) the particle whose disc covers each point (q, 2) or (2,), m; of several the one of nearest centre, -1 for none."""
+        where = checks.rows("points", points, np.dtype(float))
+        found = np.full(len(where), -1, np.int64)
+        if len(self._state):
+            reach = float(self._state.radius.max())
+            _ask.at_points(where, reach, *_cells(self._state, len(where)), self._state.position, self._state.radius, found)
+        return found
+
+    def in_box(self, lower: ArrayLike, upper: ArrayLike) -> Indices:
+        """The particles whose centre is in the box from `lower` to `upper`, rim included, ascending.
+
+        Args:
+            lower: (2,) the lower left corner, m, or (q, 2) of many boxes.
+            upper: (2,) or (q, 2), the upper right corner.
+
+        Returns:
+            (k,) indices; for many boxes (k, 2), rows of box and particle.
+        """
+        low, high = (checks.rows(name, value, np.dtype(float)) for name, value in (("lower", lower), ("upper", upper)))
+        low, high = _alike("lower", low, "upper", high)
+        if (wrong := np.flatnonzero((low > high).any(axis=1))).size:
+            k = int(wrong[0])
+            raise InputError(
+                f"upper[{k}] is {_pair(high[k])}; allowed is a corner above and to the right of lower, {_pair(low[k])}"
+            )
+        return self._in(low, high, low, np.full(len(low), np.inf), many=np.ndim(lower) > 1 or np.ndim(upper) > 1)
+
+    def in_circle(self, center: ArrayLike, radius: ArrayLike) -> Indices:
+        """The particles whose centre is no farther than `radius` from `center`, ascending.
+
+        Args:
+            center: (2,) m, or (q, 2) of many circles.
+            radius: m, at least 0, or (q,).
+
+        Returns:
+            (k,) indices; for many circles (k, 2), rows of circle and particle.
+        """
+        middle = checks.rows("center", center, np.dtype(float))
+        size = np.asarray(radius, float)
+        if size.ndim == 1 and len(middle) == 1:
+            middle = np.broadcast_to(middle, (len(size), 2))
+        size = checks.column("radius", size, np.dtype(float), len(middle))
+        if (wrong := np.flatnonzero(~(np.isfinite(size) & (size >= 0)))).size:
+            raise InputError(f"radius[{wrong[0]}] is {size[wrong[0]]:g}; allowed is a finite number of at least 0")
+        box = size[:, None]
+        return self._in(middle - box, middle + box, middle, size, many=np.ndim(center) > 1 or np.ndim(radius) > 0)
+
+    def ray(self, origin: ArrayLike, direction: ArrayLike, length: ArrayLike = np.inf) -> RayHits:
+        """What rays hit first.
+
+        Args:
+            origin: (q, 2) or (2,), m.
+            direction: (q, 2) or (2,) where they go; its length does not matter.
+            length: m, how far they reach, or (q,).
+        """
+        start, heading = checks.rows("origin", origin, np.dtype(float)), checks.rows("direction", direction, np.dtype(float))
+        start, heading = _alike("origin", start, "direction", heading)
+        norm = np.hypot(*heading.T)
+        if (wrong := np.flatnonzero(norm == 0)).size:
+            raise InputError(f"direction[{wrong[0]}] is (0.0, 0.0); allowed is a direction other than 0")
+        heading = heading / norm[:, None]
+        far = checks.column("length", length, np.dtype(float), len(start))
+        if (wrong := np.flatnonzero(~(far >= 0))).size:
+            raise InputError(f"length[{wrong[0]}] is {far[wrong[0]]:g}; allowed is a number of at least 0")
+        index, distance, normal = np.full(len(start), -1, np.int64), np.full(len(start), np.inf), np.zeros((len(start), 2))
+        if len(self._state):
+            s = self._state
+            _ask.rays(
+                start, heading, far, float(s.radius.max()), *_cells(s, len(start)), s.position, s.radius, index, distance
+            )  # fmt: skip
+            hit = index >= 0
+            rim = start[hit] + distance[hit, None] * heading[hit] - s.position[index[hit]]
+            out = np.hypot(*rim.T)[:, None]
+            # From the very centre of a particle every way out is as good: against the ray.
+            normal[hit] = np.divide(rim, out, out=-heading[hit], where=out > 0)
+        return RayHits(index, distance, normal)
+
+    def nearest(self, points: ArrayLike, k: int = 1) -> Nearest:
+        """The k particles whose centres are nearest to each point (q, 2) or (2,), m."""
+        where = checks.rows("points", points, np.dtype(float))
+        count = checks.whole("k", k)
+        index, square = np.full((len(where), count), -1, np.int64), np.full((len(where), count), np.inf)
+        if len(self._state):
+            _ask.nearest(where, *_cells(self._state, len(where)), self._state.position, index, square)
+        return Nearest(index, np.sqrt(square))
+
+    def _in(self, low: Floats, high: Floats, middle: Floats, size: Floats, *, many: bool) -> Indices:
+        found, room = 0, 64
+        query, particle = (np.zeros(0, np.int64) for _ in range(2))
+        if len(self._state):
+            cells = _cells(self._state, len(low))
+            while room > len(query):
+                query, particle = (np.empty(room, np.int64) for _ in range(2))
+                found = int(_ask.in_regions(low, high, middle, size, *cells, self._state.position, query, particle))
+                room = max(room, found)
+        order = np.lexsort((particle[:found], query[:found]))
+        pairs = np.column_stack((query[:found], particle[:found]))[order]
+        return pairs if many else np.ascontiguousarray(pairs[:, 1])
+
+
+def _cells(state: State, questions: int) -> tuple[Any, ...]:
+    """Cells over all centres with about one particle in each, as the kernels take them; one for all where that is cheaper."""
+    position, member = state.position, np.arange(len(state))
+    if motion.first_non_finite(position) >= 0:
+        member = np.flatnonzero(np.isfinite(position).all(axis=1))
+        position = position[member]
+    x0, y0, x1, y1 = map(float, grid.extent(position))
+    width, height = x1 - x0, y1 - y0
+    if questions <= FEW:
+        return x0, y0, max(width, height) or 1.0, 1, 1, np.array([0, len(member)]), member
+    count = max(len(member), 1)
+    cell = max(np.sqrt(width * height / count), max(width, height) / count) or 1.0
+    columns, rows = int(width / cell) + 1, int(height / cell) + 1
+    number, start = np.empty(len(member), np.int32), np.empty(columns * rows + 2, np.int64)
+    # In float64, as the questions are: rounded another way, a particle might not be found in its cell.
+    _grid.count_cells(position.astype(np.float64), x0, y0, 1 / cell, columns, rows, number, start)
+    order = np.empty(len(member), np.int32)
+    _grid.sort_by_cell(number, start, order)
+    return x0, y0, cell, columns, rows, start, member[order]
+
+
+def _alike(first: str, a: Floats, second: str, b: Floats) -> tuple[Floats, Floats]:
+    """One row is spread over as many as the other has."""
+    if len(a) != len(b) and 1 not in (len(a), len(b)):
+        raise InputError(f"{second} has {len(b)} rows; allowed are 1 or {len(a)}, as many as {first}")
+    count = max(len(a), len(b)) if min(len(a), len(b)) else 0
+    return np.broadcast_to(a, (count, 2)).copy(), np.broadcast_to(b, (count, 2)).copy()
+
+
+def _pair(row: Floats) -> tuple[float, float]:
+    return float(row[0]), float(row[1])

@@ -1,0 +1,400 @@
+"""The world: particles, forces, integrator, bounds and collisions, advanced frame by frame by `World.step`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from pyverlet.compile import jit
+from pyverlet.ground import checks
+from pyverlet.ground.constants import ALL_THREADS_FROM, ONE_THREAD_BELOW, REST_ACCELERATIONS, STANDARD_GRAVITY
+from pyverlet.ground.errors import InputError, NonFiniteError
+from pyverlet.kernels import motion
+from pyverlet.laws.contacts.collisions import Collisions, ContactSolver
+from pyverlet.laws.events import Events
+from pyverlet.laws.forces import Force, ForceSum
+from pyverlet.laws.integrators import Integrator, PositionVerlet
+from pyverlet.laws.ledger import Bookkeeper
+from pyverlet.laws.limiter import Watch, undriven
+from pyverlet.laws.links import Links
+from pyverlet.laws.obstacles import Course, Obstacles
+from pyverlet.laws.rooms import Boundary, Open
+from pyverlet.laws.sleep import Sleep, laws
+from pyverlet.state.state import Slots, State
+from pyverlet.world.actors import Actor
+from pyverlet.world.convenience import Doors
+from pyverlet.world.fused import Fused
+from pyverlet.world.measures import Measures
+from pyverlet.world.moments import Moment
+from pyverlet.world.profile import Profile
+from pyverlet.world.queries import Queries
+from pyverlet.world.repeats import CLOSING, OPENING, Frame, Repeats
+from pyverlet.world.saved import Saved
+
+Array = NDArray[Any]
+
+# For scenes whose collisions argument is left alone: a fresh default each time, while None means no collisions.
+_DEFAULT_COLLISIONS = Collisions()
+
+
+class World(Measures, Queries, Doors):
+    """Particles in a room, and the laws they follow. SI units, y up.
+
+    Args:
+        gravity: (x, y), m/s^2.
+        integrator: how positions and velocities advance over a substep.
+        boundary: Circle, Box or Open.
+        collisions: how particles collide; None lets them pass through each other.
+        substeps: steps of length h = dt / substeps in one call of `step`.
+        dtype: float32 or float64, of all arrays.
+        events: note in `events` which contacts begin and end in each frame, and who hit whom how hard.
+        sleep: let circles at rest sleep until touched, at little cost; not with links, moving obstacles or forces but drag.
+        ledger: keep account of where the energy goes, in `ledger`.
+        threads: at most this many for the parallel stages; None is as many as pay off. Never changes the result.
+
+    Raises:
+        InputError: an argument is outside what is allowed.
+    """
+
+    def __init__(
+        self,
+        *,
+        gravity: Sequence[float] = STANDARD_GRAVITY,
+        integrator: Integrator | None = None,
+        boundary: Boundary | None = None,
+        collisions: Collisions | None = _DEFAULT_COLLISIONS,
+        substeps: int = 8,
+        dtype: DTypeLike = np.float32,
+        threads: int | None = None,
+        ledger: bool = False,
+        events: bool = False,
+        sleep: bool = False,
+    ) -> None:
+        self._state = State(checks.floating("dtype", dtype))
+        self._h_last: float | None = None  # substep of the frame before; None: the integrator starts anew
+        self._slots = Slots(self._state.dtype, sleeps=sleep)
+        self.links = Links(self._state)
+        self._events = Events() if events else None
+        self._sleep = Sleep() if sleep else None
+        self.forces: list[Force] = []
+        self._force_sum = ForceSum(checks.vector("gravity", gravity), self.forces)
+        self.actors: list[Actor] = []
+        self.obstacles = Obstacles()
+        self._course = Course(self.obstacles)
+        self.integrator = PositionVerlet() if integrator is None else integrator
+        self.boundary = Open() if boundary is None else boundary
+        self.collisions = collisions
+        self.substeps = substeps
+        self.threads = threads
+        self.time = 0.0
+        self.frames = 0
+        self.profile = Profile()
+        self._books = Bookkeeper() if ledger else None
+        self._repeats, self._fused = Repeats(), Fused()
+        self.onlooker: Callable[[Moment], None] | None = None
+        """Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins."""
+
+    # ---- one frame -----------------------------------------------------------------------------------------------------
+
+    def step(self, dt: float) -> None:
+        """Advance by one frame of dt seconds, in `substeps` steps of h = dt / substeps.
+
+        Raises:
+            InputError: dt is not a number greater than 0.
+            NonFiniteError: a particle turned NaN or infinite; the world still holds the frame before.
+        """
+        h = checks.number("dt", dt, above=0.0) / self.substeps
+        for actor in self.actors:
+            actor.act(self, dt)
+        jit.use_threads(self.threads)
+        self.profile.begin()
+        books = self._books and self._open_books(h)
+        self._frame(h, books or self.profile.mark)
+        self._refuse_non_finite(h)
+        self._accept(dt, h, books)
+        self.profile.end()
+
+    def _frame(self, h: float, told: Callable[[str], None]) -> None:
+        """The table of contents of the engine. `told` is called with the name of each stage as it ends."""
+        state, forces, integrator = self._slots, self._force_sum, self.integrator
+        contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course or None
+        fused, lag, state.drop = self._fused.begin(self.gravity, contacts), integrator.velocity_lag * h, integrator.drop
+        parts: list[Any] = [part for part in (contacts, links, course) if part]
+        frame = self._repeats.frame(self, h, contacts, told)
+        done = frame.done
+        if not self._open(frame, h, told):
+            return
+        watch = Watch(self._state, forces, self.links, self.boundary) if contacts and undriven(self, h, self._h_last) else None
+        for substep, kind, moved in frame.substeps(self.substeps):
+            self._show(substep, h, lag)
+            if not (moved or fused.leapt or fused.leap(self, contacts, h, kind)):
+                for part in parts:
+                    part.before(state, h)
+                integrator.step(state, forces, self.time + substep * h, h)
+            done("integrate")
+            if contacts:
+                contacts.find(state, lag)
+                done("broad phase")
+                if frame.plain and fused.substep(self, contacts, h, lag, done, kind):
+                    continue
+                contacts.project(state, h, lag, forces.strongest)
+                done("contacts")
+            if links:
+                self._solve(links, contacts, h)
+                done("links")
+            self.boundary.confine(state, h, lag, REST_ACCELERATIONS * forces.strongest * h)
+            done("bounds")
+            if course:
+                course.collide(state, substep * h, h, lag, REST_ACCELERATIONS * forces.strongest * h)
+                done("obstacles")
+            if contacts:
+                contacts.still(state, h)
+            done("velocities")
+            if links:
+                links.after(state)
+                done("links")
+        self._finish(frame, contacts, watch, h)
+        told("finish")
+
+    def run(self, *, seconds: float, dt: float = 1 / 60) -> None:
+        """Advance by as many frames of dt as come nearest to `seconds`."""
+        seconds = checks.number("seconds", seconds, least=0.0)
+        for _ in range(round(seconds / checks.number("dt", dt, above=0.0))):
+            self.step(dt)
+
+    def _open(self, frame: Frame, h: float, done: Callable[[str], None]) -> bool:
+        """Take up what users have set, and begin; False if nobody is awake."""
+        if self.links.begin() and self._contacts:
+            self._contacts.broad_phase.forget()
+        self._course.begin()
+        self._clear_notes()
+        if frame.made(OPENING):
+            done("gather")
+            return True
+        with frame.noted(OPENING):
+            self._gather()
+            done("gather")  # before the velocities are those of the integrator
+            if self._sleep and self._sleep.all_asleep(self._slots):
+                return False
+            self.integrator.begin(self._slots, self._force_sum, self.time, h, self._h_last)
+        return True
+
+    def _gather(self) -> None:
+        woken = self._sleep.begin(self._slots, self._state, laws(self)) if self._sleep else False
+        changed = self._slots.gather(self._state) or woken
+        if not self._slots.most_restitution <= 1.0:
+            checks.at_most("restitution", self._state.restitution, 1.0)
+        if not self._slots.most_friction < np.inf:
+            checks.at_most("friction", self._state.friction, float(np.finfo(self.dtype).max))
+        if not changed:
+            return
+        try:
+            checks.positive("radius", self._state.radius)
+            checks.positive("mass", self._state.mass, infinite_is="pinned")
+            self.boundary.check(self._state.radius)
+        except InputError:
+            # So that the next frame sees them as new, and refuses them again.
+            self._slots = Slots(self.dtype, sleeps=self._sleep is not None)
+            raise
+        if self._contacts:
+            self._contacts.broad_phase.forget()
+            if len(self) > 1:
+                self._contacts.fit(self._slots)
+
+    def _solve(self, links: Links, contacts: ContactSolver | None, h: float) -> None:
+        with contacts.aside(self._slots) if contacts else nullcontext():
+            links.solve(self._slots, h)
+
+    def _finish(self, frame: Frame, contacts: ContactSolver | None, watch: Watch | None, h: float) -> None:
+        """The substeps are done: who rests, the velocities of now, and no more energy than there may be."""
+        if not frame.made(CLOSING):
+            with frame.noted(CLOSING):
+                if contacts:
+                    lag, marked = self.integrator.velocity_lag * h, frame.leans and contacts.packs(self._slots) is not None
+                    contacts.end(self._slots, self._state, lag, self.substeps * h, self.gravity, marked=marked)
+                self.integrator.end(self._slots, h)
+        if contacts and watch:
+            contacts.growth.heed(watch.close(self._slots, contacts.listed()))
+
+    def _accept(self, dt: float, h: float, books: Any) -> None:
+        """The frame has gone well: what it made of the state is the truth now."""
+        self._slots.scatter(self._state)
+        if books:
+            books.close(self._spent())
+        self._course.end(dt)
+        self.links.scatter()
+        if self._events:
+            if self._contacts:
+                self._events.collect(self._slots, self._contacts.broad_phase.list)
+            self._events.close(self._slots, self._state)
+        self.profile.mark("scatter")
+        self.time += dt
+        self.frames += 1
+        self._h_last = h
+
+    def _show(self, done: int, h: float, lag: float) -> None:
+        if self.onlooker and done:
+            self.onlooker(Moment(self._slots, self.time + done * h, lag))
+            self.profile.mark("pictures")
+
+    def _open_books(self, h: float) -> Any:
+        lag = self.integrator.velocity_lag * h
+        return self._books and self._books.frame(self._slots, self._force_sum, self.links, self.time, h, lag, self.profile.mark)
+
+    def _clear_notes(self) -> None:
+        """What walls and contacts note about a frame starts anew."""
+        self._slots.clear_notes()
+        if self._events:
+            self._events.forget()
+        if self._contacts:
+            self._contacts.broad_phase.list.spent.fill(0)
+
+    def _first_non_finite(self) -> int:
+        for array in (self._slots.position, self._slots.velocity):
+            slot = int(motion.first_non_finite(array))
+            if slot >= 0:
+                return int(self._slots.particle[slot])
+        return -1
+
+    def _refuse_non_finite(self, h: float) -> None:
+        """Run a bad frame again from the last good state, looking after every stage: normal frames pay nothing for it."""
+        if self._first_non_finite() < 0:
+            return
+
+        def look(stage: str) -> None:
+            particle = self._first_non_finite()
+            if particle >= 0:
+                raise NonFiniteError(particle, stage, self.time)
+
+        if self._contacts:
+            self._contacts.broad_phase.forget()
+        self._frame(h, look)
+
+    # ---- laws ----------------------------------------------------------------------------------------------------------
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """float32 or float64."""
+        return self._state.dtype
+
+    @property
+    def gravity(self) -> tuple[float, float]:
+        """(x, y), m/s^2."""
+        return self._force_sum.gravity
+
+    @gravity.setter
+    def gravity(self, value: Sequence[float]) -> None:
+        self._force_sum.gravity = checks.vector("gravity", value)
+
+    @property
+    def substeps(self) -> int:
+        """Steps of length h = dt / substeps in a frame; changing it restarts the integrator."""
+        return self._substeps
+
+    @substeps.setter
+    def substeps(self, value: int) -> None:
+        self._substeps = checks.whole("substeps", value)
+        self._h_last = None
+
+    @property
+    def integrator(self) -> Integrator:
+        """How positions and velocities advance over a substep; changing it restarts the motion from position and velocity."""
+        return self._integrator
+
+    @integrator.setter
+    def integrator(self, value: Integrator) -> None:
+        if not isinstance(value, Integrator):
+            raise InputError(f"integrator is {value!r}; allowed is an object such as pyverlet.PositionVerlet()")
+        self._integrator = value
+        self._h_last = None
+        self._state.acceleration[:] = np.nan
+
+    @property
+    def boundary(self) -> Boundary:
+        """The room: Circle, Box, Open or your own."""
+        return self._boundary
+
+    @boundary.setter
+    def boundary(self, value: Boundary) -> None:
+        if not isinstance(value, Boundary):
+            raise InputError(f"boundary is {value!r}; allowed is an object such as pyverlet.Circle(radius=10) or pyverlet.Open()")
+        value.check(self._state.radius)
+        self._boundary = value
+
+    @property
+    def collisions(self) -> Collisions | None:
+        """How particles collide; None lets them pass through each other."""
+        return self._collisions
+
+    @collisions.setter
+    def collisions(self, value: Collisions | None) -> None:
+        if value is not None and not isinstance(value, Collisions):
+            raise InputError(f"collisions is {value!r}; allowed are pyverlet.Collisions(...) and None")
+        self._collisions = value
+        self._contacts = (
+            None if value is None else ContactSolver(value, self._state.dtype, self.links.unlist, self._events, self._sleep)
+        )
+
+    @property
+    def threads(self) -> int:
+        """Threads the parallel stages use; the result is the same for any number. Set None for as many as pay off."""
+        if self._threads is None:
+            return jit.max_threads() if len(self) >= ALL_THREADS_FROM else 1
+        return self._threads if len(self) >= ONE_THREAD_BELOW else 1
+
+    @threads.setter
+    def threads(self, value: int | None) -> None:
+        most = jit.max_threads()
+        self._threads = None if value is None else checks.whole("threads", value, most=most, most_is=" (the cores here)")
+
+    # ---- save and restore ----------------------------------------------------------------------------------------------
+
+    def save(self) -> Saved:
+        """A copy of everything that moves; `restore` continues from it with the same bits."""
+        return Saved(
+            world=self._state,
+            arrays={name: array.copy() for name, array in self._state.arrays()},
+            time=self.time,
+            frames=self.frames,
+            h_last=self._h_last,
+            slots=self._slots.save(),
+            contacts=self._contacts.save() if self._contacts else None,
+            books=self._books and self._books.copy(),
+            events=self._events and self._events.copy(),
+            sleep=self._sleep and self._sleep.copy(),
+            obstacles=self.obstacles.save(),
+            actors=[(actor, actor.save()) for actor in self.actors],
+            links=self.links.save(),
+        )
+
+    def restore(self, saved: Saved) -> None:
+        """Go back to what `save` returned, with the particles of then: groups added since are dead, removed ones live again.
+
+        Raises:
+            InputError: it is another world's.
+        """
+        if saved.world is not self._state:
+            raise InputError("saved is the state of another world; allowed is what save() of this one returned")
+        numbers = self._state.number.copy()
+        self._state.restore(saved.arrays)
+        if not np.array_equal(numbers, self._state.number):
+            where = np.searchsorted(self._state.number, numbers).clip(max=max(len(self) - 1, 0))
+            self._renumber(np.where(self._state.number[where] == numbers, where, -1) if len(self) else np.full(len(numbers), -1))
+        self.links.restore(saved.links)
+        self.obstacles.restore(saved.obstacles)
+        self.actors[:] = [actor for actor, _ in saved.actors]
+        for actor, memory in saved.actors:
+            actor.restore(memory)
+        self.time, self.frames, self._h_last = saved.time, saved.frames, saved.h_last
+        self._slots.restore(saved.slots, self._state)
+        self._books = saved.books and saved.books.copy()
+        if self._sleep and saved.sleep:
+            self._sleep.take(saved.sleep, laws(self))
+        if self._events and saved.events:
+            self._events.take(saved.events)
+        if self._contacts:
+            self._contacts.restore(saved.contacts, self._slots)

@@ -1,0 +1,169 @@
+"""What contacts put into a world too much is taken back: from whom, by how much, and from nobody else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet.ground.constants import SURPLUS
+from pyverlet.lab.physics import energy as rows
+from pyverlet.laws import limiter
+from pyverlet.state.state import Slots
+
+G = 9.81
+
+
+@pytest.fixture
+def taken(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """J that were taken back, frame by frame."""
+    amounts: list[float] = []
+    real = limiter.Watch.take_back
+
+    def noted(self: limiter.Watch, slots: object, pairs: object, surplus: float) -> None:
+        amounts.append(surplus)
+        real(self, slots, pairs, surplus)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(limiter.Watch, "take_back", noted)
+    return amounts
+
+
+def crowd(count: int = 200, **options: object) -> pv.World:
+    """Circles at random places of which most overlap."""
+    world = pv.World(boundary=pv.Circle(radius=10), **options)  # type: ignore[arg-type]
+    world.add(position=np.random.default_rng(1).uniform(-6, 6, (count, 2)), radius=0.5)
+    return world
+
+
+@pytest.mark.parametrize("substeps", [1, 2, 8])
+@pytest.mark.parametrize("seed", range(3))
+def test_energy_rises_no_more_than_allowed(substeps: int, seed: int, taken: list[float]) -> None:
+    # dE <= SURPLUS m g H in every frame; positions are rounded to half a digit of 16 m: 1e-6 m of 20 m.
+    world = pv.World(boundary=pv.Circle(radius=10), substeps=substeps, collisions=pv.Collisions(restitution=0.5 * (seed % 2)))
+    world.add(position=np.random.default_rng(seed).uniform(-6, 6, (200, 2)), radius=0.5)
+    before, most = world.energy().total, SURPLUS * 200 * G * 20
+    for _ in range(180):
+        world.step(1 / 60)
+        now = world.energy().total
+        assert now - before <= most * (1 + 1e-2)
+        before = now
+    assert taken  # or nothing has been tested
+
+
+def test_without_it_energy_rises_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pyverlet.world.world.undriven", lambda *_: False)
+    assert rows.worst_rise(crowd(), 2.0)[0] > 5 * rows.MOST
+
+
+def test_what_has_touched_a_wall_is_lowered_too() -> None:
+    # At 7.47 s bricks that the ball has crushed lift it off the floor, and all motion there is does not pay for that.
+    world = pv.scenes.get("wrecking-ball").world(particles=400, substeps=4, restitution=0.5, friction=0.5)
+    assert rows.worst_rise(world, 8.0)[0] <= rows.MOST
+
+
+def test_momentum_and_angular_momentum_stay(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Of circles that nothing holds only the part of the velocities is taken that has neither. Both are kept to rounding, of the
+    # momenta of all added up without their signs; here they are looked at before and after, for pushes move what turns.
+    monkeypatch.setattr(limiter, "SURPLUS", 1e-7)  # or they part too gently
+    world = pv.World(gravity=(0, 0), dtype=np.float64)
+    rng = np.random.default_rng(2)
+    circles = world.add(position=rng.uniform(-0.3, 0.3, (60, 2)), velocity=(3.0, -1.0), radius=0.5, mass=rng.uniform(1, 5, 60))
+    circles.velocity += 0.5 * np.column_stack((-circles.position[:, 1], circles.position[:, 0]))
+    real, times = limiter.Watch.take_back, 0
+
+    def momenta(slots: Slots) -> np.ndarray:
+        (x, y), (vx, vy), m = slots.position.T, slots.velocity.T, slots.mass
+        return np.array([m @ vx, m @ vy, m @ (x * vy - y * vx)])
+
+    def compared(self: limiter.Watch, slots: Slots, pairs: object, surplus: float) -> None:
+        nonlocal times
+        before, velocity = momenta(slots), slots.velocity.copy()
+        real(self, slots, pairs, surplus)  # type: ignore[arg-type]
+        times += bool(np.abs(slots.velocity - velocity).max() > 1e-6)
+        size = float((slots.mass * np.hypot(*slots.velocity.T) * (1 + np.hypot(*slots.position.T))).sum())
+        assert momenta(slots) == pytest.approx(before, abs=1e-14 * size)
+
+    monkeypatch.setattr(limiter.Watch, "take_back", compared)
+    world.run(seconds=1)
+    assert times > 10
+
+
+def test_nothing_is_taken_from_those_who_touch_nobody(taken: list[float]) -> None:
+    # y = y0 + v t - g t^2 / 2 of one above the crowd, to rounding: PositionVerlet is exact under a constant acceleration.
+    world = crowd(dtype=np.float64)
+    world.run(seconds=1)
+    taken.clear()
+    ball = world.add(position=(0, 8.0), velocity=(0, 3.0), radius=0.1)
+    for frame in range(1, 31):
+        world.step(1 / 60)
+        t = frame / 60
+        assert ball.position[0, 1] == pytest.approx(8 + 3 * t - 0.5 * G * t**2, abs=1e-12)
+    assert taken
+
+
+def test_a_crowd_grows_as_fast_as_its_energy_may(taken: list[float]) -> None:
+    # 200 circles must be raised before they are as large as they are: by m g dy, at 60 SURPLUS m g H a second at most.
+    world = crowd()
+    world.run(seconds=1)  # they have fallen in a heap
+    low, start = float(world.position[:, 1].mean()), world.time
+    while world._state.grown.min() < 1:
+        world.step(1 / 60)
+        assert world.time < 60
+    rise = float(world.position[:, 1].mean()) - low
+    least = rise / (60 * SURPLUS * 20)
+    assert 0.9 * least < world.time - start < 2 * least
+    world.run(seconds=2)
+    assert world.overlap().max < 0.01
+
+
+def test_a_driven_world_is_left_alone(taken: list[float]) -> None:
+    class Pump:
+        velocity_dependent = True
+
+        def apply(self, state: Slots, t: float) -> None:
+            state.force += 5 * state.velocity
+
+    pumped, gaining = crowd(), crowd(integrator=pv.ExplicitEuler())
+    pumped.forces.append(Pump())
+    for world in (pumped, gaining):
+        world.run(seconds=0.5)
+    assert not taken
+
+
+def test_a_large_world_takes_no_notice_of_a_small_crowd(taken: list[float]) -> None:
+    # 20 circles in one point, 1,000 others at rest on the floor: growing, the 20 raise the energy by less than is allowed.
+    world = pv.World(boundary=pv.Box((0, 0), (200, 50)))
+    x, y = np.meshgrid(np.arange(0.5, 200, 1.01)[:190], np.arange(0.5, 5, 1.01))
+    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.5)
+    world.add(position=np.tile((100, 20), (20, 1)), radius=0.5)
+    world.run(seconds=8)
+    assert world._state.grown.min() == 1
+    assert not taken
+
+
+def test_the_same_bits_when_saved_and_for_any_threads() -> None:
+    def big(threads: int) -> pv.World:
+        world = pv.World(boundary=pv.Circle(radius=35), threads=threads)
+        world.add(position=np.random.default_rng(1).uniform(-20, 20, (2500, 2)), radius=0.5)
+        world.run(seconds=1)
+        return world
+
+    one, many = big(1), big(pv.compile.jit.max_threads())
+    assert one.state_hash() == many.state_hash()
+    saved = one.save()
+    one.run(seconds=0.5)
+    then = one.state_hash()
+    one.restore(saved)
+    one.run(seconds=0.5)
+    assert one.state_hash() == then
+
+
+def test_gravity_that_turns_within_a_frame_is_no_gain(taken: list[float]) -> None:
+    # Heights are worth something else then: m (g - g') . x of energy that no contact has given. Two balls fly undisturbed.
+    world = pv.World(boundary=pv.Circle(radius=50), gravity=(0, G))
+    balls = world.add(position=[(0, 10), (0, 20)], velocity=(0, 1), radius=0.5)
+    world.onlooker = lambda moment: setattr(world, "gravity", (0.0, -G))
+    world.step(1 / 60)
+    assert not taken
+    # One substep of v' = g, seven of v' = -g.
+    assert balls.velocity[:, 1] == pytest.approx(np.full(2, 1 - 6 * G / 480), abs=2 * G / 480)
