@@ -107,7 +107,7 @@ def test_one_core_has_no_helper(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_helper_ends_with_its_parent() -> None:
     parent = (
-        "import os, numpy as np; from pyverlet import warmup\n"
+        "import os, numpy as np; from pyverlet.world import warmup\n"
         "helper = warmup._Helper(np.dtype(np.float64), 1); print(helper._process.pid, flush=True); os._exit(0)"
     )
     pid = int(subprocess.run([sys.executable, "-c", parent], capture_output=True, text=True, check=True).stdout)
