@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.ground.constants import FED_SMOOTH, LENT
+from pyverlet.ground.constants import FED, LENT
 
 G = 9.81
 H = 1 / 480
@@ -22,14 +22,14 @@ def column(count: int, heavy: float, **options: object) -> tuple[pv.World, pv.Gr
 @pytest.mark.parametrize("times", [50.0, 1000.0])
 @pytest.mark.parametrize("substeps", [4, 8, 16])
 def test_a_heavy_circle_on_a_column_of_light_ones_soon_rests(times: float, substeps: int) -> None:
-    # Without loans the column is a spring: 10 contacts, each compressed by times g h^2 / FED_SMOOTH for masses of 1 kg, 4 cm at
+    # Without loans the column is a spring: 10 contacts, each compressed by times g h^2 / FED for masses of 1 kg, 4 cm at
     # 1000 kg and 8 substeps, on which the heavy circle bounced for minutes. Evened out, masses are as in a column of equal ones.
     world, circles = column(10, times, substeps=substeps)
     world.run(seconds=5)
     h = 1 / 60 / substeps
     weight = (times + 10) * G
-    # The heavy one lends the part LENT, and 10 light ones share it: depth = weight h^2 W / FED_SMOOTH with W = 2 / m'.
-    depth = weight * h * h * 2 / (1 + LENT * times / 10) / FED_SMOOTH
+    # The heavy one lends the part LENT, and 10 light ones share it: depth = weight h^2 W / FED with W = 2 / m'.
+    depth = weight * h * h * 2 / (1 + LENT * times / 10) / FED
     assert world.overlap().max < 2 * depth
     # What remains of the velocity carries the weight: at most g h upwards.
     assert np.abs(circles.velocity).max() < 2 * G * h

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.ground.constants import FED_SMOOTH, GROWTH, PUSHED
+from pyverlet.ground.constants import FED, GROWTH, PUSHED
 
 G = 9.81
 RADIUS = 0.5
@@ -92,18 +92,18 @@ def test_coincident_circles_separate_and_stay_inside() -> None:
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_circles_added_on_top_of_each_other_part_slowly(substeps: int, dtype: type) -> None:
     # They just touch at first and grow by at most GROWTH of their radius a second, so two part no faster than at 2 GROWTH r.
-    # What growth h puts into a substep is fed FED_SMOOTH times, and taken out again by the velocity pass.
+    # What growth h puts into a substep is fed FED times, and taken out again by the velocity pass.
     world = pv.World(gravity=(0, 0), substeps=substeps, dtype=dtype)
     balls = world.add(position=[(0.0, 0.0), (0.3, 0.0)], radius=RADIUS)
     fastest = 0.0
     while world.time < 1.2 / GROWTH:
         world.step(1 / 60)
         fastest = max(fastest, float(np.hypot(*balls.velocity.T).max()))
-    assert 0 < fastest < FED_SMOOTH * GROWTH * RADIUS
+    assert 0 < fastest < FED * GROWTH * RADIUS
     assert balls.position[1, 0] - balls.position[0, 0] == pytest.approx(2 * RADIUS, rel=2e-3)
-    # A velocity is fed FED_SMOOTH / PUSHED / h times how far a circle was pushed, rounded to half the last digit of the way it
+    # A velocity is fed FED / PUSHED / h times how far a circle was pushed, rounded to half the last digit of the way it
     # has gone since the list was made, some 0.1 m; a few roundings in the substeps whose pushes are not yet taken back.
-    rounding = 0.5 * float(np.spacing(dtype(0.1))) * FED_SMOOTH / PUSHED * 60 * substeps
+    rounding = 0.5 * float(np.spacing(dtype(0.1))) * FED / PUSHED * 60 * substeps
     assert world.momentum() == pytest.approx([0, 0], abs=10 * rounding)
 
 

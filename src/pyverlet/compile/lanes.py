@@ -151,6 +151,17 @@ def where_above(typing: Any, test: Any, limit: Any, a: Any, b: Any) -> Any:
 
 
 @intrinsic  # type: ignore[untyped-decorator]
+def where_set(typing: Any, bits: Any, a: Any, b: Any) -> Any:
+    """a in the lanes whose bit is set, b elsewhere."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        chosen = builder.bitcast(builder.trunc(args[0], ir.IntType(LANES)), ir.VectorType(ir.IntType(1), LANES))
+        return builder.select(chosen, args[1], args[2])
+
+    return a(bits, a, b), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
 def widen(typing: Any, a: Any) -> Any:
     """The same numbers in float64."""
     wide = LanesType(types.float64)

@@ -108,8 +108,9 @@ FED: Final = 1.6
 it keeps neighbours from undoing each other's push, more than all of it is stiffer: it holds the same weight with less overlap.
 docs/design/contacts.md has the comparison."""
 
-FED_SMOOTH: Final = 2.0
-"""FED of circles that neither bounce nor rub. With friction, more than 1.6 makes piles restless."""
+CARRIED_WEIGHT: Final = 0.25
+"""Of |a| h: a circle whose velocity a substep feeds by more than this carries weight. One that rests on others is fed 1 at least;
+one that touches a neighbour by a rounding error, nothing to speak of."""
 
 GRIP: Final = 0.8
 """Part of the slip of a contact that friction at rest feeds, divided by h, into the velocities: the tangential FED. Piles with

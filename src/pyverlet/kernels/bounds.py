@@ -211,7 +211,7 @@ def _at_cage(b, x0, y0, size, h, lag, e, mu, rest_speed):
     # Faster than a room width a substep one reflection is not enough: what is still outside waits at the wall.
     dx, dy = b.x - x0, b.y - y0
     distance = np.sqrt(dx * dx + dy * dy)
-    if distance > size:
+    if distance > room:
         b = moved(b, x0 + dx * (room / distance), y0 + dy * (room / distance), b.vx, b.vy, b.from_x, b.from_y)
     return b
 

@@ -104,7 +104,7 @@ def _hold(which, x0, y0, size, position, velocity, acceleration, radius, hits, h
         # Faster than a room width a substep: what is still outside waits at the wall.
         dx, dy = x - x0, y - y0
         distance = square_root(dx * dx + dy * dy)
-        outside = larger(distance - size, zero)
+        outside = larger(distance - room, zero)
         part = room / distance
         put(position, which, k, where_zero(outside, x, x0 + dx * part), where_zero(outside, y, y0 + dy * part))
         put(velocity, which, k, vx + away * nx, vy + away * ny)

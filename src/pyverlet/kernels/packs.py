@@ -1,16 +1,9 @@
-"""Contacts of inelastic circles without friction, eight pairs at a time.
+"""Candidate pairs in packs of eight that share no particle, so that `kernels.contact` can treat them eight at a time.
 
-What is computed for each pair, and why, is in kernels.contacts; here it is arranged so that a processor does eight at once:
-
-- The pairs of a strip, which come ordered by colour, are cut into packs of eight that share no particle, so that what one lane
-  writes no other one reads. A pack that is not full repeats its last pair: both lanes write the same.
-- A pair reads how far its circles have moved since the list was made, and adds what it knows of them from then: their distance,
-  the sum of their radii, how they share a push. Such small numbers keep their digits in float32, so that the velocities need not
-  be carried along: FED_SMOOTH / PUSHED / h times what a circle has been moved is what it is fed.
-- The second pass finds the normals where the first has left them, 0 for pairs that do not touch.
-- Nothing is decided for a single pair, only, before the first pack with a pair that was close, whether any of the eight touches.
-- The few packs with a pair that overlaps by more than DEEP are noted once a frame. What the sweep leaves of them beyond that is
-  treated again, as kernels.refine does.
+- The pairs of a strip, which come ordered by colour, are cut into packs. What one lane of a pack writes no other one reads. A pack
+  that is not full repeats its last pair: both lanes write the same.
+- Where a pair stood when the list was made is kept: how far its circles have moved since are small numbers, which keep their digits in
+  float32. So what circles are fed can be had from how far they have been pushed, and velocities need not be carried along.
 
 Everything runs strip by strip as kernels.pairs explains: even strips in parallel, then odd ones.
 """
@@ -20,33 +13,11 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
-from pyverlet.compile.lanes import (
-    ALL,
-    LANES,
-    larger,
-    load,
-    pick,
-    put,
-    smaller,
-    spread,
-    square_root,
-    store,
-    take,
-    where_zero,
-    which_above,
-)
-from pyverlet.compile.stealing import claim, none_claimed
-from pyverlet.ground.constants import CLOSE, DEEP, DEEP_PART, DEEP_SWEEPS, LARGEST_PUSH, PUSHED
-from pyverlet.kernels.motion import IN_PILE, arrive, set_out
+from pyverlet.compile.lanes import ALL, LANES, larger, pick, spread, store, take, which_above
+from pyverlet.ground.constants import CLOSE
 
 # Golden angle, rad: coincident centres part in directions spread evenly over the circle.
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
-
-# Particles one thread takes at a time where each is on its own.
-_CHUNK = 1024
-
-# Deep packs that are too few to be worth a meeting of the threads.
-_FEW = 64
 
 # Pairs that are looked at again for each new pack.
 _WAITING = 32
@@ -157,192 +128,24 @@ def share_out(begin, lanes, lane_i, lane_j, radius, inverse_mass, reach, share):
 
 
 @kernel
-def project_strip(
-    moved, apart, lane_i, lane_j, gap_x, gap_y, reach, share, varied, most, normal_x, normal_y, depths, deep, looks
-):  # fmt: skip
-    """Returns how many packs with a pair that overlaps by more than DEEP it has noted in `deep`."""
-    noted, count = depths.shape[0] > 0, 0
-    zero, one, limit = spread(most - most), spread(most / most), spread(moved.dtype.type(DEEP))
-    pushed, most = spread(moved.dtype.type(PUSHED)), spread(most)
-    for k in range(0, lane_i.shape[0], LANES):
-        xi, yi = take(moved, lane_i, k)
-        xj, yj = take(moved, lane_j, k)
-        dx, dy = load(gap_x, k) + (xj - xi), load(gap_y, k) + (yj - yi)
-        r, part = load(reach, k * varied), load(share, k * varied)
-        distance = square_root(dx * dx + dy * dy)
-        if k < apart and which_above(r, distance) == 0:
-            store(normal_x, k, zero)
-            store(normal_y, k, zero)
-            if noted:
-                store(depths, k, zero)
-            continue
-        depth = smaller(larger(r - distance, zero), most * r)
-        dx = where_zero(distance, r, dx)
-        distance = where_zero(distance, r, distance)
-        per_metre = one / distance
-        nx, ny = dx * per_metre, dy * per_metre
-        push = pushed * depth
-        cx, cy = nx * push, ny * push
-        put(moved, lane_i, k, xi - cx * part, yi - cy * part)
-        put(moved, lane_j, k, xj + cx * (one - part), yj + cy * (one - part))
-        store(normal_x, k, where_zero(depth, zero, nx))
-        store(normal_y, k, where_zero(depth, zero, ny))
-        if noted:
-            store(depths, k, depth)
-        elif looks and which_above(depth, limit * r) != 0:
-            deep[count] = k
-            count += 1
-    return count
+def compose(begin, lanes, lane_i, lane_j, radius, inverse_mass, restitution, friction, e, mu, made_of):
+    """What each pair is made of, the rows of `contact.Pairs.made_of`.
 
-
-@kernel
-def refine_strip(moved, lane_i, lane_j, gap_x, gap_y, reach, share, varied, deep, count):
-    """Part again, there and back, the packs in deep[:count] that still overlap by more than DEEP; returns how many those are.
-
-    Beyond LARGEST_PUSH it is no weight but a mistake, and has been pushed enough.
+    Of two circles the larger restitution counts, and the geometric mean of the frictions; e and mu, those of all, stand for ones that
+    are negative: not given.
     """
-    real = moved.dtype.type
-    zero, one, near, nearest = spread(real(0)), spread(real(1)), spread(real(1 - DEEP)), spread(real(1 - LARGEST_PUSH))
-    pushed = spread(real(DEEP_PART * PUSHED))
-    for sweep in range(DEEP_SWEEPS):
-        left = 0
-        for m in range(count):
-            k = deep[count - 1 - m if sweep % 2 else m]
-            xi, yi = take(moved, lane_i, k)
-            xj, yj = take(moved, lane_j, k)
-            dx, dy = load(gap_x, k) + (xj - xi), load(gap_y, k) + (yj - yi)
-            r, part = load(reach, k * varied), load(share, k * varied)
-            distance = square_root(dx * dx + dy * dy)
-            excess = where_zero(larger(distance - nearest * r, zero), zero, larger(near * r - distance, zero))
-            if which_above(excess, zero) == 0:
-                continue
-            if sweep == 0:
-                deep[left] = k
-                left += 1
-            push = pushed * excess / larger(distance, nearest * r)
-            cx, cy = dx * push, dy * push
-            put(moved, lane_i, k, xi - cx * part, yi - cy * part)
-            put(moved, lane_j, k, xj + cx * (one - part), yj + cy * (one - part))
-        if sweep == 0:
-            count = left
-    return count
-
-
-@kernel
-def _refine_some(first, stop, parity, moved, begin, lanes, lane_i, lane_j, gap, reach, share, varied, deep, deeps):
-    """`refine_strip` for the strips 2 half + parity, half from `first` up to `stop`."""
-    for half in range(first, stop):
-        s = 2 * half + parity
-        if deeps[s] > 0:
-            a, b = begin[s], begin[s] + lanes[s]
-            pairs = (lane_i[a:b], lane_j[a:b], gap[0, a:b], gap[1, a:b], reach[a * varied :], share[a * varied :], varied)
-            deeps[s] = refine_strip(moved, *pairs, deep[a // LANES : b // LANES], deeps[s])
-
-
-@parallel_kernel
-def project(
-    position, velocity, origin, moved, cut, begin, lanes, apart, lane_i, lane_j, gap, reach, share, varied, feed, most, normal,
-    depths, deep, deeps, fresh, sets_out, arrives, claims,
-):  # fmt: skip
-    """Move overlapping pairs apart, feed their velocities, and note the normals of those that touch.
-
-    varied: 1; or 0 if reach and share are the same for all and have one pack only. feed: FED / PUSHED / h, 1/s. depths: (lanes,)
-    for the overlaps, m, of pairs at their turn, 0 for those that do not touch; or (0,) if nobody asks. deep: (lanes / LANES,)
-    where in its strip s each of the deeps[s] packs begins that are treated again; noted anew if fresh[0], which is then 0.
-    cut: (2, threads + 1), which half s // 2 of the strips s with s % 2 = 0, and 1, each thread begins with. normal: (2, lanes).
-    moved: (n, 2) to work with. sets_out: 1 if it is yet to be set to position - origin. arrives: 1 if what becomes of it is to be
-    added to positions and fed to velocities, 0 if others do that. claims: `_claims.Claims`.
-    """
-    n, looks, listed = position.shape[0], fresh[0] != 0, (lane_i, lane_j, gap, reach, share, varied)
-    chunks = (n + _CHUNK - 1) // _CHUNK
-    if sets_out != 0:
-        for c in prange(chunks):
-            a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
-            set_out(position[a:b], origin[a:b], moved[a:b])
-    for parity in range(2):
-        none_claimed(claims)
-        for part in prange(claims.shape[0]):
-            half = claim(claims, cut[parity], part)
-            while half >= 0:
-                s = 2 * half + parity
-                a, b = begin[s], begin[s] + lanes[s]
-                pairs = (lane_i[a:b], lane_j[a:b], gap[0, a:b], gap[1, a:b], reach[a * varied :], share[a * varied :], varied)
-                noted = (most, normal[0, a:b], normal[1, a:b], depths[a:b], deep[a // LANES : b // LANES], looks)
-                count = project_strip(moved, apart[s], *pairs, *noted)
-                if looks:
-                    deeps[s] = count
-                half = claim(claims, cut[parity], part)
-    left = 0
-    for s in range(deeps.shape[0]):
-        left += deeps[s]
-    for parity in range(2):
-        if left < _FEW:
-            _refine_some(0, cut[parity, -1], parity, moved, begin, lanes, *listed, deep, deeps)
-        else:
-            for part in prange(cut.shape[1] - 1):
-                _refine_some(cut[parity, part], cut[parity, part + 1], parity, moved, begin, lanes, *listed, deep, deeps)
-    if arrives != 0:
-        for c in prange(chunks):
-            a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
-            arrive(position[a:b], velocity[a:b], origin[a:b], moved[a:b], feed)
-    fresh[0] = 0
-
-
-@kernel
-def still_strip(velocity, apart, lane_i, lane_j, share, varied, one, normal_x, normal_y):
-    """What `still` does, of one strip."""
-    zero, whole = spread(one - one), spread(one)
-    for k in range(0, lane_i.shape[0], LANES):
-        nx, ny, part = load(normal_x, k), load(normal_y, k), load(share, k * varied)
-        if k < apart and which_above(nx * nx + ny * ny, zero) == 0:
-            continue
-        xi, yi = take(velocity, lane_i, k)
-        xj, yj = take(velocity, lane_j, k)
-        speed = (xj - xi) * nx + (yj - yi) * ny
-        cx, cy = speed * nx, speed * ny
-        put(velocity, lane_i, k, xi + cx * part, yi + cy * part)
-        put(velocity, lane_j, k, xj - cx * (whole - part), yj - cy * (whole - part))
-
-
-@parallel_kernel
-def still(velocity, cut, begin, lanes, apart, lane_i, lane_j, share, varied, normal, resting, fresh, marks, claims):
-    """Set the normal velocity of touching pairs to 0; if `marks` is 1, do what `mark_touching` does, too."""
-    one = velocity.dtype.type(1)
-    for parity in range(2):
-        none_claimed(claims)
-        for part in prange(claims.shape[0]):
-            half = claim(claims, cut[parity], part)
-            while half >= 0:
-                s = 2 * half + parity
-                a, b = begin[s], begin[s] + lanes[s]
-                pairs, normals = (lane_i[a:b], lane_j[a:b]), (normal[0, a:b], normal[1, a:b])
-                still_strip(velocity, apart[s], *pairs, share[a * varied :], varied, one, *normals)
-                if marks != 0:
-                    mark_strip(resting, *pairs, *normals)
-                half = claim(claims, cut[parity], part)
-    if marks != 0:
-        fresh[0] = 1
-
-
-@kernel
-def mark_strip(flag, lane_i, lane_j, normal_x, normal_y):
-    """What `mark_touching` does, of one strip."""
-    zero = spread(normal_x.dtype.type(0))
-    for k in range(0, lane_i.shape[0], LANES):
-        nx, ny = load(normal_x, k), load(normal_y, k)
-        touches = which_above(nx * nx + ny * ny, zero)
-        for lane in range(LANES):
-            bit = np.uint8(((touches >> lane) & 1) * IN_PILE)
-            flag[lane_i[k + lane]] |= bit
-            flag[lane_j[k + lane]] |= bit
-
-
-@parallel_kernel
-def mark_touching(cut, begin, lanes, lane_i, lane_j, normal, flag, fresh):
-    """flag[i] gains IN_PILE for every particle of a touching pair. fresh[0] = 1: `project` notes anew who overlaps deeply."""
-    fresh[0] = 1
-    for parity in range(2):
-        for part in prange(cut.shape[1] - 1):
-            for half in range(cut[parity, part], cut[parity, part + 1]):
-                a, b = begin[2 * half + parity], begin[2 * half + parity] + lanes[2 * half + parity]
-                mark_strip(flag, lane_i[a:b], lane_j[a:b], normal[0, a:b], normal[1, a:b])
+    zero = e - e
+    two = made_of.dtype.type(2)
+    for s in range(lanes.shape[0]):
+        for k in range(begin[s], begin[s] + lanes[s]):
+            i, j = lane_i[k], lane_j[k]
+            ei, ej = restitution[i] if restitution[i] >= zero else e, restitution[j] if restitution[j] >= zero else e
+            given = friction[i] >= zero or friction[j] >= zero
+            mui, muj = friction[i] if friction[i] >= zero else mu, friction[j] if friction[j] >= zero else mu
+            wi, wj = inverse_mass[i], inverse_mass[j]
+            part = wi / (wi + wj)
+            made_of[0, k] = max(ei, ej)
+            made_of[1, k] = np.sqrt(mui * muj) if given else mu
+            made_of[2, k], made_of[3, k] = radius[i], radius[j]
+            made_of[4, k], made_of[5, k] = two * part / radius[i], two * (two / two - part) / radius[j]
+            made_of[6, k] = two / two / (wi + wj)

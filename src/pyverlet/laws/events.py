@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.kernels import events as kernels
 from pyverlet.laws.contacts.broadphase import PairList
+from pyverlet.laws.contacts.wide import Wide
 from pyverlet.state.state import Slots, State
 
 Array = NDArray[Any]
@@ -75,9 +76,9 @@ class Events:
             state.position, state.velocity, state.acceleration, state.size, state.real(lag), *which, pairs.closing
         )  # fmt: skip
 
-    def collect(self, state: Slots, pairs: PairList) -> None:
+    def collect(self, state: Slots, pairs: PairList | Wide) -> None:
         """The list of pairs is about to change, or the frame ends: keep what was heard."""
-        room = int(pairs.count.sum())
+        room = int(pairs.listed()[1].sum())
         keys, speeds = np.empty(room, np.int64), np.empty(room)
         which = pairs.listed()
         found = kernels.heard(*which, pairs.closing, state.particle, keys, speeds)

@@ -149,6 +149,7 @@ class Slots:
         position, velocity, acceleration, spin, radius, mass, grown, restitution, friction: as in State.
         category, mask: as in State, or empty while every circle collides with every other.
         most_restitution, most_friction: the largest of their columns; negative if no circle has values of its own.
+        given: how often what users set was taken up anew.
         size: (n,) grown * radius, m: what contacts between particles take as the radius.
         inverse_mass: (n,) 1/kg; 0 for a pinned particle. total_mass: of all others, kg.
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
@@ -178,6 +179,7 @@ class Slots:
         self.reals = lru_cache(64)(lambda *numbers: tuple(map(dtype.type, numbers)))
         self._kept: dict[str, Array] = {}
         self.drop, self.lean, self.total_mass = 1.0, 0.0, 0.0
+        self.given = 0
         self.claims = Claims()
         self._resize(0)
 
@@ -256,6 +258,7 @@ class Slots:
 
     def _take_given(self, state: State) -> bool:
         """Copy in what users set and engines leave alone."""
+        self.given += 1
         changed = self._changed
         for name in _GIVEN:
             given, now = self._given[name], getattr(state, name)

@@ -17,7 +17,7 @@ from pyverlet.ground.constants import FUSED_FROM, REST_ACCELERATIONS
 from pyverlet.kernels import fused as kernels
 from pyverlet.laws.contacts.broadphase import Strips
 from pyverlet.laws.contacts.collisions import ContactSolver
-from pyverlet.laws.contacts.packs import Packs
+from pyverlet.laws.contacts.wide import Wide
 from pyverlet.laws.rooms import hold
 from pyverlet.state.moves import leap
 from pyverlet.state.state import Slots
@@ -74,38 +74,37 @@ class Fused:
         pairs = contacts.packs(state)
         if not pairs:
             return False
-        packs, strips = pairs
+        wide, strips = contacts.set_up(state, h, lag, world._force_sum.strongest), pairs[1]
         rest_speed = REST_ACCELERATIONS * world._force_sum.strongest * h
-        room, feed = world.boundary.held(state, h, lag, rest_speed), packs.feed(state, h)
+        room = world.boundary.held(state, h, lag, rest_speed)
         if len(state) >= FUSED_FROM and strips.in_order and room:
             self.leapt = kind in (FIRST, NEXT) and world.integrator.leaps and not world.onlooker  # who looks on may turn gravity
-            strayed = self._strip_by_strip(state, packs, strips, (self.leapt, kind == LAST), (*feed, *room))
+            strayed = self._strip_by_strip(state, wide, strips, room, leaps=self.leapt, marks=kind == LAST)
             contacts.broad_phase.strayed = strayed if self.leapt else None
             done("fused")
             return True
-        packs.project(state, h, sets_out=out is not packs.moved, arrives=not room)  # another after a new list
+        wide.push(state, sets_out=out is not wide.moved, arrives=not room)  # another after a new list
         done("contacts")
         if room:
-            hold(state, room, (packs.origin, packs.moved, feed[0]))
+            hold(state, room, (wide.origin, wide.moved, wide.law.feed))
         else:
             world.boundary.confine(state, h, lag, rest_speed)
         done("bounds")
-        packs.still(state, marks=kind == LAST)
+        wide.relax(state, marks=kind == LAST)
         done("velocities")
         return True
 
     def _strip_by_strip(
-        self, state: Slots, packs: Packs, strips: Strips, does: tuple[bool, bool], numbers: tuple[Any, ...]
+        self, state: Slots, wide: Wide, strips: Strips, room: tuple[Any, ...], *, leaps: bool, marks: bool
     ) -> bool:
-        """All of it at once; does: whether it leaps, and marks who rests. Returns whether anyone has strayed."""
-        self._share_out(strips, packs.lanes, state.dtype)
-        pairs, looks = packs.for_fused(state, marks=does[1])
-        moving = (state.position, state.velocity, state.acceleration, state.radius, state.inverse_mass, state.resting, state.hits)
+        """All of it at once. Returns whether anyone has strayed."""
+        self._share_out(strips, wide.lanes, state.dtype)
+        (x0, y0, size, _, _, rest_speed), far = room, state.real(strips.allowed * strips.allowed)
         strayed = kernels.substep(
             self._cut,
-            kernels.Bodies(strips.held, *moving, packs.origin, packs.moved, strips.checked),
-            kernels.Pairs._make((*pairs, self._place, self._normal)),
-            kernels.Rules._make((int(looks), *map(int, does), *numbers, state.real(strips.allowed * strips.allowed))),
+            *wide.fused(self._normal, marks=marks),
+            kernels.Room(x0, y0, size, rest_speed, state.radius, state.hits),
+            kernels.Strips(strips.held, self._place, int(leaps), int(marks), strips.checked, far),
         )
         return bool(strayed)
 

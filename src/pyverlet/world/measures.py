@@ -75,7 +75,7 @@ class Measures(Particles):
         """What impacts and friction have taken in this frame, J, as the kernels of contacts and walls have noted."""
         spent = self._slots.spent.sum(axis=0)
         if self._contacts:
-            spent += self._contacts.broad_phase.list.spent.sum(axis=0)
+            spent += self._contacts.spent()
         return float(spent[0]), float(spent[1])
 
     def momentum(self) -> Array:

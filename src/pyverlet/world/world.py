@@ -229,7 +229,7 @@ class World(Measures, Queries, Doors):
         self.links.scatter()
         if self._events:
             if self._contacts:
-                self._events.collect(self._slots, self._contacts.broad_phase.list)
+                self._contacts.collect(self._slots)
             self._events.close(self._slots, self._state)
         self.profile.mark("scatter")
         self.time += dt
@@ -251,7 +251,7 @@ class World(Measures, Queries, Doors):
         if self._events:
             self._events.forget()
         if self._contacts:
-            self._contacts.broad_phase.list.spent.fill(0)
+            self._contacts.clear_notes()
 
     def _first_non_finite(self) -> int:
         for array in (self._slots.position, self._slots.velocity):

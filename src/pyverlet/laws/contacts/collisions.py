@@ -10,15 +10,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pyverlet.ground import checks
-from pyverlet.ground.constants import FED, FED_SMOOTH, LARGEST_PUSH, PUSHED, REST_ACCELERATIONS, UNEVEN
+from pyverlet.ground.constants import FED, LARGEST_PUSH, PUSHED, REST_ACCELERATIONS, UNEVEN
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import contacts, friction, impacts, refine
 from pyverlet.kernels.bounds import AT_WALL, CARRIED, CARRIES
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast, PairList, Strips
 from pyverlet.laws.contacts.growth import Growth
 from pyverlet.laws.contacts.loans import Lent, Loans
-from pyverlet.laws.contacts.packs import Packs
 from pyverlet.laws.contacts.slips import Kept, Slips
+from pyverlet.laws.contacts.wide import Wide
 from pyverlet.laws.events import Events
 from pyverlet.laws.sleep import Sleep
 from pyverlet.state.moves import pick_falling
@@ -75,7 +75,7 @@ class ContactSolver:
         self.broad_phase = settings.method.start(dtype)
         self._unlist = unlist
         self._seen = 0
-        self._packs = Packs(dtype)
+        self._wide = Wide(dtype, settings.restitution, settings.friction, listens=events is not None)
         self._packed = False
         self._uneven = False  # whether masses differ so much that contacts need loans of inertia, and to be refined
         self._lends = False  # in this substep
@@ -87,7 +87,7 @@ class ContactSolver:
         self.broad_phase.replacing = self._slips.stop
         if events is not None:
             self.broad_phase.list.listen()
-            self.broad_phase.renewing = events.collect
+            self.broad_phase.renewing = lambda state, pairs: self.collect(state)
 
     def fit(self, state: Slots) -> None:
         """Let particles that were added on top of others start smaller."""
@@ -104,7 +104,7 @@ class ContactSolver:
             state.note_start()
         else:
             self._slips.forget()
-            self._packs.drop_slips()
+            self._wide.drop_slips()
 
     def find(self, state: Slots, lag: float) -> None:
         """Broad phase: bring the list of candidate pairs up to date, and note events before contacts change a velocity."""
@@ -112,8 +112,13 @@ class ContactSolver:
         while self._sleep and self._sleep.touched(state, self.broad_phase.list):
             self.broad_phase.renew(state)
             self._list(state)
-        if self._events is not None:
+        if self._events is not None and self._uneven:
             self._events.listen(state, self.broad_phase.list, lag)
+
+    def collect(self, state: Slots) -> None:
+        """Tell the events who has met, and how fast."""
+        if self._events is not None:
+            self._events.collect(state, self._wide if self._packed else self.broad_phase.list)
 
     def _list(self, state: Slots) -> None:
         if self._packed and not self._eight(state):  # they were a frame ago, and the pairs may have gone
@@ -127,21 +132,21 @@ class ContactSolver:
             self._lends &= self._uneven
             self._packed = False
 
-    def _pack(self, state: Slots) -> Packs:
+    def _pack(self, state: Slots) -> Wide:
         if not self._packed:
-            self._packs.take(self.broad_phase.list, self.broad_phase.built, state.radius)
+            self._wide.take(self.broad_phase.list, self.broad_phase.built, state.radius)
             self._packed = True
-            if self._events is None and self._sleep is None:
+            if self._sleep is None:
                 self.broad_phase.release()
-        return self._packs
+        return self._wide
 
     def repeats(self, state: Slots) -> tuple[Any, ...] | None:
         """What a substep's contacts depend on beside h, if they are but calls of kernels; None: there is more to them."""
-        if not (self._alone(state) and self._packed and self._packs.fits(state)):
+        if not (self._alone(state) and self._packed and self._wide.fits(state)):
             return None
         return self.broad_phase.lasts()
 
-    def packs(self, state: Slots) -> tuple[Packs, Strips] | None:
+    def packs(self, state: Slots) -> tuple[Wide, Strips] | None:
         """Packs and strips, if a substep's contacts are but `project` and `still` of these; None: there is more to them."""
         strips = self.broad_phase.strips() if self._alone(state) else None
         return (self._pack(state), strips) if strips else None
@@ -149,16 +154,18 @@ class ContactSolver:
     def _alone(self, state: Slots) -> bool:
         return self._events is None and self._sleep is None and state.size is state.radius and self._slides(state)
 
+    def set_up(self, state: Slots, h: float, lag: float, strongest: float) -> Wide:
+        """The pairs of now, with all that their sweeps need in this substep."""
+        wide = self._pack(state)
+        if self._rubs(state):
+            self._slips.start(wide, state.particle)
+        wide.begin_substep(state, h, lag, strongest, REST_ACCELERATIONS * strongest * h, accounts=len(state.spent) > 0)
+        return wide
+
     def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
         """Move overlapping circles apart, let impacts bounce, note who touches, and let those grip each other."""
-        if self._slides(state):
-            self._pack(state).project(state, h)
-            return
-        if self._grips(state):
-            packs = self._pack(state)
-            self._slips.start(packs, state.particle)
-            packs.project(state, h, FED)
-            packs.grip(state, h, self.settings.friction, self._leaning(state, h), self.broad_phase.list.spent)
+        if self._eight(state):
+            self.set_up(state, h, lag, strongest).push(state)
             return
         pairs, real = self.broad_phase.list, state.real
         pairs.hold_notes()
@@ -167,15 +174,14 @@ class ContactSolver:
         self._lighter = self._loans.begin(state) if lends else state.inverse_mass
         bodies = (state.size, self._lighter)
         which = pairs.listed()
-        fed = self._fed(state)
-        push = (real(fed / h), real(LARGEST_PUSH))
+        push = (real(FED / h), real(LARGEST_PUSH))
         notes = (pairs.touching, pairs.impulse, pairs.touches)
         if self._bounces(state):
             self._bounce(state, h, lag, REST_ACCELERATIONS * strongest * h)
             if lends:
                 self._loans.recall(state, pairs)
         if lends:
-            self._loans.keep_weight(state, h, fed)
+            self._loans.keep_weight(state, h, FED)
         if not self._bounces(state):
             contacts.project(*moving, *bodies, *which, *push, *notes)
         else:
@@ -204,11 +210,8 @@ class ContactSolver:
 
     def still(self, state: Slots, h: float) -> None:
         """Take from touching circles the velocity that projection has put in, and rub them."""
-        if self._slides(state):
-            self._packs.still(state)
-            return
-        if self._grips(state):
-            self._packs.rub(state, h, self.settings.friction, self.broad_phase.list.spent)
+        if self._eight(state):
+            self._wide.relax(state)
             return
         pairs, real = self.broad_phase.list, state.real
         which = pairs.listed()
@@ -225,6 +228,15 @@ class ContactSolver:
         if self._lends:
             self._loans.balance(state, rubs=self._rubs(state))
 
+    def spent(self) -> Any:
+        """(2,) J that impacts, and friction, have taken in this frame, negative."""
+        return self.broad_phase.list.spent.sum(axis=0) + self._wide.spent.sum(axis=0)
+
+    def clear_notes(self) -> None:
+        """A frame begins."""
+        self.broad_phase.list.spent.fill(0)
+        self._wide.spent.fill(0)
+
     @contextmanager
     def aside(self, state: Slots) -> Iterator[None]:
         """While others, who keep momentum by themselves, change velocities between `project` and `still`."""
@@ -235,7 +247,7 @@ class ContactSolver:
 
     def listed(self) -> tuple[Any, Any, Any, Any]:
         """first, count, pair_i, pair_j of the pairs of now."""
-        return self._packs.listed() if self._packed else self.broad_phase.list.listed()
+        return self._wide.listed() if self._packed else self.broad_phase.list.listed()
 
     def save(self) -> tuple[Any, Kept, Lent, tuple[float, float]]:
         """What outlives a frame: the list, what friction remembers, who has lent what, the pace of growth."""
@@ -262,15 +274,12 @@ class ContactSolver:
         self._loans.renumber(now)
 
     def _slides(self, state: Slots) -> bool:
-        """Whether contacts are solved eight at a time, without friction."""
-        return self._eight(state) and not self._rubs(state)
-
-    def _grips(self, state: Slots) -> bool:
-        """Whether they are, with friction."""
-        return self._eight(state) and self._rubs(state)
+        """Whether nobody bounces or rubs, and nobody asks how they meet."""
+        return self._eight(state) and not (self._rubs(state) or self._bounces(state) or self._events)
 
     def _eight(self, state: Slots) -> bool:
-        return not (self._bounces(state) or self._uneven)
+        """Whether contacts are solved eight at a time."""
+        return not self._uneven
 
     def _leaning(self, state: Slots, h: float) -> float:
         """s; times -a it is the velocity that a circle at rest against others ends a substep with."""
@@ -278,11 +287,7 @@ class ContactSolver:
 
     def _lean(self, state: Slots) -> float:
         """The same, in substeps."""
-        return state.drop - PUSHED / self._fed(state)
-
-    def _fed(self, state: Slots) -> float:
-        """What velocities are fed, of an overlap."""
-        return FED if self._rubs(state) or self._bounces(state) else FED_SMOOTH
+        return state.drop - PUSHED / FED
 
     def _bounces(self, state: Slots) -> bool:
         return self.settings.restitution > 0.0 or state.most_restitution > 0.0
@@ -310,7 +315,7 @@ class ContactSolver:
     def _mark_resting(self, state: Slots) -> None:
         """Note in `state.resting` who touches another without bouncing off it."""
         if self._eight(state):
-            self._packs.mark_resting(state)
+            self._wide.mark_resting(state)
             return
         pairs = self.broad_phase.list
         notes = (pairs.touching, pairs.impulse, pairs.touches)

@@ -1,0 +1,215 @@
+"""The contacts of circles, eight pairs at a time: the pairs of a list in packs, what they are made of, and the two sweeps over them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.compile import jit
+from pyverlet.compile.lanes import LANES
+from pyverlet.ground import memory
+from pyverlet.ground.constants import CARRIED_WEIGHT, COLOURS, FED, LARGEST_PUSH, PUSHED
+from pyverlet.kernels import contact, packs
+from pyverlet.kernels.bounds import CARRIES
+from pyverlet.laws.contacts.broadphase import PairList, rows_of
+from pyverlet.state.state import Slots
+
+Array = NDArray[Any]
+
+_ROWS = len((contact.E, contact.MU, contact.R_I, contact.R_J, contact.TURN_I, contact.TURN_J, contact.MASS))
+
+
+class Wide:
+    """The pairs of one list, packed each time the list is made anew.
+
+    Args:
+        restitution, friction: of circles that have no values of their own.
+        listens: note in `closing` who meets how fast.
+
+    Attributes:
+        lane_i, lane_j: slots; those of strip s from begin[s] to begin[s] + lanes[s], the first apart[s] unlikely to touch soon.
+        gap: (2, room) from i to j when the list was made, m.
+        origin: (n, 2) where circles were then. moved: (n, 2) how far they have come since.
+        reach, share: m, and what part of a push moves i; one for each lane, or (LANES,) if they are the same for all.
+        made_of: (7, room) or (7, LANES) what each pair is made of: rows of `kernels.contact`.
+        normal: (2, room) of pairs that touch, for others 0. depth: (room,) their overlap, m.
+        slip: (room,) what contacts have slipped, m. held: (room,) m by which friction has answered it in this substep.
+        closing: (room,) largest speed of approach since the last `collect`, m/s; negative: has not touched.
+        spent: (strips, 2) J that impacts, and friction, have taken in this frame, negative.
+        asks: whether any pair may bounce or rub, or somebody listens. rubs: whether any may rub.
+    """
+
+    def __init__(self, dtype: np.dtype[Any], restitution: float = 0.0, friction: float = 0.0, *, listens: bool = False) -> None:
+        self._dtype = dtype
+        self._settings = restitution, friction
+        self._listens = listens
+        self.asks = self.rubs = False
+        self.begin = np.zeros(1, np.int64)
+        self.lanes = self.apart = np.zeros(0, np.int64)
+        self._make_room(0)
+        self._cut = np.zeros((2, 2), np.int64)
+        self.origin = self.moved = np.empty((0, 2), dtype)
+        self._spare = COLOURS * LANES  # lanes of a strip beyond its pairs: twice as many as any needed in the last list
+        self._known: Any = None  # what the tables were made from
+        self._varied = self._mixed = 0
+        self._deeps = np.zeros(0, np.int64)  # packs of each strip that overlap deeply
+        self._looks = True  # whether they are to be noted, once a frame
+        self.spent = np.zeros((1, 2))
+        self._hold_circles(0)
+
+    def _make_room(self, lanes: int) -> None:
+        self.lane_i, self.lane_j = (memory.empty(lanes, np.uint32) for _ in range(2))
+        self.gap, self.normal = memory.empty((2, lanes), self._dtype), np.empty((2, 0), self._dtype)
+        self._deep = np.empty(lanes // LANES, np.int64)
+        self.depth = self.slip = self.held = self.closing = np.empty(0, self._dtype)
+
+    def _hold_circles(self, count: int) -> None:
+        """Room for what contacts that may bounce or rub note of circles."""
+        self._carries, self._lift, self._leans, self._turned, self._turn = (np.zeros(count, self._dtype) for _ in range(5))
+
+    def take(self, pairs: PairList, origin: Array, radius: Array) -> None:
+        """Pack a new list; origin: (n, 2) positions it was made from; radius: (n,) m."""
+        need = pairs.count + self._spare
+        self.lanes, self.apart = (np.empty(len(pairs.count), np.int64) for _ in range(2))
+        which = pairs.listed()
+        while True:
+            self.begin = np.concatenate(([0], np.cumsum(need)))
+            if not self.begin[-1] <= len(self.lane_i) <= 1.1 * self.begin[-1]:
+                self._make_room(int(self.begin[-1]))
+            used = np.full(len(origin), -1, np.int64)
+            packs.pack(origin, radius, *which, used, self.begin, self.lanes, self.apart, self.lane_i, self.lane_j, self.gap)
+            if (self.lanes <= need).all():
+                break
+            need = np.maximum(need, self.lanes)
+        self._spare = 2 * max(int((self.lanes - pairs.count).max(initial=0)), LANES)
+        self._cut = np.empty((2, 0), np.int64)
+        self.origin = origin
+        self.moved = memory.empty(origin.shape, origin.dtype)
+        self._known = None
+        self._deeps, self._looks = np.zeros(len(pairs.count), np.int64), True
+        spent, self.spent = self.spent.sum(axis=0), np.zeros((max(len(self.lanes), 1), 2))
+        self.spent[0] = spent
+        if self._listens:
+            self.closing = np.full(len(self.lane_i), -1, self._dtype)
+
+    def cut(self) -> Array:
+        """(2, threads + 1): even and odd strips, each cut into as many parts of as nearly the same number of lanes as can be.
+
+        By their number alone a round room's would not be: the short rows of strips at its ends hold fewer.
+        """
+        threads = jit.threads_in_use()
+        if self._cut.shape[1] != threads + 1:
+            self._cut = np.empty((2, threads + 1), np.int64)
+            for parity in range(2):
+                before = np.concatenate(([0], np.cumsum(self.lanes[parity::2])))
+                middle = 0.5 * (before[1:] + before[:-1])
+                self._cut[parity] = np.searchsorted(middle, np.linspace(0, before[-1], threads + 1))
+        return self._cut
+
+    def pairs(self) -> Array:
+        """(k, 2) slots of the pairs in all lanes; a copy, for tests and measurements. The last pair of a pack may come twice."""
+        return rows_of(*self.listed())
+
+    def listed(self) -> tuple[Array, Array, Array, Array]:
+        """Where the pairs are: first, count, pair_i, pair_j. Some come twice, with the same notes."""
+        return self.begin[:-1], self.lanes, self.lane_i, self.lane_j
+
+    def hold_slips(self) -> None:
+        """Room for what friction notes; the values are anything."""
+        if len(self.slip) != len(self.lane_i):
+            self.slip, self.held = (np.empty(len(self.lane_i), self._dtype) for _ in range(2))
+
+    def drop_slips(self) -> None:
+        """Nobody rubs any more."""
+        self.slip = self.held = self.slip[:0]
+
+    # ---- what circles are made of ----------------------------------------------------------------------------------------
+
+    def fits(self, state: Slots) -> bool:
+        """Whether the tables are those of the circles of now."""
+        return self._known is not None and self._known[0] is state.size and self._known[1] == state.given
+
+    def fit(self, state: Slots) -> None:
+        """Bring the tables up to date with the sizes, masses and materials of now."""
+        self._known = state.size, state.given
+        size, inverse_mass, (e, mu) = state.size, state.inverse_mass, self._settings
+        self._varied = int(any(_differ(values) for values in (size, state.radius, inverse_mass)))
+        self._mixed = int(self._varied or _differ(state.restitution) or _differ(state.friction))
+        self.rubs = max(mu, state.most_friction) > 0.0
+        self.asks = self._listens or self.rubs or max(e, state.most_restitution) > 0.0
+        if self._varied:
+            self.reach, self.share = (memory.empty(len(self.lane_i), self._dtype) for _ in range(2))
+            packs.share_out(self.begin, self.lanes, self.lane_i, self.lane_j, size, inverse_mass, self.reach, self.share)
+        else:
+            self.reach, self.share = np.full(LANES, size[0] + size[0]), np.full(LANES, self._dtype.type(0.5))
+        if self.normal.shape != self.gap.shape:
+            self.normal = memory.empty(self.gap.shape, self._dtype)
+        if not self.asks:
+            self.made_of = np.empty((_ROWS, 0), self._dtype)
+            return
+        self.made_of = memory.empty((_ROWS, len(self.lane_i) if self._mixed else LANES), self._dtype)
+        lane = np.zeros(LANES, np.uint32)
+        begin, lanes, i, j = self.listed() if self._mixed else (np.zeros(1, np.int64), np.full(1, LANES), lane, lane)
+        materials = state.restitution, state.friction, state.real(e), state.real(mu)
+        packs.compose(begin, lanes, i, j, state.radius, inverse_mass, *materials, self.made_of)
+        if len(self.depth) != len(self.lane_i):
+            self.depth = np.empty(len(self.lane_i), self._dtype)
+        if len(self._carries) != len(state):
+            self._hold_circles(len(state))
+        if self.rubs:
+            # A circle at rest among others ends a substep with the velocity -leans a: see `lean` of Slots.
+            own = np.where(state.friction >= 0, state.friction, mu) > 0
+            self._rough = own.astype(self._dtype)
+
+    # ---- a substep ---------------------------------------------------------------------------------------------------------
+
+    def begin_substep(self, state: Slots, h: float, lag: float, strongest: float, rest_speed: float, *, accounts: bool) -> None:
+        """Everything that the sweeps of this substep need."""
+        if not self.fits(state):
+            self.fit(state)
+        if self.asks:
+            np.bitwise_and(state.fed, CARRIES, out=self._carries, casting="unsafe")
+        if self.rubs:
+            np.multiply(self._rough, state.real((state.drop - PUSHED / FED) * h), out=self._leans)
+            state.turn, state.lift = self._turn, self._lift
+        self.circles = contact.Circles(
+            state.position, state.velocity, state.acceleration, state.inverse_mass, self.origin, self.moved, state.resting,
+            state.spin, self._carries, state.fed, self._turned, self._turn, self._lift, self._leans,
+            state.start if self.rubs else self.origin,
+        )  # fmt: skip
+        self.law = contact.Law(
+            varied=self._varied, mixed=self._mixed, asks=int(self.asks), rubs=int(self.rubs), listens=int(self._listens),
+            accounts=int(accounts), looks=int(self._looks or self.asks), h=state.real(h), lag=state.real(lag), feed=state.real(FED / PUSHED / h),
+            most=state.real(LARGEST_PUSH), rest_speed=state.real(rest_speed), weight=int(strongest > 0),
+            carried=state.real(CARRIED_WEIGHT * strongest * h if strongest > 0 else np.inf),
+        )  # fmt: skip
+        self._arrays = contact.Pairs(
+            self.begin, self.lanes, self.apart, self.lane_i, self.lane_j, self.gap, self.reach, self.share, self.made_of,
+            self.normal, self.depth, self.slip, self.held, self.closing, self._deep, self._deeps, self.spent,
+        )  # fmt: skip
+
+    def push(self, state: Slots, *, sets_out: bool = True, arrives: bool = True) -> None:
+        """Impacts, overlaps and slips; circles `arrive` where that has moved them, unless others do that."""
+        contact.push(self.circles, self._arrays, self.law, self.cut(), int(sets_out), int(arrives), state.claims())
+        self._looks = False
+
+    def relax(self, state: Slots, *, marks: bool = False) -> None:
+        """Touching circles neither approach nor slip; mark them as resting, too."""
+        contact.relax(self.circles, self._arrays, self.law, self._cut, int(marks), state.claims())
+        self._looks |= marks
+
+    def fused(self, normal: Array, *, marks: bool) -> tuple[Any, ...]:
+        """Circles, pairs and law for `kernels.fused`, which keeps normals in an array of its own; it marks who rests, too."""
+        self._looks = marks
+        return self.circles, self._arrays._replace(normal=normal), self.law
+
+    def mark_resting(self, state: Slots) -> None:
+        """Note in `state.resting` who touches another."""
+        contact.mark_touching(self.circles, self._arrays, self.cut())
+        self._looks = True
+
+
+def _differ(values: Array) -> bool:
+    return bool((values != values[0]).any())
