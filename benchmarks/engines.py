@@ -43,9 +43,10 @@ class Engine(ABC):
         *,
         velocity: Array | None = None,
         restitution: float = 0.0,
+        friction: float = 0.0,
         gravity: tuple[float, float] = GRAVITY,
     ) -> None:
-        """Discs of radius 0.5 m and mass 1 kg at (n, 2) positions in a circular cage of this radius, m; no friction."""
+        """Discs of radius 0.5 m and mass 1 kg at (n, 2) positions in a smooth circular cage of this radius, m."""
 
     @abstractmethod
     def step(self) -> None:
@@ -71,12 +72,13 @@ class _Pyverlet(Engine):
         *,
         velocity: Array | None = None,
         restitution: float = 0.0,
+        friction: float = 0.0,
         gravity: tuple[float, float] = GRAVITY,
     ) -> None:
         self._world = pv.World(
             gravity=gravity,
             boundary=pv.Circle(radius=cage, restitution=restitution),
-            collisions=pv.Collisions(restitution=restitution, method=self.method),
+            collisions=pv.Collisions(restitution=restitution, friction=friction, method=self.method),
             substeps=8,
             threads=self.threads,
         )
@@ -131,6 +133,7 @@ class Pymunk(Engine):
         *,
         velocity: Array | None = None,
         restitution: float = 0.0,
+        friction: float = 0.0,
         gravity: tuple[float, float] = GRAVITY,
     ) -> None:
         import pymunk
@@ -144,6 +147,7 @@ class Pymunk(Engine):
         rim = _rim(cage)
         for a, b in zip(rim, np.roll(rim, -1, axis=0), strict=True):
             wall = pymunk.Segment(self._space.static_body, tuple(a), tuple(b), 0.01)
+            wall.friction = 0.0
             wall.elasticity = restitution**0.5  # of two shapes it takes the product
             self._space.add(wall)
         self._bodies = []
@@ -153,6 +157,7 @@ class Pymunk(Engine):
             body.velocity = float(vx), float(vy)
             shape = pymunk.Circle(body, RADIUS)
             shape.elasticity = restitution**0.5
+            shape.friction = friction**0.5  # the product again; a smooth wall rubs nobody, as elsewhere
             self._space.add(body, shape)
             self._bodies.append(body)
 
@@ -191,6 +196,7 @@ class Box2D(Engine):
         *,
         velocity: Array | None = None,
         restitution: float = 0.0,
+        friction: float = 0.0,
         gravity: tuple[float, float] = GRAVITY,
     ) -> None:
         import pyb2d3
@@ -199,10 +205,11 @@ class Box2D(Engine):
         self._world.sleeping_enabled = False
         self._world.restitution_threshold = self.threshold
         material = pyb2d3.surface_material(friction=0.0, restitution=restitution)
+        rough = pyb2d3.surface_material(friction=friction, restitution=restitution)
         ground = self._world.create_static_body()
         # Chains are solid on one side: clockwise, that is the inside.
         ground.create_chain(pyb2d3.chain_def(_rim(cage)[::-1], material=material, is_loop=True))
-        shape = pyb2d3.shape_def(density=1.0 / (np.pi * RADIUS**2), material=material)
+        shape = pyb2d3.shape_def(density=1.0 / (np.pi * RADIUS**2), material=rough)
         disc = pyb2d3.circle(radius=RADIUS)
         self._bodies = pyb2d3.Bodies()
         for (x, y), (vx, vy) in zip(position, _or_rest(velocity, position), strict=True):

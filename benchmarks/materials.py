@@ -1,0 +1,205 @@
+"""What circles may be made of, and what a world may be asked to do, beside the smooth heap: `python -m benchmarks materials`.
+
+One settled heap for all, laid out anew for each material and settled again; all take turns in one process, so that the machine's moods
+hit them alike. A ratio is that of the quartiles of the faster frames. Overlap stands beside each.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import pyverlet as pv
+from benchmarks.engines import DT, RADIUS, Array, Box2D, Engine, Pymunk
+from benchmarks.own import times_in_turn
+
+SETTLE_SECONDS = 10.0
+"""Each material is given so long to come to terms with the heap in its own way."""
+
+FRAMES = 20
+"""Of each world in a turn, at least."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One world, or one engine, beside the smooth heap of the same kind."""
+
+    world: str
+    particles: int
+    threads: int
+    ms_per_frame: float
+    ratio: float
+    asked: float
+    overlap_mean: float
+    overlap_max: float
+
+
+@dataclass(frozen=True)
+class Material:
+    """How a heap is made, and how many times the smooth one's time it may take."""
+
+    name: str
+    asked: float
+    collisions: pv.Collisions
+    options: dict[str, Any]
+    change: Callable[[pv.World], Any] = lambda world: None
+
+
+def _radii(ratio: float) -> Callable[[pv.World], None]:
+    """Radii uniform in their logarithm, as much area as before, masses by area: started small, for they overlap at first."""
+
+    def change(world: pv.World) -> None:
+        position, rng = world.position.copy(), np.random.default_rng(1)
+        radius = ratio ** rng.uniform(-1, 0, len(position))
+        radius *= RADIUS / np.sqrt((radius**2).mean())
+        world.remove(np.ones(len(position), bool))
+        world.add(position=position * (1 - radius.max() / world.boundary.extent()[2]), radius=radius)  # type: ignore[index]
+
+    return change
+
+
+def _masses(ratio: float) -> Callable[[pv.World], None]:
+    """Masses uniform in their logarithm."""
+
+    def change(world: pv.World) -> None:
+        world.mass[:] = ratio ** np.random.default_rng(1).uniform(0, 1, len(world))
+
+    return change
+
+
+def _nothing(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tuple[float, float]:
+    return 0.0 * x, 0.0 * y
+
+
+def _odd(world: pv.World) -> None:
+    world.restitution[len(world) // 2] = 0.3
+    world.friction[len(world) // 2] = 0.5
+
+
+def _segment(world: pv.World) -> None:
+    extent = world.boundary.extent()
+    assert extent is not None
+    world.obstacles.append(pv.Segment((-1.0, 0.8 * extent[3]), (1.0, 0.8 * extent[3])))
+
+
+def _stick(world: pv.World) -> None:
+    group = world.add(position=[(-0.5, 0.9 * world.boundary.extent()[3]), (0.5, 0.9 * world.boundary.extent()[3])], radius=0.4)  # type: ignore[index]
+    world.links.append(pv.Stick(group, 0, 1))
+
+
+SMOOTH = pv.Collisions()
+BOUNCING, ROUGH, BOTH = pv.Collisions(restitution=0.3), pv.Collisions(friction=0.5), pv.Collisions(restitution=0.3, friction=0.5)
+
+LARGE = (
+    Material("smooth", 1.0, SMOOTH, {}),
+    Material("e = 0.3", 1.3, BOUNCING, {}),
+    Material("mu = 0.5", 1.8, ROUGH, {}),
+    Material("e = 0.3, mu = 0.5", 2.2, BOTH, {}),
+    Material("radii 1:5, masses 1:25", 1.6, SMOOTH, {}, _radii(5.0)),
+    Material("masses 1:100", 1.8, SMOOTH, {}, _masses(100.0)),
+    Material("e = 0.3, mu = 0.5, masses 1:100", 3.0, BOTH, {}, _masses(100.0)),
+    Material("events", 1.4, SMOOTH, {"events": True}),
+    Material("ledger", 1.25, SMOOTH, {"ledger": True}),
+    Material("a user's force", 1.2, SMOOTH, {}, lambda world: world.forces.append(pv.force(_nothing))),
+    Material("float64", 1.6, SMOOTH, {"dtype": np.float64}),
+)
+"""Heaps of 20,000."""
+
+SMALL = (
+    Material("smooth", 1.0, SMOOTH, {}),
+    Material("one odd circle", 1.1, SMOOTH, {}, _odd),
+    Material("one segment", 1.3, SMOOTH, {}, _segment),
+    Material("one stick", 1.3, SMOOTH, {}, _stick),
+    Material("drag", 1.2, SMOOTH, {}, lambda world: world.forces.append(pv.Drag(linear=0.01))),
+    Material("sleep (awake)", 1.2, SMOOTH, {"sleep": True}, lambda world: world.forces.append(pv.Wind((0, 0), linear=0.01))),
+)
+"""Heaps of 1,000."""
+
+
+def heap(particles: int) -> tuple[Array, float]:
+    """Positions of a settled heap of equal smooth discs, and the radius of its cage."""
+    world = pv.scenes.get("cage").world(particles=particles)
+    world.run(seconds=SETTLE_SECONDS, dt=DT)
+    extent = world.boundary.extent()
+    assert extent is not None
+    return world.position.copy(), float(extent[2])
+
+
+def build(material: Material, position: Array, cage: float, threads: int) -> pv.World:
+    """This heap, of this material, settled."""
+    options = {"boundary": pv.Circle(radius=cage), "collisions": material.collisions, "substeps": 8, "threads": threads}
+    world = pv.World(**options, **material.options)
+    world.add(position=position, radius=RADIUS, mass=1.0)
+    material.change(world)
+    world.run(seconds=SETTLE_SECONDS, dt=DT)
+    return world
+
+
+def compare(materials: tuple[Material, ...], particles: int, threads: int) -> list[Row]:
+    """All of them in turn; the first is what the others are compared with."""
+    position, cage = heap(particles)
+    worlds = [build(material, position, cage, threads) for material in materials]
+    times = times_in_turn([lambda world=world: world.step(DT) for world in worlds], FRAMES)  # type: ignore[misc]
+    quick = [float(np.quantile(spent, 0.25)) for spent in times]
+    rows = []
+    for material, world, ms in zip(materials, worlds, quick, strict=True):
+        found = world.overlap()
+        rows.append(Row(material.name, len(world), threads, ms, ms / quick[0], material.asked, found.mean, found.max))
+    return rows
+
+
+def peers(particles: int, threads: int) -> list[Row]:
+    """Ours, pymunk and Box2D, with e = 0.3 and mu = 0.5 on the same heap; ratios are to ours."""
+    position, cage = heap(particles)
+    ours = build(Material("pyverlet", 1.0, BOTH, {}), position, cage, threads)
+    engines: list[Engine] = []
+    for engine in (Box2D, Pymunk):
+        try:
+            engines.append(engine(ours.position.copy(), cage, restitution=0.3, friction=0.5))
+        except ImportError:
+            continue
+    for world in engines:
+        for _ in range(60):
+            world.step()
+    times = times_in_turn([lambda: ours.step(DT), *(engine.step for engine in engines)], FRAMES)
+    quick = [float(np.quantile(spent, 0.25)) for spent in times]
+    places = [ours.position, *(engine.position() for engine in engines)]
+    rows = []
+    for name, asked, place, ms in zip(("pyverlet", "Box2D (pyb2d3)", "pymunk"), (1, 5, 30), places, quick, strict=False):
+        again = pv.World(dtype=np.float64)
+        again.add(position=place, radius=RADIUS)
+        found = again.overlap()
+        rows.append(Row(f"{name}, e = 0.3, mu = 0.5", len(place), threads, ms, ms / quick[0], asked, found.mean, found.max))
+    return rows
+
+
+def main(particles: int, path: Path | None) -> None:
+    """Print the tables; write them as CSV and JSON if asked to."""
+    rows: list[Row] = []
+    for threads in (1, 2):
+        for part in (compare(LARGE, particles, threads), *([compare(SMALL, 1_000, 1)] if threads == 1 else [])):
+            print(f"\n{part[0].particles:,} circles, {threads} thread{'s' * (threads > 1)}, 8 substeps, radii 1:1 unless said")
+            print(f"{'world':<34}{'ms a frame':>11}{'ratio':>8}{'asked':>8}{'mean overlap':>14}{'max':>8}")
+            for row in part:
+                print(
+                    f"{row.world:<34}{row.ms_per_frame:>11.3f}{row.ratio:>8.2f}{row.asked:>8.2f}"
+                    f"{row.overlap_mean:>14.3%}{row.overlap_max:>8.2%}"
+                )
+            rows += part
+    for threads in (1, 2):
+        print(f"\nbeside others, {threads} thread{'s' * (threads > 1)}: asked is how many times as long as ours they take at least")
+        for row in peers(particles, threads):
+            print(f"{row.world:<40}{row.ms_per_frame:>9.2f}{row.ratio:>8.1f}{row.asked:>8.1f}{row.overlap_mean:>10.3%}{row.overlap_max:>8.1%}")
+            rows.append(row)
+    if path:
+        with path.open("w", newline="") as file:
+            writer = csv.DictWriter(file, list(asdict(rows[0])))
+            writer.writeheader()
+            writer.writerows(asdict(row) for row in rows)
+        path.with_suffix(".json").write_text(json.dumps([asdict(row) for row in rows], indent=1))
