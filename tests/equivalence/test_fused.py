@@ -11,7 +11,7 @@ import pyverlet as pv
 from pyverlet.compile import jit
 from pyverlet.laws.contacts import broadphase, grids
 from pyverlet.laws.contacts.collisions import ContactSolver
-from pyverlet.world import fused, repeats
+from pyverlet.world import fused
 
 SECONDS = 1.5
 
@@ -33,7 +33,6 @@ class Fusing:
     def __init__(self, patch: pytest.MonkeyPatch, *, by_strips: bool) -> None:
         self._patch, self._by_strips, self.substeps, self.leaps = patch, by_strips, 0, 0
         patch.setattr(fused, "FUSED_FROM", 2 if by_strips else 10**9)
-        patch.setattr(repeats, "_key", lambda *arguments: None)  # what is replayed nobody could count
         substep, leap = fused.Fused.substep, fused.Fused.leap
 
         def counted(way: fused.Fused, *arguments: Any, **options: Any) -> bool:

@@ -45,7 +45,7 @@ from pyverlet.kernels import motion
 from pyverlet.compile import jit
 out = np.zeros((1, 2))
 motion.advance.alone(out, out, np.ones((1, 2)), 1.0)
-print(out[0, 0], sum(motion.advance.alone.variant(parallel=False).stats.cache_hits.values()))
+print(out[0, 0], sum(motion.advance.alone.stats.cache_hits.values()))
 """
 
 

@@ -1,7 +1,10 @@
-"""How kernels are compiled, cached and counted.
+"""How kernels are compiled, cached and called.
 
-Numba's disk cache looks at the file a kernel stands in and misses an edit in another file whose function was inlined.
-The cache folder is therefore named after a hash of all sources of kernels (and Numba's version): any edit starts a fresh one.
+Each is a function compiled by Numba's `njit` as its manual says, in one or two variants: for one thread, and, if it has loops
+over threads or calls kernels that have, for several.
+
+Numba's disk cache looks at the file a kernel stands in and misses an edit in another file whose function was inlined. The cache
+folder is therefore named after a hash of all sources of kernels (and Numba's version): any edit starts a fresh one.
 """
 
 from __future__ import annotations
@@ -16,17 +19,16 @@ import sys
 import tempfile
 import threading
 import time
+import types
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-import numpy as np
 from numba.core import event as numba_event
-from numba.core.compiler_lock import global_compiler_lock
+from numba.extending import typeof_impl
 
-from pyverlet.compile import entry, lean
 from pyverlet.ground import file_lock
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -124,94 +126,102 @@ def _litter() -> Iterator[None]:
             gc.enable()
 
 
-def _in_turn(function: Any, name: str, wanted: str) -> Any:
-    """The compiler of a function: no two processes compile it at a time, and whoever comes second finds it on disk."""
-    compiling = function.compile
+_compiling = threading.RLock()
+"""Held while a kernel is declared to Numba or called for the first time: Numba compiles one at a time in any case."""
 
-    def compile_in_turn(kinds: Any) -> Any:
-        with global_compiler_lock, turn(name), _litter(), lean.only(wanted):
-            return compiling(kinds)
-
-    return compile_in_turn
+_launching = threading.Lock()
+"""Held by who launches threads where only one may."""
 
 
-_VIEWS = {"T", "dtype", "fill", "flat", "itemsize", "nbytes", "ndim", "reshape", "shape", "size", "strides"}
-_MAKERS = {"arange", "array", "empty", "empty_like", "full", "full_like", "ones", "zeros", "zeros_like"} | {
-    name for name in vars(np.ndarray) if not name.startswith("_") and name not in _VIEWS
-}
+@cache
+def _one_launch_at_a_time() -> bool:
+    """Whether two Python threads may not both launch threads: Numba's own pool ends the process when they do."""
+    numba.get_num_threads()  # starts them
+    return bool(numba.threading_layer() == "workqueue")
 
 
-def _allocates(function: Callable[..., Any]) -> bool:
-    """Whether a kernel may make arrays: with NumPy's functions for it, or by a method, for even `min` makes one.
+class Kernel:
+    """A compiled function: compiled when it is first called with arguments of some types, or found on disk.
 
-    Others need no counts of who refers to an array, a sixth of what is compiled.
-    """
-    return not _MAKERS.isdisjoint(function.__code__.co_names)
-
-
-class Kernel(functools.partial[Any]):
-    """A compiled function: compiled on its first call with arguments of some kinds, then called by the short way of `_entry`.
+    From Python it runs on as many threads as are in use. Other kernels call one thread's code; those that are drivers, that of
+    their own variant.
 
     Attributes:
         function: as it is written.
-        alone: the same, on one thread always.
-        parallel: whether it has loops to spread over threads.
+        parallel: whether it has a variant for several threads.
     """
 
-    function: Callable[..., Any]
-    alone: Kernel
-    parallel: bool
-    _made: dict[str, Any]
-    _met: set[Any]
+    def __init__(self, function: Callable[..., Any], *, loops: bool = False, drives: bool = False) -> None:
+        functools.update_wrapper(self, function)
+        self.function, self.parallel = function, loops or drives
+        self._loops = loops
+        self._alone = functools.partial(self._first, "alone")
+        self._together = functools.partial(self._first, "together")
 
-    def __new__(cls, function: Callable[..., Any], parallel: bool = False) -> Kernel:
-        self = super().__new__(cls, function)
-        self.function, self.__doc__ = function, function.__doc__
-        self.parallel, self._made, self._met = parallel, {}, set()
-        self.alone = cls(function) if parallel else self
-        self._lead_to(self._learn)
-        return self
+    def __reduce__(self) -> str:
+        return self.function.__qualname__  # there is one of it, whoever is copied
 
-    def _lead_to(self, callee: Callable[..., Any]) -> None:
-        self.__setstate__((callee, (), {}, self.__dict__))  # type: ignore[attr-defined]
+    def __call__(self, *arguments: Any) -> Any:
+        """Call the variant for the threads in use."""
+        if not (self.parallel and threads_in_use() > 1):
+            return self._alone(*arguments)
+        if not _one_launch_at_a_time():
+            return self._together(*arguments)
+        with _launching:
+            return self._together(*arguments)
 
-    @property
-    def _numba_type_(self) -> Any:
-        """What other kernels call: one thread's code."""
-        return numba.types.Dispatcher(self.alone.variant(parallel=False, inner=True))
+    @functools.cached_property
+    def alone(self) -> Any:
+        """Numba's dispatcher of one thread's code."""
+        return self._dispatcher("alone", self.function)
 
-    def variant(self, *, parallel: bool, wrapped: bool = False, inner: bool = False) -> Any:
-        """Numba's own: its loops over threads or not; `wrapped` to be called with any arguments, `inner` by other kernels."""
-        name = ("inner" if inner else "parallel" if parallel else "alone") + ("-wrapped" if wrapped else "")
-        if self._made.get(name) is None:
-            with caching(name) as kept:
-                # No fastmath: it would break NaN checks and equal bits. error_model: a division is a division, not a branch and a
-                # raise. Wrappers take as long to compile as the kernel. Loops over threads may make arrays of their own.
+    @functools.cached_property
+    def together(self) -> Any:
+        """Numba's dispatcher of the code for several threads; `alone` if it has none."""
+        if not self.parallel:
+            return self.alone
+        return self._dispatcher("together", self.function if self._loops else _with_threads(self.function))
+
+    def _dispatcher(self, variant: str, function: Callable[..., Any]) -> Any:
+        with _compiling:
+            if variant in vars(self):  # by now, by another thread
+                return vars(self)[variant]
+            with caching(variant) as kept:
+                # No fastmath: it would break NaN checks and equal bits. error_model: a division is a division, not a branch and
+                # a raise. No kernel is handed to another as an argument, which is what cfunc wrappers are for.
                 made = numba.njit(
-                    nogil=True, error_model="numpy", cache=kept, parallel=parallel and {**lean.PRANGE_ONLY}, fastmath=False,
-                    no_cpython_wrapper=not wrapped, no_cfunc_wrapper=True, _nrt=parallel or _allocates(self.function),
-                )(self.function)  # fmt: skip
-            qualname = self.function.__qualname__
-            made.compile = _in_turn(made, f"{name} {self.function.__module__}.{qualname}", "" if inner else qualname)
-            self._made[name] = made
-        return self._made[name]
+                    nogil=True, error_model="numpy", cache=kept, parallel=self._loops and variant == "together",
+                    no_cfunc_wrapper=True,
+                )(function)  # fmt: skip
+            return vars(self).setdefault(variant, made)
 
-    def _learn(self, *arguments: Any) -> Any:
-        """Called with arguments of kinds that no entry knows."""
-        entry.miss()
-        parallel = self.parallel and numba.get_num_threads() > 1
-        kinds = tuple(map(numba.typeof, arguments)) if entry.takes(arguments) and entry.usable() else ()
-        if not kinds or (parallel, kinds) in self._met:
-            return self.variant(parallel=parallel, wrapped=True)(*arguments)
-        self._met.add((parallel, kinds))
-        lean = self.variant(parallel=parallel)
-        lean.compile(kinds)
-        compiled = lean.overloads[kinds]
-        if entry.gives(compiled):
-            when = entry.ANY if not self.parallel else entry.TOGETHER if parallel else entry.ALONE
-            with caching("entry") as kept, global_compiler_lock, turn("entry"):
-                self._lead_to(entry.entry(compiled, arguments, when, self.func, kept))
-        return self(*arguments)
+    def _first(self, variant: str, *arguments: Any) -> Any:
+        """The first call: no two processes compile a kernel at a time, and whoever comes second finds it on disk."""
+        dispatcher = getattr(self, variant)
+        with _compiling, turn(f"{variant} {self.function.__module__}.{self.function.__qualname__}"), _litter():
+            result = dispatcher(*arguments)
+        setattr(self, f"_{variant}", dispatcher)
+        return result
+
+
+@typeof_impl.register(Kernel)
+def _type_of_kernel(kernel: Kernel, _: Any) -> Any:
+    """What compiled code calls by the name of a kernel."""
+    return numba.typeof(kernel.alone)
+
+
+def _with_threads(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The same function, where the kernels it calls by their names are their variants for several threads."""
+    names = {
+        name: value.together
+        for name, value in function.__globals__.items()
+        if isinstance(value, Kernel) and name in function.__code__.co_names
+    }
+    other = types.FunctionType(
+        function.__code__, {**function.__globals__, **names}, function.__name__, function.__defaults__, function.__closure__
+    )
+    other.__qualname__, other.__module__ = function.__qualname__, function.__module__
+    return other
 
 
 KERNELS: dict[str, Kernel] = {}
@@ -231,9 +241,19 @@ def kernel(function: Function) -> Function:
 def parallel_kernel(function: Callable[..., Any]) -> Kernel:
     """Compile on first call, its `prange` loops spread over threads if there are several: not at all for one.
 
-    Each element of the output must have one writer. `kernel.alone` never leaves the thread it is called from.
+    Each element of the output must have one writer. Two `prange` loops in a row need a call between them, for Numba would make
+    one loop of two that have as many turns. `kernel.alone` never leaves the thread it is called from.
     """
-    return _declared(Kernel(function, parallel=True))  # type: ignore[no-any-return]
+    return _declared(Kernel(function, loops=True))  # type: ignore[no-any-return]
+
+
+def driver(function: Callable[..., Any]) -> Kernel:
+    """Compile on first call a function that calls kernels: all on one thread, or each with its loops over threads.
+
+    It has no `prange` of its own. It calls kernels, and other drivers, by names of its module, not as `module.kernel`. A stage
+    that is to stay on one thread in any case is called by a name for `stage.alone`.
+    """
+    return _declared(Kernel(function, drives=True))  # type: ignore[no-any-return]
 
 
 prange = numba.prange
@@ -276,7 +296,7 @@ class _CompileListener(numba_event.Listener):  # type: ignore[misc]
         self._started = started
 
     def on_start(self, event: Any) -> None:
-        if getattr(event.data.get("dispatcher"), "py_func", None) in self._ours:
+        if event.data["dispatcher"].py_func.__code__ in self._ours:
             self._started()
 
     def on_end(self, event: Any) -> None:
@@ -287,6 +307,6 @@ class _CompileListener(numba_event.Listener):  # type: ignore[misc]
 def watch_compiling(started: Callable[[], None]) -> Iterator[None]:
     """Call `started` whenever one of our kernels begins to compile (not when it is loaded from disk)."""
     with numba_event.install_listener(
-        "numba:compile", _CompileListener({kernel.function for kernel in KERNELS.values()}, started)
+        "numba:compile", _CompileListener({kernel.function.__code__ for kernel in KERNELS.values()}, started)
     ):
         yield

@@ -80,10 +80,6 @@ of a processor, and there it gains nothing."""
 ONE_THREAD_BELOW: Final = 2048
 """Worlds with fewer particles run on one thread altogether: at 2,000 a second one gained a tenth, and only on a quiet machine."""
 
-STAGES_FROM: Final = 512
-"""In smaller worlds what is replayed without Python (`repeats`) is one stage: looking what time it is at the end of each stage,
-and three kinds of substeps instead of one, made a frame of 10 circles a sixth longer."""
-
 ALL_THREADS_FROM: Final = 10_000
 """Unless the user says how many, worlds use all threads from this many particles on. Threads wait for each other several times a
 substep; on a busy machine (a browser drawing the world, say) each wait may last a time slice. At 5,000 two threads gain 0.3 ms of

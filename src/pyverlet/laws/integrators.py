@@ -16,7 +16,6 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from pyverlet.compile.trace import more_than_calls
 from pyverlet.kernels import motion
 from pyverlet.state.moves import advance, remember_rest
 from pyverlet.state.state import Slots
@@ -47,21 +46,18 @@ class Integrator(ABC):
         symplectic: whether the map preserves phase space volume (for forces that do not depend on velocity).
         velocity_lag: the velocity seen by contacts during a frame belongs to this fraction of h before the position.
         drop: from rest, under a constant acceleration a, a step moves a particle by drop * a h^2.
-        repeats: whether `step`, and with the h of the frame before `begin` and `end`, are always the same calls of kernels, if no
-            force is but gravity. A class with one of these of its own says so anew.
-        leaps: whether it then is v += h a, x += h v, and no more. A class with a `step` of its own says so anew.
+        leaps: whether `step` is v += h a, x += h v, and no more, if no force is but gravity. A class with a `step` of its own
+            says so anew.
     """
 
     order: ClassVar[int]
     symplectic: ClassVar[bool]
     velocity_lag: ClassVar[float] = 0.0
     drop: ClassVar[float] = 0.5
-    repeats: ClassVar[bool] = False
     leaps: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
-        for claim, methods in (("repeats", ("begin", "step", "end")), ("leaps", ("step",))):
-            setattr(cls, claim, vars(cls).get(claim, vars(cls).keys().isdisjoint(methods) and getattr(cls, claim)))
+        cls.leaps = vars(cls).get("leaps", "step" not in vars(cls) and cls.leaps)
 
     def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
         """Before the substeps of a frame. `h_last`: the substep of the frame before, None after a restart."""
@@ -107,7 +103,6 @@ class ExplicitEuler(Integrator):
     order = 1
     symplectic = False
     drop = 0.0
-    repeats = True
 
     def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
         forces(state, t)
@@ -124,7 +119,7 @@ class SemiImplicitEuler(Integrator):
     order = 1
     symplectic = True
     drop = 1.0
-    repeats = leaps = True
+    leaps = True
 
     def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
         forces.kick_drift(state, t, h)
@@ -143,7 +138,7 @@ class _Stormer(Integrator):
     symplectic = True
     drop = 1.0
     velocity_lag = 0.5
-    repeats = leaps = True
+    leaps = True
 
     def __init__(self, *, naive_start: bool = False) -> None:
         self.naive_start = naive_start
@@ -157,7 +152,6 @@ class _Stormer(Integrator):
 
     def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
         if motion.any_nan(state.acceleration):
-            more_than_calls()
             fresh = np.isnan(state.acceleration[:, 0])
             # x_prev = x - v h + a h^2 / 2 makes u = v - a h / 2: order 2. The naive x_prev = x - v h makes u = v: order 1.
             known = state.acceleration.copy()
@@ -192,8 +186,6 @@ class PositionVerlet(_Stormer):
         naive_start: start from x_prev = x - v h instead of x - v h + a h^2 / 2. Drops the global order to 1; for demonstration.
     """
 
-    repeats = True
-
     def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
         super().begin(state, forces, t, h, h_last)
         if h_last is not None and h_last != h:
@@ -205,8 +197,6 @@ class TimeCorrectedVerlet(_Stormer):
 
     With a constant step it is PositionVerlet, bit for bit.
     """
-
-    repeats = True
 
     def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
         varies = h_last is not None and h_last != h

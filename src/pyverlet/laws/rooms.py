@@ -33,10 +33,6 @@ class Boundary(ABC):
         """x, y, radius, h, lag and rest_speed as `hold` takes them, if `confine` is but that."""
         return None
 
-    def repeats(self) -> tuple[Any, ...] | None:
-        """What `confine` depends on beside its arguments, if it is but calls of kernels; None: it may be anything."""
-        return None
-
     @abstractmethod
     def extent(self) -> Extent | None:
         """(x0, y0, x1, y1) of the room, m; None if it has no walls."""
@@ -119,9 +115,6 @@ class Circle(_Walls):
         self.center = checks.vector("center", center)
         self.radius = checks.number("radius", radius, above=0.0)
 
-    def repeats(self) -> tuple[Any, ...] | None:
-        return (self, *self.center, self.radius, self.restitution, self.friction) if type(self) is Circle else None
-
     def held(self, state: Slots, h: float, lag: float, rest_speed: float) -> tuple[Any, ...] | None:
         if type(self) is Circle and self.restitution == 0.0 == self.friction and state.smooth:
             shape, (h, lag, _, _, rest_speed) = self._rounded((*self.center, self.radius), state, h, lag, rest_speed)
@@ -169,9 +162,6 @@ class Box(_Walls):
         self.upper = checks.vector("upper", upper)
         if not (self.lower[0] < self.upper[0] and self.lower[1] < self.upper[1]):
             raise InputError(f"upper is {self.upper}; allowed is a corner above and to the right of lower, {self.lower}")
-
-    def repeats(self) -> tuple[Any, ...] | None:
-        return (self, *self.lower, *self.upper, self.restitution, self.friction) if type(self) is Box else None
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         self._confine(bounds.box, (*self.lower, *self.upper), state, h, lag, rest_speed)

@@ -21,15 +21,25 @@ from pyverlet.laws.contacts.wide import Wide
 from pyverlet.laws.rooms import hold
 from pyverlet.state.moves import leap
 from pyverlet.state.state import Slots
-from pyverlet.world.repeats import FIRST, LAST, NEXT
 
 Array = NDArray[Any]
+
+ALIKE, FIRST, NEXT, LAST = range(4)
+"""Kinds of substeps: where something acts beside gravity, contacts and the room all are alike. Elsewhere accelerations are known
+in all but the first, and the last has more to do."""
 
 _APART = 2 * kernels.BEHIND + 2
 """Strips between two borders at least, so that what is left to be done at one has nothing to do with the other."""
 
 _KEPT = 8
 """Strips whose normals a thread keeps at a time: those between the first stage and the last, and one more, in pairs."""
+
+
+def kind_of(substep: int, count: int) -> int:
+    """What kind a substep is of, where nothing acts but gravity, contacts and the room."""
+    if count == 1:
+        return ALIKE
+    return FIRST if substep == 0 else LAST if substep == count - 1 else NEXT
 
 
 class Fused:

@@ -6,8 +6,6 @@ from time import perf_counter
 
 import numpy as np
 
-from pyverlet.compile.stopwatch import CLOCK, keep, note
-
 _ROOM = 64
 """Stages that have a place at most, and one more."""
 
@@ -39,14 +37,18 @@ class Profile:
 
     def mark(self, stage: str) -> None:
         """Charge the time since the last mark to `stage`."""
-        note(self._spent, self._places.get(stage) or self._places.setdefault(stage, len(self._places) + 1), CLOCK)
+        now, spent = perf_counter(), self._spent
+        spent[self._places.get(stage) or self._places.setdefault(stage, len(self._places) + 1)] += now - spent[0]
+        spent[0] = now
 
     def end(self) -> None:
         """The frame is complete."""
         self.frame_ms = (perf_counter() - self._start) * 1e3
         self.frames += 1
         self._broken_off = False
-        keep(self._spent, self._complete, self._total)
+        self._complete[:] = self._spent
+        self._total += self._spent
+        self._spent.fill(0.0)
 
     @property
     def stages(self) -> dict[str, float]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pyverlet.compile import jit
-from pyverlet.ground.constants import FUSED_FROM, KNOWN_FROM, ONE_THREAD_BELOW, STAGES_FROM, UNEVEN
+from pyverlet.ground.constants import FUSED_FROM, KNOWN_FROM, ONE_THREAD_BELOW, UNEVEN
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.collisions import Collisions
 from pyverlet.laws.forces import Conservative, Drag
@@ -31,7 +31,7 @@ _ROOMS = (Open, Circle, Box)
 def rehearse(world: World) -> None:
     """What this world needs: frames of a small one of the same kind, its forces, and sleep."""
     small = _lattice(
-        max(_enough(world.threads), *(least for least in (0, STAGES_FROM, ONE_THREAD_BELOW, KNOWN_FROM) if len(world) >= least)),
+        max(_enough(world.threads), *(least for least in (0, ONE_THREAD_BELOW, KNOWN_FROM) if len(world) >= least)),
         world.dtype,
         type(world.boundary),
         getattr(world.boundary, "restitution", 0.0),

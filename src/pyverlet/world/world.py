@@ -27,12 +27,11 @@ from pyverlet.laws.sleep import Sleep, laws
 from pyverlet.state.state import Slots, State
 from pyverlet.world.actors import Actor
 from pyverlet.world.convenience import Doors
-from pyverlet.world.fused import Fused
+from pyverlet.world.fused import ALIKE, Fused, kind_of
 from pyverlet.world.measures import Measures
 from pyverlet.world.moments import Moment
 from pyverlet.world.profile import Profile
 from pyverlet.world.queries import Queries
-from pyverlet.world.repeats import CLOSING, OPENING, Frame, Repeats
 from pyverlet.world.saved import Saved
 
 Array = NDArray[Any]
@@ -94,7 +93,7 @@ class World(Measures, Queries, Doors):
         self.frames = 0
         self.profile = Profile()
         self._books = Bookkeeper() if ledger else None
-        self._repeats, self._fused = Repeats(), Fused()
+        self._fused = Fused()
         self.onlooker: Callable[[Moment], None] | None = None
         """Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins."""
 
@@ -118,20 +117,20 @@ class World(Measures, Queries, Doors):
         self._accept(dt, h, books)
         self.profile.end()
 
-    def _frame(self, h: float, told: Callable[[str], None]) -> None:
-        """The table of contents of the engine. `told` is called with the name of each stage as it ends."""
+    def _frame(self, h: float, done: Callable[[str], None]) -> None:
+        """The table of contents of the engine. `done` is called with the name of each stage as it ends."""
         state, forces, integrator = self._slots, self._force_sum, self.integrator
         contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course or None
         fused, lag, state.drop = self._fused.begin(self.gravity, contacts), integrator.velocity_lag * h, integrator.drop
         parts: list[Any] = [part for part in (contacts, links, course) if part]
-        frame = self._repeats.frame(self, h, contacts, told)
-        done = frame.done
-        if not self._open(frame, h, told):
+        plain = not (self.forces or self.links or self.obstacles) and done == self.profile.mark
+        if not self._open(h, done):
             return
         watch = Watch(self._state, forces, self.links, self.boundary) if contacts and undriven(self, h, self._h_last) else None
-        for substep, kind, moved in frame.substeps(self.substeps):
+        for substep in range(self.substeps):
+            kind = kind_of(substep, self.substeps) if plain else ALIKE
             self._show(substep, h, lag)
-            if not (moved or fused.leapt or fused.leap(self, contacts, h, kind)):
+            if not (fused.leapt or fused.leap(self, contacts, h, kind)):
                 for part in parts:
                     part.before(state, h)
                 integrator.step(state, forces, self.time + substep * h, h)
@@ -139,7 +138,7 @@ class World(Measures, Queries, Doors):
             if contacts:
                 contacts.find(state, lag)
                 done("broad phase")
-                if frame.plain and fused.substep(self, contacts, h, lag, done, kind):
+                if plain and fused.substep(self, contacts, h, lag, done, kind):
                     continue
                 contacts.project(state, h, lag, forces.strongest)
                 done("contacts")
@@ -157,8 +156,8 @@ class World(Measures, Queries, Doors):
             if links:
                 links.after(state)
                 done("links")
-        self._finish(frame, contacts, watch, h)
-        told("finish")
+        self._finish(contacts, watch, h, leans=kind != ALIKE)
+        done("finish")
 
     def run(self, *, seconds: float, dt: float = 1 / 60) -> None:
         """Advance by as many frames of dt as come nearest to `seconds`."""
@@ -166,21 +165,17 @@ class World(Measures, Queries, Doors):
         for _ in range(round(seconds / checks.number("dt", dt, above=0.0))):
             self.step(dt)
 
-    def _open(self, frame: Frame, h: float, done: Callable[[str], None]) -> bool:
+    def _open(self, h: float, done: Callable[[str], None]) -> bool:
         """Take up what users have set, and begin; False if nobody is awake."""
         if self.links.begin() and self._contacts:
             self._contacts.broad_phase.forget()
         self._course.begin()
         self._clear_notes()
-        if frame.made(OPENING):
-            done("gather")
-            return True
-        with frame.noted(OPENING):
-            self._gather()
-            done("gather")  # before the velocities are those of the integrator
-            if self._sleep and self._sleep.all_asleep(self._slots):
-                return False
-            self.integrator.begin(self._slots, self._force_sum, self.time, h, self._h_last)
+        self._gather()
+        done("gather")  # before the velocities are those of the integrator
+        if self._sleep and self._sleep.all_asleep(self._slots):
+            return False
+        self.integrator.begin(self._slots, self._force_sum, self.time, h, self._h_last)
         return True
 
     def _gather(self) -> None:
@@ -209,14 +204,12 @@ class World(Measures, Queries, Doors):
         with contacts.aside(self._slots) if contacts else nullcontext():
             links.solve(self._slots, h)
 
-    def _finish(self, frame: Frame, contacts: ContactSolver | None, watch: Watch | None, h: float) -> None:
+    def _finish(self, contacts: ContactSolver | None, watch: Watch | None, h: float, *, leans: bool) -> None:
         """The substeps are done: who rests, the velocities of now, and no more energy than there may be."""
-        if not frame.made(CLOSING):
-            with frame.noted(CLOSING):
-                if contacts:
-                    lag, marked = self.integrator.velocity_lag * h, frame.leans and contacts.packs(self._slots) is not None
-                    contacts.end(self._slots, self._state, lag, self.substeps * h, self.gravity, marked=marked)
-                self.integrator.end(self._slots, h)
+        if contacts:
+            lag, marked = self.integrator.velocity_lag * h, leans and contacts.packs(self._slots) is not None
+            contacts.end(self._slots, self._state, lag, self.substeps * h, self.gravity, marked=marked)
+        self.integrator.end(self._slots, h)
         if contacts and watch:
             contacts.growth.heed(watch.close(self._slots, contacts.listed()))
 

@@ -140,12 +140,6 @@ class ContactSolver:
                 self.broad_phase.release()
         return self._wide
 
-    def repeats(self, state: Slots) -> tuple[Any, ...] | None:
-        """What a substep's contacts depend on beside h, if they are but calls of kernels; None: there is more to them."""
-        if not (self._alone(state) and self._packed and self._wide.fits(state)):
-            return None
-        return self.broad_phase.lasts()
-
     def packs(self, state: Slots) -> tuple[Wide, Strips] | None:
         """Packs and strips, if a substep's contacts are but `project` and `still` of these; None: there is more to them."""
         strips = self.broad_phase.strips() if self._alone(state) else None
