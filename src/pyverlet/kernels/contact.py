@@ -424,14 +424,16 @@ def _arrive(a, b, circles, law):
         x, y = law.feed * x, law.feed * y
         circles.velocity[i, 0] += x
         circles.velocity[i, 1] += y
-        circles.carries[i] = one if x * x + y * y > limit else zero
+        square = x * x + y * y
+        circles.carries[i] = one if square > limit else zero
+        if law.rubs != 0:  # who rests against others, however lightly, ends the substep as they do
+            circles.lift[i] = circles.leans[i] if square > zero else zero
     for i in range(a, b):
         circles.fed[i] = ((circles.fed[i] & (CARRIES | AT_WALL)) * CARRIED) | np.uint8(circles.carries[i])
     if law.rubs != 0:
         for i in range(a, b):
             circles.turn[i] = law.h * circles.spin[i] + circles.turned[i]
             circles.spin[i] += law.feed * circles.turned[i]
-            circles.lift[i] = circles.carries[i] * circles.leans[i]
 
 
 @kernel
