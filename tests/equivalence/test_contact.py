@@ -99,10 +99,10 @@ class OneByOne:
     def gap(self, k: int, i: int, j: int) -> Any:
         return self.wide.gap[:, k] + (self.moved[j] - self.moved[i])
 
-    def shift(self, array: Any, i: int, j: int, by: Any) -> None:
-        w = self.slots.inverse_mass
-        array[i] -= by * w[i]
-        array[j] += by * w[j]
+    def carry(self, i: int, by: Any) -> None:
+        to = self.slots.position[i] + by
+        self.moved[i] += to - self.slots.position[i]
+        self.slots.position[i] = to
 
     def bounce(self, i: int, j: int, d: Any, reach: Any, e: Any, mu: Any) -> bool:
         s, law, real = self.slots, self.law, self.real
@@ -124,9 +124,10 @@ class OneByOne:
             p = np.array([p[0] + rub * n[1], p[1] - rub * n[0]], s.dtype)
             s.spin[i] += real(2) * rub * w[i] / s.radius[i]
             s.spin[j] += real(2) * rub * w[j] / s.radius[j]
-        self.shift(s.velocity, i, j, p)
-        self.shift(s.position, i, j, time * p)
-        self.shift(self.moved, i, j, time * p)
+        s.velocity[i] -= p * w[i]
+        s.velocity[j] += p * w[j]
+        self.carry(i, -time * p * w[i])
+        self.carry(j, time * p * w[j])
         return True
 
     def make_room(self, i: int, j: int, d: Any, reach: Any) -> None:
@@ -139,8 +140,8 @@ class OneByOne:
         if self.carries[i] + self.carries[j] > 0 or (law.weight and leaving * law.h < depth):
             w = s.inverse_mass
             by = min(depth, law.most * reach) / ((w[i] + w[j]) * distance) * d
-            self.shift(s.position, i, j, by)
-            self.shift(self.moved, i, j, by)
+            self.carry(i, -by * w[i])
+            self.carry(j, by * w[j])
 
     def meets(self, k: int, i: int, j: int, reach: Any, e: Any, mu: Any) -> bool:
         """Whether a touching pair is no contact at rest, and has been seen to."""

@@ -122,12 +122,12 @@ class Law(NamedTuple):
 
 
 @kernel
-def _shift(array, i, j, x, y, wi, wj):
-    """Rows i and j apart by (x, y) per inverse mass."""
-    array[i, 0] -= x * wi
-    array[i, 1] -= y * wi
-    array[j, 0] += x * wj
-    array[j, 1] += y * wj
+def _carry(circles, i, x, y):
+    """Move circle i by (x, y) that is no push and feeds nobody: `moved` gets what of it the position has got, rounded as that is."""
+    to_x, to_y = circles.position[i, 0] + x, circles.position[i, 1] + y
+    circles.moved[i, 0] += to_x - circles.position[i, 0]
+    circles.moved[i, 1] += to_y - circles.position[i, 1]
+    circles.position[i, 0], circles.position[i, 1] = to_x, to_y
 
 
 @kernel
@@ -173,10 +173,10 @@ def _bounce(i, j, dx, dy, reach, e, mu, ri, rj, circles, law, spent):
         circles.spin[j] += two * rub * wj / rj
         if spent.shape[0] > 0:
             spent[1] += np.float64(rub) * (slip + 1.5 * (wi + wj) * rub)
-    _shift(v, i, j, px, py, wi, wj)
-    # Into positions and `moved` alike: it is no push, and feeds nobody.
-    _shift(circles.position, i, j, time * px, time * py, wi, wj)
-    _shift(circles.moved, i, j, time * px, time * py, wi, wj)
+    v[i, 0], v[i, 1] = v[i, 0] - px * wi, v[i, 1] - py * wi
+    v[j, 0], v[j, 1] = v[j, 0] + px * wj, v[j, 1] + py * wj
+    _carry(circles, i, -time * px * wi, -time * py * wi)
+    _carry(circles, j, time * px * wj, time * py * wj)
     return True
 
 
@@ -197,8 +197,8 @@ def _make_room(i, j, dx, dy, reach, circles, law):
     if carries or (law.weight != 0 and leaving * law.h < depth):
         wi, wj = circles.inverse_mass[i], circles.inverse_mass[j]
         by = min(depth, law.most * reach) / ((wi + wj) * distance)
-        _shift(circles.position, i, j, by * dx, by * dy, wi, wj)
-        _shift(circles.moved, i, j, by * dx, by * dy, wi, wj)
+        _carry(circles, i, -by * dx * wi, -by * dy * wi)
+        _carry(circles, j, by * dx * wj, by * dy * wj)
 
 
 @kernel
