@@ -209,11 +209,11 @@ def test_worlds_of_several_python_threads_record_their_own_calls() -> None:
     sys.setswitchinterval(1e-6)
     try:
         with ThreadPoolExecutor(len(worlds)) as pool:
-            list(pool.map(lambda w: w.run(seconds=4), worlds))
+            list(pool.map(lambda w: w.run(seconds=1.5), worlds))
     finally:
         sys.setswitchinterval(before)
     for w, other in zip(worlds, alone, strict=True):
-        other.run(seconds=4)
+        other.run(seconds=1.5)
         assert told(w) == told(other)
 
 

@@ -139,7 +139,7 @@ for threads in (1, 2, 8):
     world = pv.World(gravity=(0, 0), threads=threads)
     world.add(position=rng.uniform(-100, 100, (2500, 2)), radius=0.3)
     world.forces.append(pv.Gravitation(strength=0.01, softening=0.5))
-    world.run(seconds=0.1, dt=1 / 60)
+    world.run(seconds=1 / 30, dt=1 / 60)
     hashes.append(world.state_hash())
 json.dump(hashes, sys.stdout)
 """

@@ -36,7 +36,7 @@ def run(code: str, cache: Path) -> list[str]:
     return subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True).stdout.split()
 
 
-@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("threads", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_machine_code_is_made_of_the_kernel_alone(threads: int, tmp_path: Path) -> None:
     code = COMPILE.replace("THREADS", str(threads))
     assert run(code, tmp_path) == ["1.75", "1", "True", "5.0"]
