@@ -5,7 +5,8 @@ is tested is what a user gets: a data file missing from the wheel shows.
 
 What runs takes less than five minutes on two cores and looks at everything: every module, every scene, equal bits on any number
 of threads, the physics at small sizes, the live page in a browser if there is one. `--all` adds the tests marked `slow`: larger
-worlds, every combination, compiling from nothing. `--setup` stops before the tests.
+worlds, every combination, compiling from nothing. `--setup` stops before the tests. Two processes share them; with `-n0` one
+does all.
 """
 
 from __future__ import annotations
@@ -72,7 +73,8 @@ def main(arguments: list[str]) -> None:
     if WITH_ARCADE.exists():
         os.environ["PYVERLET_TEST_ARCADE"] = str(WITH_ARCADE)
     everything = ["-m", "not full"] if "--all" in arguments else []
-    run(PYTHON, "-m", "pytest", *everything, *(each for each in arguments if each != "--all"))
+    # Two processes, one of which soon has all tests of the page; whoever is through takes over what the other has left.
+    run(PYTHON, "-m", "pytest", "-n2", "--dist=worksteal", *everything, *(each for each in arguments if each != "--all"))
 
 
 if __name__ == "__main__":

@@ -78,7 +78,7 @@ circles.draw(view)
 
 
 def seen_through(code: str, *arguments: str, library: str = "") -> str:
-    """What the code prints, run by the Python that has this library; skipped where none has it, or there is nothing to draw on."""
+    """What the code prints, run by the Python that has this library; skipped where none has, or there is nothing to draw on."""
     python = ARCADES if library == "arcade" else sys.executable
     if library and not os.environ.get("CI") and python == sys.executable and importlib.util.find_spec(library) is None:
         pytest.skip(f"{library} is not installed")

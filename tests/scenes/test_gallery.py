@@ -56,7 +56,7 @@ def test_pegs_alone_send_a_ball_left_or_right_whatever_it_did_before(count: int)
     turns = np.diff(at, axis=0, prepend=0.0)
     assert (np.abs(turns) == 0.5).mean() > 0.999
     side = np.sign(turns)
-    # Of n pairs of tosses, 11 a ball, the mean product is 0 with a standard error of 1 / sqrt(n); measured 0.01 on the same board.
+    # Of n pairs of tosses, 11 a ball, the mean product is 0 with a standard error of 1 / sqrt(n); 4,000 balls measured 0.01.
     for later in (1, 2, 3):
         assert abs((side[later:] * side[:-later]).mean()) < 0.01 + 3 / np.sqrt(11 * count)
     # The variance of a walk of k steps of 1/2 is k / 4: sums of n squares have a relative standard error of sqrt(2 / n) = 0.022.
