@@ -3,7 +3,7 @@
 Needs Python >= 3.11 and the network, nothing else. The package is built as a wheel and installed from it, so that what
 is tested is what a user gets: a data file missing from the wheel shows.
 
-What runs takes less than five minutes on two cores and looks at everything: every module, every scene, equal bits on any number
+What runs is meant to take five minutes on two cores and looks at everything: every module, every scene, equal bits on any number
 of threads, the physics at small sizes, the live page in a browser if there is one. `--all` adds the tests marked `slow`: larger
 worlds, every combination, compiling from nothing. `--setup` stops before the tests. Two processes share them; with `-n0` one
 does all.

@@ -43,6 +43,7 @@ def test_machine_code_is_made_of_the_kernel_alone(threads: int, tmp_path: Path) 
     assert run(code, tmp_path) == ["1.75", "1", "True", "5.0"]  # what is found on disk has all it calls in it
 
 
+@pytest.mark.slow
 def test_a_helper_found_on_disk_serves_another_kernel(tmp_path: Path) -> None:
     run(COMPILE.replace("THREADS", "1").replace("newton_kick_drift(x, y, ", "newton(").replace(", 0.5, 0.25)", ")"), tmp_path)
     assert run(COMPILE.replace("THREADS", "1"), tmp_path) == ["1.75", "1", "True", "5.0"]

@@ -158,6 +158,7 @@ def test_colours_say_what_they_say(page: Page, program: Serve, colouring: str) -
         assert np.corrcoef(light, np.log(mass))[0, 1] > 0.9
 
 
+@pytest.mark.slow
 def test_groups_have_a_colour_each(page: Page, program: Serve) -> None:
     visit(page, program("soft-bodies", 2200).address)
     page.get_by_test_id("colour").select_option("group")
@@ -311,6 +312,7 @@ def test_velocities_and_contacts_are_drawn(page: Page, program: Serve) -> None:
     assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.overlay.contacts") == 0)
 
 
+@pytest.mark.slow
 def test_circles_that_do_not_collide_have_no_contacts(page: Page, program: Serve) -> None:
     visit(page, program("orbit", 300).address)  # a world without collisions
     page.get_by_test_id("contacts").check()
@@ -330,6 +332,7 @@ def test_circles_that_do_not_collide_have_no_contacts(page: Page, program: Serve
     assert page.evaluate(pinned) == [0, 1]
 
 
+@pytest.mark.slow
 def test_the_page_says_why_an_overlay_is_off(page: Page, program: Serve) -> None:
     visit(page, program("cage", 100, 50).address)  # the server draws
     for name in ("velocities", "contacts"):
@@ -370,6 +373,7 @@ def test_the_sheet_lists_the_keys(page: Page, program: Serve) -> None:
     page.keyboard.press("f")
 
 
+@pytest.mark.slow
 def test_a_link_carries_scene_and_settings(page: Page, browser: Browser, program: Serve) -> None:
     address = program("cage", 100).address
     visit(page, address)
