@@ -1,7 +1,12 @@
-"""Set up an environment of its own and run the tests in it: `python3 .ci/test.py [pytest arguments]`.
+"""Set up an environment of its own and run the tests in it: `python3 .ci/test.py [--all] [pytest arguments]`.
 
 Needs Python >= 3.11 and the network, nothing else. The package is built as a wheel and installed from it, so that what
-is tested is what a user gets: a data file missing from the wheel shows. `--setup` stops before the tests.
+is tested is what a user gets: a data file missing from the wheel shows.
+
+What runs is meant to take five minutes on two cores and looks at everything: every module, every scene, equal bits on any number
+of threads, the physics at small sizes, the live page in a browser if there is one. `--all` adds the tests marked `slow`: larger
+worlds, every combination, compiling from nothing. `--setup` stops before the tests. Two processes share them; with `-n0` one
+does all.
 """
 
 from __future__ import annotations
@@ -14,9 +19,16 @@ import venv
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-ENVIRONMENT = ROOT / ".venv-test"
-BIN = ENVIRONMENT / ("Scripts" if os.name == "nt" else "bin")
-PYTHON = BIN / ("python.exe" if os.name == "nt" else "python")
+BIN = "Scripts" if os.name == "nt" else "bin"
+
+
+def python_of(environment: str) -> Path:
+    """The interpreter of one of our environments."""
+    return ROOT / environment / BIN / ("python.exe" if os.name == "nt" else "python")
+
+
+PYTHON = python_of(".venv-test")
+WITH_ARCADE = python_of(".venv-arcade")
 
 
 def run(*command: str | Path) -> None:
@@ -26,18 +38,28 @@ def run(*command: str | Path) -> None:
         sys.exit(code)
 
 
-def install() -> None:
+def install(python: Path, wheel: Path, extras: str) -> None:
+    """Put the wheel and what its extras name into the environment of this interpreter."""
+    if not python.exists():
+        venv.create(python.parent.parent, with_pip=True, clear=True)
+    pip = (python, "-m", "pip", "--disable-pip-version-check", "-q")
+    run(*pip, "install", f"{wheel}[{extras}]")
+    # The version may be the same as last time while the code is not.
+    run(*pip, "install", "--force-reinstall", "--no-deps", wheel)
+
+
+def setup() -> None:
     """Build the wheel and put it, with everything the tests need, into the environment."""
     if not PYTHON.exists():
-        venv.create(ENVIRONMENT, with_pip=True, clear=True)
-    pip = (PYTHON, "-m", "pip", "--disable-pip-version-check", "-q")
+        venv.create(PYTHON.parent.parent, with_pip=True, clear=True)
     with tempfile.TemporaryDirectory() as folder:
-        run(*pip, "wheel", "--no-deps", "--wheel-dir", folder, ".")
+        run(PYTHON, "-m", "pip", "--disable-pip-version-check", "-q", "wheel", "--no-deps", "--wheel-dir", folder, ".")
         (wheel,) = Path(folder).glob("*.whl")
         # Elsewhere, tests in programs that are not installed are skipped.
-        run(*pip, "install", f"{wheel}[{'test,programs' if os.environ.get('CI') else 'test'}]")
-        # The version may be the same as last time while the code is not.
-        run(*pip, "install", "--force-reinstall", "--no-deps", wheel)
+        in_ci = bool(os.environ.get("CI"))
+        install(PYTHON, wheel, "test,bench,programs" if in_ci else "test")
+        if in_ci or WITH_ARCADE.exists():
+            install(WITH_ARCADE, wheel, "arcade")
 
 
 def main(arguments: list[str]) -> None:
@@ -45,10 +67,14 @@ def main(arguments: list[str]) -> None:
         sys.exit(f"pyverlet needs Python 3.11 or newer, this is {sys.version.split()[0]}")
     os.environ.pop("PYTHONPATH", None)  # what is tested is the installed package
     print("setting up .venv-test (a minute or two the first time)", flush=True)
-    install()
-    if "--setup" not in arguments:
-        sys.stdout.flush()
-        run(PYTHON, "-m", "pytest", *arguments)
+    setup()
+    if "--setup" in arguments:
+        return
+    if WITH_ARCADE.exists():
+        os.environ["PYVERLET_TEST_ARCADE"] = str(WITH_ARCADE)
+    everything = ["-m", "not full"] if "--all" in arguments else []
+    # Two processes, one of which soon has all tests of the page; whoever is through takes over what the other has left.
+    run(PYTHON, "-m", "pytest", "-n2", "--dist=worksteal", *everything, *(each for each in arguments if each != "--all"))
 
 
 if __name__ == "__main__":

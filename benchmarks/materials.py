@@ -193,9 +193,13 @@ def main(particles: int, path: Path | None) -> None:
                 )
             rows += part
     for threads in (1, 2):
-        print(f"\nbeside others, {threads} thread{'s' * (threads > 1)}: asked is how many times as long as ours they take at least")
+        print(
+            f"\nbeside others, {threads} thread{'s' * (threads > 1)}: asked is how many times as long as ours they take at least"
+        )
         for row in peers(particles, threads):
-            print(f"{row.world:<40}{row.ms_per_frame:>9.2f}{row.ratio:>8.1f}{row.asked:>8.1f}{row.overlap_mean:>10.3%}{row.overlap_max:>8.1%}")
+            print(
+                f"{row.world:<40}{row.ms_per_frame:>9.2f}{row.ratio:>8.1f}{row.asked:>8.1f}{row.overlap_mean:>10.3%}{row.overlap_max:>8.1%}"
+            )
             rows.append(row)
     if path:
         with path.open("w", newline="") as file:

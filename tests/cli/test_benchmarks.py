@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -26,6 +28,7 @@ def test_the_comparison_runs_and_writes_its_rows(tmp_path: Path) -> None:
     assert rows["pyverlet, 1 thread"]["overlap_max"] == rows["pyverlet, 2 threads"]["overlap_max"]
 
 
+@pytest.mark.slow
 def test_the_physics_of_every_engine_is_measured() -> None:
     command = [sys.executable, "-m", "benchmarks", "physics", "--particles", "40"]
     run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=True)

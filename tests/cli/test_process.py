@@ -46,6 +46,30 @@ def test_bad_input_in_a_real_process() -> None:
     assert done.stderr.count("\n") == 1
 
 
+ONE_KERNEL = """
+import numpy as np
+from pyverlet import World
+from pyverlet.cli._app import compile_kernels
+from pyverlet.kernels import motion
+from pyverlet.world import rehearsals, warmup
+rehearsals.PARTS.clear()
+rehearsals.PARTS["one"] = lambda dtype, threads: motion.any_nan(np.zeros((1, 2), dtype))
+warmup.rehearse = lambda world: None
+print(compile_kernels(World()))
+"""
+
+
+def test_compiling_is_announced(tmp_path: Path) -> None:
+    for announced in (True, False):
+        done = subprocess.run(
+            [sys.executable, "-c", ONE_KERNEL], env=os.environ | {"PYVERLET_CACHE_DIR": str(tmp_path)},
+            capture_output=True, text=True, timeout=120, check=True,
+        )  # fmt: skip
+        assert ("compiling kernels, once: " in done.stderr) is announced  # the second time it is on disk
+        assert float(done.stdout) > 0
+
+
+@pytest.mark.slow
 def test_compiling_is_announced_on_standard_error(tmp_path: Path) -> None:
     # An empty cache: everything has to be compiled.
     done = call("run", "fall", "--frames", "2", "--json", env=os.environ | {"PYVERLET_CACHE_DIR": str(tmp_path)})

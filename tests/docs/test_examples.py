@@ -25,6 +25,10 @@ def blocks(page: Path, language: str) -> list[tuple[int, str]]:
     return [(text.count("\n", 0, match.start(2)), match[2]) for match in BLOCK.finditer(text) if match[1] == language]
 
 
+# Commands that take long for what others show too.
+SLOW = ("pyverlet bench --particles 20000", "pyverlet record galton ", "pyverlet record image image.png ")
+
+
 def commands() -> list[str]:
     """Every line of the shell blocks, and every row of the README's table, that starts with our command."""
     shell = [line for page in PAGES for _, source in blocks(page, "sh") for line in source.splitlines()]
@@ -56,7 +60,9 @@ def test_python_examples(page: Path, shown: list[Any]) -> None:
         exec(compile("\n" * line + source, page, "exec"), names)
 
 
-@pytest.mark.parametrize("command", commands())
+@pytest.mark.parametrize(
+    "command", [pytest.param(c, id=c, marks=pytest.mark.slow if c.startswith(SLOW) else ()) for c in commands()]
+)
 def test_commands(command: str, shown: list[Any], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(shlex.split(command)[1:]) == 0, capsys.readouterr().err
 

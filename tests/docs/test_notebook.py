@@ -30,7 +30,8 @@ def test_it_is_the_page(writer: ModuleType) -> None:
     assert len(writer.notebook()) < 40_000
 
 
-# Jupyter's own parts warn about each other.
+# The page it is written from runs in test_examples.py. Jupyter's own parts warn about each other.
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_it_runs_from_top_to_bottom(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     from nbclient import NotebookClient

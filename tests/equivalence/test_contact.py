@@ -262,7 +262,18 @@ def test_eight_at_once_are_one_by_one(seed: int, n: int, spread: float, dtype: A
     slots.fed[:] = rng.random(n) < 0.5
     slots.start = (slots.position - slots.velocity * slots.real(H)).astype(dtype)
     other = Slots(slots.dtype)
-    for name in ("position", "velocity", "acceleration", "spin", "radius", "inverse_mass", "restitution", "friction", "fed", "start"):
+    for name in (
+        "position",
+        "velocity",
+        "acceleration",
+        "spin",
+        "radius",
+        "inverse_mass",
+        "restitution",
+        "friction",
+        "fed",
+        "start",
+    ):
         setattr(other, name, getattr(slots, name).copy())
     other.size = other.radius
     wide.begin_substep(slots, H, 0.5 * H, 9.81, 4 * 9.81 * H, accounts=False)

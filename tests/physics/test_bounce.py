@@ -66,6 +66,7 @@ def test_rebound_of_first_order_methods(name: str) -> None:
     assert height == pytest.approx(2.0, rel=4 * h * G / v)
 
 
+@pytest.mark.slow  # test_check.py does a hundred thousand
 def test_one_ball_in_a_box_keeps_its_energy_for_a_million_steps() -> None:
     world = pv.World(
         boundary=pv.Box((0, 0), (10, 10), restitution=1.0),

@@ -145,16 +145,16 @@ def test_the_same_bits_when_saved_and_for_any_threads() -> None:
     def big(threads: int) -> pv.World:
         world = pv.World(boundary=pv.Circle(radius=35), threads=threads)
         world.add(position=np.random.default_rng(1).uniform(-20, 20, (2500, 2)), radius=0.5)
-        world.run(seconds=1)
+        world.run(seconds=0.4)
         return world
 
     one, many = big(1), big(pv.compile.jit.max_threads())
     assert one.state_hash() == many.state_hash()
     saved = one.save()
-    one.run(seconds=0.5)
+    one.run(seconds=0.2)
     then = one.state_hash()
     one.restore(saved)
-    one.run(seconds=0.5)
+    one.run(seconds=0.2)
     assert one.state_hash() == then
 
 

@@ -24,8 +24,8 @@ def cage(n: int, *, seed: int = 0, **options: object) -> tuple[pv.World, pv.Grou
     return world, world.add(position=position, radius=RADIUS)
 
 
-def test_a_cage_of_20000_settles() -> None:
-    n = 20_000
+@pytest.mark.parametrize("n", [1500, pytest.param(20_000, marks=pytest.mark.slow)])
+def test_a_cage_settles(n: int) -> None:
     world, _ = cage(n)
     scale = n * G * world.boundary.extent()[3]  # type: ignore[index]
     energy = [world.energy().total]

@@ -18,14 +18,19 @@ from pyverlet.viewers.frames import outline
 WHITE = 0xFFFFFF
 
 
-def covered(position: Any, radius: Any, size: tuple[int, int] = (100, 80)) -> NDArray[np.float64]:
+def covered(
+    position: Any, radius: Any, size: tuple[int, int] = (100, 80), *, at_a_time: int | None = None
+) -> NDArray[np.float64]:
     """(h, w) what part of each pixel these discs cover, in a picture of a pixel a metre with (0, 0) at its lower left."""
     width, height = size
     pixels = np.zeros((height, width), dtype=np.uint32)
     position = np.atleast_2d(np.asarray(position, dtype=np.float64))
     radius = np.broadcast_to(np.asarray(radius, dtype=np.float64), len(position)).copy()
     colour = np.full(len(position), WHITE, dtype=np.uint32)
-    raster.circles(pixels, np.zeros_like(pixels), position, radius, colour, 0.0, float(height), 1.0)
+    ground = np.zeros_like(pixels)
+    for k in range(0, len(radius), at_a_time or len(radius)):
+        some = slice(k, k + (at_a_time or len(radius)))
+        raster.circles(pixels, ground, position[some], radius[some], colour[some], 0.0, float(height), 1.0)
     return np.asarray((pixels >> 24) / 255)
 
 
@@ -93,8 +98,9 @@ def test_what_is_nowhere_is_not_drawn(where: float) -> None:
     assert covered((5.0, 5.0), np.inf).sum() == 0
 
 
-def test_a_huge_disc_fills_the_picture() -> None:
-    assert (covered((50.0, 40.0), 1e7) == 1).all()
+@pytest.mark.parametrize("radius", [1e6, pytest.param(1e7, marks=pytest.mark.slow)])
+def test_a_huge_disc_fills_the_picture(radius: float) -> None:
+    assert (covered((50.0, 40.0), radius) == 1).all()
 
 
 def test_the_floor_of_a_cage_is_exact_and_its_wall_is_outside() -> None:
@@ -136,10 +142,10 @@ def picture_hash(threads: int, frames: int) -> str:
 
 
 def test_equal_worlds_give_equal_bytes_for_any_number_of_threads() -> None:
-    expected = picture_hash(1, 30)
-    assert picture_hash(1, 30) == expected
+    expected = picture_hash(1, 12)
+    assert picture_hash(1, 12) == expected
     if pv.compile.jit.max_threads() > 1:
-        assert picture_hash(2, 30) == expected
+        assert picture_hash(2, 12) == expected
 
 
 def test_the_picture_follows_the_world() -> None:
@@ -265,9 +271,7 @@ def test_a_few_narrow_discs_cover_what_a_crowd_would() -> None:
 
 def one_by_one(position: Any, radius: Any, size: tuple[int, int]) -> NDArray[np.float64]:
     """`covered`, in parts too small to be a crowd."""
-    part = stamps.CROWD // 2
-    parts = [slice(k, k + part) for k in range(0, len(radius), part)]
-    return np.asarray(sum(covered(position[part], radius[part], size) for part in parts))
+    return covered(position, radius, size, at_a_time=stamps.CROWD // 2)
 
 
 def on_a_lattice(radius: Any, apart: float, rng: Any) -> tuple[NDArray[np.float64], tuple[int, int]]:

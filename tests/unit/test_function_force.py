@@ -102,7 +102,7 @@ def test_float32_worlds_take_them_too() -> None:
     assert ball.velocity[0, 1] == pytest.approx(0.5 / 60, rel=1e-3)
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
 def test_many_particles_give_the_same_bits_on_all_threads(dtype: Any) -> None:
     rng = np.random.default_rng(0)
     position, mass = rng.normal(0, 100, (40_001, 2)), np.where(np.arange(40_001) % 7, 2.0, np.inf)

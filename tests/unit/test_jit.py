@@ -109,6 +109,7 @@ def test_warm_up_leaves_the_world_alone_and_nothing_to_compile(boundary: pv.Boun
     assert compiled == []
 
 
+@pytest.mark.slow  # it compiles all there is
 def test_warm_up_reports_progress_and_leaves_nothing_to_compile(tmp_path: Path) -> None:
     code = (
         "import pyverlet as pv; world = pv.World(); world.add(position=(0, 0)); seen = []\n"

@@ -37,31 +37,6 @@ for name in list(rehearsals.PARTS):
 """
 
 
-def test_two_processes_share_the_work(tmp_path: Path) -> None:
-    # Without the pipes of `_Helper`, to see both: whatever begins to compile is written to disk, under a name of its
-    # own. Some helpers of kernels both compile.
-    code = SHORT + (
-        "counted = os.open(os.environ['COUNTED'], os.O_WRONLY | os.O_APPEND | os.O_CREAT)\n"
-        "with jit.watch_compiling(lambda: os.write(counted, b'.') and None):\n"
-        "    warmup._compile(np.dtype(np.float32), 1, list(rehearsals.PARTS))\n"
-    )
-    env = {**os.environ, "PYVERLET_CACHE_DIR": str(tmp_path), "COUNTED": str(tmp_path / "counted")}
-    both = [subprocess.Popen([sys.executable, "-c", code], env=env) for _ in range(2)]
-    assert [process.wait(timeout=300) for process in both] == [0, 0]
-    kept = list(tmp_path.rglob("*.nbc"))
-    assert 20 < len(kept) <= len((tmp_path / "counted").read_text()) < 1.5 * len(kept)
-    assert {path.name for path in tmp_path.rglob("compiled-float32/*")} == {"_motion", "_loans"}
-
-
-def test_what_is_compiled_by_many_has_the_bits_of_what_one_has(tmp_path: Path) -> None:
-    code = (
-        "world = pv.World(collisions=None); world.add(position=np.arange(20.0).reshape(10, 2)); pv.warm_up(world)\n"
-        "world.step(0.1); print(world.state_hash())"
-    )
-    here = run("import numpy as np, pyverlet as pv; " + code, jit.cache_dir().parent)  # type: ignore[union-attr]
-    assert run(SHORT + code, tmp_path, NUMBA_NUM_THREADS="2") == here
-
-
 # Two parts of a kernel each.
 TINY = """
 import os, subprocess, sys, numpy as np, pyverlet as pv
@@ -73,6 +48,36 @@ rehearsals.PARTS["one"] = lambda dtype, threads: motion.any_nan(np.zeros((1, 2),
 rehearsals.PARTS["two"] = lambda dtype, threads: motion.clear_pinned(np.zeros((1, 2), dtype), np.zeros(1, dtype))
 warmup.rehearse = lambda world: None
 """
+
+
+@pytest.mark.parametrize("some", ["tiny", pytest.param("short", marks=pytest.mark.slow)])
+def test_two_processes_share_the_work(some: str, tmp_path: Path) -> None:
+    # Without the pipes of `_Helper`, to see both: whatever begins to compile is written to disk, under a name of its
+    # own. Some helpers of kernels both compile.
+    begin, parts, least = (TINY, {"one", "two"}, 2) if some == "tiny" else (SHORT, {"_motion", "_loans"}, 20)
+    code = begin + (
+        "counted = os.open(os.environ['COUNTED'], os.O_WRONLY | os.O_APPEND | os.O_CREAT)\n"
+        "with jit.watch_compiling(lambda: os.write(counted, b'.') and None):\n"
+        "    warmup._compile(np.dtype(np.float32), 1, list(rehearsals.PARTS))\n"
+    )
+    env = {**os.environ, "PYVERLET_CACHE_DIR": str(tmp_path), "COUNTED": str(tmp_path / "counted")}
+    both = [subprocess.Popen([sys.executable, "-c", code], env=env) for _ in range(2)]
+    assert [process.wait(timeout=300) for process in both] == [0, 0]
+    kept = list(tmp_path.rglob("*.nbc"))
+    assert least <= len(kept) <= len((tmp_path / "counted").read_text()) < 1.5 * len(kept)
+    assert {path.name for path in tmp_path.rglob("compiled-float32/*")} == parts
+
+
+@pytest.mark.slow  # it compiles a world's kernels anew
+def test_what_is_compiled_by_many_has_the_bits_of_what_one_has(tmp_path: Path) -> None:
+    code = (
+        "world = pv.World(collisions=None); world.add(position=np.arange(20.0).reshape(10, 2)); pv.warm_up(world)\n"
+        "world.step(0.1); print(world.state_hash())"
+    )
+    here = run("import numpy as np, pyverlet as pv; " + code, jit.cache_dir().parent)  # type: ignore[union-attr]
+    assert run(SHORT + code, tmp_path, NUMBA_NUM_THREADS="2") == here
+
+
 COUNTED = """
 ours = []
 pv.warm_up(pv.World(), lambda done, total: ours.append(done))

@@ -13,7 +13,7 @@ import pyverlet as pv
 from pyverlet.viewers.commands import Pause
 from pyverlet.viewers.session import Session
 
-from .browser import FLAGS, Program, Serve, chromium
+from .browser import FLAGS, KINDS, Program, Serve, chromium
 
 WaitUntil = Callable[[Callable[[], bool]], None]
 
@@ -87,7 +87,7 @@ def playwright() -> Iterator[Playwright]:
         yield running
 
 
-@pytest.fixture(scope="module", params=[[], ["--disable-3d-apis"]], ids=["webgl", "no-webgl"])
+@pytest.fixture(scope="module", params=KINDS)
 def browser(playwright: Playwright, request: pytest.FixtureRequest) -> Iterator[Browser]:
     browser = playwright.chromium.launch(executable_path=chromium(), args=[*FLAGS, *request.param])
     yield browser

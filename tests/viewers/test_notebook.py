@@ -21,7 +21,7 @@ import pyverlet as pv
 from pyverlet.viewers import bundle
 from pyverlet.viewers.notebook import MOST_VIEWS
 
-from .browser import FLAGS, chromium
+from .browser import FLAGS, KINDS, chromium
 
 LOOK = {"type": "look", "part": None, "width": 400, "height": 300, "colour": "order", "dark": True, "velocity": False}
 
@@ -190,7 +190,7 @@ window.host = el.firstChild;
 """
 
 
-@pytest.fixture(params=[[], ["--disable-3d-apis"]], ids=["webgl", "no-webgl"])
+@pytest.fixture(params=KINDS)
 def cell(comm: Comm, request: pytest.FixtureRequest) -> Iterator[Page]:
     """A cell of a notebook in Chromium, around the real widget."""
     with sync_playwright() as playwright:

@@ -155,7 +155,7 @@ def test_shift_drag_pokes_a_hole(page: Page, program: Serve) -> None:
     assert comes_true(page, lambda: near() >= 3)
 
 
-@pytest.mark.parametrize("scheme", ["dark", "light"])
+@pytest.mark.parametrize("scheme", ["dark", pytest.param("light", marks=pytest.mark.slow)])
 def test_every_circle_is_drawn_where_it_is(page: Page, program: Serve, scheme: str) -> None:
     page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
     visit(page, program("box", 60).address)

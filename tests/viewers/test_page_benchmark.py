@@ -17,6 +17,7 @@ PARTS = ("physics ran", "queued", "waited", "a frame every")
 """Of a frame's time, as the benchmark of the page prints them, and the whole."""
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="who had the processor is read off Linux's /proc")
 def test_the_page_is_measured_watched_and_unwatched() -> None:
     chromium()

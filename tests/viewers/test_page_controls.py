@@ -140,7 +140,7 @@ def test_the_scene_image_shows_its_colours(page: Page, program: Serve) -> None:
     assert page.evaluate("() => window.pyverlet.ink(0)") != inks[0]
 
 
-@pytest.mark.parametrize("colouring", ["speed", "mass", "energy"])
+@pytest.mark.parametrize("colouring", ["mass", *(pytest.param(each, marks=pytest.mark.slow) for each in ("speed", "energy"))])
 def test_colours_say_what_they_say(page: Page, program: Serve, colouring: str) -> None:
     """Brighter and yellower for more: the palette's lightness grows along it."""
     page.emulate_media(color_scheme="dark")
@@ -158,6 +158,7 @@ def test_colours_say_what_they_say(page: Page, program: Serve, colouring: str) -
         assert np.corrcoef(light, np.log(mass))[0, 1] > 0.9
 
 
+@pytest.mark.slow
 def test_groups_have_a_colour_each(page: Page, program: Serve) -> None:
     visit(page, program("soft-bodies", 2200).address)
     page.get_by_test_id("colour").select_option("group")
@@ -179,6 +180,7 @@ def test_groups_have_a_colour_each(page: Page, program: Serve) -> None:
     assert page.evaluate("() => window.pyverlet.ink(0)") == inks[0]
 
 
+@pytest.mark.slow
 def test_slow_motion(page: Page, program: Serve) -> None:
     visit(page, program("cage", 100).address)
     page.get_by_test_id("speed").select_option("0.125")
@@ -310,6 +312,7 @@ def test_velocities_and_contacts_are_drawn(page: Page, program: Serve) -> None:
     assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.overlay.contacts") == 0)
 
 
+@pytest.mark.slow
 def test_circles_that_do_not_collide_have_no_contacts(page: Page, program: Serve) -> None:
     visit(page, program("orbit", 300).address)  # a world without collisions
     page.get_by_test_id("contacts").check()
@@ -329,6 +332,7 @@ def test_circles_that_do_not_collide_have_no_contacts(page: Page, program: Serve
     assert page.evaluate(pinned) == [0, 1]
 
 
+@pytest.mark.slow
 def test_the_page_says_why_an_overlay_is_off(page: Page, program: Serve) -> None:
     visit(page, program("cage", 100, 50).address)  # the server draws
     for name in ("velocities", "contacts"):
@@ -369,6 +373,7 @@ def test_the_sheet_lists_the_keys(page: Page, program: Serve) -> None:
     page.keyboard.press("f")
 
 
+@pytest.mark.slow
 def test_a_link_carries_scene_and_settings(page: Page, browser: Browser, program: Serve) -> None:
     address = program("cage", 100).address
     visit(page, address)
@@ -406,7 +411,7 @@ def test_a_link_carries_scene_and_settings(page: Page, browser: Browser, program
 NONSENSE = ("scene=nowhere&particles=-5", "particles=1e99&gravity=a,b&substeps=x", "%%%", "integrator=<b>&colour=pink")
 
 
-@pytest.mark.parametrize("settings", NONSENSE)
+@pytest.mark.parametrize("settings", [NONSENSE[0], *(pytest.param(each, marks=pytest.mark.slow) for each in NONSENSE[1:])])
 def test_a_link_of_nonsense_does_no_harm(page: Page, program: Serve, settings: str) -> None:
     visit(page, program("cage", 50).address + "#" + settings)
     assert comes_true(page, lambda: number(page, "time") > 0.3)

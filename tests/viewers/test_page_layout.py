@@ -21,7 +21,7 @@ def place(page: Page, x: float, y: float) -> list[float]:
     return found
 
 
-@pytest.mark.parametrize("size", [(1280, 800), (390, 844)])
+@pytest.mark.parametrize("size", [(1280, 800), pytest.param((390, 844), marks=pytest.mark.slow)])
 def test_no_wall_runs_through_the_title(page: Page, program: Serve, size: tuple[int, int]) -> None:
     page.set_viewport_size({"width": size[0], "height": size[1]})
     visit(page, program("rope-bridge", 40).address)
