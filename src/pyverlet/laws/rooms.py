@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import bounds, cage
+from pyverlet.kernels import bounds, cage, meetings
 from pyverlet.state.state import Slots
 
 Array = NDArray[Any]
@@ -36,6 +36,10 @@ class Boundary(ABC):
     def repeats(self) -> tuple[Any, ...] | None:
         """What `confine` depends on beside its arguments, if it is but calls of kernels; None: it may be anything."""
         return None
+
+    def walls(self) -> Sequence[float]:
+        """Its shape as seven numbers (`kernels.meetings`), so that obstacles push nobody through it; none, if it cannot say."""
+        return (meetings.OPEN, 0, 0, 0, 0, 0, 0)
 
     @abstractmethod
     def extent(self) -> Extent | None:
@@ -122,6 +126,9 @@ class Circle(_Walls):
     def repeats(self) -> tuple[Any, ...] | None:
         return (self, *self.center, self.radius, self.restitution, self.friction) if type(self) is Circle else None
 
+    def walls(self) -> Sequence[float]:
+        return (meetings.ROUND, *self.center, self.radius, 0.0, self.restitution, self.friction)
+
     def held(self, state: Slots, h: float, lag: float, rest_speed: float) -> tuple[Any, ...] | None:
         if type(self) is Circle and self.restitution == 0.0 == self.friction and state.smooth:
             shape, (h, lag, _, _, rest_speed) = self._rounded((*self.center, self.radius), state, h, lag, rest_speed)
@@ -172,6 +179,9 @@ class Box(_Walls):
 
     def repeats(self) -> tuple[Any, ...] | None:
         return (self, *self.lower, *self.upper, self.restitution, self.friction) if type(self) is Box else None
+
+    def walls(self) -> Sequence[float]:
+        return (meetings.RECTANGLE, *self.lower, *self.upper, self.restitution, self.friction)
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         self._confine(bounds.box, (*self.lower, *self.upper), state, h, lag, rest_speed)

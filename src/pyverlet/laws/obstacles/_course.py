@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.constants import OBSTACLE_CELLS
+from pyverlet.kernels import meetings
 from pyverlet.kernels import obstacles as kernels
 from pyverlet.laws.obstacles._base import Obstacle, Obstacles
+from pyverlet.laws.rooms import Boundary
 from pyverlet.state.state import Slots
 
 Array = NDArray[Any]
@@ -56,15 +58,19 @@ class Course:
         """Before a substep: note where everybody comes from."""
         state.note_start()
 
-    def collide(self, state: Slots, time: float, h: float, lag: float, rest_speed: float) -> None:
-        """Let everybody meet what was on the way; `time`: seconds from the beginning of the frame to that of the substep."""
+    def collide(self, state: Slots, room: Boundary, time: float, h: float, lag: float, rest_speed: float) -> None:
+        """Let everybody meet what was on the way, and stay in the room.
+
+        time: seconds from the beginning of the frame to that of the substep.
+        """
         largest = float(state.radius.max(initial=0.0))
         if self._moving or self._binned_for != largest:
             kernels.place(self._segments, self._bodies, time, h)
             self._bin(largest)
         numbers = map(state.real, (h, lag, rest_speed))
-        collide: Any = kernels.collide
-        collide(self._segments, self._bodies, time + h, *self._cells, *state.bodies(), *numbers)
+        collide: Any = meetings.collide
+        walls = np.array(room.walls(), float)
+        collide(self._segments, self._bodies, time + h, *self._cells, walls, *state.bodies(), *numbers)
 
     def end(self, dt: float) -> None:
         """At the end of a frame that went well: the obstacles are where they moved to."""

@@ -1,0 +1,263 @@
+"""Circles go their way through a substep among obstacles, and meet what there is to meet (`kernels.obstacles` finds it).
+
+Everything here is float64: where a circle ends is rounded to the world's dtype once, so that many small meetings, as on a chain
+of short segments, do not add up to more than one rounding of a coordinate.
+
+**Corners.** Who is held by two surfaces that face each other by more than a right angle cannot get out of one without getting
+into the other: to push it out of one after the other converges, the more slowly the narrower the corner, and leaves a velocity
+that moves nobody. So both conditions are solved at once: n1 . v = u1 and n2 . v = u2 for the speeds u of the surfaces, and the
+same for the place. Between surfaces that are parallel, and nearer than the circle is wide, there is no such place: then it
+stands in the middle, and counts as so much smaller for the rest of the substep.
+
+**The room wins.** Who is pushed beyond a wall of the room by an obstacle is held by the wall, as by another surface; where there
+is no place left between both it stands at the wall, in the obstacle.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.kernels.bounds import Body, look, meet, moved, put
+from pyverlet.kernels.obstacles import search, tolerance
+
+MEETINGS = 256
+"""Times one circle may meet anything in a substep; who has still not come through waits where it last met something."""
+
+PARALLEL = 1e-4
+"""Sine of the angle below which two surfaces that face each other count as parallel; and part of the speed that is no
+approach."""
+
+ROOM, NOBODY = -2, -1
+"""Numbers that are no segment's."""
+
+OPEN, ROUND, RECTANGLE = 0.0, 1.0, 2.0
+"""What a room is; as numbers: [what, x0, y0, radius or x1, y1, restitution, friction]."""
+
+
+class Surface(NamedTuple):
+    """What holds a circle."""
+
+    nx: Any
+    ny: Any
+    at: Any
+    """n . x of a centre that just touches it, m."""
+    speed: Any
+    """n . v of a circle that stays at it, m/s."""
+    which: Any
+    """Segment, ROOM or NOBODY."""
+
+
+@kernel
+def _wide(b):
+    """The circle b in float64."""
+    f = np.float64
+    return Body(
+        f(b.x), f(b.y), f(b.vx), f(b.vy), f(b.ax), f(b.ay), f(b.spin), f(b.radius), f(b.inverse_mass), f(b.restitution),
+        f(b.friction), b.fed, b.resting, f(b.hit), f(b.to_impact), f(b.to_friction), f(b.from_x), f(b.from_y), f(b.share),
+        f(b.turn), f(b.lift),
+    )  # fmt: skip
+
+
+@kernel
+def _rested(b, resting):
+    """The circle b, but with these notes of who holds it."""
+    return Body(
+        b.x, b.y, b.vx, b.vy, b.ax, b.ay, b.spin, b.radius, b.inverse_mass, b.restitution, b.friction, b.fed, resting, b.hit,
+        b.to_impact, b.to_friction, b.from_x, b.from_y, b.share, b.turn, b.lift,
+    )  # fmt: skip
+
+
+@kernel
+def _beyond(room, x, y, radius):
+    """(depth, normal x, y) of the wall of the room that a rim is farthest beyond; a depth below 0: of none."""
+    if room[0] == ROUND:
+        dx, dy = x - room[1], y - room[2]
+        distance = np.hypot(dx, dy)
+        if distance > 0.0:
+            return distance + radius - room[3], -dx / distance, -dy / distance
+    elif room[0] == RECTANGLE:
+        depth, nx, ny = room[1] + radius - x, 1.0, 0.0
+        if x + radius - room[3] > depth:
+            depth, nx = x + radius - room[3], -1.0
+        if room[2] + radius - y > depth:
+            depth, nx, ny = room[2] + radius - y, 0.0, 1.0
+        if y + radius - room[4] > depth:
+            depth, nx, ny = y + radius - room[4], 0.0, -1.0
+        return depth, nx, ny
+    return -1.0, 0.0, 1.0
+
+
+@kernel
+def _kept(room, b):
+    """The circle b, not beyond any wall of the room."""
+    for _ in range(2):  # a corner
+        depth, nx, ny = _beyond(room, b.x, b.y, b.radius)
+        if depth <= 0.0:
+            break
+        b = moved(b, b.x + depth * nx, b.y + depth * ny, b.vx, b.vy, b.from_x, b.from_y)
+    return b
+
+
+@kernel
+def _touched(b, nx, ny, depth, wx, wy, h, lag, e, mu, rest_speed, which):
+    """The circle b meets a surface that moves with (wx, wy): what becomes of it, and the surface, NOBODY's if it bounced off."""
+    noted, from_x, from_y = b.resting, b.from_x, b.from_y
+    # As the surface sees it: how fast it is, and how far it went.
+    b = _rested(moved(b, b.x, b.y, b.vx - wx, b.vy - wy, from_x + h * wx, from_y + h * wy), 0)
+    b = meet(b, nx, ny, depth, h, lag, e, mu, rest_speed)
+    held = b.resting != 0
+    b = _rested(moved(b, b.x, b.y, b.vx + wx, b.vy + wy, from_x, from_y), noted | b.resting)
+    speed = nx * (wx - b.lift * b.ax) + ny * (wy - b.lift * b.ay)
+    return b, Surface(nx, ny, nx * b.x + ny * b.y, speed, which if held else NOBODY)
+
+
+@kernel
+def _still_there(surface, segments, x, y, size, least):
+    """Whether a circle of this size at (x, y) touches the surface, or is beyond it: not if it has gone past its end."""
+    if surface.which == ROOM:
+        return True
+    if surface.which == NOBODY:
+        return False
+    segment = segments[surface.which]
+    ox, oy = x - segment.bx, y - segment.by
+    along, across = segment.bc * ox + segment.bs * oy, segment.bc * oy - segment.bs * ox
+    past = along - min(max(along, 0.0), segment.length)
+    return np.hypot(past, across) <= segment.rounding + size + least
+
+
+@kernel
+def _in_corner(b, old, new, px, py, on_the_way, size, least):
+    """The circle b is held by the `old` surface too: (what becomes of it, how large it counts).
+
+    px, py: where it met the new one; `on_the_way`: having gone there, instead of overlapping it to begin with.
+    """
+    if old.nx * new.nx + old.ny * new.ny >= 0.0:
+        return b, size
+    cross = old.nx * new.ny - old.ny * new.nx
+    x, y, vx, vy = b.x, b.y, b.vx, b.vy
+    if old.nx * vx + old.ny * vy - old.speed < -PARALLEL * np.hypot(vx, vy):
+        if abs(cross) > PARALLEL:
+            vx, vy = (old.speed * new.ny - new.speed * old.ny) / cross, (old.nx * new.speed - new.nx * old.speed) / cross
+        else:
+            # The room stands where it is; of two obstacles each has half of it.
+            speed = 0.5 * (new.speed - old.speed)
+            speed = new.speed if new.which == ROOM else -old.speed if old.which == ROOM else speed
+            by = speed - new.nx * vx - new.ny * vy
+            vx, vy = vx + by * new.nx, vy + by * new.ny
+    short = old.at - old.nx * x - old.ny * y
+    if short > least:
+        parallel = abs(cross) <= PARALLEL
+        if not parallel:
+            x, y = (old.at * new.ny - new.at * old.ny) / cross, (old.nx * new.at - new.nx * old.at) / cross
+            parallel = np.hypot(x - b.x, y - b.y) > size
+        if on_the_way and new.which != ROOM:
+            x, y = px, py
+        elif parallel:
+            part = 0.0 if new.which == ROOM else 1.0 if old.which == ROOM else 0.5
+            x, y = b.x - part * short * new.nx, b.y - part * short * new.ny
+            size -= max(part, 1.0 - part) * short
+    return moved(b, x, y, vx, vy, b.from_x, b.from_y), size
+
+
+@kernel
+def _carried(segment, time, px, py, qx, qy):
+    """The place at that time on the way from p to q, taken along to where the segment is at the end of the substep."""
+    ax, ay = px - segment.ax, py - segment.ay
+    bx, by = qx - segment.bx, qy - segment.by
+    along, across = segment.c * ax + segment.s * ay, segment.c * ay - segment.s * ax
+    along += time * (segment.bc * bx + segment.bs * by - along)
+    across += time * (segment.bc * by - segment.bs * bx - across)
+    return segment.bx + segment.bc * along - segment.bs * across, segment.by + segment.bs * along + segment.bc * across
+
+
+@kernel
+def _travel(b, px, py, segments, bodies, until, x0, y0, cell, columns, rows, start, entries, room, h, lag, rest_speed):
+    """The circle b comes from p: (what becomes of it, whether it has met anything)."""
+    size, lowest = b.radius, b.inverse_mass - b.inverse_mass
+    last = older = Surface(lowest, lowest, lowest, lowest, NOBODY)
+    for number in range(MEETINGS + 1):
+        qx, qy = b.x, b.y
+        time, _, depth, nx, ny, k = search(segments, x0, y0, cell, columns, rows, start, entries, number == 0, px, py, qx, qy, size)
+        least = tolerance(qx, qy, b.radius)
+        if k >= 0:
+            segment, body = segments[k], bodies[segments[k].body]
+            # What the surface does where they touch.
+            touch_x = qx - (size - depth) * nx - body.x - until * body.vx
+            touch_y = qy - (size - depth) * ny - body.y - until * body.vy
+            belt_x, belt_y = -ny * segment.belt, nx * segment.belt
+            if segment.around == 0 and nx * segment.bs - ny * segment.bc < 0.0:
+                belt_x, belt_y = -belt_x, -belt_y
+            wx, wy = body.vx - body.spin * touch_y + belt_x, body.vy + body.spin * touch_x + belt_y
+            e, mu = segment.restitution, segment.friction
+        else:
+            if number == 0:
+                return b, False
+            depth, nx, ny = _beyond(room, qx, qy, b.radius)
+            if depth <= least:
+                break
+            k, time, wx, wy, e, mu = ROOM, 0.0, 0.0, 0.0, room[5], room[6]
+        if number == MEETINGS:
+            b = moved(b, px, py, b.vx, b.vy, b.from_x, b.from_y)
+            break
+        b, new = _touched(b, nx, ny, depth, wx, wy, h, lag, e, mu, rest_speed, k)
+        if k != ROOM:
+            if time < 0.0:  # it was inside: the way so far does not count
+                px, py = b.x, b.y
+            elif number == 0:
+                px, py = _carried(segments[k], time, px, py, qx, qy)
+            else:
+                px, py = px + time * (qx - px), py + time * (qy - py)
+        if new.which != NOBODY:
+            for old in (last, older):
+                if old.which != new.which and _still_there(old, segments, px, py, size, least):
+                    b, size = _in_corner(b, old, new, px, py, time > 0.0, size, least)
+            if last.which != new.which:
+                older = last
+            last = new
+    return _kept(room, b), True
+
+
+@kernel
+def _alone(px, py, qx, qy, x0, y0, cell, columns, rows, start):
+    """Whether the way is short and there is nothing near its middle: true for most circles, most of the time."""
+    if not abs(qx - px) + abs(qy - py) < cell:
+        return False
+    column = (0.5 * (px + qx) - x0) / cell
+    row = (0.5 * (py + qy) - y0) / cell
+    if not (0.0 <= column < columns and 0.0 <= row < rows):
+        return True
+    c = int(row) * columns + int(column)
+    return start[c] == start[c + 1]
+
+
+@parallel_kernel
+def collide(
+    segments, bodies, until, x0, y0, cell, columns, rows, start, entries, room,
+    position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
+    before, turn, lift, h, lag, rest_speed,
+):  # fmt: skip
+    """All circles, from their places `before` the substep (n, 2) to `position`; `until`: seconds into the frame at its end.
+
+    room: its wall, which wins: (7,), see OPEN.
+    """
+    for i in prange(position.shape[0]):
+        if inverse_mass[i] > 0 and not _alone(
+            before[i, 0], before[i, 1], position[i, 0], position[i, 1], x0, y0, cell, columns, rows, start
+        ):
+            b = _wide(
+                look(
+                    i, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits,
+                    spent, before, turn, lift,
+                )
+            )  # fmt: skip
+            px, py = np.float64(before[i, 0]), np.float64(before[i, 1])
+            if np.isfinite(px + py + b.x + b.y):
+                b, met = _travel(
+                    b, px, py, segments, bodies, until, x0, y0, cell, columns, rows, start, entries, room, np.float64(h),
+                    np.float64(lag), np.float64(rest_speed),
+                )  # fmt: skip
+                if met:
+                    put(i, b, position, velocity, spin, fed, resting, hits, spent, turn)
