@@ -1,7 +1,9 @@
 """Circles go their way through a substep among obstacles, and meet what there is to meet (`kernels.obstacles` finds it).
 
 Everything here is float64: where a circle ends is rounded to the world's dtype once, so that many small meetings, as on a chain
-of short segments, do not add up to more than one rounding of a coordinate.
+of short segments, do not add up to more than one rounding of a coordinate. What the integrator has rounded is computed anew: a
+circle that slides falls by g h^2 and is pushed out again in every substep, and of two roundings the push along x, if it is less
+than half of one, would always be lost.
 
 **Corners.** Who is held by two surfaces that face each other by more than a right angle cannot get out of one without getting
 into the other: to push it out of one after the other converges, the more slowly the narrower the corner, and leaves a velocity
@@ -20,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
-from pyverlet.kernels.bounds import Body, look, meet, moved, put
+from pyverlet.kernels.bounds import Body, look, meet, moved, noted, put
 from pyverlet.kernels.obstacles import search, tolerance
 
 MEETINGS = 256
@@ -62,12 +64,10 @@ def _wide(b):
 
 
 @kernel
-def _rested(b, resting):
-    """The circle b, but with these notes of who holds it."""
-    return Body(
-        b.x, b.y, b.vx, b.vy, b.ax, b.ay, b.spin, b.radius, b.inverse_mass, b.restitution, b.friction, b.fed, resting, b.hit,
-        b.to_impact, b.to_friction, b.from_x, b.from_y, b.share, b.turn, b.lift,
-    )  # fmt: skip
+def _unrounded(x, before, v, a, h, drop, step):
+    """Where the integrator has put a coordinate, without its rounding; x itself if others have moved it too. step: of rounding."""
+    exact = before + h * (v - (1.0 - drop) * h * a)
+    return exact if abs(exact - x) <= step * (abs(x) + abs(before)) else x
 
 
 @kernel
@@ -104,14 +104,27 @@ def _kept(room, b):
 @kernel
 def _touched(b, nx, ny, depth, wx, wy, h, lag, e, mu, rest_speed, which):
     """The circle b meets a surface that moves with (wx, wy): what becomes of it, and the surface, NOBODY's if it bounced off."""
-    noted, from_x, from_y = b.resting, b.from_x, b.from_y
+    resting, from_x, from_y = b.resting, b.from_x, b.from_y
     # As the surface sees it: how fast it is, and how far it went.
-    b = _rested(moved(b, b.x, b.y, b.vx - wx, b.vy - wy, from_x + h * wx, from_y + h * wy), 0)
+    b = noted(moved(b, b.x, b.y, b.vx - wx, b.vy - wy, from_x + h * wx, from_y + h * wy), 0)
     b = meet(b, nx, ny, depth, h, lag, e, mu, rest_speed)
     held = b.resting != 0
-    b = _rested(moved(b, b.x, b.y, b.vx + wx, b.vy + wy, from_x, from_y), noted | b.resting)
+    b = noted(moved(b, b.x, b.y, b.vx + wx, b.vy + wy, from_x, from_y), resting | b.resting)
     speed = nx * (wx - b.lift * b.ax) + ny * (wy - b.lift * b.ay)
     return b, Surface(nx, ny, nx * b.x + ny * b.y, speed, which if held else NOBODY)
+
+
+@kernel
+def _along(b, surface, by_x, by_y):
+    """(x, y) acceleration left to the circle b while the surface holds it; by: what it has just gained, m/s^2, friction included.
+
+    That of an arrival is no acceleration: friction is at most what would stop it from being driven along the surface.
+    """
+    nx, ny = surface.nx, surface.ny
+    driven = b.ax * ny - b.ay * nx  # along the tangent (ny, -nx)
+    rub = by_x * ny - by_y * nx
+    left = driven + max(min(rub, abs(driven)), -abs(driven))
+    return left * ny, -left * nx
 
 
 @kernel
@@ -175,9 +188,9 @@ def _carried(segment, time, px, py, qx, qy):
 
 @kernel
 def _travel(b, px, py, segments, bodies, until, x0, y0, cell, columns, rows, start, entries, room, h, lag, rest_speed):
-    """The circle b comes from p: (what becomes of it, whether it has met anything)."""
-    size, lowest = b.radius, b.inverse_mass - b.inverse_mass
-    last = older = Surface(lowest, lowest, lowest, lowest, NOBODY)
+    """The circle b comes from p: (what becomes of it, whether it has met anything, the acceleration left to it if it is held)."""
+    size, along_x, along_y = b.radius, 0.0, 0.0
+    last = older = Surface(0.0, 0.0, 0.0, 0.0, NOBODY)
     for number in range(MEETINGS + 1):
         qx, qy = b.x, b.y
         time, _, depth, nx, ny, k = search(segments, x0, y0, cell, columns, rows, start, entries, number == 0, px, py, qx, qy, size)
@@ -194,7 +207,7 @@ def _travel(b, px, py, segments, bodies, until, x0, y0, cell, columns, rows, sta
             e, mu = segment.restitution, segment.friction
         else:
             if number == 0:
-                return b, False
+                return b, False, 0.0, 0.0
             depth, nx, ny = _beyond(room, qx, qy, b.radius)
             if depth <= least:
                 break
@@ -202,6 +215,7 @@ def _travel(b, px, py, segments, bodies, until, x0, y0, cell, columns, rows, sta
         if number == MEETINGS:
             b = moved(b, px, py, b.vx, b.vy, b.from_x, b.from_y)
             break
+        vx, vy = b.vx, b.vy
         b, new = _touched(b, nx, ny, depth, wx, wy, h, lag, e, mu, rest_speed, k)
         if k != ROOM:
             if time < 0.0:  # it was inside: the way so far does not count
@@ -210,14 +224,20 @@ def _travel(b, px, py, segments, bodies, until, x0, y0, cell, columns, rows, sta
                 px, py = _carried(segments[k], time, px, py, qx, qy)
             else:
                 px, py = px + time * (qx - px), py + time * (qy - py)
+        along_x = along_y = 0.0
         if new.which != NOBODY:
+            cornered = False
+            along_x, along_y = _along(b, new, (b.vx - vx) / h, (b.vy - vy) / h)
             for old in (last, older):
                 if old.which != new.which and _still_there(old, segments, px, py, size, least):
+                    cornered |= old.nx * new.nx + old.ny * new.ny < 0.0
                     b, size = _in_corner(b, old, new, px, py, time > 0.0, size, least)
+            if cornered:
+                along_x = along_y = 0.0
             if last.which != new.which:
                 older = last
             last = new
-    return _kept(room, b), True
+    return _kept(room, b), True, along_x, along_y
 
 
 @kernel
@@ -235,15 +255,18 @@ def _alone(px, py, qx, qy, x0, y0, cell, columns, rows, start):
 
 @parallel_kernel
 def collide(
-    segments, bodies, until, x0, y0, cell, columns, rows, start, entries, room,
+    segments, bodies, until, x0, y0, cell, columns, rows, start, entries, room, along,
     position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
-    before, turn, lift, h, lag, rest_speed,
+    before, turn, lift, h, lag, rest_speed, drop,
 ):  # fmt: skip
     """All circles, from their places `before` the substep (n, 2) to `position`; `until`: seconds into the frame at its end.
 
-    room: its wall, which wins: (7,), see OPEN.
+    room: its wall, which wins: (7,), see OPEN. along: (n, 2), becomes the acceleration left to those who are held, m/s^2, or 0.
+    drop: of the integrator.
     """
+    step = 0.5 * np.finfo(position.dtype).eps
     for i in prange(position.shape[0]):
+        along[i, 0] = along[i, 1] = 0.0
         if inverse_mass[i] > 0 and not _alone(
             before[i, 0], before[i, 1], position[i, 0], position[i, 1], x0, y0, cell, columns, rows, start
         ):
@@ -255,9 +278,13 @@ def collide(
             )  # fmt: skip
             px, py = np.float64(before[i, 0]), np.float64(before[i, 1])
             if np.isfinite(px + py + b.x + b.y):
-                b, met = _travel(
-                    b, px, py, segments, bodies, until, x0, y0, cell, columns, rows, start, entries, room, np.float64(h),
-                    np.float64(lag), np.float64(rest_speed),
+                long = np.float64(h)
+                x = _unrounded(b.x, px, b.vx, b.ax, long, drop, step)
+                y = _unrounded(b.y, py, b.vy, b.ay, long, drop, step)
+                b, met, along_x, along_y = _travel(
+                    moved(b, x, y, b.vx, b.vy, b.from_x, b.from_y), px, py, segments, bodies, until, x0, y0, cell, columns, rows,
+                    start, entries, room, long, np.float64(lag), np.float64(rest_speed),
                 )  # fmt: skip
                 if met:
+                    along[i, 0], along[i, 1] = along_x, along_y
                     put(i, b, position, velocity, spin, fed, resting, hits, spent, turn)

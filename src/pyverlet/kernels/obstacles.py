@@ -148,6 +148,12 @@ def _on_the_way(segment, x0, y0, x1, y1, reach):
             x = x0 + s * dx
             if s <= 1.0 and 0.0 <= x <= length:
                 time, point = s, x
+    if time == NEVER and (left or right) and length > 0.0 and dx != 0.0:
+        # From over its neighbour's face, where rounding has left it a little too deep to be outside of this one.
+        point = 0.0 if left else length
+        s = (point - x0) / dx
+        if 0.0 <= s <= 1.0 and 0.0 <= side * (y0 + s * dy) < reach:
+            time = s
     for end in range(2):
         at = length * end
         s = _round_end(x0 - at, y0, dx, dy, reach)

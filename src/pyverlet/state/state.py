@@ -156,6 +156,7 @@ class Slots:
         turn: (n,) rad by which each circle turns in this substep; empty unless circles rub each other.
         lift: (n,) s; times -a it is the velocity with which circles at rest against others end a substep, for others 0. Kept
             only if circles rub each other.
+        along: (n, 2) m/s^2, the acceleration left to circles that an obstacle holds, for others 0; empty without obstacles.
         drop: a circle that starts at rest falls drop * a h^2 in a substep; depends on the integrator.
         fed: (n,) bits: CARRIES where a contact at rest fed the velocity in the last substep, AT_WALL where a wall was touched
             in it, CARRIED and WAS_AT_WALL the same in the one before. Kept only if circles bounce.
@@ -198,7 +199,7 @@ class Slots:
         for name in (*_COLUMNS, "inverse_mass"):
             setattr(self, name, memory.zeros(count, self.dtype))
         self.__dict__.pop("force", None)
-        self.start = np.empty((0, 2), self.dtype)
+        self.start = self.along = np.empty((0, 2), self.dtype)
         self.turn = self.lift = np.empty(0, self.dtype)
         self.size = self.radius
         self.resting = np.zeros(count, np.uint8)
@@ -298,6 +299,12 @@ class Slots:
             self.lift = np.empty_like(self.spin)
         self.lift.fill(0)
 
+    def note_along(self) -> Array:
+        """`along`, to be filled."""
+        if len(self.along) != len(self):
+            self.along = np.empty_like(self.position)
+        return self.along
+
     def keep_account(self) -> None:
         """From now on walls are to note what they take."""
         if len(self.spent) != len(self):
@@ -308,6 +315,8 @@ class Slots:
         self.hits.fill(-1)
         if len(self.spent):
             self.spent.fill(0)
+        if len(self.along):
+            self.along = self.along[:0]
         if len(self.turn):
             self.lift.fill(0)
             self.turn = self.turn[:0]

@@ -69,8 +69,8 @@ class Course:
             self._bin(largest)
         numbers = map(state.real, (h, lag, rest_speed))
         collide: Any = meetings.collide
-        walls = np.array(room.walls(), float)
-        collide(self._segments, self._bodies, time + h, *self._cells, walls, *state.bodies(), *numbers)
+        walls, along = np.array(room.walls(), float), state.note_along()
+        collide(self._segments, self._bodies, time + h, *self._cells, walls, along, *state.bodies(), *numbers, state.drop)
 
     def end(self, dt: float) -> None:
         """At the end of a frame that went well: the obstacles are where they moved to."""
