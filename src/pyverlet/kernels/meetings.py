@@ -25,8 +25,16 @@ from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.kernels.bounds import Body, look, meet, moved, noted, put
 from pyverlet.kernels.obstacles import search, tolerance
 
-MEETINGS = 256
-"""Times one circle may meet anything in a substep; who has still not come through waits where it last met something."""
+MEETINGS, BOUNCES = 256, 8
+"""Times one circle may meet anything in a substep, and bounce off it; who has still not come through waits where it last met
+something."""
+
+SQUEEZED = 0.05
+"""Part of its radius by which a circle overlaps an obstacle when a substep begins, and is no arrival that could bounce."""
+
+CLOSING = 4.0
+"""A corner whose surfaces close on a circle, and are so nearly parallel that it would have to slip out by so many times what
+they move by, closes over it: as between the blades of scissors it would be shot out at any speed."""
 
 PARALLEL = 1e-4
 """Sine of the angle below which two surfaces that face each other count as parallel; and part of the speed that is no
@@ -142,36 +150,35 @@ def _still_there(surface, segments, x, y, size, least):
 
 
 @kernel
-def _in_corner(b, old, new, px, py, on_the_way, size, least):
+def _in_corner(b, old, new, px, py, on_the_way, size, least, way, speed):
     """The circle b is held by the `old` surface too: (what becomes of it, how large it counts).
 
-    px, py: where it met the new one; `on_the_way`: having gone there, instead of overlapping it to begin with.
+    px, py: where it met the new one; `on_the_way`: having gone there, instead of overlapping it to begin with. way, speed: what
+    it has gone in this substep, m, and how fast.
     """
     if old.nx * new.nx + old.ny * new.ny >= 0.0:
         return b, size
     cross = old.nx * new.ny - old.ny * new.nx
+    over = 1.0 / cross if abs(cross) > PARALLEL else 0.0
     x, y, vx, vy = b.x, b.y, b.vx, b.vy
+    # The room stands where it is; of two obstacles each has half of it.
+    fixed = old if old.which == ROOM else new
     if old.nx * vx + old.ny * vy - old.speed < -PARALLEL * np.hypot(vx, vy):
-        if abs(cross) > PARALLEL:
-            vx, vy = (old.speed * new.ny - new.speed * old.ny) / cross, (old.nx * new.speed - new.nx * old.speed) / cross
-        else:
-            # The room stands where it is; of two obstacles each has half of it.
-            speed = 0.5 * (new.speed - old.speed)
-            speed = new.speed if new.which == ROOM else -old.speed if old.which == ROOM else speed
-            by = speed - new.nx * vx - new.ny * vy
-            vx, vy = vx + by * new.nx, vy + by * new.ny
+        vx, vy = over * (old.speed * new.ny - new.speed * old.ny), over * (old.nx * new.speed - new.nx * old.speed)
+        if over == 0.0 or np.hypot(vx, vy) > speed + CLOSING * (abs(old.speed) + abs(new.speed)):
+            stays = fixed.speed if fixed.which == ROOM else 0.5 * (new.speed - old.speed)
+            by = stays - fixed.nx * b.vx - fixed.ny * b.vy
+            vx, vy = b.vx + by * fixed.nx, b.vy + by * fixed.ny
     short = old.at - old.nx * x - old.ny * y
     if short > least:
-        parallel = abs(cross) <= PARALLEL
-        if not parallel:
-            x, y = (old.at * new.ny - new.at * old.ny) / cross, (old.nx * new.at - new.nx * old.at) / cross
-            parallel = np.hypot(x - b.x, y - b.y) > size
         if on_the_way and new.which != ROOM:
             x, y = px, py
-        elif parallel:
-            part = 0.0 if new.which == ROOM else 1.0 if old.which == ROOM else 0.5
-            x, y = b.x - part * short * new.nx, b.y - part * short * new.ny
-            size -= max(part, 1.0 - part) * short
+        else:
+            x, y = over * (old.at * new.ny - new.at * old.ny), over * (old.nx * new.at - new.nx * old.at)
+            if over == 0.0 or np.hypot(x - b.x, y - b.y) > way + CLOSING * short:
+                part = 0.0 if new.which == ROOM else 1.0 if old.which == ROOM else 0.5
+                x, y = b.x + part * short * old.nx, b.y + part * short * old.ny
+                size -= max(part, 1.0 - part) * short
     return moved(b, x, y, vx, vy, b.from_x, b.from_y), size
 
 
@@ -189,11 +196,12 @@ def _carried(segment, time, px, py, qx, qy):
 @kernel
 def _travel(b, px, py, segments, bodies, until, x0, y0, cell, columns, rows, start, entries, room, h, lag, rest_speed):
     """The circle b comes from p: (what becomes of it, whether it has met anything, the acceleration left to it if it is held)."""
-    size, along_x, along_y = b.radius, 0.0, 0.0
+    size, along_x, along_y, bounces = b.radius, 0.0, 0.0, 0
+    way, speed = np.hypot(b.x - px, b.y - py), np.hypot(b.vx, b.vy)
     last = older = Surface(0.0, 0.0, 0.0, 0.0, NOBODY)
     for number in range(MEETINGS + 1):
         qx, qy = b.x, b.y
-        time, _, depth, nx, ny, k = search(segments, x0, y0, cell, columns, rows, start, entries, number == 0, px, py, qx, qy, size)
+        time, gap, depth, nx, ny, k = search(segments, x0, y0, cell, columns, rows, start, entries, number == 0, px, py, qx, qy, size)
         least = tolerance(qx, qy, b.radius)
         if k >= 0:
             segment, body = segments[k], bodies[segments[k].body]
@@ -205,18 +213,19 @@ def _travel(b, px, py, segments, bodies, until, x0, y0, cell, columns, rows, sta
                 belt_x, belt_y = -belt_x, -belt_y
             wx, wy = body.vx - body.spin * touch_y + belt_x, body.vy + body.spin * touch_x + belt_y
             e, mu = segment.restitution, segment.friction
+            squeezed = number == 0 and time <= 0.0 and (time < 0.0 or gap < segment.rounding + (1.0 - SQUEEZED) * size)
         else:
             if number == 0:
                 return b, False, 0.0, 0.0
             depth, nx, ny = _beyond(room, qx, qy, b.radius)
             if depth <= least:
                 break
-            k, time, wx, wy, e, mu = ROOM, 0.0, 0.0, 0.0, room[5], room[6]
-        if number == MEETINGS:
+            k, time, wx, wy, e, mu, squeezed = ROOM, 0.0, 0.0, 0.0, room[5], room[6], False
+        if number == MEETINGS or bounces == BOUNCES:
             b = moved(b, px, py, b.vx, b.vy, b.from_x, b.from_y)
             break
         vx, vy = b.vx, b.vy
-        b, new = _touched(b, nx, ny, depth, wx, wy, h, lag, e, mu, rest_speed, k)
+        b, new = _touched(b, nx, ny, depth, wx, wy, h, lag, e, mu, np.inf if squeezed else rest_speed, k)
         if k != ROOM:
             if time < 0.0:  # it was inside: the way so far does not count
                 px, py = b.x, b.y
@@ -225,13 +234,15 @@ def _travel(b, px, py, segments, bodies, until, x0, y0, cell, columns, rows, sta
             else:
                 px, py = px + time * (qx - px), py + time * (qy - py)
         along_x = along_y = 0.0
-        if new.which != NOBODY:
+        if new.which == NOBODY:
+            bounces += 1
+        else:
             cornered = False
             along_x, along_y = _along(b, new, (b.vx - vx) / h, (b.vy - vy) / h)
             for old in (last, older):
                 if old.which != new.which and _still_there(old, segments, px, py, size, least):
                     cornered |= old.nx * new.nx + old.ny * new.ny < 0.0
-                    b, size = _in_corner(b, old, new, px, py, time > 0.0, size, least)
+                    b, size = _in_corner(b, old, new, px, py, time > 0.0, size, least, way, speed)
             if cornered:
                 along_x = along_y = 0.0
             if last.which != new.which:

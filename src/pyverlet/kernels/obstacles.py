@@ -244,3 +244,22 @@ def search(segments, x0, y0, cell, columns, rows, start, entries, fresh, px, py,
             segments, entries, start[c], start[c + 1], fresh, px, py, qx, qy, radius, best, gap, depth, nx, ny, k
         )
     return best, gap, depth, nx, ny, k
+
+
+@kernel
+def covered(segments, position, by):
+    """Which obstacle has each of the (n, 2) points in it, -1 for none; lines have no inside."""
+    for i in range(position.shape[0]):
+        x, y = position[i, 0], position[i, 1]
+        by[i] = -1
+        for k in range(segments.shape[0]):
+            segment = segments[k]
+            if segment.rounding > 0.0:
+                ox, oy = x - segment.ax, y - segment.ay
+                along, across = segment.c * ox + segment.s * oy, segment.c * oy - segment.s * ox
+                if np.hypot(along - min(max(along, 0.0), segment.length), across) < segment.rounding:
+                    by[i] = segment.body
+                    break
+            if segment.faces > 0 and segment.first == k and _inside(segments, segment, x, y):
+                by[i] = segment.body
+                break

@@ -54,6 +54,16 @@ class Course:
         self._moving = [k for k, obstacle in enumerate(self._seen) if obstacle.moves]
         self._binned_for = -1.0
 
+    def covering(self, position: Array) -> NDArray[np.int64]:
+        """(n,) which obstacle has each of these (n, 2) points inside it, m, -1 for none."""
+        by = np.full(len(position), -1)
+        self.begin()
+        if self._seen:
+            kernels.place(self._segments, self._bodies, 0.0, 0.0)
+            self._binned_for = -1.0  # cells are filled where segments are, and have been placed for another substep
+            kernels.covered(self._segments, position.astype(np.float64), by)
+        return by
+
     def before(self, state: Slots, h: float) -> None:
         """Before a substep: note where everybody comes from."""
         state.note_start()
@@ -69,8 +79,10 @@ class Course:
             self._bin(largest)
         numbers = map(state.real, (h, lag, rest_speed))
         collide: Any = meetings.collide
-        walls, along = np.array(room.walls(), float), state.note_along()
-        collide(self._segments, self._bodies, time + h, *self._cells, walls, along, *state.bodies(), *numbers, state.drop)
+        if len(state.along) != len(state):
+            state.along = np.empty_like(state.position)
+        walls = np.array(room.walls(), float)
+        collide(self._segments, self._bodies, time + h, *self._cells, walls, state.along, *state.bodies(), *numbers, state.drop)
 
     def end(self, dt: float) -> None:
         """At the end of a frame that went well: the obstacles are where they moved to."""
