@@ -156,8 +156,6 @@ def _in_corner(b, old, new, px, py, on_the_way, size, least, way, speed):
     px, py: where it met the new one; `on_the_way`: having gone there, instead of overlapping it to begin with. way, speed: what
     it has gone in this substep, m, and how fast.
     """
-    if old.nx * new.nx + old.ny * new.ny >= 0.0:
-        return b, size
     cross = old.nx * new.ny - old.ny * new.nx
     over = 1.0 / cross if abs(cross) > PARALLEL else 0.0
     x, y, vx, vy = b.x, b.y, b.vx, b.vy
@@ -183,6 +181,31 @@ def _in_corner(b, old, new, px, py, on_the_way, size, least, way, speed):
 
 
 @kernel
+def _in_wide_corner(b, old, new, x, y, vx, vy):
+    """The circle b meets two surfaces in a wide corner: (what becomes of it, whether both hold it).
+
+    x, y, vx, vy: where it was, and how fast, before it met the first. Both hold it if each has to push it then to satisfy both;
+    one after the other, the second would have pushed it off the first. Who comes faster than gravity makes it in a substep is not held.
+    """
+    dot = old.nx * new.nx + old.ny * new.ny
+    square = 1.0 - dot * dot
+    if square <= PARALLEL:
+        return b, False
+    first, second = old.speed - old.nx * vx - old.ny * vy, new.speed - new.nx * vx - new.ny * vy
+    by_first, by_second = (first - dot * second) / square, (second - dot * first) / square
+    if by_first < 0.0 or by_second < 0.0:
+        return b, False
+    vx, vy = vx + by_first * old.nx + by_second * new.nx, vy + by_first * old.ny + by_second * new.ny
+    first, second = old.at - old.nx * x - old.ny * y, new.at - new.nx * x - new.ny * y
+    by_first, by_second = (first - dot * second) / square, (second - dot * first) / square
+    if by_first < 0.0 or by_second < 0.0:
+        x, y = b.x, b.y
+    else:
+        x, y = x + by_first * old.nx + by_second * new.nx, y + by_first * old.ny + by_second * new.ny
+    return moved(b, x, y, vx, vy, b.from_x, b.from_y), True
+
+
+@kernel
 def _carried(segment, time, px, py, qx, qy):
     """The place at that time on the way from p to q, taken along to where the segment is at the end of the substep."""
     ax, ay = px - segment.ax, py - segment.ay
@@ -197,6 +220,7 @@ def _carried(segment, time, px, py, qx, qy):
 def _travel(b, px, py, segments, bodies, until, x0, y0, cell, columns, rows, start, entries, room, h, lag, rest_speed):
     """The circle b comes from p: (what becomes of it, whether it has met anything, the acceleration left to it if it is held)."""
     size, along_x, along_y, bounces = b.radius, 0.0, 0.0, 0
+    x_then, y_then, vx_then, vy_then = b.x, b.y, b.vx, b.vy
     way, speed = np.hypot(b.x - px, b.y - py), np.hypot(b.vx, b.vy)
     last = older = Surface(0.0, 0.0, 0.0, 0.0, NOBODY)
     for number in range(MEETINGS + 1):
@@ -237,14 +261,17 @@ def _travel(b, px, py, segments, bodies, until, x0, y0, cell, columns, rows, sta
         if new.which == NOBODY:
             bounces += 1
         else:
-            cornered = False
             along_x, along_y = _along(b, new, (b.vx - vx) / h, (b.vy - vy) / h)
             for old in (last, older):
                 if old.which != new.which and _still_there(old, segments, px, py, size, least):
-                    cornered |= old.nx * new.nx + old.ny * new.ny < 0.0
-                    b, size = _in_corner(b, old, new, px, py, time > 0.0, size, least, way, speed)
-            if cornered:
-                along_x = along_y = 0.0
+                    cornered = False
+                    if old.nx * new.nx + old.ny * new.ny < 0.0:
+                        b, size = _in_corner(b, old, new, px, py, time > 0.0, size, least, way, speed)
+                        cornered = abs(old.nx * new.ny - old.ny * new.nx) > PARALLEL
+                    elif number == 1:
+                        b, cornered = _in_wide_corner(b, old, new, x_then, y_then, vx_then, vy_then)
+                    if cornered:
+                        along_x = along_y = 0.0
             if last.which != new.which:
                 older = last
             last = new
