@@ -209,3 +209,62 @@ def test_spin_is_left_alone_without_friction() -> None:
     balls = world.add(position=[(1, 1), (2.1, 1), (1.5, 2)], radius=RADIUS, spin=[1.0, -2.0, 3.0])
     world.run(seconds=2)
     assert balls.spin.tolist() == [1.0, -2.0, 3.0]
+
+
+# ---- walls at any step ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize(("e", "mu"), [(0.0, 0.0), (0.5, 0.3), (1.0, 0.0)])
+@pytest.mark.parametrize("room", [pv.Circle, pv.Box])
+def test_no_rim_stands_out_of_the_room_at_the_end_of_a_frame(room: type, e: float, mu: float, dtype: type) -> None:
+    # A round wall bends away from the tangent by s^2 / 2 R in a way s: at 20 m/s and 50 ms by 10 radii of 2 cm.
+    rng = np.random.default_rng(1)
+    count = 200
+    radius, angle, heading = rng.uniform(0.02, 0.3, count), *rng.uniform(0, 2 * np.pi, (2, count))
+    out = np.sqrt(rng.uniform(0, 1, count)) * (2 - radius)
+    for h in (0.002, 0.008, 0.05):
+        walls = {"radius": 2.0} if room is pv.Circle else {"lower": (-2, -2), "upper": (2, 2)}
+        boundary = room(**walls, restitution=e, friction=mu)
+        world = pv.World(boundary=boundary, substeps=1, dtype=dtype, collisions=None, threads=1)
+        world.add(
+            position=out[:, None] * np.column_stack((np.cos(angle), np.sin(angle))), radius=radius,
+            velocity=20 * np.column_stack((np.cos(heading), np.sin(heading))),
+        )  # fmt: skip
+        energy = world.energy().total
+        for _ in range(40):
+            world.step(h)
+            x = np.abs(world.position.astype(float))
+            reach = np.hypot(*x.T) if room is pv.Circle else x.max(axis=1)
+            assert ((reach + radius - 2) / radius).max() < 1e-3
+        if room is pv.Circle and e == 1.0:
+            # Each of several bounces in a substep happens where and when it does.
+            assert world.energy().total == pytest.approx(energy, rel=1e-12 if dtype is np.float64 else 1e-5)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_a_disc_that_slows_down_for_ever_stays_finite(dtype: type) -> None:
+    # Wedged between a rubbing obstacle and a rubbing cage, without gravity, it slows to 1e-24 m/s, whose square underflows.
+    world = pv.World(gravity=(0, 0), boundary=pv.Circle(radius=3, restitution=1, friction=1), dtype=dtype, threads=1)
+    world.obstacles.append(pv.Segment((-2.9, -2), (2.9, -2), restitution=0.6, friction=1))
+    disc = world.add(position=(0.02, -2.5), velocity=(1, 0.1), radius=0.5)
+    world.run(seconds=5, dt=1 / 60)
+    assert np.isfinite(disc.position).all()
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("e", [0.0, 1.0])
+@pytest.mark.parametrize(
+    "room", [pv.Circle(radius=3, restitution=0.5, friction=0.5), pv.Circle(radius=3), pv.Box((-3, -3), (3, 3))]
+)
+def test_speeds_whose_squares_underflow_harm_nothing(room: pv.Boundary, e: float, dtype: type) -> None:
+    tiny = float(np.finfo(dtype).tiny)
+    slow = np.array([tiny, np.sqrt(tiny), 1e3 * np.sqrt(tiny), 1e-6 * tiny])
+    world = pv.World(gravity=(0, 0), boundary=room, collisions=pv.Collisions(restitution=e), dtype=dtype, threads=1)
+    x = np.array([2.5, -2.5, 0.0, 0.0])
+    y = np.array([0.0, 0.0, 2.5, -2.5])
+    out = np.column_stack((np.sign(x), np.sign(y)))
+    world.add(position=np.column_stack((x, y)) * (1 + 1e-6), velocity=slow[:, None] * (out + 0.3 * out[:, ::-1]), radius=0.5)
+    world.run(seconds=0.2, dt=1 / 60)
+    assert np.isfinite(world.velocity).all()
+    assert np.abs(world.velocity).max() < 1e-4

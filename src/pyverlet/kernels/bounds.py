@@ -18,6 +18,9 @@ from pyverlet.ground.constants import FED, PUSHED
 BLOCK = 64
 """Circles looked at together for whether any of them is at a wall: hardly any is."""
 
+REFLECTIONS = 8
+"""Times a circle may bounce off the walls of a room in one substep."""
+
 _ONE, _TWO = np.uint64(1), np.uint64(2)
 
 # What is noted of a circle in `fed`: a contact at rest has fed its velocity, a wall has touched it; in this substep, or the last.
@@ -101,6 +104,15 @@ def moved(b, x, y, vx, vy, from_x, from_y):
 
 
 @kernel
+def noted(b, resting):
+    """The circle b, but with these notes of who holds it."""
+    return Body(
+        b.x, b.y, b.vx, b.vy, b.ax, b.ay, b.spin, b.radius, b.inverse_mass, b.restitution, b.friction, b.fed, resting, b.hit,
+        b.to_impact, b.to_friction, b.from_x, b.from_y, b.share, b.turn, b.lift,
+    )  # fmt: skip
+
+
+@kernel
 def meet(b, nx, ny, depth, h, lag, e, mu, rest_speed):
     """The circle b is `depth` > 0 beyond a wall of normal (nx, ny): what becomes of it, bounced or held, with friction mu.
 
@@ -177,16 +189,18 @@ def impact_time(dx, dy, vx, vy, ax, ay, reach, h):
     half = h / (h + h)
     gap = reach * reach - dx * dx - dy * dy
     along = dx * vx + dy * vy
-    # On a straight path it is a quadratic equation, |v|^2 t^2 - 2 (d . v) t = gap, in the form that does not cancel.
-    time = abs(gap) / (abs(along) + np.sqrt(max(along * along + (vx * vx + vy * vy) * gap, zero)))
+    # On a straight path it is a quadratic equation, |v|^2 t^2 - 2 (d . v) t = gap, in the form that does not cancel. Squares of
+    # slow velocities underflow: who is that slow has been on its way for longer than h.
+    speed = abs(along) + np.sqrt(max(along * along + (vx * vx + vy * vy) * gap, zero))
+    time = min(abs(gap) / speed, h) if speed > zero else h
     # Newton's method for the bend of the path: what is left of it after two steps is far below a rounding error.
     for _ in range(2):
         px = dx - time * (vx - half * time * ax)
         py = dy - time * (vy - half * time * ay)
         slope = px * (ax * time - vx) + py * (ay * time - vy)
         if slope != zero:
-            time += half * (reach * reach - px * px - py * py) / slope
-    return min(max(time, zero), h)
+            time = min(max(time + half * (reach * reach - px * px - py * py) / slope, zero), h)
+    return time
 
 
 @kernel
@@ -194,21 +208,27 @@ def _at_cage(b, x0, y0, size, h, lag, e, mu, rest_speed):
     """The circle b is beyond the wall of the cage: what becomes of it."""
     zero = h - h
     half = h / (h + h)
-    dx, dy = b.x - x0, b.y - y0
-    room = size - b.radius
-    distance = np.sqrt(dx * dx + dy * dy)
-    nx, ny, depth = -dx / distance, -dy / distance, distance - room
-    vx, vy = b.vx + lag * b.ax, b.vy + lag * b.ay
-    if -(vx * nx + vy * ny) > rest_speed and room > zero:
-        # The wall it hit is the tangent where it hit, not where it would be now: that keeps the angular momentum.
-        time = impact_time(dx, dy, vx, vy, b.ax, b.ay, room, h)
-        px = dx - time * (vx - half * time * b.ax)
-        py = dy - time * (vy - half * time * b.ay)
-        reached = np.sqrt(px * px + py * py)
-        nx, ny = -px / reached, -py / reached
-        depth = max((px - dx) * nx + (py - dy) * ny, zero)
-    b = meet(b, nx, ny, depth, h, lag, e, mu, rest_speed)
-    # Faster than a room width a substep one reflection is not enough: what is still outside waits at the wall.
+    room = max(size - b.radius, zero)
+    for _ in range(REFLECTIONS):
+        dx, dy = b.x - x0, b.y - y0
+        distance = np.sqrt(dx * dx + dy * dy)
+        if not distance > room:
+            return b
+        nx, ny, depth = -dx / distance, -dy / distance, distance - room
+        vx, vy = b.vx + lag * b.ax, b.vy + lag * b.ay
+        if -(vx * nx + vy * ny) > rest_speed and room > zero:
+            # The wall it hit is the tangent where it hit, not where it would be now: that keeps the angular momentum.
+            time = impact_time(dx, dy, vx, vy, b.ax, b.ay, room, h)
+            px = dx - time * (vx - half * time * b.ax)
+            py = dy - time * (vy - half * time * b.ay)
+            reached = np.sqrt(px * px + py * py)
+            nx, ny = -px / reached, -py / reached
+            depth = max((px - dx) * nx + (py - dy) * ny, zero)
+        b = meet(b, nx, ny, depth, h, lag, e, mu, rest_speed)
+        if b.resting != 0:
+            break
+    # The wall bends away from the tangent along which a held circle goes on, and not everybody is back after so many reflections:
+    # who is still beyond the wall waits there.
     dx, dy = b.x - x0, b.y - y0
     distance = np.sqrt(dx * dx + dy * dy)
     if distance > room:
@@ -223,15 +243,21 @@ def _at_box(b, x0, y0, x1, y1, h, lag, e, mu, rest_speed):
     one = h / h
     r = b.radius
     for axis in range(2):
-        low, high, at = (x0, x1, b.x) if axis == 0 else (y0, y1, b.y)
-        below, above = low + r - at, at - (high - r)
-        if max(below, above) > zero:
+        low, high = (x0 + r, x1 - r) if axis == 0 else (y0 + r, y1 - r)
+        for _ in range(REFLECTIONS):
+            at = b.x if axis == 0 else b.y
+            below, above = low - at, at - high
+            if not max(below, above) > zero:
+                break
             inward = one if below > zero else -one
             nx, ny = (inward, zero) if axis == 0 else (zero, inward)
-            b = meet(b, nx, ny, below if below > zero else above, h, lag, e, mu, rest_speed)
-    # As in the cage: what one reflection has sent beyond the other side waits at that wall.
-    x = min(max(b.x, x0 + r), x1 - r) if b.x < x0 or b.x > x1 else b.x
-    y = min(max(b.y, y0 + r), y1 - r) if b.y < y0 or b.y > y1 else b.y
+            held = b.resting
+            b = meet(noted(b, 0), nx, ny, below if below > zero else above, h, lag, e, mu, rest_speed)
+            if b.resting != 0:
+                break
+            b = noted(b, held)
+    # As in the cage: who is still beyond waits at the wall.
+    x, y = min(max(b.x, x0 + r), x1 - r), min(max(b.y, y0 + r), y1 - r)
     return moved(b, x, y, b.vx, b.vy, b.from_x, b.from_y)
 
 

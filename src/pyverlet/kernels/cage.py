@@ -61,13 +61,15 @@ def _impact_time(dx, dy, vx, vy, ax, ay, reach, zero, half, h):
     gap = reach * reach - dx * dx - dy * dy
     along = dx * vx + dy * vy
     root = square_root(larger(along * along + (vx * vx + vy * vy) * gap, zero))
-    time = larger(gap, zero - gap) / (larger(along, zero - along) + root)
+    speed = larger(along, zero - along) + root
+    time = where_zero(speed, h, smaller(larger(gap, zero - gap) / speed, h))
     for _ in range(2):
         px = dx - time * (vx - half * time * ax)
         py = dy - time * (vy - half * time * ay)
         slope = px * (ax * time - vx) + py * (ay * time - vy)
-        time = where_zero(slope, time, time + half * (reach * reach - px * px - py * py) / slope)
-    return smaller(larger(time, zero), h)
+        after = smaller(larger(time + half * (reach * reach - px * px - py * py) / slope, zero), h)
+        time = where_zero(slope, time, after)
+    return time
 
 
 @kernel
@@ -80,12 +82,12 @@ def _hold(which, x0, y0, size, position, velocity, acceleration, radius, hits, h
         x, y = take(position, which, k)
         vx, vy = take(velocity, which, k)
         ax, ay = take(acceleration, which, k)
-        dx, dy, room = x - x0, y - y0, size - pick(radius, which, k)
+        dx, dy, room = x - x0, y - y0, larger(size - pick(radius, which, k), zero)
         distance = square_root(dx * dx + dy * dy)
         nx, ny, depth = (zero - dx) / distance, (zero - dy) / distance, distance - room
         ux, uy = vx + lag * ax, vy + lag * ay
         # 0 if it rests on the wall; otherwise that which it hit is the tangent where it hit.
-        fast = smaller(larger((zero - (ux * nx + uy * ny)) - rest_speed, zero), larger(room, zero))
+        fast = smaller(larger((zero - (ux * nx + uy * ny)) - rest_speed, zero), room)
         time = _impact_time(dx, dy, ux, uy, ax, ay, room, zero, half, h)
         px = dx - time * (ux - half * time * ax)
         py = dy - time * (uy - half * time * ay)
@@ -101,7 +103,7 @@ def _hold(which, x0, y0, size, position, velocity, acceleration, radius, hits, h
         hit = where_zero(smaller(vn, zero), zero, hit)
         place(hits, which, k, larger(pick(hits, which, k), hit))
         x, y = x + depth * nx, y + depth * ny
-        # Faster than a room width a substep: what is still outside waits at the wall.
+        # The wall bends away from the tangent along which it goes on: who is still beyond waits at the wall.
         dx, dy = x - x0, y - y0
         distance = square_root(dx * dx + dy * dy)
         outside = larger(distance - room, zero)

@@ -35,8 +35,9 @@ def attract(force, position, inverse_mass, x, y, strength, softening):
         dx = x - position[i, 0]
         dy = y - position[i, 1]
         square = dx * dx + dy * dy + softening * softening
-        if square > zero and inverse_mass[i] > zero:
-            pull = strength / (square * np.sqrt(square)) * (one / inverse_mass[i])
+        cube = np.float64(square) * np.sqrt(np.float64(square))  # of float32 it underflows at 1e-15 m
+        if cube > 0.0 and inverse_mass[i] > zero:
+            pull = strength / cube * (one / inverse_mass[i])
             force[i, 0] += pull * dx
             force[i, 1] += pull * dy
 
@@ -60,8 +61,9 @@ def gravitate(force, position, mass, slot, strength, softening):
                 dx = np.float64(position[j, 0]) - x
                 dy = np.float64(position[j, 1]) - y
                 square = dx * dx + dy * dy + square_of_softening
-                if square > 0.0 and mass[j] < np.inf:
-                    pull = np.float64(mass[j]) / (square * np.sqrt(square))
+                cube = square * np.sqrt(square)
+                if cube > 0.0 and mass[j] < np.inf:  # it underflows before the square does
+                    pull = np.float64(mass[j]) / cube
                     fx += pull * dx
                     fy += pull * dy
             force[i, 0] += strength * m * fx

@@ -239,10 +239,11 @@ def pick_falling(resting, velocity, acceleration, before, particle, lag, dt):
 
 
 @parallel_kernel
-def remember_rest(acceleration, velocity, resting, lean, h):
+def remember_rest(acceleration, velocity, resting, left, lean, h):
     """Scale the accelerations of those that are held, so that h / 2 of it makes of what they carry weight with no velocity.
 
     Nothing for who rests on a wall alone: it has none. Among others that is lean |a| h against a; at a wall what there is of it.
+    left: (n, 2) acceleration that obstacles leave to those they hold, m/s^2, or (0, 2): that is no weight, and remains.
     """
     zero, one = h - h, h / h
     for i in prange(acceleration.shape[0]):
@@ -256,8 +257,10 @@ def remember_rest(acceleration, velocity, resting, lean, h):
                 square = h * (ax * ax + ay * ay)
                 part = min(max(along / square, zero), lean) if square > zero else zero
             part *= one + one
-            acceleration[i, 0] = part * ax
-            acceleration[i, 1] = part * ay
+            ax, ay = part * ax, part * ay
+            if left.shape[0] > 0 and resting[i] == ON_WALL:
+                ax, ay = left[i, 0], left[i, 1]
+            acceleration[i, 0], acceleration[i, 1] = ax, ay
 
 
 @kernel

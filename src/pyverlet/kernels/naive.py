@@ -32,7 +32,7 @@ def circle(x0, y0, size, position, velocity, radius, inverse_mass, h, e, flip):
         dy = y0 - position[i, 1]
         room = size - radius[i]
         distance = np.sqrt(dx * dx + dy * dy)
-        if distance > room and inverse_mass[i] > zero:
+        if distance > max(room, zero) and inverse_mass[i] > zero:
             put_back(i, dx / distance, dy / distance, distance - room, position, velocity, h, e, flip)
 
 

@@ -13,8 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.compile.jit import kernel, parallel_kernel, prange
-from pyverlet.kernels.bounds import look, meet, moved, put
+from pyverlet.compile.jit import kernel
 
 BODY = np.dtype([(name, np.float64) for name in ("x", "y", "angle", "vx", "vy", "spin")])
 """Where an obstacle's pivot is at the beginning of a frame, m and rad, and how it moves, m/s and rad/s."""
@@ -39,11 +38,17 @@ SEGMENT = np.dtype(
 NEVER = 2.0
 """A time on the way, from 0 to 1, that means no meeting."""
 
-MEETINGS = 4
-"""Times one circle may meet segments in a substep; who has still not come through waits where it last met one."""
+SETTLED = 1e-9
+"""Part of the radius: a second look within a substep takes less depth than this, and what the coordinates are rounded by, for
+rounding. Ways are followed in float64, whatever the world's dtype: a place is rounded once, at the end."""
 
-SETTLED = 1e-5
-"""Part of the radius: a second look within a substep takes less depth than this for rounding."""
+_ROUNDED = 2.0**-48
+
+
+@kernel
+def tolerance(x, y, radius):
+    """Depth, m, that is but rounding for a circle at (x, y)."""
+    return SETTLED * radius + _ROUNDED * (abs(x) + abs(y))
 
 
 @kernel
@@ -109,7 +114,7 @@ def _round_end(x0, y0, dx, dy, reach):
     b = x0 * dx + y0 * dy
     c = x0 * x0 + y0 * y0 - reach * reach
     root = b * b - a * c
-    if b >= 0.0 or root < 0.0 or a == 0.0:
+    if b >= 0.0 or root < 0.0 or a == 0.0 or reach <= 0.0:
         return NEVER
     s = (-b - np.sqrt(root)) / a
     return s if 0.0 <= s <= 1.0 else NEVER
@@ -143,6 +148,12 @@ def _on_the_way(segment, x0, y0, x1, y1, reach):
             x = x0 + s * dx
             if s <= 1.0 and 0.0 <= x <= length:
                 time, point = s, x
+    if time == NEVER and (left or right) and length > 0.0 and dx != 0.0:
+        # From over its neighbour's face, where rounding has left it a little too deep to be outside of this one.
+        point = 0.0 if left else length
+        s = (point - x0) / dx
+        if 0.0 <= s <= 1.0 and 0.0 <= side * (y0 + s * dy) < reach:
+            time = s
     for end in range(2):
         at = length * end
         s = _round_end(x0 - at, y0, dx, dy, reach)
@@ -199,7 +210,7 @@ def _first_meeting(
             time, nx, ny, point = _on_the_way(segment, x0, y0, x1, y1, reach)
             depth = reach - (x1 - point) * nx - y1 * ny
             gap = np.hypot(x0 - point, y0)
-        least = 0.0 if fresh else SETTLED * radius
+        least = 0.0 if fresh else tolerance(qx, qy, radius)
         if time < NEVER and depth > least and (time < best or (time == best and gap < best_gap)):
             best, best_gap, best_depth, best_k = time, gap, depth, k
             best_nx, best_ny = segment.bc * nx - segment.bs * ny, segment.bs * nx + segment.bc * ny
@@ -207,7 +218,7 @@ def _first_meeting(
 
 
 @kernel
-def _search(segments, x0, y0, cell, columns, rows, start, entries, fresh, px, py, qx, qy, radius):
+def search(segments, x0, y0, cell, columns, rows, start, entries, fresh, px, py, qx, qy, radius):
     """The earliest meeting of the way from p to q with any segment; as `_first_meeting`."""
     best, gap, depth, nx, ny, k = NEVER, 0.0, 0.0, 0.0, 0.0, -1
     dx, dy = qx - px, qy - py
@@ -236,82 +247,19 @@ def _search(segments, x0, y0, cell, columns, rows, start, entries, fresh, px, py
 
 
 @kernel
-def _travel(
-    i, segments, bodies, until, x0, y0, cell, columns, rows, start, entries,
-    position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
-    before, turn, lift, h, lag, rest_speed,
-):  # fmt: skip
-    """Circle i goes its way through a substep and meets what there is to meet."""
-    real = position.dtype.type
-    px, py = np.float64(before[i, 0]), np.float64(before[i, 1])
-    r = np.float64(radius[i])
-    for number in range(MEETINGS + 1):
-        qx, qy = np.float64(position[i, 0]), np.float64(position[i, 1])
-        if not np.isfinite(px + py + qx + qy):
-            return
-        time, _, depth, nx, ny, k = _search(segments, x0, y0, cell, columns, rows, start, entries, number == 0, px, py, qx, qy, r)
-        if k < 0:
-            return
-        if number == MEETINGS:
-            position[i, 0], position[i, 1] = real(px), real(py)
-            return
-        segment, body = segments[k], bodies[segments[k].body]
-        # What the surface does where they touch.
-        touch_x, touch_y = qx - (r - depth) * nx - body.x - until * body.vx, qy - (r - depth) * ny - body.y - until * body.vy
-        belt_x, belt_y = -ny * segment.belt, nx * segment.belt
-        if segment.around == 0 and nx * segment.bs - ny * segment.bc < 0.0:
-            belt_x, belt_y = -belt_x, -belt_y
-        wx, wy = real(body.vx - body.spin * touch_y + belt_x), real(body.vy + body.spin * touch_x + belt_y)
-        b = look(
-            i, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
-            before, turn, lift,
-        )  # fmt: skip
-        # As the surface sees it: how fast it is, and how far it went.
-        b = moved(b, b.x, b.y, b.vx - wx, b.vy - wy, b.from_x + h * wx, b.from_y + h * wy)
-        b = meet(b, real(nx), real(ny), real(depth), h, lag, real(segment.restitution), real(segment.friction), rest_speed)
-        b = moved(b, b.x, b.y, b.vx + wx, b.vy + wy, b.from_x, b.from_y)
-        put(i, b, position, velocity, spin, fed, resting, hits, spent, turn)
-        if time < 0.0:  # it was inside: the way so far does not count
-            px, py = np.float64(position[i, 0]), np.float64(position[i, 1])
-        elif number == 0:
-            # The place of the meeting, taken along to where the segment is at the end of the substep.
-            ax, ay = px - segment.ax, py - segment.ay
-            bx, by = qx - segment.bx, qy - segment.by
-            along, across = segment.c * ax + segment.s * ay, segment.c * ay - segment.s * ax
-            along += time * (segment.bc * bx + segment.bs * by - along)
-            across += time * (segment.bc * by - segment.bs * bx - across)
-            px = segment.bx + segment.bc * along - segment.bs * across
-            py = segment.by + segment.bs * along + segment.bc * across
-        else:
-            px, py = px + time * (qx - px), py + time * (qy - py)
-
-
-@kernel
-def _alone(px, py, qx, qy, x0, y0, cell, columns, rows, start):
-    """Whether the way is short and there is nothing near its middle: true for most circles, most of the time."""
-    if not abs(qx - px) + abs(qy - py) < cell:
-        return False
-    column = (0.5 * (px + qx) - x0) / cell
-    row = (0.5 * (py + qy) - y0) / cell
-    if not (0.0 <= column < columns and 0.0 <= row < rows):
-        return True
-    c = int(row) * columns + int(column)
-    return start[c] == start[c + 1]
-
-
-@parallel_kernel
-def collide(
-    segments, bodies, until, x0, y0, cell, columns, rows, start, entries,
-    position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
-    before, turn, lift, h, lag, rest_speed,
-):  # fmt: skip
-    """All circles, from their places `before` the substep (n, 2) to `position`; `until`: seconds into the frame at its end."""
-    for i in prange(position.shape[0]):
-        if inverse_mass[i] > 0 and not _alone(
-            before[i, 0], before[i, 1], position[i, 0], position[i, 1], x0, y0, cell, columns, rows, start
-        ):
-            _travel(
-                i, segments, bodies, until, x0, y0, cell, columns, rows, start, entries,
-                position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
-                before, turn, lift, h, lag, rest_speed,
-            )  # fmt: skip
+def covered(segments, position, by):
+    """Which obstacle has each of the (n, 2) points in it, -1 for none; lines have no inside."""
+    for i in range(position.shape[0]):
+        x, y = position[i, 0], position[i, 1]
+        by[i] = -1
+        for k in range(segments.shape[0]):
+            segment = segments[k]
+            if segment.rounding > 0.0:
+                ox, oy = x - segment.ax, y - segment.ay
+                along, across = segment.c * ox + segment.s * oy, segment.c * oy - segment.s * ox
+                if np.hypot(along - min(max(along, 0.0), segment.length), across) < segment.rounding:
+                    by[i] = segment.body
+                    break
+            if segment.faces > 0 and segment.first == k and _inside(segments, segment, x, y):
+                by[i] = segment.body
+                break

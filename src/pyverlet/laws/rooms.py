@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import bounds, cage
+from pyverlet.kernels import bounds, cage, meetings
 from pyverlet.state.state import Slots
 
 Array = NDArray[Any]
@@ -32,6 +32,10 @@ class Boundary(ABC):
     def held(self, state: Slots, h: float, lag: float, rest_speed: float) -> tuple[Any, ...] | None:
         """x, y, radius, h, lag and rest_speed as `hold` takes them, if `confine` is but that."""
         return None
+
+    def walls(self) -> Sequence[float]:
+        """Its shape as seven numbers (`kernels.meetings`), so that obstacles push nobody through it; none, if it cannot say."""
+        return (meetings.OPEN, 0, 0, 0, 0, 0, 0)
 
     @abstractmethod
     def extent(self) -> Extent | None:
@@ -115,6 +119,9 @@ class Circle(_Walls):
         self.center = checks.vector("center", center)
         self.radius = checks.number("radius", radius, above=0.0)
 
+    def walls(self) -> Sequence[float]:
+        return (meetings.ROUND, *self.center, self.radius, 0.0, self.restitution, self.friction)
+
     def held(self, state: Slots, h: float, lag: float, rest_speed: float) -> tuple[Any, ...] | None:
         if type(self) is Circle and self.restitution == 0.0 == self.friction and state.smooth:
             shape, (h, lag, _, _, rest_speed) = self._rounded((*self.center, self.radius), state, h, lag, rest_speed)
@@ -162,6 +169,9 @@ class Box(_Walls):
         self.upper = checks.vector("upper", upper)
         if not (self.lower[0] < self.upper[0] and self.lower[1] < self.upper[1]):
             raise InputError(f"upper is {self.upper}; allowed is a corner above and to the right of lower, {self.lower}")
+
+    def walls(self) -> Sequence[float]:
+        return (meetings.RECTANGLE, *self.lower, *self.upper, self.restitution, self.friction)
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         self._confine(bounds.box, (*self.lower, *self.upper), state, h, lag, rest_speed)

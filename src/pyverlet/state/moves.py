@@ -54,5 +54,5 @@ def pick_falling(state: Slots, before: Array, lag: float, dt: float) -> None:
 
 def remember_rest(state: Slots, h: float) -> None:
     """Scale the accelerations of those that are held, so that h / 2 of it makes of what they carry weight with no velocity."""
-    held = state.acceleration, state.velocity, state.resting
+    held = state.acceleration, state.velocity, state.resting, state.along
     motion.remember_rest(*held, *state.reals(state.lean, h))

@@ -106,8 +106,7 @@ class State:
     def remove(self, kept: Array) -> Array:
         """Keep the particles marked in `kept` (n,) bool, in their order. Returns (n,) where each of the old is now, or -1."""
         now = np.where(kept, np.cumsum(kept) - 1, -1)
-        first = int(np.argmin(kept)) if not kept.all() else len(kept)
-        left = int(np.count_nonzero(kept))
+        first, left = int(np.argmin(kept)) if not kept.all() else len(kept), int(np.count_nonzero(kept))
         for array in self._store.values():
             array[first:left] = array[first : len(kept)][kept[first:]]
         self._show(left)
@@ -126,8 +125,7 @@ class State:
 
     def find(self, first: int, stop: int) -> slice:
         """Where the particles with numbers from `first` up to, not including, `stop` are."""
-        a, b = np.searchsorted(self.number, (first, stop))
-        return slice(int(a), int(b))
+        return slice(*map(int, np.searchsorted(self.number, (first, stop))))
 
     def _show(self, count: int) -> None:
         for name, array in self._store.items():
@@ -155,8 +153,8 @@ class Slots:
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
         start: (n, 2) positions before the integration of this substep, m; empty unless circles rub each other, or meet obstacles.
         turn: (n,) rad by which each circle turns in this substep; empty unless circles rub each other.
-        lift: (n,) s; times -a it is the velocity with which circles at rest against others end a substep, for others 0. Kept
-            only if circles rub each other.
+        lift: (n,) s; times -a it is the velocity with which circles at rest against others end a substep; only if circles rub.
+        along: (n, 2) m/s^2, the acceleration left to circles that an obstacle holds, for others 0; empty without obstacles.
         drop: a circle that starts at rest falls drop * a h^2 in a substep; depends on the integrator.
         fed: (n,) bits: CARRIES where a contact at rest fed the velocity in the last substep, AT_WALL where a wall was touched
             in it, CARRIED and WAS_AT_WALL the same in the one before. Kept only if circles bounce.
@@ -200,7 +198,7 @@ class Slots:
         for name in (*_COLUMNS, "inverse_mass"):
             setattr(self, name, memory.zeros(count, self.dtype))
         self.__dict__.pop("force", None)
-        self.start = np.empty((0, 2), self.dtype)
+        self.start = self.along = np.empty((0, 2), self.dtype)
         self.turn = self.lift = np.empty(0, self.dtype)
         self.size = self.radius
         self.resting = np.zeros(count, np.uint8)
@@ -311,6 +309,8 @@ class Slots:
         self.hits.fill(-1)
         if len(self.spent):
             self.spent.fill(0)
+        if len(self.along):
+            self.along = self.along[:0]
         if len(self.turn):
             self.lift.fill(0)
             self.turn = self.turn[:0]
@@ -338,8 +338,8 @@ class Slots:
 
     def in_users_order(self) -> State:
         """A state with the positions, velocities, spins, radii and masses of now."""
-        state = State(self.dtype)
-        values = {name: np.empty_like(getattr(self, name)) for name in (*_ROWS, "spin", "radius", "mass")}
+        state, names = State(self.dtype), (*_ROWS, "spin", "radius", "mass")
+        values = {name: np.empty_like(getattr(self, name)) for name in names}
         for name, array in values.items():
             array[self.particle] = getattr(self, name)
         state.append(values)

@@ -43,9 +43,9 @@ class Pins:
 def spawn(world: World, x: float, y: float) -> None:
     """Add a circle of the usual radius and density at (x, y), metres, at rest. On top of another it starts small and grows.
 
-    None is added outside the bounds.
+    None is added outside the bounds or inside an obstacle.
     """
-    if world.boundary.outside(np.array([[x, y]]))[0]:
+    if not world.is_free((x, y))[0]:
         return
     radius = float(np.median(world.radius)) if len(world) else SPAWNED_RADIUS
     world.add(position=(x, y), velocity=0.0, radius=radius, mass=usual_density(world) * radius**2)

@@ -40,7 +40,7 @@ class Actor(ABC):
 
 
 class Emitter(Actor):
-    """Adds particles at random places of a region where nobody is; while there is no room, it waits.
+    """Adds particles at random places of a region where nobody is, nor an obstacle; while there is no room, it waits.
 
     Args:
         region: Box or Circle the particles appear in, with all of their radius.
@@ -87,8 +87,9 @@ class Emitter(Actor):
         if wanted <= 0:
             return
         places, sizes = self._draw(_TRIES * wanted)
+        allowed = world.is_free(places)
+        places, sizes, near = places[allowed], sizes[allowed], self._near(world)
         taken = np.zeros(len(places), bool)
-        near = self._near(world)
         found = int(
             placing.free_places(
                 places, sizes, world.position[near].astype(np.float64), world.radius[near].astype(np.float64), wanted, taken

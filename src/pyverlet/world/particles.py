@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
 from pyverlet.laws.contacts.collisions import ContactSolver
 from pyverlet.laws.forces import Force, Numbered
 from pyverlet.laws.links import Links
+from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.group import Column, Group
 from pyverlet.state.state import EVERYONE, Slots, State
@@ -28,6 +30,8 @@ class Particles:
     links: Links
     _where = slice(None)
     boundary: Boundary
+    obstacles: Obstacles
+    _course: Course
 
     def add(
         self,
@@ -41,6 +45,7 @@ class Particles:
         friction: ArrayLike | None = None,
         category: ArrayLike = 1,
         mask: ArrayLike = EVERYONE,
+        allow_overlap: bool = False,
     ) -> Group:
         """Add particles.
 
@@ -54,12 +59,15 @@ class Particles:
             friction: (n,) or one for all, mu, 0 or more; None: as for restitution. The geometric mean of two counts, as in Box2D.
             category: (n,) or one for all, 32 bits: what these circles are.
             mask: (n,) or one for all, 32 bits: two circles collide if each has a bit of its category in the other's mask.
+            allow_overlap: take centres inside an obstacle or outside the room too, which get out, or in, at once. Circles on top
+                of each other need no leave: they part slowly.
 
         Returns:
             A handle whose arrays are views on these particles, in the order given.
 
         Raises:
-            InputError: shapes disagree, a value is not finite, or a circle does not fit into the boundary; nothing is added.
+            InputError: shapes disagree, a value is not finite, a circle does not fit into the boundary, or a centre is inside an
+                obstacle or outside the room, where only pinned ones may be; nothing is added.
         """
         dtype = self._state.dtype
         where = checks.rows("position", position, dtype)
@@ -85,7 +93,26 @@ class Particles:
         checks.positive("radius", values["radius"])
         checks.positive("mass", values["mass"], infinite_is="pinned")
         self.boundary.check(values["radius"])
+        if not allow_overlap:
+            self._refuse_misplaced(where, np.isfinite(values["mass"]))
         return Group(self._state, self._state.append(values), self.remove)
+
+    def is_free(self, position: ArrayLike) -> NDArray[np.bool_]:
+        """(n,) whether these places, (n, 2) or (2,), m, are inside the room and in no obstacle. Circles do not count."""
+        where = checks.rows("position", position, np.dtype(np.float64))
+        return np.asarray(~self.boundary.outside(where) & (self._course.covering(where) < 0))
+
+    def _refuse_misplaced(self, position: Array, free: Array) -> None:
+        """No particle that is free may start inside an obstacle or outside the room."""
+        outside, inside = self.boundary.outside(position), self._course.covering(position)
+        wrong = np.flatnonzero(free & (outside | (inside >= 0)))
+        if len(wrong):
+            k = int(wrong[0])
+            what = f"outside the room, {self.boundary}" if outside[k] else f"inside the {self.obstacles[inside[k]]}"
+            x, y = position[k]
+            raise InputError(
+                f"position[{k}] is ({x:g}, {y:g}) m, {what}; allowed are free places, and all with allow_overlap=True"
+            )
 
     def remove(self, which: Group | ArrayLike) -> None:
         """Remove particles. Groups keep the others, whose indices close ranks.

@@ -50,7 +50,7 @@ def rehearse(world: World) -> None:
         _fuse(world)
     if len(world) and type(world.boundary) not in _ROOMS:  # one circle in the world's own room, which has kernels of its own
         alone = World(boundary=world.boundary, collisions=None, substeps=1, dtype=world.dtype)
-        alone.add(position=world.position[0], radius=world.radius[0])
+        alone.add(position=world.position[0], radius=world.radius[0], allow_overlap=True)
         alone.step(1e-3)
     _forces(world)
     if world._sleep:

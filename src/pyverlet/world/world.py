@@ -148,7 +148,7 @@ class World(Measures, Queries, Doors):
             self.boundary.confine(state, h, lag, REST_ACCELERATIONS * forces.strongest * h)
             done("bounds")
             if course:
-                course.collide(state, substep * h, h, lag, REST_ACCELERATIONS * forces.strongest * h)
+                course.collide(state, self.boundary, substep * h, h, lag, REST_ACCELERATIONS * forces.strongest * h)
                 done("obstacles")
             if contacts:
                 contacts.still(state, h)

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.constants import OBSTACLE_CELLS
+from pyverlet.kernels import meetings
 from pyverlet.kernels import obstacles as kernels
 from pyverlet.laws.obstacles._base import Obstacle, Obstacles
+from pyverlet.laws.rooms import Boundary
 from pyverlet.state.state import Slots
 
 Array = NDArray[Any]
@@ -52,19 +54,35 @@ class Course:
         self._moving = [k for k, obstacle in enumerate(self._seen) if obstacle.moves]
         self._binned_for = -1.0
 
+    def covering(self, position: Array) -> NDArray[np.int64]:
+        """(n,) which obstacle has each of these (n, 2) points inside it, m, -1 for none."""
+        by = np.full(len(position), -1)
+        self.begin()
+        if self._seen:
+            kernels.place(self._segments, self._bodies, 0.0, 0.0)
+            self._binned_for = -1.0  # cells are filled where segments are, and have been placed for another substep
+            kernels.covered(self._segments, position.astype(np.float64), by)
+        return by
+
     def before(self, state: Slots, h: float) -> None:
         """Before a substep: note where everybody comes from."""
         state.note_start()
 
-    def collide(self, state: Slots, time: float, h: float, lag: float, rest_speed: float) -> None:
-        """Let everybody meet what was on the way; `time`: seconds from the beginning of the frame to that of the substep."""
+    def collide(self, state: Slots, room: Boundary, time: float, h: float, lag: float, rest_speed: float) -> None:
+        """Let everybody meet what was on the way, and stay in the room.
+
+        time: seconds from the beginning of the frame to that of the substep.
+        """
         largest = float(state.radius.max(initial=0.0))
         if self._moving or self._binned_for != largest:
             kernels.place(self._segments, self._bodies, time, h)
             self._bin(largest)
         numbers = map(state.real, (h, lag, rest_speed))
-        collide: Any = kernels.collide
-        collide(self._segments, self._bodies, time + h, *self._cells, *state.bodies(), *numbers)
+        collide: Any = meetings.collide
+        if len(state.along) != len(state):
+            state.along = np.empty_like(state.position)
+        walls = np.array(room.walls(), float)
+        collide(self._segments, self._bodies, time + h, *self._cells, walls, state.along, *state.bodies(), *numbers, state.drop)
 
     def end(self, dt: float) -> None:
         """At the end of a frame that went well: the obstacles are where they moved to."""
