@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pyverlet.ground import loading  # noqa: F401  (first: all that follows takes a second)
+from pyverlet.ground import loading, versions  # noqa: F401  (first: all that follows takes a second)
 
 # isort: split
 from pyverlet import scenes

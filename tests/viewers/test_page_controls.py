@@ -420,7 +420,7 @@ def test_a_link_of_nonsense_does_no_harm(page: Page, program: Serve, settings: s
 
 
 def test_curves_and_stages(page: Page, program: Serve) -> None:
-    visit(page, program("cage", 5000).address)  # substeps of small worlds are replayed, as one stage
+    visit(page, program("cage", 5000).address)
     assert comes_true(page, lambda: number(page, "time") > 1)
     pause(page)
     now = status(page)

@@ -21,7 +21,7 @@ from pyverlet.compile.jit import kernel
 
 _WINDOWS = sys.platform == "win32"
 
-_WHICH = 0 if _WINDOWS else time.CLOCK_UPTIME_RAW if sys.platform == "darwin" else time.CLOCK_MONOTONIC
+_WHICH = getattr(time, "CLOCK_UPTIME_RAW" if sys.platform == "darwin" else "CLOCK_MONOTONIC", 0)
 """Of the system's clocks that which `time.perf_counter` reads."""
 
 

@@ -204,7 +204,7 @@ class Kernel:
         return result
 
 
-@typeof_impl.register(Kernel)
+@typeof_impl.register(Kernel)  # type: ignore[untyped-decorator]
 def _type_of_kernel(kernel: Kernel, _: Any) -> Any:
     """What compiled code calls by the name of a kernel."""
     return numba.typeof(kernel.alone)

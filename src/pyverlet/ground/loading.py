@@ -28,7 +28,8 @@ def done() -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def _is_the_command() -> bool:
+def is_the_command() -> bool:
+    """Whether this process is the command, or a library of somebody's."""
     if not sys.argv or sys.argv[0] != "-m":
         return bool(sys.argv) and Path(sys.argv[0]).stem == "pyverlet"
     # Python looks for the module that it is to run: is it this one, or one that uses it?
@@ -37,7 +38,7 @@ def _is_the_command() -> bool:
 
 
 if (
-    _is_the_command()
+    is_the_command()
     and threading.current_thread() is threading.main_thread()
     and signal.getsignal(signal.SIGINT) is signal.default_int_handler
 ):

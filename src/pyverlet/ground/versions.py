@@ -1,0 +1,47 @@
+"""The versions of what the engine is compiled by and kept in: those that were tried, and one sentence for others."""
+
+from __future__ import annotations
+
+import sys
+from importlib import metadata
+from typing import Final
+
+from pyverlet.ground import loading
+
+TRIED: Final = {"numpy": ((2, 0), (2, 5)), "numba": ((0, 61), (0, 69))}
+"""By package: the first version that will do, and the first that nobody has tried."""
+
+
+def _plain(version: tuple[int, ...]) -> str:
+    return ".".join(map(str, version))
+
+
+def complaint(package: str, version: str) -> str | None:
+    """What is wrong with this version; None if nothing is, or nobody could tell."""
+    least, below = TRIED[package]
+    number = tuple(int(part) for part in version.split(".")[:2] if part.isdigit())
+    if len(number) < 2 or least <= number < below:
+        return None
+    allowed = f"{package}>={_plain(least)},<{_plain(below)}"
+    return f"{package} is {version}; allowed is {allowed} (pip install {allowed!r})"
+
+
+def check() -> None:
+    """Look at what is installed, without importing it.
+
+    Raises:
+        ImportError: a version that was never tried.
+    """
+    for package in TRIED:
+        try:
+            wrong = complaint(package, metadata.version(package))
+        except metadata.PackageNotFoundError:  # its import will say so, or it came another way
+            continue
+        if wrong and loading.is_the_command():  # whose users get sentences, no tracebacks
+            sys.stderr.write(f"pyverlet: {wrong}\n")
+            sys.exit(1)
+        if wrong:
+            raise ImportError(wrong)
+
+
+check()
