@@ -104,6 +104,9 @@ FED: Final = 1.6
 it keeps neighbours from undoing each other's push, more than all of it is stiffer: it holds the same weight with less overlap.
 docs/design/contacts.md has the comparison."""
 
+FED_UNEVEN: Final = 2.0
+"""FED of smooth inelastic circles of very unequal masses, which are still solved pair by pair."""
+
 CARRIED_WEIGHT: Final = 0.25
 """Of |a| h: a circle whose velocity a substep feeds by more than this carries weight. One that rests on others is fed 1 at least;
 one that touches a neighbour by a rounding error, nothing to speak of."""

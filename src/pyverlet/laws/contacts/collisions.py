@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pyverlet.ground import checks
-from pyverlet.ground.constants import FED, LARGEST_PUSH, PUSHED, REST_ACCELERATIONS, UNEVEN
+from pyverlet.ground.constants import FED, FED_UNEVEN, LARGEST_PUSH, PUSHED, REST_ACCELERATIONS, UNEVEN
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import contacts, friction, impacts, refine
 from pyverlet.kernels.bounds import AT_WALL, CARRIED, CARRIES
@@ -168,14 +168,15 @@ class ContactSolver:
         self._lighter = self._loans.begin(state) if lends else state.inverse_mass
         bodies = (state.size, self._lighter)
         which = pairs.listed()
-        push = (real(FED / h), real(LARGEST_PUSH))
+        fed = self._fed(state)
+        push = (real(fed / h), real(LARGEST_PUSH))
         notes = (pairs.touching, pairs.impulse, pairs.touches)
         if self._bounces(state):
             self._bounce(state, h, lag, REST_ACCELERATIONS * strongest * h)
             if lends:
                 self._loans.recall(state, pairs)
         if lends:
-            self._loans.keep_weight(state, h, FED)
+            self._loans.keep_weight(state, h, fed)
         if not self._bounces(state):
             contacts.project(*moving, *bodies, *which, *push, *notes)
         else:
@@ -281,7 +282,11 @@ class ContactSolver:
 
     def _lean(self, state: Slots) -> float:
         """The same, in substeps."""
-        return state.drop - PUSHED / FED
+        return state.drop - PUSHED / self._fed(state)
+
+    def _fed(self, state: Slots) -> float:
+        """What velocities are fed, of an overlap."""
+        return FED_UNEVEN if self._uneven and not (self._rubs(state) or self._bounces(state)) else FED
 
     def _bounces(self, state: Slots) -> bool:
         return self.settings.restitution > 0.0 or state.most_restitution > 0.0
