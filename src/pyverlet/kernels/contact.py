@@ -72,6 +72,11 @@ class Circles(NamedTuple):
     lift: Any
     leans: Any
     start: Any
+    radius: Any
+    restitution: Any
+    friction: Any
+    hits: Any
+    spent: Any
 
 
 class Pairs(NamedTuple):
@@ -100,8 +105,8 @@ class Law(NamedTuple):
     """Numbers of a substep, and what there is to do in it.
 
     varied: 1, or 0 if reach and share are the same for all and have one pack only; mixed: the same of `made_of`. asks: whether any
-    pair may bounce or rub, or somebody listens to who meets how fast. rubs, listens, accounts: likewise. looks: deep packs are to be
-    noted. feed: FED / PUSHED / h, 1/s. most: the largest part of the contact distance that a push may see. weight: whether an
+    pair may bounce or rub, or somebody listens to who meets how fast. rubs, listens, accounts: likewise. arrives: 1 if what becomes of `moved`
+    is to be added to positions and velocities when all pairs have been gone through, 0 if the room does that; always 1 where `asks`. feed: FED / PUSHED / h, 1/s. most: the largest part of the contact distance that a push may see. weight: whether an
     acceleration could stop a pair that parts. carried: m/s, by which a substep feeds the velocity of one that carries weight.
     """
 
@@ -111,7 +116,7 @@ class Law(NamedTuple):
     rubs: Any
     listens: Any
     accounts: Any
-    looks: Any
+    arrives: Any
     h: Any
     lag: Any
     feed: Any
@@ -239,8 +244,8 @@ def _treat(bits, k, at, circles, pairs, law, spent):
 
 
 @kernel
-def push_strip(s, to, circles, pairs, law):
-    """The first sweep over strip s; normals go to `to` and up. Notes in `deep` the packs that overlap by more than DEEP."""
+def push_strip(s, to, circles, pairs, law, looks):
+    """The first sweep over strip s; normals go to `to` and up. If `looks`, notes in `deep` the packs that overlap by more than DEEP."""
     moved, lane_i, lane_j = circles.moved, pairs.lane_i, pairs.lane_j
     real = moved.dtype.type
     zero, one, limit = spread(real(0)), spread(real(1)), spread(real(DEEP))
@@ -307,10 +312,10 @@ def push_strip(s, to, circles, pairs, law):
         put(moved, lane_j, k, xj + cx * (one - part), yj + cy * (one - part))
         store(pairs.normal[0], to + k, where_zero(depth, zero, nx))
         store(pairs.normal[1], to + k, where_zero(depth, zero, ny))
-        if law.looks != 0 and which_above(depth, limit * r) != 0:
+        if looks != 0 and which_above(depth, limit * r) != 0:
             pairs.deep[begin // LANES + count] = k
             count += 1
-    if law.looks != 0:
+    if looks != 0:
         pairs.deeps[s] = count
 
 
@@ -445,12 +450,11 @@ def _refine_some(first, stop, parity, circles, pairs, law):
 
 
 @parallel_kernel
-def push(circles, pairs, law, cut, sets_out, arrives, claims):
+def push(circles, pairs, law, cut, looks, sets_out, claims):
     """The first sweep: impacts, and overlaps, and what has been slipped.
 
-    cut: (2, threads + 1), which half s // 2 of the strips s with s % 2 = 0, and 1, each thread begins with. sets_out: 1 if `moved` is
-    yet to be set to position - origin. arrives: 1 if what becomes of it is to be added to positions and velocities, 0 if others do
-    that; always where somebody `asks`. claims: `compile.stealing`.
+    cut: (2, threads + 1), which half s // 2 of the strips s with s % 2 = 0, and 1, each thread begins with. looks: 1 if packs that
+    overlap deeply are to be noted. sets_out: 1 if `moved` is yet to be set to position - origin. claims: `compile.stealing`.
     """
     n = circles.position.shape[0]
     chunks = (n + _CHUNK - 1) // _CHUNK
@@ -467,7 +471,7 @@ def push(circles, pairs, law, cut, sets_out, arrives, claims):
             half = claim(claims, cut[parity], part)
             while half >= 0:
                 s = 2 * half + parity
-                push_strip(s, pairs.begin[s], circles, pairs, law)
+                push_strip(s, pairs.begin[s], circles, pairs, law, looks)
                 half = claim(claims, cut[parity], part)
     left = 0
     for s in range(pairs.deeps.shape[0]):
@@ -481,7 +485,7 @@ def push(circles, pairs, law, cut, sets_out, arrives, claims):
     if law.asks != 0:
         for c in prange(chunks):
             _arrive(c * _CHUNK, min((c + 1) * _CHUNK, n), circles, law)
-    elif arrives != 0:
+    elif law.arrives != 0:
         for c in prange(chunks):
             a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
             arrive(circles.position[a:b], circles.velocity[a:b], circles.origin[a:b], circles.moved[a:b], law.feed)
@@ -503,29 +507,29 @@ def relax(circles, pairs, law, cut, marks, claims):
                 s = 2 * half + parity
                 relax_strip(s, pairs.begin[s], circles, pairs, law)
                 if marks != 0:
-                    mark_strip(s, pairs.begin[s], circles, pairs)
+                    a = pairs.begin[s]
+                    mark_strip(a, a + pairs.lanes[s], a, pairs.lane_i, pairs.lane_j, pairs.normal, circles.resting)
                 half = claim(claims, cut[parity], part)
 
 
 @kernel
-def mark_strip(s, to, circles, pairs):
-    """`resting` gains IN_PILE for every circle of a touching pair of strip s."""
-    zero = spread(pairs.normal.dtype.type(0))
-    begin, end = pairs.begin[s], pairs.begin[s] + pairs.lanes[s]
+def mark_strip(begin, end, to, lane_i, lane_j, normal, resting):
+    """`resting` gains IN_PILE for every circle of a touching pair in the lanes from `begin` up to `end`; their normals are at `to`."""
+    zero = spread(normal.dtype.type(0))
     for k in range(begin, end, LANES):
-        nx, ny = load(pairs.normal[0], to - begin + k), load(pairs.normal[1], to - begin + k)
+        nx, ny = load(normal[0], to - begin + k), load(normal[1], to - begin + k)
         touches = which_above(nx * nx + ny * ny, zero)
         for lane in range(LANES):
             bit = np.uint8(((touches >> lane) & 1) * IN_PILE)
-            circles.resting[pairs.lane_i[k + lane]] |= bit
-            circles.resting[pairs.lane_j[k + lane]] |= bit
+            resting[lane_i[k + lane]] |= bit
+            resting[lane_j[k + lane]] |= bit
 
 
 @parallel_kernel
-def mark_touching(circles, pairs, cut):
+def mark_touching(lanes, begin, lane_i, lane_j, normal, resting, cut):
     """`resting` gains IN_PILE for every circle of a touching pair."""
     for parity in range(2):
         for part in prange(cut.shape[1] - 1):
             for half in range(cut[parity, part], cut[parity, part + 1]):
-                s = 2 * half + parity
-                mark_strip(s, pairs.begin[s], circles, pairs)
+                a = begin[2 * half + parity]
+                mark_strip(a, a + lanes[2 * half + parity], a, lane_i, lane_j, normal, resting)

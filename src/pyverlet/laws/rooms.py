@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import bounds, cage, meetings
+from pyverlet.kernels import bounds, frame, meetings
 from pyverlet.state.state import Slots
 
 Array = NDArray[Any]
@@ -29,8 +29,8 @@ class Boundary(ABC):
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         """Bounce or hold every circle that reaches beyond a wall. `lag`: seconds the velocity is behind the position."""
 
-    def held(self, state: Slots, h: float, lag: float, rest_speed: float) -> tuple[Any, ...] | None:
-        """x, y, radius, h, lag and rest_speed as `hold` takes them, if `confine` is but that."""
+    def compiled(self, state: Slots) -> tuple[Any, tuple[float, ...]] | None:
+        """What `confine` does as a driver of `kernels.frame`, and the numbers it takes; None: Python has to call it."""
         return None
 
     def walls(self) -> Sequence[float]:
@@ -52,6 +52,9 @@ class Boundary(ABC):
 
 class Open(Boundary):
     """No walls."""
+
+    def compiled(self, state: Slots) -> tuple[Any, tuple[float, ...]] | None:
+        return (frame.open_space, ()) if type(self) is Open else None
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         state.resting[:] = 0
@@ -91,17 +94,6 @@ class _Walls(Boundary):
         return self._shape, self._laws
 
 
-def hold(state: Slots, numbers: tuple[Any, ...], arriving: tuple[Any, ...] | None = None) -> None:
-    """Smooth circles stay in a smooth round room; numbers: `Boundary.held`.
-
-    arriving: origin, moved and feed, if contacts have `moved` them and they have yet to arrive there (`kernels.cage.hold`).
-    """
-    bodies = (state.position, state.velocity, state.acceleration, state.radius, state.inverse_mass, state.resting, state.hits)
-    # One kernel for both, for it takes two seconds to compile.
-    where = (1, *arriving) if arriving else (0, state.position, state.position, numbers[3])
-    cage.hold(*numbers[:3], *bodies, *numbers[3:], *where, state.claims())
-
-
 class Circle(_Walls):
     """A circular cage: particles stay inside.
 
@@ -122,17 +114,15 @@ class Circle(_Walls):
     def walls(self) -> Sequence[float]:
         return (meetings.ROUND, *self.center, self.radius, 0.0, self.restitution, self.friction)
 
-    def held(self, state: Slots, h: float, lag: float, rest_speed: float) -> tuple[Any, ...] | None:
-        if type(self) is Circle and self.restitution == 0.0 == self.friction and state.smooth:
-            shape, (h, lag, _, _, rest_speed) = self._rounded((*self.center, self.radius), state, h, lag, rest_speed)
-            return (*shape, h, lag, rest_speed)
-        return None
+    def compiled(self, state: Slots) -> tuple[Any, tuple[float, ...]] | None:
+        if type(self) is not Circle:
+            return None
+        if self.restitution == 0.0 == self.friction and state.smooth:
+            return frame.smooth_cage, (*self.center, self.radius)
+        return frame.cage, (*self.center, self.radius, self.restitution, self.friction)
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
-        if numbers := self.held(state, h, lag, rest_speed):
-            hold(state, numbers)
-        else:
-            self._confine(bounds.circle, (*self.center, self.radius), state, h, lag, rest_speed)
+        self._confine(bounds.circle, (*self.center, self.radius), state, h, lag, rest_speed)
 
     def extent(self) -> Extent:
         (x, y), r = self.center, self.radius
@@ -172,6 +162,10 @@ class Box(_Walls):
 
     def walls(self) -> Sequence[float]:
         return (meetings.RECTANGLE, *self.lower, *self.upper, self.restitution, self.friction)
+
+    def compiled(self, state: Slots) -> tuple[Any, tuple[float, ...]] | None:
+        shape = (*self.lower, *self.upper, self.restitution, self.friction)
+        return (frame.four_walls, shape) if type(self) is Box else None
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         self._confine(bounds.box, (*self.lower, *self.upper), state, h, lag, rest_speed)

@@ -27,12 +27,12 @@ from pyverlet.laws.sleep import Sleep, laws
 from pyverlet.state.state import Slots, State
 from pyverlet.world.actors import Actor
 from pyverlet.world.convenience import Doors
-from pyverlet.world.fused import ALIKE, Fused, kind_of
 from pyverlet.world.measures import Measures
 from pyverlet.world.moments import Moment
 from pyverlet.world.profile import Profile
 from pyverlet.world.queries import Queries
 from pyverlet.world.saved import Saved
+from pyverlet.world.substeps import Substeps
 
 Array = NDArray[Any]
 
@@ -93,7 +93,7 @@ class World(Measures, Queries, Doors):
         self.frames = 0
         self.profile = Profile()
         self._books = Bookkeeper() if ledger else None
-        self._fused = Fused()
+        self._run = Substeps()
         self.onlooker: Callable[[Moment], None] | None = None
         """Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins."""
 
@@ -121,16 +121,16 @@ class World(Measures, Queries, Doors):
         """The table of contents of the engine. `done` is called with the name of each stage as it ends."""
         state, forces, integrator = self._slots, self._force_sum, self.integrator
         contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course or None
-        fused, lag, state.drop = self._fused.begin(self.gravity, contacts), integrator.velocity_lag * h, integrator.drop
+        lag, state.drop, run = integrator.velocity_lag * h, integrator.drop, self._run.begin(contacts)
         parts: list[Any] = [part for part in (contacts, links, course) if part]
-        plain = not (self.forces or self.links or self.obstacles) and done == self.profile.mark
+        compiled = contacts and not (links or course) and done == self.profile.mark
         if not self._open(h, done):
             return
         watch = Watch(self._state, forces, self.links, self.boundary) if contacts and undriven(self, h, self._h_last) else None
-        for substep in range(self.substeps):
-            kind = kind_of(substep, self.substeps) if plain else ALIKE
+        substep = 0
+        while substep < self.substeps:
             self._show(substep, h, lag)
-            if not (fused.leapt or fused.leap(self, contacts, h, kind)):
+            if not run.leapt:
                 for part in parts:
                     part.before(state, h)
                 integrator.step(state, forces, self.time + substep * h, h)
@@ -138,7 +138,8 @@ class World(Measures, Queries, Doors):
             if contacts:
                 contacts.find(state, lag)
                 done("broad phase")
-                if plain and fused.substep(self, contacts, h, lag, done, kind):
+                if compiled and (reached := run.go(self, contacts, substep, h, lag)) > substep:
+                    substep = reached
                     continue
                 contacts.project(state, h, lag, forces.strongest)
                 done("contacts")
@@ -156,7 +157,8 @@ class World(Measures, Queries, Doors):
             if links:
                 links.after(state)
                 done("links")
-        self._finish(contacts, watch, h, leans=kind != ALIKE)
+            substep += 1
+        self._finish(contacts, watch, h, marked=run.marked)
         done("finish")
 
     def run(self, *, seconds: float, dt: float = 1 / 60) -> None:
@@ -204,10 +206,10 @@ class World(Measures, Queries, Doors):
         with contacts.aside(self._slots) if contacts else nullcontext():
             links.solve(self._slots, h)
 
-    def _finish(self, contacts: ContactSolver | None, watch: Watch | None, h: float, *, leans: bool) -> None:
+    def _finish(self, contacts: ContactSolver | None, watch: Watch | None, h: float, *, marked: bool) -> None:
         """The substeps are done: who rests, the velocities of now, and no more energy than there may be."""
         if contacts:
-            lag, marked = self.integrator.velocity_lag * h, leans and contacts.packs(self._slots) is not None
+            lag = self.integrator.velocity_lag * h
             contacts.end(self._slots, self._state, lag, self.substeps * h, self.gravity, marked=marked)
         self.integrator.end(self._slots, h)
         if contacts and watch:

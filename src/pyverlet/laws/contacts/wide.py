@@ -11,7 +11,7 @@ from pyverlet.compile import jit
 from pyverlet.compile.lanes import LANES
 from pyverlet.ground import memory
 from pyverlet.ground.constants import CARRIED_WEIGHT, COLOURS, FED, LARGEST_PUSH, PUSHED
-from pyverlet.kernels import contact, packs
+from pyverlet.kernels import contact, frame, packs
 from pyverlet.kernels.bounds import CARRIES
 from pyverlet.laws.contacts.broadphase import PairList, rows_of
 from pyverlet.state.state import Slots
@@ -165,49 +165,49 @@ class Wide:
 
     # ---- a substep ---------------------------------------------------------------------------------------------------------
 
-    def begin_substep(self, state: Slots, h: float, lag: float, strongest: float, rest_speed: float, *, accounts: bool) -> None:
-        """Everything that the sweeps of this substep need."""
+    def set_up(
+        self, state: Slots, h: float, lag: float, strongest: float, rest_speed: float, *, accounts: bool, arrives: bool = True
+    ) -> None:
+        """Everything that the sweeps of this substep, and of those that follow it alike, need: `circles`, `arrays` and `law`."""
         if not self.fits(state):
             self.fit(state)
         if self.asks:
             np.bitwise_and(state.fed, CARRIES, out=self._carries, casting="unsafe")
+        turn = self._turn if self.rubs else self._turn[:0]
         if self.rubs:
             np.multiply(self._rough, state.real((state.drop - PUSHED / FED) * h), out=self._leans)
-            state.turn, state.lift = self._turn, self._lift
-        self.circles = contact.Circles(
+            state.turn, state.lift = turn, self._lift
+        self.circles = (
             state.position, state.velocity, state.acceleration, state.inverse_mass, self.origin, self.moved, state.resting,
-            state.spin, self._carries, state.fed, self._turned, self._turn, self._lift, self._leans,
-            state.start if self.rubs else self.origin,
+            state.spin, self._carries, state.fed, self._turned, turn, self._lift, self._leans, state.start,
+            state.radius, state.restitution, state.friction, state.hits, state.spent,
         )  # fmt: skip
-        self.law = contact.Law(
-            varied=self._varied, mixed=self._mixed, asks=int(self.asks), rubs=int(self.rubs), listens=int(self._listens),
-            accounts=int(accounts), looks=int(self._looks or self.asks), h=state.real(h), lag=state.real(lag), feed=state.real(FED / PUSHED / h),
-            most=state.real(LARGEST_PUSH), rest_speed=state.real(rest_speed), weight=int(strongest > 0),
-            carried=state.real(CARRIED_WEIGHT * strongest * h if strongest > 0 else np.inf),
+        carried = CARRIED_WEIGHT * strongest * h if strongest > 0 else np.inf
+        self.law = (
+            self._varied, self._mixed, int(self.asks), int(self.rubs), int(self._listens), int(accounts), int(arrives or self.asks),
+            *state.reals(h, lag, FED / PUSHED / h, LARGEST_PUSH, rest_speed), int(strongest > 0), state.real(carried),
         )  # fmt: skip
-        self._arrays = contact.Pairs(
+        self.arrays = (
             self.begin, self.lanes, self.apart, self.lane_i, self.lane_j, self.gap, self.reach, self.share, self.made_of,
             self.normal, self.depth, self.slip, self.held, self.closing, self._deep, self._deeps, self.spent,
         )  # fmt: skip
 
-    def push(self, state: Slots, *, sets_out: bool = True, arrives: bool = True) -> None:
-        """Impacts, overlaps and slips; circles `arrive` where that has moved them, unless others do that."""
-        contact.push(self.circles, self._arrays, self.law, self.cut(), int(sets_out), int(arrives), state.claims())
-        self._looks = False
+    def takes_looks(self, *, marks: bool) -> int:
+        """Whether the sweep that is next is to note who overlaps deeply, which it does once a frame; `marks`: this is the last."""
+        looks, self._looks = int(self._looks or self.asks), marks
+        return looks
 
-    def relax(self, state: Slots, *, marks: bool = False) -> None:
-        """Touching circles neither approach nor slip; mark them as resting, too."""
-        contact.relax(self.circles, self._arrays, self.law, self._cut, int(marks), state.claims())
-        self._looks |= marks
+    def push(self, state: Slots) -> None:
+        """Impacts, overlaps and slips; circles are then where that has moved them."""
+        frame.project(self.circles, self.arrays, self.law, self.cut(), self.takes_looks(marks=False), 1, state.claims())
 
-    def fused(self, normal: Array, *, marks: bool) -> tuple[Any, ...]:
-        """Circles, pairs and law for `kernels.fused`, which keeps normals in an array of its own; it marks who rests, too."""
-        self._looks = marks
-        return self.circles, self._arrays._replace(normal=normal), self.law
+    def relax(self, state: Slots) -> None:
+        """Touching circles neither approach nor slip."""
+        frame.still(self.circles, self.arrays, self.law, self._cut, 0, state.claims())
 
     def mark_resting(self, state: Slots) -> None:
         """Note in `state.resting` who touches another."""
-        contact.mark_touching(self.circles, self._arrays, self.cut())
+        contact.mark_touching(self.lanes, self.begin, self.lane_i, self.lane_j, self.normal, state.resting, self.cut())
         self._looks = True
 
 
