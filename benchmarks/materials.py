@@ -133,8 +133,9 @@ def heap(particles: int) -> tuple[Array, float]:
 
 def build(material: Material, position: Array, cage: float, threads: int) -> pv.World:
     """This heap, of this material, settled."""
-    options = {"boundary": pv.Circle(radius=cage), "collisions": material.collisions, "substeps": 8, "threads": threads}
-    world = pv.World(**options, **material.options)
+    world = pv.World(
+        boundary=pv.Circle(radius=cage), collisions=material.collisions, substeps=8, threads=threads, **material.options
+    )
     world.add(position=position, radius=RADIUS, mass=1.0)
     material.change(world)
     world.run(seconds=SETTLE_SECONDS, dt=DT)

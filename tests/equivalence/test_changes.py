@@ -40,7 +40,7 @@ def told(w: pv.World) -> list[Any]:
 
 def take_the_long_way(patch: pytest.MonkeyPatch) -> None:
     """No substep leans on another."""
-    patch.setattr(ContactSolver, "packs", lambda contacts, state: None)
+    patch.setattr(ContactSolver, "steady", lambda contacts, state: None)
 
 
 def both(make: Any, frames: int, meanwhile: Any = lambda w, frame: None) -> None:
@@ -154,10 +154,10 @@ def test_a_substep_that_was_broken_off_leaves_nothing_behind() -> None:
         if frame == 5:
             w.gravity = (0, -5)
             room = w.boundary
-            room.held = mock.Mock(side_effect=KeyboardInterrupt)  # type: ignore[method-assign]
+            room.compiled = mock.Mock(side_effect=KeyboardInterrupt)  # type: ignore[method-assign]
             with pytest.raises(KeyboardInterrupt):
                 w.step(1 / 60)
-            del room.held
+            del room.compiled
 
     both(lambda: pour(boundary=ROOMS["cage"]()), 60, interrupt)
 

@@ -134,6 +134,7 @@ def beyond(world: pv.World) -> float:
     x, r, room = world.position.astype(float), world.radius.astype(float), world.boundary
     if isinstance(room, pv.Circle):
         return float(((np.hypot(*(x - room.center).T) + r - room.radius) / r).max())
+    assert isinstance(room, pv.Box)
     low, high = np.asarray(room.lower) - x, x - np.asarray(room.upper)
     return float(((np.maximum(low, high).max(axis=1) + r) / r).max())
 

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.compile.jit import inlined, kernel, parallel_kernel, prange
 from pyverlet.compile.lanes import (
     LANES,
     add_lanes,
@@ -243,7 +243,7 @@ def _treat(bits, k, at, circles, pairs, law, spent):
     return done
 
 
-@kernel
+@inlined
 def push_strip(s, to, circles, pairs, law, looks):
     """The first sweep over strip s; normals go to `to` and up. If `looks`, notes in `deep` the packs that overlap by more than DEEP."""
     moved, lane_i, lane_j = circles.moved, pairs.lane_i, pairs.lane_j
@@ -319,7 +319,7 @@ def push_strip(s, to, circles, pairs, law, looks):
         pairs.deeps[s] = count
 
 
-@kernel
+@inlined
 def refine_strip(s, circles, pairs, law):
     """Part again, there and back, the packs in `deep` that still overlap by more than DEEP; `deeps` becomes how many those are.
 
@@ -353,7 +353,7 @@ def refine_strip(s, circles, pairs, law):
     pairs.deeps[s] = count
 
 
-@kernel
+@inlined
 def relax_strip(s, to, circles, pairs, law):
     """The second sweep over strip s: no approach, and no slip but what friction cannot hold, between circles that touch."""
     velocity, lane_i, lane_j = circles.velocity, pairs.lane_i, pairs.lane_j
@@ -416,7 +416,7 @@ def _distinct(lane_i, lane_j, k):
     return lanes
 
 
-@kernel
+@inlined
 def _arrive(a, b, circles, law):
     """Of the circles from a up to b: pushes become places, and velocities; who has been fed so much carries weight."""
     zero, one = law.h - law.h, law.h / law.h
@@ -441,7 +441,7 @@ def _arrive(a, b, circles, law):
             circles.spin[i] += law.feed * circles.turned[i]
 
 
-@kernel
+@inlined
 def _refine_some(first, stop, parity, circles, pairs, law):
     """The strips 2 half + parity, half from `first` up to `stop`."""
     for half in range(first, stop):
@@ -512,7 +512,7 @@ def relax(circles, pairs, law, cut, marks, claims):
                 half = claim(claims, cut[parity], part)
 
 
-@kernel
+@inlined
 def mark_strip(begin, end, to, lane_i, lane_j, normal, resting):
     """`resting` gains IN_PILE for every circle of a touching pair in the lanes from `begin` up to `end`; their normals are at `to`."""
     zero = spread(normal.dtype.type(0))

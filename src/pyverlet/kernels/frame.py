@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from pyverlet.compile.clock import note
 from pyverlet.compile.jit import driver, parallel_kernel, prange
+from pyverlet.compile.lanes import copy_row
 from pyverlet.kernels.bounds import box, circle
 from pyverlet.kernels.cage import hold
 from pyverlet.kernels.contact import Circles, Law, Pairs, push, relax
@@ -27,8 +28,8 @@ _CHUNK = 4096
 def remember(start, position):
     """start = position: where a substep begins, for friction measures slip from there."""
     for c in prange((position.shape[0] + _CHUNK - 1) // _CHUNK):
-        a, b = c * _CHUNK, min((c + 1) * _CHUNK, position.shape[0])
-        start[a:b] = position[a:b]
+        for i in range(c * _CHUNK, min((c + 1) * _CHUNK, position.shape[0])):  # not a slice: its checks take seconds to compile
+            copy_row(start, i, position, i)
 
 
 # ---- rooms: from here on `law` and `circles` are named tuples -------------------------------------------------------------

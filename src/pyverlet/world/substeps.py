@@ -18,7 +18,6 @@ from pyverlet.kernels import frame, fused
 from pyverlet.laws.contacts.broadphase import Strips
 from pyverlet.laws.contacts.collisions import ContactSolver
 from pyverlet.laws.contacts.wide import Wide
-from pyverlet.state.state import Slots
 
 Array = NDArray[Any]
 
@@ -66,7 +65,7 @@ class Substeps:
         last = world.substeps - 1
         leaps = world.integrator.leaps and not (world.forces or world.onlooker)  # who looks on may turn gravity
         if smooth and not wide.asks and len(state) >= FUSED_FROM and strips.in_order:
-            return self._strip_by_strip(state, contacts, wide, strips, shape, substep, last, leaps=leaps)
+            return self._strip_by_strip(world, contacts, wide, strips, shape, substep, leaps=leaps)
         stop = world.substeps if leaps else substep + 1
         self.marked = stop > last
         looks = wide.takes_looks(marks=self.marked)
@@ -82,18 +81,10 @@ class Substeps:
         return int(reached)
 
     def _strip_by_strip(
-        self,
-        state: Slots,
-        contacts: ContactSolver,
-        wide: Wide,
-        strips: Strips,
-        room: Any,
-        substep: int,
-        last: int,
-        *,
-        leaps: bool,
+        self, world: Any, contacts: ContactSolver, wide: Wide, strips: Strips, room: Any, substep: int, *, leaps: bool
     ) -> int:
         """One substep, and the integration of the next if it `leaps`."""
+        state, last = world._slots, world.substeps - 1
         self._share_out(strips, wide.lanes, state.dtype)
         self.leapt, self.marked = leaps and substep < last, substep == last
         looks, far = wide.takes_looks(marks=self.marked), state.real(strips.allowed * strips.allowed)
@@ -101,6 +92,7 @@ class Substeps:
         arrays = wide.arrays[: frame.NORMAL] + (self._normal,) + wide.arrays[frame.NORMAL + 1 :]
         strayed = fused.substep(self._cut, wide.circles, arrays, wide.law, tuple(map(state.real, room)), about)
         contacts.broad_phase.strayed = bool(strayed) if self.leapt else None
+        world.profile.mark("fused")
         return substep + 1
 
     def _share_out(self, strips: Strips, lanes: Array, dtype: np.dtype[Any]) -> None:
