@@ -167,6 +167,8 @@ class Slots:
         spent: (n, 2) energy that impacts on walls, and friction there, have taken in this frame, J, negative: to be summed, for
             rows stay where they are when slots are reordered. Empty unless somebody keeps account.
 
+        taken: what the energy limiter has taken in this frame, J.
+
     Args:
         sleeps: whether particles may sleep.
     """
@@ -177,7 +179,7 @@ class Slots:
         self.real = lru_cache(64)(dtype.type)
         self.reals = lru_cache(64)(lambda *numbers: tuple(map(dtype.type, numbers)))
         self._kept: dict[str, Array] = {}
-        self.drop, self.lean, self.total_mass = 1.0, 0.0, 0.0
+        self.drop, self.lean, self.total_mass, self.taken = 1.0, 0.0, 0.0, 0.0
         self.claims = Claims()
         self._resize(0)
 
@@ -306,6 +308,7 @@ class Slots:
     def clear_notes(self) -> None:
         """Forget what walls and friction have noted in the last frame."""
         self.hits.fill(-1)
+        self.taken = 0.0
         if len(self.spent):
             self.spent.fill(0)
         if len(self.turn):

@@ -71,12 +71,12 @@ class Measures(Particles):
             raise InputError("events are off in this world; allowed is a world built with World(events=True)")
         return self._events
 
-    def _spent(self) -> tuple[float, float]:
-        """What impacts and friction have taken in this frame, J, as the kernels of contacts and walls have noted."""
+    def _spent(self) -> tuple[float, float, float]:
+        """What impacts, friction and the energy limiter have taken in this frame, J, as they have noted; negative."""
         spent = self._slots.spent.sum(axis=0)
         if self._contacts:
             spent += self._contacts.broad_phase.list.spent.sum(axis=0)
-        return float(spent[0]), float(spent[1])
+        return float(spent[0]), float(spent[1]), -self._slots.taken
 
     def momentum(self) -> Array:
         """(2,) sum of m v over all free particles, kg m/s."""
