@@ -128,7 +128,7 @@ class World(Measures, Queries, Doors):
         done = frame.done
         if not self._open(frame, h, told):
             return
-        watch = Watch(self._state, forces, self.links, self.boundary) if contacts and undriven(self, h, self._h_last) else None
+        watch = Watch(self._state, forces, self.links, self.boundary) if parts and undriven(self, h, self._h_last) else None
         for substep, kind, moved in frame.substeps(self.substeps):
             self._show(substep, h, lag)
             if not (moved or fused.leapt or fused.leap(self, contacts, h, kind)):
@@ -217,8 +217,8 @@ class World(Measures, Queries, Doors):
                     lag, marked = self.integrator.velocity_lag * h, frame.leans and contacts.packs(self._slots) is not None
                     contacts.end(self._slots, self._state, lag, self.substeps * h, self.gravity, marked=marked)
                 self.integrator.end(self._slots, h)
-        if contacts and watch:
-            contacts.growth.heed(watch.close(self._slots, contacts.listed()))
+        if watch:
+            watch.close(self._slots, contacts)
 
     def _accept(self, dt: float, h: float, books: Any) -> None:
         """The frame has gone well: what it made of the state is the truth now."""

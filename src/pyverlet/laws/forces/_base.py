@@ -43,12 +43,13 @@ class ForceSum:
 
     Attributes:
         strongest: the largest acceleration that anyone has felt in the last evaluation, m/s^2.
+        t: the time of the last evaluation that asked forces, s.
     """
 
     def __init__(self, gravity: tuple[float, float], forces: list[Any]) -> None:
         self.gravity = gravity
         self.forces = forces
-        self.strongest = 0.0
+        self.strongest = self.t = 0.0
 
     @property
     def velocity_dependent(self) -> bool:
@@ -66,6 +67,7 @@ class ForceSum:
         """The sum of all forces but gravity (n, 2), N; (0, 2) if there are none."""
         if not self.forces:
             return state.acceleration[:0]
+        self.t = t
         state.force.fill(0)
         for force in self.forces:
             force.apply(state, t)
