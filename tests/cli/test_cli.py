@@ -311,7 +311,7 @@ def test_a_report_keeps_a_ledger_if_asked(run: Any) -> None:
 
 
 def test_the_tables_of_the_physics_page(run: Any) -> None:
-    small = ("check", "limiter", "--scene", "newton-cradle", "--particles", "5", "--seconds", "0.1")
+    small = ("check", "limiter", "--scene", "newton-cradle", "--particles", "10", "--seconds", "0.1")
     rows = json.loads(run(*small, "--json")[1])
     assert [(row["scene"], row["substeps"], row["frames"]) for row in rows] == [("newton-cradle", n, 6) for n in (2, 4, 8, 16)]
     assert run(*small, "--markdown")[1].startswith("| scene | 2 substeps |")

@@ -14,6 +14,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.constants import ALL_THREADS_FROM, ONE_THREAD_BELOW, REST_ACCELERATIONS, STANDARD_GRAVITY
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.kernels import motion
+from pyverlet.laws.coarse import Coarse
 from pyverlet.laws.contacts.collisions import Collisions, ContactSolver
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import Force, ForceSum
@@ -94,7 +95,7 @@ class World(Measures, Queries, Doors):
         self.frames = 0
         self.profile = Profile()
         self._books = Bookkeeper() if ledger else None
-        self._repeats, self._fused = Repeats(), Fused()
+        self._repeats, self._fused, self._coarse = Repeats(), Fused(), Coarse()
         self.onlooker: Callable[[Moment], None] | None = None
         """Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins."""
 
@@ -232,9 +233,8 @@ class World(Measures, Queries, Doors):
                 self._events.collect(self._slots, self._contacts.broad_phase.list)
             self._events.close(self._slots, self._state)
         self.profile.mark("scatter")
-        self.time += dt
-        self.frames += 1
-        self._h_last = h
+        self.time, self.frames, self._h_last = self.time + dt, self.frames + 1, h
+        self._coarse.look(self, h)
 
     def _show(self, done: int, h: float, lag: float) -> None:
         if self.onlooker and done:
