@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -179,8 +181,8 @@ def test_what_a_spring_draws_together_gains_no_more_than_allowed(
     # dE <= SURPLUS (kinetic + spring's) in a frame, beside what the integrator's energy swings by: a lone circle shows that.
     def worst(count: int) -> float:
         rng = np.random.default_rng(0)
-        room = pv.Circle(radius=15, **law)
-        world = pv.World(gravity=(0, 0), boundary=room, collisions=pv.Collisions(**law), substeps=substeps)
+        room, laws = pv.Circle(radius=15, **law), pv.Collisions(**law)  # type: ignore[arg-type]
+        world = pv.World(gravity=(0, 0), boundary=room, collisions=laws, substeps=substeps)
         world.add(position=rng.uniform(-9, 9, (count, 2)), velocity=rng.normal(0, 1, (count, 2)), radius=0.3)
         world.forces.append(pv.PointSpring(stiffness=20.0))
         before, rise = world.energy().total, 0.0
@@ -198,7 +200,8 @@ def test_without_gravity_what_there_is_is_the_scale(taken: list[float]) -> None:
     # The scale of this gas was that of a fall through its room, 40 m at 9.81 m/s^2: 780 times what it has.
     def gas(**law: float) -> pv.World:
         rng = np.random.default_rng(3)
-        world = pv.World(gravity=(0, 0), boundary=pv.Box((-20, -20), (20, 20)), collisions=pv.Collisions(**law))
+        laws = pv.Collisions(**law)  # type: ignore[arg-type]
+        world = pv.World(gravity=(0, 0), boundary=pv.Box((-20, -20), (20, 20)), collisions=laws)
         world.add(position=rng.uniform(-5, 5, (120, 2)), velocity=rng.normal(0, 0.7, (120, 2)), radius=0.5)
         return world
 
@@ -214,11 +217,14 @@ def test_without_gravity_what_there_is_is_the_scale(taken: list[float]) -> None:
 
 
 def test_a_chain_without_contacts_is_watched(monkeypatch: pytest.MonkeyPatch) -> None:
-    watched: list[pv.World] = []
+    watched: list[object] = []
     real = limiter.Watch.close
-    monkeypatch.setattr(
-        limiter.Watch, "close", lambda self, slots, contacts: (watched.append(contacts), real(self, slots, contacts))
-    )
+
+    def close(self: limiter.Watch, slots: Slots, contacts: Any) -> None:
+        watched.append(contacts)
+        real(self, slots, contacts)
+
+    monkeypatch.setattr(limiter.Watch, "close", close)
     world = pv.World(collisions=None)
     group = world.add(position=[(0, 0), (1, 0)])
     world.step(1 / 60)

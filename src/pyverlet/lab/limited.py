@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from typing import Any
 
 from pyverlet import scenes
 from pyverlet.lab.physics.energy import scale
@@ -44,7 +45,8 @@ def table(
     names: Sequence[str], *, seconds: float, particles: int | None = None, progress: Callable[[int, int], None] | None = None
 ) -> Table:
     """A row for each scene: frames in which it acts, and what it takes, at 2, 4, 8 and 16 substeps."""
-    rows, values = [], []
+    rows: list[list[str]] = []
+    values: list[dict[str, Any]] = []
     for name in names:
         cells = [name]
         for substeps in SUBSTEPS:

@@ -90,7 +90,8 @@ def henderson(fraction: float) -> float:
 
 def table(*, seconds: float, progress: Callable[[int, int], None] | None = None) -> Table:
     """A row for each step: pressure over that at the finest, and the largest overlap, at several area fractions."""
-    rows, values = [], []
+    rows: list[list[str]] = []
+    values: list[dict[str, float]] = []
     finest: dict[float, float] = {}
     for step in STEPS:
         cells = [f"{step:g}"]

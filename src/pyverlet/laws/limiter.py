@@ -145,7 +145,7 @@ class Watch:
     def _pulls(self, slots: Slots, mass: Array) -> tuple[Array, Array]:
         """(n, 2) N, what gravity and forces with a potential do to each, at the start of the frame and now."""
         weight = mass[:, None] * self._forces.gravity
-        kept = [force for force in self._forces.forces if isinstance(force, Conservative)]
+        kept: list[Any] = [force for force in self._forces.forces if isinstance(force, Conservative)]
         if not kept:
             return weight, weight
         now, pulls = slots.position, []

@@ -99,9 +99,9 @@ class Measures(Particles):
         return int(np.count_nonzero(self.boundary.outside(self.position)))
 
     def state_hash(self) -> str:
-        """16 hex digits of time and every particle's position, velocity, spin, radius and mass: equal bits, equal hash."""
+        """16 hex digits of time and every particle's position, velocity, spin, angle, radius and mass: equal bits, equal hash."""
         digest = hashlib.blake2b(np.float64(self.time).tobytes(), digest_size=8)
-        for array in (self.position, self.velocity, self.spin, self.radius, self.mass):
+        for array in (self.position, self.velocity, self.spin, self.angle, self.radius, self.mass):
             digest.update(array.tobytes())
         return digest.hexdigest()
 

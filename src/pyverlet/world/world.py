@@ -17,7 +17,7 @@ from pyverlet.kernels import motion
 from pyverlet.laws.coarse import Coarse
 from pyverlet.laws.contacts.collisions import Collisions, ContactSolver
 from pyverlet.laws.events import Events
-from pyverlet.laws.forces import Force, ForceSum
+from pyverlet.laws.forces import ForceList, ForceSum
 from pyverlet.laws.integrators import Integrator, PositionVerlet
 from pyverlet.laws.ledger import Bookkeeper
 from pyverlet.laws.limiter import Watch, undriven
@@ -81,7 +81,7 @@ class World(Measures, Queries, Doors):
         self.links = Links(self._state)
         self._events = Events() if events else None
         self._sleep = Sleep() if sleep else None
-        self.forces: list[Force] = []
+        self.forces = ForceList()
         self._force_sum = ForceSum(checks.vector("gravity", gravity), self.forces)
         self.actors: list[Actor] = []
         self.obstacles = Obstacles()
@@ -223,7 +223,7 @@ class World(Measures, Queries, Doors):
 
     def _accept(self, dt: float, h: float, books: Any) -> None:
         """The frame has gone well: what it made of the state is the truth now."""
-        self._slots.scatter(self._state)
+        self._slots.scatter(self._state, dt)
         if books:
             books.close(self._spent())
         self._course.end(dt)

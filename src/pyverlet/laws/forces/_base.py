@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from numpy.typing import NDArray
 
+from pyverlet.ground.errors import InputError
 from pyverlet.state.moves import newton, newton_kick_drift
 from pyverlet.state.state import Slots, State
 
@@ -32,6 +33,24 @@ class Numbered(Protocol):
 
     def renumber(self, now: NDArray[Any]) -> None:
         """Particles were removed: the one that was at k is at now[k], or is no more if that is -1."""
+
+
+AnyForce = TypeVar("AnyForce", bound=Force)
+
+
+class ForceList(list[Force]):
+    """The forces of a world: a list."""
+
+    def append(self, force: AnyForce) -> AnyForce:  # type: ignore[override]
+        """Add a force; returns it.
+
+        Raises:
+            InputError: it has no method `apply`.
+        """
+        if not isinstance(force, Force):
+            raise InputError(f"force is {force!r}; allowed is an object with a method apply(state, t), such as pyverlet.Drag()")
+        super().append(force)
+        return force
 
 
 class ForceSum:
