@@ -123,7 +123,7 @@ class Artist:
         """How the circles of the frame's rows have turned, rad; None as long as nobody has."""
         if not len(frame.turned):
             return None
-        return (frame.turned if frame.whose is None else frame.turned[frame.whose]) * (np.pi / 128)
+        return np.asarray((frame.turned if frame.whose is None else frame.turned[frame.whose]) * (np.pi / 128), float)
 
     def _obstacles(self, frame: Frame) -> Sequence[Outline]:
         """All of them; the same object as long as none has moved, which the raster then need not draw again."""

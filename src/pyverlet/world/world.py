@@ -25,6 +25,7 @@ from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.rooms import Boundary, Open
 from pyverlet.laws.sleep import Sleep, laws
+from pyverlet.laws.touches import Touches
 from pyverlet.state.state import Slots, State
 from pyverlet.world.actors import Actor
 from pyverlet.world.convenience import Doors
@@ -53,6 +54,7 @@ class World(Measures, Queries, Doors):
         substeps: steps of length h = dt / substeps in one call of `step`.
         dtype: float32 or float64, of all arrays.
         events: note in `events` which contacts begin and end in each frame, and who hit whom how hard.
+        contacts: note who touches what, where and how hard, in `contacts`, and for `force_on` and `pressure`.
         sleep: let circles at rest sleep until touched, at little cost; not with links, moving obstacles or forces but drag.
         ledger: keep account of where the energy goes, in `ledger`.
         threads: at most this many for the parallel stages; None is as many as pay off. Never changes the result.
@@ -73,17 +75,17 @@ class World(Measures, Queries, Doors):
         threads: int | None = None,
         ledger: bool = False,
         events: bool = False,
+        contacts: bool = False,
         sleep: bool = False,
     ) -> None:
         self._state = State(checks.floating("dtype", dtype))
         self._h_last: float | None = None  # substep of the frame before; None: the integrator starts anew
         self._slots = Slots(self._state.dtype, sleeps=sleep)
         self.links = Links(self._state)
-        self._events = Events() if events else None
+        self._events, self._touches = Events() if events else None, Touches() if contacts else None
         self._sleep = Sleep() if sleep else None
         self.forces = ForceList()
-        self._force_sum = ForceSum(checks.vector("gravity", gravity), self.forces)
-        self.actors: list[Actor] = []
+        self._force_sum, self.actors = ForceSum(checks.vector("gravity", gravity), self.forces), list[Actor]()
         self.obstacles = Obstacles()
         self._course = Course(self.obstacles)
         self.integrator = PositionVerlet() if integrator is None else integrator
@@ -91,10 +93,8 @@ class World(Measures, Queries, Doors):
         self.collisions = collisions
         self.substeps = substeps
         self.threads = threads
-        self.time = 0.0
-        self.frames = 0
-        self.profile = Profile()
-        self._books = Bookkeeper() if ledger else None
+        self.time, self.frames = 0.0, 0
+        self.profile, self._books = Profile(), Bookkeeper() if ledger else None
         self._repeats, self._fused, self._coarse = Repeats(), Fused(), Coarse()
         self.onlooker: Callable[[Moment], None] | None = None
         """Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins."""
@@ -113,8 +113,8 @@ class World(Measures, Queries, Doors):
             actor.act(self, dt)
         jit.use_threads(self.threads)
         self.profile.begin()
-        books = self._books and self._open_books(h)
-        self._frame(h, books or self.profile.mark)
+        books = self._open_books(h)
+        self._frame(h, self._listen(h, books or self.profile.mark))
         self._refuse_non_finite(h)
         self._accept(dt, h, books)
         self.profile.end()

@@ -52,6 +52,18 @@ class Course:
         self._moving = [k for k, obstacle in enumerate(self._seen) if obstacle.moves]
         self._binned_for = -1.0
 
+    def seen(self) -> list[Obstacle]:
+        """The obstacles of the last frame."""
+        return list(self._seen)
+
+    def surfaces(self) -> tuple[Array, ...]:
+        """For each segment as it stood last: number of its obstacle, start (k, 2), direction (k, 2), length, rounding; metres."""
+        s = self._segments
+        return (
+            s["body"].copy(), np.column_stack((s["bx"], s["by"])), np.column_stack((s["bc"], s["bs"])), s["length"].copy(),
+            s["rounding"].copy(),
+        )  # fmt: skip
+
     def before(self, state: Slots, h: float) -> None:
         """Before a substep: note where everybody comes from."""
         state.note_start()
