@@ -24,7 +24,7 @@ def follow(world: pv.World, frames: int) -> list[tuple[str, int, int]]:
     told = []
     for _ in range(frames):
         world.step(1 / 60)
-        told += [("begin", int(a), int(b)) for a, b in world.events.begin.tolist()]
+        told += [("begin", int(a), int(b)) for a, b in world.events.begin[["a", "b"]].tolist()]
         told += [("end", int(a), int(b)) for a, b in world.events.end.tolist()]
     return told
 

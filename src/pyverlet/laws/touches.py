@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.laws.events import WALL
-from pyverlet.laws.obstacles import Course
+from pyverlet.laws.obstacles import Course, facing_of
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.state import Slots, State
 
@@ -176,7 +176,7 @@ class _End:
         if not len(who):
             return np.zeros(0, TOUCH)
         x, r, push = self._position[who], self._radius[who], given[who]
-        facing = self._room.facing(x) if whose == 1 else _facing(x, self._surfaces, len(self._obstacles))
+        facing = self._room.facing(x) if whose == 1 else facing_of(x, self._surfaces, len(self._obstacles))
         if facing is None:  # a room of the user's own: all that is known is where it pushes to
             size = np.hypot(*push.T)
             facing = r[:, None], (push / size[:, None])[:, None, :]
@@ -269,23 +269,6 @@ def _shared(push: Floats, near: Array, into: Floats) -> Floats:
         weight = part / part.sum() if part.sum() > 0 else np.full(len(part), 1 / len(part))
         share[mine] = part[:, None] * normal + weight[:, None] * rest
     return share
-
-
-def _facing(x: Floats, surfaces: tuple[Array, ...], count: int) -> tuple[Floats, Floats]:
-    """(k, count) distance of points x (k, 2) from each obstacle, m, and (k, count, 2) the unit normal out of it."""
-    body, start, along, length, rounding = surfaces
-    gap, normal = np.full((len(x), count), np.inf), np.zeros((len(x), count, 2))
-    for k in range(count):
-        mine = body == k
-        way = x[:, None] - start[mine]
-        t = np.clip((way * along[mine]).sum(axis=2), 0, length[mine])
-        way = way - t[:, :, None] * along[mine]
-        far = np.hypot(way[..., 0], way[..., 1])
-        nearest = np.argmin(far - rounding[mine], axis=1)
-        row = np.arange(len(x))
-        gap[:, k] = (far - rounding[mine])[row, nearest]
-        normal[:, k] = way[row, nearest] / np.maximum(far[row, nearest], 1e-300)[:, None]
-    return gap, normal
 
 
 def _rows(first: Array, count: Array, pair_i: Array, pair_j: Array, order: Array) -> Array:

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import measure
-from pyverlet.laws.contacts.collisions import ContactSolver, Overlap, measure_overlap
+from pyverlet.laws.contacts.collisions import Collisions, ContactSolver, Overlap, measure_overlap
 from pyverlet.laws.energy import Energy, energy
-from pyverlet.laws.events import Events
+from pyverlet.laws.events import Events, Place
 from pyverlet.laws.ledger import Bookkeeper, Ledger
 from pyverlet.laws.obstacles import Course, Obstacle, Obstacles
 from pyverlet.laws.rooms import Boundary
@@ -33,6 +33,7 @@ class Measures(Particles):
     _touches: Touches | None
     _course: Course
     obstacles: Obstacles
+    collisions: Collisions | None
     _contacts: ContactSolver | None
 
     def energy(self) -> Energy:
@@ -115,6 +116,10 @@ class Measures(Particles):
         if length is None:
             raise InputError(f"boundary is {self.boundary!r}; allowed is a pyverlet.Box or a pyverlet.Circle, to have a pressure")
         return touches.pushed() / length
+
+    def _place(self) -> Place:
+        """What circles may meet, for the events of a frame."""
+        return Place(self.boundary, self._course, self.collisions.restitution if self.collisions else 0.0)
 
     def _noting(self) -> Touches:
         if self._touches is None:

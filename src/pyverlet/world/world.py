@@ -231,7 +231,7 @@ class World(Measures, Queries, Doors):
         if self._events:
             if self._contacts:
                 self._events.collect(self._slots, self._contacts.broad_phase.list)
-            self._events.close(self._slots, self._state)
+            self._events.close(self._slots, self._state, self._place())
         self.profile.mark("scatter")
         self.time, self.frames, self._h_last = self.time + dt, self.frames + 1, h
         self._coarse.look(self, h)
