@@ -9,7 +9,7 @@ from pyverlet.ground import loading, versions  # noqa: F401  (first: all that fo
 # isort: split
 from pyverlet import scenes
 from pyverlet.ground import errors
-from pyverlet.ground.errors import InputError, NonFiniteError, PyverletError
+from pyverlet.ground.errors import CoarseStepWarning, InputError, NonFiniteError, PyverletError
 from pyverlet.laws import forces, integrators
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.collisions import Collisions, Overlap
@@ -43,13 +43,13 @@ from pyverlet.world.world import World
 __version__ = "0.1.0"
 
 __all__ = [
-    "RK4", "Actor", "Angle", "Area", "Attractor", "Boundary", "Box", "BruteForce", "Capsule", "Chain", "Circle", "ClampAndFlip",
-    "Clock", "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy", "Events", "ExplicitEuler", "Fast", "FrameBudget",
-    "Gravitation", "Group", "InputError", "Integrator", "Ledger", "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel",
-    "Panels", "Pin", "PointSpring", "Polygon", "PositionVerlet", "ProjectOnly", "PyverletError", "Rope", "Segment",
-    "SemiImplicitEuler", "Sink", "Spring", "Stick", "TimeCorrectedVerlet", "VelocityVerlet", "Wind", "World", "Yoshida4",
-    "bridge", "builders", "chain", "cloth", "errors", "force", "forces", "integrators", "net", "rope", "scenes", "soft_body",
-    "view", "warm_up", "widget",
+    "RK4", "Actor", "Angle", "Area", "Attractor", "Boundary", "Box", "BruteForce", "Capsule", "Chain", "Circle",
+    "ClampAndFlip", "Clock", "CoarseStepWarning", "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy",
+    "Events", "ExplicitEuler", "Fast", "FrameBudget", "Gravitation", "Group", "InputError", "Integrator", "Ledger",
+    "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel", "Panels", "Pin", "PointSpring", "Polygon", "PositionVerlet",
+    "ProjectOnly", "PyverletError", "Rope", "Segment", "SemiImplicitEuler", "Sink", "Spring", "Stick", "TimeCorrectedVerlet",
+    "VelocityVerlet", "Wind", "World", "Yoshida4", "bridge", "builders", "chain", "cloth", "errors", "force", "forces",
+    "integrators", "net", "rope", "scenes", "soft_body", "view", "warm_up", "widget",
 ]  # fmt: skip
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -62,8 +64,9 @@ def test_what_has_touched_a_wall_is_lowered_too() -> None:
 
 
 def test_momentum_and_angular_momentum_stay(monkeypatch: pytest.MonkeyPatch) -> None:
-    # Of circles that nothing holds only the part of the velocities is taken that has neither. Both are kept to rounding, of the
-    # momenta of all added up without their signs; here they are looked at before and after, for pushes move what turns.
+    # Of circles that nothing holds only the part of the velocities is taken that has neither, and if that is not enough of their
+    # turning, which pushes have changed: they move what turns. So the momentum is kept to rounding, of the momenta of all added
+    # up without their signs, and the angular momentum by far better than pushes do, 2e-4 of its scale (docs/physics.md).
     monkeypatch.setattr(limiter, "SURPLUS", 1e-7)  # or they part too gently
     world = pv.World(gravity=(0, 0), dtype=np.float64)
     rng = np.random.default_rng(2)
@@ -81,7 +84,8 @@ def test_momentum_and_angular_momentum_stay(monkeypatch: pytest.MonkeyPatch) -> 
         real(self, slots, pairs, surplus)  # type: ignore[arg-type]
         times += bool(np.abs(slots.velocity - velocity).max() > 1e-6)
         size = float((slots.mass * np.hypot(*slots.velocity.T) * (1 + np.hypot(*slots.position.T))).sum())
-        assert momenta(slots) == pytest.approx(before, abs=1e-14 * size)
+        assert momenta(slots)[:2] == pytest.approx(before[:2], abs=1e-14 * size)
+        assert momenta(slots)[2] == pytest.approx(before[2], abs=1e-7 * size)
 
     monkeypatch.setattr(limiter.Watch, "take_back", compared)
     world.run(seconds=1)
@@ -167,3 +171,68 @@ def test_gravity_that_turns_within_a_frame_is_no_gain(taken: list[float]) -> Non
     assert not taken
     # One substep of v' = g, seven of v' = -g.
     assert balls.velocity[:, 1] == pytest.approx(np.full(2, 1 - 6 * G / 480), abs=2 * G / 480)
+
+
+@pytest.mark.parametrize("substeps", [2, 8])
+@pytest.mark.parametrize("law", [{"restitution": 0.0}, {"restitution": 0.5, "friction": 0.5}])
+def test_what_a_spring_draws_together_gains_no_more_than_allowed(
+    substeps: int, law: dict[str, float], taken: list[float]
+) -> None:
+    # dE <= SURPLUS (kinetic + spring's) in a frame, beside what the integrator's energy swings by: a lone circle shows that.
+    def worst(count: int) -> float:
+        rng = np.random.default_rng(0)
+        room, laws = pv.Circle(radius=15, **law), pv.Collisions(**law)  # type: ignore[arg-type]
+        world = pv.World(gravity=(0, 0), boundary=room, collisions=laws, substeps=substeps)
+        world.add(position=rng.uniform(-9, 9, (count, 2)), velocity=rng.normal(0, 1, (count, 2)), radius=0.3)
+        world.forces.append(pv.PointSpring(stiffness=20.0))
+        before, rise = world.energy().total, 0.0
+        for _ in range(120):
+            world.step(1 / 60)
+            now = world.energy().total
+            rise, before = max(rise, (now - before) / before), now
+        return rise
+
+    assert worst(150) < 1.1 * SURPLUS + worst(1)
+    assert taken  # or nothing has been tested
+
+
+def test_without_gravity_what_there_is_is_the_scale(taken: list[float]) -> None:
+    # The scale of this gas was that of a fall through its room, 40 m at 9.81 m/s^2: 780 times what it has.
+    def gas(**law: float) -> pv.World:
+        rng = np.random.default_rng(3)
+        laws = pv.Collisions(**law)  # type: ignore[arg-type]
+        world = pv.World(gravity=(0, 0), boundary=pv.Box((-20, -20), (20, 20)), collisions=laws)
+        world.add(position=rng.uniform(-5, 5, (120, 2)), velocity=rng.normal(0, 0.7, (120, 2)), radius=0.5)
+        return world
+
+    for law in ({"restitution": 0.0}, {"restitution": 0.5, "friction": 0.5}):
+        world = gas(**law)
+        before = world.energy().total
+        for _ in range(60):
+            world.step(1 / 60)
+            now = world.energy().total
+            assert now <= before * (1 + 1.01 * SURPLUS)
+            before = now
+    assert taken
+
+
+def test_a_chain_without_contacts_is_watched(monkeypatch: pytest.MonkeyPatch) -> None:
+    watched: list[object] = []
+    real = limiter.Watch.close
+
+    def close(self: limiter.Watch, slots: Slots, contacts: Any) -> None:
+        watched.append(contacts)
+        real(self, slots, contacts)
+
+    monkeypatch.setattr(limiter.Watch, "close", close)
+    world = pv.World(collisions=None)
+    group = world.add(position=[(0, 0), (1, 0)])
+    world.step(1 / 60)
+    assert not watched  # nothing that could give energy
+    world.links.append(pv.Stick(group, 0, 1))
+    world.step(1 / 60)
+    lone = pv.World()
+    lone.add(position=(0, 1))
+    lone.obstacles.append(pv.Segment((-5, 0), (5, 0)))
+    lone.step(1 / 60)
+    assert watched == [None, None]

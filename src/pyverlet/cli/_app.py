@@ -131,13 +131,13 @@ def run(
         raise InputError(f"port is {port}; allowed is none, since this run has no live page")
     count = report.frame_count(seconds=seconds, frames=frames, dt=dt, default_seconds=DEFAULT_SECONDS)
     if plot is None:
-        panels = chosen.panels(integrators=methods, **overrides, ledger=True)
+        panels = chosen.panels(integrators=methods, **overrides, ledger=ledger)
         results = [_measure(panel, chosen, count, dt, compile_kernels(panel.world)) for panel in panels]
         _tell_all(chosen, panels, results, as_json)
         return
     if len(methods) > 1:
         raise InputError(f"integrators is {integrator!r}; allowed is one for plot (several: pyverlet compare)")
-    settings = chosen.settings(**overrides, integrator=methods[0] if methods else None)
+    settings = chosen.settings(**overrides, integrator=methods[0] if methods else None, ledger=ledger)
     _tell(_run_and_plot(chosen, settings, count, dt, plot), as_json)
 
 

@@ -86,9 +86,7 @@ Picture = Annotated[
     Path | None,
     typer.Option(help="What the circles form (scene image).", metavar="FILE", show_default=False),
 ]
-Ledger = Annotated[
-    bool, typer.Option("--ledger", help="Show on the page where the energy goes; reports always have it. Costs time.")
-]
+Ledger = Annotated[bool, typer.Option("--ledger", help="Say where the energy goes, on the page and in the report. Costs time.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 COLOURS: dict[ColourName, Callable[[], Colouring]] = {

@@ -97,7 +97,7 @@ def _substeps(substep, stop, last, circles, pairs, law, room, cut, looks, sets_o
     while True:
         push(circles, pairs, law, cut, looks, sets_out, claims)
         note(spent, CONTACTS, clock[0], clock[1])
-        confine(room, circles, law, claims)  # type: ignore[name-defined]  # noqa: F821  (bound by `frames`)
+        confine(room, circles, law, claims)  # noqa: F821  (`frames` says what that is)
         note(spent, BOUNDS, clock[0], clock[1])
         relax(circles, pairs, law, cut, 1 if substep == last else 0, claims)
         note(spent, VELOCITIES, clock[0], clock[1])

@@ -37,6 +37,14 @@ class Boundary(ABC):
         """Its shape as seven numbers (`kernels.meetings`), so that obstacles push nobody through it; none, if it cannot say."""
         return (meetings.OPEN, 0, 0, 0, 0, 0, 0)
 
+    def facing(self, position: Array) -> tuple[Array, Array] | None:
+        """(k, w) distance of centres (k, 2) from each of its walls, m, and (k, w, 2) the unit normal of each into the room."""
+        return None
+
+    def perimeter(self) -> float | None:
+        """Length of its walls, m; None if that is not known."""
+        return None
+
     @abstractmethod
     def extent(self) -> Extent | None:
         """(x0, y0, x1, y1) of the room, m; None if it has no walls."""
@@ -124,6 +132,14 @@ class Circle(_Walls):
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         self._confine(bounds.circle, (*self.center, self.radius), state, h, lag, rest_speed)
 
+    def facing(self, position: Array) -> tuple[Array, Array]:
+        way = self.center - position.astype(np.float64)
+        far = np.hypot(*way.T)
+        return (self.radius - far)[:, None], (way / np.maximum(far, 1e-300)[:, None])[:, None, :]
+
+    def perimeter(self) -> float:
+        return float(2 * np.pi * self.radius)
+
     def extent(self) -> Extent:
         (x, y), r = self.center, self.radius
         return (x - r, y - r, x + r, y + r)
@@ -169,6 +185,15 @@ class Box(_Walls):
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         self._confine(bounds.box, (*self.lower, *self.upper), state, h, lag, rest_speed)
+
+    def facing(self, position: Array) -> tuple[Array, Array]:
+        """Its walls are, in this order, the left, the right, the floor and the ceiling."""
+        (x, y), (x0, y0), (x1, y1) = position.astype(np.float64).T, self.lower, self.upper
+        into = np.array([(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
+        return np.column_stack((x - x0, x1 - x, y - y0, y1 - y)), np.broadcast_to(into, (len(position), 4, 2))
+
+    def perimeter(self) -> float:
+        return 2 * (self.upper[0] - self.lower[0] + self.upper[1] - self.lower[1])
 
     def extent(self) -> Extent:
         return (*self.lower, *self.upper)

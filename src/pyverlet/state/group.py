@@ -92,6 +92,7 @@ class Group:
     position = Column("(n, 2) centres, m.")
     velocity = Column("(n, 2) m/s.")
     spin = Column("(n,) angular velocity, rad/s, counter-clockwise.")
+    angle = Column("(n,) rad they have turned, counter-clockwise; float64.")
     radius = Column("(n,) m.")
     mass = Column("(n,) kg; infinity pins a particle.")
     restitution = Column("(n,) e of these circles; negative: as the world's `Collisions` and bounds say.")

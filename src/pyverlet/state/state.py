@@ -25,12 +25,11 @@ _SET = ("radius", "mass", "restitution", "friction")
 _COLUMNS = ("spin", "grown", *_SET)
 _MARKS = ("category", "mask")
 _GIVEN = (*_SET, *_MARKS)
-_NUMBERS = ("number",)
 
 EVERYONE = 0xFFFFFFFF
 """A mask of 32 bits that takes every category."""
 
-_DEFAULTS: dict[str, Any] = {"grown": 1, "restitution": -1, "friction": -1, "category": 1, "mask": EVERYONE}
+_DEFAULTS: dict[str, Any] = {"angle": 0, "grown": 1, "restitution": -1, "friction": -1, "category": 1, "mask": EVERYONE}
 
 
 class State:
@@ -40,9 +39,8 @@ class State:
         position: (n, 2) centres, m.
         velocity: (n, 2) m/s.
         acceleration: (n, 2) m/s^2, of the last substep; the memory of the Verlet methods, scaled at rest. NaN: none yet.
-        spin: (n,) angular velocity, rad/s, counter-clockwise.
-        radius: (n,) m.
-        mass: (n,) kg; infinity pins the particle.
+        spin: (n,) angular velocity, rad/s, counter-clockwise. angle: (n,) rad it has turned; float64, for it grows and grows.
+        radius: (n,) m. mass: (n,) kg; infinity pins the particle.
         grown: (n,) part of the radius that other circles feel; less than 1 for those that were added on top of another.
         restitution, friction: (n,) of circles that have values of their own; negative: as `Collisions` and the bounds say.
         category, mask: (n,) 32 bits each; two circles collide if each has a bit of its category in the other's mask.
@@ -63,13 +61,14 @@ class State:
     category: Array
     mask: Array
     number: Array
+    angle: NDArray[np.float64]
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self.dtype = dtype
         self._store: dict[str, Array] = {name: np.empty((0, 2), dtype) for name in _ROWS}
         self._store |= {name: np.empty(0, dtype) for name in _COLUMNS}
-        self._store |= {name: np.empty(0, np.uint32) for name in _MARKS}
-        self._store |= {name: np.empty(0, np.int64) for name in _NUMBERS}
+        for names, kind in ((_MARKS, np.uint32), (("number",), np.int64), (("angle",), np.float64)):
+            self._store |= {name: np.empty(0, kind) for name in names}
         self._numbers = 0
         self.begun: list[int] = []
         self.version = 0
@@ -166,17 +165,18 @@ class Slots:
         spent: (n, 2) energy that impacts on walls, and friction there, have taken in this frame, J, negative: to be summed, for
             rows stay where they are when slots are reordered. Empty unless somebody keeps account.
 
+        taken: what the energy limiter has taken in this frame, J.
+
     Args:
         sleeps: whether particles may sleep.
     """
 
     def __init__(self, dtype: np.dtype[Any], *, sleeps: bool = False) -> None:
-        self.dtype = dtype
-        self._sleeps = sleeps
+        self.dtype, self._sleeps = dtype, sleeps
         self.real = lru_cache(64)(dtype.type)
         self.reals = lru_cache(64)(lambda *numbers: tuple(map(dtype.type, numbers)))
         self._kept: dict[str, Array] = {}
-        self.drop, self.lean, self.total_mass = 1.0, 0.0, 0.0
+        self.drop, self.lean, self.total_mass, self.taken = 1.0, 0.0, 0.0, 0.0
         self.given = 0
         self.claims = Claims()
         self._resize(0)
@@ -301,12 +301,12 @@ class Slots:
 
     def keep_account(self) -> None:
         """From now on walls are to note what they take."""
-        if len(self.spent) != len(self):
-            self.spent = np.zeros((len(self), 2))
+        self.spent = self.spent if len(self.spent) == len(self) else np.zeros((len(self), 2))
 
     def clear_notes(self) -> None:
         """Forget what walls and friction have noted in the last frame."""
         self.hits.fill(-1)
+        self.taken = 0.0
         if len(self.spent):
             self.spent.fill(0)
         if len(self.along):
@@ -327,10 +327,10 @@ class Slots:
         """Bring `size` up to date with `grown`."""
         self.size = self.radius if (self.grown >= 1).all() else self.radius * self.grown
 
-    def scatter(self, state: State) -> None:
-        """Copy what a frame changes back to the user's arrays."""
-        given = (state.position, state.velocity, state.acceleration, state.spin)
-        motion.put_motion(self.position, self.velocity, self.acceleration, self.spin, *given, self.particle)
+    def scatter(self, state: State, dt: float) -> None:
+        """Copy what a frame of dt seconds changes back to the user's arrays."""
+        given, moved = (state.position, state.velocity, state.acceleration, state.spin), (self.position, self.velocity)
+        motion.put_motion(*moved, self.acceleration, self.spin, *given, state.angle, 0.5 * dt, self.particle)
         self._given_back.remember(given)
         self._grows |= self.size is not self.radius  # some may have been found on top of others since the gathering
         if self._grows:

@@ -374,7 +374,7 @@ class Session:
         position = stage.place(self._between(positions))
         position.flags.writeable = velocity.flags.writeable = False
         self._status = self._read()
-        return Frame(self._seq, self._shape, stage.layout.view, self._status, position, velocity, stage.moving(), *stage.links())
+        return Frame(self._seq, self._shape, stage.layout.view, self._status, position, velocity, *stage.drawn())
 
     def _read(self) -> Status:
         return self._gauges.read(

@@ -127,6 +127,17 @@ class Stage:
             first += len(world)
         return np.concatenate(pairs), np.concatenate(force)
 
+    def turned(self) -> NDArray[np.uint8]:
+        """(n,) how far each circle has turned, in 1/256 of a turn; none as long as nobody has."""
+        angles = [world.angle for world in self.worlds]
+        if not any(angle.any() for angle in angles):
+            return np.empty(0, np.uint8)
+        return np.concatenate([np.rint(angle * (128 / np.pi)).astype(np.int64).astype(np.uint8) for angle in angles])
+
+    def drawn(self) -> tuple[Sketch, NDArray[np.uint32], NDArray[np.float32], NDArray[np.uint8]]:
+        """What a frame has beside circles: `moving`, `links`, and how they have `turned`."""
+        return self.moving(), *self.links(), self.turned()
+
     def pin(self, x: float, y: float, reach: float) -> None:
         """Pin the nearest circle, or let go of it."""
         self._pinned += self.hands.pin(x, y, reach, self.layout)

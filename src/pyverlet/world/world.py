@@ -14,9 +14,10 @@ from pyverlet.ground import checks
 from pyverlet.ground.constants import ALL_THREADS_FROM, ONE_THREAD_BELOW, REST_ACCELERATIONS, STANDARD_GRAVITY
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.kernels import motion
+from pyverlet.laws.coarse import Coarse
 from pyverlet.laws.contacts.collisions import Collisions, ContactSolver
 from pyverlet.laws.events import Events
-from pyverlet.laws.forces import Force, ForceSum
+from pyverlet.laws.forces import ForceList, ForceSum
 from pyverlet.laws.integrators import Integrator, PositionVerlet
 from pyverlet.laws.ledger import Bookkeeper
 from pyverlet.laws.limiter import Watch, undriven
@@ -24,6 +25,7 @@ from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.rooms import Boundary, Open
 from pyverlet.laws.sleep import Sleep, laws
+from pyverlet.laws.touches import Touches
 from pyverlet.state.state import Slots, State
 from pyverlet.world.actors import Actor
 from pyverlet.world.convenience import Doors
@@ -51,6 +53,7 @@ class World(Measures, Queries, Doors):
         substeps: steps of length h = dt / substeps in one call of `step`.
         dtype: float32 or float64, of all arrays.
         events: note in `events` which contacts begin and end in each frame, and who hit whom how hard.
+        contacts: note who touches what, where and how hard, in `contacts`, and for `force_on` and `pressure`.
         sleep: let circles at rest sleep until touched, at little cost; not with links, moving obstacles or forces but drag.
         ledger: keep account of where the energy goes, in `ledger`.
         threads: at most this many for the parallel stages; None is as many as pay off. Never changes the result.
@@ -71,17 +74,17 @@ class World(Measures, Queries, Doors):
         threads: int | None = None,
         ledger: bool = False,
         events: bool = False,
+        contacts: bool = False,
         sleep: bool = False,
     ) -> None:
         self._state = State(checks.floating("dtype", dtype))
         self._h_last: float | None = None  # substep of the frame before; None: the integrator starts anew
         self._slots = Slots(self._state.dtype, sleeps=sleep)
         self.links = Links(self._state)
-        self._events = Events() if events else None
+        self._events, self._touches = Events() if events else None, Touches() if contacts else None
         self._sleep = Sleep() if sleep else None
-        self.forces: list[Force] = []
-        self._force_sum = ForceSum(checks.vector("gravity", gravity), self.forces)
-        self.actors: list[Actor] = []
+        self.forces = ForceList()
+        self._force_sum, self.actors = ForceSum(checks.vector("gravity", gravity), self.forces), list[Actor]()
         self.obstacles = Obstacles()
         self._course = Course(self.obstacles)
         self.integrator = PositionVerlet() if integrator is None else integrator
@@ -89,11 +92,9 @@ class World(Measures, Queries, Doors):
         self.collisions = collisions
         self.substeps = substeps
         self.threads = threads
-        self.time = 0.0
-        self.frames = 0
-        self.profile = Profile()
-        self._books = Bookkeeper() if ledger else None
-        self._run = Substeps()
+        self.time, self.frames = 0.0, 0
+        self.profile, self._books = Profile(), Bookkeeper() if ledger else None
+        self._run, self._coarse = Substeps(), Coarse()
         self.onlooker: Callable[[Moment], None] | None = None
         """Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins."""
 
@@ -111,8 +112,8 @@ class World(Measures, Queries, Doors):
             actor.act(self, dt)
         jit.use_threads(self.threads)
         self.profile.begin()
-        books = self._books and self._open_books(h)
-        self._frame(h, books or self.profile.mark)
+        books = self._open_books(h)
+        self._frame(h, self._listen(h, books or self.profile.mark))
         self._refuse_non_finite(h)
         self._accept(dt, h, books)
         self.profile.end()
@@ -126,7 +127,7 @@ class World(Measures, Queries, Doors):
         compiled = contacts and not (links or course) and done == self.profile.mark
         if not self._open(h, done):
             return
-        watch = Watch(self._state, forces, self.links, self.boundary) if contacts and undriven(self, h, self._h_last) else None
+        watch = Watch(self._state, forces, self.links, self.boundary) if parts and undriven(self, h, self._h_last) else None
         substep = 0
         while substep < self.substeps:
             self._show(substep, h, lag)
@@ -212,12 +213,12 @@ class World(Measures, Queries, Doors):
             lag = self.integrator.velocity_lag * h
             contacts.end(self._slots, self._state, lag, self.substeps * h, self.gravity, marked=marked)
         self.integrator.end(self._slots, h)
-        if contacts and watch:
-            contacts.growth.heed(watch.close(self._slots, contacts.listed()))
+        if watch:
+            watch.close(self._slots, contacts)
 
     def _accept(self, dt: float, h: float, books: Any) -> None:
         """The frame has gone well: what it made of the state is the truth now."""
-        self._slots.scatter(self._state)
+        self._slots.scatter(self._state, dt)
         if books:
             books.close(self._spent())
         self._course.end(dt)
@@ -225,11 +226,10 @@ class World(Measures, Queries, Doors):
         if self._events:
             if self._contacts:
                 self._contacts.collect(self._slots)
-            self._events.close(self._slots, self._state)
+            self._events.close(self._slots, self._state, self._place())
         self.profile.mark("scatter")
-        self.time += dt
-        self.frames += 1
-        self._h_last = h
+        self.time, self.frames, self._h_last = self.time + dt, self.frames + 1, h
+        self._coarse.look(self, h)
 
     def _show(self, done: int, h: float, lag: float) -> None:
         if self.onlooker and done:

@@ -203,6 +203,7 @@ class Links:
         for pool in self._order:
             snapped = pool.snap(work, h)
             if len(snapped):
+                pool.snapped = True
                 self._broken = np.concatenate((self._broken, self._note(pool, snapped)))
         work.give(state, h)
 
@@ -215,6 +216,9 @@ class Links:
         """The frame is good: what it did to the links holds."""
         for pool in self._order:
             pool.end()
+            # What is left is packed anew, as by `restore`: chains are cut where links have broken.
+            pool.stale |= pool.snapped
+            pool.snapped = False
         self.broken = self._broken
         self._apart_stale |= bool(len(self.broken))
 
@@ -234,6 +238,14 @@ class Links:
         """Energy stored in links that give, J, of the world's state or of another of the same particles."""
         position = (self._state if state is None else state).position.astype(np.float64)
         return sum(pool.energy(position) for pool in self._order)
+
+    def stored(self, state: Slots) -> float:
+        """The same in the middle of a frame, J, where the particles are now, without those that have broken in it."""
+        if not any(pool.gives for pool in self._order):
+            return 0.0
+        with jit.one_thread(self._few):
+            position = self._work.where(state)
+            return sum(pool.stored(position) for pool in self._order if pool.gives)
 
     def segments(self) -> tuple[Array, Array]:
         """Links as lines, without the broken: ends (m, 2, 2) in m, and what each pulls with (m,) in N, negative if it pushes."""

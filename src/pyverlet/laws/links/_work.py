@@ -32,7 +32,8 @@ class Work:
         self.particle = particle
         self.compact = np.zeros(count, np.int64)
         self.compact[particle] = np.arange(len(particle))
-        self.start, self.earlier, self.position, self.predicted, self._velocity, self.pull = np.zeros((6, len(particle), 2))
+        self.start, self.earlier, self.position, self.predicted = np.zeros((4, len(particle), 2))
+        self._where, self._velocity, self.pull = np.zeros((3, len(particle), 2))
         self.weight = np.zeros(len(particle))
         self._slot = np.zeros(len(particle), np.int64)
         self._order: Array | None = None
@@ -61,6 +62,11 @@ class Work:
         """After the integrator and the contacts."""
         motion.take_rows(self.predicted, state.position, self.slots(state))
         self.position[:] = self.predicted
+
+    def where(self, state: Slots) -> Array:
+        """(m, 2) where they are now, m; good until asked again."""
+        motion.take_rows(self._where, state.position, self.slots(state))
+        return self._where
 
     def give(self, state: Slots, h: float) -> None:
         """Hand the result back."""

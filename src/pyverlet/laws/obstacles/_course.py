@@ -64,6 +64,22 @@ class Course:
             kernels.covered(self._segments, position.astype(np.float64), by)
         return by
 
+    def seen(self) -> list[Obstacle]:
+        """The obstacles of the last frame."""
+        return list(self._seen)
+
+    def surfaces(self) -> tuple[Array, ...]:
+        """For each segment as it stood last: number of its obstacle, start (k, 2), direction (k, 2), length, rounding; metres."""
+        s = self._segments
+        return (
+            s["body"].copy(), np.column_stack((s["bx"], s["by"])), np.column_stack((s["bc"], s["bs"])), s["length"].copy(),
+            s["rounding"].copy(),
+        )  # fmt: skip
+
+    def facing(self, position: Array) -> tuple[Array, Array]:
+        """(k, w) distance of centres (k, 2) from each of the w obstacles, m, and (k, w, 2) the unit normal out of each."""
+        return facing_of(position.astype(np.float64), self.surfaces(), len(self._seen))
+
     def before(self, state: Slots, h: float) -> None:
         """Before a substep: note where everybody comes from."""
         state.note_start()
@@ -174,3 +190,20 @@ def _lowered(obstacle: Obstacle) -> Array:
     if not closed:
         table["before_x"][0] = table["before_y"][0] = table["after_x"][-1] = table["after_y"][-1] = 0.0
     return table
+
+
+def facing_of(x: Array, surfaces: tuple[Array, ...], count: int) -> tuple[Array, Array]:
+    """(k, count) distance of points x (k, 2) from each obstacle, m, and (k, count, 2) the unit normal out of it."""
+    body, start, along, length, rounding = surfaces
+    gap, normal = np.full((len(x), count), np.inf), np.zeros((len(x), count, 2))
+    for k in range(count):
+        mine = body == k
+        way = x[:, None] - start[mine]
+        t = np.clip((way * along[mine]).sum(axis=2), 0, length[mine])
+        way = way - t[:, :, None] * along[mine]
+        far = np.hypot(way[..., 0], way[..., 1])
+        nearest = np.argmin(far - rounding[mine], axis=1)
+        row = np.arange(len(x))
+        gap[:, k] = (far - rounding[mine])[row, nearest]
+        normal[:, k] = way[row, nearest] / np.maximum(far[row, nearest], 1e-300)[:, None]
+    return gap, normal
