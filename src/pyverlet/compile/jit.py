@@ -242,11 +242,6 @@ def kernel(function: Function) -> Function:
     return _declared(Kernel(function))  # type: ignore[no-any-return]
 
 
-def inlined(function: Function) -> Function:
-    """What kernels call as if it were written there: nothing is handed over, which for many arrays takes longer than small loops."""
-    return numba.njit(nogil=True, error_model="numpy", inline="always")(function)  # type: ignore[no-any-return]
-
-
 def parallel_kernel(function: Callable[..., Any]) -> Kernel:
     """Compile on first call, its `prange` loops spread over threads if there are several: not at all for one.
 

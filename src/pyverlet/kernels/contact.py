@@ -7,6 +7,8 @@ walls: approach and slip of those that touch are set to 0, as far as friction go
 Pushes are added up in `moved`, how far each circle has come since the list was made; `arrive` puts them into the positions and, times
 a gain, into the velocities. So velocities in the first sweep are those of the motion, and an impact is what it would be alone.
 
+In the loops over threads nothing is written but by other kernels: Numba drops what is written there to arrays of a tuple.
+
 Two circles whose pair has neither restitution nor friction need no velocities in the first sweep, and are not asked whether they
 bounce. What a pair is made of is kept by lane; nothing here depends on what other pairs are made of.
 """
@@ -17,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyverlet.compile.jit import inlined, kernel, parallel_kernel, prange
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.compile.lanes import (
     LANES,
     add_lanes,
@@ -243,7 +245,7 @@ def _treat(bits, k, at, circles, pairs, law, spent):
     return done
 
 
-@inlined
+@kernel
 def push_strip(s, to, circles, pairs, law, looks):
     """The first sweep over strip s; normals go to `to` and up. If `looks`, notes in `deep` the packs that overlap by more than DEEP."""
     moved, lane_i, lane_j = circles.moved, pairs.lane_i, pairs.lane_j
@@ -319,7 +321,7 @@ def push_strip(s, to, circles, pairs, law, looks):
         pairs.deeps[s] = count
 
 
-@inlined
+@kernel
 def refine_strip(s, circles, pairs, law):
     """Part again, there and back, the packs in `deep` that still overlap by more than DEEP; `deeps` becomes how many those are.
 
@@ -353,7 +355,7 @@ def refine_strip(s, circles, pairs, law):
     pairs.deeps[s] = count
 
 
-@inlined
+@kernel
 def relax_strip(s, to, circles, pairs, law):
     """The second sweep over strip s: no approach, and no slip but what friction cannot hold, between circles that touch."""
     velocity, lane_i, lane_j = circles.velocity, pairs.lane_i, pairs.lane_j
@@ -416,7 +418,14 @@ def _distinct(lane_i, lane_j, k):
     return lanes
 
 
-@inlined
+@kernel
+def _clear(numbers, a, b):
+    """numbers[a:b] = 0."""
+    for i in range(a, b):
+        numbers[i] = 0
+
+
+@kernel
 def _arrive(a, b, circles, law):
     """Of the circles from a up to b: pushes become places, and velocities; who has been fed so much carries weight."""
     zero, one = law.h - law.h, law.h / law.h
@@ -441,7 +450,7 @@ def _arrive(a, b, circles, law):
             circles.spin[i] += law.feed * circles.turned[i]
 
 
-@inlined
+@kernel
 def _refine_some(first, stop, parity, circles, pairs, law):
     """The strips 2 half + parity, half from `first` up to `stop`."""
     for half in range(first, stop):
@@ -464,7 +473,7 @@ def push(circles, pairs, law, cut, looks, sets_out, claims):
             if sets_out != 0:
                 set_out(circles.position[a:b], circles.origin[a:b], circles.moved[a:b])
             if law.rubs != 0:
-                circles.turned[a:b] = 0
+                _clear(circles.turned, a, b)
     for parity in range(2):
         none_claimed(claims)
         for part in prange(claims.shape[0]):
@@ -512,7 +521,7 @@ def relax(circles, pairs, law, cut, marks, claims):
                 half = claim(claims, cut[parity], part)
 
 
-@inlined
+@kernel
 def mark_strip(begin, end, to, lane_i, lane_j, normal, resting):
     """`resting` gains IN_PILE for every circle of a touching pair in the lanes from `begin` up to `end`; their normals are at `to`."""
     zero = spread(normal.dtype.type(0))
