@@ -8,6 +8,7 @@ from pyverlet.ground import loading  # noqa: F401  (first: all that follows take
 
 # isort: split
 from pyverlet import scenes
+from pyverlet.data.trajectory import Trajectory, read_trajectory
 from pyverlet.ground import errors
 from pyverlet.ground.errors import InputError, NonFiniteError, PyverletError
 from pyverlet.laws import forces, integrators
@@ -47,9 +48,9 @@ __all__ = [
     "Clock", "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy", "Events", "ExplicitEuler", "Fast", "FrameBudget",
     "Gravitation", "Group", "InputError", "Integrator", "Ledger", "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel",
     "Panels", "Pin", "PointSpring", "Polygon", "PositionVerlet", "ProjectOnly", "PyverletError", "Rope", "Segment",
-    "SemiImplicitEuler", "Sink", "Spring", "Stick", "TimeCorrectedVerlet", "VelocityVerlet", "Wind", "World", "Yoshida4",
-    "bridge", "builders", "chain", "cloth", "errors", "force", "forces", "integrators", "net", "rope", "scenes", "soft_body",
-    "view", "warm_up", "widget",
+    "SemiImplicitEuler", "Sink", "Spring", "Stick", "TimeCorrectedVerlet", "Trajectory", "VelocityVerlet", "Wind", "World",
+    "Yoshida4", "bridge", "builders", "chain", "cloth", "errors", "force", "forces", "integrators", "net", "read_trajectory",
+    "rope", "scenes", "soft_body", "view", "warm_up", "widget",
 ]  # fmt: skip
 
 

@@ -86,6 +86,13 @@ Picture = Annotated[
     Path | None,
     typer.Option(help="What the circles form (scene image).", metavar="FILE", show_default=False),
 ]
+Trajectory = Annotated[
+    Path | None,
+    typer.Option(help="Keep the frames in a .gsd, .xyz or .vtkhdf file, without the page.", metavar="FILE", show_default=False),
+]
+Every = Annotated[
+    int | None, typer.Option(parser=whole, help="Frames from one in the trajectory to the next.", metavar="N", show_default="1")
+]
 Ledger = Annotated[
     bool, typer.Option("--ledger", help="Show on the page where the energy goes; reports always have it. Costs time.")
 ]
