@@ -12,55 +12,56 @@ from pyverlet.data.frames import Array, Frame, Reader, Walls, Writer
 if TYPE_CHECKING:
     from pyverlet.world.world import World
 
-# Frames keep float32 under the names of the format. What it has no name for, and the doubles of worlds in float64, go here.
+SCHEMA = (1, 4)
+"""Version of HOOMD's schema: https://gsd.readthedocs.io/en/stable/schema-hoomd.html"""
+
+# Frames keep float32 under the names of the format. What it has no name for, and the doubles of worlds in float64, are logged.
 _LOGGED = ("spin", "number")
-_DOUBLES = ("position", "velocity")
+_DOUBLES = ("position", "velocity", "radius", "mass")
 
 
 class GsdWriter(Writer):
-    """Chunks that are as in the first frame are not written again."""
+    """A frame is chunks by name. Those that are as in the first frame are not written again, as the format has it."""
 
     needs = "gsd"
 
     def __init__(self, path: Path) -> None:
-        import gsd.hoomd
+        import gsd.fl
 
-        self._hoomd: Any = gsd.hoomd
-        self._file: Any = gsd.hoomd.open(str(path), "w")
+        self._file: Any = gsd.fl.open(str(path), "w", application="pyverlet", schema="hoomd", schema_version=SCHEMA)
         self._first: dict[str, Array] = {}
         self._walls = Walls()
 
     def add(self, frame: Frame, world: World) -> None:
-        snap = self._hoomd.Frame()
-        box = self._walls.around(frame, world)
-        half = np.maximum(np.abs(box[:2]), np.abs(box[2:]))  # the format's box has its middle at the origin
-        snap.configuration.step = world.frames
-        snap.configuration.dimensions = 2
-        snap.configuration.box = [2 * half[0], 2 * half[1], 0, 0, 0, 0]
-        particles = snap.particles
-        particles.N = len(frame)
-        particles.types = ["circle"]
-        particles.position = _flat(frame.position)
-        particles.velocity = _flat(frame.velocity)
-        particles.diameter = (2 * frame.radius).astype(np.float32)
-        particles.mass = frame.mass.astype(np.float32)
+        # The format's box has its middle at the origin.
+        x0, y0, x1, y1 = self._walls.around(frame, world)
         joined = world.links.pulls()[0]
-        snap.bonds.N = len(joined)
-        if len(joined):
-            snap.bonds.types = ["link"]
-            snap.bonds.group = joined.astype(np.uint32)
-        logged = {f"particles/{name}": getattr(frame, name) for name in _LOGGED}
+        chunks: dict[str, Any] = {
+            "configuration/step": np.array([world.frames], np.uint64),
+            "configuration/dimensions": np.array([2], np.uint8),
+            "configuration/box": np.array([2 * max(abs(x0), abs(x1)), 2 * max(abs(y0), abs(y1)), 0, 0, 0, 0], np.float32),
+            "particles/N": np.array([len(frame)], np.uint32),
+            "particles/types": _names("circle"),
+            "particles/position": _flat(frame.position),
+            "particles/velocity": _flat(frame.velocity),
+            "particles/diameter": (2 * frame.radius).astype(np.float32),
+            "particles/mass": frame.mass.astype(np.float32, copy=False),
+            "bonds/N": np.array([len(joined)], np.uint32),
+            "bonds/types": _names("link"),
+            "bonds/group": joined.astype(np.uint32),
+            "log/time": np.array([frame.time]),
+        }
+        chunks |= {f"log/particles/{name}": getattr(frame, name) for name in _LOGGED}
         if frame.position.dtype == np.float64:
-            logged |= {f"particles/{name}": getattr(frame, name) for name in (*_DOUBLES, "radius", "mass")}
+            chunks |= {f"log/particles/{name}": getattr(frame, name) for name in _DOUBLES}
         if not self._first:
-            self._first = {name: np.array(values) for name, values in logged.items()}
-        snap.log = {name: values for name, values in logged.items() if not len(self._file) or self._news(name, values)}
-        snap.log |= {"time": np.array([frame.time]), "state_hash": frame.state_hash}
-        self._file.append(snap)
+            self._first = {name: np.array(values) for name, values in chunks.items()}
+        for name, values in chunks.items():
+            if len(values) and (not self._file.nframes or not np.array_equal(self._first[name], values)):
+                self._file.write_chunk(name, values)
+        self._file.write_chunk("log/state_hash", frame.state_hash)
+        self._file.end_frame()
         self._file.flush()
-
-    def _news(self, name: str, values: Array) -> bool:
-        return not np.array_equal(self._first[name], values)
 
     def close(self) -> None:
         self._file.close()
@@ -99,6 +100,12 @@ class GsdReader(Reader):
 
     def close(self) -> None:
         self._file.close()
+
+
+def _names(*names: str) -> Array:
+    """Names of types as rows of characters."""
+    rows = np.array(names, dtype=f"S{max(map(len, names)) + 1}")
+    return rows.view(np.int8).reshape(len(names), -1)
 
 
 def _flat(rows: Array) -> Array:
