@@ -81,7 +81,7 @@ Frames = Annotated[
     int | None, typer.Option(parser=whole, help="Frames to run, in place of --seconds.", metavar="N", show_default=False)
 ]
 Look = Annotated[ThemeName, typer.Option("--theme", help="Behind the circles.")]
-Size = Annotated[str, typer.Option(help="Width and height in pixels.", metavar="WxH")]
+Size = Annotated[str | None, typer.Option(help="Width and height in pixels.", metavar="WxH", show_default="1280x720")]
 Picture = Annotated[
     Path | None,
     typer.Option(help="What the circles form (scene image).", metavar="FILE", show_default=False),
