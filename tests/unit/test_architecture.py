@@ -22,6 +22,7 @@ LAYERS = (
     "laws",
     "world",
     "scenes",
+    "data",
     "lab",
     "picture",
     "viewers",
