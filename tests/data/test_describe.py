@@ -50,7 +50,7 @@ def test_an_obstacle_that_has_turned_keeps_every_bit() -> None:
     world.obstacles.append(wheel)
     for _ in range(10):
         world.step(1 / 60)
-    again = Builder().build("wheel", describe(wheel), pv.Obstacle)  # type: ignore[type-abstract]
+    again = Builder().build("wheel", describe(wheel), pv.Obstacle)
     assert again.points.tobytes() == wheel.points.tobytes()
     assert np.array_equal(again._local, wheel._local)
 
@@ -88,12 +88,12 @@ def test_own_classes_are_handed_in_with_what_they_remember() -> None:
     storm, other = Storm(), Storm()
     storm.gusts = None
     assert Builder([other, storm]).build("actor", describe(other), Storm) is other
-    again = Builder([storm]).build("actor", described, pv.Actor)  # type: ignore[type-abstract]
+    again = Builder([storm]).build("actor", described, pv.Actor)
     assert again is storm
     assert storm.gusts[:2] == (1, [2.0, float("inf")])
     assert list(storm.gusts[2]["a"]) == [0, 1, 2]
     with pytest.raises(pv.InputError, match=r"Storm.*objects"):
-        Builder().build("actor", described, pv.Actor)  # type: ignore[type-abstract]
+        Builder().build("actor", described, pv.Actor)
 
 
 def test_what_cannot_be_kept_is_named() -> None:
@@ -119,4 +119,4 @@ def test_what_cannot_be_kept_is_named() -> None:
 )
 def test_wrong_descriptions_get_a_sentence(wrong: Any, said: str) -> None:
     with pytest.raises(pv.InputError, match=said):
-        Builder().build("room", wrong, pv.Boundary)  # type: ignore[type-abstract]
+        Builder().build("room", wrong, pv.Boundary)

@@ -12,7 +12,7 @@ import difflib
 import inspect
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 from pyverlet.data import memory
 from pyverlet.ground import checks
@@ -25,7 +25,6 @@ from pyverlet.world.actors import Actor, Emitter, Sink
 from pyverlet.world.world import World
 
 Description = dict[str, Any]
-Thing = TypeVar("Thing")
 
 TYPE, OBJECT, STATE = "type", "object", "state"
 """Keys of a description that are no arguments."""
@@ -246,9 +245,9 @@ class Builder:
 
     def __init__(self, objects: Iterable[Any] = (), world: World | None = None) -> None:
         self._objects = list(objects)
-        self._world = world
+        self.world = world
 
-    def build(self, name: str, description: Any, wanted: type[Thing] | tuple[type[Thing], ...]) -> Thing:
+    def build(self, name: str, description: Any, wanted: Any) -> Any:
         """The object described; `name`: what errors call it, `wanted`: what it may be.
 
         Raises:
@@ -260,7 +259,7 @@ class Builder:
         if not isinstance(thing, wanted):
             known = [kind for kind, known in KINDS.items() if issubclass(known.cls, wanted)]
             raise InputError(f"{name} is {type(thing).__name__}; allowed are {', '.join(known)}")
-        return thing  # type: ignore[no-any-return]
+        return thing
 
     def _made(self, name: str, description: Mapping[str, Any]) -> Any:
         kind = _known(name, description.get(TYPE))
@@ -285,10 +284,10 @@ class Builder:
     def _group(self, name: str, value: Any) -> Group:
         if isinstance(value, Group):
             return value
-        if self._world is None:
+        if self.world is None:
             raise InputError(f"{name} is {_brief(value)}; allowed is none where there is no world")
         first, count = checks.whole("first", value["first"], least=0), checks.whole("count", value["count"], least=0)
-        return Group.of(self._world._state, first, count, self._world.remove)
+        return Group.of(self.world._state, first, count, self.world.remove)
 
     def _taken(self, name: str, description: Mapping[str, Any]) -> Any:
         wanted = description[OBJECT]
@@ -338,6 +337,6 @@ def _brief(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def build(name: str, description: Any, wanted: type[Thing], *, objects: Iterable[Any] = ()) -> Thing:
+def build(name: str, description: Any, wanted: Any, *, objects: Iterable[Any] = ()) -> Any:
     """As `Builder.build`, for a thing that names no group."""
     return Builder(objects).build(name, description, wanted)
