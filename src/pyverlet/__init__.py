@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 from pyverlet.ground import loading  # noqa: F401  (first: all that follows takes a second)
@@ -48,9 +50,15 @@ __all__ = [
     "Clock", "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy", "Events", "ExplicitEuler", "Fast", "FrameBudget",
     "Gravitation", "Group", "InputError", "Integrator", "Ledger", "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel",
     "Panels", "Pin", "PointSpring", "Polygon", "PositionVerlet", "ProjectOnly", "PyverletError", "Rope", "Segment",
+<<<<<<< HEAD
     "SemiImplicitEuler", "Sink", "Spring", "Stick", "TimeCorrectedVerlet", "Trajectory", "VelocityVerlet", "Wind", "World",
     "Yoshida4", "bridge", "builders", "chain", "cloth", "errors", "force", "forces", "integrators", "net", "read_trajectory",
     "rope", "scenes", "soft_body", "view", "warm_up", "widget",
+=======
+    "SemiImplicitEuler", "Sink", "Spring", "Stick", "TimeCorrectedVerlet", "VelocityVerlet", "Wind", "World", "Yoshida4",
+    "bridge", "builders", "chain", "cloth", "errors", "force", "forces", "integrators", "load", "net", "rope", "save", "scenes",
+    "soft_body", "view", "warm_up", "widget",
+>>>>>>> data1
 ]  # fmt: skip
 
 
@@ -59,6 +67,20 @@ def view(world: World | Panels, **options: Any) -> None:
     from pyverlet.viewers import view as view_page
 
     view_page(world, **options)
+
+
+def save(world: World, path: str | Path, **options: Any) -> None:
+    """Write a world to a file, to go on from with the same bits; see `pyverlet.data.snapshot.save` for the options."""
+    from pyverlet.data.snapshot import save as write
+
+    write(world, path, **options)
+
+
+def load(path: str | Path, exact: bool = False, objects: Iterable[Any] = ()) -> World:
+    """The world that `save` wrote; see `pyverlet.data.snapshot.load` for the options."""
+    from pyverlet.data.snapshot import load as read
+
+    return read(path, exact=exact, objects=objects)
 
 
 def widget(world: World | Panels, **options: Any) -> Any:
