@@ -50,15 +50,9 @@ __all__ = [
     "Clock", "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy", "Events", "ExplicitEuler", "Fast", "FrameBudget",
     "Gravitation", "Group", "InputError", "Integrator", "Ledger", "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel",
     "Panels", "Pin", "PointSpring", "Polygon", "PositionVerlet", "ProjectOnly", "PyverletError", "Rope", "Segment",
-<<<<<<< HEAD
     "SemiImplicitEuler", "Sink", "Spring", "Stick", "TimeCorrectedVerlet", "Trajectory", "VelocityVerlet", "Wind", "World",
-    "Yoshida4", "bridge", "builders", "chain", "cloth", "errors", "force", "forces", "integrators", "net", "read_trajectory",
-    "rope", "scenes", "soft_body", "view", "warm_up", "widget",
-=======
-    "SemiImplicitEuler", "Sink", "Spring", "Stick", "TimeCorrectedVerlet", "VelocityVerlet", "Wind", "World", "Yoshida4",
-    "bridge", "builders", "chain", "cloth", "errors", "force", "forces", "integrators", "load", "net", "rope", "save", "scenes",
-    "soft_body", "view", "warm_up", "widget",
->>>>>>> data1
+    "Yoshida4", "bridge", "builders", "chain", "cloth", "errors", "force", "forces", "integrators", "load", "net", "read_trajectory",
+    "rope", "save", "scenes", "soft_body", "view", "warm_up", "widget",
 ]  # fmt: skip
 
 
