@@ -9,7 +9,7 @@ from typing import Any
 from pyverlet.cli import _print as out
 from pyverlet.ground.progress import Progress
 from pyverlet.laws.integrators import Integrator
-from pyverlet.scenes import Scene, Settings
+from pyverlet.scenes import SCENES, Scene, Settings
 
 
 def page(
@@ -19,6 +19,7 @@ def page(
     from pyverlet.viewers import serve
     from pyverlet.viewers.exhibit import Exhibit, Repertoire
 
+    SCENES.setdefault(scene.name, scene)  # one from a file may be picked on the page like the others
     repertoire = Repertoire(scene, dt=dt, integrators=integrators, overrides=overrides)
 
     def build() -> Exhibit:

@@ -132,6 +132,7 @@ class Scene:
         show: how it asks to be shown.
         variants: the worlds it shows side by side; empty for one world.
         line: height in metres of a line drawn across the scene.
+        document: what the file says that the scene was read from; None for scenes with a name.
     """
 
     name: str
@@ -142,6 +143,7 @@ class Scene:
     show: Show = Show()
     variants: tuple[Variant, ...] = ()
     line: float | None = None
+    document: dict[str, Any] | None = None
 
     @property
     def description(self) -> str:
@@ -190,3 +192,32 @@ class Scene:
             settings = self.settings(**{**overrides, **variant.changes})
             panels.append(Panel(variant.name, (variant.build or self.build)(settings), variant.pace))
         return Panels(panels, line=self.line)
+
+    def write(self, path: str | Path) -> None:
+        """Write the scene to a file, .toml or .json, from which `pyverlet.scenes.read` reads the same.
+
+        A scene with a name is written as that and its settings, one from a file as it was read; `freeze` writes numbers in place
+        of what they are drawn by.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        from pyverlet.data import scene_file
+
+        scene_file.write(self, path)
+
+    def freeze(self, path: str | Path, **overrides: Any) -> None:
+        """Write the start of the scene's world to a file, .toml or .json, with its arrays in a .npz beside it.
+
+        Whoever reads it gets the same start, to the last bit, whatever a later version would draw by chance.
+
+        Args:
+            path: of the file; old ones are replaced.
+            overrides: as for `settings`.
+
+        Raises:
+            InputError: the files cannot be written, or there are objects of classes of your own in the world.
+        """
+        from pyverlet.data import scene_file
+
+        scene_file.write_frozen(self, path, self.settings(**overrides))
