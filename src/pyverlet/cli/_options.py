@@ -46,7 +46,9 @@ def real(text: str) -> float:
         raise typer.BadParameter(f"{text!r} is not a number") from None
 
 
-SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="Name of a scene, see `pyverlet list`, or a file, .toml or .json.")]
+SceneName = Annotated[
+    str, typer.Argument(metavar="SCENE", help="Name of a scene, see `pyverlet list`, or a file, .toml or .json.")
+]
 Particles = Annotated[int | None, typer.Option(parser=whole, help="Number of circles.", metavar="N", show_default=False)]
 Substeps = Annotated[int | None, typer.Option(parser=whole, help="Substeps a frame.", metavar="N", show_default=False)]
 IntegratorName = Annotated[

@@ -1,4 +1,4 @@
-"""From a scene's document to its world, with settings in place of what it says, and from a world to a document that holds arrays."""
+"""From a scene's document to its world, with settings in place of what it says, and from a world to a document with arrays."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ class Recipe:
         """The other way round."""
         if settings.picture is not None:
             raise InputError(f"picture is '{settings.picture}'; allowed in a scene file is none")
-        return memory.plain(
+        found: Table = memory.plain(
             {
                 "particles": settings.particles,
                 "substeps": settings.substeps,
@@ -124,7 +124,8 @@ class Recipe:
                 "gravity": list(settings.gravity),
                 "ledger": settings.ledger,
             }
-        )  # type: ignore[no-any-return]
+        )
+        return found
 
     def _fills(self, document: Table) -> list[Table]:
         return [group for group in document.get("groups", []) if group["type"] == "fill"]
@@ -295,7 +296,9 @@ def _fill(table: Table) -> tuple[Any, Any]:
     else:
         centres, corner = _start.in_circle(rng, radii, region.radius), np.array(region.center)
     if centres is None:
-        raise InputError(f"count is {table['count']}, and so many circles do not fit into the region; allowed are fewer, or smaller")
+        raise InputError(
+            f"count is {table['count']}, and so many circles do not fit into the region; allowed are fewer, or smaller"
+        )
     return centres + corner, radii
 
 
@@ -311,7 +314,9 @@ def _named(named: dict[str, Group], key: str, name: str) -> Group:
     if name not in named:
         near = difflib.get_close_matches(name, named, n=1)
         hint = f" (did you mean {near[0]!r}?)" if near else ""
-        raise InputError(f"{key} is {name!r}{hint}; allowed are the groups and builders with a name: {', '.join(named) or 'none'}")
+        raise InputError(
+            f"{key} is {name!r}{hint}; allowed are the groups and builders with a name: {', '.join(named) or 'none'}"
+        )
     return named[name]
 
 
@@ -324,7 +329,8 @@ def freeze(world: World, path: Path) -> Table:
     Raises:
         InputError: there are objects of a user's own class in it, which no file can hold.
     """
-    arrays, groups, number = {}, [], world.group_number
+    arrays: dict[str, Any] = {}
+    groups, number = [], world.group_number
     beside = path.with_suffix(".npz")
     for k in np.unique(number):
         name = f"group{k}"
@@ -351,7 +357,9 @@ def freeze(world: World, path: Path) -> Table:
     for key, value in tables.items():
         for table in value if isinstance(value, list) else [value]:
             if isinstance(table, dict) and OBJECT in table:
-                raise InputError(f"{key} has an object of a class of your own, {table[OBJECT]!r}; allowed in a file are pyverlet's")
+                raise InputError(
+                    f"{key} has an object of a class of your own, {table[OBJECT]!r}; allowed in a file are pyverlet's"
+                )
     content = io.BytesIO()
     np.savez(content, **arrays)
     for group in groups:
@@ -372,7 +380,10 @@ def _grouped(force: Table, world: World) -> Table:
 
 def _columns(world: World, table: Table) -> Table:
     """The lists of a frozen link as arrays again."""
-    state = {key: np.array(value, np.uint8 if key == "intact" else float) for key, value in memory.unpack(table.get("state", {})).items()}
+    state = {
+        key: np.array(value, np.uint8 if key == "intact" else float)
+        for key, value in memory.unpack(table.get("state", {})).items()
+    }
     found = {key: np.array(value, float) if isinstance(value, list) else value for key, value in memory.unpack(table).items()}
     particles = np.array(table.get("particles"), np.int64)
     return found | {"particles": particles, "state": state}

@@ -66,9 +66,13 @@ def _scene(document: dict[str, Any], path: Path) -> Scene:
             document=document,
         )
     if "settings" in document:
-        raise InputError(f"'{path}' has settings and names no scene; allowed is `scene`, or what the settings say under its own key")
+        raise InputError(
+            f"'{path}' has settings and names no scene; allowed is `scene`, or what the settings say under its own key"
+        )
     recipe = Recipe(document, path)
-    return Scene(name, document.get("summary") or f"from {path.name}", recipe.build, recipe.defaults, show=show, document=document)
+    return Scene(
+        name, document.get("summary") or f"from {path.name}", recipe.build, recipe.defaults, show=show, document=document
+    )
 
 
 def write(scene: Scene, path: str | Path) -> None:
@@ -100,7 +104,7 @@ def save(document: dict[str, Any], path: Path) -> None:
 def schema() -> dict[str, Any]:
     """The JSON Schema of scene files, for editors."""
     found: dict[str, Any] = _models().Document.model_json_schema()
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "pyverlet scene"} | found
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | found | {"title": "pyverlet scene"}
 
 
 # ---- reading -----------------------------------------------------------------------------------------------------------

@@ -13,11 +13,12 @@ from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from pyverlet.data.describe import KINDS, SURFACE
 from pyverlet.ground.constants import STANDARD_GRAVITY
+from pyverlet.laws import naive, rooms
+from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.forces import Force
 from pyverlet.laws.integrators import Integrator
 from pyverlet.laws.links import Angle, Area, Pin, Rope, Spring, Stick
 from pyverlet.laws.obstacles import Obstacle
-from pyverlet.laws.rooms import Boundary
 from pyverlet.scenes import Settings
 from pyverlet.state.state import EVERYONE
 from pyverlet.world import builders
@@ -40,7 +41,8 @@ MODELS: dict[str, type[BaseModel]] = {}
 
 
 def _named(name: str, fields: dict[str, Any], doc: str | None) -> type[BaseModel]:
-    MODELS[name] = create_model(name, __base__=Part, __doc__=doc, type=(Literal[name], ...), **fields)
+    tag: Any = Literal[name]
+    MODELS[name] = create_model(name, __base__=Part, __doc__=doc, type=(tag, ...), **fields)
     return MODELS[name]
 
 
@@ -114,16 +116,16 @@ def _models(base: type | tuple[type, ...]) -> list[type[BaseModel]]:
     return found
 
 
-_walls = [model for model in _models(tuple(KINDS[name].cls for name in ("Box", "Circle")))]
-_ANNOTATED["Box | Circle"] = _one_of(_walls)
-Room = _one_of([*_walls, *(_models(tuple(KINDS[name].cls for name in ("Open", "ClampAndFlip", "ProjectOnly"))))])
+_walls = _models((rooms.Box, rooms.Circle))
+Walls: Any = _one_of(_walls)
+_ANNOTATED["Box | Circle"] = Walls
+Room: Any = _one_of([*_walls, *_models((rooms.Open, naive.ClampAndFlip, naive.ProjectOnly))])
 _ANNOTATED["Boundary"] = Room
-Method = _one_of(_models((KINDS["Fast"].cls, KINDS["BruteForce"].cls)))
-Method_ = _one_of(_models(Integrator))
-Forces = _one_of(_models(Force))
-Obstacles = _one_of(_models(Obstacle))
-Actors = _one_of(_models(Actor))
-assert issubclass(KINDS["Open"].cls, Boundary)
+Method: Any = _one_of(_models((Fast, BruteForce)))
+Integrators: Any = _one_of(_models(Integrator))
+Forces: Any = _one_of(_models(Force))
+Obstacles: Any = _one_of(_models(Obstacle))
+Actors: Any = _one_of(_models(Actor))
 
 
 class Collisions(Part):
@@ -132,7 +134,7 @@ class Collisions(Part):
     type: Literal["Collisions"] = "Collisions"
     restitution: Annotated[float, Field(ge=0, le=1)] = 0.0
     friction: Annotated[float, Field(ge=0)] = 0.0
-    method: Method = Field(default_factory=lambda: MODELS["Fast"](type="Fast"))  # type: ignore[valid-type]
+    method: Method = Field(default_factory=lambda: MODELS["Fast"](type="Fast"))
 
 
 # ---- groups ------------------------------------------------------------------------------------------------------------
@@ -157,7 +159,7 @@ class Fill(Group):
     """Circles spread evenly over a region, a little shaken, none on top of another."""
 
     type: Literal["fill"]
-    region: _ANNOTATED["Box | Circle"]  # type: ignore[valid-type]  # noqa: F821
+    region: Walls
     count: Annotated[int, Field(ge=1)]
     radius: Annotated[float, Field(gt=0)] = 0.5
     """m, root mean square."""
@@ -196,16 +198,16 @@ class Arrays(Part):
 
 
 MODELS |= {"fill": Fill, "lattice": Lattice, "circles": Circles, "arrays": Arrays}
-Groups = _one_of([Fill, Lattice, Circles, Arrays])
+Groups: Any = _one_of([Fill, Lattice, Circles, Arrays])
 
 
 # ---- builders and links ------------------------------------------------------------------------------------------------
 
-BUILDERS: dict[str, Any] = {
-    name: getattr(builders, name) for name in ("chain", "rope", "net", "cloth", "bridge", "soft_body")
-}
-_built = {"name": (str | None, None), "pinned": (list[int], [])}
-Builders = _one_of([_named(name, _fields(build, skip=("world",)) | _built, inspect.getdoc(build)) for name, build in BUILDERS.items()])
+BUILDERS: dict[str, Any] = {name: getattr(builders, name) for name in ("chain", "rope", "net", "cloth", "bridge", "soft_body")}
+_built: dict[str, Any] = {"name": (str | None, None), "pinned": (list[int], [])}
+Builders: Any = _one_of(
+    [_named(name, _fields(build, skip=("world",)) | _built, inspect.getdoc(build)) for name, build in BUILDERS.items()]
+)
 
 LINKS: dict[str, Any] = {cls.__name__: cls for cls in (Stick, Rope, Spring, Pin, Angle, Area)}
 End = tuple[str, int | list[int]]
@@ -213,7 +215,7 @@ End = tuple[str, int | list[int]]
 
 _ends = {"ends": (list[End], ...)}
 _ring = {"group": (str, ...), "ring": (list[int] | None, None)}
-Links = _one_of(
+Links: Any = _one_of(
     [
         _named(name, (_ring if cls is Area else _ends) | _fields(cls, skip=("group", "ring")), inspect.getdoc(cls))
         for name, cls in LINKS.items()
@@ -228,7 +230,7 @@ class World(Part):
     """The laws and how they are computed; see `pyverlet.World`."""
 
     gravity: Vector = STANDARD_GRAVITY
-    integrator: Method_ | None = None  # type: ignore[valid-type]
+    integrator: Integrators | None = None
     substeps: Annotated[int, Field(ge=1)] = 8
     dtype: Literal["float32", "float64"] = "float32"
     ledger: bool = False
@@ -254,13 +256,13 @@ class SceneSettings(Part):
 
     particles: Annotated[int, Field(ge=1)] | None = None
     substeps: Annotated[int, Field(ge=1)] | None = None
-    integrator: Method_ | None = None  # type: ignore[valid-type]
+    integrator: Integrators | None = None
     restitution: Annotated[float, Field(ge=0, le=1)] | None = None
     friction: Annotated[float, Field(ge=0)] | None = None
     radius_spread: Annotated[float, Field(ge=1)] | None = None
     seed: Annotated[int, Field(ge=0)] | None = None
     dtype: Literal["float32", "float64"] | None = None
-    collisions: Method | Literal[False] | None = None  # type: ignore[valid-type]
+    collisions: Method | Literal[False] | None = None
     gravity: Vector | None = None
     ledger: bool | None = None
 
@@ -278,17 +280,17 @@ class Document(Part):
     """Of `pyverlet list`; then only `settings`, `run` and `view` may follow."""
     settings: SceneSettings | None = None
     world: World = Field(default_factory=World)
-    room: Room | None = None  # type: ignore[valid-type]
+    room: Room | None = None
     """Open unless said."""
     collisions: Collisions | Literal[False] = Field(default_factory=Collisions)
-    groups: list[Groups] = []  # type: ignore[valid-type]
-    builders: list[Builders] = []  # type: ignore[valid-type]
-    links: list[Links] = []  # type: ignore[valid-type]
+    groups: list[Groups] = []
+    builders: list[Builders] = []
+    links: list[Links] = []
     joined: list[dict[str, Any]] = []
     """Links of a frozen scene, as pyverlet describes them; not to be written by hand."""
-    forces: list[Forces] = []  # type: ignore[valid-type]
-    obstacles: list[Obstacles] = []  # type: ignore[valid-type]
-    actors: list[Actors] = []  # type: ignore[valid-type]
+    forces: list[Forces] = []
+    obstacles: list[Obstacles] = []
+    actors: list[Actors] = []
     run: Run | None = None
     view: View | None = None
     start_hash: str | None = None
