@@ -111,7 +111,7 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Array]]:
     """
     try:
         with path.open("rb") as file:
-            return _read(file)
+            return read_from(file, os.fstat(file.fileno()).st_size)
     except FileNotFoundError:
         raise InputError(f"'{path}' is not there; allowed is a file that pyverlet wrote") from None
     except (IsADirectoryError, PermissionError) as error:
@@ -120,8 +120,8 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Array]]:
         raise InputError(f"'{path}' is no sound file of pyverlet's ({_brief(error)}); allowed is one as it was written") from None
 
 
-def _read(file: BinaryIO) -> tuple[dict[str, Any], dict[str, Array]]:
-    size = os.fstat(file.fileno()).st_size
+def read_from(file: BinaryIO, size: int) -> tuple[dict[str, Any], dict[str, Array]]:
+    """As `read`, from an open file of so many bytes that is known to be sound."""
     with zipfile.ZipFile(file) as archive:
         members = archive.infolist()
         names = {info.filename for info in members}

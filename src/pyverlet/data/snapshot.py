@@ -72,7 +72,7 @@ def save(world: World, path: str | Path, *, scene: Mapping[str, Any] | None = No
 
 
 def to_table(world: World, scene: Mapping[str, Any] | None = None) -> tuple[Header, dict[str, Array]]:
-    """What a file of the world holds: a table as JSON has it, still without the state's hash, and arrays."""
+    """What a file of the world holds: a table as JSON has it, without the state's hash, and arrays."""
     moving = apart.take_apart(world)
     arrays = dict(moving.arrays)
 
@@ -177,7 +177,7 @@ def from_table(header: Header, arrays: dict[str, Array], *, exact: bool = False,
     with ThreadPoolExecutor(1) as beside:
         hashed = beside.submit(_hash, header, arrays)
         world = _world(settings, moving, list(objects))
-    if header["state_hash"] != hashed.result():
+    if header.get("state_hash", hashed.result()) != hashed.result():
         raise InputError(f"the state's hash is {hashed.result()}; allowed is {header['state_hash']}, as when it was written")
     if not ours:
         warnings.warn(
