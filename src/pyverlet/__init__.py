@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pyverlet.ground import loading  # noqa: F401  (first: all that follows takes a second)
 
 # isort: split
 from pyverlet import scenes
-from pyverlet.data.trajectory import Trajectory, read_trajectory
 from pyverlet.ground import errors
 from pyverlet.ground.errors import InputError, NonFiniteError, PyverletError
 from pyverlet.laws import forces, integrators
@@ -43,17 +43,38 @@ from pyverlet.world.panels import Panel, Panels
 from pyverlet.world.warmup import warm_up
 from pyverlet.world.world import World
 
+if TYPE_CHECKING:
+    from pyverlet.data.sweep import sweep
+    from pyverlet.data.trajectory import Trajectory, read_trajectory
+    from pyverlet.data.worlds import Worlds
+
 __version__ = "0.1.0"
 
+_LATER = {
+    "Trajectory": "pyverlet.data.trajectory",
+    "Worlds": "pyverlet.data.worlds",
+    "read_trajectory": "pyverlet.data.trajectory",
+    "sweep": "pyverlet.data.sweep",
+}
+
 __all__ = [
-    "RK4", "Actor", "Angle", "Area", "Attractor", "Boundary", "Box", "BruteForce", "Capsule", "Chain", "Circle", "ClampAndFlip",
-    "Clock", "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy", "Events", "ExplicitEuler", "Fast", "FrameBudget",
-    "Gravitation", "Group", "InputError", "Integrator", "Ledger", "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel",
-    "Panels", "Pin", "PointSpring", "Polygon", "PositionVerlet", "ProjectOnly", "PyverletError", "Rope", "Segment",
-    "SemiImplicitEuler", "Sink", "Spring", "Stick", "TimeCorrectedVerlet", "Trajectory", "VelocityVerlet", "Wind", "World",
-    "Yoshida4", "bridge", "builders", "chain", "cloth", "errors", "force", "forces", "integrators", "load", "net", "read_trajectory",
-    "rope", "save", "scenes", "soft_body", "view", "warm_up", "widget",
+    "RK4", "Actor", "Angle", "Area", "Attractor", "Boundary", "Box", "BruteForce", "Capsule", "Chain", "Circle",
+    "ClampAndFlip", "Clock", "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy", "Events", "ExplicitEuler",
+    "Fast", "FrameBudget", "Gravitation", "Group", "InputError", "Integrator", "Ledger", "NonFiniteError", "Obstacle", "Open",
+    "Overlap", "Panel", "Panels", "Pin", "PointSpring", "Polygon", "PositionVerlet", "ProjectOnly", "PyverletError", "Rope",
+    "Segment", "SemiImplicitEuler", "Sink", "Spring", "Stick", "TimeCorrectedVerlet", "Trajectory", "VelocityVerlet", "Wind",
+    "World", "Worlds", "Yoshida4", "bridge", "builders", "chain", "cloth", "errors", "force", "forces", "integrators", "load",
+    "net", "read_trajectory", "rope", "save", "scenes", "soft_body", "sweep", "view", "warm_up", "widget",
 ]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    # Classes that few programs need, loaded when they are first named.
+    if name in _LATER:
+        value = getattr(import_module(_LATER[name]), name)
+        globals()[name] = value
+        return value
+    raise AttributeError(f"module 'pyverlet' has no attribute {name!r}")
 
 
 def view(world: World | Panels, **options: Any) -> None:

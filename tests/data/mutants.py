@@ -1,4 +1,4 @@
-"""Loads mutated snapshots, in a process of its own, for one that gets through might end it: `python mutants.py SEED COUNT FOLDER`.
+"""Loads mutated snapshots, in a process of its own, for one that gets through might end it: `mutants.py SEED COUNT FOLDER`.
 
 Prints what became of them as JSON. A mutant is refused with InputError, or loads and takes two frames.
 """
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 import pyverlet as pv
-from pyverlet.data import archive
+from pyverlet.data import archive, snapshot
 
 
 def subjects() -> list[tuple[dict[str, Any], dict[str, Any], bytes]]:
@@ -107,13 +107,13 @@ def mutant(rng: np.random.Generator, table: dict[str, Any], arrays: dict[str, An
     for _ in range(rng.integers(1, 3)):
         mutate_table(rng, table) if kind <= 3 else mutate_arrays(rng, arrays)
     out = io.BytesIO()
-    archive.write(out, table, {name: np.atleast_1d(array) for name, array in arrays.items()})
+    archive.write(out, lambda: table, {name: np.atleast_1d(array) for name, array in arrays.items()})
     return out.getvalue()
 
 
 def main(seed: int, count: int) -> None:
     warnings.simplefilter("ignore")
-    pv.World.state_hash = lambda world: "0"  # type: ignore[method-assign]  # no lock: whoever forges a file forges it, too
+    vars(snapshot)["hash_of"] = lambda time, arrays: "0"  # no lock: whoever forges a file forges it, too
     rng, became, worlds = np.random.default_rng(seed), collections.Counter[str](), subjects()
     path = FOLDER / "mutant.pvsnap"
     for number in range(count):
@@ -122,8 +122,7 @@ def main(seed: int, count: int) -> None:
         try:
             world = pv.load(path)
         except pv.InputError as error:
-            assert str(path) in str(error)
-            became["refused"] += 1
+            became["refused" if str(path) in str(error) else "refused without its name"] += 1
             continue
         try:
             world.step(1 / 60)

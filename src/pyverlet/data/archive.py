@@ -2,7 +2,7 @@
 
 `numpy.load` reads it, too. Arrays are stored as they are, but for three kinds: rows that are all alike stand there once, numbers
 that count up are told by the first, and of arrays that are equal to others only the name is kept. The table's `arrays` says so.
-Nothing is allocated before it is known that the file is large enough to hold it, and nothing is used before its checksum is right.
+Nothing is allocated before it is known that the file is large enough for it, and nothing used before its checksum is right.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import math
 import os
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -45,15 +45,13 @@ _BROKEN = (
 # ---- writing -----------------------------------------------------------------------------------------------------------
 
 
-def write(file: BinaryIO, table: Mapping[str, Any], arrays: Mapping[str, Array]) -> None:
-    """Write a table and arrays; the table has no key `arrays` of its own."""
+def write(file: BinaryIO, table: Callable[[], Mapping[str, Any]], arrays: Mapping[str, Array]) -> None:
+    """Write arrays and, when those are written, a table; it has no key `arrays` of its own."""
     little = {name: np.ascontiguousarray(array, array.dtype.newbyteorder("<")) for name, array in arrays.items()}
     index, stored = _shared(little)
     if sum(a.nbytes for a in little.values()) > _EXPANDS * sum(a.nbytes for a in stored.values()):
         index, stored = {name: _whole(array) for name, array in little.items()}, little
     with zipfile.ZipFile(file, "w") as archive:
-        text = json.dumps({**table, INDEX: index}, allow_nan=False, ensure_ascii=False, indent=1)
-        archive.writestr(zipfile.ZipInfo(_TABLE, _WHEN), text.encode())
         for name, array in stored.items():
             info = zipfile.ZipInfo(f"{name}.npy", _WHEN)
             info.file_size = array.nbytes + 256  # tells zipfile whether it needs 64 bits for it
@@ -61,6 +59,8 @@ def write(file: BinaryIO, table: Mapping[str, Any], arrays: Mapping[str, Array])
                 np.lib.format.write_array_header_1_0(member, np.lib.format.header_data_from_array_1_0(array))
                 if array.size:
                     member.write(array.reshape(-1).view(np.uint8).data)
+        text = json.dumps({**table(), INDEX: index}, allow_nan=False, ensure_ascii=False, indent=1)
+        archive.writestr(zipfile.ZipInfo(_TABLE, _WHEN), text.encode())
 
 
 def _whole(array: Array) -> dict[str, Any]:
@@ -69,7 +69,8 @@ def _whole(array: Array) -> dict[str, Any]:
 
 def _shared(arrays: dict[str, Array]) -> tuple[dict[str, dict[str, Any]], dict[str, Array]]:
     """How each is stored, and those that are."""
-    index, stored = {}, {}
+    index: dict[str, dict[str, Any]] = {}
+    stored: dict[str, Array] = {}
     for name, array in arrays.items():
         index[name], kept = _whole(array), array
         if len(array) > _FEW:
@@ -95,10 +96,8 @@ def _equal(one: Array, other: Array) -> bool:
     if one.dtype != other.dtype or one.shape != other.shape:
         return False
     bits = np.dtype(f"u{one.dtype.itemsize}")
-    for part in (slice(0, 64), slice(None)):  # most differ soon
-        if not np.array_equal(one[part].view(bits), other[part].view(bits)):
-            return False
-    return True
+    parts = (slice(0, 64), slice(None))  # most differ soon
+    return all(np.array_equal(one[part].view(bits), other[part].view(bits)) for part in parts)
 
 
 # ---- reading -----------------------------------------------------------------------------------------------------------
@@ -112,7 +111,7 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Array]]:
     """
     try:
         with path.open("rb") as file:
-            return _read(file)
+            return read_from(file, os.fstat(file.fileno()).st_size)
     except FileNotFoundError:
         raise InputError(f"'{path}' is not there; allowed is a file that pyverlet wrote") from None
     except (IsADirectoryError, PermissionError) as error:
@@ -121,8 +120,8 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Array]]:
         raise InputError(f"'{path}' is no sound file of pyverlet's ({_brief(error)}); allowed is one as it was written") from None
 
 
-def _read(file: BinaryIO) -> tuple[dict[str, Any], dict[str, Array]]:
-    size = os.fstat(file.fileno()).st_size
+def read_from(file: BinaryIO, size: int) -> tuple[dict[str, Any], dict[str, Array]]:
+    """As `read`, from an open file of so many bytes that is known to be sound."""
     with zipfile.ZipFile(file) as archive:
         members = archive.infolist()
         names = {info.filename for info in members}
@@ -157,7 +156,7 @@ def _no_number(text: str) -> float:
 def _bytes(how: dict[str, Any]) -> int:
     if how["dtype"] not in _DTYPES or not all(type(n) is int and n >= 0 for n in how["shape"]) or len(how["shape"]) > 2:
         raise ValueError(f"an array is of {how['dtype']!r} and shape {how['shape']!r}")
-    return int(np.dtype(how["dtype"]).itemsize) * math.prod(how["shape"])
+    return int(np.dtype(how["dtype"]).itemsize * math.prod(how["shape"]))
 
 
 def _empty(how: dict[str, Any]) -> Array:
@@ -174,7 +173,7 @@ def _member(archive: zipfile.ZipFile, name: str, how: dict[str, Any]) -> Array:
         if header != (stored, False, np.dtype(how["dtype"])) or not shape:
             raise ValueError(f"{name} is not as the table says")
         array: Array = np.empty(stored, how["dtype"])
-        room, at = memoryview(array.reshape(-1).view(np.uint8)), 0
+        room, at = array.reshape(-1).view(np.uint8).data, 0
         while at < len(room):
             piece = member.read(min(_CHUNK, len(room) - at))
             if not piece:

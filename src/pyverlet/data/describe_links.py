@@ -14,8 +14,8 @@ from pyverlet.ground.fields import Field
 from pyverlet.laws.links import Angle, Area, Link, Pin, Rope, Spring, Stick
 from pyverlet.world.world import World
 
-_REST = {Stick: "length", Rope: "length", Spring: "length", Angle: "angle", Area: "area", Pin: "point"}
-_ARITY = {Stick: 2, Rope: 2, Spring: 2, Angle: 3, Pin: 1}
+_REST: dict[Any, str] = {Stick: "length", Rope: "length", Spring: "length", Angle: "angle", Area: "area", Pin: "point"}
+_ARITY: dict[Any, int] = {Stick: 2, Rope: 2, Spring: 2, Angle: 3, Pin: 1}
 
 _LENGTH = Field(np.float64, "rows", least=0)
 _COLUMNS: dict[str, tuple[str, Field]] = {
@@ -50,7 +50,7 @@ def _described(link: Link) -> dict[str, Any]:
     assert link._pool is not None
     rows = link._pool.rows
     named = {TYPE: kind.__name__} if type(link) is kind else {TYPE: kind.__name__, OBJECT: type(link).__qualname__}
-    columns = {name: rows[_COLUMNS[name][0]][link._where].copy() for name in _names(kind)}
+    columns: dict[str, Any] = {name: rows[_COLUMNS[name][0]][link._where].copy() for name in _names(kind)}
     if kind in (Stick, Rope, Spring):
         columns["collide"] = bool(link._collide)  # type: ignore[attr-defined]
     moving = {name: rows[name][link._where].copy() for name in _MOVING}
@@ -101,14 +101,15 @@ def _append(world: World, name: str, table: dict[str, Any], own: dict[str, type]
         cls = own[table[OBJECT]]
     sizes = {"particles": len(world)}
     particles = table["particles"]
-    Field(np.int64, "rows", particles.shape[1], least=0, below="particles").check(f"{name}: particles", particles, world.dtype, sizes)
+    joined = Field(np.int64, "rows", particles.shape[1], least=0, below="particles")
+    joined.check(f"{name}: particles", particles, world.dtype, sizes)
     wanted = _ARITY.get(kind)
     if (particles.shape[1] != wanted) if wanted else (particles.shape[1] < 3 or len(particles) != 1):
         raise InputError(f"{name}: particles has shape {particles.shape}; allowed are those a {kind.__name__} joins")
     if not len(particles) or (np.diff(np.sort(particles, axis=1), axis=1) == 0).any():
         raise InputError(f"{name}: particles names one twice, or none; allowed are different ones")
     # Not by its constructor, which looks at where the particles are: a ring may have crossed itself since.
-    link: Any = cls.__new__(cls)
+    link: Any = object.__new__(cls)
     Link.__init__(link, world._state, particles)
     columns = {key: _column(name, key, table, _COLUMNS[key][1], world, sizes) for key in _names(kind)}
     for key, column in columns.items():

@@ -50,11 +50,11 @@ class Field:
             raise InputError(f"{name} is {array.dtype} of shape {array.shape}; allowed is {dtype} of shape {shape}")
         if not array.size:
             return
-        if dtype.kind == "f":
-            self._check_floats(name, array)
         low, high = array.min(), array.max()
-        if self.nan and dtype.kind == "f" and np.isnan(low):
-            return
+        if dtype.kind == "f" and not (np.isfinite(low) and np.isfinite(high)):
+            self._check_floats(name, array)
+            if self.nan and np.isnan(low):
+                return
         most = sizes[self.below] - 1 if self.below else self.most
         if (self.least is not None and low < self.least) or (self.above is not None and low <= self.above):
             raise InputError(f"{name} has {low:g}; allowed is {self._allowed(most)}")
@@ -63,16 +63,12 @@ class Field:
         self._check_order(name, array)
 
     def _check_floats(self, name: str, array: Array) -> None:
-        # The sum of absolutes is finite if all are, but for an overflow: one look at most arrays.
-        if np.isfinite(array).all():
-            return
         bad = ~np.isfinite(array)
         if self.infinite:
             bad = np.isnan(array)
         if self.nan:
             lost = np.isnan(array)
-            whole = lost.all(axis=1) if array.ndim > 1 else lost
-            bad &= ~(whole[:, None] if array.ndim > 1 else whole)
+            bad &= ~(lost.all(axis=1, keepdims=True) if array.ndim > 1 else lost)
         if bad.any():
             row = int(np.flatnonzero(bad.any(axis=1) if bad.ndim > 1 else bad)[0])
             raise InputError(f"{name}[{row}] is {array[row]}; allowed are finite numbers")
@@ -89,6 +85,5 @@ class Field:
                 raise InputError(f"{name}[{int(np.argmin(rises)) + 1}] is less than the number before; allowed is {self.order}")
 
     def _allowed(self, most: float | None) -> str:
-        low = f"greater than {self.above:g}" if self.above is not None else f"at least {self.least:g}" if self.least is not None else ""
-        high = f"at most {most:g}" if most is not None else ""
-        return " and ".join(filter(None, (low, high)))
+        limits = ("greater than", self.above), ("at least", self.least), ("at most", most)
+        return " and ".join(f"{text} {limit:g}" for text, limit in limits if limit is not None)

@@ -46,7 +46,7 @@ class State:
         restitution, friction: (n,) of circles that have values of their own; negative: as `Collisions` and the bounds say.
         category, mask: (n,) 32 bits each; two circles collide if each has a bit of its category in the other's mask.
         number: (n,) of each particle, in ascending order; no two particles of a world ever have the same.
-        begun: the number of the first particle of each `append`, ascending.
+        begun: the number of the first particle of each `append`, ascending. numbers: how many particles there have ever been.
         version: how often particles were added or removed.
     """
 
@@ -69,7 +69,7 @@ class State:
         self._store |= {name: np.empty(0, dtype) for name in _COLUMNS}
         self._store |= {name: np.empty(0, np.uint32) for name in _MARKS}
         self._store["number"] = np.empty(0, np.int64)
-        self._numbers = 0
+        self.numbers = 0
         self.begun: list[int] = []
         self.version = 0
         self._show(0)
@@ -96,9 +96,9 @@ class State:
         self._show(stop)
         for name, value in (_DEFAULTS | values).items():
             getattr(self, name)[start:stop] = value
-        self.begun.append(self._numbers)
-        self.number[start:] = np.arange(self._numbers, self._numbers + stop - start)
-        self._numbers += stop - start
+        self.begun.append(self.numbers)
+        self.number[start:] = np.arange(self.numbers, self.numbers + stop - start)
+        self.numbers += stop - start
         self.version += 1
         return slice(start, stop)
 

@@ -103,7 +103,7 @@ def take_apart(world: World) -> Parts:
     """All that moves in a world, as of now. The arrays are copies."""
     saved = world.save()
     facts: dict[str, Any] = {
-        "time": float(saved.time), "frames": saved.frames, "h_last": saved.h_last, "numbers": world._state._numbers,
+        "time": float(saved.time), "frames": saved.frames, "h_last": saved.h_last, "numbers": world._state.numbers,
         "apart_changed": bool(saved.links[3]),
     }  # fmt: skip
     arrays = {f"particles.{name}": array for name, array in saved.arrays.items()}
@@ -153,7 +153,7 @@ def fill(world: World, parts: Parts) -> None:
         raise InputError(f"the array {error} is missing; allowed are files that have all") from None
     world._state.restore(arrays)
     most = int(arrays["number"][-1]) + 1 if len(world) else 0
-    world._state._numbers = checks.whole("numbers", parts.facts.get("numbers"), least=most, most=2**31)
+    world._state.numbers = checks.whole("numbers", parts.facts.get("numbers"), least=most, most=2**31)
     world._state.begun = begun.tolist()
     world.boundary.check(world.radius)
 
@@ -164,24 +164,22 @@ def put_together(world: World, parts: Parts) -> Saved:
     Raises:
         InputError: a number is not what it must be.
     """
-    facts, own = parts.facts, world.save()
-    h_last = facts.get("h_last")
-    links = list(own.links)
-    links[2:] = _broken(parts.arrays), bool(facts.get("apart_changed"))
+    facts, h_last = parts.facts, parts.facts.get("h_last")
+    links, pools, _, _ = world.links.save()
     return Saved(
         world=world._state,
-        arrays=own.arrays,
-        time=checks.number("time", facts.get("time")),
+        arrays={name: parts.arrays[f"particles.{name}"] for name, _ in world._state.arrays()},
+        time=checks.number("time", facts["time"]),
         frames=checks.whole("frames", facts.get("frames"), least=0, most=_MOST),
         h_last=None if h_last is None else checks.number("h_last", h_last, above=0.0),
         slots=_slots(world, parts.arrays),
         contacts=_contacts(world, facts.get("contacts"), parts.arrays),
-        books=_books(facts["books"]) if own.books else None,
-        events=_events(facts, parts.arrays) if own.events else None,
-        sleep=_sleep(world, facts["sleep"], parts.arrays) if own.sleep else None,
-        obstacles=own.obstacles,
-        actors=own.actors,
-        links=tuple(links),
+        books=_books(facts["books"]) if world.keeps_ledger else None,
+        events=_events(facts, parts.arrays) if world.tells_events else None,
+        sleep=_sleep(world, facts["sleep"], parts.arrays) if world._sleep else None,
+        obstacles=world.obstacles.save(),
+        actors=[(actor, actor.save()) for actor in world.actors],
+        links=(links, pools, _broken(parts.arrays), bool(facts.get("apart_changed"))),
     )
 
 
