@@ -86,6 +86,10 @@ def run(
     as_json: options.Json = False,
     trajectory: options.Trajectory = None,
     every: options.Every = None,
+    journal: Annotated[
+        Path | None,
+        typer.Option(help="Keep all that is done on the page, for `pyverlet replay`.", metavar="FILE", show_default=False),
+    ] = None,
     headless: Annotated[
         bool, typer.Option("--headless", help=f"Run without the page, {DEFAULT_SECONDS:g} s unless said, and report.")
     ] = False,
@@ -121,6 +125,8 @@ def run(
     ends = headless or as_json or plot or trajectory or seconds is not None or frames is not None
     if every is not None and trajectory is None:
         raise InputError(f"every is {every}; allowed is none without --trajectory")
+    if journal and (ends or window):
+        raise InputError(f"journal is '{journal}' for a run without a page; allowed is one with the page")
     if window and (ends or port is not None or no_open or ledger):
         raise InputError("window is asked for together with a run that ends or with options of the page; allowed is one of them")
     if window:
@@ -131,7 +137,13 @@ def run(
     if not ends:
         port = DEFAULT_PORT if port is None else port
         show.page(
-            chosen, integrators=methods, overrides={**overrides, "ledger": ledger}, dt=dt, port=port, open_browser=not no_open
+            chosen,
+            integrators=methods,
+            overrides={**overrides, "ledger": ledger},
+            dt=dt,
+            port=port,
+            open_browser=not no_open,
+            journal=journal,
         )
         return
     if port is not None:
