@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -62,6 +63,17 @@ def test_examples_run_and_freeze_to_the_same_bits(path: Path, tmp_path: Path) ->
         each.run(seconds=0.25)
     assert len({each.state_hash() for each in (world, *again)}) == 1
     assert world.time > 0
+
+
+def test_what_the_documentation_shows(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "data.md").read_text(encoding="utf-8")
+    (document,) = re.findall(r"^```toml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    (tmp_path / "silo.toml").write_text(document, encoding="utf-8")
+    world = pv.scenes.read(tmp_path / "silo.toml").world()
+    assert len(world) == 200
+    assert not world.escaped()
+    keys = set(re.findall(r"`(\w+)`", "".join(line.split("|")[1] for line in text.splitlines() if line.startswith("| `"))))
+    assert set(schema()["properties"]) - {"joined"} <= keys
 
 
 def test_five_examples() -> None:
