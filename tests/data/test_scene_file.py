@@ -211,6 +211,20 @@ def test_arrays_that_were_changed_are_refused(tmp_path: Path) -> None:
     (tmp_path / "a.npz").write_bytes(content)
     with pytest.raises(pv.InputError, match="the file of then"):
         pv.scenes.read(tmp_path / "a.json")
+    document = json.loads((tmp_path / "a.json").read_text())
+    document["groups"][0]["file"] = "../a.npz"
+    with pytest.raises(pv.InputError, match="the name of one beside"):
+        pv.scenes.read(written(tmp_path, document))
+
+
+def test_a_frozen_one_takes_its_arrays_along(tmp_path: Path) -> None:
+    pv.scenes.get("cage").freeze(tmp_path / "a.json", particles=10)
+    (tmp_path / "b").mkdir()
+    frozen = pv.scenes.read(tmp_path / "a.json")
+    with pytest.raises(pv.InputError, match="writes them along"):
+        frozen.write(tmp_path / "b" / "a.json")
+    frozen.freeze(tmp_path / "b" / "a.toml")
+    assert pv.scenes.read(tmp_path / "b" / "a.toml").world().state_hash() == frozen.world().state_hash()
 
 
 def test_objects_of_ones_own_are_in_no_file(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ import pyverlet as pv
 from pyverlet import record
 from pyverlet.cli import main
 from pyverlet.picture import LIGHT, BySpeed, Fixed
+from pyverlet.record._disk import Disk
 from pyverlet.record._reel import FINENESS
 from pyverlet.viewers import bundle
 
@@ -111,8 +112,7 @@ def test_velocities_colours_zoom_and_time(page: Page, tmp_path: Path) -> None:
     assert number(page, "time") == pytest.approx(59 / 60, abs=1e-3)
     seek(page, 30)
     page.keyboard.press("v")
-    arrows = page.evaluate("() => pyverlet.overlay.arrows")
-    assert arrows > 100
+    assert comes_true(page, lambda: page.evaluate("() => pyverlet.overlay.arrows") > 100)
     before = everywhere(page, 300)
     page.keyboard.press("+")
     page.keyboard.press("+")
@@ -138,6 +138,23 @@ def test_a_film_that_was_cut_off_plays_what_there_is(page: Page, tmp_path: Path)
     visit(page, tmp_path / "cut.html")
     assert page.evaluate("() => pyverlet.player.reel.length") == 120
     seek(page, 119)
+
+
+def test_a_full_disk_leaves_the_seconds_before(page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Full(Disk):
+        def write(self, data: bytes) -> int:
+            if self.end + len(data) > 200_000 and self.error is None:
+                self.error = OSError(28, "No space left on device")
+            return super().write(data)
+
+    monkeypatch.setattr("pyverlet.record._films.Disk", Full)
+    with pytest.raises(pv.PyverletError, match="No space left on device") as told:
+        record.to_video(pv.scenes.get("cage").world(particles=300), tmp_path / "a.html", seconds=30)
+    kept = int(str(told.value).partition("holds the first ")[2].split()[0])
+    assert kept % 60 == 0
+    assert kept > 0
+    visit(page, tmp_path / "a.html")
+    assert page.evaluate("() => pyverlet.player.reel.length") == kept
 
 
 def test_colours_of_ones_own_come_along(page: Page, tmp_path: Path) -> None:

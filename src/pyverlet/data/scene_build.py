@@ -1,4 +1,4 @@
-"""From a scene's document to its world, with settings in place of what it says, and from a world to a document with arrays."""
+"""From a scene's document to its world, with settings in place of what it says."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from pyverlet.data import describe_links, memory
-from pyverlet.data.describe import OBJECT, Builder, describe
-from pyverlet.data.durable import replacing
+from pyverlet.data.describe import Builder, describe
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.collisions import Collisions
@@ -266,13 +265,15 @@ class Recipe:
         return group
 
     def _from_arrays(self, world: World, table: Table) -> Group:
+        if Path(table["file"]).name != table["file"]:
+            raise InputError(f"file is {table['file']!r}; allowed is the name of one beside '{self._path}'")
         beside = self._path.parent / table["file"]
         try:
             content = beside.read_bytes()
         except OSError as error:
             raise InputError(f"file is '{beside}', which cannot be read: {error.strerror or error}") from None
-        if _hash(content) != table["hash"]:
-            raise InputError(f"file '{beside}' has the hash {_hash(content)}; allowed is {table['hash']}, the file of then")
+        if hash_of(content) != table["hash"]:
+            raise InputError(f"file '{beside}' has the hash {hash_of(content)}; allowed is {table['hash']}, the file of then")
         try:
             with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
                 columns = {key: arrays[f"{table['name']}.{key}"] for key in COLUMNS}
@@ -320,64 +321,6 @@ def _named(named: dict[str, Group], key: str, name: str) -> Group:
     return named[name]
 
 
-# ---- frozen ------------------------------------------------------------------------------------------------------------
-
-
-def freeze(world: World, path: Path) -> Table:
-    """What a document says about a world at its start, whose arrays go into a file beside `path`.
-
-    Raises:
-        InputError: there are objects of a user's own class in it, which no file can hold.
-    """
-    arrays: dict[str, Any] = {}
-    groups, number = [], world.group_number
-    beside = path.with_suffix(".npz")
-    for k in np.unique(number):
-        name = f"group{k}"
-        arrays |= {f"{name}.{key}": getattr(world, key)[number == k] for key in COLUMNS}
-        groups.append({"type": "arrays", "name": name, "file": beside.name, "hash": ""})
-    tables = {
-        "world": {
-            "gravity": list(world.gravity),
-            "integrator": describe(world.integrator),
-            "substeps": world.substeps,
-            "dtype": world.dtype.name,
-            "ledger": world.keeps_ledger,
-            "events": world.tells_events,
-            "sleep": world._sleep is not None,
-        },
-        "room": describe(world.boundary),
-        "collisions": False if world.collisions is None else describe(world.collisions),
-        "joined": describe_links.describe(world),
-        "forces": [_grouped(describe(force), world) for force in world.forces],
-        "obstacles": [describe(obstacle) for obstacle in world.obstacles],
-        "actors": [describe(actor) for actor in world.actors],
-        "start_hash": world.state_hash(),
-    }
-    for key, value in tables.items():
-        for table in value if isinstance(value, list) else [value]:
-            if isinstance(table, dict) and OBJECT in table:
-                raise InputError(
-                    f"{key} has an object of a class of your own, {table[OBJECT]!r}; allowed in a file are pyverlet's"
-                )
-    content = io.BytesIO()
-    np.savez(content, **arrays)
-    for group in groups:
-        group["hash"] = _hash(content.getvalue())
-    with replacing(beside) as file:
-        file.write(content.getvalue())
-    found: Table = memory.plain(tables)
-    return {"groups": groups} | {key: value for key, value in found.items() if value != []}
-
-
-def _grouped(force: Table, world: World) -> Table:
-    """A force on a group, by the name that the group has in the file."""
-    group = force.get("group")
-    if not isinstance(group, dict):
-        return {key: value for key, value in force.items() if value is not None}
-    return force | {"group": f"group{np.searchsorted(world._state.begun, group['first'], side='right') - 1}"}
-
-
 def _columns(world: World, table: Table) -> Table:
     """The lists of a frozen link as arrays again."""
     state = {
@@ -389,5 +332,6 @@ def _columns(world: World, table: Table) -> Table:
     return found | {"particles": particles, "state": state}
 
 
-def _hash(content: bytes) -> str:
+def hash_of(content: bytes) -> str:
+    """Of a file with arrays, 16 hex digits."""
     return hashlib.blake2b(content, digest_size=8).hexdigest()

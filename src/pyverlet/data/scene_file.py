@@ -13,7 +13,8 @@ from typing import Any
 from pyverlet import scenes
 from pyverlet.data import toml
 from pyverlet.data.durable import replacing
-from pyverlet.data.scene_build import Recipe, freeze
+from pyverlet.data.scene_build import Recipe
+from pyverlet.data.scene_freeze import freeze
 from pyverlet.ground.errors import InputError
 from pyverlet.scenes import Scene, Settings
 from pyverlet.scenes._scene import Show
@@ -78,6 +79,8 @@ def _scene(document: dict[str, Any], path: Path) -> Scene:
 def write(scene: Scene, path: str | Path) -> None:
     """See `Scene.write`."""
     document = scene.document
+    if any(group["type"] == "arrays" for group in (document or {}).get("groups", [])):
+        raise InputError(f"scene {scene.name!r} has arrays beside its file; allowed is freeze(path), which writes them along")
     if document is None:
         document = {"format": 1, "name": scene.name, "scene": scene.name, "settings": Recipe.described(scene.defaults)}
     save(document, Path(path))

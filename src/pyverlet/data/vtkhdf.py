@@ -24,8 +24,11 @@ KINDS = ("Vertices", "Lines", "Polygons", "Strips")
 
 COLUMNS = ("velocity", "radius", "mass", "spin", "number")
 
-CHUNK = 1 << 16
-"""Elements of a chunk of the file, at most."""
+STEPS = 128
+"""Steps in a chunk of what there is once a step: the last chunk of each array is written again with every frame."""
+
+ROWS = (256, 1 << 16)
+"""Least and most circles in a chunk; between them as many as the first frame has, so that a frame fills its chunk."""
 
 
 class VtkHdfWriter(Writer):
@@ -81,18 +84,20 @@ class VtkHdfWriter(Writer):
 
     def _begin(self, frame: Frame) -> None:
         """The arrays, still empty, of the precision of the world."""
-        real = frame.position.dtype
+        real, rows = frame.position.dtype, min(max(len(frame), ROWS[0]), ROWS[1])
         file = self._file
         root = file.create_group("VTKHDF")
         root.attrs["Version"] = np.array(VERSION, np.int64)
         root.attrs.create("Type", np.bytes_(b"PolyData"))
         _empty(root, "NumberOfPoints", np.int64)
-        _empty(root, "Points", real, 3)
+        _empty(root, "Points", real, 3, rows=rows)
         for kind in KINDS:
-            for name in ("NumberOfCells", "NumberOfConnectivityIds", "Connectivity", "Offsets"):
+            for name in ("NumberOfCells", "NumberOfConnectivityIds"):
                 _empty(root, f"{kind}/{name}", np.int64)
+            for name in ("Connectivity", "Offsets"):
+                _empty(root, f"{kind}/{name}", np.int64, rows=rows if kind == "Vertices" else STEPS)
         for name in COLUMNS:
-            _empty(root, f"PointData/{name}", np.int64 if name == "number" else real, 3 if name == "velocity" else 0)
+            _empty(root, f"PointData/{name}", np.int64 if name == "number" else real, 3 if name == "velocity" else 0, rows=rows)
             _empty(root, f"Steps/PointDataOffsets/{name}", np.int64)
         for name in ("PartOffsets", "NumberOfParts", "PointOffsets"):
             _empty(root, f"Steps/{name}", np.int64)
@@ -138,9 +143,9 @@ class VtkHdfReader(Reader):
         self._file.close()
 
 
-def _empty(group: Any, name: str, dtype: Any, width: int = 0) -> None:
+def _empty(group: Any, name: str, dtype: Any, width: int = 0, *, rows: int = STEPS) -> None:
     tail = (width,) if width else ()
-    group.create_dataset(name, (0, *tail), dtype, maxshape=(None, *tail), chunks=(max(CHUNK // max(width, 1), 1), *tail))
+    group.create_dataset(name, (0, *tail), dtype, maxshape=(None, *tail), chunks=(rows, *tail))
 
 
 def _append(dataset: Any, values: Array | list[Any]) -> None:

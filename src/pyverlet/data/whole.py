@@ -9,8 +9,8 @@ from pathlib import Path
 class WholeFile:
     """A binary file for h5py to write to. What lay in it at the last commit stays as it was until the next.
 
-    New bytes behind the end of then are written at once: nothing refers to them yet. Changes before it, which is a few hundred
-    bytes of tables a frame, wait in memory for `commit`.
+    New bytes behind the end of then are written at once: nothing refers to them yet. Changes before it, some 27 kB of
+    tables a frame, wait in memory for `commit`.
     """
 
     def __init__(self, path: Path) -> None:

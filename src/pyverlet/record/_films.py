@@ -248,19 +248,18 @@ class Page(Film):
 
     def add(self, picture: Frame) -> None:
         self._write(self._reel.add(picture))
-        self.kept += self.error is None
 
     def _write(self, parts: list[str]) -> None:
         for part in parts:
             self._disk.write(part.encode())
             self._disk.whole()
         self.error = self._disk.error
+        if self.error is None:
+            self.kept = self._reel.finished
 
     def close(self) -> None:
-        waiting = self._reel.waiting
-        self._write(self._reel.rest())
-        if self.error is not None:
-            self.kept = max(self.kept - waiting, 0)
+        if self.error is None:
+            self._write(self._reel.rest())
         self._disk.close()
 
 

@@ -112,9 +112,9 @@ class Reel:
         self._step = 0.0
 
     @property
-    def waiting(self) -> int:
-        """Frames that are in no block yet."""
-        return len(self._frames)
+    def finished(self) -> int:
+        """Frames that are in blocks."""
+        return self._first
 
     def add(self, frame: Frame) -> list[str]:
         """The next frame; the blocks that are finished by it."""
