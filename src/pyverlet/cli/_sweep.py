@@ -28,9 +28,7 @@ app = typer.Typer(help="Parameter studies.", rich_markup_mode=None)
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="The study's.")]
 MeasurePath = Annotated[
     str | None,
-    typer.Option(
-        help="Function of a world; energy, overlap and so on unless said.", metavar="MODULE:FUNCTION", show_default=False
-    ),
+    typer.Option("--measure", help="Function of a world; energy and more unless said.", metavar="PATH", show_default=False),
 ]
 
 
