@@ -9,7 +9,7 @@ from typing import Any
 
 from pyverlet.data.describe import TYPE, Builder
 from pyverlet.data.sweep import Measure, Study, basics
-from pyverlet.data.sweep_plan import Plan
+from pyverlet.data.sweep_plan import SCENE_FILE, Plan
 from pyverlet.ground.errors import InputError
 from pyverlet.scenes import Scene, get
 from pyverlet.world.world import World
@@ -62,6 +62,8 @@ class Unknown:
 def _scene(told: Any, folder: str | Path) -> Scene:
     if isinstance(told, str):
         return get(told)
+    if "format" in told:  # a document: `Study` has written it there
+        return get(str(Path(folder) / SCENE_FILE))
     raise InputError(f"'{folder}' is a study of a scene of its program's own; allowed is pyverlet.sweep with that scene")
 
 
