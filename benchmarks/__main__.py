@@ -1,7 +1,8 @@
 """Run a comparison and print it.
 
 `python -m benchmarks --particles 2000 20000` beside other engines, `python -m benchmarks physics` what their physics is worth,
-`python -m benchmarks own` what pyverlet promises about its own speed, `python -m benchmarks page` how fast the live page is.
+`python -m benchmarks own` what pyverlet promises about its own speed, `python -m benchmarks page` how fast the live page is,
+`python -m benchmarks data` what it costs to keep worlds, to step many, and to sweep settings.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 import pyverlet as pv
-from benchmarks import own, page, physics
+from benchmarks import data, own, page, physics
 from benchmarks.engines import CAREFUL, DT, ENGINES, RADIUS, Array, Engine
 from pyverlet.scenes import report
 
@@ -118,7 +119,9 @@ def machine() -> str:
 def main() -> None:
     """Print one table for each number of particles; write them all as CSV if asked to."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("table", nargs="?", choices=("speed", "physics", "own", "page"), default="speed", help="what to compare")
+    parser.add_argument(
+        "table", nargs="?", choices=("speed", "physics", "own", "page", "data"), default="speed", help="what to compare"
+    )
     parser.add_argument("--particles", type=int, nargs="+", help="discs in the cage: 2000 20000 for speed, 2000 for physics")
     parser.add_argument("--frames", type=int, default=60, help="frames measured for each engine")
     parser.add_argument("--csv", type=Path, help="write the rows to this file too")
@@ -135,6 +138,10 @@ def main() -> None:
     print(machine())
     if arguments.table == "page":
         page.main(arguments.scene, arguments.particles or [20_000, 100_000, 1_000_000], arguments.seconds, arguments.threads)
+        return
+    if arguments.table == "data":
+        if not data.main((arguments.particles or [1_000_000])[0]):
+            sys.exit(1)
         return
     if arguments.table == "own":
         if not own.main(report.triad()["ns_per_element"], arguments.million):

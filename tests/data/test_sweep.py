@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import os
 import signal
@@ -16,6 +18,8 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
+from pyverlet import viewers
+from pyverlet.cli import main
 from pyverlet.data import sweep_run
 from pyverlet.data.sweep import Study
 
@@ -190,7 +194,7 @@ def test_bad_input_gets_a_sentence_and_loses_nothing(serial: Path, tmp_path: Pat
             pv.sweep(scene, grid, out=out, **given)
 
     refused("did you mean 'cage'", scene="cagee")
-    refused("no setting 'frction'", {"frction": [0]})
+    refused("no setting 'frction' .did you mean 'friction'", {"frction": [0]})
     refused("friction is -1", {"friction": [0, -1]})
     refused("friction is nan", {"friction": [np.nan]})
     refused("friction of the grid is 0.5", {"friction": 0.5})
@@ -265,6 +269,47 @@ def test_one_at_a_time(tmp_path: Path) -> None:
         with pytest.raises(pv.InputError, match="another process"):
             study.run(processes=1)
         other.communicate()
+
+
+def command(*arguments: object) -> tuple[int, str, str]:
+    capture = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(capture[0]), contextlib.redirect_stderr(capture[1]):
+        code = main([str(argument) for argument in arguments])
+    return code, capture[0].getvalue(), capture[1].getvalue()
+
+
+def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.py").write_text("def tops(world):\n    return {'top': float(world.position[:, 1].max())}\n")
+    run = ("sweep", "run", "box", "--vary", "friction=0,0.5", "--vary", "seed=1:3", "--set", "particles=8", "--seconds", "0.05")
+    code, text, _ = command(*run, "--measure", "mine:tops", "--out", "study", "--processes", "1")
+    assert code == 0
+    assert text.splitlines()[0].split() == ["run", "friction", "seed", "top", "start", "end", "error"]
+    assert text.splitlines()[-1] == "4 of 4 runs"
+    code, text, _ = command("sweep", "status", "study", "--json")
+    assert json.loads(text) == {"runs": 4, "done": 4, "failed": 0, "foreign": 0}
+    for measure in ((), ("--measure", "mine:tops")):
+        code, text, _ = command("sweep", "verify", "study", "--rows", "2", *measure)
+        assert (code, text.count("all as they were")) == (0, 1)
+    shown: list[pv.World] = []
+    monkeypatch.setattr(viewers, "view", lambda world, **options: shown.append(world))
+    assert command("sweep", "show", "study", 3)[0] == 0
+    assert shown[0].state_hash() == pv.scenes.get("box").world(friction=0.5, seed=2, particles=8).state_hash()
+    row = json.loads((tmp_path / "study" / "rows.jsonl").read_text().splitlines()[0])
+    row["end"] = "0" * 16
+    (tmp_path / "study" / "rows.jsonl").write_text(json.dumps(row) + "\n")
+    assert command("sweep", "verify", "study")[0] == 1
+    for wrong, said in (
+        (("sweep", "status", "nowhere"), "has no study"),
+        ((*run, "--out", "x", "--measure", "mine:bottoms"), "mine has no bottoms"),
+        ((*run, "--out", "x", "--vary", "seed"), "vary is 'seed'"),
+        (("sweep", "run", "box", "--vary", "seed=1:x", "--out", "x"), "vary has '1:x'"),
+    ):
+        code, text, error = command(*wrong)
+        assert code == 2
+        assert text == ""
+        assert said in error
+        assert error.count("\n") == 1
 
 
 @pytest.mark.full

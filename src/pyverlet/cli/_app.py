@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from pyverlet import __version__, scenes, warm_up
-from pyverlet.cli import _check
+from pyverlet.cli import _check, _sweep
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.cli import _show as show
@@ -37,6 +37,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.add_typer(_check.app, name="check")
+app.add_typer(_sweep.app, name="sweep")
 
 
 def _show_version(wanted: bool) -> None:

@@ -16,13 +16,14 @@ import struct
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.data.sweep_plan import bare
 from pyverlet.ground.errors import InputError, PyverletError
 from pyverlet.scenes import Scene
 from pyverlet.world.saved import Saved
@@ -178,7 +179,7 @@ class Crew:
 
     def __init__(self, plan: Plan, ranges: Sequence[tuple[int, int]], path: Path) -> None:
         try:
-            sent = pickle.dumps(plan)
+            sent = pickle.dumps(replace(plan, scene=bare(plan.scene)))
         except (pickle.PicklingError, AttributeError, TypeError) as error:
             raise InputError(
                 f"scene cannot be sent to other processes ({error}); allowed is one of a module, or processes=1"

@@ -7,7 +7,7 @@ import itertools
 import json
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,6 +20,9 @@ from pyverlet.scenes import SCENES, Scene
 from pyverlet.world.world import World
 
 FORMAT = 1
+
+SCENE_FILE = "scene.json"
+"""In the folder of a study of a scene that was read from a file: a copy of that."""
 
 
 class Run(NamedTuple):
@@ -84,6 +87,11 @@ class Plan:
     def world(self, run: Run) -> World:
         """The world of a run as it starts. One thread steps it: runs share the cores among themselves."""
         return self.scene.world(**{"threads": 1, **self.settings, **run.settings})
+
+
+def bare(scene: Scene) -> Scene:
+    """The scene without what is for the eye alone, and may be functions that no other process can be sent."""
+    return replace(scene, show=replace(scene.show, view=None, seconds=None), closed_form=None, variants=())
 
 
 def _scene(scene: Scene) -> Any:

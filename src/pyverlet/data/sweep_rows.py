@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from pyverlet.compile import jit
 from pyverlet.data.durable import replacing
-from pyverlet.data.sweep_plan import Plan
+from pyverlet.data.sweep_plan import SCENE_FILE, Plan
 from pyverlet.ground import file_lock
 from pyverlet.ground.errors import InputError
 
@@ -67,6 +67,8 @@ def open_folder(folder: Path, plan: Plan) -> None:
                 raise InputError(f"'{folder}' has a study whose {name} is {theirs!r}, not {value!r}; allowed is a new folder")
     wanted = json.dumps({**about, "grid": plan.described_grid()}, indent=1).encode() + b"\n"
     if known is None or path.read_bytes() != wanted:
+        if known is None and getattr(plan.scene, "document", None) is not None:
+            plan.scene.write(folder / SCENE_FILE)  # type: ignore[attr-defined]
         with replacing(path) as file:
             file.write(wanted)
 

@@ -8,6 +8,7 @@ import pickle
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor, wait
+from dataclasses import replace
 from functools import lru_cache
 from multiprocessing import get_context
 from time import perf_counter
@@ -16,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from pyverlet.compile import jit
-from pyverlet.data.sweep_plan import Plan, Run, plain
+from pyverlet.data.sweep_plan import Plan, Run, bare, plain
 from pyverlet.data.sweep_rows import made_by
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, Interrupted, PyverletError
@@ -97,6 +98,7 @@ def work(sent: bytes, task: Task) -> list[tuple[Row, float]]:
 
 def _packed(plan: Plan) -> bytes:
     """The plan for other processes: functions by name, or by value where cloudpickle is there, as it is with Dask and loky."""
+    plan = replace(plan, scene=bare(plan.scene))
     try:
         try:
             import cloudpickle

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -158,7 +159,9 @@ class Scene:
         """
         known = {f.name for f in dataclasses.fields(Settings)}
         if unknown := sorted(set(overrides) - known):
-            raise InputError(f"a scene has no setting {unknown[0]!r}; known: {', '.join(sorted(known))}")
+            near = difflib.get_close_matches(unknown[0], known, n=1)
+            suggestion = f" (did you mean {near[0]!r}?)" if near else ""
+            raise InputError(f"a scene has no setting {unknown[0]!r}{suggestion}; known: {', '.join(sorted(known))}")
         changes = {name: value for name, value in overrides.items() if value is not None}
         if changes.get("collisions") is False:
             changes["collisions"] = None
