@@ -15,6 +15,7 @@ import numpy as np
 
 from pyverlet.data import describe_links, memory
 from pyverlet.data.describe import Builder, describe
+from pyverlet.data.durable import replacing
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.collisions import Collisions
@@ -86,6 +87,26 @@ class Recipe:
                 "(other versions may draw other numbers: `pyverlet scene freeze` keeps the numbers themselves)"
             )
         return world
+
+    def copy_arrays(self, folder: Path) -> None:
+        """Have the files with arrays that lie beside the scene file lie in another folder, too."""
+        for name in {group["file"] for group in self._document.get("groups", []) if group["type"] == "arrays"}:
+            if (self._path.parent / name).resolve() != (folder / name).resolve():
+                content = self._read_beside(name)
+                with replacing(folder / name) as file:
+                    file.write(content)
+
+    def _beside(self, name: str) -> Path:
+        if Path(name).name != name:
+            raise InputError(f"file is {name!r}; allowed is the name of one beside '{self._path}'")
+        return self._path.parent / name
+
+    def _read_beside(self, name: str) -> bytes:
+        beside = self._beside(name)
+        try:
+            return beside.read_bytes()
+        except OSError as error:
+            raise InputError(f"file is '{beside}', which cannot be read: {error.strerror or error}") from None
 
     # ---- settings ------------------------------------------------------------------------------------------------------
 
@@ -265,13 +286,7 @@ class Recipe:
         return group
 
     def _from_arrays(self, world: World, table: Table) -> Group:
-        if Path(table["file"]).name != table["file"]:
-            raise InputError(f"file is {table['file']!r}; allowed is the name of one beside '{self._path}'")
-        beside = self._path.parent / table["file"]
-        try:
-            content = beside.read_bytes()
-        except OSError as error:
-            raise InputError(f"file is '{beside}', which cannot be read: {error.strerror or error}") from None
+        beside, content = self._beside(table["file"]), self._read_beside(table["file"])
         if hash_of(content) != table["hash"]:
             raise InputError(f"file '{beside}' has the hash {hash_of(content)}; allowed is {table['hash']}, the file of then")
         try:

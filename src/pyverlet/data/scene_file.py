@@ -79,8 +79,10 @@ def _scene(document: dict[str, Any], path: Path) -> Scene:
 def write(scene: Scene, path: str | Path) -> None:
     """See `Scene.write`."""
     document = scene.document
-    if any(group["type"] == "arrays" for group in (document or {}).get("groups", [])):
-        raise InputError(f"scene {scene.name!r} has arrays beside its file; allowed is freeze(path), which writes them along")
+    _suffix(Path(path))
+    recipe = getattr(scene.build, "__self__", None)
+    if isinstance(recipe, Recipe):
+        recipe.copy_arrays(Path(path).parent)
     if document is None:
         document = {"format": 1, "name": scene.name, "scene": scene.name, "settings": Recipe.described(scene.defaults)}
     save(document, Path(path))

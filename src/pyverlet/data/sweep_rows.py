@@ -68,7 +68,7 @@ def open_folder(folder: Path, plan: Plan) -> None:
     wanted = json.dumps({**about, "grid": plan.described_grid()}, indent=1).encode() + b"\n"
     if known is None or path.read_bytes() != wanted:
         if known is None and getattr(plan.scene, "document", None) is not None:
-            plan.scene.write(folder / SCENE_FILE)  # type: ignore[attr-defined]
+            plan.scene.write(folder / SCENE_FILE)
         with replacing(path) as file:
             file.write(wanted)
 
