@@ -106,6 +106,29 @@ def test_restore_after_the_collisions_were_changed() -> None:
         assert np.isfinite(world.position).all()
 
 
+def test_what_was_edited_before_saving_is_news_after_restoring() -> None:
+    # Edits between frames make lists of pairs void, and circles added on top of others are to start smaller.
+    def overlap(world: pv.World) -> None:
+        world.add(position=world.position[:3] + 0.05, radius=0.4)
+
+    def shrink(world: pv.World) -> None:
+        world.radius[:] *= 0.98
+
+    def filter_out(world: pv.World) -> None:
+        world.category[:50] = world.mask[:50] = 2
+
+    for edit in (overlap, shrink, filter_out):
+        world = falling_heap()
+        world.run(seconds=0.7)
+        edit(world)
+        saved = world.save()
+        world.run(seconds=0.1)
+        expected = world.state_hash()
+        world.restore(saved)
+        world.run(seconds=0.1)
+        assert world.state_hash() == expected, edit.__name__
+
+
 def test_measuring_does_not_change_the_motion() -> None:
     watched, alone = falling_heap(), falling_heap()
     for _ in range(60):

@@ -48,6 +48,14 @@ class Group:
         self._first = int(state.number[where.start]) if self._added else 0
         self._stop = self._first + self._added
 
+    @classmethod
+    def of(cls, state: State, first: int, added: int, remove: Callable[[Array], None]) -> Group:
+        """The group of `added` particles that were added together and have the numbers from `first` on."""
+        group = cls(state, slice(0, 0), remove)
+        group._first, group._added, group._stop = first, added, first + added
+        group._version = -1  # to be looked for
+        return group
+
     def __len__(self) -> int:
         where = self._span()
         return int(where.stop - where.start)

@@ -25,6 +25,7 @@ _SET = ("radius", "mass", "restitution", "friction")
 _COLUMNS = ("spin", "grown", *_SET)
 _MARKS = ("category", "mask")
 _GIVEN = (*_SET, *_MARKS)
+_LISTED = ("radius", "mass", *_MARKS)
 
 EVERYONE = 0xFFFFFFFF
 """A mask of 32 bits that takes every category."""
@@ -40,12 +41,12 @@ class State:
         velocity: (n, 2) m/s.
         acceleration: (n, 2) m/s^2, of the last substep; the memory of the Verlet methods, scaled at rest. NaN: none yet.
         spin: (n,) angular velocity, rad/s, counter-clockwise. angle: (n,) rad it has turned; float64, for it grows and grows.
-        radius: (n,) m. mass: (n,) kg; infinity pins the particle.
+        radius, mass: (n,) m, and (n,) kg: infinity pins the particle.
         grown: (n,) part of the radius that other circles feel; less than 1 for those that were added on top of another.
         restitution, friction: (n,) of circles that have values of their own; negative: as `Collisions` and the bounds say.
         category, mask: (n,) 32 bits each; two circles collide if each has a bit of its category in the other's mask.
         number: (n,) of each particle, in ascending order; no two particles of a world ever have the same.
-        begun: the number of the first particle of each `append`, ascending.
+        begun: the number of the first particle of each `append`, ascending. numbers: how many particles there have ever been.
         version: how often particles were added or removed.
     """
 
@@ -69,7 +70,7 @@ class State:
         self._store |= {name: np.empty(0, dtype) for name in _COLUMNS}
         for names, kind in ((_MARKS, np.uint32), (("number",), np.int64), (("angle",), np.float64)):
             self._store |= {name: np.empty(0, kind) for name in names}
-        self._numbers = 0
+        self.numbers = 0
         self.begun: list[int] = []
         self.version = 0
         self._show(0)
@@ -96,9 +97,9 @@ class State:
         self._show(stop)
         for name, value in (_DEFAULTS | values).items():
             getattr(self, name)[start:stop] = value
-        self.begun.append(self._numbers)
-        self.number[start:] = np.arange(self._numbers, self._numbers + stop - start)
-        self._numbers += stop - start
+        self.begun.append(self.numbers)
+        self.number[start:] = np.arange(self.numbers, self.numbers + stop - start)
+        self.numbers += stop - start
         self.version += 1
         return slice(start, stop)
 
@@ -133,7 +134,6 @@ class State:
 
 # What a slot remembers from frame to frame beside the user's arrays: dtype, and value for a new particle.
 _REMEMBERED: dict[str, tuple[Any, Any]] = {"fed": (np.uint8, 0), "island": (np.int64, -1), "calm": (np.float32, 0)}
-_OF_SLEEP = ("island", "calm")
 
 
 class Slots:
@@ -151,10 +151,10 @@ class Slots:
         inverse_mass: (n,) 1/kg; 0 for a pinned particle. total_mass: of all others, kg.
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
         start: (n, 2) positions before the integration of this substep, m; empty unless circles rub each other, or meet obstacles.
-        turn: (n,) rad by which each circle turns in this substep; empty unless circles rub each other.
-        lift: (n,) s; times -a it is the velocity with which circles at rest against others end a substep; only if circles rub.
+        turn, lift: empty unless circles rub each other: (n,) rad by which each turns in this substep, and (n,) s; times -a that
+            is the velocity with which circles at rest against others end a substep, for others 0.
         along: (n, 2) m/s^2, the acceleration left to circles that an obstacle holds, for others 0; empty without obstacles.
-        drop: a circle that starts at rest falls drop * a h^2 in a substep; depends on the integrator.
+        drop: a circle at rest falls drop * a h^2 in a substep; depends on the integrator.
         fed: (n,) bits: CARRIES where a contact at rest fed the velocity in the last substep, AT_WALL where a wall was touched
             in it, CARRIED and WAS_AT_WALL the same in the one before. Kept only if circles bounce.
         island: (n,) number of the island a sleeping particle belongs to, -1 for those awake. calm: (n,) seconds it has been so.
@@ -190,7 +190,7 @@ class Slots:
         order = self._kept.pop("particle", np.zeros(0, np.int32))
         self.particle = np.concatenate((order, np.arange(len(order), count, dtype=np.int32)))
         for name, (dtype, value) in _REMEMBERED.items():
-            column = np.full(count if self._sleeps or name not in _OF_SLEEP else 0, value, dtype)
+            column = np.full(count if self._sleeps or name == "fed" else 0, value, dtype)
             column[: len(order)] = self._kept.pop(name, column[: len(order)])
             setattr(self, name, column)
         for name in _ROWS:
@@ -260,8 +260,7 @@ class Slots:
         changed = self._changed
         for name in _GIVEN:
             given, now = self._given[name], getattr(state, name)
-            if name not in ("restitution", "friction"):
-                changed |= motion.differs(given, now)
+            changed |= name in _LISTED and motion.differs(given, now)
             self._given[name] = (now[:1] if (now == now[:1]).all() else now).copy()
         for name in (*_SET, "grown"):
             np.take(getattr(state, name), self.particle, out=getattr(self, name))
@@ -361,15 +360,19 @@ class Slots:
         self.resize()
         self._slot_of = None
 
-    def save(self) -> dict[str, Array]:
-        """What outlives a frame here and not in the user's arrays: the order, who carried weight, who sleeps."""
-        return {name: getattr(self, name).copy() for name in ("particle", *_REMEMBERED)}
+    def save(self, state: State) -> dict[str, Array]:
+        """What outlives a frame here, not in the user's arrays: the order, who carried weight, who sleeps; if lists are void."""
+        void = self._changed or any(motion.differs(self._given[name], getattr(state, name)) for name in _LISTED)
+        columns = {name: getattr(self, name).copy() for name in ("particle", *_REMEMBERED)}
+        return columns | {"void": np.array([void or len(state) != len(self)])}
 
     def restore(self, saved: dict[str, Array], state: State) -> None:
         """Take up what `save` returned and gather the state into that order."""
-        self._kept = {name: column.copy() for name, column in saved.items()}
+        self._kept = {name: saved[name].copy() for name in ("particle", *_REMEMBERED)}
         self._resize(len(saved["particle"]))
         self.gather(state)
+        if saved["void"][0]:  # the next frame is to find that out, too
+            self._changed = self._grows = True
 
     def scratch(self, number: int) -> Array:
         """An (n, 2) array for use within one substep; its contents are left over from whoever used it last."""

@@ -180,19 +180,19 @@ def encode_refusal(reason: str) -> bytes:
 
 
 def _join(head: dict[str, Any], body: bytes) -> bytes:
-    text = json.dumps(_finite(head), allow_nan=False, separators=(",", ":")).encode()
+    text = json.dumps(finite(head), allow_nan=False, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)  # arrays on the page must start at a multiple of their element's size
     return b"".join((struct.pack("<I", len(text)), text, body))
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
     """JSON has no NaN: a number that is none becomes null."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
-        return {key: _finite(entry) for key, entry in value.items()}
+        return {key: finite(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(entry) for entry in value]
+        return [finite(entry) for entry in value]
     return value
 
 

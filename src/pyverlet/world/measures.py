@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,14 @@ from pyverlet.laws.touches import Touches
 from pyverlet.world.particles import Particles
 
 Array = NDArray[Any]
+
+
+def hash_of(time: float, arrays: Iterable[Array]) -> str:
+    """What `Measures.state_hash` is, of a time and positions, velocities, spins, radii and masses."""
+    digest = hashlib.blake2b(np.float64(time).tobytes(), digest_size=8)
+    for array in arrays:
+        digest.update(np.ascontiguousarray(array).data)
+    return digest.hexdigest()
 
 
 class Measures(Particles):
@@ -162,10 +170,7 @@ class Measures(Particles):
 
     def state_hash(self) -> str:
         """16 hex digits of time and every particle's position, velocity, spin, angle, radius and mass: equal bits, equal hash."""
-        digest = hashlib.blake2b(np.float64(self.time).tobytes(), digest_size=8)
-        for array in (self.position, self.velocity, self.spin, self.angle, self.radius, self.mass):
-            digest.update(array.tobytes())
-        return digest.hexdigest()
+        return hash_of(self.time, (self.position, self.velocity, self.spin, self.angle, self.radius, self.mass))
 
     @property
     def rebuilds(self) -> int:

@@ -174,6 +174,15 @@ class Particles:
         return np.searchsorted(self._state.begun, self.number, side="right") - 1
 
     @property
+    def groups(self) -> list[Group]:
+        """A handle on each group, in the order they were added; of those that were removed, too, with nobody in them."""
+        state = self._state
+        ends = [*state.begun[1:], state.numbers]
+        return [
+            Group.of(state, first, end - first, self.remove) for first, end in zip(state.begun, ends, strict=bool(state.begun))
+        ]
+
+    @property
     def version(self) -> int:
         """How often particles were added or removed."""
         return self._state.version

@@ -356,7 +356,7 @@ class World(Measures, Queries, Doors):
             time=self.time,
             frames=self.frames,
             h_last=self._h_last,
-            slots=self._slots.save(),
+            slots=self._slots.save(self._state),
             contacts=self._contacts.save() if self._contacts else None,
             books=self._books and self._books.copy(),
             events=self._events and self._events.copy(),
