@@ -253,7 +253,9 @@ def test_a_disc_that_slows_down_for_ever_stays_finite(dtype: type) -> None:
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("e", [0.0, 1.0])
-@pytest.mark.parametrize("room", [pv.Circle(radius=3, restitution=0.5, friction=0.5), pv.Circle(radius=3), pv.Box((-3, -3), (3, 3))])
+@pytest.mark.parametrize(
+    "room", [pv.Circle(radius=3, restitution=0.5, friction=0.5), pv.Circle(radius=3), pv.Box((-3, -3), (3, 3))]
+)
 def test_speeds_whose_squares_underflow_harm_nothing(room: pv.Boundary, e: float, dtype: type) -> None:
     tiny = float(np.finfo(dtype).tiny)
     slow = np.array([tiny, np.sqrt(tiny), 1e3 * np.sqrt(tiny), 1e-6 * tiny])

@@ -86,7 +86,7 @@ def test_a_disc_at_rest_in_a_corner_has_no_velocity(half: float, dtype: type) ->
     a = np.deg2rad(half)
     side = 6 * np.array([np.sin(a), np.cos(a)])
     world = pv.World(dtype=dtype, threads=1)
-    world.obstacles.append(pv.Chain([side * [-1, 1], (0, 0), side]))
+    world.obstacles.append(pv.Chain(np.array([side * [-1, 1], 0 * side, side])))
     # It touches both sides where its centre is r / sin(a) above the corner.
     disc = world.add(position=(0.01, 0.2 / np.sin(a) + 0.1), radius=0.2)
     world.run(seconds=5, dt=DT)
@@ -134,6 +134,7 @@ def beyond(world: pv.World) -> float:
     x, r, room = world.position.astype(float), world.radius.astype(float), world.boundary
     if isinstance(room, pv.Circle):
         return float(((np.hypot(*(x - room.center).T) + r - room.radius) / r).max())
+    assert isinstance(room, pv.Box)
     low, high = np.asarray(room.lower) - x, x - np.asarray(room.upper)
     return float(((np.maximum(low, high).max(axis=1) + r) / r).max())
 

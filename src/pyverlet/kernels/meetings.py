@@ -111,7 +111,7 @@ def _kept(room, b):
 
 @kernel
 def _touched(b, nx, ny, depth, wx, wy, h, lag, e, mu, rest_speed, which):
-    """The circle b meets a surface that moves with (wx, wy): what becomes of it, and the surface, NOBODY's if it bounced off."""
+    """The circle b meets a surface that moves with (wx, wy): what becomes of it, and the surface; NOBODY's if it bounced."""
     resting, from_x, from_y = b.resting, b.from_x, b.from_y
     # As the surface sees it: how fast it is, and how far it went.
     b = noted(moved(b, b.x, b.y, b.vx - wx, b.vy - wy, from_x + h * wx, from_y + h * wy), 0)
@@ -185,7 +185,7 @@ def _in_wide_corner(b, old, new, x, y, vx, vy):
     """The circle b meets two surfaces in a wide corner: (what becomes of it, whether both hold it).
 
     x, y, vx, vy: where it was, and how fast, before it met the first. Both hold it if each has to push it then to satisfy both;
-    one after the other, the second would have pushed it off the first. Who comes faster than gravity makes it in a substep is not held.
+    one after the other, the second would have pushed it off the first. Who comes faster than a substep of gravity is not held.
     """
     dot = old.nx * new.nx + old.ny * new.ny
     square = 1.0 - dot * dot
@@ -225,7 +225,9 @@ def _travel(b, px, py, segments, bodies, until, x0, y0, cell, columns, rows, sta
     last = older = Surface(0.0, 0.0, 0.0, 0.0, NOBODY)
     for number in range(MEETINGS + 1):
         qx, qy = b.x, b.y
-        time, gap, depth, nx, ny, k = search(segments, x0, y0, cell, columns, rows, start, entries, number == 0, px, py, qx, qy, size)
+        time, gap, depth, nx, ny, k = search(
+            segments, x0, y0, cell, columns, rows, start, entries, number == 0, px, py, qx, qy, size
+        )
         least = tolerance(qx, qy, b.radius)
         if k >= 0:
             segment, body = segments[k], bodies[segments[k].body]
