@@ -73,7 +73,7 @@ def _wide(b):
 
 @kernel
 def _unrounded(x, before, v, a, h, drop, step):
-    """Where the integrator has put a coordinate, without its rounding; x itself if others have moved it too. step: of rounding."""
+    """Where the integrator has put a coordinate, unrounded; x itself if others have moved it too. step: of rounding."""
     exact = before + h * (v - (1.0 - drop) * h * a)
     return exact if abs(exact - x) <= step * (abs(x) + abs(before)) else x
 
