@@ -236,3 +236,28 @@ def test_a_chain_without_contacts_is_watched(monkeypatch: pytest.MonkeyPatch) ->
     lone.obstacles.append(pv.Segment((-5, 0), (5, 0)))
     lone.step(1 / 60)
     assert watched == [None, None]
+
+
+@pytest.mark.parametrize("room", [pv.Box((-3, -3), (3, 3)), pv.Circle(radius=3)])
+@pytest.mark.parametrize("gravity", [(0, -G), (0, 0)])
+def test_circles_added_to_a_crowd_that_moves_raise_no_energy(gravity: tuple[float, float], room: pv.Boundary) -> None:
+    # On top of others, and with rims beyond the wall. Energy of the scale m g H + kinetic, with 9.81 m/s^2 where there is none.
+    rng = np.random.default_rng(4)
+    world = pv.World(gravity=gravity, boundary=room, threads=1)
+
+    def scatter(count: int) -> pv.Group:
+        angle, out = rng.uniform(0, 2 * np.pi, count), 2.99 * np.sqrt(rng.uniform(0, 1, count))
+        return world.add(
+            position=out[:, None] * np.column_stack((np.cos(angle), np.sin(angle))), radius=rng.uniform(0.1, 0.4, count)
+        )
+
+    scatter(60)
+    world.run(seconds=0.5)
+    for _ in range(4):
+        new = scatter(40)
+        assert (np.hypot(*new.position.T) + new.radius <= 3 * (1 + 1e-3)).all() or isinstance(room, pv.Box)
+        for _ in range(4):
+            before = world.energy()
+            world.step(1 / 60)
+            scale = len(world) * 9.81 * 6 + before.kinetic
+            assert world.energy().total - before.total < 1e-4 * scale

@@ -89,6 +89,10 @@ REST_ACCELERATIONS: Final = 4.0
 """An approach slower than this many |a| h is contact at rest, not an impact: 0.08 m/s under gravity at 480 substeps a second. One
 substep of gravity is 1. Four times as much settled the scene `box` no better."""
 
+STANDS_OUT: Final = 1e-3
+"""Of its radius: who is added with more of it beyond a wall is put at the wall. To be lifted there by the first frame would give
+energy that nothing has lost. Less is what coordinates are rounded by."""
+
 SLEEP_SPEED: Final = 0.02
 """Of sqrt(g r): circles slower than this are calm, 0.04 m/s at a radius of 0.5 m. Box2D has 0.05 m/s for all."""
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.constants import STANDS_OUT
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import bounds, frame, meetings
 from pyverlet.state.state import Slots
@@ -52,6 +53,10 @@ class Boundary(ABC):
     @abstractmethod
     def outside(self, position: Array) -> Array:
         """(n,) bool, which of these centres are outside."""
+
+    def put_in(self, position: Array, radius: Array) -> Array:
+        """(n, 2) these places, but at the wall where a rim would stand out of it by more than STANDS_OUT; for who is added."""
+        return position
 
     @abstractmethod
     def check(self, radius: Array) -> None:
@@ -148,6 +153,13 @@ class Circle(_Walls):
         x, y = (position.astype(np.float64) - self.center).T
         return np.asarray(np.hypot(x, y) > self.radius)
 
+    def put_in(self, position: Array, radius: Array) -> Array:
+        away = position - np.asarray(self.center, position.dtype)
+        distance, room = np.hypot(*away.T), np.maximum(self.radius - radius, 0)
+        out = distance > room + STANDS_OUT * radius
+        part = np.divide(room, distance, out=np.ones_like(distance), where=out)
+        return np.where(out[:, None], (self.center + part[:, None] * away).astype(position.dtype), position)
+
     def check(self, radius: Array) -> None:
         _fits(radius, self.radius, f"the radius of the cage, {self.radius:g} m")
 
@@ -201,6 +213,11 @@ class Box(_Walls):
     def outside(self, position: Array) -> Array:
         inside = (position >= self.lower) & (position <= self.upper)
         return np.asarray(~inside.all(axis=1))
+
+    def put_in(self, position: Array, radius: Array) -> Array:
+        inside = np.clip(position, self.lower + radius[:, None], self.upper - radius[:, None])
+        out = np.abs(inside - position) > STANDS_OUT * radius[:, None]
+        return np.where(out, inside.astype(position.dtype), position)
 
     def check(self, radius: Array) -> None:
         half = 0.5 * min(self.upper[0] - self.lower[0], self.upper[1] - self.lower[1])

@@ -52,7 +52,7 @@ class Particles:
         """Add particles.
 
         Args:
-            position: (n, 2) or (2,), centres, m.
+            position: (n, 2) or (2,), centres, m. Circles of which a part would stand out of the room are put at its wall.
             velocity: (n, 2), (2,) or 0, m/s.
             radius: (n,) or one for all, m, greater than 0.
             mass: (n,) or one for all, kg, greater than 0; infinity pins the particle. 1 unless a density is given.
@@ -63,8 +63,8 @@ class Particles:
             friction: (n,) or one for all, mu, 0 or more; None: as for restitution. The geometric mean of two counts, as in Box2D.
             category: (n,) or one for all, 32 bits: what these circles are.
             mask: (n,) or one for all, 32 bits: two circles collide if each has a bit of its category in the other's mask.
-            allow_overlap: take centres inside an obstacle or outside the room too, which get out, or in, at once. Circles on top
-                of each other need no leave: they part slowly.
+            allow_overlap: leave circles where they are said to be, inside an obstacle and outside the room too: the first frame
+                gets them out, or in. Circles on top of each other need no leave: they part slowly.
 
         Returns:
             A handle whose arrays are views on these particles, in the order given.
@@ -101,7 +101,9 @@ class Particles:
         checks.positive("mass", values["mass"], infinite_is="pinned")
         self.boundary.check(values["radius"])
         if not allow_overlap:
-            self._refuse_misplaced(where, np.isfinite(values["mass"]))
+            free = np.isfinite(values["mass"])
+            self._refuse_misplaced(where, free)
+            values["position"] = np.where(free[:, None], self.boundary.put_in(where, values["radius"]), where)
         return Group(self._state, self._state.append(values), self.remove)
 
     def is_free(self, position: ArrayLike) -> NDArray[np.bool_]:

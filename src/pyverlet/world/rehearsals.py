@@ -44,6 +44,7 @@ def rehearse(world: World) -> None:
         _link(small)
     if world.obstacles:
         small.obstacles.append(Segment((0, 0), (1, 0)))
+        small.is_free((0, 0))
     _use(small)
     if len(world) >= FUSED_FROM:
         _fuse(world)

@@ -33,6 +33,8 @@ class Course:
         self._moving: list[int] = []
         self._binned_for = -1.0  # largest radius the cells were filled for; negative: fill them anew
         self._cells: tuple[Any, ...] = ()
+        self._order: Array | None = None
+        self._rest = np.empty((0, 2))  # what rounding has taken from places in the substep before
 
     def __bool__(self) -> bool:
         return bool(self._obstacles)
@@ -98,7 +100,10 @@ class Course:
         if len(state.along) != len(state):
             state.along = np.empty_like(state.position)
         walls = np.array(room.walls(), float)
-        collide(self._segments, self._bodies, time + h, *self._cells, walls, state.along, *state.bodies(), *numbers, state.drop)
+        if time == 0.0 or self._order is not state.particle:  # every new order is a new array
+            self._order, self._rest = state.particle, np.zeros_like(state.position)
+        taken = (walls, state.along, self._rest)
+        collide(self._segments, self._bodies, time + h, *self._cells, *taken, *state.bodies(), *numbers, state.drop)
 
     def end(self, dt: float) -> None:
         """At the end of a frame that went well: the obstacles are where they moved to."""
