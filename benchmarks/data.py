@@ -159,5 +159,8 @@ def main(particles: int) -> bool:
         for part in parts:
             for line in part():
                 lines.append(line)
-                print(f"{line.name:<36}{line.asked:>14}{line.measured:>14}{'' if line.holds in (True, None) else '  NOT HELD'}")
+                print(
+                    f"{line.name:<36}{line.asked:>14}{line.measured:>14}{'' if line.holds in (True, None) else '  NOT HELD'}",
+                    flush=True,
+                )
     return bool(np.all([line.holds is not False for line in lines])) or small

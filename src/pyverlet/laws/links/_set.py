@@ -214,7 +214,10 @@ class Links:
     def scatter(self) -> None:
         """The frame is good: what it did to the links holds."""
         for pool in self._order:
+            intact = pool.rows["intact"].copy() if len(self._broken) else None
             pool.end()
+            # Packed anew now, as it would be after `restore`: what is broken is part of no chain.
+            pool.stale |= intact is not None and not np.array_equal(intact, pool.rows["intact"])
         self.broken = self._broken
         self._apart_stale |= bool(len(self.broken))
 
