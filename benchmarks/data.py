@@ -160,7 +160,7 @@ def main(particles: int) -> bool:
             for line in part():
                 lines.append(line)
                 print(
-                    f"{line.name:<36}{line.asked:>14}{line.measured:>14}{'' if line.holds in (True, None) else '  NOT HELD'}",
+                    f"{line.name:<36}{line.asked:>14}{line.measured:>14}{'  NOT HELD' if line.holds is False and not small else ''}",
                     flush=True,
                 )
     return bool(np.all([line.holds is not False for line in lines])) or small
