@@ -159,5 +159,6 @@ def main(particles: int) -> bool:
         for part in parts:
             for line in part():
                 lines.append(line)
-                print(f"{line.name:<36}{line.asked:>14}{line.measured:>14}{'' if line.holds in (True, None) else '  NOT HELD'}")
+                verdict = "  NOT HELD" if line.holds is False and not small else ""
+                print(f"{line.name:<36}{line.asked:>14}{line.measured:>14}{verdict}", flush=True)
     return bool(np.all([line.holds is not False for line in lines])) or small

@@ -64,7 +64,7 @@ def slope(k: float) -> float:
     out = np.array((1.0, 2.0)) / np.sqrt(5)
     disc = w.add(position=(np.array((2.0, 9.0)) + 0.3 * out) * k, radius=0.3 * k)
     w.run(seconds=1)
-    return float(np.hypot(*disc.velocity[0])) / (G * k) * 1.5 * np.sqrt(5)
+    return float(np.hypot(*disc.velocity[0]) / (G * k) * 1.5 * np.sqrt(5))
 
 
 def settled(k: float) -> tuple[float, float, float]:

@@ -23,6 +23,7 @@ from pyverlet.laws.contacts.slips import Kept
 from pyverlet.laws.events import CONTACT, HIT, Events
 from pyverlet.laws.ledger import Bookkeeper, Ledger
 from pyverlet.laws.links._set import BROKEN
+from pyverlet.laws.links._work import Past
 from pyverlet.laws.sleep import Sleep, laws
 from pyverlet.world.saved import Saved
 from pyverlet.world.world import World
@@ -33,11 +34,15 @@ Facts = Mapping[str, Any]
 _MOST = 2**53
 """Counts beyond this are no counts."""
 
+_WHO, _HOW = ("a", "b", "wall", "obstacle"), ("speed", "point", "normal", "impulse")
+"""Fields of `events.HIT`."""
+
 PARTICLES = {
     "position": Field(None, "particles", 2),
     "velocity": Field(None, "particles", 2),
     "acceleration": Field(None, "particles", 2, nan=True),
     "spin": Field(None, "particles"),
+    "angle": Field(np.float64, "particles"),
     "grown": Field(None, "particles", above=0, most=1),
     "radius": Field(None, "particles", above=0),
     "mass": Field(None, "particles", above=0, infinite=True),
@@ -74,20 +79,27 @@ CONTACTS = {
 
 NEWS = {
     "touching": Field(np.int64, "touching", least=0, order="ascending"),
-    "begin": Field(np.int64, "begin", 2, least=-1),
+    "begin": Field(np.int64, "begin", 4, least=-1),
+    "begin_how": Field(np.float64, "begin", 6),
     "end": Field(np.int64, "end", 2, least=-1),
-    "hit": Field(np.int64, "hit", 2, least=-1),
-    "hit_speed": Field(np.float64, "hit", least=0),
     "broken": Field(np.int64, "broken", 4, least=-1),
     "broken_force": Field(np.float64, "broken", infinite=True),
     "islands": Field(np.int64, "islands", least=0, order="ascending"),
     "members": Field(np.int64, "islands", least=1),
 }
-"""What happened in the last frame, and who sleeps."""
+"""What happened in the last frame, and who sleeps. Of `begin` a, b, wall and obstacle; speed, point (2), normal (2), impulse."""
+
+LINKED = {
+    "number": Field(np.int64, "linked", least=0, most=2**31, order="ascending"),
+    "start": Field(np.float64, "linked", 2),
+    "left": Field(None, "linked", 2),
+    "calm": Field(np.float64, "linked", nan=True),
+}
+"""What links remember of the particles they join."""
 
 FIELDS = {
     f"{room}.{name}": field
-    for room, fields in (("particles", PARTICLES), ("slots", SLOTS), ("contacts", CONTACTS), ("news", NEWS))
+    for room, fields in (("particles", PARTICLES), ("slots", SLOTS), ("contacts", CONTACTS), ("news", NEWS), ("linked", LINKED))
     for name, field in fields.items()
 }
 
@@ -125,6 +137,8 @@ def take_apart(world: World) -> Parts:
     if len(broken):
         arrays["news.broken"] = np.column_stack([broken[name] for name in ("link", "row", "i", "j")])
         arrays["news.broken_force"] = broken["force"].copy()
+    if (past := saved.links[4]) is not None:
+        arrays |= {f"linked.{name}": column.copy() for name, column in past._asdict().items()}
     return Parts(facts, arrays)
 
 
@@ -165,7 +179,8 @@ def put_together(world: World, parts: Parts) -> Saved:
         InputError: a number is not what it must be.
     """
     facts, h_last = parts.facts, parts.facts.get("h_last")
-    links, pools, _, _ = world.links.save()
+    links, pools, *_ = world.links.save()
+    past = Past(*(parts.arrays[f"linked.{name}"] for name in LINKED)) if "linked.number" in parts.arrays else None
     return Saved(
         world=world._state,
         arrays={name: parts.arrays[f"particles.{name}"] for name, _ in world._state.arrays()},
@@ -179,7 +194,7 @@ def put_together(world: World, parts: Parts) -> Saved:
         sleep=_sleep(world, facts["sleep"], parts.arrays) if world._sleep else None,
         obstacles=world.obstacles.save(),
         actors=[(actor, actor.save()) for actor in world.actors],
-        links=(links, pools, _broken(parts.arrays), bool(facts.get("apart_changed"))),
+        links=(links, pools, _broken(parts.arrays), bool(facts.get("apart_changed")), past),
     )
 
 
@@ -263,21 +278,23 @@ def _books(facts: Facts) -> Bookkeeper:
 
 def _events_apart(events: Events, arrays: dict[str, Array]) -> None:
     arrays["news.touching"] = events._touching
-    for name in ("begin", "end", "hit"):
-        rows = getattr(events, name)
-        arrays[f"news.{name}"] = np.column_stack((rows["a"], rows["b"]))
-    arrays["news.hit_speed"] = events.hit["speed"].copy()
+    arrays["news.end"] = np.column_stack((events.end["a"], events.end["b"]))
+    arrays["news.begin"] = np.column_stack([events.begin[name] for name in _WHO])
+    arrays["news.begin_how"] = np.column_stack([events.begin[name] for name in _HOW])
 
 
 def _events(facts: Facts, arrays: dict[str, Array]) -> Events:
     events = Events()
     events.hit_speed = facts["hit_speed"]
     events._touching = arrays["news.touching"]
-    for name, dtype in (("begin", CONTACT), ("end", CONTACT), ("hit", HIT)):
-        rows = np.zeros(len(arrays[f"news.{name}"]), dtype)
-        rows["a"], rows["b"] = arrays[f"news.{name}"].T
-        setattr(events, name, rows)
-    events.hit["speed"] = arrays["news.hit_speed"]
+    events.end = np.zeros(len(arrays["news.end"]), CONTACT)
+    events.end["a"], events.end["b"] = arrays["news.end"].T
+    events.begin, how = np.zeros(len(arrays["news.begin"]), HIT), arrays["news.begin_how"]
+    for name, column in zip(_WHO, arrays["news.begin"].T, strict=True):
+        events.begin[name] = column
+    events.begin["speed"], events.begin["point"], events.begin["normal"] = how[:, 0], how[:, 1:3], how[:, 3:5]
+    events.begin["impulse"] = how[:, 5]
+    events.hit = events.begin[events.begin["speed"] >= events.hit_speed]
     return events
 
 
