@@ -121,7 +121,11 @@ def main() -> None:
     """Print one table for each number of particles; write them all as CSV if asked to."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument(
-        "table", nargs="?", choices=("speed", "physics", "own", "page", "materials", "data"), default="speed", help="what to compare"
+        "table",
+        nargs="?",
+        choices=("speed", "physics", "own", "page", "materials", "data"),
+        default="speed",
+        help="what to compare",
     )
     parser.add_argument("--particles", type=int, nargs="+", help="discs in the cage: 2000 20000 for speed, 2000 for physics")
     parser.add_argument("--frames", type=int, default=60, help="frames measured for each engine")

@@ -1,7 +1,7 @@
 """What circles may be made of, and what a world may be asked to do, beside the smooth heap: `python -m benchmarks materials`.
 
-One settled heap for all, laid out anew for each material and settled again; all take turns in one process, so that the machine's moods
-hit them alike. A ratio is that of the quartiles of the faster frames. Overlap stands beside each.
+One settled heap for all, laid out anew for each material and settled again; all take turns in one process, so that the machine's
+moods hit them alike. A ratio is that of the quartiles of the faster frames. Overlap stands beside each.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ import pyverlet as pv
 from pyverlet.compile.lanes import LANES
 from pyverlet.ground.constants import DEEP, DEEP_PART, DEEP_SWEEPS, FED, GRIP, LARGEST_PUSH, PUSHED
 from pyverlet.kernels.bounds import impact_time
-from pyverlet.kernels.contact import Law
+from pyverlet.kernels.tables import Law
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.wide import Wide
 from pyverlet.state.state import Slots

@@ -154,8 +154,8 @@ def test_they_change_nothing_and_are_refused_where_they_are_off() -> None:
 def test_a_hit_says_where_how_and_on_what() -> None:
     # J = (1 + e) m v at walls and obstacles, (1 + e) v m1 m2 / (m1 + m2) between circles; the larger e of two counts.
     world = pv.World(
-        gravity=(0, 0), boundary=pv.Box((-9, -9), (9, 9), restitution=0.5), collisions=pv.Collisions(restitution=0.25), events=True,
-        dtype=np.float64,
+        gravity=(0, 0), boundary=pv.Box((-9, -9), (9, 9), restitution=0.5), collisions=pv.Collisions(restitution=0.25),
+        events=True, dtype=np.float64,
     )  # fmt: skip
     world.obstacles += [pv.Disc((5, -5), 1), pv.Segment((-5, -8), (0, -8), restitution=1.0)]
     world.add(

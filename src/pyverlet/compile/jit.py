@@ -255,8 +255,8 @@ def driver(function: Callable[..., Any], **stages: Kernel) -> Kernel:
     """Compile on first call a function that calls kernels: all on one thread, or each with its loops over threads.
 
     It has no `prange` of its own. It calls kernels, and other drivers, by names of its module, not as `module.kernel`. A stage
-    that is to stay on one thread in any case is called by a name for `stage.alone`. `stages`: what some of these names are; so one
-    function serves as several drivers.
+    that is to stay on one thread in any case is called by a name for `stage.alone`. `stages`: what some of these names are; so
+    one function serves as several drivers.
     """
     if stages:
         function = _bound(function, stages, "_" + "_".join(stage.function.__name__ for stage in stages.values()))

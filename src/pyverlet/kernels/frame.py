@@ -1,7 +1,8 @@
-"""Substeps one after the other, without Python in between: what `World._frame` does stage by stage, as long as nothing is asked of it.
+"""Substeps one after the other, without Python in between: what `World._frame` does stage by stage, as long as nothing is asked
+of it.
 
-A substep is left for Python when the list of pairs may no longer be good, and when it is the last. The names are those of the stages in
-`world.profile`. A frame is compiled for a kind of room: `frames` has one for each.
+A substep is left for Python when the list of pairs may no longer be good, and when it is the last. The names are those of the
+stages in `world.profile`. A frame is compiled for a kind of room: `frames` has one for each.
 """
 
 from __future__ import annotations
@@ -11,8 +12,9 @@ from pyverlet.compile.jit import driver, parallel_kernel, prange
 from pyverlet.compile.lanes import copy_row
 from pyverlet.kernels.bounds import box, circle
 from pyverlet.kernels.cage import hold
-from pyverlet.kernels.contact import Circles, Law, Pairs, push, relax
 from pyverlet.kernels.motion import leap
+from pyverlet.kernels.sweeps import push, relax
+from pyverlet.kernels.tables import Circles, Law, Pairs
 
 CONTACTS, BOUNDS, VELOCITIES, INTEGRATE = 1, 2, 3, 4
 STAGES = ("contacts", "bounds", "velocities", "integrate")
@@ -46,7 +48,8 @@ def smooth_cage(room, circles, law, claims):
     """(x, y, radius) of a round room without restitution and friction, around circles that have none either."""
     hold(
         room[0], room[1], room[2], circles.position, circles.velocity, circles.acceleration, circles.radius, circles.inverse_mass,
-        circles.resting, circles.hits, law.h, law.lag, law.rest_speed, 1 - law.arrives, circles.origin, circles.moved, law.feed, claims,
+        circles.resting, circles.hits, law.h, law.lag, law.rest_speed, 1 - law.arrives, circles.origin, circles.moved, law.feed,
+        claims,
     )  # fmt: skip
 
 
@@ -64,9 +67,9 @@ def cage(room, circles, law, claims):
 def four_walls(room, circles, law, claims):
     """(x0, y0, x1, y1, e, mu) of a box."""
     box(
-        room[0], room[1], room[2], room[3], circles.position, circles.velocity, circles.acceleration, circles.spin, circles.radius,
-        circles.inverse_mass, circles.restitution, circles.friction, circles.fed, circles.resting, circles.hits, circles.spent,
-        circles.start, circles.turn, circles.lift, law.h, law.lag, room[4], room[5], law.rest_speed,
+        room[0], room[1], room[2], room[3], circles.position, circles.velocity, circles.acceleration, circles.spin,
+        circles.radius, circles.inverse_mass, circles.restitution, circles.friction, circles.fed, circles.resting, circles.hits,
+        circles.spent, circles.start, circles.turn, circles.lift, law.h, law.lag, room[4], room[5], law.rest_speed,
     )  # fmt: skip
 
 
@@ -88,8 +91,8 @@ def still(circles, pairs, law, cut, marks, claims):
 def _substeps(substep, stop, last, circles, pairs, law, room, cut, looks, sets_out, checked, far, claims, spent, clock):
     """From after the integration of `substep`, whose list of pairs is good, up to the end of substep `stop` - 1.
 
-    last: the substep whose end is that of the frame. circles, pairs, law: `kernels.contact`. looks, sets_out: as for `push`, in the
-    first substep. checked, far: as for `leap`. spent, clock: as for `note`, (address, tick).
+    last: the substep whose end is that of the frame. circles, pairs, law: `kernels.tables`. looks, sets_out: as for `push`, in
+    the first substep. checked, far: as for `leap`. spent, clock: as for `note`, (address, tick).
 
     Returns the substep that is next, and whether it has been integrated and the list of pairs needs a look.
     """

@@ -23,8 +23,9 @@ from typing import Any, NamedTuple
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.kernels.cage import hold_some
-from pyverlet.kernels.contact import Circles, Law, Pairs, mark_strip, push_strip, refine_strip, relax_strip
+from pyverlet.kernels.contact import mark_strip, push_strip, refine_strip, relax_strip
 from pyverlet.kernels.motion import any_strayed, arrive, kick_drift, set_out
+from pyverlet.kernels.tables import Circles, Law, Pairs
 
 BEHIND = 5
 """Strips by which the last stage is behind the first, and that a border leaves for later on both of its sides."""
@@ -33,8 +34,8 @@ BEHIND = 5
 class Strips(NamedTuple):
     """Where the circles of strip s stand, from held[s] to held[s + 1], and where it keeps its normals until they have been used.
 
-    `looks`: deep packs are to be noted. `leaps`: the next substep is to be begun, under the same acceleration. `marks`: who touches is to be marked as resting. `far`:
-    square of the distance that a circle may be from `checked` after a leap, m^2.
+    `looks`: deep packs are to be noted. `leaps`: the next substep is to be begun, under the same acceleration. `marks`: who
+    touches is to be marked as resting. `far`: square of the distance that a circle may be from `checked` after a leap, m^2.
     """
 
     held: Any
@@ -127,7 +128,8 @@ def _border(s, circles, pairs, law, room, strips):
 def substep(cut, circles, pairs, law, room, strips):
     """From after the integration of a substep to its end, or to after that of the next; whether anyone has strayed in that.
 
-    room: (x, y, radius). cut: (threads + 1,) even strip each thread begins with, at least 2 * BEHIND + 2 apart, and the number of strips.
+    room: (x, y, radius). cut: (threads + 1,) even strip each thread begins with, at least 2 * BEHIND + 2 apart, and the number of
+    strips.
     """
     circles, pairs, law, strips = Circles(*circles), Pairs(*pairs), Law(*law), Strips(*strips)
     strayed = 0

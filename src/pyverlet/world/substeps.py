@@ -1,8 +1,8 @@
 """Substeps that need nothing of Python: gone through in one call (`kernels.frame`), until somebody wants to look.
 
-Under gravity alone accelerations are known after the first substep, and a call goes on until the list of pairs may be stale or the
-frame is over. Where forces, or who looks on, are asked in every substep, it is contacts, room and velocities of one. Smooth worlds too
-large for the processor's caches go strip by strip (`kernels.fused`).
+Under gravity alone accelerations are known after the first substep, and a call goes on until the list of pairs may be stale or
+the frame is over. Where forces, or who looks on, are asked in every substep, it is contacts, room and velocities of one. Smooth
+worlds too large for the processor's caches go strip by strip (`kernels.fused`).
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ class Substeps:
         self.leapt, self.marked = leaps and substep < last, substep == last
         looks, far = wide.takes_looks(marks=self.marked), state.real(strips.allowed * strips.allowed)
         about = (strips.held, self._place, looks, int(self.leapt), int(self.marked), strips.checked, far)
-        arrays = wide.arrays[: frame.NORMAL] + (self._normal,) + wide.arrays[frame.NORMAL + 1 :]
+        arrays = (*wide.arrays[: frame.NORMAL], self._normal, *wide.arrays[frame.NORMAL + 1 :])
         strayed = fused.substep(self._cut, wide.circles, arrays, wide.law, tuple(map(state.real, room)), about)
         contacts.broad_phase.strayed = bool(strayed) if self.leapt else None
         world.profile.mark("fused")

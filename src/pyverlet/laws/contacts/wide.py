@@ -1,4 +1,4 @@
-"""The contacts of circles, eight pairs at a time: the pairs of a list in packs, what they are made of, and the two sweeps over them."""
+"""The contacts of circles, eight pairs at a time: the pairs of a list in packs, what they are made of, and the two sweeps."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from pyverlet.compile import jit
 from pyverlet.compile.lanes import LANES
 from pyverlet.ground import memory
 from pyverlet.ground.constants import CARRIED_WEIGHT, COLOURS, FED, LARGEST_PUSH, PUSHED
-from pyverlet.kernels import contact, frame, packs
+from pyverlet.kernels import frame, packs, sweeps, tables
 from pyverlet.kernels.bounds import CARRIES
 from pyverlet.laws.contacts.broadphase import PairList, rows_of
 from pyverlet.state.state import Slots
 
 Array = NDArray[Any]
 
-_ROWS = len((contact.E, contact.MU, contact.R_I, contact.R_J, contact.TURN_I, contact.TURN_J, contact.MASS))
+_ROWS = tables.MASS + 1
 
 
 class Wide:
@@ -33,7 +33,7 @@ class Wide:
         gap: (2, room) from i to j when the list was made, m.
         origin: (n, 2) where circles were then. moved: (n, 2) how far they have come since.
         reach, share: m, and what part of a push moves i; one for each lane, or (LANES,) if they are the same for all.
-        made_of: (7, room) or (7, LANES) what each pair is made of: rows of `kernels.contact`.
+        made_of: (7, room) or (7, LANES) what each pair is made of: rows of `kernels.tables`.
         normal: (2, room) of pairs that touch, for others 0. depth: (room,) their overlap, m.
         slip: (room,) what contacts have slipped, m. held: (room,) m by which friction has answered it in this substep.
         closing: (room,) largest speed of approach since the last `collect`, m/s; negative: has not touched.
@@ -184,8 +184,9 @@ class Wide:
         )  # fmt: skip
         carried = CARRIED_WEIGHT * strongest * h if strongest > 0 else np.inf
         self.law = (
-            self._varied, self._mixed, int(self.asks), int(self.rubs), int(self._listens), int(accounts), int(arrives or self.asks),
-            *state.reals(h, lag, FED / PUSHED / h, LARGEST_PUSH, rest_speed), int(strongest > 0), state.real(carried),
+            self._varied, self._mixed, int(self.asks), int(self.rubs), int(self._listens), int(accounts),
+            int(arrives or self.asks), *state.reals(h, lag, FED / PUSHED / h, LARGEST_PUSH, rest_speed), int(strongest > 0),
+            state.real(carried),
         )  # fmt: skip
         self.arrays = (
             self.begin, self.lanes, self.apart, self.lane_i, self.lane_j, self.gap, self.reach, self.share, self.made_of,
@@ -193,7 +194,7 @@ class Wide:
         )  # fmt: skip
 
     def takes_looks(self, *, marks: bool) -> int:
-        """Whether the sweep that is next is to note who overlaps deeply, which it does once a frame; `marks`: this is the last."""
+        """Whether the next sweep is to note who overlaps deeply, which it does once a frame; `marks`: it is the last."""
         looks, self._looks = int(self._looks or self.asks), marks
         return looks
 
@@ -207,7 +208,7 @@ class Wide:
 
     def mark_resting(self, state: Slots) -> None:
         """Note in `state.resting` who touches another."""
-        contact.mark_touching(self.lanes, self.begin, self.lane_i, self.lane_j, self.normal, state.resting, self.cut())
+        sweeps.mark_touching(self.lanes, self.begin, self.lane_i, self.lane_j, self.normal, state.resting, self.cut())
         self._looks = True
 
 
