@@ -5,7 +5,7 @@ then, with friction (`kernels.bounce`); other overlaps are pushed apart, and wha
 `relax_strip`, after the walls: approach and slip of those that touch are set to 0, as far as friction goes, and the slip is
 remembered.
 
-Pushes are added up in `moved`, how far each circle has come since the list was made; in the end that is put into the positions and,
+Pushes are added up in `moved`, how far each circle has come since the list was made; in the end that goes into the positions and,
 times a gain, into the velocities. So velocities in the first sweep are those of the motion, and an impact is what it would be
 alone.
 
