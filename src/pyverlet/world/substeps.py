@@ -56,27 +56,29 @@ class Substeps:
         `substep` itself: nothing has been done, for there is more to it than kernels.
         """
         out, self._out, self.leapt, state = self._out, None, False, world._slots
-        room, strips = world.boundary.compiled(state), contacts.steady(state)
-        if not (room and strips):
+        strips = contacts.steady(state)
+        if strips is None or world.boundary.compiled(state) is None:
             return substep
-        confine, shape = room
+        wide = contacts.set_up(state, h, lag, world._force_sum.strongest)
+        confine, shape = world.boundary.compiled(state)  # that circles rub is known by now
         smooth = confine is frame.smooth_cage
-        wide = contacts.set_up(state, h, lag, world._force_sum.strongest, arrives=not smooth)
+        if smooth:
+            wide.leave_arriving()
         last = world.substeps - 1
         leaps = world.integrator.leaps and not (world.forces or world.onlooker)  # who looks on may turn gravity
         if smooth and not wide.asks and len(state) >= FUSED_FROM and strips.in_order:
             return self._strip_by_strip(world, contacts, wide, strips, shape, substep, leaps=leaps)
-        stop = world.substeps if leaps else substep + 1
-        self.marked = stop > last
-        looks = wide.takes_looks(marks=self.marked)
+        stop, looks = world.substeps if leaps else substep + 1, wide.takes_looks()
         reached, self.leapt = frame.frames[confine](
             substep, stop, last, wide.circles, wide.arrays, wide.law, tuple(map(state.real, shape)), wide.cut(), looks,
             int(out is not wide.moved), strips.checked, state.real(strips.allowed * strips.allowed), state.claims(),
             world.profile.spent(frame.STAGES), (clock.address(), clock.tick()),
         )  # fmt: skip
+        self.marked = reached > last
+        if self.marked:
+            wide.has_marked()
         if self.leapt:
             contacts.broad_phase.strayed, self._out = True, wide.moved
-            self.marked = False
         contacts.broad_phase.aged(reached - substep - 1)
         return int(reached)
 
@@ -87,11 +89,13 @@ class Substeps:
         state, last = world._slots, world.substeps - 1
         self._share_out(strips, wide.lanes, state.dtype)
         self.leapt, self.marked = leaps and substep < last, substep == last
-        looks, far = wide.takes_looks(marks=self.marked), state.real(strips.allowed * strips.allowed)
+        looks, far = wide.takes_looks(), state.real(strips.allowed * strips.allowed)
         about = (strips.held, self._place, looks, int(self.leapt), int(self.marked), strips.checked, far)
         arrays = (*wide.arrays[: frame.NORMAL], self._normal, *wide.arrays[frame.NORMAL + 1 :])
         strayed = fused.substep(self._cut, wide.circles, arrays, wide.law, tuple(map(state.real, room)), about)
         contacts.broad_phase.strayed = bool(strayed) if self.leapt else None
+        if self.marked:
+            wide.has_marked()
         world.profile.mark("fused")
         return substep + 1
 

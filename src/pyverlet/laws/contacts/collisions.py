@@ -145,13 +145,13 @@ class ContactSolver:
         alone = self._eight(state) and self._sleep is None and state.size is state.radius
         return self.broad_phase.strips() if alone else None
 
-    def set_up(self, state: Slots, h: float, lag: float, strongest: float, *, arrives: bool = True) -> Wide:
-        """The pairs of now, with all that their sweeps need in this substep; `arrives` false: the room puts circles in place."""
+    def set_up(self, state: Slots, h: float, lag: float, strongest: float) -> Wide:
+        """The pairs of now, with all that their sweeps need in this substep."""
         wide = self._pack(state)
         if self._rubs(state):
             self._slips.start(wide, state.particle)
         rest_speed = REST_ACCELERATIONS * strongest * h
-        wide.set_up(state, h, lag, strongest, rest_speed, accounts=len(state.spent) > 0, arrives=arrives)
+        wide.set_up(state, h, lag, strongest, rest_speed, accounts=len(state.spent) > 0)
         return wide
 
     def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:

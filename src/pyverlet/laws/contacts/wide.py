@@ -19,6 +19,7 @@ from pyverlet.state.state import Slots
 Array = NDArray[Any]
 
 _ROWS = tables.MASS + 1
+_ARRIVES = tables.Law._fields.index("arrives")
 
 
 class Wide:
@@ -165,9 +166,7 @@ class Wide:
 
     # ---- a substep ---------------------------------------------------------------------------------------------------------
 
-    def set_up(
-        self, state: Slots, h: float, lag: float, strongest: float, rest_speed: float, *, accounts: bool, arrives: bool = True
-    ) -> None:
+    def set_up(self, state: Slots, h: float, lag: float, strongest: float, rest_speed: float, *, accounts: bool) -> None:
         """Everything that the sweeps of this substep, and of those that follow it alike, need: `circles`, `arrays` and `law`."""
         if not self.fits(state):
             self.fit(state)
@@ -185,7 +184,7 @@ class Wide:
         carried = CARRIED_WEIGHT * strongest * h if strongest > 0 else np.inf
         self.law = (
             self._varied, self._mixed, int(self.asks), int(self.rubs), int(self._listens), int(accounts),
-            int(arrives or self.asks), *state.reals(h, lag, FED / PUSHED / h, LARGEST_PUSH, rest_speed), int(strongest > 0),
+            1, *state.reals(h, lag, FED / PUSHED / h, LARGEST_PUSH, rest_speed), int(strongest > 0),
             state.real(carried),
         )  # fmt: skip
         self.arrays = (
@@ -193,14 +192,22 @@ class Wide:
             self.normal, self.depth, self.slip, self.held, self.closing, self._deep, self._deeps, self.spent,
         )  # fmt: skip
 
-    def takes_looks(self, *, marks: bool) -> int:
-        """Whether the next sweep is to note who overlaps deeply, which it does once a frame; `marks`: it is the last."""
-        looks, self._looks = int(self._looks or self.asks), marks
+    def leave_arriving(self) -> None:
+        """The room puts circles where pushes have moved them: one pass over the memory less."""
+        self.law = (*self.law[:_ARRIVES], int(self.asks), *self.law[_ARRIVES + 1 :])
+
+    def takes_looks(self) -> int:
+        """Whether the next sweep is to note who overlaps deeply, which it does once a frame."""
+        looks, self._looks = int(self._looks or self.asks), False
         return looks
+
+    def has_marked(self) -> None:
+        """Who rests has been marked in `state.resting`: the frame is over, and the next one looks anew."""
+        self._looks = True
 
     def push(self, state: Slots) -> None:
         """Impacts, overlaps and slips; circles are then where that has moved them."""
-        frame.project(self.circles, self.arrays, self.law, self.cut(), self.takes_looks(marks=False), 1, state.claims())
+        frame.project(self.circles, self.arrays, self.law, self.cut(), self.takes_looks(), 1, state.claims())
 
     def relax(self, state: Slots) -> None:
         """Touching circles neither approach nor slip."""
@@ -209,7 +216,7 @@ class Wide:
     def mark_resting(self, state: Slots) -> None:
         """Note in `state.resting` who touches another."""
         sweeps.mark_touching(self.lanes, self.begin, self.lane_i, self.lane_j, self.normal, state.resting, self.cut())
-        self._looks = True
+        self.has_marked()
 
 
 def _differ(values: Array) -> bool:
