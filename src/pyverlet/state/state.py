@@ -24,8 +24,7 @@ _ROWS = ("position", "velocity", "acceleration")
 _SET = ("radius", "mass", "restitution", "friction")
 _COLUMNS = ("spin", "grown", *_SET)
 _MARKS = ("category", "mask")
-_GIVEN = (*_SET, *_MARKS)
-_LISTED = ("radius", "mass", *_MARKS)
+_GIVEN, _LISTED = (*_SET, *_MARKS), ("radius", "mass", *_MARKS)
 
 EVERYONE = 0xFFFFFFFF
 """A mask of 32 bits that takes every category."""
@@ -157,15 +156,12 @@ class Slots:
         drop: a circle at rest falls drop * a h^2 in a substep; depends on the integrator.
         fed: (n,) bits: CARRIES where a contact at rest fed the velocity in the last substep, AT_WALL where a wall was touched
             in it, CARRIED and WAS_AT_WALL the same in the one before. Kept only if circles bounce.
-        island: (n,) number of the island a sleeping particle belongs to, -1 for those awake. calm: (n,) seconds it has been so.
-            Both are empty where nobody may sleep.
+        island, calm: (n,) number of a sleeper's island, -1 if awake, and s it has been calm; empty where nobody may sleep.
         lean: times -a h it is the velocity with which circles at rest against others end a substep; 0 until contacts say so.
         resting: (n,) bits of `kernels.motion`: who held it in the last substep, a wall or, after a frame, another particle.
         hits: (n,) largest speed with which the circle met a wall in this frame, m/s; negative: none.
-        spent: (n, 2) energy that impacts on walls, and friction there, have taken in this frame, J, negative: to be summed, for
-            rows stay where they are when slots are reordered. Empty unless somebody keeps account.
-
-        taken: what the energy limiter has taken in this frame, J.
+        spent: (n, 2) J that impacts on walls, and friction there, have taken in this frame, negative: to be summed, for rows stay
+            where they are when slots are reordered; empty unless somebody keeps account. taken: J, by the energy limiter.
 
     Args:
         sleeps: whether particles may sleep.
@@ -176,8 +172,7 @@ class Slots:
         self.real = lru_cache(64)(dtype.type)
         self.reals = lru_cache(64)(lambda *numbers: tuple(map(dtype.type, numbers)))
         self._kept: dict[str, Array] = {}
-        self.drop, self.lean, self.total_mass, self.taken = 1.0, 0.0, 0.0, 0.0
-        self.given = 0
+        self.drop, self.lean, self.total_mass, self.taken, self.given = 1.0, 0.0, 0.0, 0.0, 0
         self.claims = Claims()
         self._resize(0)
 

@@ -123,7 +123,9 @@ def take_apart(world: World) -> Parts:
     arrays |= {f"slots.{name}": column for name, column in saved.slots.items()}
     facts["contacts"] = None if saved.contacts is None else _contacts_apart(saved.contacts, arrays)
     if saved.books:
-        facts["books"] = {"energy": saved.books._energy, "ledger": saved.books.ledger.as_dict()}
+        facts["books"] = {
+            "energy": saved.books._energy, "resting": saved.books._resting, "ledger": saved.books.ledger.as_dict(),
+        }  # fmt: skip
     if saved.events:
         facts["hit_speed"] = saved.events.hit_speed
         _events_apart(saved.events, arrays)
@@ -270,7 +272,7 @@ def _list(world: World, facts: Facts | None, arrays: dict[str, Array]) -> Any:
 
 def _books(facts: Facts) -> Bookkeeper:
     books = Bookkeeper()
-    books._energy = checks.number("energy", facts["energy"])
+    books._energy, books._resting = (checks.number(name, facts[name]) for name in ("energy", "resting"))
     accounts = Ledger().as_dict()
     books.ledger = Ledger(**{name: checks.number(name, facts["ledger"][name]) for name in accounts})
     return books

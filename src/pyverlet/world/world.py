@@ -127,8 +127,7 @@ class World(Measures, Queries, Doors):
         compiled = contacts and not (links or course) and done == self.profile.mark
         if not self._open(h, done):
             return
-        watch = Watch(self._state, forces, self.links, self.boundary) if parts and undriven(self, h, self._h_last) else None
-        substep = 0
+        watch, substep = self._watch(h) if parts else None, 0
         while substep < self.substeps:
             self._show(substep, h, lag)
             if not run.leapt:
@@ -161,6 +160,10 @@ class World(Measures, Queries, Doors):
             substep += 1
         self._finish(contacts, watch, h, marked=run.marked)
         done("finish")
+
+    def _watch(self, h: float) -> Watch | None:
+        """Who looks after the energy of this frame, if nothing but contacts and links could raise it."""
+        return Watch(self._state, self._force_sum, self.links, self.boundary) if undriven(self, h, self._h_last) else None
 
     def run(self, *, seconds: float, dt: float = 1 / 60) -> None:
         """Advance by as many frames of dt as come nearest to `seconds`."""
