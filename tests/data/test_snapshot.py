@@ -182,8 +182,8 @@ def test_what_a_world_says_of_itself_is_kept(make: Callable[[], pv.World], tmp_p
     if world.keeps_ledger:
         assert again.ledger == world.ledger
     if world.tells_events:
-        assert again.events.hit.tolist() == world.events.hit.tolist()
-        assert again.events.begin.tolist() == world.events.begin.tolist()
+        assert again.events.hit.tobytes() == world.events.hit.tobytes()
+        assert again.events.begin.tobytes() == world.events.begin.tobytes()
 
 
 def test_features_have_something_to_remember() -> None:

@@ -178,7 +178,7 @@ def changed(change: Any, fusing: Fusing) -> pv.World:
     "change",
     [
         lambda world: setattr(world, "collisions", pv.Collisions(method=pv.BruteForce())),
-        lambda world: world.links.append(pv.Stick(world.add(position=[(0, 99), (1, 99)], radius=0.1), 0, 1)),
+        lambda world: world.links.append(pv.Stick(world.add(position=[(0, 99), (1, 99)], radius=0.1, allow_overlap=True), 0, 1)),
     ],
     ids=["brute force", "link"],
 )

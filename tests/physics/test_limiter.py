@@ -173,6 +173,7 @@ def test_gravity_that_turns_within_a_frame_is_no_gain(taken: list[float]) -> Non
     assert balls.velocity[:, 1] == pytest.approx(np.full(2, 1 - 6 * G / 480), abs=2 * G / 480)
 
 
+@pytest.mark.filterwarnings("ignore::pyverlet.ground.errors.CoarseStepWarning")
 @pytest.mark.parametrize("substeps", [2, 8])
 @pytest.mark.parametrize("law", [{"restitution": 0.0}, {"restitution": 0.5, "friction": 0.5}])
 def test_what_a_spring_draws_together_gains_no_more_than_allowed(
@@ -216,7 +217,7 @@ def test_without_gravity_what_there_is_is_the_scale(taken: list[float]) -> None:
     assert taken
 
 
-def test_a_chain_without_contacts_is_watched(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_who_meets_nobody_is_watched_only_among_obstacles(monkeypatch: pytest.MonkeyPatch) -> None:
     watched: list[object] = []
     real = limiter.Watch.close
 
@@ -227,15 +228,16 @@ def test_a_chain_without_contacts_is_watched(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(limiter.Watch, "close", close)
     world = pv.World(collisions=None)
     group = world.add(position=[(0, 0), (1, 0)])
-    world.step(1 / 60)
-    assert not watched  # nothing that could give energy
     world.links.append(pv.Stick(group, 0, 1))
     world.step(1 / 60)
+    assert (
+        not watched
+    )  # links alone keep their energy, and show some that they never give: a limiter would take that from the motion
     lone = pv.World()
     lone.add(position=(0, 1))
     lone.obstacles.append(pv.Segment((-5, 0), (5, 0)))
     lone.step(1 / 60)
-    assert watched == [None, None]
+    assert watched == [None]
 
 
 @pytest.mark.parametrize("room", [pv.Box((-3, -3), (3, 3)), pv.Circle(radius=3)])

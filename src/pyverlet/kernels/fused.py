@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.compile.jit import driver, kernel, parallel_kernel, prange
 from pyverlet.kernels.cage import hold_some
 from pyverlet.kernels.contact import mark_strip, push_strip, refine_strip, relax_strip
 from pyverlet.kernels.motion import any_strayed, arrive, kick_drift, set_out
@@ -125,16 +125,21 @@ def _border(s, circles, pairs, law, room, strips):
 
 
 @parallel_kernel
-def substep(cut, circles, pairs, law, room, strips):
+def _substep(cut, circles, pairs, law, room, strips):
     """From after the integration of a substep to its end, or to after that of the next; whether anyone has strayed in that.
 
     room: (x, y, radius). cut: (threads + 1,) even strip each thread begins with, at least 2 * BEHIND + 2 apart, and the number of
     strips.
     """
-    circles, pairs, law, strips = Circles(*circles), Pairs(*pairs), Law(*law), Strips(*strips)
     strayed = 0
     for part in prange(cut.shape[0] - 1):
         strayed += int(_share_of_strips(cut[part], cut[part + 1], circles, pairs, law, room, strips))
     for part in prange(1, cut.shape[0] - 1):
         strayed += int(_border(cut[part], circles, pairs, law, room, strips))
     return strayed > 0
+
+
+@driver
+def substep(cut, circles, pairs, law, room, strips):
+    """What `_substep` does, called from Python, which has plain tuples."""
+    return _substep(cut, Circles(*circles), Pairs(*pairs), Law(*law), room, Strips(*strips))

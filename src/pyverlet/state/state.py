@@ -26,8 +26,7 @@ _COLUMNS = ("spin", "grown", *_SET)
 _MARKS = ("category", "mask")
 _GIVEN, _LISTED = (*_SET, *_MARKS), ("radius", "mass", *_MARKS)
 
-EVERYONE = 0xFFFFFFFF
-"""A mask of 32 bits that takes every category."""
+EVERYONE = 0xFFFFFFFF  # a mask of 32 bits that takes every category
 
 _DEFAULTS: dict[str, Any] = {"angle": 0, "grown": 1, "restitution": -1, "friction": -1, "category": 1, "mask": EVERYONE}
 

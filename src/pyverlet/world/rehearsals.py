@@ -165,8 +165,8 @@ def _boxes(dtype: np.dtype[Any], threads: int) -> None:
 
 
 def _loans(dtype: np.dtype[Any], threads: int) -> None:
-    """Circles of very different masses that bounce."""
-    _uneven(dtype, threads, restitution=0.5)
+    """Circles of very different masses that bounce and rub."""
+    _uneven(dtype, threads, restitution=0.5, friction=0.5)
 
 
 def _refined(dtype: np.dtype[Any], threads: int) -> None:

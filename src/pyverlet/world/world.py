@@ -127,7 +127,7 @@ class World(Measures, Queries, Doors):
         compiled = contacts and not (links or course) and done == self.profile.mark
         if not self._open(h, done):
             return
-        watch, substep = self._watch(h) if parts else None, 0
+        watch, substep = self._watch(h) if contacts or course else None, 0
         while substep < self.substeps:
             self._show(substep, h, lag)
             if not run.leapt:
@@ -162,7 +162,7 @@ class World(Measures, Queries, Doors):
         done("finish")
 
     def _watch(self, h: float) -> Watch | None:
-        """Who looks after the energy of this frame, if nothing but contacts and links could raise it."""
+        """Who looks after the energy of this frame, if nothing but contacts, links and obstacles could raise it."""
         return Watch(self._state, self._force_sum, self.links, self.boundary) if undriven(self, h, self._h_last) else None
 
     def run(self, *, seconds: float, dt: float = 1 / 60) -> None:
