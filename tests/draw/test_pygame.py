@@ -102,7 +102,7 @@ def test_the_example_runs_and_obeys_the_mouse(monkeypatch: pytest.MonkeyPatch) -
     def flip() -> None:
         step = next(flips)
         if step == 0:
-            pygame.event.post(pygame.event.Event(pygame.MOUSEBUTTONDOWN, pos=(300, 20), button=3))
+            pygame.event.post(pygame.event.Event(pygame.MOUSEBUTTONDOWN, pos=(300, 60), button=3))
             pygame.event.post(pygame.event.Event(pygame.MOUSEBUTTONDOWN, pos=tenth, button=1))
         elif step == 1:
             held.extend(force.particle for force in world.forces)

@@ -83,7 +83,7 @@ class OneByOne:
         self.lanes = [lane for a, lane in enumerate(lanes) if a % LANES == 0 or lane[1:] != lanes[a - 1][1:]]
         self.moved = slots.position - wide.origin
         self.carries = (slots.fed & 1).astype(slots.dtype)
-        self.turned = np.zeros(len(slots), slots.dtype)
+        self.turned, self.slid = np.zeros(len(slots), slots.dtype), np.zeros_like(slots.position)
         self.normal: dict[int, Any] = {}
         self.depth: dict[int, Any] = {}
         self.held: dict[int, Any] = {}
@@ -178,7 +178,9 @@ class OneByOne:
             if mu > 0:
                 slip, cone = self.slip.get((i, j), real(0)), mu * (real(PUSHED) * depth)
                 rub = max(min(real(-GRIP * PUSHED / (3.0 * FED)) * slip, cone), -cone)
-                c = np.array([c[0] + rub * n[1], c[1] - rub * n[0]], s.dtype)
+                slide = np.array([rub * n[1], -(rub * n[0])], s.dtype)
+                self.slid[i] -= slide * share
+                self.slid[j] += slide * (real(1) - share)
                 self.turned[i] += rub * (real(2) * share / s.radius[i])
                 self.turned[j] += rub * (real(2) * (real(1) - share) / s.radius[j])
                 self.held[k] = rub
@@ -215,6 +217,8 @@ class OneByOne:
     def arrive(self) -> None:
         s, law = self.slots, self.law
         by = self.moved - (s.position - self.wide.origin)
+        if self.wide.rubs:
+            by = by + self.slid
         s.position += by
         fed = law.feed * by
         s.velocity += fed

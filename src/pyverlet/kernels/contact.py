@@ -103,7 +103,12 @@ def push_strip(s, to, circles, pairs, law, looks):
                 cone = mu * push
                 rub = larger(smaller(answer * where_above(spread(real(NEW)), slipped, slipped, zero), cone), zero - cone)
                 store(pairs.held, k, rub)
-                cx, cy = cx + rub * ny, cy - rub * nx
+                # Beside the pushes, which it must not change: with it in `moved` single circles of rough piles spun for ever.
+                ui, wi = take(circles.slid, lane_i, k)
+                uj, wj = take(circles.slid, lane_j, k)
+                sx, sy = rub * ny, zero - rub * nx
+                put(circles.slid, lane_i, k, ui - sx * part, wi - sy * part)
+                put(circles.slid, lane_j, k, uj + sx * (one - part), wj + sy * (one - part))
                 turned_i, turned_j = pick(circles.turned, lane_i, k), pick(circles.turned, lane_j, k)
                 place(circles.turned, lane_i, k, turned_i + rub * load(pairs.made_of[TURN_I], at))
                 place(circles.turned, lane_j, k, turned_j + rub * load(pairs.made_of[TURN_J], at))

@@ -35,6 +35,8 @@ def _arrive(a, b, circles, law):
     for i in range(a, b):
         x = circles.moved[i, 0] - (circles.position[i, 0] - circles.origin[i, 0])
         y = circles.moved[i, 1] - (circles.position[i, 1] - circles.origin[i, 1])
+        if law.rubs != 0:
+            x, y = x + circles.slid[i, 0], y + circles.slid[i, 1]
         circles.position[i, 0] += x
         circles.position[i, 1] += y
         x, y = law.feed * x, law.feed * y
@@ -76,6 +78,7 @@ def push(circles, pairs, law, cut, looks, sets_out, claims):
                 set_out(circles.position[a:b], circles.origin[a:b], circles.moved[a:b])
             if law.rubs != 0:
                 _clear(circles.turned, a, b)
+                _clear(circles.slid.reshape(-1), 2 * a, 2 * b)
     for parity in range(2):
         none_claimed(claims)
         for part in prange(claims.shape[0]):

@@ -31,6 +31,7 @@ class Circles(NamedTuple):
     spin: Any
     carries: Any
     fed: Any
+    slid: Any
     turned: Any
     turn: Any
     lift: Any

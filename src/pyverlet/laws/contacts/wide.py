@@ -69,6 +69,7 @@ class Wide:
     def _hold_circles(self, count: int) -> None:
         """Room for what contacts that may bounce or rub note of circles."""
         self._carries, self._lift, self._leans, self._turned, self._turn = (np.zeros(count, self._dtype) for _ in range(5))
+        self._slid = np.zeros((count, 2), self._dtype)
 
     def take(self, pairs: PairList, origin: Array, radius: Array) -> None:
         """Pack a new list; origin: (n, 2) positions it was made from; radius: (n,) m."""
@@ -178,7 +179,7 @@ class Wide:
             state.turn, state.lift = turn, self._lift
         self.circles = (
             state.position, state.velocity, state.acceleration, state.inverse_mass, self.origin, self.moved, state.resting,
-            state.spin, self._carries, state.fed, self._turned, turn, self._lift, self._leans, state.start,
+            state.spin, self._carries, state.fed, self._slid, self._turned, turn, self._lift, self._leans, state.start,
             state.radius, state.restitution, state.friction, state.hits, state.spent,
         )  # fmt: skip
         carried = CARRIED_WEIGHT * strongest * h if strongest > 0 else np.inf
