@@ -113,7 +113,7 @@ def _substeps(substep, stop, last, circles, pairs, law, room, cut, looks, sets_o
             circles.position, circles.velocity, circles.acceleration, law.h, checked, far, circles.origin, circles.moved, claims
         )
         note(spent, INTEGRATE, clock[0], clock[1])
-        looks, sets_out = law.asks, 0
+        looks, sets_out = 0, 0
         if strayed:
             return substep, True
 

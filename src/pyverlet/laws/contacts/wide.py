@@ -199,7 +199,7 @@ class Wide:
 
     def takes_looks(self) -> int:
         """Whether the next sweep is to note who overlaps deeply, which it does once a frame."""
-        looks, self._looks = int(self._looks or self.asks), False
+        looks, self._looks = int(self._looks), False
         return looks
 
     def has_marked(self) -> None:
