@@ -2,7 +2,8 @@
 
 `python -m benchmarks --particles 2000 20000` beside other engines, `python -m benchmarks physics` what their physics is worth,
 `python -m benchmarks own` what pyverlet promises about its own speed, `python -m benchmarks materials` what
-restitution, friction, masses and services cost, `python -m benchmarks page` how fast the live page is.
+restitution, friction, masses and services cost, `python -m benchmarks page` how fast the live page is,
+`python -m benchmarks data` what it costs to keep worlds, to step many, and to sweep settings.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 import pyverlet as pv
-from benchmarks import materials, own, page, physics
+from benchmarks import data, materials, own, page, physics
 from benchmarks.engines import CAREFUL, DT, ENGINES, RADIUS, Array, Engine
 from pyverlet.scenes import report
 
@@ -120,7 +121,11 @@ def main() -> None:
     """Print one table for each number of particles; write them all as CSV if asked to."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument(
-        "table", nargs="?", choices=("speed", "physics", "own", "page", "materials"), default="speed", help="what to compare"
+        "table",
+        nargs="?",
+        choices=("speed", "physics", "own", "page", "materials", "data"),
+        default="speed",
+        help="what to compare",
     )
     parser.add_argument("--particles", type=int, nargs="+", help="discs in the cage: 2000 20000 for speed, 2000 for physics")
     parser.add_argument("--frames", type=int, default=60, help="frames measured for each engine")
@@ -141,6 +146,10 @@ def main() -> None:
         return
     if arguments.table == "materials":
         materials.main((arguments.particles or [20_000])[0], arguments.csv)
+        return
+    if arguments.table == "data":
+        if not data.main((arguments.particles or [1_000_000])[0]):
+            sys.exit(1)
         return
     if arguments.table == "own":
         if not own.main(report.triad()["ns_per_element"], arguments.million):

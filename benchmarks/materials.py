@@ -1,7 +1,7 @@
 """What circles may be made of, and what a world may be asked to do, beside the smooth heap: `python -m benchmarks materials`.
 
-One settled heap for all, laid out anew for each material and settled again; all take turns in one process, so that the machine's moods
-hit them alike. A ratio is that of the quartiles of the faster frames. Overlap stands beside each.
+One settled heap for all, laid out anew for each material and settled again; all take turns in one process, so that the machine's
+moods hit them alike. A ratio is that of the quartiles of the faster frames. Overlap stands beside each.
 """
 
 from __future__ import annotations
@@ -133,8 +133,9 @@ def heap(particles: int) -> tuple[Array, float]:
 
 def build(material: Material, position: Array, cage: float, threads: int) -> pv.World:
     """This heap, of this material, settled."""
-    options = {"boundary": pv.Circle(radius=cage), "collisions": material.collisions, "substeps": 8, "threads": threads}
-    world = pv.World(**options, **material.options)
+    world = pv.World(
+        boundary=pv.Circle(radius=cage), collisions=material.collisions, substeps=8, threads=threads, **material.options
+    )
     world.add(position=position, radius=RADIUS, mass=1.0)
     material.change(world)
     world.run(seconds=SETTLE_SECONDS, dt=DT)

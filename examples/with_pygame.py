@@ -46,7 +46,7 @@ def main() -> None:
             if event.type == pygame.QUIT or (event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE):
                 pygame.quit()
                 return
-            if event.type == pygame.MOUSEBUTTONDOWN and event.button == 3:
+            if event.type == pygame.MOUSEBUTTONDOWN and event.button == 3 and world.is_free(view.to_world(event.pos)):
                 world.add(position=view.to_world(event.pos), radius=0.2, mass=0.04)
             if event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
                 particle = view.pick(world, event.pos)

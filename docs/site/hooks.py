@@ -47,7 +47,8 @@ def shown(path: str) -> str:
     place = ROOT / path
     if place.is_dir():
         files = sorted(each for each in place.iterdir() if each.is_file())
-        links = (f"- [{each.name}]({relpath(site_name(f'{path}/{each.name}'), 'source')})" for each in files)
+        here = str(PurePosixPath(site_name(path)).parent)
+        links = (f"- [{each.name}]({relpath(site_name(f'{path}/{each.name}'), here)})" for each in files)
         return f"# {path}\n\n" + "\n".join(links)
     code, language = place.read_text(encoding="utf-8"), LANGUAGES.get(place.suffix, "text")
     return f"---\nsearch: {{exclude: true}}\n---\n# {place.name}\n\n`{path}`\n\n````{language}\n{code}````\n"

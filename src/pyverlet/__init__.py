@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from pyverlet.ground import loading, versions  # noqa: F401  (first: all that follows takes a second)
 
 # isort: split
 from pyverlet import scenes
 from pyverlet.ground import errors
-from pyverlet.ground.errors import InputError, NonFiniteError, PyverletError
+from pyverlet.ground.errors import CoarseStepWarning, InputError, NonFiniteError, PyverletError
 from pyverlet.laws import forces, integrators
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.collisions import Collisions, Overlap
@@ -40,17 +43,39 @@ from pyverlet.world.panels import Panel, Panels
 from pyverlet.world.warmup import warm_up
 from pyverlet.world.world import World
 
+if TYPE_CHECKING:
+    from pyverlet.data.sweep import sweep
+    from pyverlet.data.trajectory import Trajectory, read_trajectory
+    from pyverlet.data.worlds import Worlds
+
 __version__ = "0.1.0"
 
+_LATER = {
+    "Trajectory": "pyverlet.data.trajectory",
+    "Worlds": "pyverlet.data.worlds",
+    "read_trajectory": "pyverlet.data.trajectory",
+    "sweep": "pyverlet.data.sweep",
+}
+
 __all__ = [
-    "RK4", "Actor", "Angle", "Area", "Attractor", "Boundary", "Box", "BruteForce", "Capsule", "Chain", "Circle", "ClampAndFlip",
-    "Clock", "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy", "Events", "ExplicitEuler", "Fast", "FrameBudget",
-    "Gravitation", "Group", "InputError", "Integrator", "Ledger", "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel",
-    "Panels", "Pin", "PointSpring", "Polygon", "PositionVerlet", "ProjectOnly", "PyverletError", "Rope", "Segment",
-    "SemiImplicitEuler", "Sink", "Spring", "Stick", "TimeCorrectedVerlet", "VelocityVerlet", "Wind", "World", "Yoshida4",
-    "bridge", "builders", "chain", "cloth", "errors", "force", "forces", "integrators", "net", "rope", "scenes", "soft_body",
-    "view", "warm_up", "widget",
+    "RK4", "Actor", "Angle", "Area", "Attractor", "Boundary", "Box", "BruteForce", "Capsule", "Chain", "Circle",
+    "ClampAndFlip", "Clock", "CoarseStepWarning", "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy",
+    "Events", "ExplicitEuler", "Fast", "FrameBudget", "Gravitation", "Group", "InputError", "Integrator", "Ledger",
+    "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel", "Panels", "Pin", "PointSpring", "Polygon", "PositionVerlet",
+    "ProjectOnly", "PyverletError", "Rope", "Segment", "SemiImplicitEuler", "Sink", "Spring", "Stick", "TimeCorrectedVerlet",
+    "Trajectory", "VelocityVerlet", "Wind", "World", "Worlds", "Yoshida4", "bridge", "builders", "chain", "cloth", "errors",
+    "force", "forces", "integrators", "load", "net", "read_trajectory", "rope", "save", "scenes", "soft_body", "sweep", "view",
+    "warm_up", "widget",
 ]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    # Classes that few programs need, loaded when they are first named.
+    if name in _LATER:
+        value = getattr(import_module(_LATER[name]), name)
+        globals()[name] = value
+        return value
+    raise AttributeError(f"module 'pyverlet' has no attribute {name!r}")
 
 
 def view(world: World | Panels, **options: Any) -> None:
@@ -58,6 +83,20 @@ def view(world: World | Panels, **options: Any) -> None:
     from pyverlet.viewers import view as view_page
 
     view_page(world, **options)
+
+
+def save(world: World, path: str | Path, **options: Any) -> None:
+    """Write a world to a file, to go on from with the same bits; see `pyverlet.data.snapshot.save` for the options."""
+    from pyverlet.data.snapshot import save as write
+
+    write(world, path, **options)
+
+
+def load(path: str | Path, exact: bool = False, objects: Iterable[Any] = ()) -> World:
+    """The world that `save` wrote; see `pyverlet.data.snapshot.load` for the options."""
+    from pyverlet.data.snapshot import load as read
+
+    return read(path, exact=exact, objects=objects)
 
 
 def widget(world: World | Panels, **options: Any) -> Any:

@@ -300,3 +300,23 @@ def test_nothing_in_the_report_is_not_a_number(run: Any) -> None:
 
     report = json.loads(run("run", "fall", "--frames", "2", "--json")[1])
     assert all(math.isfinite(n) for n in numbers(report))
+
+
+def test_a_report_keeps_a_ledger_if_asked(run: Any) -> None:
+    without, with_it = (json.loads(run("run", *SMALL, "--json", *more)[1]) for more in ((), ("--ledger",)))
+    assert without["ledger"] is None
+    assert with_it["ledger"]["limiter"] == 0
+    assert sum(with_it["ledger"].values()) == pytest.approx(with_it["energy"]["total"], rel=1e-9)
+    assert without["energy"] == with_it["energy"]
+
+
+def test_the_tables_of_the_physics_page(run: Any) -> None:
+    small = ("check", "limiter", "--scene", "newton-cradle", "--particles", "10", "--seconds", "0.1")
+    rows = json.loads(run(*small, "--json")[1])
+    assert [(row["scene"], row["substeps"], row["frames"]) for row in rows] == [("newton-cradle", n, 6) for n in (2, 4, 8, 16)]
+    assert run(*small, "--markdown")[1].startswith("| scene | 2 substeps |")
+    gas = json.loads(run("check", "pressure", "--seconds", "1", "--json")[1])
+    assert {row["fraction"] for row in gas} == {0.1, 0.3, 0.6}
+    code, out, err = run("check", "limiter", "--scene", "nowhere")
+    assert (code, out) == (2, "")
+    assert_one_sentence(err)

@@ -52,6 +52,8 @@ from pyverlet import World
 from pyverlet.cli._app import compile_kernels
 from pyverlet.kernels import motion
 from pyverlet.world import rehearsals, warmup
+from pyverlet.ground import progress
+progress.QUIET_S = 0.0
 rehearsals.PARTS.clear()
 rehearsals.PARTS["one"] = lambda dtype, threads: motion.any_nan(np.zeros((1, 2), dtype))
 warmup.rehearse = lambda world: None

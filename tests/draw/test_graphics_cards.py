@@ -22,7 +22,7 @@ import numpy as np, sys
 import pyverlet as pv
 from pyverlet.picture import Fixed, View
 world = pv.World(boundary=pv.Box((0, 0), (8, 6)), dtype=np.dtype(sys.argv[1]))
-world.add(position=[(2, 3), (6, 4.5), (5, 1)], radius=[1.0, 0.5, 0.25])
+discs = world.add(position=[(2, 3), (6, 4.5), (5, 1)], radius=[1.0, 0.5, 0.25])
 view = View.fit((0, 0, 8, 6), (400, 300), y_up=True)
 colour = Fixed([(255, 0, 0), (0, 255, 0), (0, 0, 255)])
 
@@ -35,6 +35,11 @@ def check(rows):  # (height, width, 3), the foot first
         # A rim that fades over a pixel, from r - 1/2 to r + 1/2, covers pi (r^2 + 1/12); sampled at centres, off by a little.
         assert abs(channel.sum() - np.pi * (r * r + 1 / 12)) < 0.02 * np.pi * r * r, channel.sum()
     print("seen")
+
+def check_marks(rows):  # the red one has turned by a quarter, the others by nothing: a darker line up, no other
+    red = rows[..., 0].astype(int)
+    assert red[175, 100] < 190 and red[175, 90] == 255 and red[125, 100] == 255, (red[175, 90:110], red[125, 100])
+    print("marked")
 """
 
 PYGLET = """
@@ -54,6 +59,11 @@ buffer = (gl.GLubyte * (400 * 300 * 3))()
 gl.glPixelStorei(gl.GL_PACK_ALIGNMENT, 1)
 gl.glReadPixels(0, 0, 400, 300, gl.GL_RGB, gl.GL_UNSIGNED_BYTE, buffer)
 check(np.frombuffer(buffer, np.uint8).reshape(300, 400, 3))
+discs.angle[0] = np.pi / 2
+window.clear()
+circles.draw(view)
+gl.glReadPixels(0, 0, 400, 300, gl.GL_RGB, gl.GL_UNSIGNED_BYTE, buffer)
+check_marks(np.frombuffer(buffer, np.uint8).reshape(300, 400, 3))
 """
 
 ARCADE = """
@@ -71,6 +81,10 @@ for _ in range(2):
     window.clear()
     circles.draw(view)
 check(np.asarray(arcade.get_image(0, 0, 400, 300).convert("RGB"))[::-1])
+discs.angle[0] = np.pi / 2
+window.clear()
+circles.draw(view)
+check_marks(np.asarray(arcade.get_image(0, 0, 400, 300).convert("RGB"))[::-1])
 world.add(position=[(1, 1)] * 9, radius=0.01)  # more than there was room for
 circles = Circles(world)
 circles.draw(view)

@@ -54,6 +54,17 @@ def test_circles_over_the_games_picture(surface: Any) -> None:
     assert ((red - 10) / 240).sum() == pytest.approx(np.pi * (20**2 + 30**2), abs=(8 * 50 + 16) * (0.5 / 255 + 0.5 / 240))
 
 
+def test_a_circle_that_has_turned_has_a_mark() -> None:
+    surface, world, view = pygame.Surface((200, 160), depth=32), two(), View.fit((0, 0, 10, 8), (200, 160))
+    world.angle[1] = np.pi / 2  # up, in half of its brightness; the other one's points to the right
+    adapter.draw(surface, world, view, colour=Fixed(ORANGE), walls=False)
+    half = np.array(ORANGE) // 2
+    for x, y in ((146, 61), (70, 80)):
+        assert np.abs(np.array(surface.get_at((x, y)))[:3] - half).max() < 40
+    for x, y in ((146, 91), (50, 80)):
+        assert tuple(surface.get_at((x, y)))[:3] == ORANGE
+
+
 def test_walls_are_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     surface = pygame.Surface((220, 180), depth=32)
     world = two()
@@ -91,7 +102,7 @@ def test_the_example_runs_and_obeys_the_mouse(monkeypatch: pytest.MonkeyPatch) -
     def flip() -> None:
         step = next(flips)
         if step == 0:
-            pygame.event.post(pygame.event.Event(pygame.MOUSEBUTTONDOWN, pos=(300, 20), button=3))
+            pygame.event.post(pygame.event.Event(pygame.MOUSEBUTTONDOWN, pos=(300, 60), button=3))
             pygame.event.post(pygame.event.Event(pygame.MOUSEBUTTONDOWN, pos=tenth, button=1))
         elif step == 1:
             held.extend(force.particle for force in world.forces)

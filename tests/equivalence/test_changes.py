@@ -40,7 +40,7 @@ def told(w: pv.World) -> list[Any]:
 
 def take_the_long_way(patch: pytest.MonkeyPatch) -> None:
     """No substep leans on another."""
-    patch.setattr(ContactSolver, "packs", lambda contacts, state: None)
+    patch.setattr(ContactSolver, "steady", lambda contacts, state: None)
 
 
 def both(make: Any, frames: int, meanwhile: Any = lambda w, frame: None) -> None:
@@ -149,15 +149,13 @@ def test_a_copy_has_arrays_of_its_own() -> None:
 
 
 def test_a_substep_that_was_broken_off_leaves_nothing_behind() -> None:
-    # Ctrl-C before the walls: a substep without them must not be what the next frames lean on.
+    # Ctrl-C before the contacts: a substep without them must not be what the next frames lean on.
     def interrupt(w: pv.World, frame: int) -> None:
         if frame == 5:
             w.gravity = (0, -5)
-            room = w.boundary
-            room.held = mock.Mock(side_effect=KeyboardInterrupt)  # type: ignore[method-assign]
-            with pytest.raises(KeyboardInterrupt):
+            assert w._contacts is not None
+            with mock.patch.object(w._contacts, "find", side_effect=KeyboardInterrupt), pytest.raises(KeyboardInterrupt):
                 w.step(1 / 60)
-            del room.held
 
     both(lambda: pour(boundary=ROOMS["cage"]()), 60, interrupt)
 

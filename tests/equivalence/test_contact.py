@@ -13,6 +13,7 @@ import pyverlet as pv
 from pyverlet.compile.lanes import LANES
 from pyverlet.ground.constants import DEEP, DEEP_PART, DEEP_SWEEPS, FED, GRIP, LARGEST_PUSH, PUSHED
 from pyverlet.kernels.bounds import impact_time
+from pyverlet.kernels.tables import Law
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.wide import Wide
 from pyverlet.state.state import Slots
@@ -74,7 +75,7 @@ class OneByOne:
     """docs/design/contact-law.md pair after pair, in NumPy's scalars of the same dtype: what the kernels are compared with."""
 
     def __init__(self, slots: Slots, wide: Wide, memory: dict[tuple[int, int], Any]) -> None:
-        self.slots, self.wide, self.law, self.real = slots, wide, wide.law, slots.real
+        self.slots, self.wide, self.law, self.real = slots, wide, Law(*wide.law), slots.real
         self.slip = memory
         strips = [range(a, a + n) for a, n in zip(wide.begin, wide.lanes, strict=False)]
         self.strips = [*strips[::2], *strips[1::2]]
@@ -82,7 +83,7 @@ class OneByOne:
         self.lanes = [lane for a, lane in enumerate(lanes) if a % LANES == 0 or lane[1:] != lanes[a - 1][1:]]
         self.moved = slots.position - wide.origin
         self.carries = (slots.fed & 1).astype(slots.dtype)
-        self.turned = np.zeros(len(slots), slots.dtype)
+        self.turned, self.slid = np.zeros(len(slots), slots.dtype), np.zeros_like(slots.position)
         self.normal: dict[int, Any] = {}
         self.depth: dict[int, Any] = {}
         self.held: dict[int, Any] = {}
@@ -108,7 +109,7 @@ class OneByOne:
         s, law, real = self.slots, self.law, self.real
         a, w = s.acceleration[j] - s.acceleration[i], s.inverse_mass
         v = s.velocity[j] - s.velocity[i] + law.lag * a
-        time = impact_time.function(*d, *v, *a, reach, law.h)
+        time = impact_time.function(*d, *v, *a, reach, law.h)  # type: ignore[attr-defined]
         d = d - time * (v - real(0.5) * time * a)
         distance = np.sqrt(d[0] * d[0] + d[1] * d[1])
         n = d / distance
@@ -177,7 +178,9 @@ class OneByOne:
             if mu > 0:
                 slip, cone = self.slip.get((i, j), real(0)), mu * (real(PUSHED) * depth)
                 rub = max(min(real(-GRIP * PUSHED / (3.0 * FED)) * slip, cone), -cone)
-                c = np.array([c[0] + rub * n[1], c[1] - rub * n[0]], s.dtype)
+                slide = np.array([rub * n[1], -(rub * n[0])], s.dtype)
+                self.slid[i] -= slide * share
+                self.slid[j] += slide * (real(1) - share)
                 self.turned[i] += rub * (real(2) * share / s.radius[i])
                 self.turned[j] += rub * (real(2) * (real(1) - share) / s.radius[j])
                 self.held[k] = rub
@@ -214,6 +217,8 @@ class OneByOne:
     def arrive(self) -> None:
         s, law = self.slots, self.law
         by = self.moved - (s.position - self.wide.origin)
+        if self.wide.rubs:
+            by = by + self.slid
         s.position += by
         fed = law.feed * by
         s.velocity += fed
@@ -276,14 +281,14 @@ def test_eight_at_once_are_one_by_one(seed: int, n: int, spread: float, dtype: A
     ):
         setattr(other, name, getattr(slots, name).copy())
     other.size = other.radius
-    wide.begin_substep(slots, H, 0.5 * H, 9.81, 4 * 9.81 * H, accounts=False)
+    wide.set_up(slots, H, 0.5 * H, 9.81, 4 * 9.81 * H, accounts=False)
     pairs = [(int(i), int(j)) for i, j in wide.pairs()]
     memory = {pair: slots.real(rng.normal(0, 1e-3)) for pair in dict.fromkeys(pairs) if rng.random() < 0.7}
     if wide.rubs:
         wide.hold_slips()
         where = np.concatenate([np.arange(a, a + k) for a, k in zip(wide.begin, wide.lanes, strict=False)])
         wide.slip[where] = [memory.get(pair, np.inf) for pair in pairs]
-        wide.begin_substep(slots, H, 0.5 * H, 9.81, 4 * 9.81 * H, accounts=False)
+        wide.set_up(slots, H, 0.5 * H, 9.81, 4 * 9.81 * H, accounts=False)
     reference = OneByOne(other, wide, memory)
     wide.cut()
     wide.push(slots)
@@ -307,7 +312,7 @@ def test_coincident_centres_part(dtype: Any) -> None:
     slots.position[:] = 3.0
     slots.velocity[:] = 0.0
     _, packs = packed(slots, Fast())
-    packs.begin_substep(slots, H, 0.0, 0.0, 0.0, accounts=False)
+    packs.set_up(slots, H, 0.0, 0.0, 0.0, accounts=False)
     packs.push(slots)
     # LARGEST_PUSH of the contact distance at most is seen, PUSHED of it is taken.
     parted = np.hypot(*(slots.position[1] - slots.position[0]))

@@ -106,6 +106,47 @@ def test_restore_after_the_collisions_were_changed() -> None:
         assert np.isfinite(world.position).all()
 
 
+def test_what_was_edited_before_saving_is_news_after_restoring() -> None:
+    # Edits between frames make lists of pairs void, and circles added on top of others are to start smaller.
+    def overlap(world: pv.World) -> None:
+        world.add(position=world.position[:3] + 0.05, radius=0.4)
+
+    def shrink(world: pv.World) -> None:
+        world.radius[:] *= 0.98
+
+    def filter_out(world: pv.World) -> None:
+        world.category[:50] = world.mask[:50] = 2
+
+    for edit in (overlap, shrink, filter_out):
+        world = falling_heap()
+        world.run(seconds=0.7)
+        edit(world)
+        saved = world.save()
+        world.run(seconds=0.1)
+        expected = world.state_hash()
+        world.restore(saved)
+        world.run(seconds=0.1)
+        assert world.state_hash() == expected, edit.__name__
+
+
+def test_restore_after_a_link_has_broken() -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (20, 20)))
+    group = world.add(position=[(1 + k, 10 - 0.1 * k * (12 - k)) for k in range(13)], radius=0.3)
+    group.pin([0, 12])
+    world.links.append(
+        pv.Stick(group, np.arange(12), np.arange(1, 13), breaking_force=np.where(np.arange(12) == 7, 20.0, np.inf))
+    )
+    while not len(world.links.broken):
+        world.step(1 / 60)
+        assert world.time < 1
+    saved = world.save()
+    world.run(seconds=0.2)
+    expected = world.state_hash()
+    world.restore(saved)
+    world.run(seconds=0.2)
+    assert world.state_hash() == expected
+
+
 def test_measuring_does_not_change_the_motion() -> None:
     watched, alone = falling_heap(), falling_heap()
     for _ in range(60):

@@ -227,3 +227,27 @@ def test_a_wind_of_the_wrong_shape_says_so() -> None:
     world.add(position=[(0, 0), (1, 1)])
     with pytest.raises(pv.InputError, match=r"velocity of the wind .* two components, each a number or an array of shape \(2,\)"):
         world.step(DT)
+
+
+def test_a_spring_may_act_on_a_group() -> None:
+    # x'' = -k x / m: from rest x cos(sqrt(k / m) t), of the group alone; the others stay.
+    world = pv.World(gravity=(0, 0), collisions=None, dtype=np.float64, integrator=pv.RK4())
+    others, group = world.add(position=(9, 9)), world.add(position=[(2, 0), (0, 3)], mass=2.0)
+    spring = world.forces.append(pv.PointSpring(group, stiffness=8.0))
+    assert isinstance(spring, pv.PointSpring)
+    assert world.energy().potential == pytest.approx(8 * (4 + 9) / 2)
+    world.run(seconds=1)
+    assert group.position == pytest.approx(np.array([(2, 0), (0, 3)]) * np.cos(2.0), abs=1e-9)
+    assert others.position.tolist() == [[9, 9]]
+    group.pin(1)
+    assert world.energy().potential == pytest.approx(4 * float(group.position[0] @ group.position[0]))
+
+
+def test_what_is_appended_comes_back() -> None:
+    world = pv.World()
+    floor = world.obstacles.append(pv.Segment((0, 0), (1, 0)))
+    drag = world.forces.append(pv.Drag(linear=1.0))
+    assert (list(world.obstacles), list(world.forces)) == ([floor], [drag])
+    with pytest.raises(pv.InputError, match=r"force is 3; allowed is an object with a method apply"):
+        world.forces.append(3)  # type: ignore[type-var]
+    assert list(world.forces) == [drag]

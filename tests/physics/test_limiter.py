@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -62,8 +64,9 @@ def test_what_has_touched_a_wall_is_lowered_too() -> None:
 
 
 def test_momentum_and_angular_momentum_stay(monkeypatch: pytest.MonkeyPatch) -> None:
-    # Of circles that nothing holds only the part of the velocities is taken that has neither. Both are kept to rounding, of the
-    # momenta of all added up without their signs; here they are looked at before and after, for pushes move what turns.
+    # Of circles that nothing holds only the part of the velocities is taken that has neither, and if that is not enough of their
+    # turning, which pushes have changed: they move what turns. So the momentum is kept to rounding, of the momenta of all added
+    # up without their signs, and the angular momentum by far better than pushes do, 2e-4 of its scale (docs/physics.md).
     monkeypatch.setattr(limiter, "SURPLUS", 1e-7)  # or they part too gently
     world = pv.World(gravity=(0, 0), dtype=np.float64)
     rng = np.random.default_rng(2)
@@ -81,7 +84,8 @@ def test_momentum_and_angular_momentum_stay(monkeypatch: pytest.MonkeyPatch) -> 
         real(self, slots, pairs, surplus)  # type: ignore[arg-type]
         times += bool(np.abs(slots.velocity - velocity).max() > 1e-6)
         size = float((slots.mass * np.hypot(*slots.velocity.T) * (1 + np.hypot(*slots.position.T))).sum())
-        assert momenta(slots) == pytest.approx(before, abs=1e-14 * size)
+        assert momenta(slots)[:2] == pytest.approx(before[:2], abs=1e-14 * size)
+        assert momenta(slots)[2] == pytest.approx(before[2], abs=1e-7 * size)
 
     monkeypatch.setattr(limiter.Watch, "take_back", compared)
     world.run(seconds=1)
@@ -131,11 +135,11 @@ def test_a_driven_world_is_left_alone(taken: list[float]) -> None:
 
 
 def test_a_large_world_takes_no_notice_of_a_small_crowd(taken: list[float]) -> None:
-    # 20 circles in one point, 1,000 others at rest on the floor: growing, the 20 raise the energy by less than is allowed.
+    # 14 circles in one point, 1,000 others at rest on the floor: growing, the 14 raise the energy by less than is allowed.
     world = pv.World(boundary=pv.Box((0, 0), (200, 50)))
     x, y = np.meshgrid(np.arange(0.5, 200, 1.01)[:190], np.arange(0.5, 5, 1.01))
     world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.5)
-    world.add(position=np.tile((100, 20), (20, 1)), radius=0.5)
+    world.add(position=np.tile((100, 20), (14, 1)), radius=0.5)
     world.run(seconds=8)
     assert world._state.grown.min() == 1
     assert not taken
@@ -167,3 +171,95 @@ def test_gravity_that_turns_within_a_frame_is_no_gain(taken: list[float]) -> Non
     assert not taken
     # One substep of v' = g, seven of v' = -g.
     assert balls.velocity[:, 1] == pytest.approx(np.full(2, 1 - 6 * G / 480), abs=2 * G / 480)
+
+
+@pytest.mark.filterwarnings("ignore::pyverlet.ground.errors.CoarseStepWarning")
+@pytest.mark.parametrize("substeps", [2, 8])
+@pytest.mark.parametrize("law", [{"restitution": 0.0}, {"restitution": 0.5, "friction": 0.5}])
+def test_what_a_spring_draws_together_gains_no_more_than_allowed(
+    substeps: int, law: dict[str, float], taken: list[float]
+) -> None:
+    # dE <= SURPLUS (kinetic + spring's) in a frame, beside what the integrator's energy swings by: a lone circle shows that.
+    def worst(count: int) -> float:
+        rng = np.random.default_rng(0)
+        room, laws = pv.Circle(radius=15, **law), pv.Collisions(**law)  # type: ignore[arg-type]
+        world = pv.World(gravity=(0, 0), boundary=room, collisions=laws, substeps=substeps)
+        world.add(position=rng.uniform(-9, 9, (count, 2)), velocity=rng.normal(0, 1, (count, 2)), radius=0.3)
+        world.forces.append(pv.PointSpring(stiffness=20.0))
+        before, rise = world.energy().total, 0.0
+        for _ in range(120):
+            world.step(1 / 60)
+            now = world.energy().total
+            rise, before = max(rise, (now - before) / before), now
+        return rise
+
+    assert worst(150) < 1.1 * SURPLUS + worst(1)
+    assert taken  # or nothing has been tested
+
+
+def test_without_gravity_what_there_is_is_the_scale(taken: list[float]) -> None:
+    # The scale of this gas was that of a fall through its room, 40 m at 9.81 m/s^2: 780 times what it has.
+    def gas(**law: float) -> pv.World:
+        rng = np.random.default_rng(3)
+        laws = pv.Collisions(**law)  # type: ignore[arg-type]
+        world = pv.World(gravity=(0, 0), boundary=pv.Box((-20, -20), (20, 20)), collisions=laws)
+        world.add(position=rng.uniform(-5, 5, (120, 2)), velocity=rng.normal(0, 0.7, (120, 2)), radius=0.5)
+        return world
+
+    for law in ({"restitution": 0.0}, {"restitution": 0.5, "friction": 0.5}):
+        world = gas(**law)
+        before = world.energy().total
+        for _ in range(60):
+            world.step(1 / 60)
+            now = world.energy().total
+            assert now <= before * (1 + 1.01 * SURPLUS)
+            before = now
+    assert taken
+
+
+def test_who_meets_nobody_is_watched_only_among_obstacles(monkeypatch: pytest.MonkeyPatch) -> None:
+    watched: list[object] = []
+    real = limiter.Watch.close
+
+    def close(self: limiter.Watch, slots: Slots, contacts: Any) -> None:
+        watched.append(contacts)
+        real(self, slots, contacts)
+
+    monkeypatch.setattr(limiter.Watch, "close", close)
+    world = pv.World(collisions=None)
+    group = world.add(position=[(0, 0), (1, 0)])
+    world.links.append(pv.Stick(group, 0, 1))
+    world.step(1 / 60)
+    assert (
+        not watched
+    )  # links alone keep their energy, and show some that they never give: a limiter would take that from the motion
+    lone = pv.World()
+    lone.add(position=(0, 1))
+    lone.obstacles.append(pv.Segment((-5, 0), (5, 0)))
+    lone.step(1 / 60)
+    assert watched == [None]
+
+
+@pytest.mark.parametrize("room", [pv.Box((-3, -3), (3, 3)), pv.Circle(radius=3)])
+@pytest.mark.parametrize("gravity", [(0, -G), (0, 0)])
+def test_circles_added_to_a_crowd_that_moves_raise_no_energy(gravity: tuple[float, float], room: pv.Boundary) -> None:
+    # On top of others, and with rims beyond the wall. Energy of the scale m g H + kinetic, with 9.81 m/s^2 where there is none.
+    rng = np.random.default_rng(4)
+    world = pv.World(gravity=gravity, boundary=room, threads=1)
+
+    def scatter(count: int) -> pv.Group:
+        angle, out = rng.uniform(0, 2 * np.pi, count), 2.99 * np.sqrt(rng.uniform(0, 1, count))
+        return world.add(
+            position=out[:, None] * np.column_stack((np.cos(angle), np.sin(angle))), radius=rng.uniform(0.1, 0.4, count)
+        )
+
+    scatter(60)
+    world.run(seconds=0.5)
+    for _ in range(4):
+        new = scatter(40)
+        assert (np.hypot(*new.position.T) + new.radius <= 3 * (1 + 1e-3)).all() or isinstance(room, pv.Box)
+        for _ in range(4):
+            before = world.energy()
+            world.step(1 / 60)
+            scale = len(world) * 9.81 * 6 + before.kinetic
+            assert world.energy().total - before.total < 1e-4 * scale

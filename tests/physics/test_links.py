@@ -315,3 +315,40 @@ def test_links_hold_under_every_integrator(name: str) -> None:
     crossings = downward_crossings(DT * np.arange(1, len(x) + 1), np.array(x))
     assert np.diff(crossings).mean() == pytest.approx(period, rel=5e-5)
     assert np.hypot(*group.position[1]) == pytest.approx(1.0, abs=1e-9)
+
+
+# ---- under a load ------------------------------------------------------------------------------------------------------------
+
+
+def loaded_pin(damping: float, **options: Any) -> tuple[pv.World, pv.Group, pv.Pin]:
+    """A soft pin that carries ten circles beside its own, in a slot."""
+    world = pv.World(boundary=pv.Box((-0.5, -5), (0.5, 30)), dtype=np.float64, threads=1, **options)
+    column = world.add(position=[(0, 1.0001 * k) for k in range(11)], radius=0.499)
+    return world, column, world.links.append(pv.Pin(column, 0, point=(0, 0), compliance=1e-5, damping=damping))
+
+
+@pytest.mark.parametrize("substeps", [2, 8])
+@pytest.mark.parametrize("damping", [0.0, 200.0, 2000.0])
+def test_a_soft_pin_under_a_pile_gives_what_its_compliance_says(damping: float, substeps: int) -> None:
+    # At rest nothing moves: deflection = load * compliance, whatever the damping. Contacts carry the load by velocities that
+    # move nobody, which are no motion to be damped.
+    world, column, pin = loaded_pin(damping, substeps=substeps)
+    world.run(seconds=12)
+    load = 11 * 9.81
+    assert float(np.sum(pin.force)) == pytest.approx(load, rel=1e-3)
+    assert -float(column.position[0, 1]) == pytest.approx(load * 1e-5, rel=1e-3)
+
+
+def test_what_soft_links_remember_is_saved() -> None:
+    world, column, _ = loaded_pin(2000.0)
+    world.run(seconds=0.5)
+    saved = world.save()
+    hashes = []
+    for _ in range(2):
+        world.run(seconds=0.2)
+        hashes.append(world.state_hash())
+        world.restore(saved)
+    assert hashes[0] == hashes[1]
+    column.position[0] += (0, 0.1)  # put elsewhere, its memory says nothing any more
+    world.run(seconds=0.2)
+    assert np.isfinite(world.energy().total)

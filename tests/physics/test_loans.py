@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.ground.constants import FED_UNEVEN as FED, LENT
+from pyverlet.ground.constants import FED_UNEVEN as FED
+from pyverlet.ground.constants import LENT
 
 G = 9.81
 H = 1 / 480

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -62,7 +64,7 @@ def test_friction_of_two_circles_is_the_geometric_mean() -> None:
      ({"category": 2, "mask": 4}, {"category": 4}, True), ({"category": 2, "mask": 4}, {"category": 4, "mask": 1}, False),
      ({"category": 0}, {}, False)],
 )  # fmt: skip
-def test_circles_collide_if_each_accepts_the_other(method: object, a: dict[str, int], b: dict[str, int], collide: bool) -> None:
+def test_circles_collide_if_each_accepts_the_other(method: object, a: dict[str, Any], b: dict[str, Any], collide: bool) -> None:
     world = pv.World(gravity=(0, 0), collisions=pv.Collisions(restitution=1, method=method), dtype=np.float64)  # type: ignore[arg-type]
     world.add(position=(-1, 0), velocity=(1, 0), **a)
     world.add(position=(1, 0), velocity=(-1, 0), **b)

@@ -138,10 +138,12 @@ def test_a_heap_does_not_leak_through_the_joints_of_a_hopper() -> None:
     x, y = np.meshgrid(np.arange(-4, 4, 0.42), np.arange(4.5, 9, 0.42))
     world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.2, mass=0.1)
     world.add(position=[(-2, 11), (2, 11)], radius=1.0, mass=20.0)
+    start = world.energy().total
     world.run(seconds=20, dt=DT)  # nothing rubs: for so long the heavy ones sink and the heap sloshes
     assert (np.abs(world.position[:, 0]) < 6).all()
     assert (world.position[:, 1] > 5 * (world.position[:, 0] / 6) ** 2).all()
-    assert world.energy().kinetic < 1e-2 * len(world)
+    # When the heavy ones find their way down is luck, and stirs the heap: of the energy that has gone, some per cent at most.
+    assert world.energy().kinetic < 0.05 * (start - world.energy().total)
 
 
 @settings(max_examples=30, deadline=None)

@@ -227,6 +227,29 @@ def test_links_are_drawn_in_the_colour_of_their_pull() -> None:
     assert (between(-1.0) != bare).any()
 
 
+def test_discs_that_have_turned_have_marks() -> None:
+    # 20 pixels a metre: radii of 40, 4 and 3 pixels, of which the last is too small for one.
+    world = pv.World(boundary=pv.Box((0, 0), (10, 8)))
+    world.add(position=[(3, 4), (6, 2), (8, 2)], radius=[2.0, 0.2, 0.15])
+    view, raster_ = View.fit((0, 0, 10, 8), (200, 160)), Raster((200, 160))
+    colours = np.full(3, 0x4080C0, np.uint32)
+
+    def picture() -> NDArray[np.int64]:
+        return raster_.draw(world, view, colours=colours)[..., :3].astype(np.int64)
+
+    plain = picture()
+    world.angle[:] = np.deg2rad([90, 0, 0])
+    marked = picture()
+    rows, columns = np.nonzero((marked != plain).any(axis=2))
+    # From the centre (60, 80) up to the rim and from (120, 120) to the right, each 1.4 pixels wide and half as bright.
+    up = rows < 100
+    assert (columns[up].min(), columns[up].max()) == (59, 60)
+    assert (rows[up].min(), rows[up].max()) == (39, 80)
+    assert np.abs(marked[60, 60] - plain[60, 60] / 2).max() < 0.35 * plain[60, 60].max()
+    assert (columns[~up].min(), columns[~up].max()) == (119, 124)
+    assert (rows[~up].min(), rows[~up].max()) == (119, 120)
+
+
 def test_a_crowd_narrower_than_pixels_covers_their_sum_and_has_their_mean_colour_in_any_order() -> None:
     """A pixel has A = sum of 255 pi r^2, at most 255, and beside that its ground; the colour of what covers it is the mean."""
     rng = np.random.default_rng(3)

@@ -248,7 +248,7 @@ def test_an_error_on_the_way_leaves_a_film_that_plays(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "options", "says"),
     [
-        ("a.avi", {}, r"'.*a.avi'; allowed is a name that ends in .mp4, .gif, .webp, .png"),
+        ("a.avi", {}, r"'.*a.avi'; allowed is a name that ends in .mp4, .gif, .webp, .html, .png"),
         ("a", {}, "allowed is a name that ends in"),
         ("{}{}.png", {}, r"one number, such as frame-\{:04d\}.png"),
         ("{x}.png", {}, "one number"),

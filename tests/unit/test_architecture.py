@@ -22,6 +22,7 @@ LAYERS = (
     "laws",
     "world",
     "scenes",
+    "data",
     "lab",
     "picture",
     "viewers",
@@ -35,7 +36,7 @@ BESIDE = {
     "draw": {"viewers"},
 }
 # Doors up the house, for convenience: methods of one line that load what they name only when called.
-DOORS = {"world/convenience.py": {"record"}}
+DOORS = {"world/convenience.py": {"record"}, "scenes/__init__.py": {"data"}, "scenes/_scene.py": {"data"}}
 
 MODULES = sorted(path for path in ROOT.rglob("*.py") if path.relative_to(ROOT).as_posix() not in ("__init__.py", "__main__.py"))
 

@@ -24,7 +24,7 @@ def follow(world: pv.World, frames: int) -> list[tuple[str, int, int]]:
     told = []
     for _ in range(frames):
         world.step(1 / 60)
-        told += [("begin", int(a), int(b)) for a, b in world.events.begin.tolist()]
+        told += [("begin", int(a), int(b)) for a, b in world.events.begin[["a", "b"]].tolist()]
         told += [("end", int(a), int(b)) for a, b in world.events.end.tolist()]
     return told
 
@@ -92,7 +92,8 @@ def test_begun_and_not_ended_are_those_that_touch(method: Any, restitution: floa
             alive = {(a - (a > 3) - (a > 50), b if b < 0 else b - (b > 3) - (b > 50)) for a, b in alive if not {a, b} & {3, 50}}
             world.add(position=(0, 11), radius=0.4)
         world.step(1 / 60)
-        begun, ended = ({(int(a), int(b)) for a, b in pairs.tolist()} for pairs in (world.events.begin, world.events.end))
+        told = (world.events.begin[["a", "b"]], world.events.end)
+        begun, ended = ({(int(a), int(b)) for a, b in pairs.tolist()} for pairs in told)
         assert not begun & alive
         assert ended <= alive
         alive = (alive | begun) - ended
@@ -148,3 +149,31 @@ def test_they_change_nothing_and_are_refused_where_they_are_off() -> None:
         world.events  # noqa: B018
     with pytest.raises(pv.InputError, match="hit_speed is -1; allowed is a finite number of at least 0"):
         pv.World(events=True).events.hit_speed = -1
+
+
+def test_a_hit_says_where_how_and_on_what() -> None:
+    # J = (1 + e) m v at walls and obstacles, (1 + e) v m1 m2 / (m1 + m2) between circles; the larger e of two counts.
+    world = pv.World(
+        gravity=(0, 0), boundary=pv.Box((-9, -9), (9, 9), restitution=0.5), collisions=pv.Collisions(restitution=0.25),
+        events=True, dtype=np.float64,
+    )  # fmt: skip
+    world.obstacles += [pv.Disc((5, -5), 1), pv.Segment((-5, -8), (0, -8), restitution=1.0)]
+    world.add(
+        position=[(8.4, 5), (0, 0), (1.1, 0), (-3, -7.4), (-8.4, 3)],
+        velocity=[(6, 0), (6, 0), (0, 0), (0, -6), (-6, 0)],
+        mass=[3.0, 1.0, 3.0, 2.0, 1.0],
+        restitution=[0.0, 0.0, 0.75, 0.0, 0.8],
+    )
+    hits = []
+    for _ in range(6):
+        world.step(1 / 60)
+        hits += world.events.hit.tolist()
+    hits.sort()
+    assert [hit[:5] for hit in hits] == [
+        (0, -1, pytest.approx(6), 1, -1), (1, 2, pytest.approx(6), -1, -1), (3, -1, pytest.approx(6), -1, 1),
+        (4, -1, pytest.approx(6), 0, -1),
+    ]  # fmt: skip
+    points = np.array([(9, 5), (0.55, 0), (-3, -8), (-9, 3)])
+    assert np.array([hit[5] for hit in hits]) == pytest.approx(points, abs=6 / 60)  # as of the end of the frame
+    assert np.array([hit[6] for hit in hits]) == pytest.approx(np.array([(1, 0), (1, 0), (0, -1), (-1, 0)]), abs=1e-9)
+    assert [hit[7] for hit in hits] == pytest.approx([1.5 * 18, 1.75 * 6 * 0.75, 2 * 12, 1.8 * 6])

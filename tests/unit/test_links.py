@@ -19,7 +19,7 @@ def sheet(columns: int, rows: int, **options: Any) -> tuple[pv.World, pv.Group, 
     """A net of sticks, springs across, pinned at two corners, over a floor of loose grains."""
     world = pv.World(boundary=pv.Box((-1, -8), (columns, 2)), **options)
     x, y = np.meshgrid(np.arange(columns) * 0.5, -np.arange(rows) * 0.5)
-    group = world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.2, mass=0.1)
+    group = world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.2, mass=0.1, allow_overlap=True)
     n = np.arange(columns * rows).reshape(rows, columns)
     world.links.append(pv.Stick(group, n[:, :-1].ravel(), n[:, 1:].ravel(), collide=False))
     world.links.append(pv.Rope(group, n[:-1].T.ravel(), n[1:].T.ravel(), breaking_force=40.0, collide=False))
@@ -65,6 +65,23 @@ def test_saving_continues_with_the_same_bits() -> None:
     assert list(world.links) == links
     world.run(seconds=0.5)
     assert world.state_hash() == ends[0][0]
+
+
+@pytest.mark.parametrize("seed", [0, 2, 5])
+def test_saving_continues_with_the_same_bits_once_a_chain_has_broken(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    world = pv.World(collisions=None, dtype=np.float64)
+    places = np.column_stack((0.8 * np.arange(8), np.zeros(8)))
+    group = world.add(position=places, velocity=rng.normal(0, 5, (8, 2)), radius=0.1, mass=rng.uniform(1, 10, 8))
+    sticks = world.links.append(pv.Stick(group, range(7), range(1, 8), breaking_force=1e3))
+    world.run(seconds=10 / 60)
+    assert not sticks.intact.all()
+    saved = world.save()
+    world.run(seconds=0.1)
+    went_on = world.state_hash()
+    world.restore(saved)
+    world.run(seconds=0.1)
+    assert world.state_hash() == went_on
 
 
 def test_worlds_without_links_have_no_stage_for_them() -> None:

@@ -18,8 +18,7 @@ import pytest
 import pyverlet as pv
 from pyverlet.compile import jit
 from pyverlet.ground import file_lock
-from pyverlet.laws import limiter
-from pyverlet.world import fused, rehearsals, warmup
+from pyverlet.world import rehearsals, substeps, warmup
 
 
 def run(code: str, cache: Path, **environment: str) -> str:
@@ -191,9 +190,8 @@ def test_rehearsals_of_larger_worlds_do_what_these_do(monkeypatch: pytest.Monkey
 
         monkeypatch.setattr(owner, name, spied)
 
-    spy(fused.Fused, "leap")
-    spy(limiter.Watch, "_look")
-    for count, expected in ((100, set()), (600, {"leap"}), (3000, {"leap", "_look"})):
+    spy(substeps.Substeps, "go")
+    for count, expected in ((100, {"go"}), (3000, {"go"})):
         done.clear()
         rehearsals.rehearse(pv.scenes.get("cage").world(particles=count, threads=1))
         assert done == expected, count

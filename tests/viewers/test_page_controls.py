@@ -507,6 +507,15 @@ def test_large_worlds_are_drawn_by_the_server(page: Page, program: Serve) -> Non
     expect(page.get_by_test_id("drawing")).to_have_text("Canvas2D")  # few enough again
 
 
+def test_circles_that_roll_have_marks(page: Page, program: Serve) -> None:
+    visit(page, program("conveyor", 60).address)
+    drawn = "() => window.pyverlet.overlay.marks"
+    assert comes_true(page, lambda: page.evaluate(drawn) > 10)
+    visit(page, program("cage", 60).address)
+    assert comes_true(page, lambda: status(page)["frames"] > 5)
+    assert page.evaluate(drawn) == 0  # nobody turns there
+
+
 def test_links_are_drawn_and_a_cloth_is_torn(page: Page, program: Serve) -> None:
     visit(page, program("cloth", 500).address)
     drawn = "() => window.pyverlet.overlay.links"

@@ -118,6 +118,18 @@ def test_refused_in_one_short_sentence(text: str, named: str) -> None:
     assert "allowed" in str(refusal.value)
 
 
+def test_how_circles_have_turned(world: pv.World) -> None:
+    assert "turned" not in unpack(encode_frame(Session(world).latest))[0]
+    world.angle[:] = np.linspace(-1, 7, 9) * np.pi
+    frame = Session(world).latest
+    for velocity in (False, True):
+        head, body = unpack(encode_frame(frame, velocity=velocity))
+        assert head["turned"]
+        turned = np.frombuffer(body, np.uint8)[-9:] * (np.pi / 128)
+        off = np.remainder(turned - world.angle + np.pi, 2 * np.pi) - np.pi
+        assert np.abs(off).max() <= np.pi / 256 + 1e-9
+
+
 def test_a_frame_in_bytes(world: pv.World) -> None:
     frame = Session(world).latest
     head, body = unpack(encode_frame(frame))

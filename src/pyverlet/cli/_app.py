@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -9,11 +11,12 @@ from typing import Annotated
 import typer
 
 from pyverlet import __version__, scenes, warm_up
-from pyverlet.cli import _check
+from pyverlet.cli import _check, _sweep
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.cli import _show as show
 from pyverlet.cli._integrators import integrators
+from pyverlet.data.trajectory import Trajectory
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.progress import Progress
 from pyverlet.scenes import Scene, Settings, report
@@ -34,6 +37,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.add_typer(_check.app, name="check")
+app.add_typer(_sweep.app, name="sweep")
 
 
 def _show_version(wanted: bool) -> None:
@@ -81,6 +85,12 @@ def run(
     seconds: options.Seconds = None,
     frames: options.Frames = None,
     as_json: options.Json = False,
+    trajectory: options.Trajectory = None,
+    every: options.Every = None,
+    journal: Annotated[
+        Path | None,
+        typer.Option(help="Keep all that is done on the page, for `pyverlet replay`.", metavar="FILE", show_default=False),
+    ] = None,
     headless: Annotated[
         bool, typer.Option("--headless", help=f"Run without the page, {DEFAULT_SECONDS:g} s unless said, and report.")
     ] = False,
@@ -96,7 +106,7 @@ def run(
 ) -> None:
     """Run a scene on a live page, or without one and report.
 
-    --seconds, --frames, --json and --plot ask for a run that ends, and imply --headless.
+    --seconds, --frames, --json, --trajectory and --plot ask for a run that ends, and imply --headless.
     """
     chosen = scenes.get(scene)
     overrides = options.overrides(
@@ -113,7 +123,11 @@ def run(
     )
     methods = integrators(integrator)
     chosen.settings(**overrides)  # refuse what is wrong before anything starts
-    ends = headless or as_json or plot or seconds is not None or frames is not None
+    ends = headless or as_json or plot or trajectory or seconds is not None or frames is not None
+    if every is not None and trajectory is None:
+        raise InputError(f"every is {every}; allowed is none without --trajectory")
+    if journal and (ends or window):
+        raise InputError(f"journal is '{journal}' for a run without a page; allowed is one with the page")
     if window and (ends or port is not None or no_open or ledger):
         raise InputError("window is asked for together with a run that ends or with options of the page; allowed is one of them")
     if window:
@@ -124,20 +138,29 @@ def run(
     if not ends:
         port = DEFAULT_PORT if port is None else port
         show.page(
-            chosen, integrators=methods, overrides={**overrides, "ledger": ledger}, dt=dt, port=port, open_browser=not no_open
+            chosen,
+            integrators=methods,
+            overrides={**overrides, "ledger": ledger},
+            dt=dt,
+            port=port,
+            open_browser=not no_open,
+            journal=journal,
         )
         return
     if port is not None:
         raise InputError(f"port is {port}; allowed is none, since this run has no live page")
     count = report.frame_count(seconds=seconds, frames=frames, dt=dt, default_seconds=DEFAULT_SECONDS)
     if plot is None:
-        panels = chosen.panels(integrators=methods, **overrides, ledger=True)
-        results = [_measure(panel, chosen, count, dt, compile_kernels(panel.world)) for panel in panels]
+        panels = chosen.panels(integrators=methods, **overrides, ledger=ledger)
+        with _kept(panels, trajectory, every) as observe:
+            results = [_measure(panel, chosen, count, dt, compile_kernels(panel.world), observe) for panel in panels]
         _tell_all(chosen, panels, results, as_json)
         return
+    if trajectory:
+        raise InputError(f"trajectory is '{trajectory}' and plot is '{plot}'; allowed is one of them")
     if len(methods) > 1:
         raise InputError(f"integrators is {integrator!r}; allowed is one for plot (several: pyverlet compare)")
-    settings = chosen.settings(**overrides, integrator=methods[0] if methods else None)
+    settings = chosen.settings(**overrides, integrator=methods[0] if methods else None, ledger=ledger)
     _tell(_run_and_plot(chosen, settings, count, dt, plot), as_json)
 
 
@@ -202,11 +225,41 @@ def compile_kernels(world: World) -> float:
         return warm_up(world, progress)
 
 
-def _measure(panel: Panel, scene: Scene, frames: int, dt: float, compile_s: float) -> Report:
+def _measure(
+    panel: Panel, scene: Scene, frames: int, dt: float, compile_s: float, observe: Callable[[World], None] | None = None
+) -> Report:
     with Progress("frame") as progress:
         return report.run(
-            panel.world, scene=scene.name, frames=frames, dt=dt, compile_s=compile_s, progress=progress, step=panel.step
+            panel.world,
+            scene=scene.name,
+            frames=frames,
+            dt=dt,
+            compile_s=compile_s,
+            progress=progress,
+            observe=observe,
+            step=panel.step,
         )
+
+
+@contextmanager
+def _kept(panels: Panels, path: Path | None, every: int | None) -> Iterator[Callable[[World], None] | None]:
+    """What to call after each frame so that the world is kept in a trajectory, if one is asked for."""
+    if path is None:
+        yield None
+        return
+    if len(panels) > 1:
+        raise InputError(f"trajectory is '{path}' for {len(panels)} worlds side by side; allowed is one world")
+    with Trajectory(path, every=1 if every is None else every) as film:
+        film.add(panels.worlds[0])
+
+        def observe(world: World) -> None:
+            if world.frames % film.every == 0:
+                film.add(world)
+
+        try:
+            yield observe
+        finally:
+            out.note(f"'{path}' holds {film.frames} frames")
 
 
 def _run_and_plot(scene: Scene, settings: Settings, frames: int, dt: float, path: Path) -> Report:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import difflib
-import importlib
 import inspect
-import sys
-from pathlib import Path
 
+from pyverlet.cli._imported import imported, what
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.integrators import BY_NAME, Integrator
 
@@ -43,30 +41,14 @@ def integrator(name: str) -> Integrator:
 
 
 def _imported(path: str) -> Integrator:
-    module_name, _, attribute = path.partition(":")
     allowed = "allowed is module:Class, a class deriving from pyverlet.Integrator"
-    if not all(part.isidentifier() for part in (*module_name.split("."), attribute)):
-        raise InputError(f"integrator is {path!r}; {allowed}")
-    here = str(Path.cwd())
-    if here not in sys.path:
-        sys.path.insert(0, here)
-    try:
-        module = importlib.import_module(module_name)
-    except Exception as error:  # whatever is wrong with the user's module
-        raise InputError(f"integrator is {path!r}, whose module cannot be imported ({_what(error)}); {allowed}") from error
-    found = getattr(module, attribute, None)
-    if found is None:
-        raise InputError(f"integrator is {path!r}, but {module_name} has no {attribute}; {allowed}")
+    found = imported("integrator", path, allowed)
     try:
         made = found() if isinstance(found, type) else found
     except Exception as error:
-        raise InputError(f"integrator is {path!r}, which cannot be made without arguments ({_what(error)}); {allowed}") from error
+        raise InputError(f"integrator is {path!r}, which cannot be made without arguments ({what(error)}); {allowed}") from error
     if not isinstance(made, Integrator):
         raise InputError(f"integrator is {path!r}, which is no Integrator; {allowed}")
     if lacks := [name for name in ("order", "symplectic") if inspect.getattr_static(type(made), name, None) is None]:
         raise InputError(f"integrator is {path!r}, which does not state {lacks[0]!r}; {allowed}, with order and symplectic")
     return made
-
-
-def _what(error: Exception) -> str:
-    return f"{type(error).__name__}: {error}"

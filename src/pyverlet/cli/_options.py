@@ -46,7 +46,9 @@ def real(text: str) -> float:
         raise typer.BadParameter(f"{text!r} is not a number") from None
 
 
-SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="Name of a scene, see `pyverlet list`.")]
+SceneName = Annotated[
+    str, typer.Argument(metavar="SCENE", help="Name of a scene, see `pyverlet list`, or a file, .toml or .json.")
+]
 Particles = Annotated[int | None, typer.Option(parser=whole, help="Number of circles.", metavar="N", show_default=False)]
 Substeps = Annotated[int | None, typer.Option(parser=whole, help="Substeps a frame.", metavar="N", show_default=False)]
 IntegratorName = Annotated[
@@ -81,14 +83,19 @@ Frames = Annotated[
     int | None, typer.Option(parser=whole, help="Frames to run, in place of --seconds.", metavar="N", show_default=False)
 ]
 Look = Annotated[ThemeName, typer.Option("--theme", help="Behind the circles.")]
-Size = Annotated[str, typer.Option(help="Width and height in pixels.", metavar="WxH")]
+Size = Annotated[str | None, typer.Option(help="Width and height in pixels.", metavar="WxH", show_default="1280x720")]
 Picture = Annotated[
     Path | None,
     typer.Option(help="What the circles form (scene image).", metavar="FILE", show_default=False),
 ]
-Ledger = Annotated[
-    bool, typer.Option("--ledger", help="Show on the page where the energy goes; reports always have it. Costs time.")
+Trajectory = Annotated[
+    Path | None,
+    typer.Option(help="Keep the frames in a .gsd, .xyz or .vtkhdf file, without the page.", metavar="FILE", show_default=False),
 ]
+Every = Annotated[
+    int | None, typer.Option(parser=whole, help="Frames from one in the trajectory to the next.", metavar="N", show_default="1")
+]
+Ledger = Annotated[bool, typer.Option("--ledger", help="Say where the energy goes, on the page and in the report. Costs time.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 COLOURS: dict[ColourName, Callable[[], Colouring]] = {

@@ -18,14 +18,13 @@ from pyverlet.ground.progress import Progress
 from pyverlet.picture import Fixed
 
 DEFAULT_SECONDS = 10.0
-DEFAULT_SIZE = "1280x720"
 
 
 @app.command()
 def record(
     scene: options.SceneName,
     path: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A name that ends in .mp4, .gif, .webp or .png, or frame-{:04d}.png.")
+        Path, typer.Argument(metavar="FILE", help="A name that ends in .mp4, .gif, .webp, .html or .png, or frame-{:04d}.png.")
     ],
     seconds: Annotated[
         float | None,
@@ -34,7 +33,7 @@ def record(
     fps: Annotated[
         int | None, typer.Option(parser=options.whole, help="Pictures a second.", metavar="N", show_default="60; .gif: 25")
     ] = None,
-    size: options.Size = DEFAULT_SIZE,
+    size: options.Size = None,
     colour: Annotated[
         options.ColourName | None,
         typer.Option(help="What the colours of the circles say.", show_default="origin, or the scene's"),
@@ -52,7 +51,8 @@ def record(
     collisions: options.CollisionMethod = None,
     picture: options.Picture = None,
 ) -> None:
-    """Record a scene as a film (.mp4, .gif, .webp), as numbered pictures (frame-{:04d}.png), or its last moment (.png).
+    """Record a scene as a film (.mp4, .gif, .webp), a page that plays it (.html), numbered pictures (frame-{:04d}.png), or its
+    last moment (.png).
 
     Needs no screen. The same command gives the same pictures. Ctrl-C keeps what was recorded until then.
     """
@@ -76,7 +76,7 @@ def record(
     show = chosen.show
     if seconds is None:
         seconds = show.seconds(settings) if show.seconds else DEFAULT_SECONDS
-    plan = recording.plan(path, seconds=seconds, fps=fps, size=options.pixels(size))
+    plan = recording.plan(path, seconds=seconds, fps=fps, size=None if size is None else options.pixels(size))
     world = chosen.build(settings)
     compile_kernels(world)
     given = None if colour is None else options.COLOURS[colour]()

@@ -4,28 +4,45 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from pyverlet.cli import _print as out
 from pyverlet.ground.progress import Progress
 from pyverlet.laws.integrators import Integrator
-from pyverlet.scenes import Scene, Settings
+from pyverlet.scenes import SCENES, Scene, Settings
 
 
 def page(
-    scene: Scene, *, integrators: Sequence[Integrator], overrides: Mapping[str, Any], dt: float, port: int, open_browser: bool
+    scene: Scene,
+    *,
+    integrators: Sequence[Integrator],
+    overrides: Mapping[str, Any],
+    dt: float,
+    port: int,
+    open_browser: bool,
+    journal: Path | None,
 ) -> None:
-    """Show the scene on the live page until Ctrl-C."""
+    """Show the scene on the live page until Ctrl-C, and keep what happens there in a journal if one is asked for."""
     from pyverlet.viewers import serve
     from pyverlet.viewers.exhibit import Exhibit, Repertoire
 
+    SCENES.setdefault(scene.name, scene)  # one from a file may be picked on the page like the others
     repertoire = Repertoire(scene, dt=dt, integrators=integrators, overrides=overrides)
 
     def build() -> Exhibit:
         with Progress("where each circle ends") as progress:
             return repertoire.open(progress)
 
-    serve(build, scene_name=scene.name, repertoire=repertoire, port=port, open_browser=open_browser, dt=dt)
+    options: dict[str, Any] = {"repertoire": repertoire, "port": port, "open_browser": open_browser, "dt": dt}
+    if journal is None:
+        serve(build, scene_name=scene.name, **options)
+        return
+    from pyverlet.viewers.journal import Journal
+
+    with Journal(journal, dt=dt) as kept:
+        serve(build, scene_name=scene.name, stage=kept.stage, **options)
+    out.note(f"'{journal}' holds {kept.frame:,} frames: pyverlet replay '{journal}'")
 
 
 def window(scene: Scene, settings: Settings, *, dt: float) -> None:

@@ -210,18 +210,22 @@ def _type_of_kernel(kernel: Kernel, _: Any) -> Any:
     return numba.typeof(kernel.alone)
 
 
-def _with_threads(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The same function, where the kernels it calls by their names are their variants for several threads."""
-    names = {
-        name: value.together
-        for name, value in function.__globals__.items()
-        if isinstance(value, Kernel) and name in function.__code__.co_names
-    }
+def _bound(function: Callable[..., Any], names: dict[str, Any], suffix: str = "") -> Callable[..., Any]:
+    """The same function, where these names are something else."""
     other = types.FunctionType(
         function.__code__, {**function.__globals__, **names}, function.__name__, function.__defaults__, function.__closure__
     )
-    other.__qualname__, other.__module__ = function.__qualname__, function.__module__
+    other.__qualname__, other.__module__ = function.__qualname__ + suffix, function.__module__
     return other
+
+
+def _with_threads(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The same function, where the kernels it calls by their names are their variants for several threads."""
+    used = function.__code__.co_names
+    return _bound(
+        function,
+        {name: value.together for name, value in function.__globals__.items() if isinstance(value, Kernel) and name in used},
+    )
 
 
 KERNELS: dict[str, Kernel] = {}
@@ -247,12 +251,15 @@ def parallel_kernel(function: Callable[..., Any]) -> Kernel:
     return _declared(Kernel(function, loops=True))  # type: ignore[no-any-return]
 
 
-def driver(function: Callable[..., Any]) -> Kernel:
+def driver(function: Callable[..., Any], **stages: Kernel) -> Kernel:
     """Compile on first call a function that calls kernels: all on one thread, or each with its loops over threads.
 
     It has no `prange` of its own. It calls kernels, and other drivers, by names of its module, not as `module.kernel`. A stage
-    that is to stay on one thread in any case is called by a name for `stage.alone`.
+    that is to stay on one thread in any case is called by a name for `stage.alone`. `stages`: what some of these names are; so
+    one function serves as several drivers.
     """
+    if stages:
+        function = _bound(function, stages, "_" + "_".join(stage.function.__name__ for stage in stages.values()))
     return _declared(Kernel(function, drives=True))  # type: ignore[no-any-return]
 
 

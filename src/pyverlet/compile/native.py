@@ -114,6 +114,7 @@ def _attempt(compiled: Any, parts: list[Any]) -> Any:
 
 def _reason(message: str) -> str:
     """What the compiler means, out of the pages it writes: its first telling line, and where."""
+    message = re.sub(r"\x1b\[[0-9;]*m", "", message)  # in colours, where a library for them is installed
     lines = [line.strip() for line in message.splitlines() if line.strip() and not line.startswith("Failed in")]
     says = lines[0].removesuffix(" found for signature:")
     if says != lines[0]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.picture import ByOrigin, Colouring, Theme, View
+from pyverlet.picture.marks import MARKED_PX
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
@@ -15,28 +16,36 @@ if TYPE_CHECKING:
 VERTEX = """#version 330
 in vec2 place;
 in float radius;
+in float angle;  // rad
 in vec4 tint;
 uniform vec4 window;  // metres at its left and top; from metres to its half widths, its half heights
 uniform float scale;  // pixels a metre
 out vec3 colour;
 out float reach;
+out vec2 way;
 void main() {
     gl_Position = vec4((place - window.xy) * window.zw + vec2(-1.0, 1.0), 0.0, 1.0);
     reach = max(radius * scale, 0.5);
     gl_PointSize = 2.0 * reach + 2.0;
     colour = tint.rgb;
+    way = vec2(cos(angle), -sin(angle));  // points have their y down
 }
 """
 
 FRAGMENT = """#version 330
 in vec3 colour;
 in float reach;
+in vec2 way;
+uniform float marked;  // pixels of the radius from which on there is a mark
 out vec4 pixel;
 void main() {
-    float distance = length(gl_PointCoord - 0.5) * (2.0 * reach + 2.0);
+    vec2 from = (gl_PointCoord - 0.5) * (2.0 * reach + 2.0);
+    float distance = length(from);
     float cover = clamp(reach + 0.5 - distance, 0.0, 1.0);
     if (cover <= 0.0) discard;
-    pixel = vec4(colour, cover);
+    float aside = abs(from.x * way.y - from.y * way.x);
+    float mark = reach >= marked && dot(from, way) >= 0.0 ? 0.5 * clamp(1.2 - aside, 0.0, 1.0) : 0.0;
+    pixel = vec4(colour * (1.0 - mark), cover);
 }
 """
 
@@ -60,11 +69,17 @@ class Arrays:
         self._colour = ByOrigin() if colour is None else colour
         self._theme = theme
 
-    def now(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-        """Positions (n, 2), radii (n,), colours (n,): contiguous, and writable, as ctypes asks of memory it is to look at."""
+    @property
+    def marked(self) -> float:
+        """Radius in pixels from which on circles have a mark: none as long as nobody has turned."""
+        return MARKED_PX if self._world.angle.any() else float("inf")
+
+    def now(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
+        """Positions (n, 2), radii, angles, colours (n,): contiguous, and writable, as ctypes asks of memory it is to look at."""
         world = self._world
         return (
             np.ascontiguousarray(world.position, dtype=np.float32),
             np.ascontiguousarray(world.radius, dtype=np.float32),
+            np.remainder(world.angle, 2 * np.pi, dtype=np.float64).astype(np.float32),
             np.require(self._colour.colours(world, self._theme), requirements=["C", "W"]),
         )

@@ -37,7 +37,7 @@ class Circles:
     def _make_room(self, count: int) -> None:
         """Buffers for `count` circles: they cannot grow."""
         self._room = count
-        formats = (("2f", "place", 8), ("1f", "radius", 4), ("4f1", "tint", 4))
+        formats = (("2f", "place", 8), ("1f", "radius", 4), ("1f", "angle", 4), ("4f1", "tint", 4))
         self._buffers = [self._context.buffer(reserve=count * size) for _, _, size in formats]
         content = [
             BufferDescription(buffer, kind, [name], normalized=["tint"] if name == "tint" else [])
@@ -62,6 +62,7 @@ class Circles:
             buffer.write(array.data.cast("B"))
         self._program["window"] = window(view)
         self._program["scale"] = view.scale * pixel_ratio
+        self._program["marked"] = self._arrays.marked
         with self._context.enabled(gl.GL_PROGRAM_POINT_SIZE, self._context.BLEND):
             self._context.blend_func = self._context.BLEND_DEFAULT
             self._geometry.render(self._program, vertices=count)

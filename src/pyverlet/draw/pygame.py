@@ -9,7 +9,7 @@ import pygame
 
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import lines, raster
-from pyverlet.picture import DARK, ByOrigin, Colouring, Theme, View
+from pyverlet.picture import DARK, ByOrigin, Colouring, Theme, View, marks
 from pyverlet.picture.colour import by_force
 from pyverlet.picture.palette import Packed
 from pyverlet.picture.raster import LINK_PX
@@ -33,7 +33,7 @@ def draw(
     theme: Theme = DARK,
     walls: bool = True,
 ) -> None:
-    """Draw `world` on `surface`, each circle with smooth rims, and the lines of its bounds.
+    """Draw `world` on `surface`, each circle with smooth rims and a mark once it has turned, and the lines of its bounds.
 
     Args:
         surface: of 32 bits a pixel, as displays are; its alpha, if it has any, ends up 255 under circles.
@@ -64,6 +64,7 @@ def draw(
     pixels = np.bitwise_and(own, np.uint32(0x00FFFFFF), dtype=np.uint32)  # the raster keeps count of coverage up there
     ground = pixels.copy()
     raster.circles(pixels, ground, world.position, world.radius, colours, view.left, view.top, view.scale)
+    marks.draw(pixels, world.position, world.radius, world.angle, colours, view)
     if len(world.links):
         ends, force = world.links.segments()
         pulls = by_force(force, theme)

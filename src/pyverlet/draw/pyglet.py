@@ -17,7 +17,12 @@ if TYPE_CHECKING:
 
 __all__ = ["Circles"]
 
-ATTRIBUTES = (("place", 2, gl.GL_FLOAT, False), ("radius", 1, gl.GL_FLOAT, False), ("tint", 4, gl.GL_UNSIGNED_BYTE, True))
+ATTRIBUTES = (
+    ("place", 2, gl.GL_FLOAT, False),
+    ("radius", 1, gl.GL_FLOAT, False),
+    ("angle", 1, gl.GL_FLOAT, False),
+    ("tint", 4, gl.GL_UNSIGNED_BYTE, True),
+)
 
 
 class Circles:
@@ -61,6 +66,7 @@ class Circles:
         self._program.use()
         self._program["window"] = window(view)
         self._program["scale"] = view.scale * pixel_ratio
+        self._program["marked"] = self._arrays.marked
         gl.glEnable(gl.GL_PROGRAM_POINT_SIZE)
         gl.glEnable(gl.GL_BLEND)
         gl.glBlendFunc(gl.GL_SRC_ALPHA, gl.GL_ONE_MINUS_SRC_ALPHA)

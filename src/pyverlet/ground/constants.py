@@ -89,6 +89,10 @@ REST_ACCELERATIONS: Final = 4.0
 """An approach slower than this many |a| h is contact at rest, not an impact: 0.08 m/s under gravity at 480 substeps a second. One
 substep of gravity is 1. Four times as much settled the scene `box` no better."""
 
+STANDS_OUT: Final = 1e-3
+"""Of its radius: who is added with more of it beyond a wall is put at the wall. To be lifted there by the first frame would give
+energy that nothing has lost. Less is what coordinates are rounded by."""
+
 SLEEP_SPEED: Final = 0.02
 """Of sqrt(g r): circles slower than this are calm, 0.04 m/s at a radius of 0.5 m. Box2D has 0.05 m/s for all."""
 
@@ -183,6 +187,16 @@ SMALLEST: Final = 1e-3
 
 LARGEST_PUSH: Final = 0.3
 """Overlap seen by one substep, as a fraction of the contact distance. Settled piles stay far below it."""
+
+GAS_STEP: Final = 0.1
+"""Radii, root mean square, that circles of an elastic gas may move by in a substep without a word: at an area fraction of 0.6 it
+then has 2 % less pressure, at twice that 10 % (docs/physics.md has the table)."""
+
+GAS_FROM: Final = 100
+"""Circles that make a gas: the pressure of fewer is a matter of each of them."""
+
+GAS_LOOK_FRAMES: Final = 8
+"""Frames after which that is looked at again: in each of them it took a fiftieth of the frame of 1,000 circles."""
 
 FRAME_BUDGET_MS: Final = 5.0
 """Milliseconds of physics a frame may take, of the 16.7 ms at 60 Hz: the rest belongs to drawing and the user's own code."""

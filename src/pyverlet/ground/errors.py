@@ -15,6 +15,10 @@ class Interrupted(PyverletError):  # noqa: N818  (like KeyboardInterrupt, it is 
     """A person ended long work early (Ctrl-C); the message says what is kept of it."""
 
 
+class CoarseStepWarning(UserWarning):
+    """The step is too coarse for what moves; the message names a particle and the substeps that would do."""
+
+
 class NonFiniteError(PyverletError, ArithmeticError):
     """The state turned NaN or infinite; the world keeps the last good frame readable.
 

@@ -7,6 +7,7 @@ only where nobody has written before.
 
 from __future__ import annotations
 
+import math
 import mmap
 import sys
 import weakref
@@ -26,7 +27,7 @@ _blocks: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
 def empty(shape: int | tuple[int, ...], dtype: DTypeLike) -> Array:
     """As np.empty."""
     dtype = np.dtype(dtype)
-    count = int(np.prod(shape))
+    count = shape if isinstance(shape, int) else math.prod(shape)
     size = count * dtype.itemsize
     if size < _HUGE or sys.platform != "linux":
         return np.empty(shape, dtype)

@@ -211,9 +211,10 @@ def _at_cage(b, x0, y0, size, h, lag, e, mu, rest_speed):
     room = max(size - b.radius, zero)
     for _ in range(REFLECTIONS):
         dx, dy = b.x - x0, b.y - y0
-        distance = np.sqrt(dx * dx + dy * dy)
-        if not distance > room:
+        square = dx * dx + dy * dy  # compared as where those beyond the wall are looked for
+        if not square > room * room:
             return b
+        distance = np.sqrt(square)
         nx, ny, depth = -dx / distance, -dy / distance, distance - room
         vx, vy = b.vx + lag * b.ax, b.vy + lag * b.ay
         if -(vx * nx + vy * ny) > rest_speed and room > zero:

@@ -21,35 +21,26 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.compile.jit import driver, kernel, parallel_kernel, prange
 from pyverlet.kernels.cage import hold_some
 from pyverlet.kernels.contact import mark_strip, push_strip, refine_strip, relax_strip
 from pyverlet.kernels.motion import any_strayed, arrive, kick_drift, set_out
+from pyverlet.kernels.tables import Circles, Law, Pairs
 
 BEHIND = 5
 """Strips by which the last stage is behind the first, and that a border leaves for later on both of its sides."""
 
 
-class Room(NamedTuple):
-    """The cage around the circles, as `cage.hold` takes it, and what that needs of the circles."""
-
-    x0: Any
-    y0: Any
-    size: Any
-    rest_speed: Any
-    radius: Any
-    hits: Any
-
-
 class Strips(NamedTuple):
     """Where the circles of strip s stand, from held[s] to held[s + 1], and where it keeps its normals until they have been used.
 
-    `leaps`: the next substep is to be begun, under the same acceleration. `marks`: who touches is to be marked as resting. `far`:
-    square of the distance that a circle may be from `checked` after a leap, m^2.
+    `looks`: deep packs are to be noted. `leaps`: the next substep is to be begun, under the same acceleration. `marks`: who
+    touches is to be marked as resting. `far`: square of the distance that a circle may be from `checked` after a leap, m^2.
     """
 
     held: Any
     place: Any
+    looks: Any
     leaps: Any
     marks: Any
     checked: Any
@@ -74,8 +65,8 @@ def _settle(s, t, circles, law, room, strips):
     a, b = strips.held[s], strips.held[t]
     arrive(circles.position[a:b], circles.velocity[a:b], circles.origin[a:b], circles.moved[a:b], law.feed)
     hold_some(
-        room.x0, room.y0, room.size, circles.position, circles.velocity, circles.acceleration, room.radius,
-        circles.inverse_mass, circles.resting, room.hits, law.h, law.lag, room.rest_speed, a, b,
+        room[0], room[1], room[2], circles.position, circles.velocity, circles.acceleration, circles.radius,
+        circles.inverse_mass, circles.resting, circles.hits, law.h, law.lag, law.rest_speed, a, b,
     )  # fmt: skip
 
 
@@ -83,7 +74,8 @@ def _settle(s, t, circles, law, room, strips):
 def _still(s, circles, pairs, law, strips):
     relax_strip(s, strips.place[s], circles, pairs, law)
     if strips.marks != 0:
-        mark_strip(s, strips.place[s], circles, pairs)
+        a = pairs.begin[s]
+        mark_strip(a, a + pairs.lanes[s], strips.place[s], pairs.lane_i, pairs.lane_j, pairs.normal, circles.resting)
 
 
 @kernel
@@ -104,7 +96,7 @@ def _share_of_strips(first, stop, circles, pairs, law, room, strips):
             _set_out(k, min(k + 2, stop), circles, strips)
         for s in (k, k - 1):
             if first <= s < stop - above:
-                push_strip(s, strips.place[s], circles, pairs, law)
+                push_strip(s, strips.place[s], circles, pairs, law, strips.looks)
         for s in (k - 2, k - 3):
             if first + 2 * below <= s < stop - 3 * above:
                 _refine(s, circles, pairs, law)
@@ -123,7 +115,7 @@ def _share_of_strips(first, stop, circles, pairs, law, room, strips):
 @kernel
 def _border(s, circles, pairs, law, room, strips):
     """What two threads have left to be done below and above strip s, the first of one of them."""
-    push_strip(s - 1, strips.place[s - 1], circles, pairs, law)
+    push_strip(s - 1, strips.place[s - 1], circles, pairs, law, strips.looks)
     for t in (s - 2, s, s - 3, s - 1, s + 1):
         _refine(t, circles, pairs, law)
     _settle(s - 3, s + 3, circles, law, room, strips)
@@ -133,10 +125,11 @@ def _border(s, circles, pairs, law, room, strips):
 
 
 @parallel_kernel
-def substep(cut, circles, pairs, law, room, strips):
+def _substep(cut, circles, pairs, law, room, strips):
     """From after the integration of a substep to its end, or to after that of the next; whether anyone has strayed in that.
 
-    cut: (threads + 1,) even strip each thread begins with, at least 2 * BEHIND + 2 apart, and the number of strips.
+    room: (x, y, radius). cut: (threads + 1,) even strip each thread begins with, at least 2 * BEHIND + 2 apart, and the number of
+    strips.
     """
     strayed = 0
     for part in prange(cut.shape[0] - 1):
@@ -144,3 +137,9 @@ def substep(cut, circles, pairs, law, room, strips):
     for part in prange(1, cut.shape[0] - 1):
         strayed += int(_border(cut[part], circles, pairs, law, room, strips))
     return strayed > 0
+
+
+@driver
+def substep(cut, circles, pairs, law, room, strips):
+    """What `_substep` does, called from Python, which has plain tuples."""
+    return _substep(cut, Circles(*circles), Pairs(*pairs), Law(*law), room, Strips(*strips))

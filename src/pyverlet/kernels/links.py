@@ -132,11 +132,17 @@ def snap(force, strength, intact):
 
 
 @kernel
-def step_back(out, position, velocity, h):
-    """Where everybody was a substep ago, by the velocity."""
+def look_back(out, position, before, velocity, calm, h):
+    """Where everybody was a substep ago: by the velocity, or `before`, by memory, where rest has put another velocity in.
+
+    Contacts at rest carry weight by small velocities that move nobody, and links would take them for motion. calm: (k,) m/s, by
+    how much the velocity may differ from the way gone and still be of that kind; beyond it there was an impact. NaN: unknown.
+    """
     for k in range(position.shape[0]):
-        out[k, 0] = position[k, 0] - h * velocity[k, 0]
-        out[k, 1] = position[k, 1] - h * velocity[k, 1]
+        x, y = position[k, 0] - h * velocity[k, 0], position[k, 1] - h * velocity[k, 1]
+        if np.hypot(x - before[k, 0], y - before[k, 1]) <= h * calm[k]:
+            x, y = before[k, 0], before[k, 1]
+        out[k, 0], out[k, 1] = x, y
 
 
 @parallel_kernel
@@ -152,8 +158,10 @@ def hand_back(position, velocity, slot, solved, predicted, rate, pull):
 
 
 @parallel_kernel
-def add_rows(out, slot, values):
-    """out[slot[k]] += values[k] for (n, 2) arrays; no slot comes twice."""
+def add_pull(acceleration, slot, pull, calm, rest):
+    """acceleration[slot[k]] += pull[k], (n, 2); no slot comes twice. calm[k] becomes what both are in `rest` seconds, m/s."""
     for k in prange(slot.shape[0]):
-        out[slot[k], 0] += values[k, 0]
-        out[slot[k], 1] += values[k, 1]
+        s = slot[k]
+        calm[k] = rest * (np.hypot(acceleration[s, 0], acceleration[s, 1]) + np.hypot(pull[k, 0], pull[k, 1]))
+        acceleration[s, 0] += pull[k, 0]
+        acceleration[s, 1] += pull[k, 1]

@@ -1,9 +1,8 @@
 """Circles go their way through a substep among obstacles, and meet what there is to meet (`kernels.obstacles` finds it).
 
-Everything here is float64: where a circle ends is rounded to the world's dtype once, so that many small meetings, as on a chain
-of short segments, do not add up to more than one rounding of a coordinate. What the integrator has rounded is computed anew: a
-circle that slides falls by g h^2 and is pushed out again in every substep, and of two roundings the push along x, if it is less
-than half of one, would always be lost.
+Everything here is float64, and so is a place from one substep of a frame to the next: what the world's dtype rounds it by is
+remembered, and what the integrator has rounded is computed anew. A circle that slides falls by g h^2 and is pushed out again in
+every substep; with a rounding after each, the push along x, if it is less than half of one, would always be lost.
 
 **Corners.** Who is held by two surfaces that face each other by more than a right angle cannot get out of one without getting
 into the other: to push it out of one after the other converges, the more slowly the narrower the corner, and leaves a velocity
@@ -73,7 +72,7 @@ def _wide(b):
 
 @kernel
 def _unrounded(x, before, v, a, h, drop, step):
-    """Where the integrator has put a coordinate, without its rounding; x itself if others have moved it too. step: of rounding."""
+    """Where the integrator has put a coordinate, unrounded; x itself if others have moved it too. step: of rounding."""
     exact = before + h * (v - (1.0 - drop) * h * a)
     return exact if abs(exact - x) <= step * (abs(x) + abs(before)) else x
 
@@ -111,7 +110,7 @@ def _kept(room, b):
 
 @kernel
 def _touched(b, nx, ny, depth, wx, wy, h, lag, e, mu, rest_speed, which):
-    """The circle b meets a surface that moves with (wx, wy): what becomes of it, and the surface, NOBODY's if it bounced off."""
+    """The circle b meets a surface that moves with (wx, wy): what becomes of it, and the surface; NOBODY's if it bounced."""
     resting, from_x, from_y = b.resting, b.from_x, b.from_y
     # As the surface sees it: how fast it is, and how far it went.
     b = noted(moved(b, b.x, b.y, b.vx - wx, b.vy - wy, from_x + h * wx, from_y + h * wy), 0)
@@ -185,7 +184,7 @@ def _in_wide_corner(b, old, new, x, y, vx, vy):
     """The circle b meets two surfaces in a wide corner: (what becomes of it, whether both hold it).
 
     x, y, vx, vy: where it was, and how fast, before it met the first. Both hold it if each has to push it then to satisfy both;
-    one after the other, the second would have pushed it off the first. Who comes faster than gravity makes it in a substep is not held.
+    one after the other, the second would have pushed it off the first. Who comes faster than a substep of gravity is not held.
     """
     dot = old.nx * new.nx + old.ny * new.ny
     square = 1.0 - dot * dot
@@ -295,18 +294,19 @@ def _alone(px, py, qx, qy, x0, y0, cell, columns, rows, start):
 
 @parallel_kernel
 def collide(
-    segments, bodies, until, x0, y0, cell, columns, rows, start, entries, room, along,
+    segments, bodies, until, x0, y0, cell, columns, rows, start, entries, room, along, rest,
     position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
     before, turn, lift, h, lag, rest_speed, drop,
 ):  # fmt: skip
     """All circles, from their places `before` the substep (n, 2) to `position`; `until`: seconds into the frame at its end.
 
     room: its wall, which wins: (7,), see OPEN. along: (n, 2), becomes the acceleration left to those who are held, m/s^2, or 0.
-    drop: of the integrator.
+    rest: (n, 2), what rounding has taken from places in the substep before, and takes in this, m. drop: of the integrator.
     """
     step = 0.5 * np.finfo(position.dtype).eps
     for i in prange(position.shape[0]):
         along[i, 0] = along[i, 1] = 0.0
+        met = False
         if inverse_mass[i] > 0 and not _alone(
             before[i, 0], before[i, 1], position[i, 0], position[i, 1], x0, y0, cell, columns, rows, start
         ):
@@ -316,11 +316,12 @@ def collide(
                     spent, before, turn, lift,
                 )
             )  # fmt: skip
-            px, py = np.float64(before[i, 0]), np.float64(before[i, 1])
+            rest_x, rest_y = np.float64(rest[i, 0]), np.float64(rest[i, 1])
+            px, py = before[i, 0] + rest_x, before[i, 1] + rest_y
             if np.isfinite(px + py + b.x + b.y):
                 long = np.float64(h)
-                x = _unrounded(b.x, px, b.vx, b.ax, long, drop, step)
-                y = _unrounded(b.y, py, b.vy, b.ay, long, drop, step)
+                x = _unrounded(b.x + rest_x, px, b.vx, b.ax, long, drop, step)
+                y = _unrounded(b.y + rest_y, py, b.vy, b.ay, long, drop, step)
                 b, met, along_x, along_y = _travel(
                     moved(b, x, y, b.vx, b.vy, b.from_x, b.from_y), px, py, segments, bodies, until, x0, y0, cell, columns, rows,
                     start, entries, room, long, np.float64(lag), np.float64(rest_speed),
@@ -328,3 +329,6 @@ def collide(
                 if met:
                     along[i, 0], along[i, 1] = along_x, along_y
                     put(i, b, position, velocity, spin, fed, resting, hits, spent, turn)
+                    rest[i, 0], rest[i, 1] = b.x - position[i, 0], b.y - position[i, 1]
+        if not met:
+            rest[i, 0] = rest[i, 1] = 0.0

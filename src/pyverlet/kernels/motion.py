@@ -178,10 +178,13 @@ def take_motion(position, velocity, acceleration, spin, from_position, from_velo
 
 
 @parallel_kernel
-def put_motion(position, velocity, acceleration, spin, to_position, to_velocity, to_acceleration, to_spin, index):
-    """The way back: index is a permutation, so every row has one writer."""
+def put_motion(
+    position, velocity, acceleration, spin, to_position, to_velocity, to_acceleration, to_spin, angle, half_dt, index
+):  # fmt: skip
+    """The way back: index is a permutation, so every row has one writer. Angles turn by the mean of the spins before and now."""
     for k in prange(index.shape[0]):
         i = np.int64(index[k])
+        angle[i] += half_dt * (np.float64(to_spin[i]) + np.float64(spin[k]))
         copy_row(to_position, i, position, k)
         copy_row(to_velocity, i, velocity, k)
         copy_row(to_acceleration, i, acceleration, k)

@@ -1,9 +1,9 @@
 """Candidate pairs in packs of eight that share no particle, so that `kernels.contact` can treat them eight at a time.
 
-- The pairs of a strip, which come ordered by colour, are cut into packs. What one lane of a pack writes no other one reads. A pack
-  that is not full repeats its last pair: both lanes write the same.
-- Where a pair stood when the list was made is kept: how far its circles have moved since are small numbers, which keep their digits in
-  float32. So what circles are fed can be had from how far they have been pushed, and velocities need not be carried along.
+- The pairs of a strip, which come ordered by colour, are cut into packs. What one lane of a pack writes no other one reads. A
+  pack that is not full repeats its last pair: both lanes write the same.
+- Where a pair stood when the list was made is kept: how far its circles have moved since are small numbers, which keep their
+  digits in float32. So what circles are fed can be had from how far they have been pushed, and velocities need not be carried.
 
 Everything runs strip by strip as kernels.pairs explains: even strips in parallel, then odd ones.
 """
@@ -129,10 +129,10 @@ def share_out(begin, lanes, lane_i, lane_j, radius, inverse_mass, reach, share):
 
 @kernel
 def compose(begin, lanes, lane_i, lane_j, radius, inverse_mass, restitution, friction, e, mu, made_of):
-    """What each pair is made of, the rows of `contact.Pairs.made_of`.
+    """What each pair is made of, the rows of `tables.Pairs.made_of`.
 
-    Of two circles the larger restitution counts, and the geometric mean of the frictions; e and mu, those of all, stand for ones that
-    are negative: not given.
+    Of two circles the larger restitution counts, and the geometric mean of the frictions; e and mu, those of all, stand for ones
+    that are negative: not given.
     """
     zero = e - e
     two = made_of.dtype.type(2)

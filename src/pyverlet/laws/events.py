@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,8 @@ from pyverlet.ground import checks
 from pyverlet.kernels import events as kernels
 from pyverlet.laws.contacts.broadphase import PairList
 from pyverlet.laws.contacts.wide import Wide
+from pyverlet.laws.obstacles import Course
+from pyverlet.laws.rooms import Boundary
 from pyverlet.state.state import Slots, State
 
 Array = NDArray[Any]
@@ -24,8 +26,15 @@ CONTACT = np.dtype([("a", np.int64), ("b", np.int64)])
 _LOWER = 0xFFFFFFFF
 """Bits of a key that are b + 1, of two particles' a < b; 0 is a wall. The others are a."""
 
-HIT = np.dtype([("a", np.int64), ("b", np.int64), ("speed", np.float64)])
-"""The same, and the normal speed they met with, m/s."""
+HIT = np.dtype(
+    [
+        ("a", np.int64), ("b", np.int64), ("speed", np.float64), ("wall", np.int64), ("obstacle", np.int64),
+        ("point", np.float64, (2,)), ("normal", np.float64, (2,)), ("impulse", np.float64),
+    ]
+)  # fmt: skip
+"""The same, and the normal speed they met with, m/s; which wall of the room or which obstacle it was, else -1; where they touch,
+m, and the unit normal out of a, both as of the end of the frame; what turned them, (1 + e) times the reduced mass times the
+speed, N s. NaN where a room of the user's own does not say."""
 
 
 class Events:
@@ -34,15 +43,15 @@ class Events:
     In a pile that comes to rest, contacts without weight may end and begin again.
 
     Attributes:
-        begin: CONTACT, those who touch now and did not in the frame before.
+        begin: HIT, those who touch now and did not in the frame before.
         end: CONTACT, those who did and do not now; without those of removed particles.
         hit: HIT, those of `begin` who met with at least `hit_speed`.
     """
 
     def __init__(self) -> None:
         self._hit_speed = 1.0
-        self.begin = self.end = np.empty(0, CONTACT)
-        self.hit = np.empty(0, HIT)
+        self.begin = self.hit = np.empty(0, HIT)
+        self.end = np.empty(0, CONTACT)
         self._touching = np.empty(0, np.int64)  # keys, sorted
         self._keys: list[Array] = []
         self._speeds: list[Array] = []
@@ -89,8 +98,8 @@ class Events:
         """A frame begins, or begins again."""
         self._keys, self._speeds = [], []
 
-    def close(self, slots: Slots, state: State) -> None:
-        """The frame has gone well: what was heard is what happened."""
+    def close(self, slots: Slots, state: State, place: Place) -> None:
+        """The frame has gone well: what was heard is what happened; `place`: who and what they met."""
         at_wall = slots.hits >= 0
         self._keys.append(slots.particle[at_wall].astype(np.int64) << 32)
         self._speeds.append(slots.hits[at_wall].astype(np.float64))
@@ -103,11 +112,10 @@ class Events:
         keys, speeds = keys[first], np.maximum.reduceat(speeds, first) if len(first) else speeds
         new = ~_among(keys, self._touching)
         gone = self._touching[~_among(self._touching, keys)]
-        self.begin, self.end = _contacts(keys[new], state), _contacts(gone, state)
-        hard = new & (speeds >= self._hit_speed)
-        self.hit = np.empty(np.count_nonzero(hard), HIT)
-        struck = _contacts(keys[hard], state)
-        self.hit["a"], self.hit["b"], self.hit["speed"] = struck["a"], struck["b"], speeds[hard]
+        self.end = _contacts(gone, state)
+        met, speeds = _contacts(keys[new], state), speeds[new]
+        self.begin = place.hits(met, speeds, state)
+        self.hit = self.begin[speeds >= self._hit_speed]
         self._touching = keys
         self.forget()
 
@@ -116,6 +124,67 @@ class Events:
         numbers = np.sort(state.number[slots.particle[slots.asleep]])
         b = (self._touching & _LOWER) - 1
         return self._touching[_among(self._touching >> 32, numbers) & ((b < 0) | _among(b, numbers))]
+
+
+class Place(NamedTuple):
+    """What circles may meet, and by which laws."""
+
+    room: Boundary
+    course: Course
+    restitution: float
+    """Of circles that have none of their own, between each other."""
+
+    def hits(self, met: Array, speed: Array, state: State) -> Array:
+        """HIT from CONTACT and m/s, of circles that are where they are now."""
+        found = np.zeros(len(met), HIT)
+        for name, column in (("a", met["a"]), ("b", met["b"]), ("speed", speed), ("wall", -1), ("obstacle", -1)):
+            found[name] = column
+        at_wall = met["b"] == WALL
+        pair, single = np.flatnonzero(~at_wall), np.flatnonzero(at_wall)
+        x, r = state.position.astype(float), state.radius.astype(float)
+        with np.errstate(divide="ignore"):
+            inverse = 1 / state.mass.astype(float)
+        e = state.restitution.astype(float)
+        if len(pair):
+            a, b = met["a"][pair], met["b"][pair]
+            way = x[b] - x[a]
+            far = np.hypot(*way.T)
+            normal = way / np.maximum(far, 1e-300)[:, None]
+            both = np.maximum(*(np.where(e[k] >= 0, e[k], self.restitution) for k in (a, b)))
+            weight = inverse[a] + inverse[b]
+            self._write(found, pair, x[a] + (r[a] + 0.5 * (far - r[a] - r[b]))[:, None] * normal, normal, both, weight)
+        if len(single):
+            a = met["a"][single]
+            gap, into, surface = self._nearest(x[a], found, single)
+            both = np.maximum(surface, np.where(e[a] >= 0, e[a], 0.0))
+            self._write(found, single, x[a] - gap[:, None] * into, -into, both, inverse[a])
+        return found
+
+    def _write(self, found: Array, rows: Array, point: Array, normal: Array, e: Array, weight: Array) -> None:
+        found["point"][rows], found["normal"][rows] = point, normal
+        found["impulse"][rows] = (1 + e) * found["speed"][rows] / np.where(weight > 0, weight, np.inf)
+
+    def _nearest(self, x: Array, found: Array, rows: Array) -> tuple[Array, Array, Array]:
+        """Which wall or obstacle it was; its distance from the centres x, m, its normal, and its restitution."""
+        gap, into, surface = np.full(len(x), np.inf), np.full((len(x), 2), np.nan), np.zeros(len(x))
+        facing = self.room.facing(x)
+        if facing is not None:
+            wall = np.argmin(facing[0], axis=1)
+            found["wall"][rows], row = wall, np.arange(len(x))
+            gap, into = facing[0][row, wall].copy(), np.array(facing[1][row, wall])
+            surface[:] = getattr(self.room, "restitution", 0.0)
+        elif self.room.extent() is not None:  # of the user's own: it may have been its wall
+            found["wall"][rows] = 0
+        obstacles = self.course.seen()
+        if obstacles:
+            far, normal = self.course.facing(x)
+            which, row = np.argmin(far, axis=1), np.arange(len(x))
+            nearer = far[row, which] < gap
+            found["obstacle"][rows] = np.where(nearer, which, -1)
+            found["wall"][rows] = np.where(nearer, -1, found["wall"][rows])
+            gap, into = np.where(nearer, far[row, which], gap), np.where(nearer[:, None], normal[row, which], into)
+            surface = np.where(nearer, np.array([obstacle.restitution for obstacle in obstacles])[which], surface)
+        return np.where(np.isfinite(gap), gap, np.nan), into, surface
 
 
 def _numbered(keys: Array, state: State) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,6 +28,7 @@ class Ledger:
         forces: work of all other forces without a potential, such as a user's own and the mouse.
         links: taken by links: damping, and what stiff ones do not give back.
         projection: put in by moving overlapping circles apart, where contacts together gained more than they took in a frame.
+        limiter: taken back by the energy limiter: what contacts had gained in a frame beyond what they may.
         outside: brought by what was done between frames: particles added, removed or written to, gravity changed.
         residual: what is left over: the error of the integrator and, with forces that have no potential, of the trapezoidal rule
             their work is summed by.
@@ -39,6 +40,7 @@ class Ledger:
     forces: float = 0.0
     links: float = 0.0
     projection: float = 0.0
+    limiter: float = 0.0
     outside: float = 0.0
     residual: float = 0.0
 
@@ -52,11 +54,11 @@ class Ledger:
         return asdict(self)
 
 
-@dataclass(frozen=True)
-class _Instant:
-    """Energy of the world, and power of its forces without potential by account, W."""
+class _Instant(NamedTuple):
+    """Energy of the world, J; the part of it that links and forces hold; power of forces without potential by account, W."""
 
     energy: float
+    held: float
     power: dict[str, float]
 
 
@@ -70,11 +72,12 @@ class Bookkeeper:
     def __init__(self) -> None:
         self.ledger = Ledger()
         self._energy = 0.0  # at the end of the last frame
+        self._resting = 0.0  # what it lacked then of that between substeps: users see who rests without what carries its weight
 
     def copy(self) -> Bookkeeper:
         """Another one with the same accounts."""
         other = Bookkeeper()
-        other.ledger, other._energy = replace(self.ledger), self._energy
+        other.ledger, other._energy, other._resting = replace(self.ledger), self._energy, self._resting
         return other
 
     def frame(
@@ -89,11 +92,14 @@ class _Frame:
         self, books: Bookkeeper, state: Slots, forces: ForceSum, links: Links, t: float, h: float, lag: float,
         done: Callable[[str], None],
     ) -> None:  # fmt: skip
-        self._books, self._state, self._forces, self._links, self._done = books, state, forces, links, done
-        self._t, self._h, self._lag = t, h, lag
+        self._books, self._state, self._links, self._done = books, state, links or None, done
+        self._gravity, self._t, self._h, self._lag = forces.gravity, t, h, lag
+        self._holding = [force for force in forces.forces if isinstance(force, Conservative)]
+        self._working = [force for force in forces.forces if not isinstance(force, Conservative)]
         self._open = replace(books.ledger)
-        self._contacts = 0.0
-        self._now = _Instant(0.0, {})
+        self._contacts, self._resting = 0.0, books._resting
+        self._now = _Instant(0.0, 0.0, {})
+        self._settled = False  # whether positions are final in this substep
 
     def __call__(self, stage: str) -> None:
         self._done(stage)
@@ -103,48 +109,58 @@ class _Frame:
             self._open.outside += self._now.energy - self._books._energy
         elif stage == "integrate":
             self._t += self._h
+            self._settled = False
             before, self._now = self._now, self._look(self._lag)
             gained = self._now.energy - before.energy
             for account, power in self._now.power.items():
                 work = 0.5 * self._h * (before.power[account] + power)
                 setattr(self._open, account, getattr(self._open, account) + work)
                 gained -= work
-            self._open.residual += gained
+            # The first integration gives back what the last frame has left out.
+            self._open.residual += gained + self._resting
+            self._contacts -= self._resting
+            self._resting = 0.0
         elif stage == "links":
-            before, self._now = self._now, self._look(self._lag)
+            # Before the contacts they move what they join; after them they are but part of the acceleration.
+            before, self._now = self._now, self._look(self._lag, moved=not self._settled, works=self._settled)
             self._open.links += self._now.energy - before.energy
         elif stage == "velocities" or (stage == "contacts" and self._links):
-            before, self._now = self._now, self._look(self._lag)
+            self._settled = stage == "velocities"
+            before, self._now = self._now, self._look(self._lag, works=self._settled and not self._links)
             self._contacts += self._now.energy - before.energy
         elif stage == "finish":
             # Velocities as users see them: those of circles at rest without what carries their weight.
             before, self._now = self._now, self._look(0.0)
-            self._contacts += self._now.energy - before.energy
+            self._resting = self._now.energy - before.energy
+            self._contacts += self._resting
         else:
             return
         self._done("ledger")
 
-    def close(self, spent: tuple[float, float]) -> None:
-        """The frame has gone well; `spent` is what the kernels of contacts say that impacts and friction have taken, J."""
-        restitution, friction = spent
-        rest = self._contacts - restitution - friction
+    def close(self, spent: tuple[float, float, float]) -> None:
+        """The frame has gone well; `spent` is what impacts, friction and the energy limiter say they have taken, J, negative."""
+        restitution, friction, limiter = spent
+        rest = self._contacts - restitution - friction - limiter
         self._open.restitution += restitution + min(rest, 0.0)
         self._open.friction += friction
         self._open.projection += max(rest, 0.0)
-        self._books.ledger, self._books._energy = self._open, self._now.energy
+        self._open.limiter += limiter
+        self._books.ledger, self._books._energy, self._books._resting = self._open, self._now.energy, self._resting - limiter
 
-    def _look(self, lag: float) -> _Instant:
-        s, forces = self._state, self._forces
-        kept = [force for force in forces.forces if isinstance(force, Conservative)]
-        moving = (s.position, s.velocity, s.acceleration, lag, s.spin, s.radius, s.mass)
-        energy = measure.mechanical(*moving, *forces.gravity)
-        if kept or self._links:
-            state = s.in_users_order()
-            energy += sum(force.potential(state) for force in kept) + self._links.energy(state)
-        others = [force for force in forces.forces if not isinstance(force, Conservative)]
-        return _Instant(float(energy), self._power(others, lag) if others else {})
+    def _look(self, lag: float, *, moved: bool = True, works: bool = True) -> _Instant:
+        """Now. moved: whether positions may have changed since `_now`. works: whether the power of forces is asked for."""
+        s, held = self._state, self._now.held
+        energy: float = measure.mechanical(
+            s.position, s.velocity, s.acceleration, lag, s.spin, s.radius, s.mass, *self._gravity
+        )  # fmt: skip
+        if moved:
+            held = self._links.stored(s) if self._links else 0.0
+            if self._holding:
+                state = s.in_users_order()
+                held += sum(force.potential(state) for force in self._holding)
+        return _Instant(energy + held, held, self._power(lag) if works and self._working else {})
 
-    def _power(self, forces: list[Any], lag: float) -> dict[str, float]:
+    def _power(self, lag: float) -> dict[str, float]:
         """Power by account, at velocities of the time of the positions."""
         s = self._state
         carried = s.velocity.copy()
@@ -152,7 +168,7 @@ class _Frame:
             s.velocity += s.real(lag) * s.acceleration
         power: dict[str, float] = {}
         free = np.isfinite(s.mass)
-        for force in forces:
+        for force in self._working:
             s.force[:] = 0
             force.apply(s, self._t)
             account = getattr(force, "account", "forces")

@@ -3,13 +3,15 @@
 Pushing circles apart lifts them and throws them: in a crash that a substep sees as deep overlap, and where circles grow that were
 added on top of each other. So the energy at the end of a frame is compared with that at its start. What it has gained beyond
 SURPLUS of the world's scale is taken back, cluster by cluster, in proportion to what each has gained, never more than that. A
-cluster is what hangs together by contacts in this frame, and by links. In this order:
+cluster is what hangs together by contacts in this frame, and by links. What it has gained is its kinetic energy less the work of
+gravity and of the forces with a potential, by the trapezoidal rule: exact for springs. In this order:
 
 1. The velocities within the cluster, beside those with which it moves and turns as a whole: that keeps its momentum and its
    angular momentum. Kinetic energy goes with the square, so all are multiplied by sqrt(1 - taken / energy).
-2. The velocities and spins of all in it: it was not alone, for nothing thrusts itself off nothing.
-3. What circles have been raised in this frame: they are lowered by a part of that, and have grown by that part less. Not those
-   that a wall has raised because they were beyond it: it would do so again.
+2. The velocities and spins of all in it: its turning, which pushes have changed, and if its momentum is not what it was, what it
+   moves with as a whole: then it was not alone, for nothing thrusts itself off nothing.
+3. What circles have been raised against these forces in this frame: they are lowered by a part of that, and have grown by that
+   part less. Not those that a wall has raised because they were beyond it: it would do so again.
 """
 
 from __future__ import annotations
@@ -19,8 +21,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground.constants import ONE_THREAD_BELOW, SLEEP_NEAR, STANDARD_GRAVITY, SURPLUS
+from pyverlet.ground.constants import ONE_THREAD_BELOW, SLEEP_NEAR, SURPLUS
 from pyverlet.kernels import clusters, measure
+from pyverlet.laws.contacts.collisions import ContactSolver
 from pyverlet.laws.forces import Conservative, Drag, ForceSum
 from pyverlet.laws.links import Links
 from pyverlet.laws.rooms import Boundary
@@ -29,6 +32,12 @@ from pyverlet.state.state import Slots, State
 Array = NDArray[Any]
 Listed = tuple[Array, Array, Array, Array]
 Extent = tuple[float, float, float, float]
+
+_NOBODY: Listed = (np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.uint32), np.zeros(0, np.uint32))
+"""No pairs."""
+
+_ROUNDED = 1e-5
+"""Of what momenta come to without their signs: less is rounding, in float32 by eight substeps of a thousand circles or so."""
 
 _INSIDE = 0.99
 """Of its radius: a circle was inside the room if the point so far below its centre was, the way gravity points."""
@@ -41,40 +50,47 @@ class Watch:
         self._start, self._forces, self._links, self._room = start, forces, links, room
         self._gravity = forces.gravity
         self._plain = len(start) < ONE_THREAD_BELOW and not (forces.forces or links)
-        self._energy = 0.0 if self._plain else self._look(start)  # what links hold is not known any more when the frame is over
+        # What links hold is not known any more when the frame is over.
+        self._held = 0.0 if self._plain else self._holds(start)
+        self._energy = 0.0 if self._plain else self._held + self._mechanical(start, self._gravity)
 
-    def _look(self, now: State | Slots) -> float:
-        """Energy of all, J."""
+    def _mechanical(self, now: State | Slots, gravity: tuple[float, float]) -> float:
         moving, body = (now.position, now.velocity, now.velocity, 0.0), (now.spin, now.radius, now.mass)
-        energy: float = measure.mechanical(*moving, *body, *self._forces.gravity)
-        if self._forces.forces or self._links:
-            state = now.in_users_order() if isinstance(now, Slots) else now
-            kept = (force for force in self._forces.forces if isinstance(force, Conservative))
-            energy += sum(force.potential(state) for force in kept) + self._links.energy(state)
-        return energy
+        return float(measure.mechanical(*moving, *body, *gravity))
+
+    def _holds(self, now: State | Slots) -> float:
+        """Energy that forces and links hold, J."""
+        if not (self._forces.forces or self._links):
+            return 0.0
+        state = now.in_users_order() if isinstance(now, Slots) else now
+        kept = (force for force in self._forces.forces if isinstance(force, Conservative))
+        return float(sum(force.potential(state) for force in kept) + self._links.energy(state))
 
     def _gained(self, now: Slots) -> float:
-        """What `_look` finds now more than at the start, which is still there: in one call, without forces and links."""
+        """What the energy of all is now above that at the start, J."""
+        if not self._plain:
+            return self._mechanical(now, self._gravity) + self._holds(now) - self._energy
         then, motion = self._start, (now.position, now.velocity, now.spin, now.radius, now.mass)
         start = (then.position, then.velocity, then.spin, then.radius, then.mass)
         return float(measure.gained(*start, *motion, *self._gravity))
 
-    def close(self, slots: Slots, listed: Listed) -> float:
-        """The frame is over: take back what has been gained too much.
-
-        listed: first, count, pair_i, pair_j of the pairs that may touch.
-
-        Returns what had been gained, as a part of what is allowed.
-        """
+    def close(self, slots: Slots, contacts: ContactSolver | None) -> None:
+        """The frame is over: take back what has been gained too much, and let circles grow at a pace that gains less."""
         if self._forces.gravity != self._gravity:  # it has turned on the way, and drove the world
-            return 0.0
-        gained = self._gained(slots) if self._plain else self._look(slots) - self._energy
-        room = SURPLUS * fall(slots.total_mass, self._forces.gravity, self._room.extent())
-        if room < gained < np.inf:
-            surplus = gained - max(room, SURPLUS * self._kinetic().sum())
-            if surplus > 0.0:
-                self.take_back(slots, listed, surplus)
-        return gained / room if room > 0.0 else 0.0
+            risen = 0.0
+        else:
+            gained = self._gained(slots)
+            room = SURPLUS * fall(slots.total_mass, self._gravity, self._room.extent())
+            risen = gained / room if room > 0.0 else 0.0
+            if room < gained < np.inf:
+                # Beside a fall, what there is: motion, and what forces and links hold.
+                there = self._mechanical(self._start, (0.0, 0.0)) + abs(self._held)
+                surplus = gained - max(room, SURPLUS * there)
+                if surplus > 0.0 and gained > _rounding(slots):
+                    self.take_back(slots, contacts.listed() if contacts else _NOBODY, surplus)
+                    slots.taken = gained - self._gained(slots)
+        if contacts:
+            contacts.growth.heed(risen)
 
     def _kinetic(self) -> Array:
         """(n,) J, at the start of the frame, in the user's order."""
@@ -84,15 +100,16 @@ class Watch:
 
     def take_back(self, slots: Slots, listed: Listed, surplus: float) -> None:
         """Take so many J from those who have gained in this frame."""
-        g, start, order = np.array(self._forces.gravity), self._start, slots.particle
+        start, order = self._start, slots.particle
         mass = np.where(slots.inverse_mass > 0, slots.mass, 0).astype(float)
         x, v = slots.position.astype(float), slots.velocity.astype(float)
         moved = x - start.position[order]
-        lift = -mass * (moved @ g)
+        before, pull = self._pulls(slots, mass)
+        lift = -0.5 * ((before + pull) * moved).sum(axis=1)
         cluster = self._clusters(slots, listed, moved)
         add = _Sums(cluster)
         gain = np.maximum(add(_kinetic(mass, v, slots.radius, slots.spin) - self._kinetic()[order] + lift), 0)
-        if self._forces.forces:  # what has touched nobody has its gain from a force
+        if self._forces.forces:  # what has touched nobody has its gain from the integrator
             gain *= (add(np.ones(len(slots))) > 1) | (add(slots.hits >= 0) > 0)
         # Energy that forces and links hold may be more than they ever give: it is not answered alone.
         left = gain * min(surplus / max(gain.sum(), 1e-300), 2.0)
@@ -102,19 +119,44 @@ class Watch:
         within = add(0.5 * mass * ((v - whole) ** 2).sum(axis=1))
         v = whole + _slowed(left, within)[cluster, None] * (v - whole)
         left = np.maximum(left - within, 0)
-        # 2. As a whole.
-        kinetic = add(_kinetic(mass, v, slots.radius, slots.spin))
+        # 2. As a whole: about where it drifts to if it was alone.
+        drift = np.where(self._pushed(slots, mass, add)[cluster, None], 0.0, _mean(mass, v, add))
+        kinetic = add(_kinetic(mass, v - drift, slots.radius, slots.spin))
         slower = _slowed(left, kinetic)[cluster]
         left = np.maximum(left - kinetic, 0)
-        slots.velocity[taken_from] = (slower[:, None] * v)[taken_from]
+        slots.velocity[taken_from] = (drift + slower[:, None] * (v - drift))[taken_from]
         slots.spin *= slower.astype(slots.dtype)
         # 3. What has been raised.
         lift = np.where((slots.hits < 0) | self._was_inside()[order], np.maximum(lift, 0), 0)
         part = np.minimum(_ratio(left, add(lift)), 1)[cluster]
-        slots.position += ((part * _ratio(lift, mass * (g @ g)))[:, None] * g).astype(slots.dtype)
+        strength = np.hypot(*pull.T)
+        drop = part * np.minimum(_ratio(lift, strength), np.hypot(*moved.T))  # who is near where a spring pulls to feels little
+        slots.position += (_ratio(drop, strength)[:, None] * pull).astype(slots.dtype)
         if slots.size is not slots.radius:
             slots.grown -= (part * (slots.grown - start.grown[order])).astype(slots.dtype)
             slots.resize()
+
+    def _pushed(self, slots: Slots, mass: Array, add: _Sums) -> Array:
+        """(n,) bool, clusters whose momentum has changed in this frame by more than rounding does."""
+        now, then = slots.velocity.astype(float), self._start.velocity[slots.particle].astype(float)
+        change = np.hypot(*(add(mass * column) for column in (now - then).T))
+        return np.asarray(change > _ROUNDED * add(mass * np.hypot(*now.T)))
+
+    def _pulls(self, slots: Slots, mass: Array) -> tuple[Array, Array]:
+        """(n, 2) N, what gravity and forces with a potential do to each, at the start of the frame and now."""
+        weight = mass[:, None] * self._forces.gravity
+        kept: list[Any] = [force for force in self._forces.forces if isinstance(force, Conservative)]
+        if not kept:
+            return weight, weight
+        now, pulls = slots.position, []
+        for where in (self._start.position[slots.particle], now):
+            slots.position = where
+            slots.force.fill(0)
+            for force in kept:
+                force.apply(slots, self._forces.t)
+            pulls.append(weight + np.where(mass > 0, 1.0, 0.0)[:, None] * slots.force)
+        slots.position = now
+        return pulls[0], pulls[1]
 
     def _was_inside(self) -> Array:
         """(n,) bool, who was above the wall when the frame began, in the user's order."""
@@ -145,14 +187,17 @@ class _Sums:
 
 
 def fall(mass: float, gravity: tuple[float, float], extent: Extent | None) -> float:
-    """What a fall through the room would give, m g H, J; without walls H is a fall of a second, g t^2 / 2.
-
-    Without gravity g is 9.81 m/s^2 all the same: circles that start at rest on top of each other have no other scale.
-    """
-    gx, gy = gravity if any(gravity) else STANDARD_GRAVITY
+    """What a fall through the room would give, m g H, J; without walls H is a fall of a second, g t^2 / 2."""
+    gx, gy = gravity
     if extent is None:
         return mass * 0.5 * (gx * gx + gy * gy)
     return mass * (abs(gx) * (extent[2] - extent[0]) + abs(gy) * (extent[3] - extent[1]))
+
+
+def _rounding(slots: Slots) -> float:
+    """J that are not worth looking for: the energy of who moves by a rounding error of the largest coordinate in 1/60 s."""
+    speed = 60.0 * float(np.finfo(slots.dtype).eps) * float(np.abs(slots.position).max(initial=0.0))
+    return 0.5 * slots.total_mass * speed * speed
 
 
 def undriven(world: Any, h: float, h_last: float | None) -> bool:
@@ -185,12 +230,13 @@ def _kinetic(mass: Array, velocity: Array, radius: Array, spin: Array) -> Array:
 
 def _as_a_whole(mass: Array, x: Array, v: Array, add: _Sums) -> Array:
     """(n, 2) velocities, m/s, of the rigid motion of each cluster that has its momentum and its angular momentum."""
-
-    def mean(rows: Array) -> Array:
-        return np.column_stack([_ratio(add(mass * column), total) for column in rows.T])[add.cluster]
-
-    total = add(mass)
-    r, drift = x - mean(x), mean(v)
+    r, drift = x - _mean(mass, x, add), _mean(mass, v, add)
     u = v - drift
     turn = _ratio(add(mass * (r[:, 0] * u[:, 1] - r[:, 1] * u[:, 0])), add(mass * (r * r).sum(axis=1)))[add.cluster]
     return np.asarray(drift + turn[:, None] * np.column_stack((-r[:, 1], r[:, 0])))
+
+
+def _mean(mass: Array, rows: Array, add: _Sums) -> Array:
+    """(n, 2) the mean of these over the mass of each cluster."""
+    total = add(mass)
+    return np.column_stack([_ratio(add(mass * column), total) for column in rows.T])[add.cluster]

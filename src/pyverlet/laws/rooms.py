@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.constants import STANDS_OUT
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import bounds, cage, meetings
+from pyverlet.kernels import bounds, frame, meetings
 from pyverlet.state.state import Slots
 
 Array = NDArray[Any]
@@ -29,13 +30,21 @@ class Boundary(ABC):
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         """Bounce or hold every circle that reaches beyond a wall. `lag`: seconds the velocity is behind the position."""
 
-    def held(self, state: Slots, h: float, lag: float, rest_speed: float) -> tuple[Any, ...] | None:
-        """x, y, radius, h, lag and rest_speed as `hold` takes them, if `confine` is but that."""
+    def compiled(self, state: Slots) -> tuple[Any, tuple[float, ...]] | None:
+        """What `confine` does as a driver of `kernels.frame`, and the numbers it takes; None: Python has to call it."""
         return None
 
     def walls(self) -> Sequence[float]:
         """Its shape as seven numbers (`kernels.meetings`), so that obstacles push nobody through it; none, if it cannot say."""
         return (meetings.OPEN, 0, 0, 0, 0, 0, 0)
+
+    def facing(self, position: Array) -> tuple[Array, Array] | None:
+        """(k, w) distance of centres (k, 2) from each of its walls, m, and (k, w, 2) the unit normal of each into the room."""
+        return None
+
+    def perimeter(self) -> float | None:
+        """Length of its walls, m; None if that is not known."""
+        return None
 
     @abstractmethod
     def extent(self) -> Extent | None:
@@ -45,6 +54,10 @@ class Boundary(ABC):
     def outside(self, position: Array) -> Array:
         """(n,) bool, which of these centres are outside."""
 
+    def put_in(self, position: Array, radius: Array) -> Array:
+        """(n, 2) these places, but at the wall where a rim would stand out of it by more than STANDS_OUT; for who is added."""
+        return position
+
     @abstractmethod
     def check(self, radius: Array) -> None:
         """Raise InputError if one of these circles does not fit."""
@@ -52,6 +65,9 @@ class Boundary(ABC):
 
 class Open(Boundary):
     """No walls."""
+
+    def compiled(self, state: Slots) -> tuple[Any, tuple[float, ...]] | None:
+        return (frame.open_space, ()) if type(self) is Open else None
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         state.resting[:] = 0
@@ -91,17 +107,6 @@ class _Walls(Boundary):
         return self._shape, self._laws
 
 
-def hold(state: Slots, numbers: tuple[Any, ...], arriving: tuple[Any, ...] | None = None) -> None:
-    """Smooth circles stay in a smooth round room; numbers: `Boundary.held`.
-
-    arriving: origin, moved and feed, if contacts have `moved` them and they have yet to arrive there (`kernels.cage.hold`).
-    """
-    bodies = (state.position, state.velocity, state.acceleration, state.radius, state.inverse_mass, state.resting, state.hits)
-    # One kernel for both, for it takes two seconds to compile.
-    where = (1, *arriving) if arriving else (0, state.position, state.position, numbers[3])
-    cage.hold(*numbers[:3], *bodies, *numbers[3:], *where, state.claims())
-
-
 class Circle(_Walls):
     """A circular cage: particles stay inside.
 
@@ -122,17 +127,23 @@ class Circle(_Walls):
     def walls(self) -> Sequence[float]:
         return (meetings.ROUND, *self.center, self.radius, 0.0, self.restitution, self.friction)
 
-    def held(self, state: Slots, h: float, lag: float, rest_speed: float) -> tuple[Any, ...] | None:
-        if type(self) is Circle and self.restitution == 0.0 == self.friction and state.smooth:
-            shape, (h, lag, _, _, rest_speed) = self._rounded((*self.center, self.radius), state, h, lag, rest_speed)
-            return (*shape, h, lag, rest_speed)
-        return None
+    def compiled(self, state: Slots) -> tuple[Any, tuple[float, ...]] | None:
+        if type(self) is not Circle:
+            return None
+        if self.restitution == 0.0 == self.friction and state.smooth:
+            return frame.smooth_cage, (*self.center, self.radius)
+        return frame.cage, (*self.center, self.radius, self.restitution, self.friction)
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
-        if numbers := self.held(state, h, lag, rest_speed):
-            hold(state, numbers)
-        else:
-            self._confine(bounds.circle, (*self.center, self.radius), state, h, lag, rest_speed)
+        self._confine(bounds.circle, (*self.center, self.radius), state, h, lag, rest_speed)
+
+    def facing(self, position: Array) -> tuple[Array, Array]:
+        way = self.center - position.astype(np.float64)
+        far = np.hypot(*way.T)
+        return (self.radius - far)[:, None], (way / np.maximum(far, 1e-300)[:, None])[:, None, :]
+
+    def perimeter(self) -> float:
+        return float(2 * np.pi * self.radius)
 
     def extent(self) -> Extent:
         (x, y), r = self.center, self.radius
@@ -141,6 +152,13 @@ class Circle(_Walls):
     def outside(self, position: Array) -> Array:
         x, y = (position.astype(np.float64) - self.center).T
         return np.asarray(np.hypot(x, y) > self.radius)
+
+    def put_in(self, position: Array, radius: Array) -> Array:
+        away = position - np.asarray(self.center, position.dtype)
+        distance, room = np.hypot(*away.T), np.maximum(self.radius - radius, 0)
+        out = distance > room + STANDS_OUT * radius
+        part = np.divide(room, distance, out=np.ones_like(distance), where=out)
+        return np.where(out[:, None], (self.center + part[:, None] * away).astype(position.dtype), position)
 
     def check(self, radius: Array) -> None:
         _fits(radius, self.radius, f"the radius of the cage, {self.radius:g} m")
@@ -173,8 +191,21 @@ class Box(_Walls):
     def walls(self) -> Sequence[float]:
         return (meetings.RECTANGLE, *self.lower, *self.upper, self.restitution, self.friction)
 
+    def compiled(self, state: Slots) -> tuple[Any, tuple[float, ...]] | None:
+        shape = (*self.lower, *self.upper, self.restitution, self.friction)
+        return (frame.four_walls, shape) if type(self) is Box else None
+
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         self._confine(bounds.box, (*self.lower, *self.upper), state, h, lag, rest_speed)
+
+    def facing(self, position: Array) -> tuple[Array, Array]:
+        """Its walls are, in this order, the left, the right, the floor and the ceiling."""
+        (x, y), (x0, y0), (x1, y1) = position.astype(np.float64).T, self.lower, self.upper
+        into = np.array([(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
+        return np.column_stack((x - x0, x1 - x, y - y0, y1 - y)), np.broadcast_to(into, (len(position), 4, 2))
+
+    def perimeter(self) -> float:
+        return 2 * (self.upper[0] - self.lower[0] + self.upper[1] - self.lower[1])
 
     def extent(self) -> Extent:
         return (*self.lower, *self.upper)
@@ -182,6 +213,11 @@ class Box(_Walls):
     def outside(self, position: Array) -> Array:
         inside = (position >= self.lower) & (position <= self.upper)
         return np.asarray(~inside.all(axis=1))
+
+    def put_in(self, position: Array, radius: Array) -> Array:
+        inside = np.clip(position, self.lower + radius[:, None], self.upper - radius[:, None])
+        out = np.abs(inside - position) > STANDS_OUT * radius[:, None]
+        return np.where(out, inside.astype(position.dtype), position)
 
     def check(self, radius: Array) -> None:
         half = 0.5 * min(self.upper[0] - self.lower[0], self.upper[1] - self.lower[1])

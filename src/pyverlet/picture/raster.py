@@ -13,6 +13,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import lines, raster
 from pyverlet.laws.obstacles import Outline
+from pyverlet.picture import marks
 from pyverlet.picture.colour import by_force
 from pyverlet.picture.palette import DARK, Packed, Theme, swapped
 from pyverlet.picture.view import View
@@ -78,14 +79,16 @@ class Raster:
         obstacles = world.obstacles.outlines()
         links = world.links.segments() if len(world.links) else None
         return self.discs(
-            world.position, world.radius, view, outlines=outlines, obstacles=obstacles, colours=colours, links=links
-        )
+            world.position, world.radius, view, outlines=outlines, obstacles=obstacles, colours=colours, links=links,
+            angle=world.angle,
+        )  # fmt: skip
 
     def discs(
         self, position: NDArray[Any], radius: NDArray[Any], view: View, *,
         outlines: Lines = (), obstacles: Sequence[Outline] = (), colours: Packed, links: Links | None = None,
+        angle: NDArray[np.float64] | None = None,
     ) -> NDArray[np.uint8]:  # fmt: skip
-        """The same from arrays: centres (n, 2) and radii (n,) in metres, links as `world.links.segments` has them.
+        """The same from arrays: centres (n, 2) and radii (n,) in metres, links as `world.links.segments` has them, (n,) in rad.
 
         For pictures made in another thread than the physics.
         """
@@ -102,6 +105,8 @@ class Raster:
         np.copyto(self._pixels, self._ground)
         colours = np.ascontiguousarray(colours, dtype=np.uint32)
         raster.circles(self._pixels, self._ground, position, radius, colours, view.left, view.top, view.scale)
+        if angle is not None:
+            marks.draw(self._pixels, position, radius, angle, colours, view)
         if links is not None:
             ends, force = links
             lines.lines(self._pixels, ends, by_force(force, self.theme), view.left, view.top, view.scale, LINK_PX / 2)

@@ -21,11 +21,10 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, Interrupted, PyverletError
 from pyverlet.picture import DARK, Colouring, Theme
-from pyverlet.picture.raster import check_size
 from pyverlet.record import _films
 from pyverlet.scenes.report import frame_count
 from pyverlet.viewers.frames import Rect
-from pyverlet.viewers.painter import Painter
+from pyverlet.viewers.painter import Painter, check_look
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
@@ -64,7 +63,7 @@ class FilmPlan:
         frames_between: frames of physics from one picture to the next.
     """
 
-    film: type[_films._Stream | _films.Frames]
+    film: type[_films.Film]
     path: Path
     size: tuple[int, int]
     fps: int
@@ -78,13 +77,12 @@ class FilmPlan:
         return 1.0 / (self.fps * self.frames_between)
 
 
-def plan(path: str | Path, *, seconds: float = 10.0, fps: int | None = None, size: tuple[int, int] = (1280, 720)) -> FilmPlan:
+def plan(path: str | Path, *, seconds: float = 10.0, fps: int | None = None, size: tuple[int, int] | None = None) -> FilmPlan:
     """Check everything about a recording. Parameters as for `to_video`; a plain .png shows the last moment."""
     path = Path(path)
     film = _films.film_for(path)
     fps = checks.whole("fps", film.default_fps if fps is None else fps, most=MOST_FPS)
-    size = check_size(size)
-    film.check(size, fps)
+    size = film.sized(size, fps)
     pictures = frame_count(seconds=seconds, frames=None, dt=1.0 / fps, default_seconds=seconds)
     between = steps_between(fps)
     if _is_still(path):
@@ -103,7 +101,7 @@ def to_video(
     *,
     seconds: float = 10.0,
     fps: int | None = None,
-    size: tuple[int, int] = (1280, 720),
+    size: tuple[int, int] | None = None,
     colour: Colouring | None = None,
     theme: Theme = DARK,
     part: Rect | None = None,
@@ -116,11 +114,13 @@ def to_video(
 
     Args:
         world: stepped in place, to the time of the last picture.
-        path: .mp4, .gif or .webp; or .png with a number in it, such as frame-{:04d}.png, for a file a picture.
+        path: .mp4, .gif or .webp; .html for a page that plays the world, in one file; or .png with a number in it, such as
+            frame-{:04d}.png, for a file a picture.
         seconds: simulated seconds.
         fps: pictures a second; 60 unless said, and 25 for .gif.
-        size: (width, height) in pixels; even numbers for .mp4.
-        colour: what the colours say, such as `pyverlet.picture.BySpeed()`; by default where each circle started.
+        size: (width, height) in pixels, 1280 x 720 unless said; even numbers for .mp4, none for .html.
+        colour: what the colours say, such as `pyverlet.picture.BySpeed()`; by default where each circle started. A page shows
+            colourings of your own as they are at first.
         theme: `pyverlet.picture.DARK` or `LIGHT`.
         part: of the plane to show, (x0, y0, x1, y1) in metres; by default the bounds, or where the particles are.
         progress: called as progress(done, total) after every picture.
@@ -143,8 +143,10 @@ def shoot(
     progress: Progress | None = None,
 ) -> Recorded:
     """Carry out a plan; see `to_video`."""
-    painter = Painter(world, size=film_plan.size, colour=colour, theme=theme, part=part)
+    check_look(colour, theme)
+    film_plan.film.check_colour(colour)
     film = film_plan.film(film_plan.path, film_plan.size, film_plan.fps)
+    picture = film.watch(world, colour=colour, theme=theme, part=part)
     before, total = film_plan.frames_before, film_plan.frames_before + film_plan.pictures
     with _interruptions() as interrupted:
         try:
@@ -154,12 +156,12 @@ def shoot(
                 world.step(film_plan.dt)
                 if progress:
                     progress(frame + 1, total)
-            for picture in range(film_plan.pictures):
-                for _ in range(film_plan.frames_between if picture else 0):
+            for number in range(film_plan.pictures):
+                for _ in range(film_plan.frames_between if number else 0):
                     world.step(film_plan.dt)
-                film.add(painter.paint())
+                film.add(picture())
                 if progress:
-                    progress(before + picture + 1, total)
+                    progress(before + number + 1, total)
                 if film.error or interrupted():
                     break
         finally:

@@ -1,4 +1,7 @@
-"""Where pictures go, by the suffix of a file: one class each. PyAV carries the encoders, Pillow writes single pictures."""
+"""Where pictures go, by the suffix of a file: one class each. PyAV carries the encoders, Pillow writes single pictures.
+
+A page draws by itself: what it is given are the numbers of the world, not pixels.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +9,28 @@ import importlib.util
 import re
 import struct
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
+from pyverlet.picture import Colouring, Theme
+from pyverlet.picture.raster import check_size
+from pyverlet.record import _reel
 from pyverlet.record._disk import Disk
+from pyverlet.viewers import bundle
+from pyverlet.viewers.frames import Frame, Rect
+from pyverlet.viewers.painter import Painter
+
+if TYPE_CHECKING:
+    from pyverlet.world.world import World
+
+DEFAULT_SIZE = (1280, 720)
+"""Pixels."""
 
 Pixels = NDArray[np.uint8]
 """(height, width, 4) bytes R, G, B and one that is ignored."""
@@ -23,18 +39,36 @@ Pixels = NDArray[np.uint8]
 class Film(ABC):
     """Takes pictures one after the other. `error` says why no more are kept, if so; `kept` how many are."""
 
-    needs: ClassVar[str] = "av"
+    needs: ClassVar[tuple[str, ...]] = ("av",)
     default_fps: ClassVar[int] = 60
     error: OSError | None = None
     kept: int = 0
 
     @classmethod
+    def sized(cls, size: tuple[int, int] | None, fps: int) -> tuple[int, int]:
+        """The size that is asked for, or the usual one. Raise InputError where this kind of file cannot hold such pictures."""
+        size = check_size(DEFAULT_SIZE if size is None else size)
+        cls.check(size, fps)
+        return size
+
+    @classmethod
     def check(cls, size: tuple[int, int], fps: int) -> None:
         """Raise InputError where this kind of file cannot hold such pictures."""
 
+    @classmethod
+    def check_colour(cls, colour: Colouring | None) -> None:
+        """Raise InputError where this kind of file cannot show such colours."""
+
+    def watch(self, world: World, *, colour: Colouring | None, theme: Theme, part: Rect | None) -> Callable[[], Any]:
+        """What gives a picture of the world, as it is whenever that is called, in the form that `add` takes."""
+        return Painter(world, size=self.size, colour=colour, theme=theme, part=part).paint
+
+    def __init__(self, path: Path, size: tuple[int, int], fps: int) -> None:
+        self.path, self.size, self.fps = path, size, fps
+
     @abstractmethod
-    def add(self, pixels: Pixels) -> None:
-        """The next picture."""
+    def add(self, picture: Any) -> None:
+        """The next picture: pixels, unless `watch` says otherwise."""
 
     def close(self) -> None:
         """Finish the file."""
@@ -50,6 +84,7 @@ class _Stream(Film):
     mend: ClassVar[bytes] = b""
 
     def __init__(self, path: Path, size: tuple[int, int], fps: int) -> None:
+        super().__init__(path, size, fps)
         import av
 
         self._av: Any = av
@@ -75,8 +110,8 @@ class _Stream(Film):
     def _frame(self, pixels: Pixels) -> Any:
         """The picture as PyAV's."""
 
-    def add(self, pixels: Pixels) -> None:
-        frame = self._frame(pixels)
+    def add(self, picture: Pixels) -> None:
+        frame = self._frame(picture)
         frame.pts, frame.time_base = self._pictures, self._stream.codec_context.time_base
         self._pictures += 1
         self._write(self._stream.encode(frame))
@@ -136,7 +171,7 @@ class Mp4(_Stream):
 class Gif(_Stream):
     """At most 256 colours a picture, times in hundredths of a second; starts over for ever."""
 
-    needs = "PIL"
+    needs = ("av", "PIL")
     default_fps = 25
     movie = "gif"
     codec = "gif"
@@ -183,12 +218,58 @@ class WebP(_Stream):
                 file.write(struct.pack("<I", max(length - 8, 0)))
 
 
+class Page(Film):
+    """A page that plays the world: one file, to be opened in any browser, drawn there as the live page does."""
+
+    needs = ()
+
+    @classmethod
+    def sized(cls, size: tuple[int, int] | None, fps: int) -> tuple[int, int]:
+        if size is not None:
+            raise InputError(
+                f"size is {size[0]}x{size[1]}; allowed for .html is none: it is as large as the window it is seen in"
+            )
+        return DEFAULT_SIZE
+
+    @classmethod
+    def check_colour(cls, colour: Colouring | None) -> None:
+        _reel.page_colour(colour)
+
+    def __init__(self, path: Path, size: tuple[int, int], fps: int) -> None:
+        super().__init__(path, size, fps)
+        self._disk = Disk(path)
+        self._reel = _reel.Reel(fps)
+
+    def watch(self, world: World, *, colour: Colouring | None, theme: Theme, part: Rect | None) -> Callable[[], Any]:
+        watch = _reel.Watch(world, title=self.path.stem, fps=self.fps, colour=colour, theme=theme, part=part)
+        look, name = _reel.page_colour(colour), "dark" if theme.dark else "light"
+        self._write([bundle.film(self.path.stem, fps=self.fps, colour=look, theme=name)])
+        return watch.picture
+
+    def add(self, picture: Frame) -> None:
+        self._write(self._reel.add(picture))
+
+    def _write(self, parts: list[str]) -> None:
+        for part in parts:
+            self._disk.write(part.encode())
+            self._disk.whole()
+        self.error = self._disk.error
+        if self.error is None:
+            self.kept = self._reel.finished
+
+    def close(self) -> None:
+        if self.error is None:
+            self._write(self._reel.rest())
+        self._disk.close()
+
+
 class Frames(Film):
     """Single pictures. The path may be a template such as frame-{:04d}.png: a file a picture."""
 
-    needs = "PIL"
+    needs = ("PIL",)
 
     def __init__(self, path: Path, size: tuple[int, int], fps: int) -> None:
+        super().__init__(path, size, fps)
         self._template = str(path)
         first = self._named(0)
         try:
@@ -196,9 +277,9 @@ class Frames(Film):
         except OSError as error:
             raise InputError(f"path is '{first}', which cannot be written: {error.strerror or error}") from None
 
-    def add(self, pixels: Pixels) -> None:
+    def add(self, picture: Pixels) -> None:
         try:
-            write_picture(self._named(self.kept), pixels)
+            write_picture(self._named(self.kept), picture)
         except OSError as error:
             self.error = error
         else:
@@ -208,14 +289,14 @@ class Frames(Film):
         return Path(self._template.format(number) if "{" in self._template else self._template)
 
 
-FILMS: dict[str, type[_Stream]] = {".mp4": Mp4, ".gif": Gif, ".webp": WebP}
+FILMS: dict[str, type[Film]] = {".mp4": Mp4, ".gif": Gif, ".webp": WebP, ".html": Page}
 """Films by suffix. A new kind of file is a class and an entry here."""
 
 PICTURE = ".png"
 """Suffix of single pictures."""
 
 
-def film_for(path: Path) -> type[_Stream | Frames]:
+def film_for(path: Path) -> type[Film]:
     """The kind of film a path asks for.
 
     Raises:
@@ -223,7 +304,7 @@ def film_for(path: Path) -> type[_Stream | Frames]:
     """
     suffix = path.suffix.lower()
     if suffix in FILMS:
-        check_extra("av", FILMS[suffix].needs)
+        check_extra(*FILMS[suffix].needs)
         return FILMS[suffix]
     if suffix != PICTURE:
         known = ", ".join((*FILMS, PICTURE))
@@ -235,7 +316,7 @@ def film_for(path: Path) -> type[_Stream | Frames]:
             numbered = False
         if not numbered:
             raise InputError(f"path is '{path}'; allowed for numbered pictures is one number, such as frame-{{:04d}}.png")
-    check_extra("PIL")
+    check_extra(*Frames.needs)
     return Frames
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from pathlib import Path
 
 from pyverlet.ground.errors import InputError
 from pyverlet.scenes import (
@@ -30,7 +31,7 @@ from pyverlet.scenes import (
 )
 from pyverlet.scenes._scene import Scene, Settings, Variant
 
-__all__ = ["SCENES", "Scene", "Settings", "Variant", "get"]
+__all__ = ["SCENES", "Scene", "Settings", "Variant", "get", "read"]
 
 SCENES: dict[str, Scene] = {
     scene.name: scene
@@ -61,12 +62,25 @@ SCENES: dict[str, Scene] = {
 }
 
 
+def read(path: str | Path) -> Scene:
+    """The scene of a file, .toml or .json: `docs/data.md` says what may stand in it.
+
+    Raises:
+        InputError: the file cannot be read, or something in it is wrong; for a key that is unknown, with the nearest known one.
+    """
+    from pyverlet.data import scene_file
+
+    return scene_file.read(path)
+
+
 def get(name: str) -> Scene:
-    """The scene called `name`.
+    """The scene called `name`, or that of a file if the name ends in .toml or .json.
 
     Raises:
         InputError: there is none; the message suggests the nearest and names the known ones.
     """
+    if name.lower().endswith((".toml", ".json")):
+        return read(name)
     if name in SCENES:
         return SCENES[name]
     near = difflib.get_close_matches(name.lower(), SCENES, n=1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -132,6 +133,7 @@ class Scene:
         show: how it asks to be shown.
         variants: the worlds it shows side by side; empty for one world.
         line: height in metres of a line drawn across the scene.
+        document: what the file says that the scene was read from; None for scenes with a name.
     """
 
     name: str
@@ -142,6 +144,7 @@ class Scene:
     show: Show = Show()
     variants: tuple[Variant, ...] = ()
     line: float | None = None
+    document: dict[str, Any] | None = None
 
     @property
     def description(self) -> str:
@@ -156,7 +159,9 @@ class Scene:
         """
         known = {f.name for f in dataclasses.fields(Settings)}
         if unknown := sorted(set(overrides) - known):
-            raise InputError(f"a scene has no setting {unknown[0]!r}; known: {', '.join(sorted(known))}")
+            near = difflib.get_close_matches(unknown[0], known, n=1)
+            suggestion = f" (did you mean {near[0]!r}?)" if near else ""
+            raise InputError(f"a scene has no setting {unknown[0]!r}{suggestion}; known: {', '.join(sorted(known))}")
         changes = {name: value for name, value in overrides.items() if value is not None}
         if changes.get("collisions") is False:
             changes["collisions"] = None
@@ -190,3 +195,32 @@ class Scene:
             settings = self.settings(**{**overrides, **variant.changes})
             panels.append(Panel(variant.name, (variant.build or self.build)(settings), variant.pace))
         return Panels(panels, line=self.line)
+
+    def write(self, path: str | Path) -> None:
+        """Write the scene to a file, .toml or .json, from which `pyverlet.scenes.read` reads the same.
+
+        A scene with a name is written as that and its settings, one from a file as it was read; `freeze` writes numbers in place
+        of what they are drawn by.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        from pyverlet.data import scene_file
+
+        scene_file.write(self, path)
+
+    def freeze(self, path: str | Path, **overrides: Any) -> None:
+        """Write the start of the scene's world to a file, .toml or .json, with its arrays in a .npz beside it.
+
+        Whoever reads it gets the same start, to the last bit, whatever a later version would draw by chance.
+
+        Args:
+            path: of the file; old ones are replaced.
+            overrides: as for `settings`.
+
+        Raises:
+            InputError: the files cannot be written, or there are objects of classes of your own in the world.
+        """
+        from pyverlet.data import scene_file
+
+        scene_file.write_frozen(self, path, self.settings(**overrides))

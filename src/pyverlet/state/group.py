@@ -48,6 +48,14 @@ class Group:
         self._first = int(state.number[where.start]) if self._added else 0
         self._stop = self._first + self._added
 
+    @classmethod
+    def of(cls, state: State, first: int, added: int, remove: Callable[[Array], None]) -> Group:
+        """The group of `added` particles that were added together and have the numbers from `first` on."""
+        group = cls(state, slice(0, 0), remove)
+        group._first, group._added, group._stop = first, added, first + added
+        group._version = -1  # to be looked for
+        return group
+
     def __len__(self) -> int:
         where = self._span()
         return int(where.stop - where.start)
@@ -92,6 +100,7 @@ class Group:
     position = Column("(n, 2) centres, m.")
     velocity = Column("(n, 2) m/s.")
     spin = Column("(n,) angular velocity, rad/s, counter-clockwise.")
+    angle = Column("(n,) rad they have turned, counter-clockwise; float64.")
     radius = Column("(n,) m.")
     mass = Column("(n,) kg; infinity pins a particle.")
     restitution = Column("(n,) e of these circles; negative: as the world's `Collisions` and bounds say.")

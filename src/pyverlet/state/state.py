@@ -24,13 +24,11 @@ _ROWS = ("position", "velocity", "acceleration")
 _SET = ("radius", "mass", "restitution", "friction")
 _COLUMNS = ("spin", "grown", *_SET)
 _MARKS = ("category", "mask")
-_GIVEN = (*_SET, *_MARKS)
-_NUMBERS = ("number",)
+_GIVEN, _LISTED = (*_SET, *_MARKS), ("radius", "mass", *_MARKS)
 
-EVERYONE = 0xFFFFFFFF
-"""A mask of 32 bits that takes every category."""
+EVERYONE = 0xFFFFFFFF  # a mask of 32 bits that takes every category
 
-_DEFAULTS: dict[str, Any] = {"grown": 1, "restitution": -1, "friction": -1, "category": 1, "mask": EVERYONE}
+_DEFAULTS: dict[str, Any] = {"angle": 0, "grown": 1, "restitution": -1, "friction": -1, "category": 1, "mask": EVERYONE}
 
 
 class State:
@@ -40,14 +38,13 @@ class State:
         position: (n, 2) centres, m.
         velocity: (n, 2) m/s.
         acceleration: (n, 2) m/s^2, of the last substep; the memory of the Verlet methods, scaled at rest. NaN: none yet.
-        spin: (n,) angular velocity, rad/s, counter-clockwise.
-        radius: (n,) m.
-        mass: (n,) kg; infinity pins the particle.
+        spin: (n,) angular velocity, rad/s, counter-clockwise. angle: (n,) rad it has turned; float64, for it grows and grows.
+        radius, mass: (n,) m, and (n,) kg: infinity pins the particle.
         grown: (n,) part of the radius that other circles feel; less than 1 for those that were added on top of another.
         restitution, friction: (n,) of circles that have values of their own; negative: as `Collisions` and the bounds say.
         category, mask: (n,) 32 bits each; two circles collide if each has a bit of its category in the other's mask.
         number: (n,) of each particle, in ascending order; no two particles of a world ever have the same.
-        begun: the number of the first particle of each `append`, ascending.
+        begun: the number of the first particle of each `append`, ascending. numbers: how many particles there have ever been.
         version: how often particles were added or removed.
     """
 
@@ -63,14 +60,15 @@ class State:
     category: Array
     mask: Array
     number: Array
+    angle: NDArray[np.float64]
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self.dtype = dtype
         self._store: dict[str, Array] = {name: np.empty((0, 2), dtype) for name in _ROWS}
         self._store |= {name: np.empty(0, dtype) for name in _COLUMNS}
-        self._store |= {name: np.empty(0, np.uint32) for name in _MARKS}
-        self._store |= {name: np.empty(0, np.int64) for name in _NUMBERS}
-        self._numbers = 0
+        for names, kind in ((_MARKS, np.uint32), (("number",), np.int64), (("angle",), np.float64)):
+            self._store |= {name: np.empty(0, kind) for name in names}
+        self.numbers = 0
         self.begun: list[int] = []
         self.version = 0
         self._show(0)
@@ -97,9 +95,9 @@ class State:
         self._show(stop)
         for name, value in (_DEFAULTS | values).items():
             getattr(self, name)[start:stop] = value
-        self.begun.append(self._numbers)
-        self.number[start:] = np.arange(self._numbers, self._numbers + stop - start)
-        self._numbers += stop - start
+        self.begun.append(self.numbers)
+        self.number[start:] = np.arange(self.numbers, self.numbers + stop - start)
+        self.numbers += stop - start
         self.version += 1
         return slice(start, stop)
 
@@ -134,7 +132,6 @@ class State:
 
 # What a slot remembers from frame to frame beside the user's arrays: dtype, and value for a new particle.
 _REMEMBERED: dict[str, tuple[Any, Any]] = {"fed": (np.uint8, 0), "island": (np.int64, -1), "calm": (np.float32, 0)}
-_OF_SLEEP = ("island", "calm")
 
 
 class Slots:
@@ -152,32 +149,29 @@ class Slots:
         inverse_mass: (n,) 1/kg; 0 for a pinned particle. total_mass: of all others, kg.
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
         start: (n, 2) positions before the integration of this substep, m; empty unless circles rub each other, or meet obstacles.
-        turn: (n,) rad by which each circle turns in this substep; empty unless circles rub each other.
-        lift: (n,) s; times -a it is the velocity with which circles at rest against others end a substep; only if circles rub.
+        turn, lift: empty unless circles rub each other: (n,) rad by which each turns in this substep, and (n,) s; times -a that
+            is the velocity with which circles at rest against others end a substep, for others 0.
         along: (n, 2) m/s^2, the acceleration left to circles that an obstacle holds, for others 0; empty without obstacles.
-        drop: a circle that starts at rest falls drop * a h^2 in a substep; depends on the integrator.
+        drop: a circle at rest falls drop * a h^2 in a substep; depends on the integrator.
         fed: (n,) bits: CARRIES where a contact at rest fed the velocity in the last substep, AT_WALL where a wall was touched
             in it, CARRIED and WAS_AT_WALL the same in the one before. Kept only if circles bounce.
-        island: (n,) number of the island a sleeping particle belongs to, -1 for those awake. calm: (n,) seconds it has been so.
-            Both are empty where nobody may sleep.
+        island, calm: (n,) number of a sleeper's island, -1 if awake, and s it has been calm; empty where nobody may sleep.
         lean: times -a h it is the velocity with which circles at rest against others end a substep; 0 until contacts say so.
         resting: (n,) bits of `kernels.motion`: who held it in the last substep, a wall or, after a frame, another particle.
         hits: (n,) largest speed with which the circle met a wall in this frame, m/s; negative: none.
-        spent: (n, 2) energy that impacts on walls, and friction there, have taken in this frame, J, negative: to be summed, for
-            rows stay where they are when slots are reordered. Empty unless somebody keeps account.
+        spent: (n, 2) J that impacts on walls, and friction there, have taken in this frame, negative: to be summed, for rows stay
+            where they are when slots are reordered; empty unless somebody keeps account. taken: J, by the energy limiter.
 
     Args:
         sleeps: whether particles may sleep.
     """
 
     def __init__(self, dtype: np.dtype[Any], *, sleeps: bool = False) -> None:
-        self.dtype = dtype
-        self._sleeps = sleeps
+        self.dtype, self._sleeps = dtype, sleeps
         self.real = lru_cache(64)(dtype.type)
         self.reals = lru_cache(64)(lambda *numbers: tuple(map(dtype.type, numbers)))
         self._kept: dict[str, Array] = {}
-        self.drop, self.lean, self.total_mass = 1.0, 0.0, 0.0
-        self.given = 0
+        self.drop, self.lean, self.total_mass, self.taken, self.given = 1.0, 0.0, 0.0, 0.0, 0
         self.claims = Claims()
         self._resize(0)
 
@@ -190,7 +184,7 @@ class Slots:
         order = self._kept.pop("particle", np.zeros(0, np.int32))
         self.particle = np.concatenate((order, np.arange(len(order), count, dtype=np.int32)))
         for name, (dtype, value) in _REMEMBERED.items():
-            column = np.full(count if self._sleeps or name not in _OF_SLEEP else 0, value, dtype)
+            column = np.full(count if self._sleeps or name == "fed" else 0, value, dtype)
             column[: len(order)] = self._kept.pop(name, column[: len(order)])
             setattr(self, name, column)
         for name in _ROWS:
@@ -260,8 +254,7 @@ class Slots:
         changed = self._changed
         for name in _GIVEN:
             given, now = self._given[name], getattr(state, name)
-            if name not in ("restitution", "friction"):
-                changed |= motion.differs(given, now)
+            changed |= name in _LISTED and motion.differs(given, now)
             self._given[name] = (now[:1] if (now == now[:1]).all() else now).copy()
         for name in (*_SET, "grown"):
             np.take(getattr(state, name), self.particle, out=getattr(self, name))
@@ -301,12 +294,12 @@ class Slots:
 
     def keep_account(self) -> None:
         """From now on walls are to note what they take."""
-        if len(self.spent) != len(self):
-            self.spent = np.zeros((len(self), 2))
+        self.spent = self.spent if len(self.spent) == len(self) else np.zeros((len(self), 2))
 
     def clear_notes(self) -> None:
         """Forget what walls and friction have noted in the last frame."""
         self.hits.fill(-1)
+        self.taken = 0.0
         if len(self.spent):
             self.spent.fill(0)
         if len(self.along):
@@ -327,10 +320,10 @@ class Slots:
         """Bring `size` up to date with `grown`."""
         self.size = self.radius if (self.grown >= 1).all() else self.radius * self.grown
 
-    def scatter(self, state: State) -> None:
-        """Copy what a frame changes back to the user's arrays."""
-        given = (state.position, state.velocity, state.acceleration, state.spin)
-        motion.put_motion(self.position, self.velocity, self.acceleration, self.spin, *given, self.particle)
+    def scatter(self, state: State, dt: float) -> None:
+        """Copy what a frame of dt seconds changes back to the user's arrays."""
+        given, moved = (state.position, state.velocity, state.acceleration, state.spin), (self.position, self.velocity)
+        motion.put_motion(*moved, self.acceleration, self.spin, *given, state.angle, 0.5 * dt, self.particle)
         self._given_back.remember(given)
         self._grows |= self.size is not self.radius  # some may have been found on top of others since the gathering
         if self._grows:
@@ -361,15 +354,19 @@ class Slots:
         self.resize()
         self._slot_of = None
 
-    def save(self) -> dict[str, Array]:
-        """What outlives a frame here and not in the user's arrays: the order, who carried weight, who sleeps."""
-        return {name: getattr(self, name).copy() for name in ("particle", *_REMEMBERED)}
+    def save(self, state: State) -> dict[str, Array]:
+        """What outlives a frame here, not in the user's arrays: the order, who carried weight, who sleeps; if lists are void."""
+        void = self._changed or any(motion.differs(self._given[name], getattr(state, name)) for name in _LISTED)
+        columns = {name: getattr(self, name).copy() for name in ("particle", *_REMEMBERED)}
+        return columns | {"void": np.array([void or len(state) != len(self)])}
 
     def restore(self, saved: dict[str, Array], state: State) -> None:
         """Take up what `save` returned and gather the state into that order."""
-        self._kept = {name: column.copy() for name, column in saved.items()}
+        self._kept = {name: saved[name].copy() for name in ("particle", *_REMEMBERED)}
         self._resize(len(saved["particle"]))
         self.gather(state)
+        if saved["void"][0]:  # the next frame is to find that out, too
+            self._changed = self._grows = True
 
     def scratch(self, number: int) -> Array:
         """An (n, 2) array for use within one substep; its contents are left over from whoever used it last."""

@@ -51,6 +51,7 @@ def serve(
     port: int = DEFAULT_PORT,
     open_browser: bool = True,
     dt: float = 1 / 60,
+    **options: Any,
 ) -> None:
     """Build a world, compile what it needs and show it on a live page until Ctrl-C. What the command line uses.
 
@@ -64,13 +65,16 @@ def serve(
         port: TCP port, 1 to 65535; 0 takes any free one.
         open_browser: open a tab when there is a screen to open it on.
         dt: simulated seconds per frame.
+        options: see `pyverlet.viewers.launch.serve`.
 
     Raises:
         InputError: the host or port cannot be used, dt is not positive, or whatever `build` refuses.
     """
     from pyverlet.viewers import launch
 
-    launch.serve(build, title=scene_name, host=host, port=port, open_browser=open_browser, dt=dt, repertoire=repertoire)
+    launch.serve(
+        build, title=scene_name, host=host, port=port, open_browser=open_browser, dt=dt, repertoire=repertoire, **options
+    )
 
 
 def widget(world: World | Panels, *, title: str = "pyverlet", dt: float = 1 / 60, height: int = 480) -> Any:

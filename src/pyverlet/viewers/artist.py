@@ -104,6 +104,7 @@ class Artist:
             obstacles=self._obstacles(frame),
             colours=colours,
             links=(frame.position[frame.joined], frame.force) if len(frame.joined) else None,
+            angle=self._angles(frame),
         )
 
     def _in_rows(self, frame: Frame, colours: Packed) -> tuple[Packed, NDArray[np.float32]]:
@@ -117,6 +118,12 @@ class Artist:
         if self._still_sorted[0] is not colours:
             self._still_sorted = (colours, colours[whose])
         return self._still_sorted[1], self._sorted[2]
+
+    def _angles(self, frame: Frame) -> NDArray[np.float64] | None:
+        """How the circles of the frame's rows have turned, rad; None as long as nobody has."""
+        if not len(frame.turned):
+            return None
+        return np.asarray((frame.turned if frame.whose is None else frame.turned[frame.whose]) * (np.pi / 128), float)
 
     def _obstacles(self, frame: Frame) -> Sequence[Outline]:
         """All of them; the same object as long as none has moved, which the raster then need not draw again."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import re
 from importlib import resources
@@ -9,6 +10,13 @@ from importlib import resources
 _IMPORT = re.compile(r'^import \{[^}]*\} from "\./([\w.]+)";\n', re.MULTILINE)
 _EXPORT = re.compile(r"^export (?!default)", re.MULTILINE)
 _BODY = re.compile(r"<body>(.*)</body>", re.DOTALL)
+
+ALONE = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
+"""What a page that came as one file may load: nothing but itself."""
+
+TRANSPORT = """  <div id="transport"><input id="seek" data-testid="seek" type="range" min="0" max="0" step="any" value="0"
+    aria-label="Time of the film"><span id="clock" data-testid="clock"></span></div>"""
+"""Where a film is in its time."""
 
 
 def page_file(name: str) -> str:
@@ -21,10 +29,20 @@ def script(entry: str = "notebook.js") -> str:
 
     The names of the modules' own functions and constants must differ; a test holds them to that.
     """
+    constants = {"STYLE": page_file("page.css"), "MARKUP": markup()}
+    return "\n".join((*(f"const {name} = {json.dumps(text)};\n" for name, text in constants.items()), modules(entry)))
+
+
+def markup() -> str:
+    """What the page's body holds."""
     body = _BODY.search(page_file("index.html"))
     assert body
-    constants = {"STYLE": page_file("page.css"), "MARKUP": body[1].strip()}
-    parts = [f"const {name} = {json.dumps(text)};\n" for name, text in constants.items()]
+    return body[1].strip()
+
+
+def modules(entry: str) -> str:
+    """The module `entry` and all it imports as one module."""
+    parts: list[str] = []
     seen: set[str] = set()
 
     def add(name: str) -> None:
@@ -38,3 +56,30 @@ def script(entry: str = "notebook.js") -> str:
 
     add(entry)
     return "\n".join(parts)
+
+
+def film(title: str, *, fps: int, colour: str, theme: str) -> str:
+    """The page that plays a film, without the film: its blocks are to follow. It asks the network for nothing, and may not.
+
+    Args:
+        title: heading.
+        fps: pictures a second.
+        colour: what the colours say at first, one of `looks.COLOURINGS`.
+        theme: "dark" or "light", at first.
+    """
+    head = page_file("index.html")
+    icon = next(line for line in head.splitlines() if 'rel="icon"' in line)
+    dataset = f'id="pyverlet" data-fps="{fps}" data-colour="{colour}" data-theme="{theme}"'
+    lines = [
+        "<!doctype html>",
+        '<html lang="en">',
+        '<meta charset="utf-8">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        f'<meta http-equiv="Content-Security-Policy" content="{ALONE}">',
+        f"<title>{html.escape(title)}</title>",
+        icon.strip(),
+        f"<style>{page_file('page.css')}</style>",
+        markup().replace('id="pyverlet"', dataset, 1).replace("</aside>", f"</aside>\n{TRANSPORT}", 1),
+        f'<script type="module">{modules("film.js")}</script>',
+    ]
+    return "\n".join(lines) + "\n"

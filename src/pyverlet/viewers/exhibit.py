@@ -64,8 +64,8 @@ class Repertoire:
 
     @property
     def summaries(self) -> dict[str, str]:
-        """Name and one line of every scene."""
-        return {scene.name: scene.summary for scene in scenes.SCENES.values()}
+        """Name and one line of every scene, and of the one to begin with if it is none of these."""
+        return {scene.name: scene.summary for scene in (*scenes.SCENES.values(), self._scene)}
 
     def open(self, progress: Progress | None = None) -> Exhibit:
         """The scene to begin with."""
@@ -82,8 +82,8 @@ class Repertoire:
         Raises:
             InputError: there is no such scene, or it cannot have so many particles.
         """
-        scene = scenes.get(name)
-        first = scene is self._scene
+        first = name == self._scene.name
+        scene = self._scene if first else scenes.get(name)
         overrides = self._overrides if first else {key: self._overrides.get(key) for key in CARRIED}
         if particles is not None:
             overrides = {**overrides, "particles": particles}

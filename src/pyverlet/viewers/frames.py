@@ -154,6 +154,8 @@ class Frame:
     """(m, 2) which circles each link joins."""
     force: NDArray[np.float32] = field(default_factory=lambda: np.empty(0, np.float32))
     """(m,) what it pulls with, N; negative if it pushes."""
+    turned: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, np.uint8))
+    """(n,) how far each circle has turned, in 1/256 of a turn, counter-clockwise; empty as long as nobody has."""
     whose: NDArray[np.int32] | None = None
     """(n,) which particle each row is of, between the substeps of a frame; None: row k is particle k."""
     whose_moving: NDArray[np.int32] | None = None

@@ -120,6 +120,11 @@ class HandsOnPanels:
         panel, x, y = self._take(hand, x, y, layout)
         self._hands[panel].poke(hand, x, y, view_size)
 
+    @property
+    def busy(self) -> bool:
+        """Whether any hand has come down."""
+        return bool(self._panel)
+
     def hold(self, hand: int) -> bool:
         """Whether this hand has come down already: then it only aims anew."""
         return hand in self._panel

@@ -26,6 +26,7 @@ from pyverlet.viewers.exhibit import Exhibit, Repertoire
 from pyverlet.viewers.looks import Look
 from pyverlet.viewers.protocol import MAX_MESSAGE
 from pyverlet.viewers.session import Session
+from pyverlet.viewers.stage import Stage
 from pyverlet.viewers.web import LOOPBACK_NAMES, make_app
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ def serve(
     open_browser: bool,
     dt: float,
     repertoire: Repertoire | None = None,
+    stage: Callable[[Exhibit], Stage] = Stage,
 ) -> None:
     """Show the world that `build` makes until Ctrl-C. See `pyverlet.viewers.serve`."""
     _refuse_running_loop()
@@ -52,7 +54,7 @@ def serve(
         with _patient_workers():
             exhibit = Exhibit.of(build(), title)
             _compile(exhibit)
-        session = Session(exhibit, dt=dt, repertoire=repertoire)
+        session = Session(exhibit, dt=dt, repertoire=repertoire, stage=stage)
         if draws_here(session.latest.shape):
             Artist().jpeg(session.latest, Look())  # compiles what it needs: no tab shall wait for that
         with _on_air(session, listener, only_loopback=host in LOOPBACK_NAMES), _ended_by_signals(session):

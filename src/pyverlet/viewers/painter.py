@@ -15,6 +15,14 @@ if TYPE_CHECKING:
     from pyverlet.world.world import World
 
 
+def check_look(colour: Any, theme: Any) -> None:
+    """Raise InputError unless these are a colouring or None, and a theme."""
+    if colour is not None and not isinstance(colour, Colouring):
+        raise InputError(f"colour is {colour!r}; allowed is an object such as pyverlet.picture.BySpeed()")
+    if not isinstance(theme, Theme):
+        raise InputError(f"theme is {theme!r}; allowed are pyverlet.picture.DARK and LIGHT")
+
+
 class Painter:
     """Paints one world, as it is now, whenever asked.
 
@@ -38,10 +46,7 @@ class Painter:
         theme: Theme = DARK,
         part: Rect | None = None,
     ) -> None:
-        if colour is not None and not isinstance(colour, Colouring):
-            raise InputError(f"colour is {colour!r}; allowed is an object such as pyverlet.picture.BySpeed()")
-        if not isinstance(theme, Theme):
-            raise InputError(f"theme is {theme!r}; allowed are pyverlet.picture.DARK and LIGHT")
+        check_look(colour, theme)
         self._world = world
         self._raster = Raster(size, theme=theme)
         self._colour = ByOrigin() if colour is None else colour

@@ -4,8 +4,9 @@
 - head: JSON padded with spaces, {"kind": "shape" | "frame" | "picture" | "refused", ...}.
 - body, little-endian: of a shape n float32 radii, n float32 masses, n uint32 numbers, "apart" pairs of uint32, circles that do
   not collide, if "kinds" n pairs of uint32, category and mask, and if "coloured" n times three bytes R, G, B; of a frame n pairs
-  of uint16 on the grid over "view" and, if the tab looks at velocities, n pairs of int16 in units of "unit" m/s; of a picture a
-  JPEG.
+  of uint16 on the grid over "view", if the tab looks at velocities n pairs of int16 in units of "unit" m/s, of "links" two
+  uint32, who they join, each, and then a byte each, how hard they pull, and if "turned" n bytes, in 1/256 of a turn; of a picture
+  a JPEG.
 """
 
 from __future__ import annotations
@@ -100,6 +101,9 @@ def encode_frame(frame: Frame, part: Rect | None = None, *, velocity: bool = Fal
     if len(frame.joined):
         head["links"] = len(frame.joined)
         body += frame.joined.tobytes() + frame.strain.tobytes()
+    if len(frame.turned):
+        head["turned"] = True
+        body += frame.turned.tobytes()
     return _join(head, body)
 
 
@@ -176,19 +180,19 @@ def encode_refusal(reason: str) -> bytes:
 
 
 def _join(head: dict[str, Any], body: bytes) -> bytes:
-    text = json.dumps(_finite(head), allow_nan=False, separators=(",", ":")).encode()
+    text = json.dumps(finite(head), allow_nan=False, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)  # arrays on the page must start at a multiple of their element's size
     return b"".join((struct.pack("<I", len(text)), text, body))
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
     """JSON has no NaN: a number that is none becomes null."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
-        return {key: _finite(entry) for key, entry in value.items()}
+        return {key: finite(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(entry) for entry in value]
+        return [finite(entry) for entry in value]
     return value
 
 

@@ -60,6 +60,7 @@ class Session:
         dt: simulated seconds per frame, also the pace: 1/dt frames a second.
         budget_ms: milliseconds of physics a frame may take, for the figures on show.
         repertoire: scenes a viewer may put in place of the world; None: the world is all there is.
+        stage: of an exhibit: where it is shown; a journal's keeps what happens there.
 
     Raises:
         InputError: dt or budget_ms is not a positive finite number.
@@ -73,10 +74,12 @@ class Session:
         dt: float = 1 / 60,
         budget_ms: float = FRAME_BUDGET_MS,
         repertoire: Repertoire | None = None,
+        stage: Callable[[Exhibit], Stage] = Stage,
     ) -> None:
         self._dt = checks.number("dt", dt, above=0.0)
         self._budget_ms = checks.number("budget_ms", budget_ms, above=0.0)
         self._repertoire = repertoire
+        self._staged = stage
         self._commands = Inbox()
         self._listeners: tuple[Callable[[], None], ...] = ()
         self._listeners_lock = threading.Lock()
@@ -245,7 +248,6 @@ class Session:
             self._error = f"{type(error).__name__}: {error}"
 
     def _do(self, command: Command | None) -> None:
-        stage = self._stage
         match command:
             case None:
                 pass  # only wakes the thread up
@@ -262,30 +264,17 @@ class Session:
                 self._speed = value
                 self._gauges.held()
                 self._before = None
-            case asked.Reset():
-                stage.reset()
-                self._fresh_start()
             case asked.Build(scene, particles):
                 self._build(scene, particles)
-            case asked.SetGravity() | asked.SetSubsteps() | asked.SetRestitution() | asked.SetFriction() | asked.SetIntegrator():
-                stage.pull(command)
-            case asked.Drag(hand, x, y, reach):
-                stage.hands.drag(hand, x, y, reach, stage.layout)
-            case asked.Poke(hand, x, y):
-                stage.hands.poke(hand, x, y, stage.view_size, stage.layout)
-            case asked.Pin(_, x, y, reach):
-                stage.pin(x, y, reach)
-            case asked.Spawn(_, x, y):
-                stage.hands.spawn(x, y, stage.layout)
-            case asked.Delete(_, x, y, reach):
-                stage.hands.delete(x, y, reach, stage.layout)
-            case asked.Release(hand):
-                stage.hands.release(hand)
+            case _:
+                self._stage.do(command)
+                if isinstance(command, asked.Reset):
+                    self._fresh_start()
 
     # -- what is on show ----------------------------------------------------------------------------------------------
 
     def _enter(self, exhibit: Exhibit) -> None:
-        self._stage = Stage(exhibit)
+        self._stage = self._staged(exhibit)
         self._fresh_start()
 
     def _fresh_start(self) -> None:
@@ -313,7 +302,7 @@ class Session:
             self._last = time.perf_counter()
         if scene is None:
             for command in levers.present(old.worlds[0]):
-                self._stage.pull(command)
+                self._stage.do(command)
         self._publish()
 
     def _on_the_way(self, name: str) -> Callable[[int, int], None]:
@@ -374,7 +363,7 @@ class Session:
         position = stage.place(self._between(positions))
         position.flags.writeable = velocity.flags.writeable = False
         self._status = self._read()
-        return Frame(self._seq, self._shape, stage.layout.view, self._status, position, velocity, stage.moving(), *stage.links())
+        return Frame(self._seq, self._shape, stage.layout.view, self._status, position, velocity, *stage.drawn())
 
     def _read(self) -> Status:
         return self._gauges.read(

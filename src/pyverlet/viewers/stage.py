@@ -11,7 +11,22 @@ from numpy.typing import NDArray
 
 from pyverlet.state.state import EVERYONE
 from pyverlet.viewers import levers
-from pyverlet.viewers.commands import Command, Drag, Poke, SetGravity, Setting
+from pyverlet.viewers.commands import (
+    Command,
+    Delete,
+    Drag,
+    Pin,
+    Poke,
+    Release,
+    Reset,
+    SetFriction,
+    SetGravity,
+    SetIntegrator,
+    SetRestitution,
+    SetSubsteps,
+    Setting,
+    Spawn,
+)
 from pyverlet.viewers.exhibit import Exhibit
 from pyverlet.viewers.frames import Camera, PanelShape, Shape, outline
 from pyverlet.viewers.hands import HandsOnPanels
@@ -96,6 +111,26 @@ class Stage:
             for world in self.worlds:
                 levers.pull(world, command)
 
+    def do(self, command: Command) -> None:
+        """Obey a command that is about the worlds; those about time are the session's."""
+        match command:
+            case SetGravity() | SetSubsteps() | SetRestitution() | SetFriction() | SetIntegrator():
+                self.pull(command)
+            case Drag(hand, x, y, reach):
+                self.hands.drag(hand, x, y, reach, self.layout)
+            case Poke(hand, x, y):
+                self.hands.poke(hand, x, y, self.view_size, self.layout)
+            case Pin(_, x, y, reach):
+                self._pinned += self.hands.pin(x, y, reach, self.layout)
+            case Spawn(_, x, y):
+                self.hands.spawn(x, y, self.layout)
+            case Delete(_, x, y, reach):
+                self.hands.delete(x, y, reach, self.layout)
+            case Release(hand):
+                self.hands.release(hand)
+            case Reset():
+                self.reset()
+
     def takes_at_once(self, command: Command | None) -> bool:
         """Whether this may be done between two substeps: gravity and hands that hold something are asked for in each of them.
 
@@ -127,9 +162,16 @@ class Stage:
             first += len(world)
         return np.concatenate(pairs), np.concatenate(force)
 
-    def pin(self, x: float, y: float, reach: float) -> None:
-        """Pin the nearest circle, or let go of it."""
-        self._pinned += self.hands.pin(x, y, reach, self.layout)
+    def turned(self) -> NDArray[np.uint8]:
+        """(n,) how far each circle has turned, in 1/256 of a turn; none as long as nobody has."""
+        angles = [world.angle for world in self.worlds]
+        if not any(angle.any() for angle in angles):
+            return np.empty(0, np.uint8)
+        return np.concatenate([np.rint(angle * (128 / np.pi)).astype(np.int64).astype(np.uint8) for angle in angles])
+
+    def drawn(self) -> tuple[Sketch, NDArray[np.uint32], NDArray[np.float32], NDArray[np.uint8]]:
+        """What a frame has beside circles: `moving`, `links`, and how they have `turned`."""
+        return self.moving(), *self.links(), self.turned()
 
     def reset(self) -> None:
         """Back to the start; settings stay."""

@@ -47,7 +47,8 @@ class Emitter(Actor):
         rate: particles a second.
         velocity: (x, y) they start with, m/s.
         radius: m, or (smallest, largest) to be drawn evenly.
-        mass: kg.
+        mass: kg; 1 unless a density is given.
+        density: kg/m^2, in place of the mass: mass = density pi radius^2.
         most: particles in all; None goes on for ever.
         seed: of the places; the same seed gives the same ones.
 
@@ -62,7 +63,8 @@ class Emitter(Actor):
         rate: float,
         velocity: Sequence[float] = (0.0, 0.0),
         radius: float | tuple[float, float] = 0.5,
-        mass: float = 1.0,
+        mass: float | None = None,
+        density: float | None = None,
         most: int | None = None,
         seed: int = 0,
     ) -> None:
@@ -74,7 +76,10 @@ class Emitter(Actor):
         low, high = radius if isinstance(radius, tuple) else (radius, radius)
         self.radius = (checks.number("radius", low, above=0.0), checks.number("radius", high, least=low))
         region.check(np.array([self.radius[1]]))
-        self.mass = checks.number("mass", mass, above=0.0)
+        if mass is not None and density is not None:
+            raise InputError(f"density is {density!r} and mass is {mass!r}; allowed is one of them, not both")
+        self.density = None if density is None else checks.number("density", density, above=0.0)
+        self.mass = None if density is not None else checks.number("mass", 1.0 if mass is None else mass, above=0.0)
         self.most = None if most is None else checks.whole("most", most, least=0)
         self._rng = np.random.default_rng(checks.whole("seed", seed, least=0))
         self._due = 0.0
@@ -96,7 +101,8 @@ class Emitter(Actor):
             )
         )
         if found:
-            world.add(position=places[taken], velocity=self.velocity, radius=sizes[taken], mass=self.mass)
+            weight = {"mass": self.mass, "density": self.density}
+            world.add(position=places[taken], velocity=self.velocity, radius=sizes[taken], **weight)  # type: ignore[arg-type]
             self.emitted += found
             self._due -= found
 

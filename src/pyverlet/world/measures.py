@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -10,13 +11,24 @@ from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import measure
-from pyverlet.laws.contacts.collisions import ContactSolver, Overlap, measure_overlap
+from pyverlet.laws.contacts.collisions import Collisions, ContactSolver, Overlap, measure_overlap
 from pyverlet.laws.energy import Energy, energy
-from pyverlet.laws.events import Events
+from pyverlet.laws.events import Events, Place
 from pyverlet.laws.ledger import Bookkeeper, Ledger
+from pyverlet.laws.obstacles import Course, Obstacle, Obstacles
+from pyverlet.laws.rooms import Boundary
+from pyverlet.laws.touches import Touches
 from pyverlet.world.particles import Particles
 
 Array = NDArray[Any]
+
+
+def hash_of(time: float, arrays: Iterable[Array]) -> str:
+    """What `Measures.state_hash` is, of a time and positions, velocities, spins, radii and masses."""
+    digest = hashlib.blake2b(np.float64(time).tobytes(), digest_size=8)
+    for array in arrays:
+        digest.update(np.ascontiguousarray(array).data)
+    return digest.hexdigest()
 
 
 class Measures(Particles):
@@ -26,6 +38,10 @@ class Measures(Particles):
     gravity: tuple[float, float]
     _books: Bookkeeper | None
     _events: Events | None
+    _touches: Touches | None
+    _course: Course
+    obstacles: Obstacles
+    collisions: Collisions | None
     _contacts: ContactSolver | None
 
     def energy(self) -> Energy:
@@ -71,12 +87,66 @@ class Measures(Particles):
             raise InputError("events are off in this world; allowed is a world built with World(events=True)")
         return self._events
 
-    def _spent(self) -> tuple[float, float]:
-        """What impacts and friction have taken in this frame, J, as the kernels of contacts and walls have noted."""
+    # ---- who touches -----------------------------------------------------------------------------------------------------
+
+    @property
+    def contacts(self) -> Array:
+        """Contacts of the last frame, a structured array sorted by `a`, then `b`; an impact that is over is one, too.
+
+        Fields: circles `a` < `b`, or b = -1 and the number of a `wall` of the room (of a Box: left, right, floor, ceiling) or
+        of an `obstacle`, else -1; `point` (2), m; `normal` (2) out of a; `impulse` along it, N s, summed over the frame, and
+        `rub`, what a got along (-n_y, n_x): of walls and obstacles. Of circles the impulses are the smallest that explain what
+        each has got; friction between them is left out.
+
+        Raises:
+            InputError: the world notes none.
+        """
+        return self._noting().array(self._state)
+
+    def force_on(self, what: Obstacle | Boundary) -> Array:
+        """(2,) N, the force of all circles on an obstacle or on all walls of the room, averaged over the last frame.
+
+        Raises:
+            InputError: it is not in this world, or the world notes no contacts.
+        """
+        touches = self._noting()
+        if what is not self.boundary and not any(what is obstacle for obstacle in self.obstacles):
+            raise InputError(f"what is {what!r}; allowed is an obstacle of this world, or its boundary")
+        return touches.force_on(what, self.boundary)
+
+    def pressure(self) -> float:
+        """N/m, what circles push the walls of the room with along their normals, over their length; of the last frame.
+
+        Raises:
+            InputError: the room has no walls of a known length, or the world notes no contacts.
+        """
+        touches, length = self._noting(), self.boundary.perimeter()
+        if length is None:
+            raise InputError(f"boundary is {self.boundary!r}; allowed is a pyverlet.Box or a pyverlet.Circle, to have a pressure")
+        return touches.pushed() / length
+
+    def _place(self) -> Place:
+        """What circles may meet, for the events of a frame."""
+        return Place(self.boundary, self._course, self.collisions.restitution if self.collisions else 0.0)
+
+    def _noting(self) -> Touches:
+        if self._touches is None:
+            raise InputError("contacts are off in this world; allowed is a world built with World(contacts=True)")
+        return self._touches
+
+    def _listen(self, h: float, told: Callable[[str], None]) -> Callable[[str], None]:
+        """Who is told of the stages of a frame: `told`, and before it those who note contacts."""
+        if self._touches is None:
+            return told
+        listed = self._contacts.listed if self._contacts and len(self) > 1 else None
+        return self._touches.frame(self._slots, self._state, h, self.boundary, self._course, listed, told)
+
+    def _spent(self) -> tuple[float, float, float]:
+        """What impacts, friction and the energy limiter have taken in this frame, J, as they have noted; negative."""
         spent = self._slots.spent.sum(axis=0)
         if self._contacts:
             spent += self._contacts.spent()
-        return float(spent[0]), float(spent[1])
+        return float(spent[0]), float(spent[1]), -self._slots.taken
 
     def momentum(self) -> Array:
         """(2,) sum of m v over all free particles, kg m/s."""
@@ -99,11 +169,8 @@ class Measures(Particles):
         return int(np.count_nonzero(self.boundary.outside(self.position)))
 
     def state_hash(self) -> str:
-        """16 hex digits of time and every particle's position, velocity, spin, radius and mass: equal bits, equal hash."""
-        digest = hashlib.blake2b(np.float64(self.time).tobytes(), digest_size=8)
-        for array in (self.position, self.velocity, self.spin, self.radius, self.mass):
-            digest.update(array.tobytes())
-        return digest.hexdigest()
+        """16 hex digits of time and every particle's position, velocity, spin, angle, radius and mass: equal bits, equal hash."""
+        return hash_of(self.time, (self.position, self.velocity, self.spin, self.angle, self.radius, self.mass))
 
     @property
     def rebuilds(self) -> int:

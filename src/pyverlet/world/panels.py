@@ -31,12 +31,12 @@ class Panel:
         self.name = name
         self.world = world
         self.frames = 0
-        self._pace = pace
+        self.pace = pace
 
     def step(self, dt: float) -> None:
         """One frame of the screen, dt seconds, passes."""
         self.frames += 1
-        self._pace(self.world, self.frames, dt)
+        self.pace(self.world, self.frames, dt)
 
 
 class Panels:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.contacts.collisions import ContactSolver
-from pyverlet.laws.forces import Force, Numbered
+from pyverlet.laws.forces import ForceList, Numbered
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.rooms import Boundary
@@ -26,7 +26,7 @@ class Particles:
     _state: State
     _slots: Slots
     _contacts: ContactSolver | None
-    forces: list[Force]
+    forces: ForceList
     links: Links
     _where = slice(None)
     boundary: Boundary
@@ -39,8 +39,10 @@ class Particles:
         position: ArrayLike,
         velocity: ArrayLike = 0.0,
         radius: ArrayLike = 0.5,
-        mass: ArrayLike = 1.0,
+        mass: ArrayLike | None = None,
+        density: ArrayLike | None = None,
         spin: ArrayLike = 0.0,
+        angle: ArrayLike = 0.0,
         restitution: ArrayLike | None = None,
         friction: ArrayLike | None = None,
         category: ArrayLike = 1,
@@ -50,17 +52,19 @@ class Particles:
         """Add particles.
 
         Args:
-            position: (n, 2) or (2,), centres, m.
+            position: (n, 2) or (2,), centres, m. Circles of which a part would stand out of the room are put at its wall.
             velocity: (n, 2), (2,) or 0, m/s.
             radius: (n,) or one for all, m, greater than 0.
-            mass: (n,) or one for all, kg, greater than 0; infinity pins the particle.
+            mass: (n,) or one for all, kg, greater than 0; infinity pins the particle. 1 unless a density is given.
+            density: (n,) or one for all, kg/m^2, in place of the mass: mass = density pi radius^2.
             spin: (n,) or one for all, rad/s, counter-clockwise.
+            angle: (n,) or one for all, rad they have turned so far, counter-clockwise.
             restitution: (n,) or one for all, e from 0 to 1; None: as `Collisions` and the bounds say. The larger of two counts.
             friction: (n,) or one for all, mu, 0 or more; None: as for restitution. The geometric mean of two counts, as in Box2D.
             category: (n,) or one for all, 32 bits: what these circles are.
             mask: (n,) or one for all, 32 bits: two circles collide if each has a bit of its category in the other's mask.
-            allow_overlap: take centres inside an obstacle or outside the room too, which get out, or in, at once. Circles on top
-                of each other need no leave: they part slowly.
+            allow_overlap: leave circles where they are said to be, inside an obstacle and outside the room too: the first frame
+                gets them out, or in. Circles on top of each other need no leave: they part slowly.
 
         Returns:
             A handle whose arrays are views on these particles, in the order given.
@@ -72,13 +76,15 @@ class Particles:
         dtype = self._state.dtype
         where = checks.rows("position", position, dtype)
         count = len(where)
+        size = checks.column("radius", radius, dtype, count)
         values = {
             "position": where,
             "velocity": checks.rows("velocity", velocity, dtype, count),
             "acceleration": np.full((count, 2), np.nan, dtype),
             "spin": checks.column("spin", spin, dtype, count),
-            "radius": checks.column("radius", radius, dtype, count),
-            "mass": checks.column("mass", mass, dtype, count),
+            "angle": checks.column("angle", angle, np.dtype(np.float64), count),
+            "radius": size,
+            "mass": _mass(mass, density, size),
             "grown": np.ones(count, dtype),
             "restitution": checks.column("restitution", -1.0 if restitution is None else restitution, dtype, count),
             "friction": checks.column("friction", -1.0 if friction is None else friction, dtype, count),
@@ -89,12 +95,15 @@ class Particles:
             checks.within("restitution", values["restitution"], 0.0, 1.0)
         if friction is not None:
             checks.within("friction", values["friction"], 0.0, np.inf)
-        checks.rows("spin", np.column_stack((values["spin"], values["spin"])), dtype, count)
+        for name in ("spin", "angle"):
+            checks.rows(name, np.column_stack((values[name], values[name])), np.dtype(np.float64), count)
         checks.positive("radius", values["radius"])
         checks.positive("mass", values["mass"], infinite_is="pinned")
         self.boundary.check(values["radius"])
         if not allow_overlap:
-            self._refuse_misplaced(where, np.isfinite(values["mass"]))
+            free = np.isfinite(values["mass"])
+            self._refuse_misplaced(where, free)
+            values["position"] = np.where(free[:, None], self.boundary.put_in(where, values["radius"]), where)
         return Group(self._state, self._state.append(values), self.remove)
 
     def is_free(self, position: ArrayLike) -> NDArray[np.bool_]:
@@ -148,6 +157,7 @@ class Particles:
     position = Column("(n, 2) centres of all particles in the order they were added, m; a view.")
     velocity = Column("(n, 2) m/s; a view.")
     spin = Column("(n,) angular velocity, rad/s, counter-clockwise; a view.")
+    angle = Column("(n,) rad they have turned, counter-clockwise, float64 whatever the dtype: it grows and grows; a view.")
     radius = Column("(n,) m; a view.")
     mass = Column("(n,) kg, infinite where pinned; a view.")
     restitution = Column("(n,) e of circles that have their own, negative where `Collisions` and the bounds decide; a view.")
@@ -166,6 +176,26 @@ class Particles:
         return np.searchsorted(self._state.begun, self.number, side="right") - 1
 
     @property
+    def groups(self) -> list[Group]:
+        """A handle on each group, in the order they were added; of those that were removed, too, with nobody in them."""
+        state = self._state
+        ends = [*state.begun[1:], state.numbers]
+        return [
+            Group.of(state, first, end - first, self.remove) for first, end in zip(state.begun, ends, strict=bool(state.begun))
+        ]
+
+    @property
     def version(self) -> int:
         """How often particles were added or removed."""
         return self._state.version
+
+
+def _mass(mass: ArrayLike | None, density: ArrayLike | None, radius: Array) -> Array:
+    """(n,) kg, from that or from the density of discs."""
+    if density is None:
+        return checks.column("mass", 1.0 if mass is None else mass, radius.dtype, len(radius))
+    if mass is not None:
+        raise InputError(f"density is {density!r} and mass is {mass!r}; allowed is one of them, not both")
+    wide = checks.column("density", density, np.dtype(np.float64), len(radius))
+    checks.positive("density", wide)
+    return np.asarray(np.pi * wide * radius.astype(np.float64) ** 2, radius.dtype)

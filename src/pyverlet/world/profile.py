@@ -41,6 +41,12 @@ class Profile:
         spent[self._places.get(stage) or self._places.setdefault(stage, len(self._places) + 1)] += now - spent[0]
         spent[0] = now
 
+    def spent(self, stages: tuple[str, ...]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        """Where compiled code notes the time of these stages, which have the first places: `compile.clock.note`."""
+        if stages[0] not in self._places:
+            self._places = {stage: place for place, stage in enumerate(stages, 1)}
+        return self._spent
+
     def end(self) -> None:
         """The frame is complete."""
         self.frame_ms = (perf_counter() - self._start) * 1e3

@@ -20,8 +20,8 @@ from pyverlet.world.rehearsals import PARTS, rehearse
 from pyverlet.world.world import World
 
 OF_CIRCLES = (
-    "bounds", "cage", "clusters", "contacts", "friction", "grid", "grips", "impacts", "loans", "measure", "motion", "packs",
-    "pairs", "refine",
+    "bounce", "bounds", "cage", "clusters", "contact", "contacts", "frame", "friction", "grid", "impacts", "loans", "measure",
+    "motion", "packs", "pairs", "refine", "sweeps",
 )  # fmt: skip
 """Modules of the kernels that every world of circles may need: how many there are is what progress is measured by."""
 

@@ -14,9 +14,10 @@ from pyverlet.ground import checks
 from pyverlet.ground.constants import ALL_THREADS_FROM, ONE_THREAD_BELOW, REST_ACCELERATIONS, STANDARD_GRAVITY
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.kernels import motion
+from pyverlet.laws.coarse import Coarse
 from pyverlet.laws.contacts.collisions import Collisions, ContactSolver
 from pyverlet.laws.events import Events
-from pyverlet.laws.forces import Force, ForceSum
+from pyverlet.laws.forces import ForceList, ForceSum
 from pyverlet.laws.integrators import Integrator, PositionVerlet
 from pyverlet.laws.ledger import Bookkeeper
 from pyverlet.laws.limiter import Watch, undriven
@@ -24,15 +25,16 @@ from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.rooms import Boundary, Open
 from pyverlet.laws.sleep import Sleep, laws
+from pyverlet.laws.touches import Touches
 from pyverlet.state.state import Slots, State
 from pyverlet.world.actors import Actor
 from pyverlet.world.convenience import Doors
-from pyverlet.world.fused import ALIKE, Fused, kind_of
 from pyverlet.world.measures import Measures
 from pyverlet.world.moments import Moment
 from pyverlet.world.profile import Profile
 from pyverlet.world.queries import Queries
 from pyverlet.world.saved import Saved
+from pyverlet.world.substeps import Substeps
 
 Array = NDArray[Any]
 
@@ -51,6 +53,7 @@ class World(Measures, Queries, Doors):
         substeps: steps of length h = dt / substeps in one call of `step`.
         dtype: float32 or float64, of all arrays.
         events: note in `events` which contacts begin and end in each frame, and who hit whom how hard.
+        contacts: note who touches what, where and how hard, in `contacts`, and for `force_on` and `pressure`.
         sleep: let circles at rest sleep until touched, at little cost; not with links, moving obstacles or forces but drag.
         ledger: keep account of where the energy goes, in `ledger`.
         threads: at most this many for the parallel stages; None is as many as pay off. Never changes the result.
@@ -80,17 +83,17 @@ class World(Measures, Queries, Doors):
         threads: int | None = None,
         ledger: bool = False,
         events: bool = False,
+        contacts: bool = False,
         sleep: bool = False,
     ) -> None:
         self._state = State(checks.floating("dtype", dtype))
         self._h_last: float | None = None  # substep of the frame before; None: the integrator starts anew
         self._slots = Slots(self._state.dtype, sleeps=sleep)
         self.links = Links(self._state)
-        self._events = Events() if events else None
+        self._events, self._touches = Events() if events else None, Touches() if contacts else None
         self._sleep = Sleep() if sleep else None
-        self.forces: list[Force] = []
-        self._force_sum = ForceSum(checks.vector("gravity", gravity), self.forces)
-        self.actors: list[Actor] = []
+        self.forces = ForceList()
+        self._force_sum, self.actors = ForceSum(checks.vector("gravity", gravity), self.forces), list[Actor]()
         self.obstacles = Obstacles()
         self._course = Course(self.obstacles)
         self.integrator = PositionVerlet() if integrator is None else integrator
@@ -98,11 +101,9 @@ class World(Measures, Queries, Doors):
         self.collisions = collisions
         self.substeps = substeps
         self.threads = threads
-        self.time = 0.0
-        self.frames = 0
-        self.profile = Profile()
-        self._books = Bookkeeper() if ledger else None
-        self._fused = Fused()
+        self.time, self.frames = 0.0, 0
+        self.profile, self._books = Profile(), Bookkeeper() if ledger else None
+        self._run, self._coarse = Substeps(), Coarse()
         self.onlooker: Callable[[Moment], None] | None = None
         """Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins."""
 
@@ -120,8 +121,8 @@ class World(Measures, Queries, Doors):
             actor.act(self, dt)
         jit.use_threads(self.threads)
         self.profile.begin()
-        books = self._books and self._open_books(h)
-        self._frame(h, books or self.profile.mark)
+        books = self._open_books(h)
+        self._frame(h, self._listen(h, books or self.profile.mark))
         self._refuse_non_finite(h)
         self._accept(dt, h, books)
         self.profile.end()
@@ -130,16 +131,15 @@ class World(Measures, Queries, Doors):
         """The table of contents of the engine. `done` is called with the name of each stage as it ends."""
         state, forces, integrator = self._slots, self._force_sum, self.integrator
         contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course or None
-        fused, lag, state.drop = self._fused.begin(self.gravity, contacts), integrator.velocity_lag * h, integrator.drop
+        lag, state.drop, run = integrator.velocity_lag * h, integrator.drop, self._run.begin(contacts)
         parts: list[Any] = [part for part in (contacts, links, course) if part]
-        plain = not (self.forces or self.links or self.obstacles) and done == self.profile.mark
+        compiled = contacts and not (links or course) and done == self.profile.mark
         if not self._open(h, done):
             return
-        watch = Watch(self._state, forces, self.links, self.boundary) if contacts and undriven(self, h, self._h_last) else None
-        for substep in range(self.substeps):
-            kind = kind_of(substep, self.substeps) if plain else ALIKE
+        watch, substep = self._watch(h) if contacts or course else None, 0
+        while substep < self.substeps:
             self._show(substep, h, lag)
-            if not (fused.leapt or fused.leap(self, contacts, h, kind)):
+            if not run.leapt:
                 for part in parts:
                     part.before(state, h)
                 integrator.step(state, forces, self.time + substep * h, h)
@@ -147,7 +147,8 @@ class World(Measures, Queries, Doors):
             if contacts:
                 contacts.find(state, lag)
                 done("broad phase")
-                if plain and fused.substep(self, contacts, h, lag, done, kind):
+                if compiled and (reached := run.go(self, contacts, substep, h, lag)) > substep:
+                    substep = reached
                     continue
                 contacts.project(state, h, lag, forces.strongest)
                 done("contacts")
@@ -165,8 +166,13 @@ class World(Measures, Queries, Doors):
             if links:
                 links.after(state)
                 done("links")
-        self._finish(contacts, watch, h, leans=kind != ALIKE)
+            substep += 1
+        self._finish(contacts, watch, h, marked=run.marked)
         done("finish")
+
+    def _watch(self, h: float) -> Watch | None:
+        """Who looks after the energy of this frame, if nothing but contacts, links and obstacles could raise it."""
+        return Watch(self._state, self._force_sum, self.links, self.boundary) if undriven(self, h, self._h_last) else None
 
     def run(self, *, seconds: float, dt: float = 1 / 60) -> None:
         """Advance by as many frames of dt as come nearest to `seconds`."""
@@ -213,18 +219,18 @@ class World(Measures, Queries, Doors):
         with contacts.aside(self._slots) if contacts else nullcontext():
             links.solve(self._slots, h)
 
-    def _finish(self, contacts: ContactSolver | None, watch: Watch | None, h: float, *, leans: bool) -> None:
+    def _finish(self, contacts: ContactSolver | None, watch: Watch | None, h: float, *, marked: bool) -> None:
         """The substeps are done: who rests, the velocities of now, and no more energy than there may be."""
         if contacts:
-            lag, marked = self.integrator.velocity_lag * h, leans and contacts.packs(self._slots) is not None
+            lag = self.integrator.velocity_lag * h
             contacts.end(self._slots, self._state, lag, self.substeps * h, self.gravity, marked=marked)
         self.integrator.end(self._slots, h)
-        if contacts and watch:
-            contacts.growth.heed(watch.close(self._slots, contacts.listed()))
+        if watch:
+            watch.close(self._slots, contacts)
 
     def _accept(self, dt: float, h: float, books: Any) -> None:
         """The frame has gone well: what it made of the state is the truth now."""
-        self._slots.scatter(self._state)
+        self._slots.scatter(self._state, dt)
         if books:
             books.close(self._spent())
         self._course.end(dt)
@@ -232,11 +238,10 @@ class World(Measures, Queries, Doors):
         if self._events:
             if self._contacts:
                 self._contacts.collect(self._slots)
-            self._events.close(self._slots, self._state)
+            self._events.close(self._slots, self._state, self._place())
         self.profile.mark("scatter")
-        self.time += dt
-        self.frames += 1
-        self._h_last = h
+        self.time, self.frames, self._h_last = self.time + dt, self.frames + 1, h
+        self._coarse.look(self, h)
 
     def _show(self, done: int, h: float, lag: float) -> None:
         if self.onlooker and done:
@@ -363,7 +368,7 @@ class World(Measures, Queries, Doors):
             time=self.time,
             frames=self.frames,
             h_last=self._h_last,
-            slots=self._slots.save(),
+            slots=self._slots.save(self._state),
             contacts=self._contacts.save() if self._contacts else None,
             books=self._books and self._books.copy(),
             events=self._events and self._events.copy(),

@@ -11,7 +11,7 @@ from pyverlet import scenes
 from pyverlet.lab.physics._check import Result
 from pyverlet.lab.physics._worlds import RADIUS, G, fastest, frames, in_disc
 from pyverlet.laws.contacts.collisions import Collisions
-from pyverlet.laws.forces import Conservative
+from pyverlet.laws.forces import Conservative, PointSpring
 from pyverlet.laws.naive import Naive
 from pyverlet.laws.rooms import Box, Circle
 from pyverlet.world.world import World
@@ -28,9 +28,13 @@ Build = Callable[[int], World]
 def scale(world: World, seconds: float) -> float:
     """Scale of a world's energy, J: what it moves with now, and what a fall through its room would give, m g H.
 
-    Without gravity g is 9.81 m/s^2 all the same: circles that start at rest and overlapping would otherwise have the scale 0.
-    Without walls H is the depth of a fall that takes all the time there is, g t^2 / 2.
+    Without gravity it is what moves and what forces and links hold; g is 9.81 m/s^2 all the same where circles start on top of
+    each other: at rest they would have the scale 0. Without walls H is the depth of a fall that takes all the time there is,
+    g t^2 / 2.
     """
+    now = world.energy()
+    if not any(world.gravity) and not world.overlap().contacts:
+        return now.kinetic + abs(now.potential) + abs(now.links)
     mass = float(world.mass[np.isfinite(world.mass)].sum(dtype=float))
     gx, gy = world.gravity if any(world.gravity) else (0.0, G)
     extent = world.boundary.extent()
@@ -38,7 +42,7 @@ def scale(world: World, seconds: float) -> float:
         fall = 0.5 * (gx * gx + gy * gy) * seconds**2
     else:
         fall = abs(gx) * (extent[2] - extent[0]) + abs(gy) * (extent[3] - extent[1])
-    return world.energy().kinetic + mass * fall
+    return now.kinetic + mass * fall
 
 
 def worst_rise(world: World, seconds: float) -> tuple[float, float, float]:
@@ -69,6 +73,15 @@ def elastic_gas(substeps: int, particles: int = 300) -> World:
     rng = np.random.default_rng(0)
     world = World(boundary=Box((-20, -20), (20, 20), restitution=1.0), collisions=Collisions(restitution=1.0), substeps=substeps)
     world.add(position=in_disc(particles, 15, 1.5), velocity=rng.normal(0, 5, (particles, 2)), radius=RADIUS)
+    return world
+
+
+def drawn_gas(substeps: int, particles: int = 200) -> World:
+    """Circles without gravity that a spring draws to a point, where they collect."""
+    rng = np.random.default_rng(0)
+    world = World(gravity=(0, 0), boundary=Circle(radius=20), substeps=substeps)
+    world.add(position=in_disc(particles, 15, 1.5), velocity=rng.normal(0, 1, (particles, 2)), radius=RADIUS)
+    world.forces.append(PointSpring(stiffness=2.0))
     return world
 
 
@@ -126,8 +139,8 @@ def in_scenes(seconds: float) -> Result:
 
 
 def in_gas(seconds: float) -> Result:
-    """Energy of elastic circles under gravity."""
-    return never_rises({"elastic gas under gravity": elastic_gas}, seconds)
+    """Energy of elastic circles under gravity, and of what a spring draws together."""
+    return never_rises({"elastic gas under gravity": elastic_gas, "drawn by a spring": drawn_gas}, seconds)
 
 
 def when_overlapped(seconds: float) -> Result:

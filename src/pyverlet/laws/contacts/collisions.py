@@ -140,20 +140,18 @@ class ContactSolver:
                 self.broad_phase.release()
         return self._wide
 
-    def packs(self, state: Slots) -> tuple[Wide, Strips] | None:
-        """Packs and strips, if a substep's contacts are but `project` and `still` of these; None: there is more to them."""
-        strips = self.broad_phase.strips() if self._alone(state) else None
-        return (self._pack(state), strips) if strips else None
-
-    def _alone(self, state: Slots) -> bool:
-        return self._events is None and self._sleep is None and state.size is state.radius and self._slides(state)
+    def steady(self, state: Slots) -> Strips | None:
+        """Where strips stand, if a substep's contacts are but the two sweeps; None: there is more to them."""
+        alone = self._eight(state) and self._sleep is None and state.size is state.radius
+        return self.broad_phase.strips() if alone else None
 
     def set_up(self, state: Slots, h: float, lag: float, strongest: float) -> Wide:
         """The pairs of now, with all that their sweeps need in this substep."""
         wide = self._pack(state)
         if self._rubs(state):
             self._slips.start(wide, state.particle)
-        wide.begin_substep(state, h, lag, strongest, REST_ACCELERATIONS * strongest * h, accounts=len(state.spent) > 0)
+        rest_speed = REST_ACCELERATIONS * strongest * h
+        wide.set_up(state, h, lag, strongest, rest_speed, accounts=len(state.spent) > 0)
         return wide
 
     def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
@@ -267,10 +265,6 @@ class ContactSolver:
         """The particles are now at `now` (n,), or no more (-1)."""
         self._slips.renumber(now)
         self._loans.renumber(now)
-
-    def _slides(self, state: Slots) -> bool:
-        """Whether nobody bounces or rubs, and nobody asks how they meet."""
-        return self._eight(state) and not (self._rubs(state) or self._bounces(state) or self._events)
 
     def _eight(self, state: Slots) -> bool:
         """Whether contacts are solved eight at a time."""

@@ -114,7 +114,8 @@ class Loans:
 
     def renumber(self, now: Array) -> None:
         """The particles are now at `now` (n,), or no more (-1)."""
-        self._kept = self._kept._replace(particle=now[self._kept.particle].astype(np.int32))
+        before = self._kept.particle  # some may be no more already
+        self._kept = self._kept._replace(particle=np.where(before >= 0, now[before], -1).astype(np.int32))
 
     def save(self) -> Lent:
         """What `restore` needs."""

@@ -73,7 +73,7 @@ class Slips:
     def renumber(self, now: Array) -> None:
         """The particles are now at `now` (n,), or no more (-1)."""
         if self._holder is not None:
-            self._owner = now[self._owner].astype(np.int32)
+            self._owner = np.where(self._owner >= 0, now[self._owner], -1).astype(np.int32)  # some may be no more already
         low, high = now[self._kept.low].astype(np.int32), now[self._kept.high].astype(np.int32)
         alive = (low >= 0) & (high >= 0)
         self._kept = Kept(low[alive], high[alive], self._kept.slip[alive])

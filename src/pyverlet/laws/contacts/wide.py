@@ -1,4 +1,4 @@
-"""The contacts of circles, eight pairs at a time: the pairs of a list in packs, what they are made of, and the two sweeps over them."""
+"""The contacts of circles, eight pairs at a time: the pairs of a list in packs, what they are made of, and the two sweeps."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from pyverlet.compile import jit
 from pyverlet.compile.lanes import LANES
 from pyverlet.ground import memory
 from pyverlet.ground.constants import CARRIED_WEIGHT, COLOURS, FED, LARGEST_PUSH, PUSHED
-from pyverlet.kernels import contact, packs
+from pyverlet.kernels import frame, packs, sweeps, tables
 from pyverlet.kernels.bounds import CARRIES
 from pyverlet.laws.contacts.broadphase import PairList, rows_of
 from pyverlet.state.state import Slots
 
 Array = NDArray[Any]
 
-_ROWS = len((contact.E, contact.MU, contact.R_I, contact.R_J, contact.TURN_I, contact.TURN_J, contact.MASS))
+_ROWS = tables.MASS + 1
+_ARRIVES = tables.Law._fields.index("arrives")
 
 
 class Wide:
@@ -33,7 +34,7 @@ class Wide:
         gap: (2, room) from i to j when the list was made, m.
         origin: (n, 2) where circles were then. moved: (n, 2) how far they have come since.
         reach, share: m, and what part of a push moves i; one for each lane, or (LANES,) if they are the same for all.
-        made_of: (7, room) or (7, LANES) what each pair is made of: rows of `kernels.contact`.
+        made_of: (7, room) or (7, LANES) what each pair is made of: rows of `kernels.tables`.
         normal: (2, room) of pairs that touch, for others 0. depth: (room,) their overlap, m.
         slip: (room,) what contacts have slipped, m. held: (room,) m by which friction has answered it in this substep.
         closing: (room,) largest speed of approach since the last `collect`, m/s; negative: has not touched.
@@ -68,6 +69,7 @@ class Wide:
     def _hold_circles(self, count: int) -> None:
         """Room for what contacts that may bounce or rub note of circles."""
         self._carries, self._lift, self._leans, self._turned, self._turn = (np.zeros(count, self._dtype) for _ in range(5))
+        self._slid = np.zeros((count, 2), self._dtype)
 
     def take(self, pairs: PairList, origin: Array, radius: Array) -> None:
         """Pack a new list; origin: (n, 2) positions it was made from; radius: (n,) m."""
@@ -165,50 +167,57 @@ class Wide:
 
     # ---- a substep ---------------------------------------------------------------------------------------------------------
 
-    def begin_substep(self, state: Slots, h: float, lag: float, strongest: float, rest_speed: float, *, accounts: bool) -> None:
-        """Everything that the sweeps of this substep need."""
+    def set_up(self, state: Slots, h: float, lag: float, strongest: float, rest_speed: float, *, accounts: bool) -> None:
+        """Everything that the sweeps of this substep, and of those that follow it alike, need: `circles`, `arrays` and `law`."""
         if not self.fits(state):
             self.fit(state)
         if self.asks:
             np.bitwise_and(state.fed, CARRIES, out=self._carries, casting="unsafe")
+        turn = self._turn if self.rubs else self._turn[:0]
         if self.rubs:
             np.multiply(self._rough, state.real((state.drop - PUSHED / FED) * h), out=self._leans)
-            state.turn, state.lift = self._turn, self._lift
-        self.circles = contact.Circles(
+            state.turn, state.lift = turn, self._lift
+        self.circles = (
             state.position, state.velocity, state.acceleration, state.inverse_mass, self.origin, self.moved, state.resting,
-            state.spin, self._carries, state.fed, self._turned, self._turn, self._lift, self._leans,
-            state.start if self.rubs else self.origin,
+            state.spin, self._carries, state.fed, self._slid, self._turned, turn, self._lift, self._leans, state.start,
+            state.radius, state.restitution, state.friction, state.hits, state.spent,
         )  # fmt: skip
-        self.law = contact.Law(
-            varied=self._varied, mixed=self._mixed, asks=int(self.asks), rubs=int(self.rubs), listens=int(self._listens),
-            accounts=int(accounts), looks=int(self._looks or self.asks), h=state.real(h), lag=state.real(lag), feed=state.real(FED / PUSHED / h),
-            most=state.real(LARGEST_PUSH), rest_speed=state.real(rest_speed), weight=int(strongest > 0),
-            carried=state.real(CARRIED_WEIGHT * strongest * h if strongest > 0 else np.inf),
+        carried = CARRIED_WEIGHT * strongest * h if strongest > 0 else np.inf
+        self.law = (
+            self._varied, self._mixed, int(self.asks), int(self.rubs), int(self._listens), int(accounts),
+            1, *state.reals(h, lag, FED / PUSHED / h, LARGEST_PUSH, rest_speed), int(strongest > 0),
+            state.real(carried),
         )  # fmt: skip
-        self._arrays = contact.Pairs(
+        self.arrays = (
             self.begin, self.lanes, self.apart, self.lane_i, self.lane_j, self.gap, self.reach, self.share, self.made_of,
             self.normal, self.depth, self.slip, self.held, self.closing, self._deep, self._deeps, self.spent,
         )  # fmt: skip
 
-    def push(self, state: Slots, *, sets_out: bool = True, arrives: bool = True) -> None:
-        """Impacts, overlaps and slips; circles `arrive` where that has moved them, unless others do that."""
-        contact.push(self.circles, self._arrays, self.law, self.cut(), int(sets_out), int(arrives), state.claims())
-        self._looks = False
+    def leave_arriving(self) -> None:
+        """The room puts circles where pushes have moved them: one pass over the memory less."""
+        self.law = (*self.law[:_ARRIVES], int(self.asks), *self.law[_ARRIVES + 1 :])
 
-    def relax(self, state: Slots, *, marks: bool = False) -> None:
-        """Touching circles neither approach nor slip; mark them as resting, too."""
-        contact.relax(self.circles, self._arrays, self.law, self._cut, int(marks), state.claims())
-        self._looks |= marks
+    def takes_looks(self) -> int:
+        """Whether the next sweep is to note who overlaps deeply, which it does once a frame."""
+        looks, self._looks = int(self._looks), False
+        return looks
 
-    def fused(self, normal: Array, *, marks: bool) -> tuple[Any, ...]:
-        """Circles, pairs and law for `kernels.fused`, which keeps normals in an array of its own; it marks who rests, too."""
-        self._looks = marks
-        return self.circles, self._arrays._replace(normal=normal), self.law
+    def has_marked(self) -> None:
+        """Who rests has been marked in `state.resting`: the frame is over, and the next one looks anew."""
+        self._looks = True
+
+    def push(self, state: Slots) -> None:
+        """Impacts, overlaps and slips; circles are then where that has moved them."""
+        frame.project(self.circles, self.arrays, self.law, self.cut(), self.takes_looks(), 1, state.claims())
+
+    def relax(self, state: Slots) -> None:
+        """Touching circles neither approach nor slip."""
+        frame.still(self.circles, self.arrays, self.law, self._cut, 0, state.claims())
 
     def mark_resting(self, state: Slots) -> None:
         """Note in `state.resting` who touches another."""
-        contact.mark_touching(self.circles, self._arrays, self.cut())
-        self._looks = True
+        sweeps.mark_touching(self.lanes, self.begin, self.lane_i, self.lane_j, self.normal, state.resting, self.cut())
+        self.has_marked()
 
 
 def _differ(values: Array) -> bool:

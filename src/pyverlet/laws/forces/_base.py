@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from numpy.typing import NDArray
 
+from pyverlet.ground.errors import InputError
 from pyverlet.state.moves import newton, newton_kick_drift
 from pyverlet.state.state import Slots, State
 
@@ -34,6 +35,24 @@ class Numbered(Protocol):
         """Particles were removed: the one that was at k is at now[k], or is no more if that is -1."""
 
 
+AnyForce = TypeVar("AnyForce", bound=Force)
+
+
+class ForceList(list[Force]):
+    """The forces of a world: a list."""
+
+    def append(self, force: AnyForce) -> AnyForce:  # type: ignore[override]
+        """Add a force; returns it.
+
+        Raises:
+            InputError: it has no method `apply`.
+        """
+        if not isinstance(force, Force):
+            raise InputError(f"force is {force!r}; allowed is an object with a method apply(state, t), such as pyverlet.Drag()")
+        super().append(force)
+        return force
+
+
 class ForceSum:
     """Gravity and the world's forces together: what integrators call. Forces are summed, then a = F / m.
 
@@ -43,12 +62,13 @@ class ForceSum:
 
     Attributes:
         strongest: the largest acceleration that anyone has felt in the last evaluation, m/s^2.
+        t: the time of the last evaluation that asked forces, s.
     """
 
     def __init__(self, gravity: tuple[float, float], forces: list[Any]) -> None:
         self.gravity = gravity
         self.forces = forces
-        self.strongest = 0.0
+        self.strongest = self.t = 0.0
 
     @property
     def velocity_dependent(self) -> bool:
@@ -66,6 +86,7 @@ class ForceSum:
         """The sum of all forces but gravity (n, 2), N; (0, 2) if there are none."""
         if not self.forces:
             return state.acceleration[:0]
+        self.t = t
         state.force.fill(0)
         for force in self.forces:
             force.apply(state, t)

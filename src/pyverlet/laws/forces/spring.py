@@ -7,28 +7,34 @@ from collections.abc import Sequence
 import numpy as np
 
 from pyverlet.ground import checks
+from pyverlet.state.group import Group
 from pyverlet.state.state import Slots, State
 
 
 class PointSpring:
-    """A spring of zero length from every particle to one point.
+    """A spring of zero length from every particle, or each of a group, to one point.
 
-    F = -stiffness (x - center), with the potential stiffness |x - center|^2 / 2.
+    F = -stiffness (x - center), with the potential stiffness |x - center|^2 / 2. Pinned particles take no part.
 
     Args:
+        group: whom it acts on; None is all.
         center: (x, y), m.
         stiffness: N/m.
     """
 
     velocity_dependent = False
 
-    def __init__(self, *, center: Sequence[float] = (0.0, 0.0), stiffness: float) -> None:
+    def __init__(self, group: Group | None = None, *, center: Sequence[float] = (0.0, 0.0), stiffness: float) -> None:
+        self.group = group
         self.center = checks.vector("center", center)
         self.stiffness = checks.number("stiffness", stiffness, least=0.0)
 
     def apply(self, state: Slots, t: float) -> None:
-        state.force -= self.stiffness * (state.position - np.asarray(self.center, state.dtype))
+        where = slice(None) if self.group is None else state.slots_of(self.group.index)
+        state.force[where] -= self.stiffness * (state.position[where] - np.asarray(self.center, state.dtype))
 
     def potential(self, state: State) -> float:
-        offset = state.position.astype(np.float64) - self.center
+        where = slice(None) if self.group is None else self.group.index
+        free = np.isfinite(state.mass[where])
+        offset = state.position[where][free].astype(np.float64) - self.center
         return float(0.5 * self.stiffness * np.sum(offset * offset))

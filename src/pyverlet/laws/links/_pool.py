@@ -25,10 +25,13 @@ class Pool(ABC):
         drawn: whether its rows are lines between their particles.
         stale: rows have come or gone since `pack`.
         changed: numbers of rows have changed since `begin`.
+        snapped: rows have broken in this frame.
+        gives: whether any row stores energy, once a frame has begun.
         colours: how many parts are solved one after the other, once packed.
     """
 
     drawn = True
+    snapped = gives = False
 
     def __init__(self, turn: int, **columns: Any) -> None:
         self.turn = turn
@@ -104,3 +107,7 @@ class Pool(ABC):
     @abstractmethod
     def energy(self, position: Array) -> float:
         """Energy stored in soft links at (n, 2) positions in the user's order, J."""
+
+    @abstractmethod
+    def stored(self, position: Array) -> float:
+        """The same in the middle of a frame, of the rows that are intact then, at (m, 2) positions in the order of `Work`."""

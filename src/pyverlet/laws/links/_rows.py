@@ -61,13 +61,24 @@ class RowPool(Pool):
         if self.changed:
             self.changed = False
             row |= {name: self.rows[name][self._order] for name in _GIVEN}
-            self._soft = bool(np.isfinite(row["stiffness"]).any())
+            self._look_for_soft(np.flatnonzero(np.isfinite(row["stiffness"])))
             self._brittle = bool(np.isfinite(row["strength"]).any())
         row |= {name: self.rows[name][self._order] for name in MOVING}
 
+    def _look_for_soft(self, soft: Array) -> None:
+        """Note the packed rows that give, and room to measure them alone."""
+        self.gives, self._soft = bool(len(soft)), soft
+        arity = np.diff(self._first)[soft]
+        first = np.concatenate((np.zeros(1, np.int64), np.cumsum(arity)))
+        within = np.arange(first[-1]) - np.repeat(first[:-1], arity)
+        particle = self._particle[np.repeat(self._first[soft], arity) + within]
+        self._soft_rows = first, particle, self._row["rest"][soft], 0, len(soft)
+        self._soft_value, self._soft_bend = np.empty((2, len(soft)))
+        self._soft_gradient = np.empty((len(particle), 2))
+
     def before(self, work: Work, h: float) -> None:
         row, which = self._row, (self._first, self._particle, self._row["rest"], 0, len(self._order))
-        if self._soft:
+        if self.gives:
             self.measure(work.earlier, *which, row["earlier"], self._gradient, row["bend"])
         self.measure(work.start, *which, row["start"], self._along, row["bend"])
         links.prepare(
@@ -77,7 +88,7 @@ class RowPool(Pool):
         )  # fmt: skip
 
     def ahead(self, work: Work) -> None:
-        if not self._soft:
+        if not self.gives:
             return
         which = (self._first, self._particle, work.weight, self._row["intact"], self._along, self._row["lam"])
         for a, b in self.parts:
@@ -124,13 +135,17 @@ class RowPool(Pool):
         for name in MOVING:
             self.rows[name][self._order] = np.where(self._row["intact"], self._row[name], 0)
 
+    def stored(self, position: Array) -> float:
+        row, soft, value = self._row, self._soft, self._soft_value
+        self.measure(position, *self._soft_rows, value, self._soft_gradient, self._soft_bend)
+        return _stored(row["stiffness"][soft], row["upper"][soft], row["intact"][soft], value)
+
     def energy(self, position: Array) -> float:
         rows, first, particle = self.rows, self.first, self.entries["particle"]
         value, bend, gradient = np.empty(len(rows)), np.empty(len(rows)), np.empty((len(particle), 2))
         self.measure(position, first, particle, rows["rest"], 0, len(rows), value, gradient, bend)
-        soft = np.isfinite(rows["stiffness"]) & (rows["intact"] != 0)
-        pulled = soft & ~((rows["upper"] <= 0.0) & (value < 0.0))
-        return 0.5 * float(np.sum(rows["stiffness"][pulled] * value[pulled] ** 2))
+        soft = np.isfinite(rows["stiffness"])
+        return _stored(rows["stiffness"][soft], rows["upper"][soft], rows["intact"][soft], value[soft])
 
 
 class ChainPool(RowPool):
@@ -157,3 +172,9 @@ class ChainPool(RowPool):
             row["bow"], row["give"], row["offset"], self._active, self._right, self._inverse, self._carried, self._move,
             self._step, row["lam"],
         )  # fmt: skip
+
+
+def _stored(stiffness: Array, upper: Array, intact: Array, value: Array) -> float:
+    """Energy of rows of finite stiffness, J: none of the broken, nor of slack ropes."""
+    pulled = (intact != 0) & ~((upper <= 0.0) & (value < 0.0))
+    return 0.5 * float(np.sum(np.where(pulled, stiffness * value * value, 0.0)))

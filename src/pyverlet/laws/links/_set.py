@@ -12,12 +12,11 @@ from pyverlet.compile import jit
 from pyverlet.ground import checks
 from pyverlet.ground.constants import LINKS_ONE_THREAD_BELOW
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import links as kernels
 from pyverlet.kernels import runs
 from pyverlet.laws.contacts.broadphase import PairList
 from pyverlet.laws.links._link import Array, Link
 from pyverlet.laws.links._pool import Pool
-from pyverlet.laws.links._work import Work
+from pyverlet.laws.links._work import Past, Work
 from pyverlet.state.state import Slots, State
 
 AnyLink = TypeVar("AnyLink", bound=Link)
@@ -41,6 +40,7 @@ class Links:
         self._next_owner = 0
         self._few = True
         self._work = Work(np.empty(0, np.int64), 0)
+        self._past: Past | None = None
         self._iterations = 1
         self._apart, self._apart_stale = np.empty((0, 2), np.int64), False
         self._partners = np.zeros(1, np.int64), np.empty(0, np.int64)
@@ -145,6 +145,7 @@ class Links:
             for pool in self._order:
                 pool.pack(self._work)
             self._few = len(self._work) < LINKS_ONE_THREAD_BELOW
+        self._work.begin(self._state, self._past)
         for pool in self._order:
             pool.begin()
         self._broken = np.empty(0, BROKEN)
@@ -203,18 +204,23 @@ class Links:
         for pool in self._order:
             snapped = pool.snap(work, h)
             if len(snapped):
+                pool.snapped = True
                 self._broken = np.concatenate((self._broken, self._note(pool, snapped)))
         work.give(state, h)
 
     def after(self, state: Slots) -> None:
         """After the contacts: what the links did is part of the acceleration, for integrators that remember it."""
         with jit.one_thread(self._few):
-            kernels.add_rows(state.acceleration, self._work.slots(state), self._work.pull)
+            self._work.after(state)
 
     def scatter(self) -> None:
         """The frame is good: what it did to the links holds."""
+        self._past = self._work.end(self._state) if self._order else None
         for pool in self._order:
             pool.end()
+            # What is left is packed anew, as by `restore`: chains are cut where links have broken.
+            pool.stale |= pool.snapped
+            pool.snapped = False
         self.broken = self._broken
         self._apart_stale |= bool(len(self.broken))
 
@@ -234,6 +240,14 @@ class Links:
         """Energy stored in links that give, J, of the world's state or of another of the same particles."""
         position = (self._state if state is None else state).position.astype(np.float64)
         return sum(pool.energy(position) for pool in self._order)
+
+    def stored(self, state: Slots) -> float:
+        """The same in the middle of a frame, J, where the particles are now, without those that have broken in it."""
+        if not any(pool.gives for pool in self._order):
+            return 0.0
+        with jit.one_thread(self._few):
+            position = self._work.where(state)
+            return sum(pool.stored(position) for pool in self._order if pool.gives)
 
     def segments(self) -> tuple[Array, Array]:
         """Links as lines, without the broken: ends (m, 2, 2) in m, and what each pulls with (m,) in N, negative if it pushes."""
@@ -269,11 +283,12 @@ class Links:
     def save(self) -> Any:
         """A copy of all there is about links."""
         pools = {family: (pool, pool.rows.copy(), pool.entries.copy()) for family, pool in self._pools.items()}
-        return [(link, link.particles, link._where) for link in self._links], pools, self.broken, self._apart_changed
+        links = [(link, link.particles, link._where) for link in self._links]
+        return links, pools, self.broken, self._apart_changed, self._past
 
     def restore(self, saved: Any) -> None:
         """Go back to what `save` returned, with the links of then."""
-        links, pools, self.broken, apart_changed = saved
+        links, pools, self.broken, apart_changed, self._past = saved
         for link in self._links:
             link._pool = None
         for pool in self._order:

@@ -2,15 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.ground.constants import REST_ACCELERATIONS
 from pyverlet.kernels import links, motion
-from pyverlet.state.state import Slots
+from pyverlet.state.state import Slots, State
 
 Array = NDArray[Any]
+
+
+class Past(NamedTuple):
+    """What is remembered of linked particles from frame to frame; it counts for who has not been put elsewhere since."""
+
+    number: Array
+    """(m,) of the particles, ascending."""
+    start: Array
+    """(m, 2) where each was at the start of the last substep, m."""
+    left: Array
+    """(m, 2) and where at its end."""
+    calm: Array
+    """(m,) m/s, see `kernels.links.look_back`."""
 
 
 class Work:
@@ -32,9 +46,12 @@ class Work:
         self.particle = particle
         self.compact = np.zeros(count, np.int64)
         self.compact[particle] = np.arange(len(particle))
-        self.start, self.earlier, self.position, self.predicted, self._velocity, self.pull = np.zeros((6, len(particle), 2))
+        self.start, self.earlier, self.position, self.predicted = np.zeros((4, len(particle), 2))
+        self._where, self._velocity, self.pull, self._spare = np.zeros((4, len(particle), 2))
         self.weight = np.zeros(len(particle))
         self._slot = np.zeros(len(particle), np.int64)
+        self._calm = np.full(len(particle), np.nan)
+        self._h = 0.0
         self._order: Array | None = None
 
     def __len__(self) -> int:
@@ -49,12 +66,29 @@ class Work:
             self._slot = slot_of[self.particle]
         return self._slot
 
+    def begin(self, state: State, past: Past | None) -> None:
+        """A frame begins: take up what is remembered of those who are where they were left."""
+        self._calm.fill(np.nan)
+        if past is None or not len(past.number):
+            return
+        number, where = state.number[self.particle], state.position[self.particle]
+        row = np.searchsorted(past.number, number).clip(max=len(past.number) - 1)
+        same = (past.number[row] == number) & (past.left[row] == where).all(axis=1)
+        self.start[same], self._calm[same] = past.start[row[same]], past.calm[row[same]]
+
+    def end(self, state: State) -> Past:
+        """The frame is good: what is to be remembered."""
+        number, left = state.number[self.particle], state.position[self.particle]
+        return Past(number, self.start.copy(), left, self._calm.copy())
+
     def look(self, state: Slots, h: float) -> None:
         """Before the integrator: where they are, and where they were."""
-        slot = self.slots(state)
+        slot, self._h = self.slots(state), h
+        before = self.start
+        self.start, self._spare = self._spare, before
         motion.take_rows(self.start, state.position, slot)
         motion.take_rows(self._velocity, state.velocity, slot)
-        links.step_back(self.earlier, self.start, self._velocity, h)
+        links.look_back(self.earlier, self.start, before, self._velocity, self._calm, h)
         self.weight[:] = state.inverse_mass[slot]
 
     def take(self, state: Slots) -> None:
@@ -62,6 +96,15 @@ class Work:
         motion.take_rows(self.predicted, state.position, self.slots(state))
         self.position[:] = self.predicted
 
+    def where(self, state: Slots) -> Array:
+        """(m, 2) where they are now, m; good until asked again."""
+        motion.take_rows(self._where, state.position, self.slots(state))
+        return self._where
+
     def give(self, state: Slots, h: float) -> None:
         """Hand the result back."""
         links.hand_back(state.position, state.velocity, self.slots(state), self.position, self.predicted, 1 / h, self.pull)
+
+    def after(self, state: Slots) -> None:
+        """After the contacts: what the links did is part of the acceleration, for integrators that remember it."""
+        links.add_pull(state.acceleration, self.slots(state), self.pull, self._calm, REST_ACCELERATIONS * self._h)

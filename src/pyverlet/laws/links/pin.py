@@ -90,7 +90,8 @@ class _PinPool(Pool):
         self._offset = np.zeros((len(self.rows), 2))
 
     def begin(self) -> None:
-        self.changed = False
+        if self.changed:
+            self.gives, self.changed = bool(np.isfinite(self.rows["stiffness"]).any()), False
         self._intact = self.rows["intact"].copy()
         self._force = self.rows["force"].copy()
 
@@ -122,8 +123,14 @@ class _PinPool(Pool):
         self.rows["intact"][:] = self._intact
         self.rows["force"][:] = np.where(self._intact, self._force, 0.0)
 
+    def stored(self, position: Array) -> float:
+        return self._energy(position, self._particle, self._intact)
+
     def energy(self, position: Array) -> float:
+        return self._energy(position, self.entries["particle"], self.rows["intact"])
+
+    def _energy(self, position: Array, particle: Array, intact: Array) -> float:
         rows = self.rows
-        soft = np.isfinite(rows["stiffness"]) & (rows["intact"] != 0)
-        away = position[self.entries["particle"][soft]] - rows["point"][soft]
+        soft = np.isfinite(rows["stiffness"]) & (intact != 0)
+        away = position[particle[soft]] - rows["point"][soft]
         return 0.5 * float(np.sum(rows["stiffness"][soft] * np.sum(away * away, axis=1)))

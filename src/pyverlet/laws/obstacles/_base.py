@@ -144,6 +144,9 @@ class Obstacle(ABC):
         return f"{type(self).__name__} at ({x:g}, {y:g}) m"
 
 
+AnyObstacle = TypeVar("AnyObstacle", bound=Obstacle)
+
+
 class Obstacles(list[Obstacle]):
     """The obstacles of a world: a list."""
 
@@ -151,6 +154,11 @@ class Obstacles(list[Obstacle]):
         super().__init__(obstacles)
         self._drawn: list[list[Outline]] = []
         self._outlines: list[Outline] = []
+
+    def append(self, obstacle: AnyObstacle) -> AnyObstacle:  # type: ignore[override]
+        """Add an obstacle; returns it."""
+        super().append(obstacle)
+        return obstacle
 
     def outlines(self) -> list[Outline]:
         """Lines that draw all of them where they are now, metres; the same list as long as nothing has moved."""

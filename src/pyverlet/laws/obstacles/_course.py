@@ -33,6 +33,8 @@ class Course:
         self._moving: list[int] = []
         self._binned_for = -1.0  # largest radius the cells were filled for; negative: fill them anew
         self._cells: tuple[Any, ...] = ()
+        self._order: Array | None = None
+        self._rest = np.empty((0, 2))  # what rounding has taken from places in the substep before
 
     def __bool__(self) -> bool:
         return bool(self._obstacles)
@@ -64,6 +66,22 @@ class Course:
             kernels.covered(self._segments, position.astype(np.float64), by)
         return by
 
+    def seen(self) -> list[Obstacle]:
+        """The obstacles of the last frame."""
+        return list(self._seen)
+
+    def surfaces(self) -> tuple[Array, ...]:
+        """For each segment as it stood last: number of its obstacle, start (k, 2), direction (k, 2), length, rounding; metres."""
+        s = self._segments
+        return (
+            s["body"].copy(), np.column_stack((s["bx"], s["by"])), np.column_stack((s["bc"], s["bs"])), s["length"].copy(),
+            s["rounding"].copy(),
+        )  # fmt: skip
+
+    def facing(self, position: Array) -> tuple[Array, Array]:
+        """(k, w) distance of centres (k, 2) from each of the w obstacles, m, and (k, w, 2) the unit normal out of each."""
+        return facing_of(position.astype(np.float64), self.surfaces(), len(self._seen))
+
     def before(self, state: Slots, h: float) -> None:
         """Before a substep: note where everybody comes from."""
         state.note_start()
@@ -82,7 +100,10 @@ class Course:
         if len(state.along) != len(state):
             state.along = np.empty_like(state.position)
         walls = np.array(room.walls(), float)
-        collide(self._segments, self._bodies, time + h, *self._cells, walls, state.along, *state.bodies(), *numbers, state.drop)
+        if time == 0.0 or self._order is not state.particle:  # every new order is a new array
+            self._order, self._rest = state.particle, np.zeros_like(state.position)
+        taken = (walls, state.along, self._rest)
+        collide(self._segments, self._bodies, time + h, *self._cells, *taken, *state.bodies(), *numbers, state.drop)
 
     def end(self, dt: float) -> None:
         """At the end of a frame that went well: the obstacles are where they moved to."""
@@ -174,3 +195,20 @@ def _lowered(obstacle: Obstacle) -> Array:
     if not closed:
         table["before_x"][0] = table["before_y"][0] = table["after_x"][-1] = table["after_y"][-1] = 0.0
     return table
+
+
+def facing_of(x: Array, surfaces: tuple[Array, ...], count: int) -> tuple[Array, Array]:
+    """(k, count) distance of points x (k, 2) from each obstacle, m, and (k, count, 2) the unit normal out of it."""
+    body, start, along, length, rounding = surfaces
+    gap, normal = np.full((len(x), count), np.inf), np.zeros((len(x), count, 2))
+    for k in range(count):
+        mine = body == k
+        way = x[:, None] - start[mine]
+        t = np.clip((way * along[mine]).sum(axis=2), 0, length[mine])
+        way = way - t[:, :, None] * along[mine]
+        far = np.hypot(way[..., 0], way[..., 1])
+        nearest = np.argmin(far - rounding[mine], axis=1)
+        row = np.arange(len(x))
+        gap[:, k] = (far - rounding[mine])[row, nearest]
+        normal[:, k] = way[row, nearest] / np.maximum(far[row, nearest], 1e-300)[:, None]
+    return gap, normal

@@ -25,6 +25,7 @@ const GESTURES = [
   ["wheel, pinch", "zoom"],
   ["double-click a slider", "where it was"],
 ];
+const FILMED = { turn: "a second back, on", slower: "faster, slow motion", reset: "from the start" };
 const WRITTEN = { " ": "space", ArrowLeft: "←", ArrowRight: "→" };
 
 /** Obey the keyboard wherever `target` gets it. */
@@ -37,7 +38,7 @@ export function listen(target, root, act) {
     if (field.matches?.("button, summary, [type=checkbox]") && (event.key === " " || event.key === "Enter")) return;
     if (field.matches?.("[type=radio], [type=range]") && event.key.startsWith("Arrow")) return;
     const found = SHORTCUTS.find(([keys]) => keys.includes(event.key.length === 1 ? event.key.toLowerCase() : event.key));
-    if (!found) return;
+    if (!found || !act[found[2]]) return;
     const [, , name, repeats] = found;
     event.preventDefault();
     event.stopPropagation(); // a notebook has shortcuts of its own
@@ -46,13 +47,13 @@ export function listen(target, root, act) {
   target.addEventListener("keyup", (event) => root.classList.toggle("shift", event.shiftKey));
 }
 
-/** Fill the sheet. */
-export function fillSheet(body) {
+/** Fill the sheet with what there is; `film`: whether that is one. */
+export function fillSheet(body, act, film) {
   const row = (keys, text) => {
     const line = body.insertRow(), cell = line.insertCell();
     cell.append(...keys.map((key) => Object.assign(document.createElement("kbd"), { textContent: WRITTEN[key] ?? key })));
     line.insertCell().textContent = text;
   };
-  for (const [keys, text] of SHORTCUTS) row(keys, text);
-  for (const [gesture, text] of GESTURES) row([gesture], text);
+  for (const [keys, text, name] of SHORTCUTS) if (act[name]) row(keys, (film && FILMED[name]) ?? text);
+  for (const [gesture, text] of film ? [["drag", "move the view"], GESTURES[3]] : GESTURES) row([gesture], text);
 }

@@ -1,4 +1,4 @@
-// What is drawn over the circles: lines of the scene, what moves in it, pins, velocities, contacts.
+// What is drawn over the circles: how they have turned, lines of the scene, what moves in it, pins, velocities, contacts.
 
 import { drawObstacles, resizeCanvas } from "./backdrop.js";
 import { heat } from "./colour.js";
@@ -8,6 +8,7 @@ import { GRID_MAX } from "./draw.js";
 export const MOST_CONTACTS = 20000; // circles whose contacts are searched for: beyond, it would cost frames
 const LINK_PX = 1.6;
 const LOADS = 12; // shades that links are drawn in: a stroke for each
+const MARKED_PX = 4; // radius from which on a circle has a mark that shows how it has turned, as in pictures and films
 const MOST_ARROWS = 4000; // of more circles, every so many has one
 const ARROW_S = 0.08; // a velocity is drawn as the way of so many seconds
 
@@ -18,13 +19,14 @@ export class Overlay {
     this.contacts = 0; // pairs on show
     this.links = 0;
     this.arrows = 0;
+    this.marks = 0;
   }
 
   /** `wants`: {velocities, contacts}; `colour(name)` is that of a custom property. */
   draw(shape, frame, camera, size, ratio, wants, colour, dark) {
     const pinned = frame.grid ? pins(shape.mass) : [];
-    const busy = shape.lines.length || frame.obstacles.length || frame.links || pinned.length || wants.velocities || wants.contacts;
-    this.contacts = this.arrows = this.links = 0;
+    const busy = shape.lines.length || frame.obstacles.length || frame.links || frame.turned || pinned.length || wants.velocities || wants.contacts;
+    this.contacts = this.arrows = this.links = this.marks = 0;
     if (!busy && this.clean) return;
     this.clean = this.canvas.hidden = !busy;
     resizeCanvas(this.canvas, size, ratio);
@@ -38,6 +40,7 @@ export class Overlay {
     const { grid } = frame, seen = (i) => grid[2 * i] && grid[2 * i + 1] && grid[2 * i] !== GRID_MAX && grid[2 * i + 1] !== GRID_MAX;
     const x = (i) => place.left + grid[2 * i] * sx, y = (i) => place.top + place.height - grid[2 * i + 1] * sy;
     const n = grid.length / 2;
+    if (frame.turned) this.marks = drawMarks(context, frame.turned, shape.radius, camera.scale, { x, y, seen });
     this.links = drawLinks(context, frame, { x, y, seen }, dark);
     context.beginPath();
     if (wants.contacts && n <= MOST_CONTACTS) {
@@ -92,6 +95,21 @@ function drawLinks(context, { joined, strain }, at, dark) {
     }
     ink(context, shades[load], LINK_PX);
   }
+  return drawn;
+}
+
+/** A line from centre to rim on each circle that is large enough; returns how many. `turned`: 1/256 of a turn. */
+function drawMarks(context, turned, radius, scale, at) {
+  let drawn = 0;
+  context.beginPath();
+  for (let i = 0; i < turned.length; i++) {
+    const reach = radius[i] * scale, angle = (turned[i] * Math.PI) / 128;
+    if (reach < MARKED_PX || !at.seen(i)) continue;
+    context.moveTo(at.x(i), at.y(i));
+    context.lineTo(at.x(i) + reach * Math.cos(angle), at.y(i) - reach * Math.sin(angle));
+    drawn++;
+  }
+  ink(context, "rgb(0 0 0 / 50%)", 1.4);
   return drawn;
 }
 

@@ -26,8 +26,9 @@ const NAMES = { canvas: "Canvas2D", webgl2: "WebGL2" };
 /**
  * Bring the page to life.
  * root: an element with the page's markup. connect: see main.js. address: a Location, whose hash has settings; null in a notebook.
+ * film: what keys do in place of what only a live world does, if this is none; null otherwise.
  */
-export function mount(root, connect, { address = null, renderer: wanted = "auto" } = {}) {
+export function mount(root, connect, { address = null, renderer: wanted = "auto", film = null } = {}) {
   const $ = (id) => root.querySelector(`#${id}`);
   const stage = $("stage"), photo = $("photo"), renderer = makeRenderer(stage, wanted), photographs = photo.getContext("bitmaprenderer");
   const darkness = matchMedia("(prefers-color-scheme: dark)");
@@ -55,7 +56,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   const send = (type, fields = {}) => write({ type, ...fields });
 
   async function receive(data) {
-    const message = unpack(data), order = ++arrived;
+    const message = data instanceof ArrayBuffer ? unpack(data) : data, order = ++arrived;
     if (message.kind === "shape") {
       newest = order;
       newShape(message);
@@ -220,7 +221,8 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     const whole = root.getBoundingClientRect(), aside = root.querySelector("aside").getBoundingClientRect();
     const below = aside.left - whole.left <= 1; // on a narrow page the controls are at its foot
     const width = Math.max(below ? whole.width : aside.left - whole.left, 1), height = below ? aside.top - whole.top : whole.height;
-    const leave = (top) => (camera.free = { left: 0, top, width, height: Math.max(height - top, 1) });
+    const foot = below ? 0 : root.querySelector("#transport")?.offsetHeight ?? 0; // of a film
+    const leave = (top) => (camera.free = { left: 0, top, width, height: Math.max(height - top - foot, 1) });
     leave(0);
     const title = root.querySelector("header").getBoundingClientRect();
     if (shape.panels.length || (!shape.parted && camera.encloses(shape.outlines, title.right - whole.left, title.bottom - whole.top))) leave(HEADER_PX);
@@ -257,7 +259,8 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   }
 
   /** How fast the world goes, unless that is as fast as the clock: wished so, or more the machine cannot do. */
-  const pace = ({ pace, speed }) => (speed === 1 && (pace === null || pace > SLOW) ? "live" : `live at ${pace === null ? speed : Number(pace.toPrecision(2))}× speed`);
+  const pace = ({ pace, speed }) => (speed === 1 && (pace === null || pace > SLOW) ? kind : `${kind} at ${pace === null ? speed : Number(pace.toPrecision(2))}× speed`);
+  const kind = film ? "film" : "live";
 
   // -- numbers --------------------------------------------------------------------------------------------------------
 
@@ -332,6 +335,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
       refresh();
     },
   };
+  if (film) Object.assign(act, film);
   for (const id of ["pause", "step", "reset", "fit", "copy", "help", "fold"]) {
     $(id).addEventListener("click", (event) => {
       act[id]();
@@ -349,8 +353,8 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   for (const id of ["velocities", "contacts"]) $(id).addEventListener("change", () => (refresh(), $(id).blur()));
   for (const tool of tools()) tool.addEventListener("change", () => ((root.dataset.tool = tool.value), tool.blur()));
   $("sheet-close").addEventListener("click", () => $("sheet").close());
-  fillSheet($("sheet").querySelector("tbody"));
-  listen(address ? document : root, root, act);
+  fillSheet($("sheet").querySelector("tbody"), act, film);
+  listen(address || film ? document : root, root, act);
 
   const zoomed = () => ((numbersStale = true), refresh());
 

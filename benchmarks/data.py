@@ -1,0 +1,164 @@
+"""What worlds cost as data: snapshots of a large one, many small ones at once, and sweeps; asked beside measured."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import pyverlet as pv
+from pyverlet.compile import jit
+from pyverlet.data import sweep_run
+
+DT = 1 / 60
+ROUNDS = 5
+MILLION = 1_000_000
+SETTLED, SETTLE_S = 50_000, 8.0
+
+
+class Line(NamedTuple):
+    """One promise: what is asked, what was measured, and whether that is enough (None: nothing is asked at this size)."""
+
+    name: str
+    asked: str
+    measured: str
+    holds: bool | None
+
+
+def fastest(action: Callable[[], Any], rounds: int = ROUNDS) -> float:
+    """Seconds of the fastest round: others wait for the disk or for who else uses the machine."""
+    times = []
+    for _ in range(rounds):
+        begin = perf_counter()
+        action()
+        times.append(perf_counter() - begin)
+    return min(times)
+
+
+def snapshots(particles: int, folder: Path) -> list[Line]:
+    """Save and load a heap: of equal circles, of mixed sizes, and of mixed sizes that rub. Small ones cost what names do.
+
+    Bytes are those of a smaller heap that has settled: of a larger one they are as many a circle.
+    """
+    asked = particles >= MILLION
+    lines = []
+    cases: list[tuple[str, dict[str, Any], int]] = [
+        ("equal circles", {"radius_spread": 1.0, "restitution": 0.0, "friction": 0.0}, 40),
+        ("mixed sizes", {"radius_spread": 2.0, "restitution": 0.0, "friction": 0.0}, 90),
+        ("mixed, friction", {"radius_spread": 2.0, "restitution": 0.0, "friction": 0.4}, 120),
+    ]
+    path = folder / "heap.pvsnap"
+    for name, options, most in cases:
+        world = pv.scenes.get("box").world(particles=min(particles, SETTLED), **options)
+        world.run(seconds=SETTLE_S, dt=DT)
+        pv.save(world, path)
+        held = path.stat().st_size / len(world)
+        world = pv.scenes.get("box").world(particles=particles, **options)
+        world.run(seconds=0.5, dt=DT)
+        pv.save(world, path)
+        assert pv.load(path, exact=True).state_hash() == world.state_hash()
+        save_s, load_s = fastest(partial(pv.save, world, path)), fastest(partial(pv.load, path))
+        lines += [
+            Line(f"save, {name}", "<= 0.3 s", f"{save_s:.3f} s", save_s <= 0.3 if asked else None),
+            Line(f"load, {name}", "<= 0.5 s", f"{load_s:.3f} s", load_s <= 0.5 if asked else None),
+            Line(f"bytes a circle, {name}", f"<= {most}", f"{held:.1f}", held <= most if asked else None),
+        ]
+    return lines
+
+
+def resident() -> int:
+    """Bytes of this process in memory; 0 where nobody says."""
+    try:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except OSError:
+        return 0
+
+
+def worlds(count: int) -> list[Line]:
+    """Many worlds of 100 circles, in one process and on all cores, in turn."""
+    loose = [pv.scenes.get("cage").world(particles=100, seed=k, threads=1) for k in range(count)]
+    for world in loose[:3]:
+        world.step(DT)
+    before = resident()
+    alone = pv.Worlds("cage", count, particles=100, processes=1)
+    start = alone.save()
+    alone.step(DT)
+    each = (resident() - before) / count
+    cores = jit.max_threads()
+    with pv.Worlds("cage", count, particles=100, processes=cores) as together:
+        for _ in range(3):
+            alone.step(DT)
+            together.step(DT)
+        times = [(fastest(lambda: alone.step(DT), 1), fastest(lambda: together.step(DT), 1)) for _ in range(8 * ROUNDS)]
+        one, all_cores = (min(column) for column in zip(*times, strict=True))
+
+    def step_loose() -> None:
+        for world in loose:
+            world.step(DT)
+
+    loose_s = fastest(step_loose)
+    reset_s = fastest(lambda: alone.restore(start, 7))
+    pace = one / all_cores
+    return [
+        Line("pace of all cores over one", f">= {0.85 * cores:.2f}", f"{pace:.2f}", pace >= 0.85 * cores if cores > 1 else None),
+        Line("a frame of a world of 100", "", f"{1e6 * one / count:.1f} us", None),
+        Line("over worlds by themselves", "<= 10 %", f"{100 * (one / loose_s - 1):+.0f} %", one <= 1.1 * loose_s),
+        Line("reset of one", "<= 0.5 ms", f"{1e3 * reset_s:.3f} ms", reset_s <= 0.5e-3),
+        Line("memory of one, with its start", "<= 130 KiB", f"{each / 1024:.0f} KiB", each <= 130 * 1024),
+    ]
+
+
+def sweeps(folder: Path, runs: int, rows: int) -> list[Line]:
+    """What a run costs beside its simulation, and how soon a study that is done is back."""
+    study = pv.sweep("box", {"seed": range(runs)}, particles=20, seconds=0.1, out=folder / "study")
+
+    def simulate() -> None:
+        for run in study._runs[: runs // 10]:
+            sweep_run.one(study._plan, run)
+
+    simulate()
+    alone_s = fastest(simulate, 3) / (runs // 10)
+    begin = perf_counter()
+    study.run(processes=1)
+    beside = (perf_counter() - begin) / runs - alone_s
+    large = pv.sweep("box", {"seed": range(rows)}, particles=20, seconds=0.1, out=folder / "large")
+    known = {"values": {"height": 1.0}, "start": "0" * 16, "end": "0" * 16}
+    lines = [json.dumps({**sweep_run._blank(run), **known}) for run in large._runs]
+    (folder / "large" / "rows.jsonl").write_text("\n".join(lines) + "\n")
+    begin = perf_counter()
+    again = pv.sweep("box", {"seed": range(rows)}, particles=20, seconds=0.1, out=folder / "large")
+    done = again.status().done
+    resumed = perf_counter() - begin
+    assert done == rows
+    return [
+        Line("a run beside its simulation", "<= 2 ms", f"{1e3 * beside:.2f} ms", beside <= 2e-3),
+        Line(f"{rows:,} finished rows are back in", "<= 1 s", f"{resumed:.2f} s", resumed <= 1.0),
+    ]
+
+
+def main(particles: int) -> bool:
+    """Print a line for each promise; whether all hold."""
+    small = particles < 100_000
+    print(f"{particles:,} circles in a snapshot")
+    print(f"{'':<36}{'asked':>14}{'measured':>14}")
+    lines = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        parts: tuple[Callable[[], list[Line]], ...] = (
+            lambda: snapshots(particles, folder),
+            lambda: worlds(20 if small else 1_000),
+            lambda: sweeps(folder, 50 if small else 500, 1_000 if small else 10_000),
+        )
+        for part in parts:
+            for line in part():
+                lines.append(line)
+                verdict = "  NOT HELD" if line.holds is False and not small else ""
+                print(f"{line.name:<36}{line.asked:>14}{line.measured:>14}{verdict}", flush=True)
+    return bool(np.all([line.holds is not False for line in lines])) or small

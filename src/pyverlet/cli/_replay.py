@@ -1,0 +1,69 @@
+"""The command `replay`."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pyverlet.cli import _options as options
+from pyverlet.cli import _print as out
+from pyverlet.cli._app import app
+from pyverlet.ground.errors import InputError
+from pyverlet.ground.progress import Progress
+from pyverlet.viewers import DEFAULT_PORT
+
+__all__ = ["app"]
+
+
+@app.command()
+def replay(
+    path: Annotated[Path, typer.Argument(metavar="FILE", help="A journal, as `pyverlet run --journal FILE` wrote it.")],
+    headless: Annotated[bool, typer.Option("--headless", help="Without the page, as fast as it goes, and report.")] = False,
+    as_json: options.Json = False,
+    no_open: Annotated[bool, typer.Option("--no-open", help="Do not open a browser tab.")] = False,
+    port: Annotated[
+        int | None, typer.Option(parser=options.whole, help="Port of the live page.", metavar="N", show_default=str(DEFAULT_PORT))
+    ] = None,
+) -> None:
+    """Go through a session again, on the page or without, and compare the state's hash with that of then every second.
+
+    --json implies --headless. The exit code is 1 where a hash differs.
+    """
+    from pyverlet.viewers import serve
+    from pyverlet.viewers.exhibit import Exhibit
+    from pyverlet.viewers.replay import ReplayStage, Script
+
+    script = Script(path)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        first = script.open()
+    for warning in told:
+        out.note(f"note: {warning.message}")
+    if not (headless or as_json):
+
+        def stage(exhibit: Exhibit) -> ReplayStage:
+            return ReplayStage(script, exhibit)
+
+        port = DEFAULT_PORT if port is None else port
+        serve(lambda: first, scene_name=first.title, port=port, open_browser=not no_open, dt=script.dt, stage=stage)
+        return
+    if port is not None or no_open:
+        raise InputError("port or no-open is given for a replay without a page; allowed is none of them")
+    with Progress("frame") as progress:
+        done = script.run(progress)
+    if as_json:
+        out.write_json(done)
+        return
+    end = "" if done["whole"] else "; it was cut off there"
+    rows = [
+        ("journal", str(path)),
+        ("went through", f"{done['frames']:,} frames, {done['seconds']:.4g} s, {done['commands']} commands{end}"),
+        ("hashes", f"{done['checked']} of {done['checked']} as they were"),
+        ("state hash", done["state_hash"]),
+    ]
+    if done["stopped"]:
+        rows.append(("stopped", f"{done['stopped']}, as in the session"))
+    out.write(out.table(rows))

@@ -1,0 +1,191 @@
+"""`pyverlet sweep`: parameter studies from the command line."""
+
+from __future__ import annotations
+
+import ast
+import itertools
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from pyverlet.cli import _options as options
+from pyverlet.cli import _print as out
+from pyverlet.cli._imported import imported
+from pyverlet.cli._integrators import integrator
+from pyverlet.data.sweep import Measure, Status, Study
+from pyverlet.data.sweep import sweep as make
+from pyverlet.data.sweep_open import open_study
+from pyverlet.ground.errors import InputError
+from pyverlet.viewers import DEFAULT_PORT
+
+FAILED = 1
+_SHOWN = 20
+
+app = typer.Typer(help="Parameter studies.", rich_markup_mode=None)
+
+Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="The study's.")]
+MeasurePath = Annotated[
+    str | None,
+    typer.Option("--measure", help="Function of a world; energy and more unless said.", metavar="PATH", show_default=False),
+]
+
+
+@app.command(name="run")
+def run_sweep(
+    scene: options.SceneName,
+    vary: Annotated[
+        list[str], typer.Option(help="A setting's values: friction=0,0.2,0.4 or seed=0:100; repeat it.", metavar="NAME=VALUES")
+    ],
+    folder: Annotated[Path, typer.Option("--out", help="Folder of the study; one that has it goes on.", metavar="FOLDER")],
+    fixed: Annotated[
+        list[str] | None, typer.Option("--set", help="One of all runs: particles=500.", metavar="NAME=VALUE", show_default=False)
+    ] = None,
+    seconds: Annotated[float, typer.Option(parser=options.real, help="Simulated.", metavar="S", show_default="10")] = 10.0,
+    dt: options.Dt = 1 / 60,
+    measure: MeasurePath = None,
+    processes: Annotated[
+        int | None, typer.Option(parser=options.whole, help="That share the work.", metavar="N", show_default="one for each core")
+    ] = None,
+    dask: Annotated[
+        str | None, typer.Option(help="Address of a Dask scheduler, in place of processes here (extra dask).", metavar="URL")
+    ] = None,
+    again: Annotated[bool, typer.Option("--again", help="Make those again that failed, or that other kernels made.")] = False,
+    as_json: options.Json = False,
+) -> None:
+    """Run a scene with every combination of settings. Ctrl-C ends it; the same command goes on."""
+    grid = dict(map(_varied, vary))
+    settings = {name: _value(name, text) for name, _, text in (each.partition("=") for each in fixed or [])}
+    study = make(scene, grid, out=folder, measure=_measure(measure), seconds=seconds, dt=dt, **settings)
+    if dask is None:
+        study.run(processes=processes, again=again)
+    else:
+        _on_dask(study, dask, again)
+    _tell(study, as_json)
+
+
+def _on_dask(study: Study, address: str, again: bool) -> None:
+    try:
+        import distributed
+    except ImportError:
+        raise InputError("dask is not installed; allowed are `pip install 'pyverlet[dask]'`, and processes here") from None
+    try:
+        client = distributed.Client(address, timeout=10)
+    except (OSError, ValueError) as error:
+        raise InputError(f"dask is {address!r}, where no scheduler answers ({error}); allowed is the address of one") from None
+    with client:
+        study.run(client.get_executor(pure=False), workers=max(sum(client.ncores().values()), 1), again=again)
+
+
+@app.command(name="status")
+def sweep_status(folder: Folder, as_json: options.Json = False) -> None:
+    """How far a study is."""
+    _tell(open_study(folder), as_json, rows=False)
+
+
+@app.command(name="verify")
+def verify_sweep(
+    folder: Folder,
+    rows: Annotated[int, typer.Option(parser=options.whole, help="How many.", metavar="N", show_default="5")] = 5,
+    measure: MeasurePath = None,
+    as_json: options.Json = False,
+) -> None:
+    """Compute some rows again, drawn at random, and compare. Exit code 1 if one differs."""
+    found = open_study(folder, _measure(measure)).verify(rows)
+    if as_json:
+        out.write_json(found._asdict())
+    else:
+        said = f"these differ: {', '.join(map(str, found.differ))}" if found.differ else "all as they were"
+        out.write(f"made again: runs {', '.join(map(str, found.runs)) or 'none'}; {said}")
+    if found.differ:
+        raise typer.Exit(FAILED)
+
+
+@app.command(name="show")
+def show_world(
+    folder: Folder,
+    number: Annotated[int, typer.Argument(parser=options.whole, metavar="RUN", help="Its number in the table.")],
+    port: Annotated[int, typer.Option(help="Of the page.", metavar="N")] = DEFAULT_PORT,
+    no_browser: Annotated[bool, typer.Option("--no-browser", help="Print the address only.")] = False,
+) -> None:
+    """Show the world of a run on the live page, from its start."""
+    from pyverlet.viewers import view
+
+    view(open_study(folder).world(number), port=port, open_browser=not no_browser)
+
+
+def _tell(study: Study, as_json: bool, *, rows: bool = True) -> None:
+    status = study.status()
+    if as_json:
+        table = study.array()
+        lines = [dict(zip(table.dtype.names or (), map(_plain, row), strict=True)) for row in table] if rows else []
+        out.write_json(status._asdict() | ({"rows": lines} if rows else {}))
+        return
+    if rows:
+        table = study.array()
+        names = [name for name in table.dtype.names or () if name not in ("pyverlet", "numpy", "numba", "python", "kernels")]
+        shown = [[_short(row[name]) for name in names] for row in table[:_SHOWN]]
+        out.write(out.columns(names, shown))
+        if len(table) > _SHOWN:
+            out.write(f"... {len(table) - _SHOWN} more, all in table.csv")
+    out.write(_sentence(status))
+
+
+def _sentence(status: Status) -> str:
+    parts = [f"{status.done} of {status.runs} runs"]
+    if status.failed:
+        parts.append(f"{status.failed} failed")
+    if status.foreign:
+        parts.append(f"{status.foreign} made by other kernels or versions")
+    return ", ".join(parts)
+
+
+def _plain(value: Any) -> Any:
+    value = value.item() if isinstance(value, np.generic) else value
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def _short(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+# ---- strings to values -------------------------------------------------------------------------------------------------
+
+
+def _measure(path: str | None) -> Measure | None:
+    if path is None:
+        return None
+    found = imported("measure", path, "allowed is module:function, a function of a world")
+    if not callable(found):
+        raise InputError(f"measure is {path!r}, which is no function; allowed is a function of a world")
+    return found  # type: ignore[no-any-return]
+
+
+def _varied(text: str) -> tuple[str, list[Any]]:
+    name, given, values = text.partition("=")
+    if not given or not values:
+        raise InputError(f"vary is {text!r}; allowed is a setting and its values, such as friction=0,0.2 or seed=0:100")
+    return name, list(itertools.chain.from_iterable(_values(name, part) for part in values.split(",")))
+
+
+def _values(name: str, text: str) -> list[Any]:
+    """One value, or whole numbers from:to or from:to:step, without the last, as in Python."""
+    if ":" not in text:
+        return [_value(name, text)]
+    try:
+        numbers = [int(part) for part in text.split(":")]
+        return list(range(*numbers)) if len(numbers) in (2, 3) else [_value(name, text)]
+    except ValueError:
+        raise InputError(f"vary has {text!r} for {name}; allowed are whole numbers from:to, and values with commas") from None
+
+
+def _value(name: str, text: str) -> Any:
+    if name == "integrator":
+        return integrator(text)
+    if name == "dtype":
+        return np.dtype(text).type if text in ("float32", "float64") else text
+    try:
+        return ast.literal_eval(text)
+    except (ValueError, SyntaxError):
+        return text

@@ -1,0 +1,4 @@
+"""Worlds as data: kept in files, many at once, and in sweeps over one machine or a cluster.
+
+Importing this loads nothing but the engine; libraries that write a format are loaded when it is asked for.
+"""

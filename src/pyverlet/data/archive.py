@@ -1,0 +1,190 @@
+"""Named arrays and a table in one file: npz without pickles, and the table in it as JSON.
+
+`numpy.load` reads it, too. Arrays are stored as they are, but for three kinds: rows that are all alike stand there once, numbers
+that count up are told by the first, and of arrays that are equal to others only the name is kept. The table's `arrays` says so.
+Nothing is allocated before it is known that the file is large enough for it, and nothing used before its checksum is right.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import zipfile
+import zlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.ground.errors import InputError
+
+Array = NDArray[Any]
+
+INDEX = "arrays"
+"""Key of the table under which the archive keeps how arrays are stored."""
+
+_TABLE = "snapshot.json"
+_WHEN = (1980, 1, 1, 0, 0, 0)  # equal worlds are equal files
+_EXPANDS = 64
+"""Arrays are at most so many times larger than the file: else they are stored in full."""
+
+_FEW = 16
+"""Rows that are not worth an entry of their own."""
+
+_DTYPES = {"|b1", "|u1", "<u4", "<i4", "<i8", "<f4", "<f8"}
+_CHUNK = 1 << 22
+_BROKEN = (
+    zipfile.BadZipFile, zlib.error, KeyError, TypeError, ValueError, EOFError, OSError, NotImplementedError, RuntimeError,
+    RecursionError, OverflowError, AttributeError, IndexError, SyntaxError,
+)  # fmt: skip
+
+
+# ---- writing -----------------------------------------------------------------------------------------------------------
+
+
+def write(file: BinaryIO, table: Callable[[], Mapping[str, Any]], arrays: Mapping[str, Array]) -> None:
+    """Write arrays and, when those are written, a table; it has no key `arrays` of its own."""
+    little = {name: np.ascontiguousarray(array, array.dtype.newbyteorder("<")) for name, array in arrays.items()}
+    index, stored = _shared(little)
+    if sum(a.nbytes for a in little.values()) > _EXPANDS * sum(a.nbytes for a in stored.values()):
+        index, stored = {name: _whole(array) for name, array in little.items()}, little
+    with zipfile.ZipFile(file, "w") as archive:
+        for name, array in stored.items():
+            info = zipfile.ZipInfo(f"{name}.npy", _WHEN)
+            info.file_size = array.nbytes + 256  # tells zipfile whether it needs 64 bits for it
+            with archive.open(info, "w") as member:
+                np.lib.format.write_array_header_1_0(member, np.lib.format.header_data_from_array_1_0(array))
+                if array.size:
+                    member.write(array.reshape(-1).view(np.uint8).data)
+        text = json.dumps({**table(), INDEX: index}, allow_nan=False, ensure_ascii=False, indent=1)
+        archive.writestr(zipfile.ZipInfo(_TABLE, _WHEN), text.encode())
+
+
+def _whole(array: Array) -> dict[str, Any]:
+    return {"shape": list(array.shape), "dtype": array.dtype.str}
+
+
+def _shared(arrays: dict[str, Array]) -> tuple[dict[str, dict[str, Any]], dict[str, Array]]:
+    """How each is stored, and those that are."""
+    index: dict[str, dict[str, Any]] = {}
+    stored: dict[str, Array] = {}
+    for name, array in arrays.items():
+        index[name], kept = _whole(array), array
+        if len(array) > _FEW:
+            twin = next((other for other, old in stored.items() if _equal(old, array)), None)
+            if twin is not None:
+                index[name]["same_as"] = twin
+                continue
+            if _equal(array[1:], array[:-1]):
+                index[name]["repeated"], kept = True, array[:1]
+            elif array.dtype.kind == "i" and array.ndim == 1 and array[-1] - array[0] == len(array) - 1 and _counts(array):
+                index[name]["counts_from"] = int(array[0])
+                continue
+        stored[name] = kept
+    return index, stored
+
+
+def _counts(array: Array) -> bool:
+    return bool((array[1:] - array[:-1] == 1).all())
+
+
+def _equal(one: Array, other: Array) -> bool:
+    """Whether all bits are."""
+    if one.dtype != other.dtype or one.shape != other.shape:
+        return False
+    bits = np.dtype(f"u{one.dtype.itemsize}")
+    parts = (slice(0, 64), slice(None))  # most differ soon
+    return all(np.array_equal(one[part].view(bits), other[part].view(bits)) for part in parts)
+
+
+# ---- reading -----------------------------------------------------------------------------------------------------------
+
+
+def read(path: Path) -> tuple[dict[str, Any], dict[str, Array]]:
+    """The table, without what it says about arrays, and the arrays: writable, in the byte order of this machine.
+
+    Raises:
+        InputError: there is no such file, or it is none that `write` wrote, whole and unchanged.
+    """
+    try:
+        with path.open("rb") as file:
+            return read_from(file, os.fstat(file.fileno()).st_size)
+    except FileNotFoundError:
+        raise InputError(f"'{path}' is not there; allowed is a file that pyverlet wrote") from None
+    except (IsADirectoryError, PermissionError) as error:
+        raise InputError(f"'{path}' cannot be read ({error.strerror}); allowed is a file that pyverlet wrote") from None
+    except _BROKEN as error:
+        raise InputError(f"'{path}' is no sound file of pyverlet's ({_brief(error)}); allowed is one as it was written") from None
+
+
+def read_from(file: BinaryIO, size: int) -> tuple[dict[str, Any], dict[str, Array]]:
+    """As `read`, from an open file of so many bytes that is known to be sound."""
+    with zipfile.ZipFile(file) as archive:
+        members = archive.infolist()
+        names = {info.filename for info in members}
+        if len(names) < len(members) or any(info.compress_type != zipfile.ZIP_STORED for info in members):
+            raise ValueError("it has a member twice, or a compressed one")
+        if sum(info.file_size for info in members) > size:
+            raise ValueError("its members are larger than the file")
+        table = json.loads(archive.read(_TABLE), parse_constant=_no_number)
+        index = table.pop(INDEX)
+        if sum(map(_bytes, index.values())) > _EXPANDS * size:
+            raise ValueError("its arrays are too large for such a file")
+        arrays: dict[str, Array] = {}
+        for name, how in index.items():
+            if "same_as" in how:
+                arrays[name] = arrays[how["same_as"]].copy()
+            elif "counts_from" in how:
+                arrays[name] = np.arange(len(_empty(how)), dtype=how["dtype"]) + np.dtype(how["dtype"]).type(how["counts_from"])
+            else:
+                names.discard(f"{name}.npy")
+                arrays[name] = _member(archive, name, how)
+            if arrays[name].shape != tuple(how["shape"]) or arrays[name].dtype.str != how["dtype"]:
+                raise ValueError(f"{name} is not as the table says")
+        if names != {_TABLE}:
+            raise ValueError(f"it has the unknown member {min(names - {_TABLE})!r}")
+    return table, {name: array.astype(array.dtype.newbyteorder("="), copy=False) for name, array in arrays.items()}
+
+
+def _no_number(text: str) -> float:
+    raise ValueError(f"{text} is no number of JSON")
+
+
+def _bytes(how: dict[str, Any]) -> int:
+    if how["dtype"] not in _DTYPES or not all(type(n) is int and n >= 0 for n in how["shape"]) or len(how["shape"]) > 2:
+        raise ValueError(f"an array is of {how['dtype']!r} and shape {how['shape']!r}")
+    return int(np.dtype(how["dtype"]).itemsize * math.prod(how["shape"]))
+
+
+def _empty(how: dict[str, Any]) -> Array:
+    return np.empty(how["shape"], how["dtype"])
+
+
+def _member(archive: zipfile.ZipFile, name: str, how: dict[str, Any]) -> Array:
+    shape = tuple(how["shape"])
+    stored = (1, *shape[1:]) if how.get("repeated") else shape
+    with archive.open(f"{name}.npy") as member:
+        if np.lib.format.read_magic(member) != (1, 0):
+            raise ValueError(f"{name} is of another version")
+        header = np.lib.format.read_array_header_1_0(member)
+        if header != (stored, False, np.dtype(how["dtype"])) or not shape:
+            raise ValueError(f"{name} is not as the table says")
+        array: Array = np.empty(stored, how["dtype"])
+        room, at = array.reshape(-1).view(np.uint8).data, 0
+        while at < len(room):
+            piece = member.read(min(_CHUNK, len(room) - at))
+            if not piece:
+                raise ValueError(f"{name} ends early")
+            room[at : at + len(piece)] = piece
+            at += len(piece)
+        if member.read(1):
+            raise ValueError(f"{name} goes on too long")
+    return np.broadcast_to(array, shape).copy() if how.get("repeated") else array
+
+
+def _brief(error: BaseException) -> str:
+    text = " ".join(str(error).split()) or type(error).__name__
+    return text if len(text) <= 100 else f"{text[:97]}..."

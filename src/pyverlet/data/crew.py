@@ -1,0 +1,299 @@
+"""Who has the worlds of `Worlds`: a `Keeper` some of them, and a `Crew` of processes each a keeper.
+
+Processes are started by themselves rather than by `multiprocessing`, which would run the user's script anew in each of them. They
+take orders by their standard input, and share the particles in a file mapped to memory.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import mmap
+import os
+import pickle
+import signal
+import struct
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.data.sweep_plan import bare
+from pyverlet.ground.errors import InputError, PyverletError
+from pyverlet.scenes import Scene
+from pyverlet.world.saved import Saved
+from pyverlet.world.world import World
+
+Array = NDArray[Any]
+
+_ALIGNED = 64
+_ROWS = {"position": 2, "velocity": 2, "spin": 1, "radius": 1, "mass": 1}
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What all keepers know.
+
+    Attributes:
+        scene, settings, seed: of the worlds.
+        count: of all worlds.
+        particles: of each, as they begin.
+        dtype: of their arrays.
+    """
+
+    scene: Scene
+    settings: dict[str, Any]
+    seed: int
+    count: int
+    particles: int
+    dtype: str
+
+    def _layout(self) -> dict[str, tuple[int, tuple[int, ...], int, str]]:
+        """Of each array: where it begins, the shape of a world's part, bytes from world to world, dtype."""
+        real, at, layout = np.dtype(self.dtype), 0, {}
+        own = {name: ((self.particles, 2) if width == 2 else (self.particles,), real) for name, width in _ROWS.items()}
+        shapes: dict[str, Any] = own | {
+            "gravity": ((2,), np.dtype("f8")),
+            "time": ((), np.dtype("f8")),
+            "count": ((), np.dtype("i8")),
+        }
+        for name, (shape, dtype) in shapes.items():
+            size = int(np.prod(shape, dtype=int)) * dtype.itemsize
+            stride = -(-size // _ALIGNED) * _ALIGNED if name in own else size  # kernels look at a world as if it were alone
+            layout[name] = (at, shape, stride, dtype.str)
+            at += -(-stride * self.count // _ALIGNED) * _ALIGNED
+        layout[""] = (at, (), 0, "")
+        return layout
+
+    @property
+    def size(self) -> int:
+        """Bytes of the file."""
+        return max(self._layout()[""][0], 1)
+
+    def open(self, path: Path) -> dict[str, Array]:
+        """(count, ...) arrays that all who open the file share."""
+        with path.open("r+b") as file:
+            memory = mmap.mmap(file.fileno(), self.size)
+        arrays = {}
+        for name, (at, shape, stride, dtype) in self._layout().items():
+            if name:
+                inner = np.empty(shape, dtype).strides
+                arrays[name] = np.ndarray((self.count, *shape), dtype, memory, at, (stride, *inner))
+        return arrays
+
+
+class Keeper:
+    """Some of the worlds, and what is done to them.
+
+    Args:
+        plan: of all.
+        first, stop: which of them it has.
+        shared: arrays of all worlds; the particles of those it has live in them.
+    """
+
+    def __init__(self, plan: Plan, first: int, stop: int, shared: dict[str, Array]) -> None:
+        from pyverlet.data.worlds import seed_of
+
+        self._first, self._shared, self._particles = first, shared, plan.particles
+        self.worlds = [plan.scene.world(**plan.settings, seed=seed_of(plan.seed, k)) for k in range(first, stop)]
+        self._views = [{name: shared[name][k] for name in _ROWS} for k in range(first, stop)]
+        self._saved: dict[int, list[Saved]] = {}
+        self._gravity: list[tuple[float, float]] = [(0.0, 0.0)] * len(self.worlds)
+        for number, world in enumerate(self.worlds):
+            self._note(number, world)
+
+    def _note(self, number: int, world: World) -> None:
+        """The world is as it is: have its particles live in the shared arrays, if they fit there, and say how many there are."""
+        state, views, shared, k = world._state, self._views[number], self._shared, self._first + number
+        if len(world) == self._particles and state._store["mass"] is not views["mass"]:
+            for name, view in views.items():
+                view[...] = getattr(state, name)
+                state._store[name] = view
+            state._show(len(world))
+        shared["time"][k], shared["count"][k] = world.time, len(world)
+        if self._gravity[number] is not world.gravity:
+            self._gravity[number] = world.gravity
+            shared["gravity"][k] = world.gravity
+
+    def step(self, dt: float, frames: int = 1) -> None:
+        """All of them; the first that fails is told of when all have been stepped."""
+        failed: PyverletError | None = None
+        gravity = self._shared["gravity"][self._first : self._first + len(self.worlds)].tolist()
+        for number, world in enumerate(self.worlds):
+            if gravity[number] != list(self._gravity[number]):
+                world.gravity = gravity[number]
+            try:
+                for _ in range(frames):
+                    world.step(dt)
+            except PyverletError as error:
+                failed = failed or _named(error, self._first + number)
+            self._note(number, world)
+        if failed:
+            raise failed
+
+    def save(self, token: int) -> None:
+        """Keep them as they are under this number."""
+        self._saved[token] = [world.save() for world in self.worlds]
+
+    def restore(self, token: int, which: list[int]) -> None:
+        """Those of `which` that are here go back to that."""
+        saved = self._saved[token]
+        for k in which:
+            number = k - self._first
+            if 0 <= number < len(self.worlds):
+                self.worlds[number].restore(saved[number])
+                self._note(number, self.worlds[number])
+
+    def drop(self, token: int) -> None:
+        """Nobody will go back there."""
+        self._saved.pop(token, None)
+
+    def file(self, k: int) -> bytes:
+        """What a file of world k would hold."""
+        from pyverlet.data import archive, snapshot
+
+        out = io.BytesIO()
+        table, arrays = snapshot.to_table(self.worlds[k - self._first])
+        archive.write(out, lambda: table, arrays)
+        return out.getvalue()
+
+
+def _named(error: PyverletError, k: int) -> PyverletError:
+    error.args = (f"world {k}: {error}", *error.args[1:])
+    return error
+
+
+class Crew:
+    """Processes that are keepers.
+
+    Args:
+        plan: of all worlds.
+        ranges: first and stop of those that each process has.
+        path: of the file they share.
+    """
+
+    def __init__(self, plan: Plan, ranges: Sequence[tuple[int, int]], path: Path) -> None:
+        try:
+            sent = pickle.dumps(replace(plan, scene=bare(plan.scene)))
+        except (pickle.PicklingError, AttributeError, TypeError) as error:
+            raise InputError(
+                f"scene cannot be sent to other processes ({error}); allowed is one of a module, or processes=1"
+            ) from None
+        command = [sys.executable, "-c", "from pyverlet.data.crew import main; main()"]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+        self._processes = [
+            subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment) for _ in ranges
+        ]
+        try:
+            for process, (first, stop) in zip(self._processes, ranges, strict=True):
+                _send(_in(process), (sent, first, stop, str(path)))
+            self._hear()
+        except BaseException:
+            self.close()
+            raise
+
+    def tell(self, *order: Any) -> None:
+        """Have all of them do something, and wait until it is done."""
+        with self._alive():
+            for process in self._processes:
+                _send(_in(process), order)
+            self._hear()
+
+    def ask(self, part: int, *order: Any) -> Any:
+        """Have one of them do something, and return what it returns."""
+        process = self._processes[part]
+        with self._alive():
+            _send(_in(process), order)
+            return _heard([_receive(_out(process))])[0]
+
+    @contextlib.contextmanager
+    def _alive(self) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, EOFError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise
+            self.close()
+            raise PyverletError("a process that had some of the worlds has ended; they are lost, build them anew") from None
+
+    def _hear(self) -> None:
+        # All of them, before any error is raised: who is not heard now would be heard for an answer to the next order.
+        _heard([_receive(_out(process)) for process in self._processes])
+
+    def close(self) -> None:
+        """End them."""
+        for process in self._processes:
+            with contextlib.suppress(OSError):
+                _in(process).close()
+        for process in self._processes:
+            process.wait()
+            _out(process).close()
+
+
+def _in(process: subprocess.Popen[bytes]) -> BinaryIO:
+    assert process.stdin is not None
+    return process.stdin  # type: ignore[return-value]
+
+
+def _out(process: subprocess.Popen[bytes]) -> BinaryIO:
+    assert process.stdout is not None
+    return process.stdout  # type: ignore[return-value]
+
+
+def _heard(answers: list[Any]) -> list[Any]:
+    for error, _ in answers:
+        if error is not None:
+            raise error
+    return [value for _, value in answers]
+
+
+def _send(file: BinaryIO, message: Any) -> None:
+    data = pickle.dumps(message)
+    file.write(struct.pack("<q", len(data)) + data)
+    file.flush()
+
+
+def _receive(file: BinaryIO) -> Any:
+    head = file.read(8)
+    if len(head) < 8:
+        raise EOFError
+    return pickle.loads(file.read(struct.unpack("<q", head)[0]))
+
+
+def main() -> None:
+    """Keep worlds as the standard input says, until that ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started us decides
+    orders = sys.stdin.buffer
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what a scene prints is no answer
+    keeper: Keeper | None = None
+    with contextlib.suppress(EOFError, BrokenPipeError):
+        while True:
+            order = _receive(orders)
+            error, value = None, None
+            try:
+                if keeper is None:
+                    sent, first, stop, path = order
+                    plan: Plan = _unpickled(sent)
+                    keeper = Keeper(plan, first, stop, plan.open(Path(path)))
+                else:
+                    value = getattr(keeper, order[0])(*order[1:])
+            except PyverletError as raised:
+                error = raised
+            except Exception as raised:  # of a scene's own code
+                error = PyverletError(f"{type(raised).__name__}: {raised}")
+            _send(answers, (error, value))
+
+
+def _unpickled(sent: bytes) -> Any:
+    try:
+        return pickle.loads(sent)
+    except (AttributeError, ImportError) as error:
+        raise InputError(
+            f"scene cannot be read in another process ({error}); allowed is one of a module, or processes=1"
+        ) from None

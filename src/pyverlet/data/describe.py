@@ -1,0 +1,342 @@
+"""What a world is made of, as plain numbers and text, and back: `{"type": "Circle", "center": [0, 0], "radius": 3.0}`.
+
+A description names a class of ours by `type`, and its arguments by the names they have there; what has changed since it was built
+is under `state`. Rooms, collisions, integrators, forces, obstacles and actors are all there is; links are in `describe_links`.
+Of an object of a user's own class it says only `{"object": name}`: whoever builds hands such objects in, and nothing is ever
+imported because a file says so.
+"""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pyverlet.data import memory
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
+from pyverlet.laws import forces, integrators, naive, obstacles, rooms
+from pyverlet.laws.contacts.broadphase import BruteForce, Fast
+from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.state.group import Group
+from pyverlet.world.actors import Actor, Emitter, Sink
+from pyverlet.world.world import World
+
+Description = dict[str, Any]
+
+TYPE, OBJECT, STATE = "type", "object", "state"
+"""Keys of a description that are no arguments."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """How a class is described.
+
+    Attributes:
+        cls: the class.
+        arguments: of (object): what its class is to be called with, by name; values may be numbers, text, arrays and objects.
+        state: of (object): what it remembers besides, empty if nothing.
+        recall: of (object, state): take that up again, in a new object.
+        known: the names of all arguments its class takes.
+    """
+
+    cls: type
+    arguments: Callable[[Any], dict[str, Any]]
+    state: Callable[[Any], dict[str, Any]]
+    recall: Callable[[Any, dict[str, Any]], None]
+    known: tuple[str, ...]
+
+
+KINDS: dict[str, Kind] = {}
+"""By name of the class."""
+
+
+def _nothing(thing: Any) -> dict[str, Any]:
+    return {}
+
+
+def _refuse(thing: Any, state: dict[str, Any]) -> None:
+    if state:
+        raise InputError(f"state of {type(thing).__name__} is {state!r}; allowed is none")
+
+
+def _kind(
+    cls: type,
+    *names: str,
+    arguments: Callable[[Any], dict[str, Any]] | None = None,
+    state: Callable[[Any], dict[str, Any]] = _nothing,
+    recall: Callable[[Any, dict[str, Any]], None] = _refuse,
+    known: tuple[str, ...] = (),
+) -> None:
+    """Register a class whose arguments are attributes of these names, or what `arguments` says."""
+    if arguments is None:
+
+        def arguments(thing: Any) -> dict[str, Any]:
+            return {name: getattr(thing, name) for name in names}
+
+    taken = tuple(name for name, p in inspect.signature(cls).parameters.items() if p.kind is not p.VAR_KEYWORD)
+    KINDS[cls.__name__] = Kind(cls, arguments, state, recall, (*taken, *known))
+
+
+# ---- what there is -----------------------------------------------------------------------------------------------------
+
+_kind(rooms.Open)
+_kind(rooms.Circle, "center", "radius", "restitution", "friction")
+_kind(rooms.Box, "lower", "upper", "restitution", "friction")
+_kind(naive.ClampAndFlip, "room")
+_kind(naive.ProjectOnly, "room")
+
+_kind(Fast, "skin")
+_kind(BruteForce)
+_kind(Collisions, "restitution", "friction", "method")
+
+for _integrator in integrators.BY_NAME.values():
+    _kind(_integrator, *inspect.signature(_integrator).parameters)
+
+_kind(forces.Attractor, "center", "strength", "softening")
+_kind(forces.ConstantForce, "newtons", "group")
+_kind(forces.Drag, "linear", "quadratic")
+_kind(forces.Wind, "velocity", "linear", "quadratic")
+_kind(forces.Gravitation, "group", "strength", "softening")
+_kind(forces.PointSpring, "center", "stiffness")
+_kind(forces.Push, "center", "radius", "acceleration")
+
+
+def _grip(grip: forces.Grip) -> dict[str, Any]:
+    # One whose particle is no more holds nothing for ever.
+    held = {"particle": max(grip.particle, 0)}
+    return held | {name: getattr(grip, name) for name in ("target", "frequency", "strength")}
+
+
+def _let_go(grip: forces.Grip, state: dict[str, Any]) -> None:
+    if state not in ({}, {"holds": False}):
+        raise InputError(f"state of Grip is {state!r}; allowed are none and that it holds nothing")
+    if state:
+        grip.particle = -1
+
+
+_kind(forces.Grip, arguments=_grip, state=lambda grip: {} if grip.particle >= 0 else {"holds": False}, recall=_let_go)
+
+SURFACE = ("restitution", "friction", "surface_speed", "velocity", "angular_velocity", "pivot")
+"""Arguments that all obstacles take."""
+
+
+def _shape(obstacle: Any) -> dict[str, Any]:
+    """Corners as seen from its pivot, so that no bit is lost; where that is, is its state."""
+    local = obstacle._local
+    if isinstance(obstacle, obstacles.Disc):
+        shape = {"center": tuple(map(float, local[0])), "radius": obstacle.radius}
+    elif isinstance(obstacle, obstacles.Polygon):
+        shape = {"points": local, "radius": obstacle.radius}
+    elif isinstance(obstacle, obstacles.Segment | obstacles.Capsule):
+        shape = {"start": tuple(map(float, local[0])), "end": tuple(map(float, local[1]))}
+        shape |= {"radius": obstacle.radius} if isinstance(obstacle, obstacles.Capsule) else {}
+    else:
+        shape = {"points": local, "closed": obstacle.closed, "radius": obstacle.radius}
+    surface = {name: getattr(obstacle, name) for name in SURFACE}
+    return shape | surface | {"pivot": (0.0, 0.0)}
+
+
+def _place(obstacle: Any, state: dict[str, Any]) -> None:
+    if unknown := set(state) - {"pivot", "angle"}:
+        raise InputError(f"state of {type(obstacle).__name__} has {sorted(unknown)[0]!r}; allowed are pivot and angle")
+    for name, value in state.items():
+        setattr(obstacle, name, value)
+
+
+for _obstacle in (obstacles.Chain, obstacles.Segment, obstacles.Capsule, obstacles.Disc, obstacles.Polygon):
+    _kind(
+        _obstacle,
+        arguments=_shape,
+        state=lambda obstacle: {"pivot": obstacle.pivot, "angle": obstacle.angle},
+        recall=_place,
+        known=SURFACE,
+    )
+
+
+def _emitter(emitter: Emitter) -> dict[str, Any]:
+    return {name: getattr(emitter, name) for name in ("region", "rate", "velocity", "radius", "mass", "most")}
+
+
+def _emitted(emitter: Emitter) -> dict[str, Any]:
+    due, emitted, random = emitter.save()
+    return {"due": due, "emitted": emitted, "random": random}
+
+
+def _recall_emitter(emitter: Emitter, state: dict[str, Any]) -> None:
+    if not state:
+        return
+    due, emitted = checks.number("due", state["due"], least=0.0), checks.whole("emitted", state["emitted"], least=0)
+    emitter.restore((due, emitted, state["random"]))
+    emitter._rng.random()  # numbers that are no state of its kind show here, not in the middle of a frame
+    emitter.restore((due, emitted, state["random"]))
+
+
+_kind(Emitter, arguments=_emitter, state=_emitted, recall=_recall_emitter)
+
+
+def _recall_sink(sink: Sink, state: dict[str, Any]) -> None:
+    sink.restore(checks.whole("removed", state["removed"], least=0) if state else 0)
+
+
+_kind(Sink, "region", "outside", state=lambda sink: {"removed": sink.removed}, recall=_recall_sink)
+
+
+# ---- there -------------------------------------------------------------------------------------------------------------
+
+
+def describe(thing: Any) -> Description:
+    """Describe a room, collisions, an integrator, a force, an obstacle or an actor.
+
+    Values are numbers, text, lists, further descriptions and NumPy arrays; `memory.plain` makes lists of the arrays, too.
+
+    Raises:
+        InputError: an object of a user's own class remembers what a description cannot hold.
+    """
+    kind = KINDS.get(type(thing).__name__)
+    if kind is None or kind.cls is not type(thing):
+        return _own(thing)
+    arguments = kind.arguments(thing)
+    if any(callable(value) for value in arguments.values()):  # a wind that is a function
+        return _own(thing)
+    description = {TYPE: kind.cls.__name__} | {name: _value(value) for name, value in arguments.items()}
+    state = {name: _value(value) for name, value in kind.state(thing).items()}
+    return description | ({STATE: state} if state else {})
+
+
+def _value(value: Any) -> Any:
+    if isinstance(value, Group):
+        return {"first": value._first, "count": value._added}
+    if type(value).__name__ in KINDS:
+        return describe(value)
+    return memory.pack(list(value) if isinstance(value, tuple) else value)
+
+
+def _own(thing: Any) -> Description:
+    description: Description = {OBJECT: name_of(thing)}
+    if isinstance(thing, Actor):
+        kept = thing.save()
+        if kept is not None:
+            try:
+                description[STATE] = memory.pack(kept)
+            except InputError as error:
+                raise InputError(f"what {description[OBJECT]}.save() returns cannot be kept: {error}") from None
+    return description
+
+
+def name_of(thing: Any) -> str:
+    """How a description calls an object of a user's own class, or a function that was made a force."""
+    own = thing if isinstance(thing, forces.FunctionForce) else type(thing)
+    return str(getattr(own, "__qualname__", type(thing).__qualname__))
+
+
+# ---- and back ----------------------------------------------------------------------------------------------------------
+
+
+class Builder:
+    """Makes objects of descriptions.
+
+    Args:
+        objects: a user's own, in the order in which descriptions name them; several of one name are taken in turn.
+        world: whose particles groups are of.
+    """
+
+    def __init__(self, objects: Iterable[Any] = (), world: World | None = None) -> None:
+        self._objects = list(objects)
+        self.world = world
+
+    def build(self, name: str, description: Any, wanted: Any) -> Any:
+        """The object described; `name`: what errors call it, `wanted`: what it may be.
+
+        Raises:
+            InputError: it is no description of that; the sentence names what is wrong and, for a name, the nearest known one.
+        """
+        if not isinstance(description, Mapping):
+            raise InputError(f"{name} is {_brief(description)}; allowed is a table with a `type`")
+        thing = self._taken(name, description) if OBJECT in description else self._made(name, description)
+        if not isinstance(thing, wanted):
+            known = [kind for kind, known in KINDS.items() if issubclass(known.cls, wanted)]
+            raise InputError(f"{name} is {type(thing).__name__}; allowed are {', '.join(known)}")
+        return thing
+
+    def _made(self, name: str, description: Mapping[str, Any]) -> Any:
+        kind = _known(name, description.get(TYPE))
+        arguments = {key: value for key, value in description.items() if key not in (TYPE, STATE)}
+        for key in arguments:
+            if key not in kind.known:
+                raise InputError(f"{name}: {kind.cls.__name__} has no {key!r}{_nearest(key, kind.known)}")
+        with _one_sentence(name):
+            values = {key: self._argument(f"{name}: {key}", key, value) for key, value in arguments.items()}
+            thing = kind.cls(**values)
+            kind.recall(thing, memory.unpack(description.get(STATE, {})))
+            return thing
+
+    def _argument(self, name: str, key: str, value: Any) -> Any:
+        if key == "group":
+            return None if value is None else self._group(name, value)
+        if isinstance(value, Mapping) and (TYPE in value or OBJECT in value):
+            return self.build(name, value, object)
+        value = memory.unpack(value)
+        return tuple(value) if isinstance(value, list) and not any(isinstance(part, list) for part in value) else value
+
+    def _group(self, name: str, value: Any) -> Group:
+        if isinstance(value, Group):
+            return value
+        if self.world is None:
+            raise InputError(f"{name} is {_brief(value)}; allowed is none where there is no world")
+        first, count = checks.whole("first", value["first"], least=0), checks.whole("count", value["count"], least=0)
+        return Group.of(self.world._state, first, count, self.world.remove)
+
+    def _taken(self, name: str, description: Mapping[str, Any]) -> Any:
+        wanted = description[OBJECT]
+        for k, thing in enumerate(self._objects):
+            if name_of(thing) == wanted:
+                del self._objects[k]
+                break
+        else:
+            raise InputError(f"{name} is of a class of your own, {wanted!r}; allowed is a file whose `objects` are handed in")
+        if isinstance(thing, Actor) and STATE in description:
+            with _one_sentence(name):
+                thing.restore(memory.unpack(description[STATE]))
+        return thing
+
+
+class _one_sentence:  # noqa: N801  (a context manager)
+    """What goes wrong with values of the wrong kind, as one sentence."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        if isinstance(error, InputError):
+            said = str(error)
+            raise InputError(said if said.startswith(self._name) else f"{self._name}: {said}") from None
+        if isinstance(error, TypeError | ValueError | KeyError | IndexError | AttributeError | OverflowError):
+            raise InputError(f"{self._name} has values of the wrong kind ({error}); allowed are those its class takes") from error
+
+
+def _known(name: str, kind: Any) -> Kind:
+    if isinstance(kind, str) and kind in KINDS:
+        return KINDS[kind]
+    near = _nearest(kind, tuple(KINDS)) if isinstance(kind, str) else ""
+    raise InputError(f"{name} has the type {_brief(kind)}{near}; known: {', '.join(KINDS)}")
+
+
+def _nearest(name: str, known: tuple[str, ...]) -> str:
+    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    return f" (did you mean {near[0]!r}?)" if near else f"; known: {', '.join(known)}"
+
+
+def _brief(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def build(name: str, description: Any, wanted: Any, *, objects: Iterable[Any] = ()) -> Any:
+    """As `Builder.build`, for a thing that names no group."""
+    return Builder(objects).build(name, description, wanted)

@@ -1,0 +1,132 @@
+"""Links as tables: which particles, their numbers as columns, and what they have come to. See `describe` for all else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from pyverlet.data import memory
+from pyverlet.data.describe import OBJECT, STATE, TYPE
+from pyverlet.ground.errors import InputError
+from pyverlet.ground.fields import Field
+from pyverlet.laws.links import Angle, Area, Link, Pin, Rope, Spring, Stick
+from pyverlet.world.world import World
+
+_REST: dict[Any, str] = {Stick: "length", Rope: "length", Spring: "length", Angle: "angle", Area: "area", Pin: "point"}
+_ARITY: dict[Any, int] = {Stick: 2, Rope: 2, Spring: 2, Angle: 3, Pin: 1}
+
+_LENGTH = Field(np.float64, "rows", least=0)
+_COLUMNS: dict[str, tuple[str, Field]] = {
+    "length": ("rest", _LENGTH),
+    "angle": ("rest", Field(np.float64, "rows")),
+    "area": ("rest", _LENGTH),
+    "point": ("point", Field(np.float64, "rows", 2)),
+    "stiffness": ("stiffness", Field(np.float64, "rows", least=0, infinite=True)),
+    "damping": ("damping", Field(np.float64, "rows", least=0)),
+    "strength": ("strength", Field(np.float64, "rows", above=0, infinite=True)),
+}
+"""What a description calls a column, what its pool does, and what it must be."""
+
+_MOVING = {
+    "intact": Field(np.uint8, "rows", least=0, most=1),
+    "force": Field(np.float64, "rows"),
+    "last": Field(np.float64, "rows"),
+}
+
+
+def describe(world: World) -> list[dict[str, Any]]:
+    """A table for each link of a world, in their order; `strength` is what it breaks at, N or N m.
+
+    Raises:
+        InputError: one is of a class that derives from none of ours.
+    """
+    return [_described(link) for link in world.links]
+
+
+def _described(link: Link) -> dict[str, Any]:
+    kind = _kind_of(type(link))
+    assert link._pool is not None
+    rows = link._pool.rows
+    named = {TYPE: kind.__name__} if type(link) is kind else {TYPE: kind.__name__, OBJECT: type(link).__qualname__}
+    columns: dict[str, Any] = {name: rows[_COLUMNS[name][0]][link._where].copy() for name in _names(kind)}
+    if kind in (Stick, Rope, Spring):
+        columns["collide"] = bool(link._collide)  # type: ignore[attr-defined]
+    moving = {name: rows[name][link._where].copy() for name in _MOVING}
+    return named | {"particles": link.particles.copy()} | columns | {STATE: moving}
+
+
+def _kind_of(cls: type) -> type:
+    for base in cls.__mro__:
+        if base in _REST:
+            return base
+    raise InputError(f"a link is of the class {cls.__qualname__}; allowed are {', '.join(kind.__name__ for kind in _REST)}")
+
+
+def _names(kind: type) -> tuple[str, ...]:
+    return (_REST[kind], "stiffness", "damping", *(() if kind is Area else ("strength",)))
+
+
+def build(world: World, tables: Any, objects: Iterable[Any] = ()) -> None:
+    """Append to a world the links that these tables describe; columns are arrays.
+
+    Args:
+        world: one that has their particles.
+        tables: what `describe` returned.
+        objects: a user's own classes of links.
+
+    Raises:
+        InputError: a table lacks something, or a number is outside what is allowed.
+    """
+    if not isinstance(tables, list):
+        raise InputError("links is not a list; allowed is one of tables")
+    own = {thing.__qualname__: thing for thing in objects if isinstance(thing, type)}
+    for number, table in enumerate(tables):
+        name = f"links[{number}]"
+        try:
+            _append(world, name, table, own)
+        except (KeyError, TypeError, AttributeError) as error:
+            raise InputError(f"{name} lacks something ({error}); allowed is what describes a link") from error
+
+
+def _append(world: World, name: str, table: dict[str, Any], own: dict[str, type]) -> None:
+    kind = next((known for known in _REST if known.__name__ == table[TYPE]), None)
+    if kind is None:
+        raise InputError(f"{name} has the type {table[TYPE]!r}; known: {', '.join(known.__name__ for known in _REST)}")
+    cls: type = kind
+    if OBJECT in table:
+        if table[OBJECT] not in own or not issubclass(own[table[OBJECT]], kind):
+            raise InputError(f"{name} is of a class of your own, {table[OBJECT]!r}; allowed is a file whose `objects` hold it")
+        cls = own[table[OBJECT]]
+    sizes = {"particles": len(world)}
+    particles = table["particles"]
+    joined = Field(np.int64, "rows", particles.shape[1], least=0, below="particles")
+    joined.check(f"{name}: particles", particles, world.dtype, sizes)
+    wanted = _ARITY.get(kind)
+    if (particles.shape[1] != wanted) if wanted else (particles.shape[1] < 3 or len(particles) != 1):
+        raise InputError(f"{name}: particles has shape {particles.shape}; allowed are those a {kind.__name__} joins")
+    if not len(particles) or (np.diff(np.sort(particles, axis=1), axis=1) == 0).any():
+        raise InputError(f"{name}: particles names one twice, or none; allowed are different ones")
+    # Not by its constructor, which looks at where the particles are: a ring may have crossed itself since.
+    link: Any = object.__new__(cls)
+    Link.__init__(link, world._state, particles)
+    columns = {key: _column(name, key, table, _COLUMNS[key][1], world, sizes) for key in _names(kind)}
+    for key, column in columns.items():
+        setattr(link, f"_{key}", column)
+    if kind in (Stick, Rope, Spring):
+        link._collide = table["collide"]
+        if not isinstance(link._collide, bool):
+            raise InputError(f"{name}: collide is {link._collide!r}; allowed are true and false")
+    moving = {key: _column(name, key, table[STATE], field, world, sizes) for key, field in _MOVING.items()}
+    world.links.append(link)
+    for key, column in moving.items():
+        link._pool.rows[key][link._where] = column
+
+
+def _column(name: str, key: str, table: dict[str, Any], field: Field, world: World, sizes: dict[str, int]) -> Any:
+    column = memory.unpack(table[key])
+    if not isinstance(column, np.ndarray):
+        raise InputError(f"{name}: {key} is {column!r}; allowed is an array")
+    field.check(f"{name}: {key}", column, world.dtype, sizes)
+    return column

@@ -1,0 +1,117 @@
+"""A moment of a recorded world, and where moments go to and come from: what every format of a trajectory has in common."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from pyverlet.world.world import World
+
+Array = NDArray[Any]
+
+ROOM = 1.5
+"""Half sides of the box of a world without bounds, in terms of how far its circles reach."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A world at a moment, in the order its particles were added.
+
+    Attributes:
+        time: s.
+        position: (n, 2) centres, m.
+        velocity: (n, 2) m/s.
+        spin: (n,) rad/s, counter-clockwise.
+        radius: (n,) m.
+        mass: (n,) kg, infinite where pinned.
+        number: (n,) of each particle, ascending: it keeps that while others come and go.
+        state_hash: of the world at that moment, `World.state_hash`.
+    """
+
+    time: float
+    position: Array
+    velocity: Array
+    spin: Array
+    radius: Array
+    mass: Array
+    number: NDArray[np.int64]
+    state_hash: str
+
+    def __len__(self) -> int:
+        return len(self.radius)
+
+    @classmethod
+    def of(cls, world: World) -> Frame:
+        """The world now: views on its arrays, good until it moves."""
+        columns = (world.position, world.velocity, world.spin, world.radius, world.mass, world.number)
+        return cls(float(world.time), *columns, world.state_hash())
+
+
+class Writer(ABC):
+    """Appends moments to a new file. What `add` has written can be read whatever happens to this program afterwards."""
+
+    needs: ClassVar[str | None] = None
+
+    @abstractmethod
+    def __init__(self, path: Path) -> None: ...
+
+    @abstractmethod
+    def add(self, frame: Frame, world: World) -> None:
+        """Append a moment. Raises OSError where the disk does not take it."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Close the file."""
+
+
+class Reader(ABC):
+    """Reads moments, in any order."""
+
+    needs: ClassVar[str | None] = None
+
+    @abstractmethod
+    def __init__(self, path: Path) -> None:
+        """Open it. Raises OSError, or ValueError with a reason if it is not such a file."""
+
+    @abstractmethod
+    def __len__(self) -> int: ...
+
+    @abstractmethod
+    def frame(self, k: int) -> Frame:
+        """Moment k, from 0."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Close the file."""
+
+
+class Walls:
+    """A box (x0, y0, x1, y1) in metres around a world: its bounds, or where its circles are and some room; it never shrinks."""
+
+    def __init__(self) -> None:
+        self._box: tuple[float, float, float, float] | None = None
+
+    def around(self, frame: Frame, world: World) -> tuple[float, float, float, float]:
+        """The box now."""
+        extent = world.boundary.extent()
+        if extent is not None:
+            return tuple(map(float, extent))  # type: ignore[return-value]
+        reach = frame.radius.max(initial=0.0)
+        low, high = (f(frame.position, axis=0) for f in (np.min, np.max)) if len(frame) else (np.zeros(2), np.ones(2))
+        box = (*(low - reach), *(high + reach))
+        old = self._box
+        if old is None or box[0] < old[0] or box[1] < old[1] or box[2] > old[2] or box[3] > old[3]:
+            (x0, y0), (x1, y1) = (
+                np.minimum(box[:2], old[:2] if old else box[:2]),
+                np.maximum(box[2:], old[2:] if old else box[2:]),
+            )
+            dx, dy = (ROOM - 1.0) * (x1 - x0) / 2, (ROOM - 1.0) * (y1 - y0) / 2
+            self._box = (float(x0 - dx), float(y0 - dy), float(x1 + dx), float(y1 + dy))
+        assert self._box is not None
+        return self._box

@@ -1,0 +1,115 @@
+"""GSD, the file of HOOMD-blue: read by OVITO, freud and MDAnalysis. By the library of that name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pyverlet.data.frames import Array, Frame, Reader, Walls, Writer
+
+if TYPE_CHECKING:
+    from pyverlet.world.world import World
+
+SCHEMA = (1, 4)
+"""Version of HOOMD's schema: https://gsd.readthedocs.io/en/stable/schema-hoomd.html"""
+
+# Frames keep float32 under the names of the format. What it has no name for, and the doubles of worlds in float64, are logged.
+_LOGGED = ("spin", "number")
+_DOUBLES = ("position", "velocity", "radius", "mass")
+
+
+class GsdWriter(Writer):
+    """A frame is chunks by name. Those that are as in the first frame are not written again, as the format has it."""
+
+    needs = "gsd"
+
+    def __init__(self, path: Path) -> None:
+        import gsd.fl
+
+        self._file: Any = gsd.fl.open(str(path), "w", application="pyverlet", schema="hoomd", schema_version=SCHEMA)
+        self._first: dict[str, Array] = {}
+        self._walls = Walls()
+
+    def add(self, frame: Frame, world: World) -> None:
+        # The format's box has its middle at the origin.
+        x0, y0, x1, y1 = self._walls.around(frame, world)
+        joined = world.links.pulls()[0]
+        chunks: dict[str, Any] = {
+            "configuration/step": np.array([world.frames], np.uint64),
+            "configuration/dimensions": np.array([2], np.uint8),
+            "configuration/box": np.array([2 * max(abs(x0), abs(x1)), 2 * max(abs(y0), abs(y1)), 0, 0, 0, 0], np.float32),
+            "particles/N": np.array([len(frame)], np.uint32),
+            "particles/types": _names("circle"),
+            "particles/position": _flat(frame.position),
+            "particles/velocity": _flat(frame.velocity),
+            "particles/diameter": (2 * frame.radius).astype(np.float32),
+            "particles/mass": frame.mass.astype(np.float32, copy=False),
+            "bonds/N": np.array([len(joined)], np.uint32),
+            "bonds/types": _names("link"),
+            "bonds/group": joined.astype(np.uint32),
+            "log/time": np.array([frame.time]),
+        }
+        chunks |= {f"log/particles/{name}": getattr(frame, name) for name in _LOGGED}
+        if frame.position.dtype == np.float64:
+            chunks |= {f"log/particles/{name}": getattr(frame, name) for name in _DOUBLES}
+        if not self._first:
+            self._first = {name: np.array(values) for name, values in chunks.items()}
+        for name, values in chunks.items():
+            if len(values) and (not self._file.nframes or not np.array_equal(self._first[name], values)):
+                self._file.write_chunk(name, values)
+        self._file.write_chunk("log/state_hash", frame.state_hash)
+        self._file.end_frame()
+        self._file.flush()
+
+    def close(self) -> None:
+        self._file.close()
+
+
+class GsdReader(Reader):
+    """Frames of any GSD file; those of other programs have no spins and numbers, and the time is their step."""
+
+    needs = "gsd"
+
+    def __init__(self, path: Path) -> None:
+        import gsd.hoomd
+
+        try:
+            self._file: Any = gsd.hoomd.open(str(path), "r")
+        except RuntimeError as error:  # not GSD, or a newer one
+            raise ValueError(str(error)) from None
+
+    def __len__(self) -> int:
+        return len(self._file)
+
+    def frame(self, k: int) -> Frame:
+        snap = self._file[k]
+        particles, log, count = snap.particles, snap.log, snap.particles.N
+        get = {
+            "position": particles.position[:, :2],
+            "velocity": particles.velocity[:, :2],
+            "radius": particles.diameter / np.float32(2),
+            "mass": particles.mass,
+            "spin": np.zeros(count, np.float32),
+            "number": np.arange(count),
+        }
+        get |= {name: log[f"particles/{name}"] for name in get if f"particles/{name}" in log}
+        time = float(log["time"][0]) if "time" in log else float(snap.configuration.step)
+        return Frame(time, state_hash=str(log.get("state_hash", "")), **get)
+
+    def close(self) -> None:
+        self._file.close()
+
+
+def _names(*names: str) -> Array:
+    """Names of types as rows of characters."""
+    rows = np.array(names, dtype=f"S{max(map(len, names)) + 1}")
+    return rows.view(np.int8).reshape(len(names), -1)
+
+
+def _flat(rows: Array) -> Array:
+    """(n, 3) float32 with z = 0."""
+    result = np.zeros((len(rows), 3), np.float32)
+    result[:, :2] = rows
+    return result

@@ -1,0 +1,213 @@
+"""Scene files: a world as a document in TOML or JSON, read into the same `Scene` that a name gives, and written."""
+
+from __future__ import annotations
+
+import difflib
+import importlib.util
+import json
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from pyverlet import scenes
+from pyverlet.data import toml
+from pyverlet.data.durable import replacing
+from pyverlet.data.scene_build import Recipe
+from pyverlet.data.scene_freeze import freeze
+from pyverlet.ground.errors import InputError
+from pyverlet.scenes import Scene, Settings
+from pyverlet.scenes._scene import Show
+
+SUFFIXES = (".toml", ".json")
+
+LARGEST = 64_000_000
+"""Bytes of a scene file; arrays belong beside it."""
+
+ALONE = {"format", "name", "summary", "scene", "settings", "run", "view"}
+"""Keys that a document may have that names a scene."""
+
+
+def is_file(name: str) -> bool:
+    """Whether this is meant to be a file rather than a name."""
+    return name.lower().endswith(SUFFIXES)
+
+
+def read(path: str | Path) -> Scene:
+    """See `pyverlet.scenes.read`."""
+    path = Path(path)
+    document = validated(_loaded(path), str(path))
+    return _scene(document, path)
+
+
+def _scene(document: dict[str, Any], path: Path) -> Scene:
+    show = Show()
+    if "view" in document:
+        x0, y0, x1, y1 = document["view"]["part"]
+        if not (x0 < x1 and y0 < y1):
+            raise InputError(f"'{path}': part is {[x0, y0, x1, y1]}; allowed is x0 < x1 and y0 < y1")
+        show = Show(view=lambda settings: (x0, y0, x1, y1))
+    if "run" in document:
+        show = Show(view=show.view, seconds=lambda settings: float(document["run"]["seconds"]))
+    name = document.get("name") or path.stem
+    if "scene" in document:
+        if unknown := sorted(set(document) - ALONE):
+            raise InputError(f"'{path}' names a scene and has {unknown[0]!r}; allowed beside are {', '.join(sorted(ALONE))}")
+        base = scenes.get(document["scene"])
+        given = Recipe.settings_of(document.get("settings", {}))
+        return Scene(
+            name,
+            document.get("summary") or base.summary,
+            base.build,
+            base.settings(**given),
+            base.closed_form,
+            Show(base.show.colours, show.view or base.show.view, show.seconds or base.show.seconds),
+            base.variants,
+            base.line,
+            document=document,
+        )
+    if "settings" in document:
+        raise InputError(
+            f"'{path}' has settings and names no scene; allowed is `scene`, or what the settings say under its own key"
+        )
+    recipe = Recipe(document, path)
+    return Scene(
+        name, document.get("summary") or f"from {path.name}", recipe.build, recipe.defaults, show=show, document=document
+    )
+
+
+def write(scene: Scene, path: str | Path) -> None:
+    """See `Scene.write`."""
+    document = scene.document
+    _suffix(Path(path))
+    recipe = getattr(scene.build, "__self__", None)
+    if isinstance(recipe, Recipe):
+        recipe.copy_arrays(Path(path).parent)
+    if document is None:
+        document = {"format": 1, "name": scene.name, "scene": scene.name, "settings": Recipe.described(scene.defaults)}
+    save(document, Path(path))
+
+
+def write_frozen(scene: Scene, path: str | Path, settings: Settings) -> None:
+    """See `Scene.freeze`."""
+    path = Path(path)
+    _suffix(path)
+    document = freeze(scene.build(settings), path)
+    about = {key: value for key, value in (scene.document or {}).items() if key in ("summary", "run", "view")}
+    if scene.show.view and "view" not in about:
+        about["view"] = {"part": [float(value) for value in scene.show.view(settings)]}
+    save({"format": 1, "name": scene.name, "summary": scene.summary} | about | document, path)
+
+
+def save(document: dict[str, Any], path: Path) -> None:
+    """Write a document; an old file stays until the new one is whole."""
+    text = toml.dumps(document) if _suffix(path) == ".toml" else json.dumps(document, indent=1, allow_nan=False) + "\n"
+    with replacing(path) as file:
+        file.write(text.encode())
+
+
+def schema() -> dict[str, Any]:
+    """The JSON Schema of scene files, for editors."""
+    found: dict[str, Any] = _models().Document.model_json_schema()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | found | {"title": "pyverlet scene"}
+
+
+# ---- reading -----------------------------------------------------------------------------------------------------------
+
+
+def _suffix(path: Path) -> str:
+    if not is_file(path.name):
+        raise InputError(f"path is '{path}'; allowed for a scene is a name that ends in {' or '.join(SUFFIXES)}")
+    return path.suffix.lower()
+
+
+def _loaded(path: Path) -> Any:
+    suffix = _suffix(path)
+    try:
+        if path.stat().st_size > LARGEST:
+            raise InputError(f"'{path}' has {path.stat().st_size:,} bytes; allowed are {LARGEST:,}")
+        text = path.read_text(encoding="utf-8")
+        return tomllib.loads(text) if suffix == ".toml" else json.loads(text)
+    except OSError as error:
+        raise InputError(f"path is '{path}', which cannot be read: {error.strerror or error}") from None
+    except (ValueError, RecursionError) as error:  # both parsers' errors, and text that is no UTF-8
+        raise InputError(f"'{path}' is no {suffix[1:].upper()}: {error}") from None
+
+
+def _models() -> Any:
+    if importlib.util.find_spec("pydantic") is None:
+        raise InputError("scene files need 'pydantic', which is not installed: pip install pydantic")
+    from pyverlet.data import scene_models
+
+    return scene_models
+
+
+def validated(value: Any, name: str) -> dict[str, Any]:
+    """The document if it is one; what it does not say is left out.
+
+    Raises:
+        InputError: in one sentence, what is wrong where, and for a key the nearest known one.
+    """
+    models = _models()
+    from pydantic import ValidationError
+
+    try:
+        text = json.dumps(value)
+    except (TypeError, ValueError) as error:  # a date, which TOML has
+        raise InputError(f"'{name}' holds something else than tables, lists, numbers and texts ({error})") from None
+    try:
+        document = models.Document.model_validate_json(text)
+    except ValidationError as error:
+        raise InputError(f"'{name}': {_sentence(error.errors(), models)}") from None
+    found: dict[str, Any] = document.model_dump(mode="json", exclude_unset=True)
+    return found
+
+
+def _sentence(errors: list[Any], models: Any) -> str:
+    """The first thing that is wrong; unknown keys first, for they are why others are missing."""
+    error = min(errors, key=lambda error: error["type"] != "extra_forbidden")
+    where = _path(error["loc"], models)
+    if error["type"] == "extra_forbidden":
+        holder = _holder(error["loc"][:-1], models)
+        key = str(error["loc"][-1])
+        near = difflib.get_close_matches(key, holder.model_fields, n=1, cutoff=0.5)
+        known = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(holder.model_fields)}"
+        at = _path(error["loc"][:-1], models)
+        return f"{at + ' ' if at else ''}has no key {key!r} ({known})"
+    if error["type"] == "missing":
+        return f"{_path(error['loc'][:-1], models) or 'the file'} lacks {error['loc'][-1]!r}"
+    if error["type"] == "union_tag_invalid":
+        given, tags = error["ctx"]["tag"], [tag.strip(" '") for tag in error["ctx"]["expected_tags"].split(",")]
+        near = difflib.get_close_matches(given, tags, n=1, cutoff=0.4)
+        return f"{where} has the type {given!r}{f' (did you mean {near[0]!r}?)' if near else ''}; allowed are {', '.join(tags)}"
+    if error["type"] == "union_tag_not_found":
+        return f"{where} lacks 'type'"
+    given = repr(error["input"])
+    said = error["msg"][0].lower() + error["msg"][1:]
+    return f"{where} is {given if len(given) <= 60 else given[:57] + '...'}; {said}"
+
+
+def _path(loc: tuple[Any, ...], models: Any) -> str:
+    """groups[0].radius: where it is, without the names of the models on the way."""
+    text = ""
+    for part in _own(loc, models):
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    return text
+
+
+def _own(loc: tuple[Any, ...], models: Any) -> Iterator[Any]:
+    """The parts of a place that are in the file, not in the models."""
+    for k, part in enumerate(loc):
+        after_table = k > 0 and (isinstance(loc[k - 1], int) or loc[k - 1] in models.TABLES)
+        if not (isinstance(part, str) and (part in models.INNER or (after_table and part in models.MODELS))):
+            yield part
+
+
+def _holder(loc: tuple[Any, ...], models: Any) -> Any:
+    """The model of the table at this place."""
+    for part in reversed(loc):
+        if part in models.MODELS:
+            return models.MODELS[part]
+        if part in models.SECTIONS:
+            return models.SECTIONS[part]
+    return models.Document

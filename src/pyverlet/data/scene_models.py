@@ -1,0 +1,313 @@
+"""What a scene file may say: models of pydantic, made of the very signatures that the engine's classes and builders have.
+
+Loaded when a file is read, not before: pydantic comes along with the command.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import Annotated, Any, Literal, Union
+
+from pydantic import BaseModel, ConfigDict, Field, create_model
+
+from pyverlet.data.describe import KINDS, SURFACE
+from pyverlet.ground.constants import STANDARD_GRAVITY
+from pyverlet.laws import naive, rooms
+from pyverlet.laws.contacts.broadphase import BruteForce, Fast
+from pyverlet.laws.forces import Force
+from pyverlet.laws.integrators import Integrator
+from pyverlet.laws.links import Angle, Area, Pin, Rope, Spring, Stick
+from pyverlet.laws.obstacles import Obstacle
+from pyverlet.scenes import Settings
+from pyverlet.state.state import EVERYONE
+from pyverlet.world import builders
+from pyverlet.world.actors import Actor
+
+FORMAT = 1
+
+Vector = tuple[float, float]
+Bits = Annotated[int, Field(ge=0, le=EVERYONE)]
+
+
+class Part(BaseModel):
+    """What all tables have in common: no unknown keys, no text for numbers, no NaN."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+
+MODELS: dict[str, type[BaseModel]] = {}
+"""By the `type` of a table, for who looks for the nearest key."""
+
+
+def _named(name: str, fields: dict[str, Any], doc: str | None) -> type[BaseModel]:
+    tag: Any = Literal[name]
+    MODELS[name] = create_model(name, __base__=Part, __doc__=doc, type=(tag, ...), **fields)
+    return MODELS[name]
+
+
+def _one_of(models: list[Any]) -> Any:
+    return Annotated[Union[tuple(models)], Field(discriminator="type")]  # noqa: UP007  (of as many as there are)
+
+
+# ---- classes and functions as tables -----------------------------------------------------------------------------------
+
+# Arguments by their annotation; those of links and outlines, which take any array, by their name.
+_ANNOTATED: dict[str, Any] = {
+    "float": float,
+    "float | None": float | None,
+    "int": int,
+    "int | None": int | None,
+    "bool": bool,
+    "Point": Vector,
+    "Sequence[float]": Vector,
+    "Sequence[float] | None": Vector | None,
+    "Sequence[float] | Field": Vector,
+    "float | tuple[float, float]": float | Vector,
+    "Group | None": str | None,
+    "ArrayLike": float | list[float],
+    "ArrayLike | None": float | list[float] | None,
+}
+
+
+class Disc(Part):
+    """An outline: a circle."""
+
+    center: Vector
+    radius: Annotated[float, Field(gt=0)]
+
+
+_BY_NAME: dict[str, Any] = {
+    "points": list[Vector],
+    "outline": list[Vector] | Disc,
+    "point": Vector | list[Vector] | None,
+}
+
+
+def _fields(what: Callable[..., Any], *, skip: tuple[str, ...] = ()) -> dict[str, Any]:
+    """The arguments of a class or a function as fields of a model."""
+    fields: dict[str, Any] = {}
+    for name, parameter in inspect.signature(what).parameters.items():
+        if name in skip or parameter.kind in (parameter.VAR_KEYWORD, parameter.VAR_POSITIONAL):
+            continue
+        kind = _BY_NAME.get(name) or _ANNOTATED[str(parameter.annotation)]
+        default = parameter.default
+        if default is parameter.empty:
+            fields[name] = (kind, ...)
+        elif isinstance(default, int | float | tuple | None):
+            # Infinity is said by leaving the key out: JSON has none.
+            fields[name] = (kind, default) if default not in (float("inf"),) else (kind | None, None)
+        else:
+            fields[name] = (kind, None)
+    return fields
+
+
+def _models(base: type | tuple[type, ...]) -> list[type[BaseModel]]:
+    """A model for each class of the engine that derives from `base`."""
+    found = []
+    for name, kind in KINDS.items():
+        if issubclass(kind.cls, base):
+            fields = _fields(kind.cls)
+            if issubclass(kind.cls, Obstacle):
+                surface = _fields(Obstacle.__init__, skip=("self", "points"))
+                fields |= {key: surface[key] for key in SURFACE}
+            fields["state"] = (dict[str, Any] | None, None)
+            found.append(_named(name, fields, inspect.getdoc(kind.cls)))
+    return found
+
+
+_walls = _models((rooms.Box, rooms.Circle))
+Walls: Any = _one_of(_walls)
+_ANNOTATED["Box | Circle"] = Walls
+Room: Any = _one_of([*_walls, *_models((rooms.Open, naive.ClampAndFlip, naive.ProjectOnly))])
+_ANNOTATED["Boundary"] = Room
+Method: Any = _one_of(_models((Fast, BruteForce)))
+Integrators: Any = _one_of(_models(Integrator))
+Forces: Any = _one_of(_models(Force))
+Obstacles: Any = _one_of(_models(Obstacle))
+Actors: Any = _one_of(_models(Actor))
+
+
+class Collisions(Part):
+    """How circles collide."""
+
+    type: Literal["Collisions"] = "Collisions"
+    restitution: Annotated[float, Field(ge=0, le=1)] = 0.0
+    friction: Annotated[float, Field(ge=0)] = 0.0
+    method: Method = Field(default_factory=lambda: MODELS["Fast"](type="Fast"))
+
+
+# ---- groups ------------------------------------------------------------------------------------------------------------
+
+
+class Group(Part):
+    """Circles that are added together."""
+
+    name: str | None = None
+    velocity: Vector = (0.0, 0.0)
+    spin: float = 0.0
+    mass: Annotated[float, Field(gt=0)] | None = None
+    """kg, of each; unless said, 1 kg for a radius of 0.5 m, and others by their area."""
+    restitution: Annotated[float, Field(ge=0, le=1)] | None = None
+    friction: Annotated[float, Field(ge=0)] | None = None
+    category: Bits = 1
+    mask: Bits = EVERYONE
+    pinned: bool = False
+
+
+class Fill(Group):
+    """Circles spread evenly over a region, a little shaken, none on top of another."""
+
+    type: Literal["fill"]
+    region: Walls
+    count: Annotated[int, Field(ge=1)]
+    radius: Annotated[float, Field(gt=0)] = 0.5
+    """m, root mean square."""
+    spread: Annotated[float, Field(ge=1)] = 1.0
+    """Bound on largest / smallest radius."""
+    seed: Annotated[int, Field(ge=0)] = 0
+
+
+class Lattice(Group):
+    """Circles in rows and columns, up and to the right of the first."""
+
+    type: Literal["lattice"]
+    origin: Vector
+    columns: Annotated[int, Field(ge=1)]
+    rows: Annotated[int, Field(ge=1)] = 1
+    spacing: Vector
+    radius: Annotated[float, Field(gt=0)] = 0.5
+
+
+class Circles(Group):
+    """Circles one by one."""
+
+    type: Literal["circles"]
+    position: list[Vector]
+    radius: Annotated[float, Field(gt=0)] | list[Annotated[float, Field(gt=0)]] = 0.5
+
+
+class Arrays(Part):
+    """Circles from arrays in a .npz file beside this one: NAME.position, NAME.radius and so on."""
+
+    type: Literal["arrays"]
+    name: str
+    file: str
+    hash: str
+    """Of the file, as `pyverlet scene freeze` wrote it: another file is refused."""
+
+
+MODELS |= {"fill": Fill, "lattice": Lattice, "circles": Circles, "arrays": Arrays}
+Groups: Any = _one_of([Fill, Lattice, Circles, Arrays])
+
+
+# ---- builders and links ------------------------------------------------------------------------------------------------
+
+BUILDERS: dict[str, Any] = {name: getattr(builders, name) for name in ("chain", "rope", "net", "cloth", "bridge", "soft_body")}
+_built: dict[str, Any] = {"name": (str | None, None), "pinned": (list[int], [])}
+Builders: Any = _one_of(
+    [_named(name, _fields(build, skip=("world",)) | _built, inspect.getdoc(build)) for name, build in BUILDERS.items()]
+)
+
+LINKS: dict[str, Any] = {cls.__name__: cls for cls in (Stick, Rope, Spring, Pin, Angle, Area)}
+End = tuple[str, int | list[int]]
+"""The name of a group and an index in it, or several."""
+
+_ends = {"ends": (list[End], ...)}
+_ring = {"group": (str, ...), "ring": (list[int] | None, None)}
+Links: Any = _one_of(
+    [
+        _named(name, (_ring if cls is Area else _ends) | _fields(cls, skip=("group", "ring")), inspect.getdoc(cls))
+        for name, cls in LINKS.items()
+    ]
+)
+
+
+# ---- the whole ---------------------------------------------------------------------------------------------------------
+
+
+class World(Part):
+    """The laws and how they are computed; see `pyverlet.World`."""
+
+    gravity: Vector = STANDARD_GRAVITY
+    integrator: Integrators | None = None
+    substeps: Annotated[int, Field(ge=1)] = 8
+    dtype: Literal["float32", "float64"] = "float32"
+    ledger: bool = False
+    events: bool = False
+    sleep: bool = False
+
+
+class Run(Part):
+    """How long it is worth watching."""
+
+    seconds: Annotated[float, Field(gt=0)]
+
+
+class View(Part):
+    """What is shown."""
+
+    part: tuple[float, float, float, float]
+    """x0, y0, x1, y1 of the plane, m."""
+
+
+class SceneSettings(Part):
+    """Settings of a scene with a name; see `pyverlet.scenes.Settings`."""
+
+    particles: Annotated[int, Field(ge=1)] | None = None
+    substeps: Annotated[int, Field(ge=1)] | None = None
+    integrator: Integrators | None = None
+    restitution: Annotated[float, Field(ge=0, le=1)] | None = None
+    friction: Annotated[float, Field(ge=0)] | None = None
+    radius_spread: Annotated[float, Field(ge=1)] | None = None
+    seed: Annotated[int, Field(ge=0)] | None = None
+    dtype: Literal["float32", "float64"] | None = None
+    collisions: Method | Literal[False] | None = None
+    gravity: Vector | None = None
+    ledger: bool | None = None
+
+
+assert set(SceneSettings.model_fields) <= set(Settings.__dataclass_fields__)
+
+
+class Document(Part):
+    """A scene of pyverlet: a world from scratch, or one with a name and other settings. SI units, y up."""
+
+    format: Literal[1]
+    name: str | None = None
+    summary: str = ""
+    scene: str | None = None
+    """Of `pyverlet list`; then only `settings`, `run` and `view` may follow."""
+    settings: SceneSettings | None = None
+    world: World = Field(default_factory=World)
+    room: Room | None = None
+    """Open unless said."""
+    collisions: Collisions | Literal[False] = Field(default_factory=Collisions)
+    groups: list[Groups] = []
+    builders: list[Builders] = []
+    links: list[Links] = []
+    joined: list[dict[str, Any]] = []
+    """Links of a frozen scene, as pyverlet describes them; not to be written by hand."""
+    forces: list[Forces] = []
+    obstacles: list[Obstacles] = []
+    actors: list[Actors] = []
+    run: Run | None = None
+    view: View | None = None
+    start_hash: str | None = None
+    """`World.state_hash` of the start: a recipe that gives another start than it did is refused."""
+
+
+SECTIONS: dict[str, type[BaseModel]] = {
+    "world": World,
+    "run": Run,
+    "view": View,
+    "settings": SceneSettings,
+    "collisions": Collisions,
+    "Disc": Disc,
+}
+
+TABLES = {"room", "method", "integrator", "region"}
+"""Keys whose table has a `type`, which pydantic names in the place of an error."""
+
+INNER = {"Collisions", "literal[False]", "Disc", "float", "list[float]", "constrained-float", "list[constrained-float]"}
+"""What pydantic calls the choices it tried: no keys of a file."""

@@ -1,0 +1,269 @@
+"""A world in a file, to go on from with the same bits in any process: `save` and `load`."""
+
+from __future__ import annotations
+
+import dataclasses
+import platform
+import sys
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.compile import jit
+from pyverlet.data import archive, describe_links, memory
+from pyverlet.data.describe import Builder, describe
+from pyverlet.data.durable import replacing
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
+from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.integrators import Integrator
+from pyverlet.laws.obstacles import Obstacle
+from pyverlet.laws.rooms import Boundary
+from pyverlet.world import parts as apart
+from pyverlet.world.actors import Actor
+from pyverlet.world.measures import hash_of
+from pyverlet.world.parts import Parts
+from pyverlet.world.world import World
+
+Array = NDArray[Any]
+Header = dict[str, Any]
+
+FORMAT = 1
+
+MIGRATIONS: dict[int, Callable[[Header, dict[str, Array]], None]] = {}
+"""Of a format number: changes what was read of a file of that format, in place, into the next."""
+
+
+class OtherBits(UserWarning):
+    """A world was loaded that other kernels wrote: from here on it may differ from theirs in the last bits."""
+
+
+# ---- saving ------------------------------------------------------------------------------------------------------------
+
+
+def save(world: World, path: str | Path, *, scene: Mapping[str, Any] | None = None) -> None:
+    """Write a world to a file, from which `load` goes on with the same bits: all at once, or not at all.
+
+    Everything that moves, remembers or acts is kept; compiled code, the profile and the onlooker are not. Objects of classes of
+    your own are kept by name, and with what their `save` returns if they are actors.
+
+    Args:
+        world: between two frames.
+        path: of the file, `heap.pvsnap` by custom. An old one is replaced when the new one is whole on the disk.
+        scene: kept along with it, as JSON has it: which document the world was made from.
+
+    Raises:
+        InputError: the file cannot be written, a value is one that no world can go on from, or something remembers what files
+            cannot hold. An old file is as it was.
+    """
+    if not isinstance(world, World):
+        raise InputError(f"world is {world!r}; allowed is a pyverlet.World")
+    header, arrays = to_table(world, scene)
+    with ThreadPoolExecutor(1) as beside, replacing(Path(path)) as file:
+        hashed = beside.submit(_hash, header, arrays)  # of a million circles it takes as long as all the rest
+        apart.check(Parts(header["facts"], _moving(arrays)), world.dtype)
+        archive.write(file, lambda: header | {"state_hash": hashed.result()}, arrays)
+
+
+def to_table(world: World, scene: Mapping[str, Any] | None = None) -> tuple[Header, dict[str, Array]]:
+    """What a file of the world holds: a table as JSON has it, without the state's hash, and arrays."""
+    moving = apart.take_apart(world)
+    arrays = dict(moving.arrays)
+
+    def put_aside(array: Array) -> dict[str, str]:
+        name = f"extra.{sum(known.startswith('extra.') for known in arrays)}"
+        arrays[name] = array
+        return {memory.ARRAY: name}
+
+    header: Header = {
+        "format": FORMAT,
+        "made_by": _made_by(),
+        "kernels": jit.sources_hash(),
+        "particles": len(world),
+        "scene": memory.pack(dict(scene)) if scene is not None else None,
+        "world": memory.map_arrays(_settings(world), put_aside),
+        "facts": memory.pack(moving.facts),
+    }
+    return header, arrays
+
+
+def _moving(arrays: dict[str, Array]) -> dict[str, Array]:
+    return {name: array for name, array in arrays.items() if not name.startswith("extra.")}
+
+
+def _hash(header: Header, arrays: dict[str, Array]) -> str:
+    names = ("position", "velocity", "spin", "angle", "radius", "mass")
+    return hash_of(header["facts"]["time"], (arrays[f"particles.{name}"] for name in names))
+
+
+def _made_by() -> dict[str, str]:
+    import pyverlet
+
+    return {
+        "pyverlet": pyverlet.__version__, "numpy": np.__version__, "numba": version("numba"),
+        "python": platform.python_version(), "system": sys.platform, "machine": platform.machine(),
+    }  # fmt: skip
+
+
+def _settings(world: World) -> dict[str, Any]:
+    """How the world was built, and what acts in it."""
+    return {
+        "dtype": world.dtype.name,
+        "gravity": list(world.gravity),
+        "substeps": world.substeps,
+        "threads": world._threads,
+        "ledger": world.keeps_ledger,
+        "events": world.tells_events,
+        "sleep": world._sleep is not None,
+        "boundary": describe(world.boundary),
+        "collisions": world.collisions and describe(world.collisions),
+        "integrator": describe(world.integrator),
+        "forces": [describe(force) for force in world.forces],
+        "obstacles": [describe(obstacle) for obstacle in world.obstacles],
+        "actors": [describe(actor) for actor in world.actors],
+        "links": describe_links.describe(world),
+        "iterations": world.links.iterations,
+    }
+
+
+# ---- loading -----------------------------------------------------------------------------------------------------------
+
+
+def load(path: str | Path, exact: bool = False, objects: Iterable[Any] = ()) -> World:
+    """The world that `save` wrote.
+
+    It goes on with the same bits as the one that was saved, in any process and on any number of threads. If other kernels than
+    these wrote the file, another version of pyverlet's, it goes on from the same state, and a warning says that bits may differ.
+
+    Args:
+        path: of the file.
+        exact: refuse a file that other kernels wrote.
+        objects: for what is of classes of your own: forces, actors, a boundary, an integrator, obstacles, functions made forces,
+            several of one class in the order of the world; and classes of links.
+
+    Raises:
+        InputError: there is no such file, it is damaged or of a newer format, `exact` is not to be had, or an object is missing.
+    """
+    path = Path(path)
+    header, arrays = archive.read(path)
+    try:
+        return from_table(header, arrays, exact=exact, objects=objects)
+    except InputError as error:
+        raise InputError(f"'{path}': {error}") from error.__cause__
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
+        raise InputError(f"'{path}' lacks something ({error!r}); allowed is a file as pyverlet wrote it") from error
+
+
+def from_table(header: Header, arrays: dict[str, Array], *, exact: bool = False, objects: Iterable[Any] = ()) -> World:
+    """The world of what `to_table` returned; the arrays are its own from now on."""
+    if _migrated(header, arrays) and exact:
+        raise InputError("exact is True, and the file is of an older format; allowed is exact=False")
+    ours = header["kernels"] == jit.sources_hash()
+    if exact and not ours:
+        raise InputError(
+            f"exact is True, and the file was written by other kernels ({header['kernels']}, pyverlet "
+            f"{header['made_by']['pyverlet']}) than these ({jit.sources_hash()}); allowed is exact=False"
+        )
+    settings = _with_arrays(header["world"], arrays)
+    moving = Parts(memory.unpack(header["facts"]), _moving(arrays))
+    if unknown := set(moving.arrays) - set(apart.FIELDS):
+        raise InputError(f"there is an array {min(unknown)!r}; allowed are those pyverlet knows")
+    with ThreadPoolExecutor(1) as beside:
+        hashed = beside.submit(_hash, header, arrays)
+        world = _world(settings, moving, list(objects))
+    if header.get("state_hash", hashed.result()) != hashed.result():
+        raise InputError(f"the state's hash is {hashed.result()}; allowed is {header['state_hash']}, as when it was written")
+    if not ours:
+        warnings.warn(
+            f"this world was written by other kernels (pyverlet {header['made_by']['pyverlet']}): it goes on from the same "
+            "state, and may differ from theirs in the last bits",
+            OtherBits,
+            stacklevel=3,
+        )
+    return world
+
+
+def _migrated(header: Header, arrays: dict[str, Array]) -> bool:
+    """Bring what was read up to the format of now. Whether there was anything to do."""
+    first = number = checks.whole("format", header.get("format"))
+    if number > FORMAT:
+        raise InputError(f"format is {number}, of a newer pyverlet; allowed are 1 to {FORMAT}")
+    for older in range(number, FORMAT):
+        MIGRATIONS[older](header, arrays)
+    return first < FORMAT
+
+
+def _with_arrays(value: Any, arrays: dict[str, Array]) -> Any:
+    if isinstance(value, list):
+        return [_with_arrays(part, arrays) for part in value]
+    if isinstance(value, dict):
+        if list(value) == [memory.ARRAY]:
+            return arrays[value[memory.ARRAY]]
+        return {key: _with_arrays(part, arrays) for key, part in value.items()}
+    return value
+
+
+def _world(settings: dict[str, Any], moving: Parts, objects: list[Any]) -> World:
+    builder = Builder(objects)
+    threads = settings["threads"]
+    world = World(
+        gravity=settings["gravity"],
+        boundary=builder.build("boundary", settings["boundary"], Boundary),
+        collisions=settings["collisions"] and builder.build("collisions", settings["collisions"], Collisions),
+        integrator=builder.build("integrator", settings["integrator"], Integrator),
+        substeps=settings["substeps"],
+        dtype=settings["dtype"],
+        threads=None if threads is None else min(checks.whole("threads", threads), jit.max_threads()),
+        ledger=settings["ledger"],
+        events=settings["events"],
+        sleep=settings["sleep"],
+    )
+    builder.world = world
+    apart.fill(world, moving)
+    rooms: Any = {"forces": (world.forces, object), "obstacles": (world.obstacles, Obstacle), "actors": (world.actors, Actor)}
+    for name, (room, wanted) in rooms.items():
+        for number, description in enumerate(settings[name]):
+            room.append(builder.build(f"{name}[{number}]", description, wanted))
+    describe_links.build(world, settings["links"], objects)
+    world.links.iterations = settings["iterations"]
+    world.restore(apart.put_together(world, moving))
+    return world
+
+
+@dataclasses.dataclass(frozen=True)
+class About:
+    """What a file says about the world in it, without building that."""
+
+    format: int
+    particles: int
+    time: float
+    frames: int
+    state_hash: str
+    kernels: str
+    made_by: dict[str, str]
+    scene: dict[str, Any] | None
+    settings: dict[str, Any]
+    same_kernels: bool
+
+
+def about(path: str | Path) -> About:
+    """What is in a file.
+
+    Raises:
+        InputError: there is no such file, or it is damaged.
+    """
+    header, _ = archive.read(Path(path))
+    try:
+        facts = header["facts"]
+        return About(
+            header["format"], header["particles"], facts["time"], facts["frames"], header["state_hash"], header["kernels"],
+            header["made_by"], header["scene"], header["world"], header["kernels"] == jit.sources_hash(),
+        )  # fmt: skip
+    except (KeyError, TypeError) as error:
+        raise InputError(f"'{path}' lacks {error}; allowed is a file that pyverlet.save wrote") from None

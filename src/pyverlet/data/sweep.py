@@ -1,0 +1,247 @@
+"""Parameter studies: one world a combination, on all cores or a cluster, that go on where they were ended."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.data import sweep_rows, sweep_run
+from pyverlet.data.sweep_plan import Plan, plain
+from pyverlet.data.sweep_rows import Rows
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
+from pyverlet.ground.progress import Progress
+from pyverlet.scenes import Scene, get
+from pyverlet.world.world import World
+
+Measure = Callable[[World], Any]
+
+
+class Status(NamedTuple):
+    """How far a study is: runs in all, those that have a row, those of them that failed, those of other kernels or versions."""
+
+    runs: int
+    done: int
+    failed: int
+    foreign: int
+
+
+class Verified(NamedTuple):
+    """What `Study.verify` found: runs computed again, and those of them that came out otherwise."""
+
+    runs: list[int]
+    differ: list[int]
+
+
+def sweep(
+    scene: str | Scene,
+    grid: Mapping[str, Sequence[Any]],
+    *,
+    out: str | Path,
+    measure: Measure | None = None,
+    seconds: float | None = None,
+    dt: float = 1 / 60,
+    **settings: Any,
+) -> Study:
+    """A study: a world of a scene for each combination of settings, run for some seconds and measured.
+
+    Args:
+        scene: its name, or a `pyverlet.scenes.Scene`.
+        grid: values of each setting, such as {"friction": [0, 0.2, 0.4], "seed": range(100)}; the last changes fastest.
+        out: the folder of the study. One that has this study goes on with it; it may have grown by values of the grid.
+        measure: of (world) when its seconds have passed: a number, or numbers and text by name. None is `basics`.
+        seconds: simulated; None leaves the running to `measure`.
+        dt: seconds a frame.
+        settings: of all runs.
+
+    Raises:
+        InputError: there is no such setting, a value is not allowed or NaN, the folder cannot be written, or has another study.
+    """
+    scene = get(scene) if isinstance(scene, str) else scene
+    values = {name: list(each) for name, each in _checked(grid).items()}
+    if both := values.keys() & settings.keys():
+        raise InputError(f"{min(both)} is in the grid and beside it; allowed is one of them")
+    if measure is not None and not callable(measure):
+        raise InputError(f"measure is {measure!r}; allowed is a function of a world")
+    dt = checks.number("dt", dt, above=0.0)
+    frames = None if seconds is None else round(checks.number("seconds", seconds, least=0.0) / dt)
+    plan = Plan(scene, values, settings, measure or basics, frames, dt)
+    for name, each in values.items():
+        for value in each:
+            scene.settings(**settings, **{name: value})
+    return Study(plan, Path(out))
+
+
+def _checked(grid: Any) -> Mapping[str, Sequence[Any]]:
+    if not isinstance(grid, Mapping) or not grid:
+        raise InputError(f"grid is {grid!r}; allowed are values by setting, such as {{'friction': [0, 0.2]}}")
+    for name, values in grid.items():
+        if isinstance(values, str | bytes) or not hasattr(values, "__iter__") or not len(list(values)):
+            raise InputError(f"{name} of the grid is {values!r}; allowed are one value or more, in a list")
+        known = [plain(name, value) for value in values]
+        if twice := [value for number, value in enumerate(known) if value in known[:number]]:
+            raise InputError(f"{name} of the grid has {twice[0]!r} twice; allowed is each once")
+    return grid
+
+
+def basics(world: World) -> dict[str, float]:
+    """What is measured unless said: energy, overlap, who has escaped, the height of the middle of all."""
+    energy, overlap = world.energy(), world.overlap()
+    return {
+        "energy": energy.total,
+        "kinetic": energy.kinetic,
+        "overlap_mean": overlap.mean,
+        "overlap_max": overlap.max,
+        "escaped": world.escaped(),
+        "height": float(world.position[:, 1].mean(dtype=np.float64)) if len(world) else 0.0,
+    }
+
+
+class Study:
+    """What `sweep` returns. Its folder holds `plan.json`, `rows.jsonl`, `timing.jsonl` and, once all is done, `table.csv`."""
+
+    def __init__(self, plan: Plan, folder: Path) -> None:
+        self._plan, self._folder = plan, folder
+        sweep_rows.open_folder(folder, plan)
+        self._runs = plan.runs()
+
+    def __len__(self) -> int:
+        return len(self._runs)
+
+    def __repr__(self) -> str:
+        status = self.status()
+        return f"Study of {self._plan.scene.name!r}: {status.done} of {status.runs} runs, in '{self._folder}'"
+
+    # ---- running -------------------------------------------------------------------------------------------------------
+
+    def run(
+        self, executor: Executor | None = None, *, processes: int | None = None, workers: int | None = None, again: bool = False
+    ) -> Any:
+        """Make the runs that have no row yet, and return the table.
+
+        It may be ended at any time, and started again. Each row is kept as it arrives, and the table is the same byte for byte
+        whatever happened on the way. A worker that is killed costs its runs only; a run that raises is a row that says so.
+
+        Args:
+            executor: any `concurrent.futures.Executor`: Dask's `client.get_executor(pure=False)`, loky, MPIPoolExecutor. None:
+                processes on this machine.
+            processes: how many of these; 1 is this one alone, None one for each core.
+            workers: of the executor, where it does not say.
+            again: make those again that failed, or that other kernels or versions have made.
+
+        Raises:
+            InputError: another process is at it, rows are of other kernels, or measures return different columns.
+            Interrupted: Ctrl-C; all rows until then are kept.
+        """
+        with sweep_rows.only_one(self._folder), Rows(self._folder) as rows:
+            left = [run for run in self._runs if self._lacks(rows.get(run.key), again=again)]
+            done = len(self._runs) - len(left)
+            with Progress(f"{self._plan.scene.name}, run") as progress:
+                progress(done, len(self._runs))
+                columns = _Columns(row for run in self._runs if (row := rows.get(run.key)) and run not in left)
+                for row, seconds in sweep_run.make(self._plan, left, executor, processes=processes, workers=workers):
+                    rows.add(row, seconds)
+                    self._lacks(row, again=False)  # a worker may have other kernels
+                    done += 1
+                    progress(done, len(self._runs))
+                    columns.check(row)
+            sweep_rows.write_table(self._folder, self._plan, self._table_rows(rows))
+        return self.table()
+
+    def _lacks(self, row: Mapping[str, Any] | None, *, again: bool) -> bool:
+        if row is None:
+            return True
+        if row["made_by"] != sweep_rows.made_by():
+            if not again:
+                theirs, ours = (" ".join(map(str, each.values())) for each in (row["made_by"], sweep_rows.made_by()))
+                raise InputError(
+                    f"'{self._folder}' has rows made by {theirs}, and this is {ours}; allowed are a new folder, and again=True"
+                )
+            return True
+        return again and row["error"] is not None
+
+    def _table_rows(self, rows: Rows) -> list[Mapping[str, Any]]:
+        return [row for run in self._runs if (row := rows.get(run.key)) is not None]
+
+    # ---- looking -------------------------------------------------------------------------------------------------------
+
+    def _read(self) -> Rows:
+        return Rows(self._folder, read_only=True)
+
+    def status(self) -> Status:
+        """How far it is."""
+        found = self._table_rows(self._read())
+        ours = sweep_rows.made_by()
+        failed = sum(row["error"] is not None for row in found)
+        return Status(len(self._runs), len(found), failed, sum(row["made_by"] != ours for row in found))
+
+    def table(self) -> Any:
+        """The rows there are, in the order of the grid: a DataFrame if pandas is installed, a structured array otherwise."""
+        array = self.array()
+        try:
+            import pandas as pd
+        except ImportError:
+            return array
+        return pd.DataFrame({name: array[name] for name in array.dtype.names or ()})
+
+    def array(self) -> NDArray[Any]:
+        """The rows there are as a structured array: run, settings, what was measured, hashes, error, and who made it."""
+        return sweep_rows.as_array(self._plan, self._table_rows(self._read()))
+
+    def world(self, k: int) -> World:
+        """The world of run k as it starts, to look at live: `pv.view(study.world(17))`."""
+        return self._plan.world(self._run(k))
+
+    def _run(self, k: int) -> Any:
+        return self._runs[checks.whole("k", k, least=0, most=len(self._runs) - 1)]
+
+    def verify(self, rows: int = 5, *, seed: int | None = None) -> Verified:
+        """Make some runs again in this process, drawn at random of those there are, and compare hashes and what was measured.
+
+        Args:
+            rows: how many; all, if there are fewer.
+            seed: of the draw; None draws others each time.
+        """
+        known = self._read()
+        ready = [run for run in self._runs if (row := known.get(run.key)) is not None and row["error"] is None]
+        most = checks.whole("rows", rows)
+        chosen = np.random.default_rng(seed).permutation(len(ready))[:most]
+        picked = sorted((ready[k] for k in chosen), key=lambda run: run.number)
+        differ = []
+        with Progress("verifying, run") as progress:
+            for done, run in enumerate(picked):
+                row, told = sweep_run.one(self._plan, run), known.get(run.key)
+                assert told is not None
+                if row["values"] == {}:  # of a measure nobody knows here
+                    row["values"] = told["values"]
+                if any(row[name] != told[name] for name in ("start", "end", "values", "error")):
+                    differ.append(run.number)
+                progress(done + 1, len(picked))
+        return Verified([run.number for run in picked], differ)
+
+
+class _Columns:
+    """All runs measure the same things."""
+
+    def __init__(self, rows: Iterator[Mapping[str, Any]]) -> None:
+        self._first: Mapping[str, Any] | None = None
+        for row in rows:
+            self.check(row)
+
+    def check(self, row: Mapping[str, Any]) -> None:
+        if row["error"] is not None:
+            return
+        self._first = self._first or row
+        if list(row["values"]) != list(self._first["values"]):
+            one, other = (f"{', '.join(each['values'])} for run {each['key'][:8]}" for each in (row, self._first))
+            raise InputError(
+                f"measure returned {one}, and {other}; allowed are the same columns for all (the rows there are have been kept)"
+            )
+
+
+__all__ = ["Status", "Study", "Verified", "basics", "sweep"]

@@ -1,0 +1,131 @@
+"""What a study is made of: which runs, and what makes one of them itself and no other."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pyverlet.data import memory
+from pyverlet.data.describe import KINDS, describe
+from pyverlet.ground.errors import InputError
+from pyverlet.scenes import SCENES, Scene
+from pyverlet.world.world import World
+
+FORMAT = 1
+
+SCENE_FILE = "scene.json"
+"""In the folder of a study of a scene that was read from a file: a copy of that."""
+
+
+class Run(NamedTuple):
+    """One run: its number in the grid, its key and its settings, as the scene takes them."""
+
+    number: int
+    key: str
+    settings: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A study.
+
+    Attributes:
+        scene: of all worlds.
+        grid: values by setting.
+        settings: of all runs.
+        measure: of a world at the end.
+        frames: to run; None leaves that to `measure`.
+        dt: seconds a frame.
+    """
+
+    scene: Scene
+    grid: dict[str, list[Any]]
+    settings: dict[str, Any]
+    measure: Callable[[World], Any]
+    frames: int | None
+    dt: float
+
+    def about(self) -> dict[str, Any]:
+        """All but the grid, as JSON has it: studies that differ in this are others."""
+        return {
+            "format": FORMAT,
+            "scene": _scene(self.scene),
+            "settings": {name: plain(name, value) for name, value in sorted(self.settings.items())},
+            # Without its module, which is another for who runs a script than for who imports it.
+            "measure": getattr(self.measure, "__qualname__", type(self.measure).__qualname__),
+            "frames": self.frames,
+            "dt": self.dt,
+        }
+
+    def described_grid(self) -> dict[str, Any]:
+        """The grid as JSON has it."""
+        return {name: [plain(name, value) for value in values] for name, values in self.grid.items()}
+
+    def runs(self) -> list[Run]:
+        """All of them, the last setting of the grid changing fastest."""
+        head = _canonical(self.about())
+        known = [[(value, self._said(name, value)) for value in values] for name, values in self.grid.items()]
+        runs = []
+        for number, chosen in enumerate(itertools.product(*known)):
+            text = head + ",".join(sorted(said for _, said in chosen))
+            key = hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+            runs.append(Run(number, key, dict(zip(self.grid, (value for value, _ in chosen), strict=True))))
+        return runs
+
+    @staticmethod
+    def _said(name: str, value: Any) -> str:
+        return f"{json.dumps(name)}:{_canonical(plain(name, value))}"
+
+    def world(self, run: Run) -> World:
+        """The world of a run as it starts. One thread steps it: runs share the cores among themselves."""
+        return self.scene.world(**{"threads": 1, **self.settings, **run.settings})
+
+
+def bare(scene: Scene) -> Scene:
+    """The scene without what is for the eye alone, and may be functions that no other process can be sent."""
+    return replace(scene, show=replace(scene.show, view=None, seconds=None), closed_form=None, variants=())
+
+
+def _scene(scene: Scene) -> Any:
+    if SCENES.get(scene.name) is scene:
+        return scene.name
+    document = getattr(scene, "document", None)
+    if document is not None:
+        return memory.plain(memory.pack(document))
+    build = scene.build
+    return {"name": scene.name, "build": f"{build.__module__}:{getattr(build, '__qualname__', type(build).__qualname__)}"}
+
+
+def _canonical(value: Any) -> str:
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def plain(name: str, value: Any) -> Any:
+    """A setting as JSON has it.
+
+    Raises:
+        InputError: it is NaN, or an object nobody could describe.
+    """
+    if isinstance(value, float | np.floating) and not math.isfinite(value):
+        raise InputError(f"{name} is {float(value)}; allowed are finite numbers")
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, type):
+        return np.dtype(value).name
+    if isinstance(value, tuple | list):
+        return [plain(name, part) for part in value]
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if type(value).__name__ in KINDS:
+        return memory.plain(describe(value))
+    raise InputError(f"{name} is {value!r}; allowed are numbers, text and objects of pyverlet's")

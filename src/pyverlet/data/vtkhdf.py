@@ -1,0 +1,154 @@
+"""VTKHDF: points that come, go and move, in an HDF5 file that ParaView opens. By h5py.
+
+A moment is a step of a PolyData with a vertex for each circle: https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pyverlet.data.frames import Array, Frame, Reader, Writer
+from pyverlet.data.whole import WholeFile
+
+if TYPE_CHECKING:
+    from pyverlet.world.world import World
+
+VERSION = (2, 0)
+"""Of the format: the first with steps of PolyData."""
+
+KINDS = ("Vertices", "Lines", "Polygons", "Strips")
+"""Cells of a PolyData, in the order of the format; there are only vertices here."""
+
+COLUMNS = ("velocity", "radius", "mass", "spin", "number")
+
+STEPS = 128
+"""Steps in a chunk of what there is once a step: the last chunk of each array is written again with every frame."""
+
+ROWS = (256, 1 << 16)
+"""Least and most circles in a chunk; between them as many as the first frame has, so that a frame fills its chunk."""
+
+
+class VtkHdfWriter(Writer):
+    """All steps one after the other in each array; Steps says where each begins."""
+
+    needs = "h5py"
+
+    def __init__(self, path: Path) -> None:
+        import h5py
+
+        self._disk = WholeFile(path)
+        self._file: Any = h5py.File(self._disk, "w", libver=("v110", "v110"))
+        self._root: Any = None
+        self._cells = 0  # the first vertex of the part under way
+
+    def add(self, frame: Frame, world: World) -> None:
+        if self._root is None:
+            self._begin(frame)
+        root, count = self._root, len(frame)
+        steps, parts = root["Steps"], root["NumberOfPoints"]
+        at = len(root["Points"])
+        if not len(parts) or count != parts[-1]:
+            self._begin_part(count)
+        points = np.zeros((count, 3), frame.position.dtype)
+        points[:, :2] = frame.position
+        _append(root["Points"], points)
+        for name in COLUMNS:
+            values = getattr(frame, name)
+            _append(root["PointData"][name], np.pad(values, ((0, 0), (0, 1))) if name == "velocity" else values)
+            _append(steps["PointDataOffsets"][name], [at])
+        _append(steps["Values"], [frame.time])
+        _append(steps["PartOffsets"], [len(parts) - 1])
+        _append(steps["NumberOfParts"], [1])
+        _append(steps["PointOffsets"], [at])
+        _append(steps["CellOffsets"], [[self._cells, 0, 0, 0]])
+        _append(steps["ConnectivityIdOffsets"], [[self._cells, 0, 0, 0]])
+        steps.attrs.modify("NSteps", np.int64(len(steps["Values"])))
+        _append(self._file["pyverlet/state_hash"], np.array([frame.state_hash], "S16"))
+        self._file.flush()
+        self._disk.commit()
+
+    def _begin_part(self, count: int) -> None:
+        """A vertex for each of `count` circles, which the steps from here on share until that number changes."""
+        root = self._root
+        self._cells = len(root["Vertices/Connectivity"])
+        _append(root["NumberOfPoints"], [count])
+        for kind in KINDS:
+            own = np.arange(count + 1 if kind == "Vertices" else 1)
+            _append(root[kind]["NumberOfCells"], [len(own) - 1])
+            _append(root[kind]["NumberOfConnectivityIds"], [len(own) - 1])
+            _append(root[kind]["Connectivity"], own[:-1])
+            _append(root[kind]["Offsets"], own)
+
+    def _begin(self, frame: Frame) -> None:
+        """The arrays, still empty, of the precision of the world."""
+        real, rows = frame.position.dtype, min(max(len(frame), ROWS[0]), ROWS[1])
+        file = self._file
+        root = file.create_group("VTKHDF")
+        root.attrs["Version"] = np.array(VERSION, np.int64)
+        root.attrs.create("Type", np.bytes_(b"PolyData"))
+        _empty(root, "NumberOfPoints", np.int64)
+        _empty(root, "Points", real, 3, rows=rows)
+        for kind in KINDS:
+            for name in ("NumberOfCells", "NumberOfConnectivityIds"):
+                _empty(root, f"{kind}/{name}", np.int64)
+            for name in ("Connectivity", "Offsets"):
+                _empty(root, f"{kind}/{name}", np.int64, rows=rows if kind == "Vertices" else STEPS)
+        for name in COLUMNS:
+            _empty(root, f"PointData/{name}", np.int64 if name == "number" else real, 3 if name == "velocity" else 0, rows=rows)
+            _empty(root, f"Steps/PointDataOffsets/{name}", np.int64)
+        for name in ("PartOffsets", "NumberOfParts", "PointOffsets"):
+            _empty(root, f"Steps/{name}", np.int64)
+        for name in ("CellOffsets", "ConnectivityIdOffsets"):
+            _empty(root, f"Steps/{name}", np.int64, 4)
+        _empty(root, "Steps/Values", np.float64)
+        root["Steps"].attrs["NSteps"] = np.int64(0)
+        _empty(file, "pyverlet/state_hash", np.dtype("S16"))
+        self._root = root
+
+    def close(self) -> None:
+        self._file.close()
+        self._disk.close()
+
+
+class VtkHdfReader(Reader):
+    """Files that `VtkHdfWriter` made."""
+
+    needs = "h5py"
+
+    def __init__(self, path: Path) -> None:
+        import h5py
+
+        self._file: Any = h5py.File(path, "r")
+        if "VTKHDF/Steps/Values" not in self._file or "pyverlet/state_hash" not in self._file:
+            self._file.close()
+            raise ValueError("it was not written by pyverlet")
+        self._root = self._file["VTKHDF"]
+
+    def __len__(self) -> int:
+        return int(self._root["Steps"].attrs["NSteps"])
+
+    def frame(self, k: int) -> Frame:
+        root, steps = self._root, self._root["Steps"]
+        start, count = int(steps["PointOffsets"][k]), int(root["NumberOfPoints"][steps["PartOffsets"][k]])
+        here = slice(start, start + count)
+        columns = {name: root["PointData"][name][here] for name in COLUMNS}
+        columns["velocity"] = columns["velocity"][:, :2]
+        time, state_hash = float(steps["Values"][k]), self._file["pyverlet/state_hash"][k].decode()
+        return Frame(time, root["Points"][here][:, :2], state_hash=state_hash, **columns)
+
+    def close(self) -> None:
+        self._file.close()
+
+
+def _empty(group: Any, name: str, dtype: Any, width: int = 0, *, rows: int = STEPS) -> None:
+    tail = (width,) if width else ()
+    group.create_dataset(name, (0, *tail), dtype, maxshape=(None, *tail), chunks=(rows, *tail))
+
+
+def _append(dataset: Any, values: Array | list[Any]) -> None:
+    count = dataset.shape[0]
+    dataset.resize(count + len(values), axis=0)
+    dataset[count:] = values

@@ -1,0 +1,228 @@
+"""Many worlds of one scene behind one set of arrays: for training, statistics and tuning."""
+
+from __future__ import annotations
+
+import io
+import itertools
+import os
+import shutil
+import tempfile
+import weakref
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyverlet.compile import jit
+from pyverlet.data import archive, snapshot
+from pyverlet.data.crew import Crew, Keeper, Plan
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
+from pyverlet.scenes import Scene, get
+from pyverlet.world.world import World
+
+Array = NDArray[Any]
+
+_WORTH_A_PROCESS = 8
+"""Worlds that a process should have, for it takes a second to start."""
+
+_ARRAYS = ("position", "velocity", "spin", "radius", "mass")
+
+_tokens = itertools.count()
+
+
+@dataclass(frozen=True)
+class Start:
+    """What `Worlds.save` keeps; where the worlds are, so that going back takes no time. Opaque."""
+
+    owner: Any
+    token: int
+
+
+class Worlds:
+    """Worlds of one scene that differ in their seeds, stepped together on all cores.
+
+    The arrays are those of the worlds themselves: reading copies nothing, and what is written there is what the next frame begins
+    with. A world's bits are those it would have alone, however many there are and whoever steps them. Close them when done, or
+    use them in a `with` block.
+
+    Args:
+        scene: its name, or a `pyverlet.scenes.Scene`.
+        n: how many.
+        seed: of all of them: world k has `seed_of(seed, k)`.
+        processes: that share the work; 1 is this one alone. None is one for each core, if there are worlds enough.
+        settings: of the scene, as for `Scene.settings`.
+
+    Raises:
+        InputError: there is no such scene or setting, or the scene cannot be sent to another process.
+    """
+
+    def __init__(self, scene: str | Scene, n: int, *, seed: int = 0, processes: int | None = None, **settings: Any) -> None:
+        self.scene = get(scene) if isinstance(scene, str) else scene
+        self._count = checks.whole("n", n)
+        self.seed = checks.whole("seed", seed, least=0)
+        settings = {"threads": 1} | settings
+        if processes is None:
+            processes = max(min(jit.max_threads(), self._count // _WORTH_A_PROCESS), 1)
+        processes = checks.whole("processes", processes, most=self._count, most_is=", one for each world")
+        first = self.scene.world(**settings, seed=seed_of(self.seed, 0))
+        plan = Plan(self.scene, settings, self.seed, self._count, len(first), first.dtype.str)
+        folder = Path(tempfile.mkdtemp(prefix="pyverlet-", dir=_shared_folder()))
+        self._keepers: Sequence[Keeper] = ()
+        self._dropped: list[int] = []
+        try:
+            path = folder / "worlds"
+            with path.open("wb") as file:
+                file.truncate(plan.size)
+            cuts = np.linspace(0, self._count, processes + 1).astype(int).tolist()
+            ranges = list(itertools.pairwise(cuts))
+            self._shared = plan.open(path)
+            if processes == 1:
+                self._crew: Crew | None = None
+                self._keepers = [Keeper(plan, 0, self._count, self._shared)]
+            else:
+                self._crew = Crew(plan, ranges, path)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)  # it lives on as long as anyone has it open
+        self._first = [begin for begin, _ in ranges]
+        self._finalizer = weakref.finalize(self, self._crew.close) if self._crew else None
+
+    # ---- stepping ------------------------------------------------------------------------------------------------------
+
+    def step(self, dt: float) -> None:
+        """Advance each world by one frame of dt seconds.
+
+        Raises:
+            InputError: dt is not a number greater than 0.
+            NonFiniteError: a world turned NaN or infinite; it holds its last good frame, the others have gone on.
+        """
+        self._tell("step", checks.number("dt", dt, above=0.0))
+
+    def run(self, *, seconds: float, dt: float = 1 / 60) -> None:
+        """Advance by as many frames of dt as come nearest to `seconds`: in one go, so that nobody waits between frames."""
+        frames = round(checks.number("seconds", seconds, least=0.0) / checks.number("dt", dt, above=0.0))
+        self._tell("step", dt, frames)
+
+    def save(self) -> Start:
+        """A copy of everything that moves in all worlds, for `restore`. It stays where the worlds are."""
+        start = Start(weakref.ref(self), next(_tokens))
+        self._tell("save", start.token)
+        weakref.finalize(start, self._dropped.append, start.token)  # nobody can go back to what nobody has
+        return start
+
+    def restore(self, saved: Start, which: ArrayLike | None = None) -> None:
+        """Go back to what `save` returned.
+
+        Args:
+            saved: of these worlds.
+            which: an index, several, or (n,) bool; None is all.
+
+        Raises:
+            InputError: it is of other worlds, or there is no such world.
+        """
+        if getattr(saved, "owner", lambda: None)() is not self:
+            raise InputError("saved is none of these worlds'; allowed is what save() of them returned")
+        chosen = np.arange(self._count) if which is None else checks.indices("which", which, self._count)
+        self._tell("restore", saved.token, chosen.tolist())
+
+    def _tell(self, what: str, *arguments: Any) -> None:
+        while self._dropped:  # noted whenever the collector pleases, and told between two orders
+            self._order("drop", self._dropped.pop())
+        self._order(what, *arguments)
+
+    def _order(self, what: str, *arguments: Any) -> None:
+        if self._crew is not None:
+            self._crew.tell(what, *arguments)
+        for keeper in self._keepers:
+            getattr(keeper, what)(*arguments)
+
+    def close(self) -> None:
+        """End the processes that have the worlds. They cannot be stepped any more."""
+        if self._finalizer is not None:
+            self._finalizer()
+
+    def __enter__(self) -> Worlds:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    # ---- to look at ----------------------------------------------------------------------------------------------------
+
+    def _array(self, name: str) -> Array:
+        counts = self._shared["count"]
+        if (counts != self._shared[name].shape[1]).any():
+            raise InputError(
+                f"the worlds have {int(counts.min())} to {int(counts.max())} particles; allowed is {name} of worlds that have "
+                "equally many, as they began; many[k] is a world by itself"
+            )
+        return self._shared[name]
+
+    @property
+    def position(self) -> Array:
+        """(n, k, 2) centres of the k particles of each world, m."""
+        return self._array("position")
+
+    @property
+    def velocity(self) -> Array:
+        """(n, k, 2) m/s."""
+        return self._array("velocity")
+
+    @property
+    def spin(self) -> Array:
+        """(n, k) rad/s."""
+        return self._array("spin")
+
+    @property
+    def radius(self) -> Array:
+        """(n, k) m."""
+        return self._array("radius")
+
+    @property
+    def mass(self) -> Array:
+        """(n, k) kg."""
+        return self._array("mass")
+
+    @property
+    def gravity(self) -> Array:
+        """(n, 2) of each world, m/s^2."""
+        return self._shared["gravity"]
+
+    @property
+    def time(self) -> Array:
+        """(n,) seconds that have passed in each world; a copy."""
+        return self._shared["time"].copy()
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """(n,) particles in each world; a copy."""
+        return self._shared["count"].copy()
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, k: int) -> World:
+        """World k as it is now: one of its own, to look at and to go on with; these here stay as they are."""
+        if not -self._count <= k < self._count:
+            raise IndexError(f"world {k} of {self._count}")
+        k %= self._count
+        part = int(np.searchsorted(self._first, k, side="right")) - 1
+        raw = self._crew.ask(part, "file", k) if self._crew else self._keepers[0].file(k)
+        table, arrays = archive.read_from(io.BytesIO(raw), len(raw))
+        return snapshot.from_table(table, arrays)
+
+    def __iter__(self) -> Iterator[World]:
+        return (self[k] for k in range(self._count))
+
+
+def seed_of(seed: int, k: int) -> int:
+    """The seed of world or run k: independent of all others, and of who makes it."""
+    return int(np.random.SeedSequence((seed, k)).generate_state(1, np.uint64)[0])
+
+
+def _shared_folder() -> str | None:
+    """Where files are memory, if there is such a place."""
+    return "/dev/shm" if os.access("/dev/shm", os.W_OK) else None

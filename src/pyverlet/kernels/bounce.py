@@ -1,0 +1,127 @@
+"""Pairs that meet or part faster than a contact at rest does: one by one, for hardly any does."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pyverlet.compile.jit import kernel
+from pyverlet.compile.lanes import LANES
+from pyverlet.kernels.bounds import impact_time
+from pyverlet.kernels.tables import MU, R_I, R_J, E
+
+
+@kernel
+def _carry(circles, i, x, y):
+    """Move circle i by (x, y), which is no push and feeds nobody: `moved` gets what the position gets, rounded alike."""
+    to_x, to_y = circles.position[i, 0] + x, circles.position[i, 1] + y
+    circles.moved[i, 0] += to_x - circles.position[i, 0]
+    circles.moved[i, 1] += to_y - circles.position[i, 1]
+    circles.position[i, 0], circles.position[i, 1] = to_x, to_y
+
+
+@kernel
+def _bounce(i, j, dx, dy, reach, e, mu, ri, rj, circles, law, spent):
+    """An overlapping pair that meets faster than a contact at rest: back to when and where it met, and on from there.
+
+    At the time t ago at which their distance was `reach` they met at the speed v_n along n. They part with e v_n; the impulse
+    (1 + e) v_n / W, W = w_i + w_j, keeps the momentum, for e = 1 the energy too, and what was gained in velocity has carried them
+    for the time t. Friction takes the slip v_t of the rims, as far as mu times the impulse goes: a disc has I = m r^2 / 2, so
+    that the rims have the inverse mass 3 W along the tangent (n_y, -n_x). Returns whether they have met in this substep.
+    """
+    zero = law.h - law.h
+    half = law.h / (law.h + law.h)
+    two = (law.h + law.h) / law.h
+    three = two + law.h / law.h
+    v, a, w = circles.velocity, circles.acceleration, circles.inverse_mass
+    wi, wj = w[i], w[j]
+    ax, ay = a[j, 0] - a[i, 0], a[j, 1] - a[i, 1]
+    vx, vy = v[j, 0] - v[i, 0] + law.lag * ax, v[j, 1] - v[i, 1] + law.lag * ay
+    time = impact_time(dx, dy, vx, vy, ax, ay, reach, law.h)
+    dx -= time * (vx - half * time * ax)
+    dy -= time * (vy - half * time * ay)
+    distance = np.sqrt(dx * dx + dy * dy)
+    if not distance > zero:
+        return False
+    nx, ny = dx / distance, dy / distance
+    vx -= time * ax
+    vy -= time * ay
+    hit = -(vx * nx + vy * ny)
+    if not hit > law.rest_speed:
+        return False
+    kick = (hit + e * hit) / (wi + wj)
+    px, py = kick * nx, kick * ny
+    if spent.shape[0] > 0:
+        spent[0] -= half * np.float64(hit) * hit * (1.0 - np.float64(e) * e) / (wi + wj)
+    if mu > zero:
+        slip = vx * ny - vy * nx + circles.spin[i] * ri + circles.spin[j] * rj
+        most = mu * kick
+        rub = max(min(-slip / (three * (wi + wj)), most), -most)
+        px += rub * ny
+        py -= rub * nx
+        circles.spin[i] += two * rub * wi / ri
+        circles.spin[j] += two * rub * wj / rj
+        if spent.shape[0] > 0:
+            spent[1] += np.float64(rub) * (slip + 1.5 * (wi + wj) * rub)
+    v[i, 0], v[i, 1] = v[i, 0] - px * wi, v[i, 1] - py * wi
+    v[j, 0], v[j, 1] = v[j, 0] + px * wj, v[j, 1] + py * wj
+    _carry(circles, i, -time * px * wi, -time * py * wi)
+    _carry(circles, j, time * px * wj, time * py * wj)
+    return True
+
+
+@kernel
+def _make_room(i, j, dx, dy, reach, circles, law):
+    """A pair on its way apart goes to where it no longer overlaps, without being thrown apart any faster.
+
+    Without weight, one that parts by itself within the substep is left alone: moving it changes its angular momentum.
+    """
+    distance = np.sqrt(dx * dx + dy * dy)
+    depth = reach - distance
+    if not (depth > 0 and distance > 0):
+        return
+    vx = circles.velocity[j, 0] - circles.velocity[i, 0]
+    vy = circles.velocity[j, 1] - circles.velocity[i, 1]
+    leaving = (dx * vx + dy * vy) / distance
+    carries = circles.carries[i] + circles.carries[j] > 0
+    if carries or (law.weight != 0 and leaving * law.h < depth):
+        wi, wj = circles.inverse_mass[i], circles.inverse_mass[j]
+        by = min(depth, law.most * reach) / ((wi + wj) * distance)
+        _carry(circles, i, -by * dx * wi, -by * dy * wi)
+        _carry(circles, j, by * dx * wj, by * dy * wj)
+
+
+@kernel
+def _apart(i, j, k, circles, pairs):
+    """From i to j, the pair of lane k, m."""
+    dx = pairs.gap[0, k] + (circles.moved[j, 0] - circles.moved[i, 0])
+    return dx, pairs.gap[1, k] + (circles.moved[j, 1] - circles.moved[i, 1])
+
+
+@kernel
+def treat(bits, k, at, circles, pairs, law, spent):
+    """Pairs of a pack, by bits, that meet or part faster than a contact at rest: one by one, for hardly any does.
+
+    Returns those that are done with: the others turn out to rest.
+    """
+    done = 0
+    v, a, m = circles.velocity, circles.acceleration, pairs.made_of
+    for lane in range(LANES):
+        if (bits >> lane) & 1:
+            i, j = pairs.lane_i[k + lane], pairs.lane_j[k + lane]
+            if lane > 0 and i == pairs.lane_i[k + lane - 1] and j == pairs.lane_j[k + lane - 1]:
+                done |= ((done >> (lane - 1)) & 1) << lane  # a pair repeated to fill the pack
+                continue
+            dx, dy = _apart(i, j, k + lane, circles, pairs)
+            one, reach = at + lane * law.mixed, pairs.reach[(k + lane) * law.varied]
+            vx = v[j, 0] - v[i, 0] + law.lag * (a[j, 0] - a[i, 0])
+            vy = v[j, 1] - v[i, 1] + law.lag * (a[j, 1] - a[i, 1])
+            along = dx * vx + dy * vy
+            if along < 0:
+                if not _bounce(i, j, dx, dy, reach, m[E, one], m[MU, one], m[R_I, one], m[R_J, one], circles, law, spent):
+                    continue
+                dx, dy = _apart(i, j, k + lane, circles, pairs)
+            elif not along > law.rest_speed * np.sqrt(dx * dx + dy * dy):
+                continue
+            _make_room(i, j, dx, dy, reach, circles, law)
+            done |= 1 << lane
+    return done

@@ -1,0 +1,93 @@
+"""What the kernels of contacts are handed: circles, pairs, and the law of a substep, each as a tuple by name.
+
+Python hands over plain tuples, which are quicker to look through; drivers give them these names.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+NEW = np.inf
+"""The slip of a pair that did not touch in the substep before. What it slips in its first one, it may have slipped before it
+met."""
+
+E, MU, R_I, R_J, TURN_I, TURN_J, MASS = range(7)
+"""Rows of `Pairs.made_of`: restitution, friction, radii m, what a push turns each disc by (2 / r times its share), reduced mass
+kg."""
+
+
+class Circles(NamedTuple):
+    """Circles by slot; what each is: `Slots`, and of contacts `Wide`."""
+
+    position: Any
+    velocity: Any
+    acceleration: Any
+    inverse_mass: Any
+    origin: Any
+    moved: Any
+    resting: Any
+    spin: Any
+    carries: Any
+    fed: Any
+    slid: Any
+    turned: Any
+    turn: Any
+    lift: Any
+    leans: Any
+    start: Any
+    radius: Any
+    restitution: Any
+    friction: Any
+    hits: Any
+    spent: Any
+
+
+class Pairs(NamedTuple):
+    """Candidate pairs by lane, those of strip s from begin[s] to begin[s] + lanes[s]; what each is: `Wide`."""
+
+    begin: Any
+    lanes: Any
+    apart: Any
+    lane_i: Any
+    lane_j: Any
+    gap: Any
+    reach: Any
+    share: Any
+    made_of: Any
+    normal: Any
+    depth: Any
+    slip: Any
+    held: Any
+    closing: Any
+    deep: Any
+    deeps: Any
+    spent: Any
+
+
+class Law(NamedTuple):
+    """Numbers of a substep, and what there is to do in it.
+
+    varied: 1, or 0 if reach and share are the same for all and have one pack only; mixed: the same of `made_of`. asks: whether
+    any pair may bounce or rub, or somebody listens to who meets how fast. rubs, listens, accounts: likewise. arrives: 1 if what
+    becomes of `moved` is to be added to positions and velocities when all pairs have been gone through, 0 if the room does that;
+    always 1 where `asks`. feed: FED / PUSHED / h, 1/s. most: the largest part of the contact distance that a push may see.
+    weight: whether an acceleration could stop a pair that parts. carried: m/s, by which a substep feeds the velocity of one that
+    carries weight.
+    """
+
+    varied: Any
+    mixed: Any
+    asks: Any
+    rubs: Any
+    listens: Any
+    accounts: Any
+    arrives: Any
+    h: Any
+    lag: Any
+    feed: Any
+    most: Any
+    rest_speed: Any
+    weight: Any
+    carried: Any

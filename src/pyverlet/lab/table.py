@@ -1,0 +1,27 @@
+"""A table for a terminal, a page or a program."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Table:
+    """What a series of runs has found.
+
+    Attributes:
+        head: of the columns.
+        rows: of text, as for reading.
+        values: a mapping for each run, for programs.
+    """
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    values: Sequence[Mapping[str, Any]]
+
+    def markdown(self) -> str:
+        """As Markdown."""
+        lines = [self.head, ["---"] * len(self.head), *self.rows]
+        return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)

@@ -1,0 +1,307 @@
+"""Who touched whom in the last frame, where, and how hard: `Touches` notes what each stage gives to every circle.
+
+What walls, obstacles and other circles have given a circle is what its momentum changed by in their stages: true whatever solves
+them. Of one wall or obstacle that is all there is to know. Between several, and between circles, it is shared out along the
+lines of contact: pushes only, the smallest that explain what each has got. A solver that knows the impulses of its pairs says so
+(`hear`), and nothing has to be found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.laws.events import WALL
+from pyverlet.laws.obstacles import Course, facing_of
+from pyverlet.laws.rooms import Boundary
+from pyverlet.state.state import Slots, State
+
+Array = NDArray[Any]
+Floats = NDArray[np.float64]
+
+NOBODY = -1
+
+TOUCH = np.dtype(
+    [
+        ("a", np.int64), ("b", np.int64), ("wall", np.int64), ("obstacle", np.int64), ("point", np.float64, (2,)),
+        ("normal", np.float64, (2,)), ("impulse", np.float64), ("rub", np.float64),
+    ]
+)  # fmt: skip
+"""A contact: circle a and circle b, or b = -1 and the number of a wall or of an obstacle (the others are -1); where they touch,
+m; the unit normal out of a; what pushes them apart along it and what rubs a along (-n_y, n_x), summed over the frame, N s."""
+
+_NEAR = 0.02
+"""Of its radius: walls that are farther than the nearest by more were not touched."""
+
+_FEW = 1e-7
+"""Of the largest impulse: less is none."""
+
+_SWEEPS = 300
+"""Steps of conjugate gradients at most."""
+
+_STAGES = {"contacts": 0, "velocities": 0, "bounds": 1, "obstacles": 2}
+"""Whose doing it is when a stage has changed velocities: circles', the room's, obstacles'."""
+
+
+class Touches:
+    """The contacts of the last frame. Indices are those of its end."""
+
+    def __init__(self) -> None:
+        self._given = np.zeros((3, 0, 2))
+        self._heard: list[tuple[Array, Array, Floats]] = []
+        self._found: Array | None = None
+        self._end: _End | None = None
+
+    def frame(
+        self, state: Slots, users: State, h: float, room: Boundary, course: Course,
+        listed: Callable[[], tuple[Array, Array, Array, Array]] | None, done: Callable[[str], None],
+    ) -> Callable[[str], None]:  # fmt: skip
+        """A frame of substeps of h seconds, to be told of each stage; it passes on what it is told to `done`.
+
+        Args:
+            state, users: the engine's arrays, and the user's.
+            h: s.
+            room, course: walls and obstacles.
+            listed: says which pairs may touch, as first, count, pair_i, pair_j; None if there are no collisions.
+            done: told of each stage.
+        """
+        before, steps = state.velocity, 0
+
+        def told(stage: str) -> None:
+            nonlocal before, steps
+            done(stage)
+            if stage == "gather":
+                self._given, self._heard, steps = np.zeros((3, len(state), 2)), [], 0
+            elif stage in _STAGES:
+                self._note(_STAGES[stage], state, before)
+            elif stage == "integrate":
+                steps += 1
+            elif stage == "finish":
+                pairs = np.empty((0, 2), np.int64) if listed is None else _rows(*listed(), state.particle)
+                self._end = _End(state, users.number.copy(), self._given, self._heard, room, course, pairs, steps * h)
+                self._found = None
+            before = state.velocity.copy()
+
+        return told
+
+    def _note(self, whose: int, state: Slots, before: Array) -> None:
+        moved = np.flatnonzero((state.velocity != before).any(axis=1) & (state.inverse_mass > 0))
+        change = state.velocity[moved].astype(float) - before[moved]
+        self._given[whose, state.particle[moved]] += state.mass[moved, None] * change
+
+    def hear(self, state: Slots, i: Array, j: Array, impulse: Floats) -> None:
+        """A contact solver's word, in any substep: what slots i (k,) have given slots j, (k, 2) N s; it need not come sorted."""
+        self._heard.append((state.particle[i].astype(np.int64), state.particle[j].astype(np.int64), np.array(impulse, float)))
+
+    def array(self, state: State) -> Array:
+        """TOUCH, sorted by a, then b; without removed particles."""
+        if self._end is None:
+            return np.zeros(0, TOUCH)
+        if self._found is None:
+            self._found = self._end.contacts()
+        return self._end.renumbered(self._found, state)
+
+    def force_on(self, what: Any, room: Boundary) -> Floats:
+        """(2,) N, by all circles, averaged over the frame."""
+        if self._end is None:
+            return np.zeros(2)
+        if what is room:
+            return np.asarray(-self._end.given[1].sum(axis=0) / self._end.dt)
+        found = self.array_of_then()
+        mine = found[found["obstacle"] == self._end.number_of(what)]
+        return np.asarray(vectors(mine).sum(axis=0) / self._end.dt)
+
+    def array_of_then(self) -> Array:
+        """TOUCH by the indices of then."""
+        assert self._end is not None
+        if self._found is None:
+            self._found = self._end.contacts()
+        return self._found
+
+    def pushed(self) -> float:
+        """N, the sum of what walls of the room were pushed with along their normals, averaged over the frame."""
+        if self._end is None:
+            return 0.0
+        found = self.array_of_then()
+        return float(found["impulse"][found["wall"] >= 0].sum() / self._end.dt)
+
+
+class _End:
+    """What is known when a frame is over."""
+
+    def __init__(
+        self, state: Slots, numbers: Array, given: Floats, heard: list[tuple[Array, Array, Floats]], room: Boundary,
+        course: Course, pairs: Array, dt: float,
+    ) -> None:  # fmt: skip
+        count = len(state)
+        self.given, self._heard, self._room, self.dt = given, heard, room, dt
+        self._numbers, self._pairs = numbers, pairs
+        self._position, self._velocity, self._radius = np.empty((count, 2)), np.empty((count, 2)), np.empty(count)
+        self._free = np.empty(count, bool)
+        order = state.particle
+        self._position[order], self._velocity[order], self._radius[order] = state.position, state.velocity, state.size
+        self._free[order] = state.inverse_mass > 0
+        self._surfaces, self._obstacles = course.surfaces(), course.seen()
+
+    def number_of(self, obstacle: Any) -> int:
+        """Among the obstacles of then; -2 if it was none."""
+        return next((k for k, other in enumerate(self._obstacles) if other is obstacle), -2)
+
+    def renumbered(self, found: Array, state: State) -> Array:
+        """With the indices of now; `state` is as it was, but for removed particles and new ones at its end."""
+        if np.array_equal(self._numbers, state.number[: len(self._numbers)]):
+            return found
+        where = np.searchsorted(state.number, self._numbers)
+        lives = where < len(state)
+        lives[lives] = state.number[where[lives]] == self._numbers[lives]
+        kept: Array = found[lives[found["a"]] & ((found["b"] < 0) | lives[found["b"]])].copy()
+        kept["a"] = where[kept["a"]]
+        kept["b"] = np.where(kept["b"] < 0, WALL, where[kept["b"]])
+        return kept
+
+    def contacts(self) -> Array:
+        """TOUCH, by the indices of then."""
+        rows = [self._between_circles(), self._at(1), self._at(2)]
+        both = np.concatenate(rows)
+        return both[np.lexsort((both["obstacle"], both["wall"], both["b"], both["a"]))]
+
+    # ---- walls and obstacles -------------------------------------------------------------------------------------------
+
+    def _at(self, whose: int) -> Array:
+        given = self.given[whose]
+        who = np.flatnonzero(given.any(axis=1))
+        if not len(who):
+            return np.zeros(0, TOUCH)
+        x, r, push = self._position[who], self._radius[who], given[who]
+        facing = self._room.facing(x) if whose == 1 else facing_of(x, self._surfaces, len(self._obstacles))
+        if facing is None:  # a room of the user's own: all that is known is where it pushes to
+            size = np.hypot(*push.T)
+            facing = r[:, None], (push / size[:, None])[:, None, :]
+        gap, into = facing
+        gap = gap - r[:, None]
+        near = gap <= gap.min(axis=1, keepdims=True) + _NEAR * r[:, None]
+        circle, wall = np.nonzero(near)
+        share = _shared(push, near, into)
+        found = np.zeros(len(circle), TOUCH)
+        found["a"], found["b"] = who[circle], WALL
+        found["wall"], found["obstacle"] = (wall, NOBODY) if whose == 1 else (NOBODY, wall)
+        out = -into[circle, wall]
+        found["normal"] = out
+        found["point"] = x[circle] + (r[circle] + gap[circle, wall])[:, None] * out
+        _write(found, share)
+        return np.asarray(found[(found["impulse"] != 0) | (found["rub"] != 0)])
+
+    # ---- circles -------------------------------------------------------------------------------------------------------
+
+    def _between_circles(self) -> Array:
+        pairs, impulse = self._told() if self._heard else self._solved()
+        found = np.zeros(len(pairs), TOUCH)
+        if len(pairs):
+            a, b = pairs.T
+            normal = self._normals(pairs)
+            found["a"], found["b"], found["wall"], found["obstacle"] = a, b, NOBODY, NOBODY
+            gap = np.hypot(*(self._position[b] - self._position[a]).T) - self._radius[a] - self._radius[b]
+            found["normal"] = normal
+            found["point"] = self._position[a] + (self._radius[a] + 0.5 * gap)[:, None] * normal
+            _write(found, -impulse)
+        return found
+
+    def _normals(self, pairs: Array) -> Floats:
+        way = self._position[pairs[:, 1]] - self._position[pairs[:, 0]]
+        return np.asarray(way / np.maximum(np.hypot(*way.T), 1e-300)[:, None])
+
+    def _told(self) -> tuple[Array, Floats]:
+        """(k, 2) a < b, and (k, 2) what a has given b, as the solver says."""
+        i, j, given = (np.concatenate(parts) for parts in zip(*self._heard, strict=True))
+        swap = i > j
+        low, high = np.where(swap, j, i), np.where(swap, i, j)
+        given = np.where(swap[:, None], -given, given)
+        key, where = np.unique(low * (len(self._radius) + 1) + high, return_inverse=True)
+        total = np.column_stack([np.bincount(where, column, len(key)) for column in given.T])
+        return np.column_stack(np.divmod(key, len(self._radius) + 1)), total.astype(float)
+
+    def _solved(self) -> tuple[Array, Floats]:
+        """The same from what each circle has got: pushes along the normals, the smallest that explain it."""
+        got, pairs = self.given[0], self._pairs
+        touched = got.any(axis=1) | ~self._free
+        pairs = pairs[touched[pairs].all(axis=1) & self._free[pairs].any(axis=1)]
+        if len(pairs):
+            a, b = pairs.T
+            gap = np.hypot(*(self._position[b] - self._position[a]).T) - self._radius[a] - self._radius[b]
+            speed = np.hypot(*(self._velocity[b] - self._velocity[a]).T)
+            pairs = pairs[gap <= self.dt * speed + 0.01 * (self._radius[a] + self._radius[b])]
+        push = np.zeros(0)
+        while len(pairs):
+            normal = self._normals(pairs)
+            push = _least(pairs, normal, np.where(self._free[:, None], got, 0.0), self._free)
+            if not (pulls := push < 0).any():
+                kept = push > _FEW * push.max()
+                return pairs[kept], push[kept, None] * normal[kept]
+            pairs = pairs[~pulls]
+        return pairs, np.zeros((0, 2))
+
+
+def vectors(found: Array) -> Floats:
+    """(k, 2) N s, what a has given the other."""
+    n = found["normal"]
+    return np.asarray(found["impulse"][:, None] * n - found["rub"][:, None] * np.column_stack((-n[:, 1], n[:, 0])))
+
+
+def _write(found: Array, got: Floats) -> None:
+    """Split what a has got (k, 2) into what pushes and what rubs."""
+    n = found["normal"]
+    found["impulse"] = -(got * n).sum(axis=1)
+    found["rub"] = got[:, 1] * n[:, 0] - got[:, 0] * n[:, 1]
+
+
+def _shared(push: Floats, near: Array, into: Floats) -> Floats:
+    """(k, 2) of each circle and wall in `near`, in its order: what it has got from that one, all together `push`."""
+    circle, wall = np.nonzero(near)
+    share = push[circle]
+    for i in np.flatnonzero(near.sum(axis=1) > 1):  # in a corner
+        mine = circle == i
+        normal = into[i, wall[mine]]
+        part = np.linalg.lstsq(normal.T, push[i], rcond=None)[0].clip(min=0)
+        rest = push[i] - part @ normal
+        weight = part / part.sum() if part.sum() > 0 else np.full(len(part), 1 / len(part))
+        share[mine] = part[:, None] * normal + weight[:, None] * rest
+    return share
+
+
+def _rows(first: Array, count: Array, pair_i: Array, pair_j: Array, order: Array) -> Array:
+    """(k, 2) the user's a < b of each listed pair, once."""
+    which = np.concatenate([np.zeros(0, np.int64), *(np.arange(f, f + c) for f, c in zip(first, count, strict=True))])
+    pairs = np.sort(np.column_stack((order[pair_i[which]], order[pair_j[which]])).astype(np.int64), axis=1)
+    return np.unique(pairs, axis=0)
+
+
+def _least(pairs: Array, normal: Floats, got: Floats, free: Array) -> Floats:
+    """(k,) the smallest p with sum of p (n on b, -n on a) as near to `got` as can be: conjugate gradients (Hestenes, Stiefel)."""
+    a, b = pairs.T
+    held = free.astype(float)[:, None]
+
+    def spread(p: Floats) -> Floats:
+        out, along = np.zeros_like(got), p[:, None] * normal
+        np.add.at(out, b, along)
+        np.subtract.at(out, a, along)
+        return np.asarray(out * held)
+
+    def gather(g: Floats) -> Floats:
+        return np.asarray(((g[b] - g[a]) * normal).sum(axis=1))
+
+    p, left = np.zeros(len(pairs)), got.copy()
+    slope = way = gather(left)
+    size = start = float(slope @ slope)
+    for _ in range(_SWEEPS):
+        if size <= 1e-20 * start:
+            break
+        ahead = spread(way)
+        step = size / float((ahead * ahead).sum())
+        p, left = p + step * way, left - step * ahead
+        slope = gather(left)
+        size, before = float(slope @ slope), size
+        way = slope + (size / before) * way
+    return p

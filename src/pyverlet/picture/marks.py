@@ -1,0 +1,41 @@
+"""A mark on each disc that shows how far it has turned: a line from its centre to its rim."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.kernels import lines
+from pyverlet.picture.palette import Packed
+from pyverlet.picture.view import View
+
+MARKED_PX = 4.0
+"""Radius from which on a disc has a mark: in a smaller one it could not be told from its rim."""
+
+MARK_PX = 1.4
+"""Width of its line."""
+
+
+def draw(
+    pixels: Packed, position: NDArray[Any], radius: NDArray[Any], angle: NDArray[np.float64], colours: Packed, view: View
+) -> None:
+    """Mark the discs on a picture, in half of their own brightness; none as long as nobody has turned.
+
+    Args:
+        pixels: (h, w) of the view.
+        position, radius, angle: (n, 2) and (n,) in metres, (n,) in rad.
+        colours: (n,) of the discs.
+        view: of the picture.
+    """
+    if not angle.any():
+        return
+    shown = np.flatnonzero(radius * view.scale >= MARKED_PX)
+    if not len(shown):
+        return
+    centre, turned = position[shown].astype(np.float64), angle[shown]
+    reach = radius[shown].astype(np.float64)[:, None]
+    rim = centre + reach * np.column_stack((np.cos(turned), np.sin(turned)))
+    half = np.asarray((colours[shown] >> np.uint32(1)) & np.uint32(0x7F7F7F), dtype=np.uint32)
+    lines.lines(pixels, np.stack((centre, rim), axis=1), half, view.left, view.top, view.scale, MARK_PX / 2)

@@ -1,0 +1,199 @@
+"""A world's pictures as numbers, for a page that draws them itself: what it looks at, and how that is made small.
+
+A film is blocks: shapes, as the live page gets them, and chunks of up to a second. Positions are whole steps of a grid, and a
+frame of a chunk is written as the difference from where the two frames before would have taken each circle; velocities as the
+difference from what the positions say. Almost all of that are small numbers: their bytes are sorted by weight, and zlib does the
+rest, which browsers undo by themselves. The page's half is `viewers/page/reel.js`.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import zlib
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.ground.errors import InputError
+from pyverlet.picture import ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Groups, Theme
+from pyverlet.viewers.exhibit import Exhibit
+from pyverlet.viewers.frames import Frame, Rect, Shape, Status
+from pyverlet.viewers.gauges import Gauges
+from pyverlet.viewers.protocol import encode_shape, finite
+from pyverlet.viewers.stage import Stage
+from pyverlet.world.clock import FrameBudget
+from pyverlet.world.panels import Panels
+
+if TYPE_CHECKING:
+    from pyverlet.world.world import World
+
+FINENESS = 256
+"""Steps of the grid in the median radius: to be seen only if a circle fills a tenth of the screen."""
+
+RATIO = 2
+"""Steps of velocity in a step of the grid from frame to frame."""
+
+MOST_NUMBERS = 2_000_000
+"""Circles times frames of a chunk, at most: a page unpacks that in a blink, and holds a few."""
+
+LEVEL = 6
+"""Of zlib: more takes twice as long for a hundredth less."""
+
+_COLOURS: dict[type[Colouring], str] = {ByOrigin: "order", BySpeed: "speed", ByMass: "mass", Groups: "group", ByEnergy: "energy"}
+
+
+def page_colour(colour: Colouring | None) -> str:
+    """What the page calls this colouring; `picture` for colours of the user's own.
+
+    Raises:
+        InputError: the page has none like it.
+    """
+    if colour is None:
+        return "order"
+    if getattr(colour, "_full", None) is not None:
+        raise InputError(f"colour is {type(colour).__name__}(full=...); allowed for .html is one that finds its scale itself")
+    if isinstance(colour, Groups) and colour._groups:
+        return "picture"
+    return _COLOURS.get(type(colour), "picture")
+
+
+class Watch:
+    """Looks at one world as the live page does: `picture` is its frame now.
+
+    Args:
+        world: only read.
+        title: heading of the page.
+        fps: pictures a second.
+        colour: what the colours say at first; the page offers all.
+        theme: dark or light, which decides on colours of the user's own.
+        part: of the plane to show, m.
+    """
+
+    def __init__(self, world: World, *, title: str, fps: int, colour: Colouring | None, theme: Theme, part: Rect | None) -> None:
+        rgb = None
+        if page_colour(colour) == "picture" and colour is not None:
+            packed = colour.colours(world, theme)
+            rgb = np.stack([(packed >> shift) & 255 for shift in (0, 8, 16)], axis=1).astype(np.uint8)
+        self._stage = Stage(Exhibit(title, Panels.of(world), colours=rgb, part=part))
+        self._gauges, self._budget, self._dt = Gauges(FrameBudget()), FrameBudget().limit_ms, 1.0 / fps
+        self._version: object = None
+        self._shape: Any = None
+        self._seq = 0
+
+    def picture(self) -> Frame:
+        """The world now."""
+        stage = self._stage
+        positions, velocity = stage.look()
+        if self._version != stage.version:
+            self._version = stage.version
+            self._shape = stage.shape(dt=self._dt, budget_ms=self._budget, scenes=())
+        self._seq += 1
+        status = self._gauges.read(stage, dropped=0, speed=1.0, paused=False, busy=None, error=None, at_once=True)
+        place = stage.place(positions)
+        return Frame(self._seq, self._shape, stage.layout.view, status, place, velocity, stage.moving(), *stage.links())
+
+
+class Reel:
+    """Turns frames into the blocks of a film.
+
+    Args:
+        fps: pictures a second.
+    """
+
+    def __init__(self, fps: int) -> None:
+        self._fps = fps
+        self._frames: list[Frame] = []
+        self._first = 0
+        self._shape: Shape | None = None
+        self._shapes = 0
+        self._step = 0.0
+
+    @property
+    def finished(self) -> int:
+        """Frames that are in blocks."""
+        return self._first
+
+    def add(self, frame: Frame) -> list[str]:
+        """The next frame; the blocks that are finished by it."""
+        blocks = []
+        if frame.shape is not self._shape:
+            blocks += self.rest()
+            self._shape = frame.shape
+            self._shapes += 1
+            if self._step == 0.0:
+                self._step = float(np.median(frame.shape.radius)) / FINENESS if len(frame.shape.radius) else 0.0
+            blocks.append(_block("shape", {"id": self._shapes}, encode_shape(frame.shape)))
+        self._frames.append(frame)
+        if len(self._frames) >= max(1, min(self._fps, MOST_NUMBERS // max(len(frame.position), 1))):
+            blocks += self.rest()
+        return blocks
+
+    def rest(self) -> list[str]:
+        """A block of the frames that are in none yet."""
+        frames, self._frames = self._frames, []
+        if not frames:
+            return []
+        first, self._first = self._first, self._first + len(frames)
+        return [_block("chunk", {"first": first, "count": len(frames), "shape": self._shapes}, self._chunk(frames))]
+
+    def _chunk(self, frames: list[Frame]) -> bytes:
+        step = self._step or 1e-3
+        rate = self._fps * step  # m/s in a step a frame
+        joined, strain, heads = [], [], []
+        before: NDArray[np.uint32] | None = None
+        for frame in frames:
+            head = {
+                "status": _status(frame.status),
+                "room": frame.view,
+                "obstacles": frame.obstacles.lines,
+                "links": len(frame.joined),
+            }
+            if before is None or not np.array_equal(before, frame.joined):
+                before = frame.joined
+                joined.append(frame.joined.astype("<u4").tobytes())
+                head["joined"] = True
+            strain.append(frame.strain.tobytes())
+            heads.append(head)
+        place = _whole(np.array([frame.position for frame in frames], np.float64) / step)
+        way = np.diff(place, axis=0, prepend=0)
+        bend = way.copy()
+        bend[2:] -= way[1:-1]
+        way[0] = 0
+        velocity = _whole(np.array([frame.velocity for frame in frames], np.float64) * (RATIO / rate))
+        position_bytes, planes = _packed(bend)
+        velocity_bytes, velocity_planes = _packed(velocity - RATIO * way)
+        about = {"step": step, "unit": rate / RATIO, "ratio": RATIO, "planes": [planes, velocity_planes], "frames": heads}
+        text = json.dumps(finite(about), allow_nan=False, separators=(",", ":")).encode()
+        text += b" " * (-len(text) % 4)
+        return b"".join((len(text).to_bytes(4, "little"), text, *joined, *strain, position_bytes, velocity_bytes))
+
+
+def _status(status: Status) -> dict[str, Any]:
+    """The numbers on show without those that say how fast this machine was: the same world gives the same film."""
+    return asdict(status) | {"physics_ms": 0.0, "physics_median_ms": 0.0, "physics_p95_ms": 0.0, "stages": {}}
+
+
+def _whole(values: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Rounded; what is no number, or too far to be drawn, is somewhere outside."""
+    return np.rint(np.clip(np.nan_to_num(values, nan=-(2.0**28)), -(2.0**28), 2.0**28)).astype(np.int64)
+
+
+def _packed(values: NDArray[np.int64]) -> tuple[bytes, int]:
+    """(f, n, 2) small numbers as bytes: all x, then all y; of each the lowest bytes, then the next. And how many those are.
+
+    Numbers of either sign become 0, -1, 1, -2, 2, ... = 0, 1, 2, 3, 4, ...: near 0 only the lowest byte says anything.
+    """
+    folded = ((values << 1) ^ (values >> 63)).astype("<u4")
+    planes = max(1, (int(folded.max(initial=0)).bit_length() + 7) // 8)
+    parts = np.ascontiguousarray(folded.transpose(2, 0, 1)).view(np.uint8).reshape(2, -1, 4)
+    return np.ascontiguousarray(parts.transpose(0, 2, 1)[:, :planes]).tobytes(), planes
+
+
+def _block(kind: str, about: dict[str, int], content: bytes) -> str:
+    """As an element of a page, which knows by `size` whether it is whole."""
+    text = base64.b64encode(zlib.compress(content, LEVEL)).decode()
+    attributes = "".join(f' data-{name}="{value}"' for name, value in about.items())
+    return f'<script type="application/x-pyverlet-{kind}"{attributes} data-size="{len(text)}">{text}</script>\n'

@@ -1,0 +1,147 @@
+"""What was done to worlds on show, in a file: enough to go through it again, bit for bit. `replay` reads it.
+
+A line of JSON for each thing, written at once: the first says what this is, then come worlds as snapshots, and from there
+commands, the numbers that commands depend on besides, and every second the hash of the state. Each line has the frame before
+which it happened, and `substep` where it was between two substeps of that frame.
+"""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import json
+import logging
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from pyverlet.data.snapshot import save
+from pyverlet.ground.errors import InputError
+from pyverlet.viewers.commands import Command
+from pyverlet.viewers.exhibit import Exhibit
+from pyverlet.viewers.stage import Stage
+from pyverlet.world.moments import Moment
+from pyverlet.world.panels import every_frame
+
+_log = logging.getLogger(__name__)
+
+FORMAT = 1
+
+HASH_S = 1.0
+"""Seconds of the world from one hash to the next."""
+
+
+class Journal:
+    """A file that grows while a session runs.
+
+    Args:
+        path: `session.pvlog` by custom; an old file is replaced.
+        dt: simulated seconds a frame.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+
+    def __init__(self, path: str | Path, *, dt: float) -> None:
+        self.path = Path(path)
+        self.frame = 0
+        self._every = max(1, round(HASH_S / dt))
+        self._known: dict[str, Any] = {}
+        self._broken = False
+        self._stage: Stage | None = None
+        try:
+            self._file = self.path.open("wb", buffering=0)
+        except OSError as error:
+            raise InputError(f"journal is '{path}', which cannot be written: {error.strerror or error}") from None
+        self.note(pvlog=FORMAT, dt=dt)
+
+    def stage(self, exhibit: Exhibit) -> Stage:
+        """A stage whose worlds and commands are kept."""
+        self._stage = _RecordedStage(exhibit, self)
+        return self._stage
+
+    def note(self, **what: Any) -> None:
+        """A line. A disk that is full ends the journal, not the session."""
+        if self._broken:
+            return
+        try:
+            self._file.write(json.dumps({**what, "frame": self.frame}, separators=(",", ":")).encode() + b"\n")
+        except OSError as error:
+            self._broken = True
+            _log.warning("the journal '%s' ends here: %s", self.path, error.strerror or error)
+
+    def note_news(self, **what: Any) -> None:
+        """A line, unless the last one about this said the same."""
+        news = {key: value for key, value in what.items() if self._known.get(key) != value}
+        if news:
+            self._known |= news
+            self.note(**news)
+
+    def passed(self, state_hash: Callable[[], str]) -> None:
+        """A frame has been made."""
+        self.frame += 1
+        if self.frame % self._every == 0:
+            self.note(hash=state_hash())
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """The session has ended."""
+        if self._stage is not None:
+            self.note(hash=self._stage.panels.state_hash(), end=True)
+        self._file.close()
+
+
+class _RecordedStage(Stage):
+    def __init__(self, exhibit: Exhibit, journal: Journal) -> None:
+        if any(panel.pace is not every_frame for panel in exhibit.panels):
+            allowed = "a scene whose worlds make a frame for each of the screen's"
+            raise InputError(
+                f"journal is asked for with {exhibit.title!r}, whose worlds keep a pace of their own; allowed is {allowed}"
+            )
+        super().__init__(exhibit)
+        self._journal, self._substep = journal, 0
+        journal.note(
+            worlds=[{"name": panel.name, "snapshot": _snapshot(panel.world)} for panel in exhibit.panels],
+            title=exhibit.title,
+            part=exhibit.part,
+            line=exhibit.panels.line,
+        )
+
+    def do(self, command: Command) -> None:
+        self._journal.note_news(room=self.layout.room)  # how far a poke reaches depends on it
+        said = {"do": type(command).__name__, **dataclasses.asdict(command)}
+        self._journal.note(**said, **({"substep": self._substep} if self._substep else {}))
+        super().do(command)
+
+    def step(self, dt: float, onlooker: Callable[[Moment], None] | None = None) -> None:
+        self._journal.note_news(looked_on=onlooker is not None)  # then hands follow their mice between substeps, too
+        if self.hands.busy:
+            self._journal.note_news(room=self.layout.room)
+
+        def counted(moment: Moment) -> None:
+            self._substep += 1
+            assert onlooker
+            onlooker(moment)
+
+        try:
+            super().step(dt, onlooker and counted)
+        except Exception as error:
+            self._journal.note(stopped=str(error))
+            raise
+        finally:
+            self._substep = 0
+        self._journal.passed(self.panels.state_hash)
+
+
+def _snapshot(world: Any) -> str:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "world.pvsnap"
+        save(world, path)
+        return base64.b64encode(path.read_bytes()).decode()

@@ -1,0 +1,250 @@
+"""Going through a journal again: the same worlds, the same commands at the same frames, the same hashes, or a word about it."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import dataclasses
+import json
+import tempfile
+import typing
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from pyverlet.data.snapshot import load
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError, PyverletError
+from pyverlet.viewers import commands
+from pyverlet.viewers.commands import Command, Reset
+from pyverlet.viewers.exhibit import Exhibit
+from pyverlet.viewers.journal import FORMAT
+from pyverlet.viewers.layout import Layout
+from pyverlet.viewers.stage import Stage
+from pyverlet.world.moments import Moment
+from pyverlet.world.panels import Panel, Panels
+from pyverlet.world.world import World
+
+Progress = Callable[[int, int], None]
+
+_COMMANDS: dict[str, Any] = {command.__name__: command for command in typing.get_args(commands.Command)}
+
+
+class EndError(PyverletError):
+    """The journal has nothing more."""
+
+
+class StoppedError(PyverletError):
+    """The worlds stopped here, as they did in the session."""
+
+
+class DivergedError(PyverletError):
+    """The worlds are not where the journal says they were."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Event:
+    """A line of a journal: before which frame, after which substep of it (0: none), and what."""
+
+    frame: int
+    substep: int
+    what: dict[str, Any]
+    command: Command | None
+
+
+class Script:
+    """A journal that was read.
+
+    Attributes:
+        dt: simulated seconds a frame.
+        events: in order.
+        frames: how many there are.
+        checks: hashes among the events.
+        whole: whether the session came to its end.
+
+    Raises:
+        InputError: there is no such file, or it is no journal.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        try:
+            lines = self.path.read_bytes().split(b"\n")
+        except OSError as error:
+            raise InputError(f"journal is '{path}', which cannot be read: {error.strerror or error}") from None
+        self.events: list[Event] = []
+        for number, line in enumerate(lines[:-1]):  # behind the last end of a line is nothing, or a line that was cut
+            try:
+                what = json.loads(line)
+                frame = checks.whole("frame", what.pop("frame"), least=0)
+                if number == 0:
+                    if what["pvlog"] != FORMAT:
+                        raise InputError(f"pvlog is {what['pvlog']!r}; allowed is {FORMAT}")
+                    self.dt = checks.number("dt", what["dt"], above=0.0)
+                    continue
+                if self.events and frame < self.events[-1].frame:
+                    raise InputError(f"frame is {frame} after {self.events[-1].frame}; allowed are frames in order")
+                substep = checks.whole("substep", what.pop("substep", 0), least=0)
+                command = _command(dict(what)) if "do" in what else None
+                self.events.append(Event(frame, substep, what, command))
+            except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:  # InputError is a ValueError
+                raise InputError(f"'{path}' is no journal of pyverlet's: line {number + 1}: {error}") from None
+        if not self.events or "worlds" not in self.events[0].what:
+            raise InputError(f"'{path}' is no journal of pyverlet's: it has no worlds")
+        self.frames = self.events[-1].frame
+        self.checks = sum("hash" in event.what for event in self.events)
+        self.whole = "end" in self.events[-1].what
+
+    def exhibit(self, event: Event) -> Exhibit:
+        """The worlds of an event that has some."""
+        what = event.what
+        try:
+            panels = [Panel(str(each["name"]), self._world(each["snapshot"])) for each in what["worlds"]]
+            part = what.get("part") and tuple(checks.number("part", value) for value in what["part"])
+            line = what.get("line") if what.get("line") is None else checks.number("line", what["line"])
+            return Exhibit(str(what["title"]), Panels(panels, line=line), part=part)
+        except (KeyError, TypeError, binascii.Error) as error:
+            raise InputError(f"'{self.path}' is no journal of pyverlet's: its worlds lack something ({error})") from None
+
+    def _world(self, snapshot: str) -> World:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "world.pvsnap"
+            path.write_bytes(base64.b64decode(snapshot, validate=True))
+            return load(path)
+
+    def open(self) -> Exhibit:
+        """The first worlds, for a viewer."""
+        return self.exhibit(self.events[0])
+
+    def run(self, progress: Progress | None = None) -> dict[str, Any]:
+        """Go through all of it without a viewer.
+
+        Returns:
+            frames, seconds, commands, hashes checked, state_hash at the end, and what stopped the session, if something did.
+
+        Raises:
+            DivergedError: a hash is not what it was.
+        """
+        stage, stopped = ReplayStage(self, self.open()), None
+        try:
+            while True:
+                try:
+                    stage.step(self.dt)
+                except StoppedError as error:
+                    stopped = str(error)
+                if progress:
+                    progress(stage.frame, max(self.frames, 1))
+        except EndError:
+            pass
+        return {
+            "frames": stage.frame,
+            "seconds": stage.frame * self.dt,
+            "commands": sum(event.command is not None for event in self.events),
+            "checked": stage.checked,
+            "state_hash": stage.panels.state_hash(),
+            "stopped": stopped,
+            "whole": self.whole,
+        }
+
+
+class ReplayStage(Stage):
+    """A stage on which a script is played: nobody else's commands are obeyed, but for going back to the start.
+
+    Attributes:
+        frame: how many have been made. checked: hashes that were as they should be.
+    """
+
+    def __init__(self, script: Script, exhibit: Exhibit) -> None:
+        self._script = script
+        self._begin()
+        super().__init__(exhibit)
+
+    def _begin(self) -> None:
+        self.frame, self.checked = 0, 0
+        self._at = 1  # of the next event; the first are the worlds
+        self._substep = 0
+        self._looked_on = False
+        self._room: Any = None
+
+    def do(self, command: Command) -> None:
+        if isinstance(command, Reset):
+            changes = self._pinned
+            self._begin()
+            super().__init__(self._script.open())
+            self._pinned = changes + 1
+
+    def step(self, dt: float, onlooker: Callable[[Moment], None] | None = None) -> None:
+        self._substep = 0
+        self._obey()
+        events = self._script.events
+        if self._at == len(events) and self.frame >= self._script.frames:
+            raise EndError(f"the journal ends here, after {self.frame:,} frames; {self.checked} hashes are as they were")
+        self._set_room()
+
+        def between(moment: Moment) -> None:
+            self._substep += 1
+            self._obey()
+            self._set_room()
+            if onlooker:
+                onlooker(moment)
+
+        stop = next((k for k in range(self._at, len(events)) if "stopped" in events[k].what), None)
+        stops = stop is not None and events[stop].frame == self.frame
+        try:
+            super().step(self._script.dt, between if self._looked_on else None)
+        except Exception as error:
+            if stop is None or not stops:
+                raise
+            self._at = stop + 1
+            raise StoppedError(str(error)) from error
+        if stop is not None and stops:
+            said = events[stop].what["stopped"]
+            raise DivergedError(f"frame {self.frame + 1} goes well here, and in the session it stopped: {said}")
+        self.frame += 1
+        self._substep = 0
+        while self._at < len(events) and events[self._at].frame == self.frame and "hash" in events[self._at].what:
+            self._check(events[self._at].what["hash"])
+            self._at += 1
+
+    def _obey(self) -> None:
+        """All that was done before this frame, or up to this substep of it."""
+        events = self._script.events
+        while self._at < len(events):
+            event = events[self._at]
+            if (event.frame, event.substep) > (self.frame, self._substep) or "stopped" in event.what:
+                return
+            self._at += 1
+            what = event.what
+            if event.command is not None:
+                self._set_room()
+                super().do(event.command)
+            elif "worlds" in what:
+                changes = self._pinned
+                super().__init__(self._script.exhibit(event))
+                self._pinned = changes + 1
+            elif "hash" in what:
+                self._check(what["hash"])
+            self._looked_on = what.get("looked_on", self._looked_on)
+            self._room = what.get("room", self._room)
+
+    def _set_room(self) -> None:
+        """How far hands reach is as it was, whatever is looked at now."""
+        if self._room is not None:
+            self.layout = Layout(tuple(map(float, self._room)), len(self.worlds), self.layout.bounded)  # type: ignore[arg-type]
+
+    def _check(self, known: str) -> None:
+        found = self.panels.state_hash()
+        if found != known:
+            raise DivergedError(
+                f"after frame {self.frame} ({self.frame * self._script.dt:.4g} s) the hash of the state is {found}, and was "
+                f"{known} in the session: other kernels or another machine may go another way"
+            )
+        self.checked += 1
+
+
+def _command(what: dict[str, Any]) -> Command:
+    kind = _COMMANDS.get(what.pop("do"))
+    if kind is None:
+        raise InputError(f"a command is none of {', '.join(_COMMANDS)}")
+    command: Command = kind(**what)
+    return command

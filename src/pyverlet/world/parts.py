@@ -1,0 +1,323 @@
+"""A saved world taken apart into named arrays and plain numbers, and put together again in another world, or another process.
+
+Whatever `World.save` comes to keep has a line here: a field for each array, checked before any kernel sees it, and a check for
+each number. Rooms, forces, obstacles, actors and links are not among them: they are objects, and described elsewhere.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.ground import checks
+from pyverlet.ground.constants import SKIN_LEAST, SKIN_MOST
+from pyverlet.ground.errors import InputError
+from pyverlet.ground.fields import Field
+from pyverlet.laws.contacts.broadphase import Fast
+from pyverlet.laws.contacts.loans import Lent
+from pyverlet.laws.contacts.slips import Kept
+from pyverlet.laws.events import CONTACT, HIT, Events
+from pyverlet.laws.ledger import Bookkeeper, Ledger
+from pyverlet.laws.links._set import BROKEN
+from pyverlet.laws.links._work import Past
+from pyverlet.laws.sleep import Sleep, laws
+from pyverlet.world.saved import Saved
+from pyverlet.world.world import World
+
+Array = NDArray[Any]
+Facts = Mapping[str, Any]
+
+_MOST = 2**53
+"""Counts beyond this are no counts."""
+
+_WHO, _HOW = ("a", "b", "wall", "obstacle"), ("speed", "point", "normal", "impulse")
+"""Fields of `events.HIT`."""
+
+PARTICLES = {
+    "position": Field(None, "particles", 2),
+    "velocity": Field(None, "particles", 2),
+    "acceleration": Field(None, "particles", 2, nan=True),
+    "spin": Field(None, "particles"),
+    "angle": Field(np.float64, "particles"),
+    "grown": Field(None, "particles", above=0, most=1),
+    "radius": Field(None, "particles", above=0),
+    "mass": Field(None, "particles", above=0, infinite=True),
+    "restitution": Field(None, "particles", most=1),
+    "friction": Field(None, "particles"),
+    "category": Field(np.uint32, "particles"),
+    "mask": Field(np.uint32, "particles"),
+    "number": Field(np.int64, "particles", least=0, most=2**31, order="ascending"),
+    "begun": Field(np.int64, "groups", least=0, most=2**31, order="rising"),
+}
+"""The user's arrays, and where each group begins."""
+
+SLOTS = {
+    "particle": Field(np.int32, "slots", least=0, below="slots", order="permutation"),
+    "fed": Field(np.uint8, "slots"),
+    "island": Field(np.int64, "sleepers", least=-1),
+    "calm": Field(np.float32, "sleepers", least=0),
+    "void": Field(np.bool_, "one"),
+}
+"""The engine's order, and what it remembers by slot."""
+
+CONTACTS = {
+    "built": Field(None, "listed", 2),
+    "checked": Field(None, "listed", 2),
+    "low": Field(np.int32, "slips", least=0, below="particles", order="rising"),
+    "high": Field(np.int32, "slips", least=0, below="particles"),
+    "slip": Field(None, "slips"),
+    "lent_particle": Field(np.int32, "lent", least=-1, below="particles"),
+    "lent": Field(None, "lent"),
+    "busy": Field(None, "lent"),
+    "held": Field(np.uint8, "lent"),
+}
+"""What contacts remember: where the list of pairs was made, what has slipped, who has lent whom inertia."""
+
+NEWS = {
+    "touching": Field(np.int64, "touching", least=0, order="ascending"),
+    "begin": Field(np.int64, "begin", 4, least=-1),
+    "begin_how": Field(np.float64, "begin", 6),
+    "end": Field(np.int64, "end", 2, least=-1),
+    "broken": Field(np.int64, "broken", 4, least=-1),
+    "broken_force": Field(np.float64, "broken", infinite=True),
+    "islands": Field(np.int64, "islands", least=0, order="ascending"),
+    "members": Field(np.int64, "islands", least=1),
+}
+"""What happened in the last frame, and who sleeps. Of `begin` a, b, wall and obstacle; speed, point (2), normal (2), impulse."""
+
+LINKED = {
+    "number": Field(np.int64, "linked", least=0, most=2**31, order="ascending"),
+    "start": Field(np.float64, "linked", 2),
+    "left": Field(None, "linked", 2),
+    "calm": Field(np.float64, "linked", nan=True),
+}
+"""What links remember of the particles they join."""
+
+FIELDS = {
+    f"{room}.{name}": field
+    for room, fields in (("particles", PARTICLES), ("slots", SLOTS), ("contacts", CONTACTS), ("news", NEWS), ("linked", LINKED))
+    for name, field in fields.items()
+}
+
+
+class Parts(NamedTuple):
+    """A world at a moment: numbers as JSON has them, and arrays by the names of `FIELDS`, those of one room or of none."""
+
+    facts: dict[str, Any]
+    arrays: dict[str, Array]
+
+
+def take_apart(world: World) -> Parts:
+    """All that moves in a world, as of now. The arrays are copies."""
+    saved = world.save()
+    facts: dict[str, Any] = {
+        "time": float(saved.time), "frames": saved.frames, "h_last": saved.h_last, "numbers": world._state.numbers,
+        "apart_changed": bool(saved.links[3]),
+    }  # fmt: skip
+    arrays = {f"particles.{name}": array for name, array in saved.arrays.items()}
+    arrays["particles.begun"] = np.array(world._state.begun, np.int64)
+    arrays |= {f"slots.{name}": column for name, column in saved.slots.items()}
+    facts["contacts"] = None if saved.contacts is None else _contacts_apart(saved.contacts, arrays)
+    if saved.books:
+        facts["books"] = {
+            "energy": saved.books._energy, "resting": saved.books._resting, "ledger": saved.books.ledger.as_dict(),
+        }  # fmt: skip
+    if saved.events:
+        facts["hit_speed"] = saved.events.hit_speed
+        _events_apart(saved.events, arrays)
+    if saved.sleep:
+        known = saved.sleep._laws
+        facts["sleep"] = {"next": saved.sleep._next, "laws": known and ("same" if known == laws(world) else "others")}
+        members = dict(sorted(saved.sleep._members.items()))
+        arrays["news.islands"] = np.array(list(members), np.int64)
+        arrays["news.members"] = np.array(list(members.values()), np.int64)
+    broken = saved.links[2]
+    if len(broken):
+        arrays["news.broken"] = np.column_stack([broken[name] for name in ("link", "row", "i", "j")])
+        arrays["news.broken_force"] = broken["force"].copy()
+    if (past := saved.links[4]) is not None:
+        arrays |= {f"linked.{name}": column.copy() for name, column in past._asdict().items()}
+    return Parts(facts, arrays)
+
+
+def check(parts: Parts, real: np.dtype[Any]) -> None:
+    """Refuse arrays that are not what `FIELDS` says.
+
+    Raises:
+        InputError: one of them; the sentence names it.
+    """
+    sizes = {"one": 1}
+    for name, array in parts.arrays.items():
+        FIELDS[name].check(name, array, real, sizes)
+
+
+def fill(world: World, parts: Parts) -> None:
+    """Give an empty world the particles, with their numbers and groups; `put_together` needs them there.
+
+    Raises:
+        InputError: the arrays are not what they must be.
+    """
+    check(parts, world.dtype)
+    try:
+        arrays = {name: parts.arrays[f"particles.{name}"] for name, _ in world._state.arrays()}
+        begun = parts.arrays["particles.begun"]
+    except KeyError as error:
+        raise InputError(f"the array {error} is missing; allowed are files that have all") from None
+    world._state.restore(arrays)
+    most = int(arrays["number"][-1]) + 1 if len(world) else 0
+    world._state.numbers = checks.whole("numbers", parts.facts.get("numbers"), least=most, most=2**31)
+    world._state.begun = begun.tolist()
+    world.boundary.check(world.radius)
+
+
+def put_together(world: World, parts: Parts) -> Saved:
+    """What `world.restore` takes: of a world that `fill` gave its particles, and that has its obstacles, actors and links.
+
+    Raises:
+        InputError: a number is not what it must be.
+    """
+    facts, h_last = parts.facts, parts.facts.get("h_last")
+    links, pools, *_ = world.links.save()
+    past = Past(*(parts.arrays[f"linked.{name}"] for name in LINKED)) if "linked.number" in parts.arrays else None
+    return Saved(
+        world=world._state,
+        arrays={name: parts.arrays[f"particles.{name}"] for name, _ in world._state.arrays()},
+        time=checks.number("time", facts["time"]),
+        frames=checks.whole("frames", facts.get("frames"), least=0, most=_MOST),
+        h_last=None if h_last is None else checks.number("h_last", h_last, above=0.0),
+        slots=_slots(world, parts.arrays),
+        contacts=_contacts(world, facts.get("contacts"), parts.arrays),
+        books=_books(facts["books"]) if world.keeps_ledger else None,
+        events=_events(facts, parts.arrays) if world.tells_events else None,
+        sleep=_sleep(world, facts["sleep"], parts.arrays) if world._sleep else None,
+        obstacles=world.obstacles.save(),
+        actors=[(actor, actor.save()) for actor in world.actors],
+        links=(links, pools, _broken(parts.arrays), bool(facts.get("apart_changed")), past),
+    )
+
+
+def _slots(world: World, arrays: dict[str, Array]) -> dict[str, Array]:
+    slots = {name: arrays[f"slots.{name}"] for name in SLOTS}
+    count = len(slots["particle"])
+    if count > len(world) or len(slots["island"]) != (count if world._sleep else 0):
+        raise InputError(f"slots.particle has {count} rows; allowed are at most {len(world)}, one for each particle")
+    return slots
+
+
+# ---- contacts ----------------------------------------------------------------------------------------------------------
+
+
+def _contacts_apart(contacts: Any, arrays: dict[str, Array]) -> dict[str, Any]:
+    phase, slips, lent, (pace, risen) = contacts
+    facts: dict[str, Any] = {"pace": pace, "risen": risen}
+    if phase is not None:
+        kept, skin, age, hold, mean = phase
+        facts["list"] = {"skin": skin, "age": age, "hold": hold, "mean_radius": mean, "allowed": kept and kept[2]}
+        if kept is not None:
+            arrays["contacts.built"], arrays["contacts.checked"] = kept[:2]
+    if len(slips.low):
+        arrays |= {"contacts.low": slips.low, "contacts.high": slips.high, "contacts.slip": slips.slip}
+    if len(lent.particle):
+        names = ("contacts.lent_particle", "contacts.lent", "contacts.busy", "contacts.held")
+        arrays |= dict(zip(names, lent, strict=True))
+    return facts
+
+
+def _contacts(world: World, facts: Facts | None, arrays: dict[str, Array]) -> Any:
+    """What `ContactSolver.restore` takes; None where contacts remember nothing."""
+    if facts is None or not world.collisions:
+        return None
+    none = Kept(np.empty(0, np.int32), np.empty(0, np.int32), np.empty(0, world.dtype))
+    slips = Kept(*(arrays.get(f"contacts.{name}", empty) for name, empty in zip(("low", "high", "slip"), none, strict=True)))
+    if not (slips.low < slips.high).all():
+        raise InputError("contacts.low has a particle not less than contacts.high; allowed are pairs low < high")
+    empty = Lent(np.empty(0, np.int32), np.empty(0, world.dtype), np.empty(0, world.dtype), np.empty(0, np.uint8))
+    columns = ("lent_particle", "lent", "busy", "held")
+    lent = Lent(*(arrays.get(f"contacts.{name}", column) for name, column in zip(columns, empty, strict=True)))
+    alive = lent.particle[lent.particle >= 0]
+    if len(np.unique(alive)) < len(alive):
+        raise InputError("contacts.lent_particle has a particle twice; allowed is each once")
+    pace = checks.number("pace", facts["pace"], above=0.0), checks.number("risen", facts["risen"])
+    checks.fraction("pace", pace[0])
+    return _list(world, facts.get("list"), arrays), slips, lent, pace
+
+
+def _list(world: World, facts: Facts | None, arrays: dict[str, Array]) -> Any:
+    assert world.collisions is not None
+    method = world.collisions.method
+    if facts is None or not isinstance(method, Fast):
+        return None
+    skin, least, most = checks.number("skin", facts["skin"]), SKIN_LEAST / 2, 2 * SKIN_MOST
+    if not (least <= skin <= most if method.skin is None else skin == method.skin):
+        raise InputError(f"skin is {skin:g}; allowed is what the collisions say, or a number from {least:g} to {most:g}")
+    age, hold = (checks.whole(name, facts[name], least=0, most=_MOST) for name in ("age", "hold"))
+    mean = checks.number("mean_radius", facts["mean_radius"], least=0.0)
+    kept = None
+    if "contacts.built" in arrays:
+        allowed = checks.number("allowed", facts["allowed"], least=0.0)
+        if not mean:
+            raise InputError("mean_radius is 0; allowed is a number greater than 0 where there is a list of pairs")
+        if not arrays["slots.void"][0] and not math.isclose(mean, float(world.radius.mean(dtype=float)), rel_tol=1e-6):
+            raise InputError(f"mean_radius is {mean:g}; allowed is that of the particles, {float(world.radius.mean()):g}")
+        kept = arrays["contacts.built"], arrays["contacts.checked"], allowed
+    return kept, skin, age, hold, mean
+
+
+# ---- books, events and sleep -------------------------------------------------------------------------------------------
+
+
+def _books(facts: Facts) -> Bookkeeper:
+    books = Bookkeeper()
+    books._energy, books._resting = (checks.number(name, facts[name]) for name in ("energy", "resting"))
+    accounts = Ledger().as_dict()
+    books.ledger = Ledger(**{name: checks.number(name, facts["ledger"][name]) for name in accounts})
+    return books
+
+
+def _events_apart(events: Events, arrays: dict[str, Array]) -> None:
+    arrays["news.touching"] = events._touching
+    arrays["news.end"] = np.column_stack((events.end["a"], events.end["b"]))
+    arrays["news.begin"] = np.column_stack([events.begin[name] for name in _WHO])
+    arrays["news.begin_how"] = np.column_stack([events.begin[name] for name in _HOW])
+
+
+def _events(facts: Facts, arrays: dict[str, Array]) -> Events:
+    events = Events()
+    events.hit_speed = facts["hit_speed"]
+    events._touching = arrays["news.touching"]
+    events.end = np.zeros(len(arrays["news.end"]), CONTACT)
+    events.end["a"], events.end["b"] = arrays["news.end"].T
+    events.begin, how = np.zeros(len(arrays["news.begin"]), HIT), arrays["news.begin_how"]
+    for name, column in zip(_WHO, arrays["news.begin"].T, strict=True):
+        events.begin[name] = column
+    events.begin["speed"], events.begin["point"], events.begin["normal"] = how[:, 0], how[:, 1:3], how[:, 3:5]
+    events.begin["impulse"] = how[:, 5]
+    events.hit = events.begin[events.begin["speed"] >= events.hit_speed]
+    return events
+
+
+def _broken(arrays: dict[str, Array]) -> Array:
+    rows = arrays.get("news.broken", np.zeros((0, 4), np.int64))
+    broken = np.zeros(len(rows), BROKEN)
+    for name, column in zip(("link", "row", "i", "j"), rows.T, strict=True):
+        broken[name] = column
+    broken["force"] = arrays.get("news.broken_force", 0.0)
+    return broken
+
+
+def _sleep(world: World, facts: Facts, arrays: dict[str, Array]) -> Sleep:
+    sleep = Sleep()
+    sleep._next = checks.whole("next", facts["next"], least=0, most=_MOST)
+    sleep._members = dict(zip(arrays["news.islands"].tolist(), arrays["news.members"].tolist(), strict=True))
+    asleep = np.unique(arrays["slots.island"])
+    if lost := set(asleep[asleep >= 0].tolist()) - sleep._members.keys():
+        raise InputError(f"slots.island has {min(lost)}; allowed are numbers of news.islands, and -1")
+    if max(sleep._members, default=-1) >= sleep._next:
+        raise InputError(f"news.islands has {max(sleep._members)}; allowed is less than `next`, {sleep._next}")
+    # Laws hold objects of the world's own: what counts is whether they were those of the frame before.
+    sleep._laws = {"same": laws(world), "others": ((), ())}.get(facts["laws"])
+    return sleep

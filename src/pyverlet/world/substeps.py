@@ -1,0 +1,121 @@
+"""Substeps that need nothing of Python: gone through in one call (`kernels.frame`), until somebody wants to look.
+
+Under gravity alone accelerations are known after the first substep, and a call goes on until the list of pairs may be stale or
+the frame is over. Where forces, or who looks on, are asked in every substep, it is contacts, room and velocities of one. Smooth
+worlds too large for the processor's caches go strip by strip (`kernels.fused`).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.compile import clock, jit
+from pyverlet.ground.constants import FUSED_FROM
+from pyverlet.kernels import frame, fused
+from pyverlet.laws.contacts.broadphase import Strips
+from pyverlet.laws.contacts.collisions import ContactSolver
+from pyverlet.laws.contacts.wide import Wide
+
+Array = NDArray[Any]
+
+_APART = 2 * fused.BEHIND + 2
+"""Strips between two borders at least, so that what is left to be done at one has nothing to do with the other."""
+
+_KEPT = 8
+"""Strips whose normals a thread keeps at a time: those between the first stage and the last, and one more, in pairs."""
+
+
+class Substeps:
+    """The substeps of one frame of a world after another.
+
+    Attributes:
+        leapt: whether the integration of the next substep has been done already.
+        marked: whether the last substep has marked who rests.
+    """
+
+    def __init__(self) -> None:
+        self.leapt = self.marked = False
+        self._out: Array | None = None  # `moved` of the pairs that has been set out for this substep
+        self._held: Array | None = None
+        self._cut = self._place = np.zeros(0, np.int64)
+        self._normal = np.empty((2, 0))
+
+    def begin(self, contacts: ContactSolver | None) -> Substeps:
+        """A frame begins. That before may have been broken off, and the user may have changed everything since."""
+        self.leapt, self.marked, self._out = False, False, None
+        if contacts:
+            contacts.broad_phase.strayed = None
+        return self
+
+    def go(self, world: Any, contacts: ContactSolver, substep: int, h: float, lag: float) -> int:
+        """From after the integration of `substep`, whose list is good, as far as it goes: the substep that is next.
+
+        `substep` itself: nothing has been done, for there is more to it than kernels.
+        """
+        out, self._out, self.leapt, state = self._out, None, False, world._slots
+        strips = contacts.steady(state)
+        if strips is None or world.boundary.compiled(state) is None:
+            return substep
+        wide = contacts.set_up(state, h, lag, world._force_sum.strongest)
+        confine, shape = world.boundary.compiled(state)  # that circles rub is known by now
+        smooth = confine is frame.smooth_cage
+        if smooth:
+            wide.leave_arriving()
+        last = world.substeps - 1
+        leaps = world.integrator.leaps and not (world.forces or world.onlooker)  # who looks on may turn gravity
+        if smooth and not wide.asks and len(state) >= FUSED_FROM and strips.in_order:
+            return self._strip_by_strip(world, contacts, wide, strips, shape, substep, leaps=leaps)
+        stop, looks = world.substeps if leaps else substep + 1, wide.takes_looks()
+        reached, self.leapt = frame.frames[confine](
+            substep, stop, last, wide.circles, wide.arrays, wide.law, tuple(map(state.real, shape)), wide.cut(), looks,
+            int(out is not wide.moved), strips.checked, state.real(strips.allowed * strips.allowed), state.claims(),
+            world.profile.spent(frame.STAGES), (clock.address(), clock.tick()),
+        )  # fmt: skip
+        self.marked = reached > last
+        if self.marked:
+            wide.has_marked()
+        if self.leapt:
+            contacts.broad_phase.strayed, self._out = True, wide.moved
+        contacts.broad_phase.aged(reached - substep - 1)
+        return int(reached)
+
+    def _strip_by_strip(
+        self, world: Any, contacts: ContactSolver, wide: Wide, strips: Strips, room: Any, substep: int, *, leaps: bool
+    ) -> int:
+        """One substep, and the integration of the next if it `leaps`."""
+        state, last = world._slots, world.substeps - 1
+        self._share_out(strips, wide.lanes, state.dtype)
+        self.leapt, self.marked = leaps and substep < last, substep == last
+        looks, far = wide.takes_looks(), state.real(strips.allowed * strips.allowed)
+        about = (strips.held, self._place, looks, int(self.leapt), int(self.marked), strips.checked, far)
+        arrays = (*wide.arrays[: frame.NORMAL], self._normal, *wide.arrays[frame.NORMAL + 1 :])
+        strayed = fused.substep(self._cut, wide.circles, arrays, wide.law, tuple(map(state.real, room)), about)
+        contacts.broad_phase.strayed = bool(strayed) if self.leapt else None
+        if self.marked:
+            wide.has_marked()
+        world.profile.mark("fused")
+        return substep + 1
+
+    def _share_out(self, strips: Strips, lanes: Array, dtype: np.dtype[Any]) -> None:
+        """Which strips each thread does, as nearly as many lanes as can be, and where each strip keeps its normals."""
+        threads = min(jit.threads_in_use(), max(len(lanes) // (2 * _APART), 1))
+        if self._held is strips.held and len(self._cut) == threads + 1:
+            return
+        self._held = strips.held
+        before = np.cumsum(lanes)
+        self._cut = np.searchsorted(before, np.linspace(0, before[-1], threads + 1)) // 2 * 2
+        self._cut[[0, -1]] = 0, len(lanes)
+        for part in range(1, threads):  # one strip may have most of the lanes
+            self._cut[part] = max(self._cut[part], self._cut[part - 1] + _APART)
+        for part in range(threads - 1, 0, -1):
+            self._cut[part] = min(self._cut[part], (self._cut[part + 1] - _APART) // 2 * 2)
+        strip, widest = np.arange(len(lanes)), int(lanes.max())
+        slot = strip % _KEPT + _KEPT * (np.searchsorted(self._cut[1:-1], strip, side="right"))
+        for border in self._cut[1:-1]:  # those that wait for it
+            near = slice(border - fused.BEHIND, border + fused.BEHIND)
+            slot[near] = np.arange(near.stop - near.start) + slot.max() + 1
+        self._place = slot * widest
+        self._normal = np.empty((2, int(self._place.max(initial=0)) + widest), dtype)

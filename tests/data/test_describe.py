@@ -1,0 +1,122 @@
+"""Descriptions: every kind of object there and back, also through JSON, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet.data import memory
+from pyverlet.data.describe import KINDS, Builder, describe
+from pyverlet.laws.forces import Grip, Push
+
+ROOM = pv.Box((0, 0), (2, 1), restitution=0.5, friction=0.25)
+
+THINGS: list[Any] = [
+    pv.Open(), pv.Circle(center=(1, 2), radius=3.0, restitution=0.1, friction=0.2), ROOM, pv.ClampAndFlip(pv.Box((0, 0), (1, 1))),
+    pv.ProjectOnly(pv.Circle(radius=2)), pv.Fast(), pv.Fast(skin=0.1), pv.BruteForce(),
+    pv.Collisions(restitution=0.3, friction=0.6, method=pv.BruteForce()),
+    *(cls() for cls in pv.integrators.BY_NAME.values()), pv.PositionVerlet(naive_start=True),
+    pv.Attractor(strength=2, softening=0.1), pv.ConstantForce((1, 2)), pv.Drag(linear=0.1), pv.Wind((1, 0), quadratic=0.5),
+    pv.Gravitation(strength=1.5), pv.PointSpring(stiffness=3), Push(center=(1, 1), radius=2, acceleration=9),
+    Grip(3, target=(1, 2)), pv.Sink(ROOM, outside=True), pv.Emitter(ROOM, rate=10, radius=(0.1, 0.2), most=7, seed=3),
+    pv.Segment((0.1, 0.2), (1.3, 0.7), friction=0.3), pv.Capsule((0, 0), (1, 1 / 3), radius=0.1, surface_speed=2),
+    pv.Disc((1 / 3, 2), 0.5, velocity=(1, 0)), pv.Polygon([(0, 0), (0, 1), (1 / 7, 0)], radius=0.1, angular_velocity=1.0),
+    pv.Chain([(0, 0), (1, 0.3), (2, 0)], closed=True, pivot=(0.1, 0)),
+]  # fmt: skip
+
+
+def test_every_kind_is_tried() -> None:
+    assert {type(thing).__name__ for thing in THINGS} == set(KINDS)
+
+
+@pytest.mark.parametrize("thing", THINGS, ids=lambda thing: type(thing).__name__)
+def test_there_and_back(thing: Any) -> None:
+    described = json.loads(json.dumps(memory.plain(describe(thing)), allow_nan=False))
+    again = Builder().build("it", described, object)
+    assert type(again) is type(thing)
+    assert memory.plain(describe(again)) == described
+    if isinstance(thing, pv.Obstacle):
+        assert again.points.tobytes() == thing.points.tobytes()
+
+
+def test_an_obstacle_that_has_turned_keeps_every_bit() -> None:
+    world = pv.World(gravity=(0, 0))
+    world.add(position=(5, 5))
+    wheel = pv.Polygon([(0.1, 0), (1.7, 0.3), (0.3, 1.1)], angular_velocity=0.7, velocity=(0.3, 0.1))
+    world.obstacles.append(wheel)
+    for _ in range(10):
+        world.step(1 / 60)
+    again = Builder().build("wheel", describe(wheel), pv.Obstacle)
+    assert again.points.tobytes() == wheel.points.tobytes()
+    assert np.array_equal(again._local, wheel._local)
+
+
+def test_an_emitter_goes_on_where_it_was() -> None:
+    def world() -> pv.World:
+        return pv.World(gravity=(0, 0), collisions=None)
+
+    emitter, first = pv.Emitter(ROOM, rate=300, radius=0.01), world()
+    for _ in range(5):
+        emitter.act(first, 1 / 60)
+    again, (one, other) = Builder().build("emitter", describe(emitter), pv.Emitter), (world(), world())
+    emitter.act(one, 0.1)
+    again.act(other, 0.1)
+    assert len(one) > 0
+    assert np.array_equal(one.position, other.position)
+
+
+class Storm(pv.Actor):
+    def __init__(self) -> None:
+        self.gusts: Any = (1, [2.0, float("inf")], {"a": np.arange(3)})
+
+    def act(self, world: pv.World, dt: float) -> None:
+        pass
+
+    def save(self) -> Any:
+        return self.gusts
+
+    def restore(self, saved: Any) -> None:
+        self.gusts = saved
+
+
+def test_own_classes_are_handed_in_with_what_they_remember() -> None:
+    described = describe(Storm())
+    storm, other = Storm(), Storm()
+    storm.gusts = None
+    assert Builder([other, storm]).build("actor", describe(other), Storm) is other
+    again = Builder([storm]).build("actor", described, pv.Actor)
+    assert again is storm
+    assert storm.gusts[:2] == (1, [2.0, float("inf")])
+    assert list(storm.gusts[2]["a"]) == [0, 1, 2]
+    with pytest.raises(pv.InputError, match=r"Storm.*objects"):
+        Builder().build("actor", described, pv.Actor)
+
+
+def test_what_cannot_be_kept_is_named() -> None:
+    storm = Storm()
+    storm.gusts = {1, 2}
+    with pytest.raises(pv.InputError, match=r"Storm.save\(\).*set"):
+        describe(storm)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"type": "Circel", "radius": 1}, "did you mean 'Circle'"),
+        ({"type": "Circle", "radios": 1}, "did you mean 'radius'"),
+        ({"type": "Circle", "radius": -1}, "room: radius is -1"),
+        ({"type": "Circle", "radius": [1, 2]}, "radius"),
+        ({"type": "Circle"}, "radius"),
+        ({"type": ["Circle"]}, "known"),
+        ({"type": "Drag"}, "allowed are Open"),
+        ({"type": "Open", "state": {"a": 1}}, "state"),
+        (7, "room is 7"),
+    ],
+)
+def test_wrong_descriptions_get_a_sentence(wrong: Any, said: str) -> None:
+    with pytest.raises(pv.InputError, match=said):
+        Builder().build("room", wrong, pv.Boundary)

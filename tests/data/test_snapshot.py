@@ -1,0 +1,431 @@
+"""Snapshots: the same bits afterwards in another process, whole files whatever happens, a sentence for bad ones."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet.data import archive, snapshot
+
+HERE = Path(__file__).parent
+
+GO_ON = """
+import json, sys
+import pyverlet as pv
+hashes = {}
+for path in sys.argv[2:]:
+    world = pv.load(path, exact=True)
+    world.threads = int(sys.argv[1])
+    for _ in range(10):
+        world.step(1 / 60)
+    hashes[path] = world.state_hash()
+json.dump(hashes, sys.stdout)
+"""
+
+
+def in_another_process(paths: list[str], threads: int) -> dict[str, str]:
+    """Hashes ten frames after what these files hold."""
+    environment = {**os.environ, "NUMBA_NUM_THREADS": "2"}
+    command = [sys.executable, "-c", GO_ON, str(threads), *paths]
+    run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=600, check=False)
+    assert run.returncode == 0, run.stderr
+    hashes: dict[str, str] = json.loads(run.stdout)
+    return hashes
+
+
+def follow(name: str, world: pv.World, folder: Path, frames: int, every: int) -> dict[str, str]:
+    """Save a world at every so many frames of its run; the hash that each file is to come to in ten frames, by its path."""
+    paths: dict[int, str] = {}
+    hashes = {}
+    for frame in range(frames + 10):
+        if frame % every == 0 and frame < frames:
+            paths[frame + 10] = str(folder / f"{name}-{frame}.pvsnap")
+            pv.save(world, paths[frame + 10])
+        world.step(1 / 60)
+        if frame + 1 in paths:
+            hashes[paths[frame + 1]] = world.state_hash()
+    return hashes
+
+
+def worlds(most: int) -> dict[str, pv.World]:
+    """All worlds of all scenes, with at most so many circles."""
+    found: dict[str, pv.World] = {}
+    for name, scene in pv.scenes.SCENES.items():
+        panels = scene.panels(particles=min(scene.defaults.particles, most))
+        found |= {f"{name}-{number}": world for number, world in enumerate(panels.worlds)}
+    return found
+
+
+def check(expected: dict[str, str]) -> None:
+    for threads in (1, 2):
+        assert in_another_process(list(expected), threads) == expected, f"{threads} threads"
+
+
+def test_every_scene_goes_on_with_the_same_bits(tmp_path: Path) -> None:
+    expected: dict[str, str] = {}
+    for name, world in worlds(60).items():
+        expected |= follow(name, world, tmp_path, frames=31, every=30)
+    assert len(expected) > 2 * len(pv.scenes.SCENES)
+    check(expected)
+
+
+@pytest.mark.full
+def test_every_scene_goes_on_with_the_same_bits_from_every_tenth_frame(tmp_path: Path) -> None:
+    expected: dict[str, str] = {}
+    for name, world in worlds(3000).items():
+        expected |= follow(name, world, tmp_path, frames=200, every=10)
+    check(expected)
+
+
+# ---- features ----------------------------------------------------------------------------------------------------------
+
+
+def heap(**options: Any) -> pv.World:
+    world = pv.World(boundary=pv.Box((0, 0), (12, 60), friction=options.pop("walls", 0.0)), **options)
+    x, y = np.meshgrid(np.arange(1, 11.0), np.arange(1, 31.0))
+    rng = np.random.default_rng(0)
+    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=rng.uniform(0.3, 0.45, x.size))
+    return world
+
+
+def rubbing() -> pv.World:
+    return heap(collisions=pv.Collisions(friction=0.5), walls=0.5, ledger=True)
+
+
+def told() -> pv.World:
+    world = heap(events=True, collisions=pv.Collisions(restitution=0.4, friction=0.2))
+    world.events.hit_speed = 2.0
+    return world
+
+
+def sleeping() -> pv.World:
+    world = pv.World(boundary=pv.Box((0, 0), (20, 20)), sleep=True, events=True)
+    world.add(position=np.column_stack((np.arange(1, 19, 2.0), np.full(9, 0.5))))
+    world.add(position=(5.0, 16.0), velocity=(0, 6))
+    return world
+
+
+def uneven() -> pv.World:
+    world = heap(collisions=pv.Collisions(friction=0.2))
+    world.mass[:] = np.geomspace(1, 1e4, len(world))
+    return world
+
+
+def pouring() -> pv.World:
+    world = heap(dtype=np.float64, integrator=pv.VelocityVerlet())
+    world.actors.append(pv.Emitter(pv.Box((1, 40), (11, 55)), rate=200, radius=(0.1, 0.4), velocity=(0, -5), seed=4))
+    world.actors.append(pv.Sink(pv.Box((0, 0), (2, 1))))
+    world.forces += [pv.Drag(quadratic=0.1), pv.PointSpring(stiffness=0.1), pv.Gravitation(strength=0.01, softening=1.0)]
+    return world
+
+
+def linked() -> pv.World:
+    world = heap(substeps=4)
+    chain = pv.chain(world, (1, 40), (11, 40), links=12)
+    world.links.append(pv.Pin(chain.group, 0, compliance=1e-4))
+    world.links.append(pv.Rope(chain.group, 0, 12, length=9, breaking_force=2.0))
+    world.links.append(pv.Angle(chain.group, [1, 4], [2, 5], [3, 6], compliance=0.01))
+    world.links.append(pv.Spring(chain.group, 2, 9, stiffness=30.0, damping=0.5, collide=False))
+    body = pv.soft_body(world, [(4, 44), (6, 44), (6, 46), (4, 46)], spacing=0.5)
+    world.forces.append(pv.ConstantForce((3, 0), group=body.group))
+    world.links.iterations = 2
+    world.remove([3, 5, 305])  # of the heap two, and a link of the chain
+    return world
+
+
+def crowded() -> pv.World:
+    world = pv.World(boundary=pv.Circle(radius=6))
+    world.add(position=np.random.default_rng(2).uniform(-1, 1, (80, 2)), radius=0.4)
+    return world
+
+
+FEATURES = (rubbing, told, sleeping, uneven, pouring, linked, crowded)
+
+
+def test_all_that_is_remembered_is_kept(tmp_path: Path) -> None:
+    expected: dict[str, str] = {}
+    for make in FEATURES:
+        expected |= follow(make.__name__, make(), tmp_path, frames=141, every=70)
+    check(expected)
+
+
+@pytest.mark.parametrize("make", FEATURES)
+def test_what_a_world_says_of_itself_is_kept(make: Callable[[], pv.World], tmp_path: Path) -> None:
+    world = make()
+    world.run(seconds=1.5)
+    pv.save(world, tmp_path / "a.pvsnap")
+    again = pv.load(tmp_path / "a.pvsnap", exact=True)
+    for each in (world, again):
+        each.run(seconds=0.2)
+    assert again.state_hash() == world.state_hash()
+    assert (again.time, again.frames, again.substeps, again.gravity) == (world.time, world.frames, world.substeps, world.gravity)
+    assert again.group_number.tolist() == world.group_number.tolist()
+    assert again.number.tolist() == world.number.tolist()
+    assert again.asleep.tolist() == world.asleep.tolist()
+    assert [repr(link) for link in again.links] == [repr(link) for link in world.links]
+    for one, other in zip(world.links, again.links, strict=True):
+        assert one.particles.tolist() == other.particles.tolist()
+        assert one.force.tolist() == other.force.tolist()
+        assert one.intact.tolist() == other.intact.tolist()
+    assert again.links.broken.tolist() == world.links.broken.tolist()
+    assert again.energy() == world.energy()
+    if world.keeps_ledger:
+        assert again.ledger == world.ledger
+    if world.tells_events:
+        assert again.events.hit.tobytes() == world.events.hit.tobytes()
+        assert again.events.begin.tobytes() == world.events.begin.tobytes()
+
+
+def test_features_have_something_to_remember() -> None:
+    # Else the tests above would pass without it.
+    world = sleeping()
+    world.run(seconds=1.5)
+    assert world.asleep.any()
+    assert not world.asleep.all()
+    world = linked()
+    world.run(seconds=1.5)
+    assert not all(link.intact.all() for link in world.links)
+    world = rubbing()
+    world.run(seconds=1.5)
+    assert len(world.save().contacts[1].low)
+    world = crowded()
+    world.run(seconds=0.2)
+    assert (world._state.grown < 1).any()
+
+
+def test_groups_go_on_naming_their_particles(tmp_path: Path) -> None:
+    world = heap()
+    gone, left = world.add(position=(1, 40)), world.add(position=[(3, 40), (5, 40)], radius=0.2)
+    world.remove(gone)
+    pv.save(world, tmp_path / "a.pvsnap")
+    again = pv.load(tmp_path / "a.pvsnap")
+    groups = again.groups
+    assert [len(group) for group in groups] == [300, 0, 2]
+    assert groups[2].index.tolist() == left.index.tolist()
+    groups[2].velocity[:] = 1.0
+    assert (again.velocity[-2:] == 1.0).all()
+    assert again.add(position=(8, 40)).index.tolist() == [302]
+
+
+# ---- objects of one's own ----------------------------------------------------------------------------------------------
+
+
+class Blower(pv.Actor):
+    def __init__(self) -> None:
+        self.blown = 0
+
+    def act(self, world: pv.World, dt: float) -> None:
+        self.blown += 1
+        world.velocity[:, 0] += 0.001 * self.blown
+
+    def save(self) -> int:
+        return self.blown
+
+    def restore(self, saved: Any) -> None:
+        self.blown = saved
+
+
+@pv.force
+def swirl(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tuple[float, float]:
+    return -mass * y, mass * x
+
+
+def test_a_users_own_objects_are_handed_in(tmp_path: Path) -> None:
+    path = tmp_path / "a.pvsnap"
+    world = heap()
+    world.actors.append(Blower())
+    world.forces.append(swirl)
+    world.run(seconds=0.2)
+    pv.save(world, path)
+    again = pv.load(path, objects=[swirl, Blower()])
+    for each in (world, again):
+        each.run(seconds=0.2)
+    assert again.state_hash() == world.state_hash()
+    with pytest.raises(pv.InputError, match=r"forces\[0\].*'swirl'.*objects"):
+        pv.load(path, objects=[Blower()])
+
+
+# ---- files -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    world = linked()
+    world.run(seconds=0.3)
+    path: Path = tmp_path_factory.mktemp("saved") / "heap.pvsnap"
+    pv.save(world, path, scene={"scene": "heap", "format": 1})
+    return path
+
+
+def test_numpy_reads_it_and_what_it_says(saved: Path) -> None:
+    with np.load(saved) as file:  # no pickles: the default
+        assert file["particles.position"].shape == (len(pv.load(saved)), 2)
+    about = snapshot.about(saved)
+    assert about.scene == {"scene": "heap", "format": 1}
+    assert about.state_hash == pv.load(saved).state_hash()
+    assert about.made_by["pyverlet"] == pv.__version__
+    assert about.same_kernels
+
+
+def test_equal_worlds_are_equal_files(saved: Path, tmp_path: Path) -> None:
+    pv.save(pv.load(saved), tmp_path / "again.pvsnap", scene={"scene": "heap", "format": 1})
+    assert (tmp_path / "again.pvsnap").read_bytes() == saved.read_bytes()
+
+
+def test_equal_columns_are_stored_once(tmp_path: Path) -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (110, 110)))
+    x, y = np.meshgrid(np.arange(1, 101.0), np.arange(1, 101.0))
+    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.5)
+    pv.save(world, tmp_path / "new.pvsnap")
+    # A position, twice four bytes, and some thousands for names and the table; the order of slots counts up.
+    assert (tmp_path / "new.pvsnap").stat().st_size < 8 * len(world) + 12_000
+    again = pv.load(tmp_path / "new.pvsnap")
+    assert again.radius.tolist() == world.radius.tolist()
+    again.radius[0] = 0.4  # an array of its own
+    assert again.radius[1] == np.float32(0.5)
+
+
+def test_other_kernels_are_told(saved: Path, tmp_path: Path) -> None:
+    path = tmp_path / "other.pvsnap"
+    table, arrays = archive.read(saved)
+    table["kernels"] = "0" * 16
+    with path.open("wb") as file:
+        archive.write(file, lambda: table, arrays)
+    with pytest.warns(snapshot.OtherBits, match="last bits"):
+        assert pv.load(path).state_hash() == table["state_hash"]
+    with pytest.raises(pv.InputError, match="exact is True"):
+        pv.load(path, exact=True)
+
+
+def test_formats(saved: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "newer.pvsnap"
+    table, arrays = archive.read(saved)
+    table["format"] = snapshot.FORMAT + 1
+    with path.open("wb") as file:
+        archive.write(file, lambda: table, arrays)
+    with pytest.raises(pv.InputError, match="newer pyverlet"):
+        pv.load(path)
+    # An older one goes through all migrations from its own on.
+    monkeypatch.setattr(snapshot, "FORMAT", 3)
+    turned: list[Any] = []
+    for older in (1, 2):
+        monkeypatch.setitem(snapshot.MIGRATIONS, older, lambda table, arrays: turned.append(table["format"]))
+    assert len(pv.load(saved)) > 0
+    assert turned == [1, 1]  # it is theirs to know from which, and nobody's to write down
+    with pytest.raises(pv.InputError, match="older format"):
+        pv.load(saved, exact=True)
+
+
+def test_bad_paths_and_values_lose_nothing(saved: Path, tmp_path: Path) -> None:
+    world = heap()
+    with pytest.raises(pv.InputError, match="cannot be written"):
+        pv.save(world, tmp_path / "nowhere" / "a.pvsnap")
+    with pytest.raises(pv.InputError, match="is not there"):
+        pv.load(tmp_path / "nowhere.pvsnap")
+    with pytest.raises(pv.InputError, match=r"world is 3"):
+        pv.save(3, tmp_path / "a.pvsnap")  # type: ignore[arg-type]
+    path = tmp_path / "kept.pvsnap"
+    path.write_bytes(saved.read_bytes())
+    world.position[3, 1] = np.nan
+    with pytest.raises(pv.InputError, match=r"particles.position\[3\]"):
+        pv.save(world, path)
+    world.actors.append(Blower())
+    world.actors[0].blown = {1}  # type: ignore[attr-defined]
+    with pytest.raises(pv.InputError, match="Blower"):
+        pv.save(world, path)
+    assert path.read_bytes() == saved.read_bytes()
+    assert [file.name for file in tmp_path.iterdir()] == ["kept.pvsnap"]
+
+
+def mutants(seed: int, count: int, folder: Path) -> dict[str, int]:
+    command = [sys.executable, "-X", "faulthandler", str(HERE / "mutants.py"), str(seed), str(count), str(folder)]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=1200, check=False)
+    assert run.returncode == 0, f"mutant {(folder / 'number').read_text()} of seed {seed}: {run.stderr}"
+    became: dict[str, int] = json.loads(run.stdout)
+    return became
+
+
+def check_mutants(seed: int, count: int, folder: Path) -> None:
+    became = mutants(seed, count, folder)
+    assert sum(became.values()) == count
+    assert set(became) <= {"refused", "went on", "turned non-finite", "refused in a frame"}
+    assert became["refused"] > count / 2
+
+
+def test_mutated_files_are_refused_or_sound(tmp_path: Path) -> None:
+    check_mutants(7, 60, tmp_path)
+
+
+@pytest.mark.full
+def test_two_thousand_mutated_files(tmp_path: Path) -> None:
+    check_mutants(8, 2000, tmp_path)
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+import pyverlet as pv
+from pyverlet.data import archive, durable, snapshot
+path = Path(sys.argv[1])
+world = pv.World(boundary=pv.Box((0, 0), (10, 10)))
+world.add(position=[(1, 1), (3, 1), (5, 1)])
+world.step(1 / 60)
+pv.save(world, path)
+old = world.state_hash()
+world.step(1 / 60)
+new = world.state_hash()
+files = {archive.__file__, durable.__file__, snapshot.__file__}
+seen, lines, done = [], 0, False
+while not done:
+    child = os.fork()
+    if child == 0:
+        left = lines
+        def trace(frame, event, argument):
+            global left
+            if frame.f_code.co_filename not in files:
+                return None
+            if event == "line":
+                left -= 1
+                if left < 0:
+                    os.kill(os.getpid(), signal.SIGKILL)
+            return trace
+        sys.settrace(trace)
+        pv.save(world, path)
+        sys.settrace(None)
+        os._exit(0)
+    _, status = os.waitpid(child, 0)
+    done = os.WIFEXITED(status)
+    assert done or os.WTERMSIG(status) == signal.SIGKILL, status
+    seen.append(pv.load(path).state_hash())
+    assert seen[-1] in (old, new), lines
+    lines += 7
+assert seen[-1] == new
+print(lines, seen.count(old), seen.count(new))
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="forks")
+def test_killed_in_any_step_of_saving_leaves_a_whole_file(tmp_path: Path) -> None:
+    path = tmp_path / "a.pvsnap"
+    run = subprocess.run([sys.executable, "-c", KILLED, str(path)], capture_output=True, text=True, timeout=300, check=False)
+    assert run.returncode == 0, run.stderr
+    lines, old, _ = map(int, run.stdout.split())
+    assert lines > 100
+    assert old > 10
+    assert len(list(tmp_path.iterdir())) > 1  # what those that were killed had begun
+
+
+def test_warnings_are_of_a_kind_of_their_own() -> None:
+    assert issubclass(snapshot.OtherBits, UserWarning)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", snapshot.OtherBits)

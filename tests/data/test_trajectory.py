@@ -1,0 +1,274 @@
+"""Trajectories: what other programs read of them, that every bit comes back, and that a killed program leaves them whole."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import ase.io
+import gsd.hoomd
+import h5py
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet.cli import main
+from pyverlet.data.trajectory import FORMATS
+
+SUFFIXES = [".gsd", ".xyz", ".vtkhdf"]
+
+
+def changing(dtype: Any = np.float32) -> pv.World:
+    """Circles of many sizes that rub, so that they spin, with a rope among them."""
+    world = pv.World(boundary=pv.Box((-3, 0), (3, 8)), collisions=pv.Collisions(friction=0.5), dtype=dtype)
+    world.add(
+        position=[(-2, 1), (0, 1), (2, 1)],
+        velocity=[(3, 0), (0, 0), (-3, 0)],
+        radius=[0.3, 0.5, 0.7],
+        mass=[1, np.inf, 3],
+        spin=2,
+    )
+    pv.rope(world, (-2, 5), (2, 5), links=4, radius=0.1)
+    return world
+
+
+def kept(path: Path, dtype: Any = np.float32) -> list[dict[str, Any]]:
+    """Write a trajectory in which circles come and go; what the world had at each moment."""
+    world, had = changing(dtype), []
+    with pv.Trajectory(path) as film:
+        for frame in range(10):
+            if frame == 4:
+                world.add(position=(0, 7), radius=0.2)
+            if frame == 7:
+                world.remove([0, 2])
+            film.add(world)
+            names = ("position", "velocity", "spin", "radius", "mass", "number")
+            had.append(
+                {name: np.array(getattr(world, name)) for name in names} | {"hash": world.state_hash(), "time": world.time}
+            )
+            world.step(1 / 60)
+    assert film.frames == 10
+    return had
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_every_bit_comes_back(tmp_path: Path, suffix: str, dtype: Any) -> None:
+    had = kept(tmp_path / f"a{suffix}", dtype)
+    with pv.read_trajectory(tmp_path / f"a{suffix}") as film:
+        assert len(film) == 10
+        assert film.state_hash == [moment["hash"] for moment in had]
+        assert film.time.tolist() == [moment["time"] for moment in had]
+        assert film.particles.tolist() == [len(moment["radius"]) for moment in had]
+        for frame, moment in zip(film, had, strict=True):
+            for name in ("position", "velocity", "spin", "radius", "mass", "number"):
+                # Text reads back as float64; rounded to the world's own precision it is what it was.
+                assert np.array_equal(getattr(frame, name).astype(moment[name].dtype), moment[name]), name
+        assert np.any(film[3].spin)
+        with pytest.raises(pv.InputError, match="particles came or went before frame 4"):
+            _ = film.position
+
+
+def test_gsd_as_its_own_library_reads_it(tmp_path: Path) -> None:
+    had = kept(tmp_path / "a.gsd")
+    with gsd.hoomd.open(str(tmp_path / "a.gsd"), "r") as file:
+        assert len(file) == 10
+        for frame, moment in zip(file, had, strict=True):
+            assert frame.configuration.dimensions == 2
+            assert np.array_equal(frame.particles.position[:, :2], moment["position"])
+            assert np.array_equal(frame.particles.diameter, 2 * moment["radius"])
+            assert np.array_equal(frame.particles.velocity[:, :2], moment["velocity"])
+            assert frame.log["state_hash"] == moment["hash"]
+            assert frame.log["time"] == moment["time"]
+            # Nobody is outside the box, whose middle is the origin of the format.
+            assert np.all(np.abs(frame.particles.position) <= np.array(frame.configuration.box[:3]) / 2)
+        assert file[0].bonds.N == 4
+
+
+def test_xyz_as_ase_reads_it(tmp_path: Path) -> None:
+    had = kept(tmp_path / "a.xyz")
+    frames = ase.io.read(tmp_path / "a.xyz", index=":", format="extxyz")
+    for frame, moment in zip(frames, had, strict=True):
+        # ASE keeps doubles, the text has the 9 digits that tell all float32 apart.
+        assert frame.positions[:, :2] == pytest.approx(moment["position"], rel=1e-8)
+        assert frame.arrays["radius"] == pytest.approx(moment["radius"], rel=1e-8)
+        assert frame.info["state_hash"] == moment["hash"]
+        assert frame.info["Time"] == moment["time"]
+
+
+def test_vtkhdf_has_what_the_format_asks_for(tmp_path: Path) -> None:
+    had = kept(tmp_path / "a.vtkhdf")
+    with h5py.File(tmp_path / "a.vtkhdf") as file:
+        root = file["VTKHDF"]
+        assert (root.attrs["Type"], root["Steps"].attrs["NSteps"]) == (b"PolyData", 10)
+        for k, moment in enumerate(had):
+            steps = {
+                name: root["Steps"][name][k] for name in ("PartOffsets", "PointOffsets", "CellOffsets", "ConnectivityIdOffsets")
+            }
+            part, first, cell = steps["PartOffsets"], steps["PointOffsets"], steps["CellOffsets"][0]
+            count = root["NumberOfPoints"][part]
+            assert np.array_equal(root["Points"][first : first + count, :2], moment["position"])
+            # Each part has one offset more than cells: those of part p begin p further on.
+            offsets = root["Vertices/Offsets"][cell + part : cell + part + count + 1]
+            assert offsets.tolist() == list(range(count + 1))
+            vertices = root["Vertices/Connectivity"][steps["ConnectivityIdOffsets"][0] :][:count]
+            assert vertices.tolist() == list(range(count))
+
+
+def test_paraview_and_ovito_open_them(tmp_path: Path) -> None:
+    for suffix in SUFFIXES:
+        kept(tmp_path / f"a{suffix}")
+    program = """if True:
+        import json, sys
+        found = {}
+        from vtkmodules.vtkIOHDF import vtkHDFReader
+        reader = vtkHDFReader()
+        reader.SetFileName(sys.argv[1] + "/a.vtkhdf")
+        reader.UpdateInformation()
+        def points(step):
+            reader.SetStep(step)
+            reader.Update()
+            found = reader.GetOutputDataObject(0)
+            return [found.GetNumberOfPoints(), found.GetNumberOfVerts(), found.GetPointData().GetArray("radius").GetValue(1)]
+        found[".vtkhdf"] = [points(step) for step in range(reader.GetNumberOfSteps())]
+        from ovito.io import import_file
+        for suffix in (".gsd", ".xyz"):
+            film = import_file(sys.argv[1] + "/a" + suffix)
+            frames = [film.compute(k) for k in range(film.source.num_frames)]
+            found[suffix] = [
+                [f.particles.count, float(f.particles["Radius"][1]), str(f.attributes["state_hash"])] for f in frames
+            ]
+        print(json.dumps(found))
+    """
+    pytest.importorskip("vtkmodules")
+    pytest.importorskip("ovito")
+    done = subprocess.run([sys.executable, "-c", program, str(tmp_path)], capture_output=True, text=True, check=True)
+    found = json.loads(done.stdout)
+    hashes = pv.read_trajectory(tmp_path / "a.gsd").state_hash
+    counts = [8] * 4 + [9] * 3 + [7] * 3
+    assert [row[0] for row in found[".vtkhdf"]] == [row[1] for row in found[".vtkhdf"]] == counts
+    assert [row[2] for row in found[".vtkhdf"]] == pytest.approx([0.5] * 7 + [0.1] * 3)
+    for suffix in (".gsd", ".xyz"):
+        assert [row[0] for row in found[suffix]] == counts
+        assert [row[1] for row in found[suffix]] == pytest.approx([0.5] * 7 + [0.1] * 3)
+        assert [row[2] for row in found[suffix]] == hashes
+
+
+ENDLESS = """
+import itertools, sys
+import pyverlet as pv
+films = [pv.Trajectory(sys.argv[1] + "/a" + suffix) for suffix in sys.argv[2:]]
+world = pv.World(gravity=(0, 0))
+world.add(position=[(2.0 * k, 0.0) for k in range(100)], velocity=(1, 2))
+for count in itertools.count(1):
+    for film in films:
+        film.add(world)
+    print(count, flush=True)
+    world.time += 1
+    world.position[0, 1] += 1
+"""
+
+
+def test_killed_at_any_moment_what_was_added_is_there(tmp_path: Path) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", ENDLESS, str(tmp_path), *SUFFIXES], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    last = [process.stdout.readline() for _ in range(20)][-1]
+    process.kill()
+    out, err = process.communicate()
+    said = int((out.split() or [last])[-1])
+    assert "Traceback" not in err
+    assert said >= 20
+    for suffix in SUFFIXES:
+        with pv.read_trajectory(tmp_path / f"a{suffix}") as film:
+            assert len(film) >= said
+            assert film.time.tolist() == list(range(len(film)))
+            assert film.position[:, 0, 1].tolist() == list(range(len(film)))
+
+
+def test_run_keeps_every_so_many_frames_and_the_first(tmp_path: Path) -> None:
+    world = changing()
+    with pv.Trajectory(tmp_path / "a.gsd", every=5) as film:
+        film.run(world, seconds=0.5)
+        film.run(world, seconds=0.5)
+    again = changing()
+    with pv.read_trajectory(tmp_path / "a.gsd") as moments:
+        assert moments.time == pytest.approx(np.arange(13) / 12)
+        again.run(seconds=1.0)
+        assert moments[-1].state_hash == again.state_hash() == world.state_hash()
+        assert moments.position.shape == (13, 8, 2)
+        assert moments.mass.shape == moments.radius.shape == moments.spin.shape == (13, 8)
+        assert len(moments[2:4]) == 2
+
+
+def test_a_world_that_breaks_leaves_what_was_before(tmp_path: Path) -> None:
+    world = changing()
+
+    with pytest.raises(ZeroDivisionError), pv.Trajectory(tmp_path / "a.xyz") as film:  # noqa: PT012
+        film.run(world, seconds=0.1)
+        _ = 1 / 0
+    assert len(pv.read_trajectory(tmp_path / "a.xyz")) == 7
+    with (tmp_path / "a.xyz").open("ab") as file:
+        file.write(b'3\nLattice="1 0 0 0 1 0 0 0 1" Prop')  # cut while it was written
+    assert len(pv.read_trajectory(tmp_path / "a.xyz")) == 7
+
+
+def test_an_empty_world_and_one_without_walls(tmp_path: Path) -> None:
+    for suffix in SUFFIXES:
+        world = pv.World()
+        with pv.Trajectory(tmp_path / f"a{suffix}") as film:
+            film.add(world)
+            world.add(position=(100.0, -1000.0))
+            film.add(world)
+        assert pv.read_trajectory(tmp_path / f"a{suffix}").particles.tolist() == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("a.csv", "allowed for a trajectory is a name that ends in .gsd"),
+        ("none/a.gsd", "cannot be written"),
+        ("none/a.xyz", "cannot be written"),
+        ("none/a.vtkhdf", "cannot be written"),
+    ],
+)
+def test_bad_names_are_told_in_a_sentence(tmp_path: Path, name: str, said: str) -> None:
+    with pytest.raises(pv.InputError, match=said):
+        pv.Trajectory(tmp_path / name)
+
+
+@pytest.mark.parametrize("suffix", [*FORMATS])
+def test_files_of_another_kind_are_told_in_a_sentence(tmp_path: Path, suffix: str) -> None:
+    (tmp_path / f"a{suffix}").write_bytes(b"no trajectory at all" * 50)
+    for name in (f"a{suffix}", f"none{suffix}"):
+        with pytest.raises(pv.InputError, match="cannot be read as a trajectory"):
+            pv.read_trajectory(tmp_path / name)
+
+
+def test_a_closed_one_and_bad_numbers_are_refused(tmp_path: Path) -> None:
+    with pv.Trajectory(tmp_path / "a.gsd") as film:
+        with pytest.raises(pv.InputError, match="seconds is -1"):
+            film.run(changing(), seconds=-1)
+        with pytest.raises(pv.InputError, match="dt is 0"):
+            film.run(changing(), seconds=1, dt=0)
+    with pytest.raises(pv.InputError, match="is closed"):
+        film.add(changing())
+    with pytest.raises(pv.InputError, match="every is 0"):
+        pv.Trajectory(tmp_path / "a.gsd", every=0)
+
+
+def test_run_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.gsd"
+    run = ["run", "cage", "--particles", "50", "--frames", "10", "--json", "--trajectory", str(path)]
+    assert main([*run, "--every", "5"]) == 0
+    with pv.read_trajectory(path) as film:
+        assert film.time == pytest.approx([0, 5 / 60, 10 / 60])
+        assert film[-1].state_hash == json.loads(capsys.readouterr().out)["state_hash"]
+    assert main(["run", "cage", "--every", "5", "--frames", "1"]) == 2
+    assert "every is 5; allowed is none without --trajectory" in capsys.readouterr().err
+    assert main(["run", "bounce-order", "--frames", "1", "--trajectory", str(path)]) == 2
+    assert "worlds side by side" in capsys.readouterr().err

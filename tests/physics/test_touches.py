@@ -1,0 +1,171 @@
+"""Contacts, forces on obstacles and walls, pressure."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import DTypeLike
+
+import pyverlet as pv
+from pyverlet.lab.pressure import WeighedBox
+from pyverlet.laws.touches import TOUCH, Touches, vectors
+
+G = 9.81
+
+
+def pile(dtype: DTypeLike = np.float64, **options: object) -> pv.World:
+    """50 circles of 2 kg in five layers, at rest."""
+    world = pv.World(boundary=pv.Box((0, 0), (10, 20)), contacts=True, dtype=dtype, **options)  # type: ignore[arg-type]
+    column = np.arange(10) + 0.5
+    where = np.stack(np.meshgrid(column, np.arange(5) + 0.5), -1).reshape(-1, 2)
+    world.add(position=where + np.random.default_rng(0).normal(0, 0.005, (50, 2)), radius=0.499, mass=2.0)
+    world.run(seconds=8)
+    return world
+
+
+@pytest.mark.parametrize(("dtype", "within"), [(np.float32, 2e-3), (np.float64, 1e-6)])
+def test_a_floor_is_weighed(dtype: type[np.float32], within: float) -> None:
+    # At rest the walls give what gravity takes, m g dt in a frame, whatever happens between the circles.
+    world = pile(dtype)
+    weight = 50 * 2 * G
+    assert world.force_on(world.boundary) == pytest.approx([0, -weight], abs=within * weight)
+    contacts = world.contacts
+    floor = contacts[contacts["wall"] == 2]
+    assert floor["impulse"].sum() * 60 == pytest.approx(weight, rel=within)
+    assert set(floor["a"]) == set(range(10))
+    assert np.allclose(floor["normal"], (0, -1))
+    assert np.allclose(floor["point"][:, 1], 0, atol=1e-3)
+    # Left and right wall push alike; pressure is what all of them push, over their length.
+    sides = [contacts["impulse"][contacts["wall"] == wall].sum() * 60 for wall in (0, 1)]
+    assert sides[0] == pytest.approx(sides[1], abs=2 * within * weight)
+    assert world.pressure() == pytest.approx((sum(sides) + weight) / 60, rel=within)
+
+
+def test_what_circles_give_each_other_explains_what_each_has_got() -> None:
+    # m dv = 0 of each: its contacts carry its weight, m g dt; action is reaction by how they are written down.
+    world = pile()
+    contacts = world.contacts
+    given, pairs = vectors(contacts), contacts[contacts["b"] >= 0]
+    got = np.zeros((50, 2))
+    np.subtract.at(got, contacts["a"], given)
+    np.add.at(got, pairs["b"], given[contacts["b"] >= 0])
+    assert got * 60 == pytest.approx(np.tile((0, 2 * G), (50, 1)), abs=1e-2 * 2 * G)
+    assert (pairs["impulse"] > 0).all()
+    assert (pairs["a"] < pairs["b"]).all()
+    between = world.position[pairs["b"]] - world.position[pairs["a"]]
+    assert np.allclose(pairs["point"], world.position[pairs["a"]] + 0.5 * between, atol=1e-3)
+
+
+def test_a_column_carries_more_the_deeper() -> None:
+    # The k-th contact from above carries k weights.
+    world = pv.World(boundary=pv.Box((0, 0), (1, 20)), contacts=True, dtype=np.float64)
+    world.add(position=[(0.5, 0.5 + k) for k in range(6)], radius=0.5)
+    world.run(seconds=5)
+    contacts = world.contacts
+    upright = contacts[np.abs(contacts["normal"][:, 1]) > 0.9]
+    assert sorted(upright["impulse"] * 60 / G) == pytest.approx([1, 2, 3, 4, 5, 6], rel=1e-3)
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+def test_an_impact_gives_what_it_turns(e: float) -> None:
+    # J = (1 + e) v m for a wall, (1 + e) v m1 m2 / (m1 + m2) for two circles.
+    world = pv.World(
+        gravity=(0, 0), boundary=pv.Box((-9, -9), (9, 9), restitution=e), collisions=pv.Collisions(restitution=e), contacts=True,
+        dtype=np.float64,
+    )  # fmt: skip
+    world.add(position=[(8.4, 5), (0, 0), (1.1, 0)], velocity=[(5, 0), (4, 0), (0, 0)], mass=[3.0, 1.0, 3.0])
+    seen = []
+    for _ in range(6):
+        world.step(1 / 60)
+        seen += world.contacts[["a", "b", "wall", "impulse"]].tolist()
+    assert [row[:3] for row in seen if row[3] > 0.1] == [(0, -1, 1), (1, 2, -1)]
+    assert [row[3] for row in seen if row[3] > 0.1] == pytest.approx([(1 + e) * 5 * 3, (1 + e) * 4 * 0.75], rel=1e-6)
+
+
+def test_obstacles_are_told_apart() -> None:
+    # A V of two plates at 30 and 60 degrees to the floor: two forces that carry the weight, N1 = m g cos 30, N2 = m g sin 30.
+    world = pv.World(contacts=True, dtype=np.float64)
+    flat = world.obstacles.append(pv.Segment((0, 0), (6 * np.cos(np.pi / 6), 3)))
+    steep = world.obstacles.append(pv.Segment((0, 0), (-3, 6 * np.cos(np.pi / 6))))
+    away = world.obstacles.append(pv.Disc((50, 50), 1))
+    place = 0.5 * np.sqrt(2) * np.array((np.cos(np.deg2rad(75)), np.sin(np.deg2rad(75))))  # the corner is a right angle
+    world.add(position=place, radius=0.5, mass=2.0)
+    world.run(seconds=2)
+    on_flat, on_steep = world.force_on(flat), world.force_on(steep)
+    assert on_flat + on_steep == pytest.approx([0, -2 * G], abs=1e-6)
+    assert on_flat == pytest.approx(2 * G * np.cos(np.pi / 6) * np.array((0.5, -np.cos(np.pi / 6))), abs=1e-3)
+    assert on_steep == pytest.approx(2 * G * 0.5 * np.array((-np.cos(np.pi / 6), -0.5)), abs=1e-3)
+    assert world.force_on(away).tolist() == [0, 0]
+    assert set(world.contacts["obstacle"]) == {0, 1}
+
+
+def test_friction_rubs() -> None:
+    # Sliding, mu N against the way; rolling, nothing.
+    world = pv.World(contacts=True, dtype=np.float64)
+    floor = world.obstacles.append(pv.Segment((-50, 0), (50, 0), friction=0.3))
+    world.add(position=(-40, 0.5), velocity=(6, 0), mass=2.0)
+    world.run(seconds=0.2)
+    assert world.force_on(floor) == pytest.approx([0.3 * 2 * G, -2 * G], rel=1e-6)
+    row = world.contacts[0]
+    assert row["rub"] * 60 == pytest.approx(-0.3 * 2 * G, rel=1e-6)  # the normal is (0, -1): along (1, 0)
+    world.run(seconds=3)
+    assert world.force_on(floor) == pytest.approx([0, -2 * G], abs=1e-6)
+
+
+def test_the_pressure_of_a_gas_is_what_its_walls_give() -> None:
+    # The other way to weigh it: a room that sums m |dv| of its own, which tests/physics/test_coarse.py holds against Henderson.
+    rng, room = np.random.default_rng(1), WeighedBox((0, 0), (20, 20), restitution=1)
+    world = pv.World(gravity=(0, 0), boundary=room, collisions=pv.Collisions(restitution=1), contacts=True, dtype=np.float64)
+    place = (np.arange(14) + 0.5) * 20 / 14
+    where = np.stack(np.meshgrid(place, place), -1).reshape(-1, 2)
+    world.add(position=where, velocity=rng.normal(0, 3, (196, 2)), radius=0.5)
+    for _ in range(20):
+        before = room.impulse
+        world.step(1 / 60)
+        assert world.pressure() * 80 / 60 == pytest.approx(room.impulse - before, rel=1e-9)
+    assert room.impulse > 10
+
+
+def test_who_is_removed_is_no_contact_any_more() -> None:
+    world = pile()
+    before = world.contacts
+    world.remove([0, 7])
+    after = world.contacts
+    gone = np.isin(before["a"], (0, 7)) | np.isin(before["b"], (0, 7))
+    assert len(after) == len(before) - int(gone.sum())
+    assert np.array_equal(after["impulse"], before["impulse"][~gone])
+    assert int(after["a"].max()) < 48
+    world.step(1 / 60)
+    assert len(world.contacts) > 20
+
+
+def test_a_solver_may_say_what_pairs_give() -> None:
+    world = pile()
+    touches = world._touches
+    assert isinstance(touches, Touches)
+    slots = world._slots
+    i, j = slots.slots_of(np.array([3, 3])), slots.slots_of(np.array([13, 2]))
+    touches._heard.clear()
+    touches.hear(slots, i, j, np.array([(0.0, 1.0), (2.0, 0.0)]))
+    touches.hear(slots, j[:1], i[:1], np.array([(0.0, -0.5)]))  # the other way round, in another substep
+    assert touches._end is not None
+    touches._end._heard, touches._found = touches._heard, None
+    pairs = world.contacts[world.contacts["b"] >= 0]
+    assert [(int(a), int(b)) for a, b in pairs[["a", "b"]]] == [(2, 3), (3, 13)]
+    assert vectors(pairs) == pytest.approx(np.array([(-2.0, 0.0), (0.0, 1.5)]), abs=1e-12)
+
+
+def test_it_changes_nothing_and_is_refused_where_it_is_off() -> None:
+    with_it, without = (pv.World(boundary=pv.Circle(radius=6, friction=0.3), contacts=on) for on in (True, False))
+    for world in (with_it, without):
+        world.add(position=np.random.default_rng(2).uniform(-3, 3, (40, 2)), radius=0.4)
+        world.run(seconds=1)
+    assert with_it.state_hash() == without.state_hash()
+    for ask in (lambda: without.contacts, without.pressure, lambda: without.force_on(without.boundary)):
+        with pytest.raises(pv.InputError, match=r"allowed is a world built with World\(contacts=True\)"):
+            ask()
+    with pytest.raises(pv.InputError, match="allowed is an obstacle of this world, or its boundary"):
+        with_it.force_on(pv.Segment((0, 0), (1, 0)))
+    with pytest.raises(pv.InputError, match="to have a pressure"):
+        pv.World(contacts=True).pressure()
+    assert pv.World(contacts=True).contacts.dtype == TOUCH

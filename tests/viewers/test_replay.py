@@ -1,0 +1,202 @@
+"""A session in a file: whatever was done to its worlds, going through it again ends in the same bits."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet.cli import main
+from pyverlet.viewers.commands import Build, Delete, Drag, Pause, Pin, Poke, Release, Reset, SetFriction, SetGravity, Spawn, Step
+from pyverlet.viewers.exhibit import Exhibit, Repertoire
+from pyverlet.viewers.journal import Journal
+from pyverlet.viewers.replay import DivergedError, EndError, ReplayStage, Script
+from pyverlet.viewers.session import Session
+from pyverlet.world.panels import Panel, Panels
+
+DT = 1 / 60
+
+
+def crowd() -> pv.World:
+    """Without bounds, so that the camera follows, and how far hands reach with it."""
+    world = pv.World(collisions=pv.Collisions(restitution=0.3, friction=0.3))
+    world.obstacles.append(pv.Segment((-20, 0), (20, 0)))
+    rng = np.random.default_rng(5)
+    world.add(position=rng.uniform((-4, 0.5), (4, 6), (40, 2)), velocity=rng.normal(0, 2, (40, 2)), radius=0.3)
+    pv.rope(world, (-3, 8), (3, 8), links=8).group.pin([0, -1])
+    return world
+
+
+def session_of(path: Path, commands: list[Any], world: Any = None, **options: Any) -> str:
+    """A session in which these are asked for one after the other; the hash at its end."""
+    with Journal(path, dt=DT) as journal:
+        session = Session(crowd() if world is None else world, dt=DT, stage=journal.stage, **options)
+        for command in (Pause(True), *commands):
+            session.submit(command)
+            session.turn()
+        assert session.latest.status.error is None
+        return session._stage.panels.state_hash()
+
+
+def test_everything_a_mouse_can_do_is_done_again(tmp_path: Path) -> None:
+    commands = [
+        Step(20), SetGravity(1.0, -8.0), Step(10), Drag(0, 0.0, 1.0, 3.0), Step(5), Drag(0, 2.0, 5.0, 3.0), Step(40), Release(0),
+        Poke(1, -1.0, 1.0), Step(10), Release(1), Spawn(0, 0.0, 7.0), Pin(0, 0.0, 3.0, 9.0), Step(30), SetFriction(0.9), Step(5),
+        Delete(0, 0.0, 0.5, 9.0), Step(100), Reset(), Step(7), Spawn(0, 1.0, 9.0),
+    ]  # fmt: skip
+    end = session_of(tmp_path / "a.pvlog", commands)
+    script = Script(tmp_path / "a.pvlog")
+    done = script.run()
+    assert done["state_hash"] == end
+    assert done["frames"] == 227
+    assert done["checked"] == script.checks == 4  # three seconds, and the end
+    assert done["commands"] == 12
+    assert done["whole"]
+    assert done["stopped"] is None
+
+
+def test_what_was_done_between_substeps_is_done_there_again(tmp_path: Path) -> None:
+    with Journal(tmp_path / "a.pvlog", dt=DT) as journal:
+        stage = journal.stage(Exhibit("crowd", Panels.of(crowd())))
+        looks: list[float] = []
+
+        def onlooker(moment: Any) -> None:
+            looks.append(moment.time)
+            if len(looks) % 5 == 0:
+                stage.do(Drag(0, 0.1 * len(looks), 3.0, 9.0))
+            if len(looks) == 23:
+                stage.do(SetGravity(0.0, 3.0))
+
+        stage.do(Drag(0, 0.0, 3.0, 9.0))
+        for frame in range(30):
+            stage.look()  # somebody watches now and then, which moves the camera
+            stage.step(DT, onlooker if 5 < frame < 20 else None)
+        end = stage.panels.state_hash()
+    lines = [json.loads(line) for line in (tmp_path / "a.pvlog").read_text().splitlines()]
+    assert {line.get("substep") for line in lines} > {None, 5}
+    assert Script(tmp_path / "a.pvlog").run()["state_hash"] == end
+
+
+def test_other_scenes_and_worlds_side_by_side(tmp_path: Path) -> None:
+    repertoire = Repertoire(pv.scenes.get("cage"), dt=DT, overrides={"particles": 30})
+    commands = [Step(3), SetGravity(0, -3), Build("box", 20), Step(4), Build(None, 40), SetGravity(0, 2), Step(5)]
+    end = session_of(tmp_path / "a.pvlog", commands, repertoire.open(), repertoire=repertoire)
+    assert Script(tmp_path / "a.pvlog").run()["state_hash"] == end
+    panels = Panels([Panel("one", crowd()), Panel("two", crowd())], line=1.0)
+    panels.worlds[1].substeps = 3
+    end = session_of(tmp_path / "b.pvlog", [Step(10), Drag(0, 0, 1, 9), Step(20)], panels)
+    assert Script(tmp_path / "b.pvlog").run()["state_hash"] == end
+
+
+def test_a_world_that_stopped_stops_again(tmp_path: Path) -> None:
+    world = pv.World(gravity=(0, 0))
+    world.add(position=[(0, 0), (0, 9)], mass=1e-9)
+    world.forces.append(pv.ConstantForce((1e38, 0)))  # over so small a mass it is infinite in float32
+    with Journal(tmp_path / "a.pvlog", dt=DT) as journal:
+        session = Session(world, dt=DT, stage=journal.stage)
+        for command in (Pause(True), Step(50), SetGravity(0, 1), Reset(), Step(1)):
+            session.submit(command)
+            session.turn()
+        said = session.latest.status.error
+        end = session._stage.panels.state_hash()
+    done = Script(tmp_path / "a.pvlog").run()
+    assert said is not None
+    assert done["stopped"] == said
+    assert done["state_hash"] == end
+
+
+def test_what_differs_is_told_with_its_frame(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.pvlog"
+    session_of(path, [Step(150)])
+    lines = path.read_text().splitlines()
+    for k, line in enumerate(lines):
+        if '"hash"' in line and '"frame":120' in line:
+            lines[k] = json.dumps({"hash": "0" * 16, "frame": 120})
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(DivergedError, match=r"after frame 120 \(2 s\) the hash"):
+        Script(path).run()
+    assert main(["replay", str(path), "--headless"]) == 1
+    assert "after frame 120" in capsys.readouterr().err
+
+
+def test_a_journal_that_was_cut_off_is_gone_through_as_far_as_it_goes(tmp_path: Path) -> None:
+    path = tmp_path / "a.pvlog"
+    session_of(path, [Step(70), SetGravity(0, 5), Step(70)])
+    content = path.read_bytes()
+    path.write_bytes(content[: content.index(b'"frame":120') + 5])  # in the middle of a line
+    done = Script(path).run()
+    assert (done["frames"], done["checked"], done["whole"]) == (70, 1, False)
+
+
+def test_on_the_page_nobody_interferes_and_reset_starts_over(tmp_path: Path) -> None:
+    end = session_of(tmp_path / "a.pvlog", [Step(30), SetGravity(2, -5), Step(40)])
+    script = Script(tmp_path / "a.pvlog")
+    session = Session(script.open(), dt=script.dt, stage=lambda exhibit: ReplayStage(script, exhibit))
+    for command in (SetGravity(0, 0), Step(50), Spawn(0, 0, 9), Reset(), Step(70)):
+        session.submit(command)
+        session.turn()
+    assert session._stage.panels.state_hash() == end
+    session.submit(Step(5))
+    session.turn()
+    assert session.latest.status.error is not None
+    assert "the journal ends here, after 70 frames; 2 hashes are as they were" in session.latest.status.error
+    with pytest.raises(EndError):
+        session._stage.step(DT)
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        (["nonsense"], "line 1"),
+        (['{"pvlog": 7, "dt": 0.1, "frame": 0}'], "pvlog is 7"),
+        (['{"pvlog": 1, "dt": 0.1, "frame": 0}'], "it has no worlds"),
+        (['{"pvlog": 1, "dt": 0.1, "frame": 0}', '{"worlds": [], "frame": 3}', '{"hash": "", "frame": 1}'], "frames in order"),
+        (['{"pvlog": 1, "dt": 0.1, "frame": 0}', '{"do": "Explode", "frame": 0}'], "a command is none of"),
+        (['{"pvlog": 1, "dt": 0.1, "frame": 0}', '{"do": "SetGravity", "x": "a", "y": 0, "frame": 0}'], "gravity x is 'a'"),
+        (['{"pvlog": 1, "dt": 0.1, "frame": 0}', '{"do": "SetGravity", "z": 1, "frame": 0}'], "line 2"),
+    ],
+)
+def test_bad_journals_are_one_sentence(tmp_path: Path, lines: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "a.pvlog").write_text("\n".join(lines) + "\n")
+    assert main(["replay", str(tmp_path / "a.pvlog"), "--headless"]) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert "Traceback" not in err
+
+
+def test_bad_use_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", str(tmp_path / "none.pvlog")]) == 2
+    assert "cannot be read" in capsys.readouterr().err
+    assert main(["run", "cage", "--headless", "--journal", str(tmp_path / "a.pvlog")]) == 2
+    assert "allowed is one with the page" in capsys.readouterr().err
+    with pytest.raises(pv.InputError, match="cannot be written"):
+        Journal(tmp_path / "none" / "a.pvlog", dt=DT)
+    with Journal(tmp_path / "a.pvlog", dt=DT) as journal, pytest.raises(pv.InputError, match="pace of their own"):
+        Session(pv.scenes.get("frame-rate").panels(), stage=journal.stage)
+
+
+def test_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.pvlog"
+    command = [sys.executable, "-m", "pyverlet", "run", "cage", "--particles", "50", "--port", "0", "--no-open"]
+    process = subprocess.Popen([*command, "--journal", str(path)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    process.stdout.readline()
+    deadline = time.monotonic() + 20
+    while not (path.exists() and b'"hash"' in path.read_bytes()) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=20)
+    assert f"pyverlet replay '{path}'" in err
+    assert main(["replay", str(path), "--json"]) == 0
+    done = json.loads(capsys.readouterr().out)
+    assert done["whole"]
+    assert done["frames"] >= 60
+    assert done["checked"] >= 2
