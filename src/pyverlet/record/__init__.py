@@ -189,7 +189,10 @@ def to_image(
     Args:
         world: only read.
         path: a name that ends in .png, which needs the extra `record`; None writes nothing and needs nothing.
-        size, colour, theme, part: as for `to_video`.
+        size: (width, height) in pixels.
+        colour: what the colours say; by default where each circle started.
+        theme: `pyverlet.picture.DARK` or `LIGHT`.
+        part: of the plane to show, (x0, y0, x1, y1) in metres; by default the bounds, or where the particles are.
 
     Raises:
         InputError: an argument is outside what is allowed, or the file cannot be written.

@@ -58,6 +58,15 @@ class World(Measures, Queries, Doors):
         ledger: keep account of where the energy goes, in `ledger`.
         threads: at most this many for the parallel stages; None is as many as pay off. Never changes the result.
 
+    Attributes:
+        forces: list of forces besides gravity; append and remove as you like.
+        links: the links between particles, as a list.
+        obstacles: what stands in the way, as a list.
+        actors: list of those who act before each frame, such as emitters.
+        time: simulated seconds since the world was built.
+        frames: calls of `step` since then.
+        profile: the time of the last frame: `frame_ms`, and `stages`, ms by name.
+
     Raises:
         InputError: an argument is outside what is allowed.
     """

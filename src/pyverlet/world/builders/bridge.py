@@ -29,7 +29,8 @@ def bridge(
 
     Args:
         world: gets the particles and the links.
-        start, end: (x, y) where it is fixed, m.
+        start: (x, y) where it is fixed, m.
+        end: (x, y) of its other end, m.
         slack: part by which the deck is longer than the way, 0 or more. Without, the pull at its ends is enormous.
         planks: how many.
         mass: of all planks together, kg.

@@ -29,7 +29,8 @@ def chain(
 
     Args:
         world: gets the particles and the sticks.
-        start, end: (x, y) of the first and the last particle, m.
+        start: (x, y) of the first particle, m.
+        end: (x, y) of the last one, m.
         links: how many sticks.
         mass: of all particles together, kg.
         radius: of each, m; by default they all but touch.

@@ -36,8 +36,10 @@ def cloth(
     Args:
         world: gets the particles and the links.
         top_left: (x, y) of the first particle, m.
-        width, height: of the cloth, m.
-        columns, rows: of particles, at least 2.
+        width: of the cloth, m.
+        height: of the cloth, m.
+        columns: particles in a row, at least 2.
+        rows: particles in a column, at least 2.
         mass: of all particles together, kg.
         radius: of each, m; by default neighbours all but touch.
         slack: part by which the threads along the rows are longer than the way: the cloth hangs in folds.

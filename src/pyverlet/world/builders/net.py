@@ -34,8 +34,10 @@ def net(
     Args:
         world: gets the particles and the ropes.
         top_left: (x, y) of the first knot, m.
-        width, height: of the net, m.
-        columns, rows: of knots, at least 2.
+        width: of the net, m.
+        height: of the net, m.
+        columns: knots in a row, at least 2.
+        rows: knots in a column, at least 2.
         mass: of all knots together, kg.
         radius: of each, m; by default neighbours all but touch.
         compliance: of each piece of rope, m/N.

@@ -31,7 +31,8 @@ def rope(
 
     Args:
         world: gets the particles and the ropes.
-        start, end: (x, y) of the first and the last particle, m.
+        start: (x, y) of the first particle, m.
+        end: (x, y) of the last one, m.
         length: of the whole rope, m; more than the ends are apart makes it sag. None takes their distance.
         links: how many pieces.
         mass: of all particles together, kg.
