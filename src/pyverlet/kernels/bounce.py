@@ -73,7 +73,8 @@ def _bounce(i, j, dx, dy, reach, e, mu, ri, rj, circles, law, spent):
 def _make_room(i, j, dx, dy, reach, circles, law):
     """A pair on its way apart goes to where it no longer overlaps, without being thrown apart any faster.
 
-    Without weight, one that parts by itself within the substep is left alone: moving it changes its angular momentum.
+    Without weight, one that parts by itself within the substep is left alone: moving it changes its angular momentum, unless both
+    move alike.
     """
     distance = np.sqrt(dx * dx + dy * dy)
     depth = reach - distance
@@ -83,7 +84,7 @@ def _make_room(i, j, dx, dy, reach, circles, law):
     vy = circles.velocity[j, 1] - circles.velocity[i, 1]
     leaving = (dx * vx + dy * vy) / distance
     carries = circles.carries[i] + circles.carries[j] > 0
-    if carries or (law.weight != 0 and leaving * law.h < depth):
+    if carries or (law.weight != 0 and leaving * law.h < depth) or (vx == 0 and vy == 0):
         wi, wj = circles.inverse_mass[i], circles.inverse_mass[j]
         by = min(depth, law.most * reach) / ((wi + wj) * distance)
         _carry(circles, i, -by * dx * wi, -by * dy * wi)
@@ -120,7 +121,7 @@ def treat(bits, k, at, circles, pairs, law, spent):
                 if not _bounce(i, j, dx, dy, reach, m[E, one], m[MU, one], m[R_I, one], m[R_J, one], circles, law, spent):
                     continue
                 dx, dy = _apart(i, j, k + lane, circles, pairs)
-            elif not along > law.rest_speed * np.sqrt(dx * dx + dy * dy):
+            elif not along > law.rest_speed * np.sqrt(dx * dx + dy * dy) and not (law.weight == 0 and m[E, one] > 0):
                 continue
             _make_room(i, j, dx, dy, reach, circles, law)
             done |= 1 << lane

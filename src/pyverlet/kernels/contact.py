@@ -81,7 +81,8 @@ def push_strip(s, to, circles, pairs, law, looks):
                     store(pairs.closing, k, where_set(touching, larger(heard, speed), heard))
                 free = one - pick(circles.carries, lane_i, k) * pick(circles.carries, lane_j, k)
                 fast = which_above(free * larger(closing, zero - closing), rest * distance)
-                done = live & touching & fast
+                # Where nothing accelerates, nothing that bounces rests: not even who moves alike is pushed, and fed.
+                done = live & touching & (fast if law.weight != 0 else fast | which_above(e, zero))
                 if done != 0:
                     done = treat(done, k, at, circles, pairs, law, spent)
                     xi, yi = take(moved, lane_i, k)
@@ -158,13 +159,25 @@ def refine_strip(s, circles, pairs, law):
 
 
 @kernel
+def _struck(bits, k, circles, pairs):
+    """Which of these pairs, that rested at their turn and now approach fast, do not both carry weight: one was struck since."""
+    struck = 0
+    for lane in range(LANES):
+        if (bits >> lane) & 1:
+            i, j = pairs.lane_i[k + lane], pairs.lane_j[k + lane]
+            if not circles.carries[i] * circles.carries[j] > 0:
+                struck |= 1 << lane
+    return struck
+
+
+@kernel
 def relax_strip(s, to, circles, pairs, law):
     """The second sweep over strip s: no approach, and no slip but what friction cannot hold, between circles that touch."""
     velocity, lane_i, lane_j = circles.velocity, pairs.lane_i, pairs.lane_j
     real = velocity.dtype.type
     zero, one, third, half3 = spread(real(0)), spread(real(1)), spread(real(1) / real(3)), spread(real(1.5))
     new, feed, fed = spread(real(NEW)), spread(law.feed), spread(law.feed * real(PUSHED))
-    memory = spread(real(3) * law.h / real(GRIP))
+    memory, rest = spread(real(3) * law.h / real(GRIP)), spread(law.rest_speed)
     begin, end = pairs.begin[s], pairs.begin[s] + pairs.lanes[s]
     close, to = begin + pairs.apart[s], to - begin
     taken = 0.0
@@ -178,14 +191,23 @@ def relax_strip(s, to, circles, pairs, law):
         xi, yi = take(velocity, lane_i, k)
         xj, yj = take(velocity, lane_j, k)
         vx, vy = xj - xi, yj - yi
-        speed = vx * nx + vy * ny
+        speed, at = vx * nx + vy * ny, k * law.mixed
+        struck = 0
+        if law.asks != 0:
+            fast = which_above(zero - speed, rest) & which_above(load(pairs.made_of[E], at), zero)
+            if fast != 0:
+                struck = _struck(fast, k, circles, pairs)
+                speed = where_set(struck, zero, speed)
         cx, cy = speed * nx, speed * ny
         if law.rubs != 0:
-            at = k * law.mixed
             mu = load(pairs.made_of[MU], at)
             if which_above(mu, zero) != 0:
                 ri, rj = load(pairs.made_of[R_I], at), load(pairs.made_of[R_J], at)
-                depth, before, given = load(pairs.depth, k), load(pairs.slip, k), load(pairs.held, k) * feed
+                depth, before, given = (
+                    where_set(struck, zero, load(pairs.depth, k)),
+                    load(pairs.slip, k),
+                    load(pairs.held, k) * feed,
+                )
                 si, sj = pick(circles.spin, lane_i, k), pick(circles.spin, lane_j, k)
                 slides = vx * ny - vy * nx + si * ri + sj * rj
                 # As changes of the relative velocity: impulses times W. Together with what the push has given.
