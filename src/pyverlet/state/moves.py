@@ -56,3 +56,12 @@ def remember_rest(state: Slots, h: float) -> None:
     """Scale the accelerations of those that are held, so that h / 2 of it makes of what they carry weight with no velocity."""
     held = state.acceleration, state.velocity, state.resting, state.along
     motion.remember_rest(*held, *state.reals(state.lean, h))
+
+
+def first_non_finite(state: Slots) -> int:
+    """The user's index of a particle whose position or velocity is NaN or infinite; -1 if all are finite."""
+    for array in (state.position, state.velocity):
+        slot = int(motion.first_non_finite(array))
+        if slot >= 0:
+            return int(state.particle[slot])
+    return -1

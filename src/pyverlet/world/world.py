@@ -13,7 +13,6 @@ from pyverlet.compile import jit
 from pyverlet.ground import checks
 from pyverlet.ground.constants import ALL_THREADS_FROM, ONE_THREAD_BELOW, REST_ACCELERATIONS, STANDARD_GRAVITY
 from pyverlet.ground.errors import InputError, NonFiniteError
-from pyverlet.kernels import motion
 from pyverlet.laws.coarse import Coarse
 from pyverlet.laws.contacts.collisions import Collisions, ContactSolver
 from pyverlet.laws.events import Events
@@ -26,6 +25,7 @@ from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.rooms import Boundary, Open
 from pyverlet.laws.sleep import Sleep, laws
 from pyverlet.laws.touches import Touches
+from pyverlet.state.moves import first_non_finite
 from pyverlet.state.state import Slots, State
 from pyverlet.world.actors import Actor
 from pyverlet.world.convenience import Doors
@@ -260,20 +260,13 @@ class World(Measures, Queries, Doors):
         if self._contacts:
             self._contacts.clear_notes()
 
-    def _first_non_finite(self) -> int:
-        for array in (self._slots.position, self._slots.velocity):
-            slot = int(motion.first_non_finite(array))
-            if slot >= 0:
-                return int(self._slots.particle[slot])
-        return -1
-
     def _refuse_non_finite(self, h: float) -> None:
         """Run a bad frame again from the last good state, looking after every stage: normal frames pay nothing for it."""
-        if self._first_non_finite() < 0:
+        if first_non_finite(self._slots) < 0:
             return
 
         def look(stage: str) -> None:
-            particle = self._first_non_finite()
+            particle = first_non_finite(self._slots)
             if particle >= 0:
                 raise NonFiniteError(particle, stage, self.time)
 
