@@ -37,7 +37,7 @@ def test_pegs_alone_send_a_ball_left_or_right_whatever_it_did_before(count: int)
     world = scenes.get("galton").world(particles=1, collisions=False, threads=1)
     assert not world.forces
     assert not world.actors
-    # Of seeds 0 to 4 the first is off by p = 7.5e-5 at 4,000 balls, the others are within: tosses are independent to 0.01, no better.
+    # Of seeds 0 to 4 the first is off at 4,000 balls, p = 7.5e-5, the others are within: tosses are independent to 0.01.
     start = np.random.default_rng(1).uniform(
         (-0.05 * galton.SPACING, 0.9 * galton.DROP), (0.05 * galton.SPACING, 1.1 * galton.DROP), (count, 2)
     )
