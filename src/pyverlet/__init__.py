@@ -33,7 +33,7 @@ from pyverlet.laws.ledger import Ledger
 from pyverlet.laws.links import Angle, Area, Pin, Rope, Spring, Stick
 from pyverlet.laws.naive import ClampAndFlip, ProjectOnly
 from pyverlet.laws.obstacles import Capsule, Chain, Disc, Obstacle, Polygon, Segment
-from pyverlet.laws.rooms import Boundary, Box, Circle, Open
+from pyverlet.laws.rooms import Boundary, Box, Circle, Open, Periodic
 from pyverlet.state.group import Group
 from pyverlet.world import builders
 from pyverlet.world.actors import Actor, Emitter, Sink
@@ -61,7 +61,7 @@ __all__ = [
     "RK4", "Actor", "Angle", "Area", "Attractor", "Boundary", "Box", "BruteForce", "Capsule", "Chain", "Circle",
     "ClampAndFlip", "Clock", "CoarseStepWarning", "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy",
     "Events", "ExplicitEuler", "Fast", "FrameBudget", "Gravitation", "Group", "InputError", "Integrator", "Ledger",
-    "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel", "Panels", "Pin", "PointSpring", "Polygon", "PositionVerlet",
+    "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel", "Panels", "Periodic", "Pin", "PointSpring", "Polygon", "PositionVerlet",
     "ProjectOnly", "PyverletError", "Rope", "Segment", "SemiImplicitEuler", "Sink", "Spring", "Stick", "TimeCorrectedVerlet",
     "Trajectory", "VelocityVerlet", "Wind", "World", "Worlds", "Yoshida4", "bridge", "builders", "chain", "cloth", "errors",
     "force", "forces", "integrators", "load", "net", "read_trajectory", "rope", "save", "scenes", "soft_body", "sweep", "view",

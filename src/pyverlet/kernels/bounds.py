@@ -280,7 +280,7 @@ def _beyond_circle(x0, y0, size, position, radius, first, stop, flag):
 def _beyond_box(x0, y0, x1, y1, position, radius, first, stop, flag):
     """The same for a box."""
     x = position.reshape(-1)
-    zero = x0 - x0
+    zero = x.dtype.type(0)  # not x0 - x0: a wall may be infinitely far away
     found = False
     for k in range(first, stop):
         i = np.uint64(k)

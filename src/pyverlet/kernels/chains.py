@@ -19,6 +19,7 @@ import numpy as np
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.ground.constants import LINK_COLOURS, LINK_ROUNDS, LINK_TAUT, LINK_TURN
+from pyverlet.kernels.seam import nearest
 from pyverlet.kernels.shapes import measure_distance
 
 _SWEEPS = 4
@@ -101,7 +102,7 @@ def _slack_changes(a, b, node, first, gradient, upper, intact, active, right, mo
 
 
 @kernel
-def _sweep(a, b, position, first, particle, weight, rest, upper, intact, offset, give, lam):
+def _sweep(a, b, position, period_x, period_y, first, particle, weight, rest, upper, intact, offset, give, lam):
     """One link after the other, back and forth: less exact, but safe when links turn too far to be solved as straight ones."""
     for sweep in range(_SWEEPS):
         for s in range(a, b):
@@ -109,7 +110,7 @@ def _sweep(a, b, position, first, particle, weight, rest, upper, intact, offset,
             if not intact[r]:
                 continue
             i, j = particle[first[r]], particle[first[r] + 1]
-            dx, dy = position[j, 0] - position[i, 0], position[j, 1] - position[i, 1]
+            dx, dy = nearest(position[j, 0] - position[i, 0], period_x), nearest(position[j, 1] - position[i, 1], period_y)
             length = np.sqrt(dx * dx + dy * dy)
             ww = weight[i] + weight[j]
             if length == 0.0 or ww == 0.0:
@@ -145,12 +146,12 @@ def _solve_one(r, position, first, particle, weight, upper, along, gradient, giv
 
 @kernel
 def _solve_run(
-    a, b, node, position, first, particle, weight, rest, upper, intact, value, gradient, along, turn, bend, bow, give, offset,
+    a, b, node, position, period_x, period_y, first, particle, weight, rest, upper, intact, value, gradient, along, turn, bend, bow, give, offset,
     active, right, inverse, carried, move, step, lam,
 ):  # fmt: skip
     one_sided = False
     for r in range(a, b):
-        measure_distance(r, first[r], position, particle, rest, value, gradient, bend)
+        measure_distance(r, first[r], position, period_x, period_y, particle, rest, value, gradient, bend)
         e = first[r] + 1
         nx, ny = gradient[e, 0], gradient[e, 1]
         along[e, 0] += turn[r] * (nx - along[e, 0])
@@ -175,7 +176,7 @@ def _solve_run(
         mx, my = move[k + 1, 0] - move[k, 0], move[k + 1, 1] - move[k, 1]
         trusted &= abs(gradient[e + 1, 0] * my - gradient[e + 1, 1] * mx) * bend[r] < LINK_TURN
     if not trusted:
-        _sweep(a, b, position, first, particle, weight, rest, upper, intact, offset, give, lam)
+        _sweep(a, b, position, period_x, period_y, first, particle, weight, rest, upper, intact, offset, give, lam)
         return
     for r in range(a, b):
         lam[r] += step[r]
@@ -188,7 +189,7 @@ def _solve_run(
 
 @parallel_kernel
 def sweep(
-    back, skip, colour, run, position, first, particle, weight, rest, upper, intact, value, gradient, along, turn, bend, bow,
+    back, skip, colour, run, position, period_x, period_y, first, particle, weight, rest, upper, intact, value, gradient, along, turn, bend, bow,
     give, offset, active, right, inverse, carried, move, step, lam,
 ):  # fmt: skip
     """Solve all runs, colour by colour or `back` from the last one, without the first colour on the way if `skip`.
@@ -202,12 +203,12 @@ def sweep(
         if c < LINK_COLOURS - 1:
             for k in prange(colour[c], colour[c + 1]):
                 _solve_run(
-                    run[k], run[k + 1], run[k] + k, position, first, particle, weight, rest, upper, intact, value, gradient,
+                    run[k], run[k + 1], run[k] + k, position, period_x, period_y, first, particle, weight, rest, upper, intact, value, gradient,
                     along, turn, bend, bow, give, offset, active, right, inverse, carried, move, step, lam,
                 )  # fmt: skip
         else:
             for k in range(colour[c], colour[c + 1]):
                 _solve_run(
-                    run[k], run[k + 1], run[k] + k, position, first, particle, weight, rest, upper, intact, value, gradient,
+                    run[k], run[k + 1], run[k] + k, position, period_x, period_y, first, particle, weight, rest, upper, intact, value, gradient,
                     along, turn, bend, bow, give, offset, active, right, inverse, carried, move, step, lam,
                 )  # fmt: skip

@@ -71,7 +71,7 @@ class Sleep:
             return False
         touched = np.zeros(len(slots), np.uint8)
         which = pairs.listed()
-        if not kernels.touch(slots.position, slots.size, slots.island, *which, touched):
+        if not kernels.touch(slots.position, slots.size, *slots.reals(*slots.seam.period), slots.island, *which, touched):
             return False
         return self._wake(slots, np.isin(slots.island, slots.island[touched == 1]))
 
@@ -85,9 +85,8 @@ class Sleep:
             return False
         root = np.empty(len(slots), np.int64)
         which = pairs.listed()
-        kernels.find_islands(
-            slots.position, slots.size, slots.inverse_mass, slots.calm, *which, real(SLEEP_NEAR), np.float32(SLEEP_AFTER_S), root
-        )
+        bodies = (slots.position, slots.size, *slots.reals(*slots.seam.period), slots.inverse_mass, slots.calm)
+        kernels.find_islands(*bodies, *which, real(SLEEP_NEAR), np.float32(SLEEP_AFTER_S), root)
         sleeper = root >= 0
         if not sleeper.any():
             return False

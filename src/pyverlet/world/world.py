@@ -48,7 +48,7 @@ class World(Measures, Queries, Doors):
     Args:
         gravity: (x, y), m/s^2.
         integrator: how positions and velocities advance over a substep.
-        boundary: Circle, Box or Open.
+        boundary: Circle, Box, Periodic or Open.
         collisions: how particles collide; None lets them pass through each other.
         substeps: steps of length h = dt / substeps in one call of `step`.
         dtype: float32 or float64, of all arrays.
@@ -174,12 +174,6 @@ class World(Measures, Queries, Doors):
         """Who looks after the energy of this frame, if nothing but contacts, links and obstacles could raise it."""
         return Watch(self._state, self._force_sum, self.links, self.boundary) if undriven(self, h, self._h_last) else None
 
-    def run(self, *, seconds: float, dt: float = 1 / 60) -> None:
-        """Advance by as many frames of dt as come nearest to `seconds`."""
-        seconds = checks.number("seconds", seconds, least=0.0)
-        for _ in range(round(seconds / checks.number("dt", dt, above=0.0))):
-            self.step(dt)
-
     def _open(self, h: float, done: Callable[[str], None]) -> bool:
         """Take up what users have set, and begin; False if nobody is awake."""
         if self.links.begin() and self._contacts:
@@ -201,6 +195,8 @@ class World(Measures, Queries, Doors):
         if not self._slots.most_friction < np.inf:
             checks.at_most("friction", self._state.friction, float(np.finfo(self.dtype).max))
         if not changed:
+            if self._contacts:
+                self._contacts.broad_phase.follow(self._slots)
             return
         try:
             checks.positive("radius", self._state.radius)
@@ -315,7 +311,7 @@ class World(Measures, Queries, Doors):
 
     @property
     def boundary(self) -> Boundary:
-        """The room: Circle, Box, Open or your own."""
+        """The room: Circle, Box, Periodic, Open or your own."""
         return self._boundary
 
     @boundary.setter
@@ -323,7 +319,10 @@ class World(Measures, Queries, Doors):
         if not isinstance(value, Boundary):
             raise InputError(f"boundary is {value!r}; allowed is an object such as pyverlet.Circle(radius=10) or pyverlet.Open()")
         value.check(self._state.radius)
-        self._boundary = value
+        self.links.check(value.seam)
+        if value.seam != self._state.seam and getattr(self, "_contacts", None):  # lists are about the images of then
+            self._contacts.broad_phase.forget()
+        self._boundary, self._state.seam = value, value.seam
 
     @property
     def collisions(self) -> Collisions | None:

@@ -128,13 +128,14 @@ class ContactSolver:
             self._seen = self.broad_phase.rebuilds
             self._unlist(self.broad_phase.list, state.particle)
             free = state.inverse_mass[state.inverse_mass > 0]
-            self._uneven = bool(len(free)) and float(free.max()) > UNEVEN * float(free.min())
+            # Loans of inertia know of no seam.
+            self._uneven = bool(len(free)) and float(free.max()) > UNEVEN * float(free.min()) and not state.seam
             self._lends &= self._uneven
             self._packed = False
 
     def _pack(self, state: Slots) -> Wide:
         if not self._packed:
-            self._wide.take(self.broad_phase.list, self.broad_phase.built, state.radius)
+            self._wide.take(self.broad_phase.list, self.broad_phase.built, state.radius, state.seam)
             self._packed = True
             if self._sleep is None:
                 self.broad_phase.release()
@@ -321,7 +322,7 @@ def find_contacts(state: State, method: Fast | BruteForce) -> np.ndarray[Any, np
     pairs = phase.list.pairs()
     a, b = slots.position[pairs[:, 0]].astype(np.float64), slots.position[pairs[:, 1]].astype(np.float64)
     reach = slots.radius[pairs].astype(np.float64).sum(axis=1)
-    touching = pairs[np.hypot(*(a - b).T) < reach]
+    touching = pairs[np.hypot(*state.seam.nearest(a - b).T) < reach]
     named = np.sort(slots.particle[touching].astype(np.int64), axis=1)
     return named[np.lexsort(named.T[::-1])]
 
@@ -333,7 +334,7 @@ def measure_overlap(state: State, unlist: Unlist) -> Overlap:
     slots, phase = _listed(state, Fast(skin=0.0))
     pairs = phase.list
     unlist(pairs, slots.particle)
-    number, total, largest = contacts.overlaps(slots.position, slots.radius, *pairs.listed())
+    number, total, largest = contacts.overlaps(slots.position, slots.radius, *map(float, slots.seam.period), *pairs.listed())
     return Overlap(total / number if number else 0.0, largest, number)
 
 

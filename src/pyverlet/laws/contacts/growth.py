@@ -24,7 +24,7 @@ class Growth:
 
     def fit(self, state: Slots, pairs: PairList, fresh: np.ndarray) -> None:
         """Shrink those marked in `fresh` (n,), and whom they overlap, until they just touch."""
-        which = pairs.listed()
+        which = (*state.reals(*state.seam.period), *pairs.listed())
         contacts.fit(state.position, state.radius, *which, fresh, state.real(SMALLEST), state.grown)
         state.resize()
 

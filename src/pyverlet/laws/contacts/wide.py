@@ -13,7 +13,9 @@ from pyverlet.ground import memory
 from pyverlet.ground.constants import CARRIED_WEIGHT, COLOURS, FED, LARGEST_PUSH, PUSHED
 from pyverlet.kernels import frame, packs, sweeps, tables
 from pyverlet.kernels.bounds import CARRIES
+from pyverlet.kernels.seam import close_gaps
 from pyverlet.laws.contacts.broadphase import PairList, rows_of
+from pyverlet.state.seam import NONE, Seam
 from pyverlet.state.state import Slots
 
 Array = NDArray[Any]
@@ -71,7 +73,7 @@ class Wide:
         self._carries, self._lift, self._leans, self._turned, self._turn = (np.zeros(count, self._dtype) for _ in range(5))
         self._slid = np.zeros((count, 2), self._dtype)
 
-    def take(self, pairs: PairList, origin: Array, radius: Array) -> None:
+    def take(self, pairs: PairList, origin: Array, radius: Array, seam: Seam = NONE) -> None:
         """Pack a new list; origin: (n, 2) positions it was made from; radius: (n,) m."""
         need = pairs.count + self._spare
         self.lanes, self.apart = (np.empty(len(pairs.count), np.int64) for _ in range(2))
@@ -85,6 +87,9 @@ class Wide:
             if (self.lanes <= need).all():
                 break
             need = np.maximum(need, self.lanes)
+        if seam:
+            period, packed = map(self._dtype.type, seam.period), (self.begin, self.lanes, self.lane_i, self.lane_j, radius)
+            close_gaps(*packed, *period, self.gap, self.apart)
         self._spare = 2 * max(int((self.lanes - pairs.count).max(initial=0)), LANES)
         self._cut = np.empty((2, 0), np.int64)
         self.origin = origin

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from pyverlet.ground.constants import REST_ACCELERATIONS
 from pyverlet.kernels import links, motion
+from pyverlet.state.seam import NONE
 from pyverlet.state.state import Slots, State
 
 Array = NDArray[Any]
@@ -52,6 +53,7 @@ class Work:
         self._slot = np.zeros(len(particle), np.int64)
         self._calm = np.full(len(particle), np.nan)
         self._h = 0.0
+        self.seam = NONE
         self._order: Array | None = None
 
     def __len__(self) -> int:
@@ -69,6 +71,7 @@ class Work:
     def begin(self, state: State, past: Past | None) -> None:
         """A frame begins: take up what is remembered of those who are where they were left."""
         self._calm.fill(np.nan)
+        self.seam = state.seam
         if past is None or not len(past.number):
             return
         number, where = state.number[self.particle], state.position[self.particle]
@@ -88,6 +91,8 @@ class Work:
         self.start, self._spare = self._spare, before
         motion.take_rows(self.start, state.position, slot)
         motion.take_rows(self._velocity, state.velocity, slot)
+        if self.seam:  # it may be remembered by another image
+            before = self.start + self.seam.nearest(before - self.start)
         links.look_back(self.earlier, self.start, before, self._velocity, self._calm, h)
         self.weight[:] = state.inverse_mass[slot]
 

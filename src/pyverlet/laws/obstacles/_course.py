@@ -12,6 +12,7 @@ from pyverlet.kernels import meetings
 from pyverlet.kernels import obstacles as kernels
 from pyverlet.laws.obstacles._base import Obstacle, Obstacles
 from pyverlet.laws.rooms import Boundary
+from pyverlet.state.moves import bodies
 from pyverlet.state.state import Slots
 
 Array = NDArray[Any]
@@ -103,7 +104,7 @@ class Course:
         if time == 0.0 or self._order is not state.particle:  # every new order is a new array
             self._order, self._rest = state.particle, np.zeros_like(state.position)
         taken = (walls, state.along, self._rest)
-        collide(self._segments, self._bodies, time + h, *self._cells, *taken, *state.bodies(), *numbers, state.drop)
+        collide(self._segments, self._bodies, time + h, *self._cells, *taken, *bodies(state), *numbers, state.drop)
 
     def end(self, dt: float) -> None:
         """At the end of a frame that went well: the obstacles are where they moved to."""
