@@ -52,6 +52,7 @@ def _bounce(i, j, dx, dy, reach, e, mu, ri, rj, circles, law, spent):
     px, py = kick * nx, kick * ny
     if spent.shape[0] > 0:
         spent[0] -= half * np.float64(hit) * hit * (1.0 - np.float64(e) * e) / (wi + wj)
+        spent[2] += np.float64(kick) * reach
     if mu > zero:
         slip = vx * ny - vy * nx + circles.spin[i] * ri + circles.spin[j] * rj
         most = mu * kick

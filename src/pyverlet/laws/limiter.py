@@ -107,6 +107,7 @@ class Watch:
         before, pull = self._pulls(slots, mass)
         lift = -0.5 * ((before + pull) * moved).sum(axis=1)
         cluster = self._clusters(slots, listed, moved)
+        x = x[cluster] + slots.seam.nearest(x - x[cluster])  # across the seam they hang together, too
         add = _Sums(cluster)
         gain = np.maximum(add(_kinetic(mass, v, slots.radius, slots.spin) - self._kinetic()[order] + lift), 0)
         if self._forces.forces:  # what has touched nobody has its gain from the integrator

@@ -117,13 +117,24 @@ class Measures(Particles):
     def pressure(self) -> float:
         """N/m, what circles push the walls of the room with along their normals, over their length; of the last frame.
 
+        A room without walls that is periodic has the pressure of the virial theorem: the sum of m |v - u|^2, u the velocity of all
+        together, and of what pushes each pair of circles that meet times their distance, over twice the area. Links and forces
+        between particles are left out.
+
         Raises:
-            InputError: the room has no walls of a known length, or the world notes no contacts.
+            InputError: the room has neither walls of a known length nor periods, or the world notes no contacts.
         """
         touches, length = self._noting(), self.boundary.perimeter()
-        if length is None:
-            raise InputError(f"boundary is {self.boundary!r}; allowed is a pyverlet.Box or a pyverlet.Circle, to have a pressure")
-        return touches.pushed() / length
+        if length is not None:
+            return touches.pushed() / length
+        if not self.boundary.seam:
+            allowed = "a pyverlet.Box, Circle or Periodic"
+            raise InputError(f"boundary is {self.boundary!r}; allowed is {allowed}, to have a pressure")
+        free = np.isfinite(self.mass)
+        mass, velocity = self.mass[free].astype(float), self.velocity[free].astype(float)
+        stream = mass @ velocity / max(mass.sum(), 1e-300)
+        motion = float((mass[:, None] * (velocity - stream) ** 2).sum())
+        return (motion + touches.virial()) / (2 * self.boundary.seam.period_x * self.boundary.seam.period_y)
 
     def _place(self) -> Place:
         """What circles may meet, for the events of a frame."""
@@ -138,8 +149,11 @@ class Measures(Particles):
         """Who is told of the stages of a frame: `told`, and before it those who note contacts."""
         if self._touches is None:
             return told
-        listed = self._contacts.listed if self._contacts and len(self) > 1 else None
-        return self._touches.frame(self._slots, self._state, h, self.boundary, self._course, listed, told)
+        listed = virial = None
+        if self._contacts and len(self) > 1:
+            self._contacts.weigh(bool(self.boundary.seam) and self.boundary.perimeter() is None)
+            listed, virial = self._contacts.listed, self._contacts.virial
+        return self._touches.frame(self._slots, self._state, h, self.boundary, self._course, listed, virial, told)
 
     def _spent(self) -> tuple[float, float, float]:
         """What impacts, friction and the energy limiter have taken in this frame, J, as they have noted; negative."""

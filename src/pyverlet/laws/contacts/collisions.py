@@ -224,7 +224,15 @@ class ContactSolver:
 
     def spent(self) -> Any:
         """(2,) J that impacts, and friction, have taken in this frame, negative."""
-        return self.broad_phase.list.spent.sum(axis=0) + self._wide.spent.sum(axis=0)
+        return self.broad_phase.list.spent.sum(axis=0) + self._wide.spent[:, :2].sum(axis=0)
+
+    def weigh(self, asked: bool) -> None:
+        """Whether somebody asks for the virial."""
+        self._wide.weigh(asked)
+
+    def virial(self) -> float:
+        """Sum over all contacts of this frame of what pushes them apart times their distance, N s m."""
+        return float(self._wide.spent[:, 2].sum())
 
     def clear_notes(self) -> None:
         """A frame begins."""

@@ -40,7 +40,9 @@ class Wide:
         normal: (2, room) of pairs that touch, for others 0. depth: (room,) their overlap, m.
         slip: (room,) what contacts have slipped, m. held: (room,) m by which friction has answered it in this substep.
         closing: (room,) largest speed of approach since the last `collect`, m/s; negative: has not touched.
-        spent: (strips, 2) J that impacts, and friction, have taken in this frame, negative.
+        spent: (strips, 3) J that impacts, and friction, have taken in this frame, negative; and the virial of contacts, the sum of
+            what pushes each pair apart times their distance, N s m.
+        weighs: whether that is asked for.
         asks: whether any pair may bounce or rub, or somebody listens. rubs: whether any may rub.
     """
 
@@ -48,7 +50,7 @@ class Wide:
         self._dtype = dtype
         self._settings = restitution, friction
         self._listens = listens
-        self.asks = self.rubs = False
+        self.asks = self.rubs = self.weighs = False
         self.begin = np.zeros(1, np.int64)
         self.lanes = self.apart = np.zeros(0, np.int64)
         self._make_room(0)
@@ -59,7 +61,7 @@ class Wide:
         self._varied = self._mixed = 0
         self._deeps = np.zeros(0, np.int64)  # packs of each strip that overlap deeply
         self._looks = True  # whether they are to be noted, once a frame
-        self.spent = np.zeros((1, 2))
+        self.spent = np.zeros((1, 3))
         self._hold_circles(0)
 
     def _make_room(self, lanes: int) -> None:
@@ -96,7 +98,7 @@ class Wide:
         self.moved = memory.empty(origin.shape, origin.dtype)
         self._known = None
         self._deeps, self._looks = np.zeros(len(pairs.count), np.int64), True
-        spent, self.spent = self.spent.sum(axis=0), np.zeros((max(len(self.lanes), 1), 2))
+        spent, self.spent = self.spent.sum(axis=0), np.zeros((max(len(self.lanes), 1), 3))
         self.spent[0] = spent
         if self._listens:
             self.closing = np.full(len(self.lane_i), -1, self._dtype)
@@ -132,6 +134,11 @@ class Wide:
         """Nobody rubs any more."""
         self.slip = self.held = self.slip[:0]
 
+    def weigh(self, asked: bool) -> None:
+        """Whether somebody asks for the virial."""
+        if asked != self.weighs:
+            self.weighs, self._known = asked, None
+
     # ---- what circles are made of ----------------------------------------------------------------------------------------
 
     def fits(self, state: Slots) -> bool:
@@ -145,7 +152,7 @@ class Wide:
         self._varied = int(any(_differ(values) for values in (size, state.radius, inverse_mass)))
         self._mixed = int(self._varied or _differ(state.restitution) or _differ(state.friction))
         self.rubs = max(mu, state.most_friction) > 0.0
-        self.asks = self._listens or self.rubs or max(e, state.most_restitution) > 0.0
+        self.asks = self._listens or self.weighs or self.rubs or max(e, state.most_restitution) > 0.0
         if self._varied:
             self.reach, self.share = (memory.empty(len(self.lane_i), self._dtype) for _ in range(2))
             packs.share_out(self.begin, self.lanes, self.lane_i, self.lane_j, size, inverse_mass, self.reach, self.share)
@@ -189,7 +196,7 @@ class Wide:
         )  # fmt: skip
         carried = CARRIED_WEIGHT * strongest * h if strongest > 0 else np.inf
         self.law = (
-            self._varied, self._mixed, int(self.asks), int(self.rubs), int(self._listens), int(accounts),
+            self._varied, self._mixed, int(self.asks), int(self.rubs), int(self._listens), int(accounts or self.weighs),
             1, *state.reals(h, lag, FED / PUSHED / h, LARGEST_PUSH, rest_speed), int(strongest > 0),
             state.real(carried),
         )  # fmt: skip

@@ -9,6 +9,7 @@ const MEANS = {
   projection: "put in by moving overlapping circles apart",
   limiter: "taken back by the energy limiter, of what contacts had gained too much",
   outside: "what the circles had at the start, and what was done between frames",
+  seam: "of circles that fell through the seam of a periodic room, and are up again",
   residual: "left over: the error of the integrator",
 };
 
