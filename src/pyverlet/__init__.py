@@ -61,11 +61,11 @@ __all__ = [
     "RK4", "Actor", "Angle", "Area", "Attractor", "Boundary", "Box", "BruteForce", "Capsule", "Chain", "Circle",
     "ClampAndFlip", "Clock", "CoarseStepWarning", "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy",
     "Events", "ExplicitEuler", "Fast", "FrameBudget", "Gravitation", "Group", "InputError", "Integrator", "Ledger",
-    "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel", "Panels", "Periodic", "Pin", "PointSpring", "Polygon", "PositionVerlet",
-    "ProjectOnly", "PyverletError", "Rope", "Segment", "SemiImplicitEuler", "Sink", "Spring", "Stick", "TimeCorrectedVerlet",
-    "Trajectory", "VelocityVerlet", "Wind", "World", "Worlds", "Yoshida4", "bridge", "builders", "chain", "cloth", "errors",
-    "force", "forces", "integrators", "load", "net", "read_trajectory", "rope", "save", "scenes", "soft_body", "sweep", "view",
-    "warm_up", "widget",
+    "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel", "Panels", "Periodic", "Pin", "PointSpring", "Polygon",
+    "PositionVerlet", "ProjectOnly", "PyverletError", "Rope", "Segment", "SemiImplicitEuler", "Sink", "Spring", "Stick",
+    "TimeCorrectedVerlet", "Trajectory", "VelocityVerlet", "Wind", "World", "Worlds", "Yoshida4", "bridge", "builders",
+    "chain", "cloth", "errors", "force", "forces", "integrators", "load", "net", "read_trajectory", "rope", "save",
+    "scenes", "soft_body", "sweep", "view", "warm_up", "widget",
 ]  # fmt: skip
 
 

@@ -100,7 +100,8 @@ def test_a_stream_keeps_its_digits() -> None:
     place = LOWER + (np.column_stack(np.divmod(np.arange(40), 5)) + 0.5) * PERIOD / (8, 5)
     world.add(position=place, velocity=velocity - velocity.mean(axis=0) + (300.0, 0.0), radius=0.4)
     world.run(seconds=24.0)
-    assert world.escaped() == 0 and ((world.position >= LOWER) & (world.position <= LOWER + PERIOD)).all()
+    assert world.escaped() == 0
+    assert ((world.position >= LOWER) & (world.position <= LOWER + PERIOD)).all()
     # In float32 a velocity of 300 m/s has a last digit of 3e-5; 40 circles met some hundred times.
     assert world.momentum() / 40 == pytest.approx((300.0, 0.0), abs=2e-3)
     assert world.overlap().max < 0.02
@@ -129,7 +130,7 @@ def test_a_gas_keeps_energy_for_a_minute(fraction: float) -> None:
 
 def _compressibility(world: pv.World, frames: int) -> float:
     """Mean Z = P A / (N k T) with k T = m <v^2> / 2, over so many frames of 1/240 s, after 1/8 of them."""
-    area, count, total = float(np.prod(world.boundary.seam.period)), len(world), 0.0
+    area, total = float(np.prod(world.boundary.seam.period)), 0.0
     for _ in range(frames // 8):
         world.step(1 / 240)
     for _ in range(frames):

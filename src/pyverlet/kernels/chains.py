@@ -110,7 +110,8 @@ def _sweep(a, b, position, period_x, period_y, first, particle, weight, rest, up
             if not intact[r]:
                 continue
             i, j = particle[first[r]], particle[first[r] + 1]
-            dx, dy = nearest(position[j, 0] - position[i, 0], period_x), nearest(position[j, 1] - position[i, 1], period_y)
+            dx = nearest(position[j, 0] - position[i, 0], period_x)
+            dy = nearest(position[j, 1] - position[i, 1], period_y)
             length = np.sqrt(dx * dx + dy * dy)
             ww = weight[i] + weight[j]
             if length == 0.0 or ww == 0.0:
@@ -146,8 +147,8 @@ def _solve_one(r, position, first, particle, weight, upper, along, gradient, giv
 
 @kernel
 def _solve_run(
-    a, b, node, position, period_x, period_y, first, particle, weight, rest, upper, intact, value, gradient, along, turn, bend, bow, give, offset,
-    active, right, inverse, carried, move, step, lam,
+    a, b, node, position, period_x, period_y, first, particle, weight, rest, upper, intact, value, gradient, along, turn, bend,
+    bow, give, offset, active, right, inverse, carried, move, step, lam,
 ):  # fmt: skip
     one_sided = False
     for r in range(a, b):
@@ -189,8 +190,8 @@ def _solve_run(
 
 @parallel_kernel
 def sweep(
-    back, skip, colour, run, position, period_x, period_y, first, particle, weight, rest, upper, intact, value, gradient, along, turn, bend, bow,
-    give, offset, active, right, inverse, carried, move, step, lam,
+    back, skip, colour, run, position, period_x, period_y, first, particle, weight, rest, upper, intact, value, gradient, along,
+    turn, bend, bow, give, offset, active, right, inverse, carried, move, step, lam,
 ):  # fmt: skip
     """Solve all runs, colour by colour or `back` from the last one, without the first colour on the way if `skip`.
 
@@ -203,12 +204,12 @@ def sweep(
         if c < LINK_COLOURS - 1:
             for k in prange(colour[c], colour[c + 1]):
                 _solve_run(
-                    run[k], run[k + 1], run[k] + k, position, period_x, period_y, first, particle, weight, rest, upper, intact, value, gradient,
-                    along, turn, bend, bow, give, offset, active, right, inverse, carried, move, step, lam,
+                    run[k], run[k + 1], run[k] + k, position, period_x, period_y, first, particle, weight, rest, upper, intact,
+                    value, gradient, along, turn, bend, bow, give, offset, active, right, inverse, carried, move, step, lam,
                 )  # fmt: skip
         else:
             for k in range(colour[c], colour[c + 1]):
                 _solve_run(
-                    run[k], run[k + 1], run[k] + k, position, period_x, period_y, first, particle, weight, rest, upper, intact, value, gradient,
-                    along, turn, bend, bow, give, offset, active, right, inverse, carried, move, step, lam,
+                    run[k], run[k + 1], run[k] + k, position, period_x, period_y, first, particle, weight, rest, upper, intact,
+                    value, gradient, along, turn, bend, bow, give, offset, active, right, inverse, carried, move, step, lam,
                 )  # fmt: skip

@@ -56,11 +56,11 @@ def follow(position, reference, period_x, period_y):
 
 @kernel
 def ghosts(position, radius, low_x, low_y, period_x, period_y, reach, to_position, to_radius, owner):
-    """Copies of circles near the seam, a period further: of any two that are near each other across it, one has a copy there.
+    """Copies of circles near the seam, a period further: of two that are near each other across it, one has a copy there.
 
-    Half of the neighbouring rooms will do: those to the right, above, above to the left and to the right. position: (n, 2), inside
-    the room. reach: m, how near rims count, and the largest radius. owner[k]: whose copy it is. Returns how many copies there are,
-    also beyond the room for them.
+    Half of the neighbouring rooms will do: those to the right, above, above to the left and to the right. position: (n, 2),
+    inside the room. reach: m, how near rims count, and the largest radius. owner[k]: whose copy it is. Returns how many copies
+    there are, also beyond the room for them.
     """
     found, room = 0, owner.shape[0]
     for i in range(position.shape[0]):

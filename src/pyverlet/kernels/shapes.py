@@ -72,7 +72,7 @@ def area(position, period_x, period_y, first, particle, rest, begin, end, value,
     """C = area of the ring, positive if it runs counter-clockwise, minus rest, m^2 (the shoelace formula)."""
     for r in prange(begin, end):
         a, b = first[r], first[r + 1]
-        # From corner to corner, each the nearest image of the one before; from the first one, for far from the origin digits cancel.
+        # From corner to corner, each the nearest image of the one before; seen from the first, for far away digits would cancel.
         twice = x = y = 0.0
         bx, by = _way(position, particle[b - 1], particle[a], period_x, period_y)
         for e in range(a, b):

@@ -168,7 +168,8 @@ class Watch:
     def _clusters(self, slots: Slots, listed: Listed, moved: Array) -> Array:
         """(n,) lowest slot of the cluster that each slot belongs to."""
         root = np.arange(len(slots))
-        bodies = (slots.position, moved.astype(slots.dtype), slots.size, *slots.reals(*slots.seam.period), slots.inverse_mass)
+        period_x, period_y = slots.reals(*slots.seam.period)
+        bodies = (slots.position, moved.astype(slots.dtype), slots.size, period_x, period_y, slots.inverse_mass)
         clusters.join_met(*bodies, *listed, slots.real(SLEEP_NEAR), root)
         if self._links:
             rows, _ = self._links.pulls()
@@ -204,8 +205,8 @@ def _rounding(slots: Slots) -> float:
 def undriven(world: Any, h: float, h_last: float | None) -> bool:
     """Whether nothing but contacts and links could raise the energy of a world.
 
-    Forces have a potential or are drag, no obstacle moves, gravity does not point along a period, and the integrator does not raise it either: of order 2 or more, and
-    with a constant step, which `PositionVerlet` needs.
+    Forces have a potential or are drag, no obstacle moves, gravity does not point along a period, and the integrator does not
+    raise it either: of order 2 or more, and with a constant step, which `PositionVerlet` needs.
     """
     if world.integrator.order < 2 or h_last not in (None, h):
         return False

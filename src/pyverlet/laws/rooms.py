@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -249,7 +249,7 @@ class Periodic(_Walls):
         friction: mu of the walls, where there are any, 0 or more.
 
     Raises:
-        InputError: an argument is outside what is allowed. Of `World.add` and `World.step`: a circle is larger than half a period.
+        InputError: an argument is outside what is allowed; from `World.add`, a circle is larger than half a period.
     """
 
     def __init__(
@@ -257,7 +257,7 @@ class Periodic(_Walls):
         lower: Sequence[float],
         upper: Sequence[float],
         *,
-        axes: Literal["xy", "x", "y"] = "xy",
+        axes: str = "xy",
         restitution: float = 0.0,
         friction: float = 0.0,
     ) -> None:

@@ -70,8 +70,8 @@ class Sleep:
         if not self._members:
             return False
         touched = np.zeros(len(slots), np.uint8)
-        which = pairs.listed()
-        if not kernels.touch(slots.position, slots.size, *slots.reals(*slots.seam.period), slots.island, *which, touched):
+        (period_x, period_y), which = slots.reals(*slots.seam.period), pairs.listed()
+        if not kernels.touch(slots.position, slots.size, period_x, period_y, slots.island, *which, touched):
             return False
         return self._wake(slots, np.isin(slots.island, slots.island[touched == 1]))
 
@@ -85,7 +85,8 @@ class Sleep:
             return False
         root = np.empty(len(slots), np.int64)
         which = pairs.listed()
-        bodies = (slots.position, slots.size, *slots.reals(*slots.seam.period), slots.inverse_mass, slots.calm)
+        period_x, period_y = slots.reals(*slots.seam.period)
+        bodies = (slots.position, slots.size, period_x, period_y, slots.inverse_mass, slots.calm)
         kernels.find_islands(*bodies, *which, real(SLEEP_NEAR), np.float32(SLEEP_AFTER_S), root)
         sleeper = root >= 0
         if not sleeper.any():

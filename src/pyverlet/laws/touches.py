@@ -131,7 +131,6 @@ class Touches:
         found = self.array_of_then()
         return float(found["impulse"][found["wall"] >= 0].sum() / self._end.dt)
 
-
     def virial(self) -> float:
         """J, sum over contacts between circles of force times distance, averaged over the frame."""
         return 0.0 if self._end is None else self._virial / self._end.dt

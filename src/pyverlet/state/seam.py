@@ -34,11 +34,11 @@ class Seam(NamedTuple):
         return min((period for period in self.period if period > 0), default=np.inf)
 
     def nearest(self, way: Array) -> Array:
-        """(..., 2) these differences of places, m, each as the image of it that is nearest to 0; as it is where there is no period."""
+        """(..., 2) of these differences of places, m, the images that are nearest to 0; themselves where there is no period."""
         if not self:
             return way
         period = np.asarray(self.period, way.dtype)
-        return way - period * np.rint(np.divide(way, period, out=np.zeros_like(way), where=period > 0))
+        return np.asarray(way - period * np.rint(np.divide(way, period, out=np.zeros_like(way), where=period > 0)))
 
     def wrapped(self, position: Array) -> Array:
         """(n, 2) the images of these places inside the room, m; the same array without a seam."""

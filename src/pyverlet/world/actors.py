@@ -95,17 +95,9 @@ class Emitter(Actor):
         allowed = world.is_free(places)
         places, sizes, near = places[allowed], sizes[allowed], self._near(world)
         taken = np.zeros(len(places), bool)
-        found = int(
-            placing.free_places(
-                places,
-                sizes,
-                world.position[near].astype(np.float64),
-                world.radius[near].astype(np.float64),
-                *map(float, world.boundary.seam.period),
-                wanted,
-                taken,
-            )  # fmt: skip
-        )
+        there = world.position[near].astype(np.float64), world.radius[near].astype(np.float64)
+        period_x, period_y = map(float, world.boundary.seam.period)
+        found = int(placing.free_places(places, sizes, *there, period_x, period_y, wanted, taken))
         if found:
             weight = {"mass": self.mass, "density": self.density}
             world.add(position=places[taken], velocity=self.velocity, radius=sizes[taken], **weight)  # type: ignore[arg-type]

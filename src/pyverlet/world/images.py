@@ -64,4 +64,4 @@ def left_in_room(start: Floats, heading: Floats, seam: Seam) -> Floats:
             d = heading[:, axis]
             edge = np.where(d > 0, low + period, low) - start[:, axis]
             far = np.minimum(far, np.divide(edge, d, out=np.full(len(d), np.inf), where=d != 0))
-    return np.maximum(far, 0.0)
+    return np.asarray(np.maximum(far, 0.0))

@@ -117,9 +117,9 @@ class Measures(Particles):
     def pressure(self) -> float:
         """N/m, what circles push the walls of the room with along their normals, over their length; of the last frame.
 
-        A room without walls that is periodic has the pressure of the virial theorem: the sum of m |v - u|^2, u the velocity of all
-        together, and of what pushes each pair of circles that meet times their distance, over twice the area. Links and forces
-        between particles are left out.
+        A room without walls that is periodic has the pressure of the virial theorem: the sum of m |v - u|^2, with the velocity u
+        of all together, and of what pushes each pair of circles that meet times their distance, over twice the area. Links and
+        forces between particles are left out.
 
         Raises:
             InputError: the room has neither walls of a known length nor periods, or the world notes no contacts.

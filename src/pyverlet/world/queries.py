@@ -177,7 +177,7 @@ def _regions(low: Floats, high: Floats, middle: Floats, size: Floats, cells: tup
 
 
 def _in_first_room(low: Floats, high: Floats, middle: Floats, size: Floats, seam: Seam) -> tuple[Floats, Floats, Floats]:
-    """Regions moved by whole periods, so that what is in them is in them or in an image beside them; no box wider than the room."""
+    """Regions moved by whole periods into the room, or beside it; no box wider than that."""
     where = np.where(np.isfinite(size)[:, None], middle, low)
     move = seam.wrapped(where) - where
     low, high, middle = low + move, high + move, middle + move
@@ -202,7 +202,7 @@ def _nearer(index: Indices, square: Floats, other: Indices, far: Floats) -> tupl
 
 
 def _pieces(start: Floats, heading: Floats, far: Floats, seam: Seam) -> Iterator[tuple[Indices, Floats, Floats, Floats]]:
-    """Rays in pieces that stay in the room: which rays, from where, how far they have come, how far they go; while `far` lets them."""
+    """Rays in pieces that stay in the room, as far as `far` lets them: which, from where, how far they have come and go on."""
     if not seam:
         yield np.arange(len(start)), start, np.zeros(len(start)), far.copy()
         return

@@ -320,8 +320,8 @@ class World(Measures, Queries, Doors):
             raise InputError(f"boundary is {value!r}; allowed is an object such as pyverlet.Circle(radius=10) or pyverlet.Open()")
         value.check(self._state.radius)
         self.links.check(value.seam)
-        if value.seam != self._state.seam and getattr(self, "_contacts", None):  # lists are about the images of then
-            self._contacts.broad_phase.forget()
+        if value.seam != self._state.seam and (contacts := getattr(self, "_contacts", None)):  # its list is about other images
+            contacts.broad_phase.forget()
         self._boundary, self._state.seam = value, value.seam
 
     @property

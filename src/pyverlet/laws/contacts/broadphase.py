@@ -193,18 +193,9 @@ class _AllPairs(BroadPhase):
 
     def _fill(self, state: Slots) -> int:
         pairs = self.list
-        found = int(
-            kernels.list_all_pairs(
-                state.position,
-                state.radius,
-                *state.reals(*state.seam.period),
-                state.inverse_mass,
-                state.category,
-                state.mask,
-                pairs.pair_i,
-                pairs.pair_j,
-            )  # fmt: skip
-        )
+        period_x, period_y = state.reals(*state.seam.period)
+        who = (state.inverse_mass, state.category, state.mask)
+        found = int(kernels.list_all_pairs(state.position, state.radius, period_x, period_y, *who, pairs.pair_i, pairs.pair_j))
         pairs.set_strips(1)
         pairs.count[0] = found
         return found

@@ -53,13 +53,14 @@ class Crowd(NamedTuple):
         largest = float(state.radius.max(initial=0.0))
         known = _KNOWN * skin + rounding
         where, size, owner = np.empty((0, 2), state.dtype), np.empty(0, state.dtype), np.empty(0, np.int32)
+        copy: Any = kernels.ghosts
         numbers = state.reals(*seam, largest + known)
-        while (copies := int(kernels.ghosts(position, state.radius, *numbers, where, size, owner))) > len(owner):
+        while (copies := int(copy(position, state.radius, *numbers, where, size, owner))) > len(owner):
             where, size, owner = np.empty((copies, 2), state.dtype), np.empty(copies, state.dtype), np.empty(copies, np.int32)
         above = seam.low_y + seam.period_y if seam.period_y else np.inf
-        rest = (np.concatenate((column, column[owner])) if len(column) else column for column in columns[1:])
-        both = np.concatenate((position, where)), np.concatenate((state.radius, size))
-        return cls(*both, *rest, owner, copies, rounding, above, known)
+        weight, category, mask = (np.concatenate((column, column[owner])) if len(column) else column for column in columns[1:])
+        position, radius = np.concatenate((position, where)), np.concatenate((state.radius, size))
+        return cls(position, radius, weight, category, mask, owner, copies, rounding, above, known)
 
     def originals(self, order: Array) -> Array:
         """Those of an order (n + copies,) that are no copies."""

@@ -76,7 +76,7 @@ class Grids:
         strips = grid.cut_strips(self.levels, self.start, max(len(self.order) // STRIPS, STRIP_PARTICLES), row, held)
         row, held = row[: strips + 1], held[: strips + 1]
         if self._above < np.inf:
-            # Across the seam the last strip writes to the first one: it has all rows near the seam, and is an odd one, or the only.
+            # Across the seam the last strip writes to the first: it has all rows near the seam, and is an odd one or the only.
             top = (self._above - float(self.levels.y0)) * float(self.levels.along[0])
             kept = np.flatnonzero(row[:-1] <= max(top - 1.0 - _ROUNDED, 0.0))
             kept = kept[: len(kept) - len(kept) % 2] if len(kept) > 1 else kept

@@ -40,7 +40,7 @@ class Wide:
         normal: (2, room) of pairs that touch, for others 0. depth: (room,) their overlap, m.
         slip: (room,) what contacts have slipped, m. held: (room,) m by which friction has answered it in this substep.
         closing: (room,) largest speed of approach since the last `collect`, m/s; negative: has not touched.
-        spent: (strips, 3) J that impacts, and friction, have taken in this frame, negative; and the virial of contacts, the sum of
+        spent: (strips, 3) J that impacts, and friction, have taken in this frame, negative; and the virial of contacts: sum of
             what pushes each pair apart times their distance, N s m.
         weighs: whether that is asked for.
         asks: whether any pair may bounce or rub, or somebody listens. rubs: whether any may rub.

@@ -67,9 +67,8 @@ class Distance(Link):
         half = 0.5 * seam.shortest
         if (wrong := np.flatnonzero(self._length > half)).size:
             k = int(wrong[0])
-            raise InputError(
-                f"{type(self).__name__}: length[{k}] is {self._length[k]:g} m; allowed is at most half a period of the room, {half:g} m"
-            )
+            what = f"{type(self).__name__}: length[{k}] is {self._length[k]:g} m"
+            raise InputError(f"{what}; allowed is at most half a period of the room, {half:g} m")
 
     @property
     def _family(self) -> Any:

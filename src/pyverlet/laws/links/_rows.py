@@ -168,10 +168,10 @@ class ChainPool(RowPool):
     def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
         row = self._row
         chains.sweep(
-            back, skip, self._colour[: self.colours + 1], self._run, work.position, *work.seam.period, self._first, self._particle, work.weight,
-            row["rest"], row["upper"], row["intact"], row["value"], self._gradient, self._along, row["turn"], row["bend"],
-            row["bow"], row["give"], row["offset"], self._active, self._right, self._inverse, self._carried, self._move,
-            self._step, row["lam"],
+            back, skip, self._colour[: self.colours + 1], self._run, work.position, *work.seam.period, self._first,
+            self._particle, work.weight, row["rest"], row["upper"], row["intact"], row["value"], self._gradient, self._along,
+            row["turn"], row["bend"], row["bow"], row["give"], row["offset"], self._active, self._right, self._inverse,
+            self._carried, self._move, self._step, row["lam"],
         )  # fmt: skip
 
 
