@@ -13,7 +13,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import lines, raster
 from pyverlet.laws.obstacles import Outline
-from pyverlet.picture import marks
+from pyverlet.picture import across, marks
 from pyverlet.picture.colour import by_force
 from pyverlet.picture.palette import DARK, Packed, Theme, swapped
 from pyverlet.picture.view import View
@@ -77,11 +77,16 @@ class Raster:
             cover; R, G, B are complete without it.
         """
         obstacles = world.obstacles.outlines()
-        links = world.links.segments() if len(world.links) else None
+        links, seam = world.links.segments() if len(world.links) else None, world.boundary.seam
+        position, radius, angle = world.position, world.radius, world.angle
+        if seam:
+            owner, place = across.copies(position, radius, seam)
+            position, colours = np.concatenate((position, place)), np.concatenate((colours, colours[owner]))
+            radius, angle = np.concatenate((radius, radius[owner])), np.concatenate((angle, angle[owner]))
+            links = links and across.lines(world.position[world.links.pulls()[0]], links[1], seam)
         return self.discs(
-            world.position, world.radius, view, outlines=outlines, obstacles=obstacles, colours=colours, links=links,
-            angle=world.angle,
-        )  # fmt: skip
+            position, radius, view, outlines=outlines, obstacles=obstacles, colours=colours, links=links, angle=angle
+        )
 
     def discs(
         self, position: NDArray[Any], radius: NDArray[Any], view: View, *,

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from pyverlet.kernels import wire
 from pyverlet.laws.rooms import Circle
+from pyverlet.picture import across
 from pyverlet.picture.colour import USUAL_MULTIPLE
+from pyverlet.state.seam import Seam
 from pyverlet.viewers.sketch import NOTHING, Sketch
 
 if TYPE_CHECKING:
@@ -95,6 +97,8 @@ class Shape:
     """(k, 2) circles that do not collide with each other since a link says so."""
     colours: NDArray[np.uint8] | None
     """(n, 3) bytes R, G, B, the circles' own, if they have any; read-only."""
+    seams: tuple[tuple[int, int, Seam], ...] = ()
+    """Periodic worlds: number of the first circle, how many, and where in the picture the room joins on to itself."""
 
 
 @dataclass(frozen=True)
@@ -198,6 +202,27 @@ class Frame:
         return quantise(self.position, self.view)
 
     @cached_property
+    def copies(self) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
+        """Circles that reach through the seam of a periodic room, once more: (k,) which, and (k, 2) where, m."""
+        found = [(np.empty(0, np.uint32), np.empty((0, 2), np.float32))]
+        for first, count, seam in self.shape.seams:
+            mine = slice(first, first + count)
+            owner, place = across.copies(self.position[mine], self.shape.radius[mine], seam)
+            found.append((owner + np.uint32(first), place))
+        owners, places = zip(*found, strict=True)
+        return np.concatenate(owners), np.concatenate(places)
+
+    @cached_property
+    def segments(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Links as lines, (m, 2, 2) in m, and (m,) what they pull with, N; those through a seam from both of their ends."""
+        ends, force, found = self.position[self.joined], self.force, []
+        for first, count, seam in self.shape.seams:
+            mine = (self.joined[:, 0] >= first) & (self.joined[:, 0] < first + count)
+            found.append(across.lines(ends[mine], force[mine], seam))
+            ends, force = ends[~mine], force[~mine]
+        return np.concatenate([ends, *(lines for lines, _ in found)]), np.concatenate([force, *(pulls for _, pulls in found)])
+
+    @cached_property
     def velocity_unit(self) -> float:
         """Metres a second that one count of `velocity_grid` stands for."""
         fastest = float(np.abs(self.velocity).max(initial=0.0))
@@ -268,7 +293,9 @@ class Camera:
         if extents:
             lowest, highest = np.min(extents, axis=0), np.max(extents, axis=0)
             x0, y0, x1, y1 = (float(value) for value in (*lowest[:2], *highest[2:]))
-            margin = VIEW_MARGIN * max(x1 - x0, y1 - y0)
+            # Through a seam circles reach out of the room.
+            out = max((1.1 * float(world.radius.max(initial=0.0)) for world in worlds if world.boundary.seam), default=0.0)
+            margin = max(VIEW_MARGIN * max(x1 - x0, y1 - y0), out)
             self._fixed = (x0 - margin, y0 - margin, x1 + margin, y1 + margin)
             return
         _, _, reach = _middle_and_reach(np.concatenate([world.position for world in worlds]))

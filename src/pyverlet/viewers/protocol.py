@@ -4,7 +4,8 @@
 - head: JSON padded with spaces, {"kind": "shape" | "frame" | "picture" | "refused", ...}.
 - body, little-endian: of a shape n float32 radii, n float32 masses, n uint32 numbers, "apart" pairs of uint32, circles that do
   not collide, if "kinds" n pairs of uint32, category and mask, and if "coloured" n times three bytes R, G, B; of a frame n pairs
-  of uint16 on the grid over "view", if the tab looks at velocities n pairs of int16 in units of "unit" m/s, of "links" two
+  of uint16 on the grid over "view", if the tab looks at velocities n pairs of int16 in units of "unit" m/s, of "copies", circles
+  that reach through a seam and are drawn once more, a uint32 each, whose they are, and then a pair of uint16, of "links" two
   uint32, who they join, each, and then a byte each, how hard they pull, and if "turned" n bytes, in 1/256 of a turn; of a picture
   a JPEG.
 """
@@ -98,6 +99,10 @@ def encode_frame(frame: Frame, part: Rect | None = None, *, velocity: bool = Fal
     if velocity:
         head["unit"] = frame.velocity_unit
         body += frame.velocity_grid.tobytes()
+    owner, place = frame.copies
+    if len(owner):
+        head["copies"] = len(owner)
+        body += owner.tobytes() + quantise(place, frame.view if part is None else part).tobytes()
     if len(frame.joined):
         head["links"] = len(frame.joined)
         body += frame.joined.tobytes() + frame.strain.tobytes()
@@ -140,6 +145,7 @@ def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = N
         "bounded": shape.bounded,
         "parted": shape.parted,
         "outlines": shape.outlines,
+        "seams": shape.seams,
         "lines": shape.lines,
         "panels": [dataclasses.asdict(panel) for panel in shape.panels],
         "differing": shape.differing,

@@ -382,7 +382,8 @@ class Session:
         if self._speed == 1.0 or self._paused or before is None or list(map(len, before)) != list(map(len, now)):
             return now
         alpha = np.float32(self._clock.alpha)
-        return [a + alpha * (b - a) for a, b in zip(before, now, strict=True)]
+        seams = [world.boundary.seam for world in self._stage.worlds]
+        return [seam.wrapped(a + alpha * seam.nearest(b - a)) for a, b, seam in zip(before, now, seams, strict=True)]
 
 
 class _Stopped(Exception):  # noqa: N818  (no error: somebody has asked for it)

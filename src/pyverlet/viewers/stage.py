@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.state.seam import Seam
 from pyverlet.state.state import EVERYONE
 from pyverlet.viewers import levers
 from pyverlet.viewers.commands import (
@@ -185,6 +186,7 @@ class Stage:
         outlines: list[tuple[tuple[float, float], ...]] = []
         lines: list[tuple[tuple[float, float], tuple[float, float]]] = []
         panels: list[PanelShape] = []
+        seams: list[tuple[int, int, Seam]] = []
         first, starts = 0, []
         for k, (panel, world) in enumerate(zip(self.panels, self.worlds, strict=True)):
             dx, dy = self.layout.offset(k)
@@ -193,6 +195,8 @@ class Stage:
                 lines.append(((extent[0] + dx, self.panels.line + dy), (extent[2] + dx, self.panels.line + dy)))
             if len(self.panels) > 1:
                 panels.append(PanelShape(panel.name, first, len(world), self._start_energies[k], self.layout.strip(k)))
+            if seam := world.boundary.seam:
+                seams.append((first, len(world), seam._replace(low_x=seam.low_x + dx, low_y=seam.low_y + dy)))
             starts.append(first)
             first += len(world)
         return Shape(
@@ -217,6 +221,7 @@ class Stage:
                 np.concatenate([pairs + start for pairs, start in zip(self._apart, starts, strict=True)]).astype(np.uint32)
             ),
             colours=self._colours(),
+            seams=tuple(seams),
         )
 
     def _bounded(self) -> bool:

@@ -55,6 +55,7 @@ class Player {
       this.reel.shape(here.chunk.shape).then((shape) => {
         this.busy = false;
         this.shape = here.chunk.shape;
+        this.about = shape;
         this.sent = "";
         this.hear(shape);
         this.show();
@@ -66,7 +67,7 @@ class Player {
     this.moved(this);
     if (wish === this.sent) return;
     this.sent = wish;
-    const frame = message(here, ++this.seq, this.part, next, fine);
+    const frame = message(here, ++this.seq, this.part, next, fine, this.about);
     frame.status = { ...frame.status, paused: this.paused, speed: this.speed, pace: this.paused ? null : this.speed };
     this.hear(frame);
   }

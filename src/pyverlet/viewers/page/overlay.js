@@ -3,6 +3,7 @@
 import { drawObstacles, resizeCanvas } from "./backdrop.js";
 import { heat } from "./colour.js";
 import { touching } from "./contacts.js";
+import { nearest, periods } from "./copies.js";
 import { GRID_MAX } from "./draw.js";
 
 export const MOST_CONTACTS = 20000; // circles whose contacts are searched for: beyond, it would cost frames
@@ -36,12 +37,14 @@ export class Overlay {
     dashes(context, shape.lines, camera, colour("--soft"));
     drawObstacles(context, frame.obstacles, camera, colour);
     if (!frame.grid) return;
-    const place = camera.place(frame.view), sx = place.width / GRID_MAX, sy = place.height / GRID_MAX;
-    const { grid } = frame, seen = (i) => grid[2 * i] && grid[2 * i + 1] && grid[2 * i] !== GRID_MAX && grid[2 * i + 1] !== GRID_MAX;
-    const x = (i) => place.left + grid[2 * i] * sx, y = (i) => place.top + place.height - grid[2 * i + 1] * sy;
+    const place = camera.place(frame.view);
+    const { grid } = frame, { x, y, seen } = scaled(grid, place);
     const n = grid.length / 2;
-    if (frame.turned) this.marks = drawMarks(context, frame.turned, shape.radius, camera.scale, { x, y, seen });
-    this.links = drawLinks(context, frame, { x, y, seen }, dark);
+    if (frame.turned) {
+      this.marks = drawMarks(context, frame.turned, shape.radius, camera.scale, { x, y, seen });
+      if (frame.copies) this.marks += drawMarks(context, ...copied(frame, shape.radius), camera.scale, scaled(frame.copies.places, place));
+    }
+    this.links = drawLinks(context, frame, { x, y, seen }, dark, periods(shape.seams, n)?.map((metres) => metres * camera.scale));
     context.beginPath();
     if (wants.contacts && n <= MOST_CONTACTS) {
       const xs = new Float64Array(n), ys = new Float64Array(n), rs = new Float64Array(n);
@@ -78,8 +81,21 @@ export class Overlay {
   }
 }
 
-/** Links as lines in the colour of their pull; returns how many. `at`: where a circle is on the screen. */
-function drawLinks(context, { joined, strain }, at, dark) {
+/** Where the circles of a grid are on the screen, and which are in sight; `place`: where the grid is. */
+function scaled(grid, place) {
+  const sx = place.width / GRID_MAX, sy = place.height / GRID_MAX;
+  return {
+    seen: (i) => grid[2 * i] && grid[2 * i + 1] && grid[2 * i] !== GRID_MAX && grid[2 * i + 1] !== GRID_MAX,
+    x: (i) => place.left + grid[2 * i] * sx,
+    y: (i) => place.top + place.height - grid[2 * i + 1] * sy,
+  };
+}
+
+/** How the copies of a frame have turned, and their radii. */
+const copied = ({ turned, copies }, radius) => [Uint8Array.from(copies.owner, (i) => turned[i]), Float32Array.from(copies.owner, (i) => radius[i])];
+
+/** Links as lines in the colour of their pull; returns how many. `at`: where a circle is on the screen; `period`: (2n,) or undefined. */
+function drawLinks(context, { joined, strain }, at, dark, period) {
   if (!strain?.length) return 0;
   const shades = heat(LOADS, dark), groups = shades.map(() => []);
   for (let k = 0; k < strain.length; k++) groups[(strain[k] * LOADS) >> 8].push(k);
@@ -89,8 +105,13 @@ function drawLinks(context, { joined, strain }, at, dark) {
     for (const k of group) {
       const a = joined[2 * k], b = joined[2 * k + 1];
       if (!at.seen(a) || !at.seen(b)) continue;
+      const dx = at.x(b) - at.x(a), dy = at.y(b) - at.y(a), nx = nearest(dx, period?.[2 * a]), ny = nearest(dy, period?.[2 * a + 1]);
       context.moveTo(at.x(a), at.y(a));
-      context.lineTo(at.x(b), at.y(b));
+      context.lineTo(at.x(a) + nx, at.y(a) + ny);
+      if (nx !== dx || ny !== dy) {
+        context.moveTo(at.x(b), at.y(b));
+        context.lineTo(at.x(b) - nx, at.y(b) - ny);
+      }
       drawn++;
     }
     ink(context, shades[load], LINK_PX);

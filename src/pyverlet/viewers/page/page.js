@@ -5,6 +5,7 @@ import { Backdrop } from "./backdrop.js";
 import { Camera } from "./camera.js";
 import { Inks, isLively } from "./colour.js";
 import { Controls } from "./controls.js";
+import { withCopies } from "./copies.js";
 import { GRID_MAX, makeRenderer } from "./draw.js";
 import { fillSheet, listen } from "./keys.js";
 import { Numbers } from "./numbers.js";
@@ -197,7 +198,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
       radiusFor = pixels;
       radiusPx = shape.radius.map((metres) => metres * pixels);
     }
-    renderer.draw(frame.grid, radiusPx, inks.ink);
+    renderer.draw(...withCopies(frame, radiusPx, inks.ink));
   }
 
   /** What lies behind, over and beside the circles; and the canvas of the circles to its place. */
