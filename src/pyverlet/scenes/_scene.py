@@ -18,6 +18,7 @@ from pyverlet.ground.errors import InputError
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.collisions import Collisions
 from pyverlet.laws.integrators import Integrator, PositionVerlet
+from pyverlet.scenes._graph import Gauge
 from pyverlet.world.panels import Pace, Panel, Panels, every_frame
 from pyverlet.world.world import World
 
@@ -69,8 +70,8 @@ class Settings:
         checks.fraction("restitution", self.restitution)
         checks.number("friction", self.friction, least=0.0)
 
-    def empty_world(self, boundary: Any) -> World:
-        """A world with these settings inside `boundary`, still without circles."""
+    def empty_world(self, boundary: Any, **more: Any) -> World:
+        """A world with these settings inside `boundary`, still without circles; `more`: of `World`, what users do not set."""
         collisions = None
         if self.collisions is not None:
             collisions = Collisions(restitution=self.restitution, friction=self.friction, method=self.collisions)
@@ -83,6 +84,7 @@ class Settings:
             dtype=self.dtype,
             threads=self.threads,
             ledger=self.ledger,
+            **more,
         )
 
 
@@ -95,11 +97,13 @@ class Show:
             progress(done, total) is called while that takes long. A scene that has it takes a picture.
         view: the part of the plane to show, (x0, y0, x1, y1) in metres.
         seconds: how long it is worth watching, s.
+        graph: of (settings): what measures the world as it runs, for a graph beside it.
     """
 
     colours: Callable[[Settings, float, Callable[[int, int], None] | None], NDArray[np.uint8]] | None = None
     view: Callable[[Settings], tuple[float, float, float, float]] | None = None
     seconds: Callable[[Settings], float] | None = None
+    graph: Callable[[Settings], Gauge] | None = None
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pyverlet import scenes
 from pyverlet.laws.integrators import Integrator
 from pyverlet.scenes import Scene
+from pyverlet.scenes._graph import Gauge
 from pyverlet.viewers.frames import Rect
 from pyverlet.world.panels import Panels
 from pyverlet.world.world import World
@@ -32,6 +33,7 @@ class Exhibit:
         scene: the name of the scene they are, or "" for worlds of the user's own.
         colours: (n, 3) bytes R, G, B, the circles' own; None leaves colours to the viewer.
         part: of the plane to show, metres; None shows the bounds, or where the circles are.
+        graph: what measures the one world for a graph beside it; None shows none.
     """
 
     title: str
@@ -39,6 +41,7 @@ class Exhibit:
     scene: str = ""
     colours: NDArray[np.uint8] | None = None
     part: Rect | None = None
+    graph: Gauge | None = None
 
     @classmethod
     def of(cls, shown: World | Panels | Exhibit, title: str) -> Exhibit:
@@ -94,4 +97,5 @@ class Repertoire:
         if scene.show.colours and len(panels) == 1:
             colours = scene.show.colours(settings, self._dt, progress)
         part = scene.show.view(settings) if scene.show.view else None
-        return Exhibit(scene.name, panels, scene.name, colours, part)
+        graph = scene.show.graph(settings) if scene.show.graph and len(panels) == 1 else None
+        return Exhibit(scene.name, panels, scene.name, colours, part, graph)

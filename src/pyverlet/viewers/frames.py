@@ -13,6 +13,7 @@ from pyverlet.kernels import wire
 from pyverlet.laws.rooms import Circle
 from pyverlet.picture import across
 from pyverlet.picture.colour import USUAL_MULTIPLE
+from pyverlet.scenes._graph import Graph
 from pyverlet.state.seam import Seam
 from pyverlet.viewers.sketch import NOTHING, Sketch
 
@@ -138,6 +139,8 @@ class Status:
     busy: str | None
     """What keeps the world from moving for now, such as building another."""
     error: str | None
+    graph: Graph | None = None
+    """What the scene measures, beside a curve."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -85,6 +85,7 @@ class Gauges:
             paused=paused,
             busy=busy,
             error=error,
+            graph=stage.exhibit.graph and stage.exhibit.graph(stage.worlds[0]),
         )
 
     def _read_slow(self, stage: Stage) -> None:
