@@ -440,3 +440,27 @@ def test_a_room_that_changes() -> None:
     two.velocity[:, 0] = 1.0, -1.0
     world.run(seconds=1.0)
     assert two.velocity[:, 0] == pytest.approx((-1.0, 1.0))  # off each other
+
+
+# ---- obstacles ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("speed", [0.0, 2.0])
+def test_obstacles_across_the_seam(speed: float) -> None:
+    """A ball that meets a disc that moves, or not, and hangs over the seam: as in the middle of the room."""
+    found = []
+    for move in CORNERS:
+        world = _world(collisions=None, contacts=True)
+        disc = pv.Disc(MIDDLE + (0.5, 0.2) + move, 0.6, velocity=(-speed, 0.0), restitution=1.0)
+        world.obstacles.append(disc)
+        ball = world.add(position=MIDDLE - (1.2, 0.0) + move, velocity=(3.0, 0.0), radius=0.3)
+        for _ in range(60):
+            world.step(1 / 60)
+        found.append((ball.velocity.copy(), ball.position - move, np.array([disc.pivot]) - move))
+        assert not world.is_free(disc.pivot)[0]
+    (velocity, place, pivot), *others = found
+    assert velocity[0, 0] < 0.0
+    for other in others:
+        assert other[0] == pytest.approx(velocity, abs=1e-9)
+        assert _apart(other[1], place) < 1e-9
+        assert _apart(other[2], pivot) < 1e-9

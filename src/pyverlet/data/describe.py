@@ -85,6 +85,7 @@ def _kind(
 _kind(rooms.Open)
 _kind(rooms.Circle, "center", "radius", "restitution", "friction")
 _kind(rooms.Box, "lower", "upper", "restitution", "friction")
+_kind(rooms.Periodic, "lower", "upper", "axes", "restitution", "friction")
 _kind(naive.ClampAndFlip, "room")
 _kind(naive.ProjectOnly, "room")
 

@@ -33,6 +33,11 @@ class Seam(NamedTuple):
         """The shortest period there is, m; infinite without any."""
         return min((period for period in self.period if period > 0), default=np.inf)
 
+    def images(self) -> Array:
+        """(k, 2) m from a room to itself and to those around it that are its images; itself first."""
+        ways = [(0, -1, 1) if period > 0 else (0,) for period in self.period]
+        return np.array([(i * self.period_x, j * self.period_y) for i in ways[0] for j in ways[1]], float)
+
     def nearest(self, way: Array) -> Array:
         """(..., 2) of these differences of places, m, the images that are nearest to 0; themselves where there is no period."""
         if not self:

@@ -84,7 +84,7 @@ class Hands:
 
     def _leashed(self, particle: int, aim: tuple[float, float], leash: float) -> tuple[float, float]:
         x, y = (float(value) for value in self._world.position[particle])
-        dx, dy = aim[0] - x, aim[1] - y
+        dx, dy = self._world.boundary.seam.nearest(np.array(aim) - (x, y))
         shorten = min(1.0, leash / max(float(np.hypot(dx, dy)), 1e-30))
         return (x + dx * shorten, y + dy * shorten)
 

@@ -34,7 +34,7 @@ class Images(NamedTuple):
         low, high = np.array((seam.low_x, seam.low_y)), np.array((seam.low_x + seam.period_x, seam.low_y + seam.period_y))
         periodic = np.array(seam.period) > 0
         places, owners = [inside], [np.arange(len(state))]
-        for shift in shifts(seam)[1:]:
+        for shift in seam.images()[1:]:
             moved = inside + shift
             near = np.flatnonzero((((moved >= low - reach) & (moved <= high + reach)) | ~periodic).all(axis=1))
             places.append(moved[near].astype(inside.dtype))
@@ -45,15 +45,6 @@ class Images(NamedTuple):
     def named(self, found: Indices) -> Indices:
         """Particles in place of images; -1 stays."""
         return found if self.owner is None else np.where(found >= 0, self.owner[found], -1)
-
-
-def shifts(seam: Seam) -> Floats:
-    """(k, 2) m from a room to itself and to those around it that are its images; itself first."""
-    return np.array([(i * seam.period_x, j * seam.period_y) for i in _ways(seam.period_x) for j in _ways(seam.period_y)])
-
-
-def _ways(period: float) -> tuple[int, ...]:
-    return (0, -1, 1) if period > 0 else (0,)
 
 
 def left_in_room(start: Floats, heading: Floats, seam: Seam) -> Floats:

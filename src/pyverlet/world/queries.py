@@ -13,7 +13,7 @@ from pyverlet.ground.errors import InputError
 from pyverlet.kernels import grid, motion, queries
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import State
-from pyverlet.world.images import PERIODS, Images, left_in_room, shifts
+from pyverlet.world.images import PERIODS, Images, left_in_room
 
 _ask: Any = queries
 _grid: Any = grid
@@ -145,7 +145,7 @@ class Queries:
         if len(self._state):
             position, seam = self._state.seam.wrapped(self._state.position), self._state.seam
             cells, inside = _cells(position, len(where)), seam.wrapped(where)
-            for shift in shifts(seam):
+            for shift in seam.images():
                 seen, far = np.full_like(index, -1), np.full_like(square, np.inf)
                 _ask.nearest(inside - shift, *cells, position, seen, far)
                 index, square = _nearer(index, square, seen, far)
@@ -159,7 +159,7 @@ class Queries:
                 position = seam.wrapped(position)
                 low, high, middle = _in_first_room(low, high, middle, size, seam)
             cells = _cells(position, len(low))
-            rows = [_regions(low - shift, high - shift, middle - shift, size, cells, position) for shift in shifts(seam)]
+            rows = [_regions(low - shift, high - shift, middle - shift, size, cells, position) for shift in seam.images()]
             pairs = np.concatenate(rows)
             pairs = np.unique(pairs, axis=0) if seam else pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
         return pairs if many else np.ascontiguousarray(pairs[:, 1])

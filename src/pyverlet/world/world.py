@@ -322,7 +322,7 @@ class World(Measures, Queries, Doors):
         self.links.check(value.seam)
         if value.seam != self._state.seam and (contacts := getattr(self, "_contacts", None)):  # its list is about other images
             contacts.broad_phase.forget()
-        self._boundary, self._state.seam = value, value.seam
+        self._boundary, self._state.seam, self._course.seam = value, value.seam, value.seam
 
     @property
     def collisions(self) -> Collisions | None:
