@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.laws.obstacles import Outline
 from pyverlet.state.seam import Seam
 
 Array = NDArray[Any]
@@ -41,3 +43,18 @@ def lines(ends: Array, force: Array, seam: Seam) -> tuple[Array, Array]:
     back = ends[through][:, ::-1].copy()
     back[:, 1] = back[:, 0] - way[through]
     return np.concatenate((there, back)), np.concatenate((force, force[through]))
+
+
+def outlines(drawn: Sequence[Outline], seam: Seam) -> list[Outline]:
+    """These, and again those that reach into another image of the room."""
+    if not seam:
+        return list(drawn)
+    low, high = np.array((seam.low_x, seam.low_y)), np.array((seam.low_x + seam.period_x, seam.low_y + seam.period_y))
+    periodic, found = np.array(seam.period) > 0, []
+    for points, filled in drawn:
+        for shift in seam.images():
+            moved = points + shift
+            inside = ((moved.max(axis=0) > low) & (moved.min(axis=0) < high)) | ~periodic
+            if inside.all() or not shift.any():
+                found.append(Outline(moved, filled))
+    return found

@@ -83,6 +83,7 @@ class Raster:
             owner, place = across.copies(position, radius, seam)
             position, colours = np.concatenate((position, place)), np.concatenate((colours, colours[owner]))
             radius, angle = np.concatenate((radius, radius[owner])), np.concatenate((angle, angle[owner]))
+            obstacles = across.outlines(obstacles, seam)
             links = links and across.lines(world.position[world.links.pulls()[0]], links[1], seam)
         return self.discs(
             position, radius, view, outlines=outlines, obstacles=obstacles, colours=colours, links=links, angle=angle

@@ -81,8 +81,8 @@ class Course:
         """For each segment as it stood last: number of its obstacle, start (k, 2), direction (k, 2), length, rounding; metres."""
         s = self._segments
         return (
-            s["body"] % max(len(self._seen), 1), np.column_stack((s["bx"], s["by"])), np.column_stack((s["bc"], s["bs"])), s["length"].copy(),
-            s["rounding"].copy(),
+            s["body"] % max(len(self._seen), 1), np.column_stack((s["bx"], s["by"])), np.column_stack((s["bc"], s["bs"])),
+            s["length"].copy(), s["rounding"].copy(),
         )  # fmt: skip
 
     def facing(self, position: Array) -> tuple[Array, Array]:
