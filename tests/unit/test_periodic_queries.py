@@ -12,14 +12,14 @@ LOWER, PERIOD = np.array([-3.0, 2.0]), np.array([10.0, 7.0])
 
 def _world(axes: str) -> pv.World:
     rng = np.random.default_rng(5)
-    world = pv.World(boundary=pv.Periodic(LOWER, LOWER + PERIOD, axes=axes), dtype=np.float64)
+    world = pv.World(boundary=pv.Periodic(tuple(LOWER), tuple(LOWER + PERIOD), axes=axes), dtype=np.float64)
     world.add(position=rng.uniform(LOWER, LOWER + PERIOD, (60, 2)), radius=rng.uniform(0.1, 0.6, 60))
     return world
 
 
 def _nearest(world: pv.World, way: np.ndarray) -> np.ndarray:
     period = np.array(world.boundary.seam.period)
-    return way - period * np.rint(way / np.where(period > 0, period, np.inf))
+    return np.asarray(way - period * np.rint(way / np.where(period > 0, period, np.inf)))
 
 
 @pytest.mark.parametrize("axes", ["xy", "x", "y"])
@@ -46,7 +46,7 @@ def test_regions(axes: str, size: float) -> None:
     middle = rng.uniform(LOWER - PERIOD, LOWER + 2 * PERIOD, (20, 2))
     far = np.hypot(*np.moveaxis(_nearest(world, world.position[None] - middle[:, None]), 2, 0))
     assert np.array_equal(world.in_circle(middle, size), np.argwhere(far <= size))
-    low, high = middle - (size, 0.3), middle + (size, 0.4)
+    low, high = middle - np.array((size, 0.3)), middle + np.array((size, 0.4))
     period, inside = np.array(world.boundary.seam.period), np.ones((20, 60), bool)
     for axis in range(2):
         images = [world.position[None, :, axis] + k * period[axis] for k in (range(-6, 7) if period[axis] else (0,))]
@@ -56,7 +56,7 @@ def test_regions(axes: str, size: float) -> None:
 
 @pytest.mark.parametrize("axes", ["xy", "x", "y"])
 def test_rays_go_on_through_the_seam(axes: str) -> None:
-    """Against the images in eleven by eleven rooms: origin o, direction d, circle c: |o + s d - c| = r for the smallest s >= 0."""
+    """Against the images in eleven by eleven rooms: |o + s d - c| = r of origin o, direction d, circle c, the smallest s >= 0."""
     world, rng = _world(axes), np.random.default_rng(9)
     start, angle, length = rng.uniform(LOWER, LOWER + PERIOD, (30, 2)), rng.uniform(0, 2 * np.pi, 30), 25.0
     heading = np.column_stack((np.cos(angle), np.sin(angle)))
