@@ -30,8 +30,9 @@ export function fillGraph(figure, graph) {
     context.textAlign = x === 0 ? "left" : x === most ? "right" : "center";
     context.fillText(String(x), (x / most) * width, height);
   }
-  context.textAlign = "center";
-  context.fillText(axis, width * (0.5 + (most % 2 ? 0 : 0.25)), height);
+  context.textAlign = "right";
+  context.textBaseline = "top";
+  context.fillText(axis, width, 0);
 }
 
 function write(element, text) {
