@@ -109,19 +109,20 @@ def test_a_gas_that_begins_with_equal_speeds_has_maxwells_in_the_end() -> None:
     square = (world.velocity.astype(float) ** 2).sum(axis=1)
     assert stats.kstest(square / square.mean(), "expon").pvalue < 1e-9
     gauge = gas.Thermometer()
-    for _ in range(180):
+    world.run(seconds=1.0)
+    for _ in range(120):
         world.step(1 / 60)
         graph = gauge(world)
     square = (world.velocity.astype(float) ** 2).sum(axis=1)
     assert stats.kstest(square / square.mean(), "expon").pvalue > 0.01
-    # The graph is a mean over the last seconds, of which the first is not yet Maxwell's.
+    # 600 circles, new speeds some eight times in two seconds, and f / 8 of them in a bar: 0.04 is the standard deviation.
     x = (np.arange(gas.BARS) + 0.5) * gas.MOST / gas.BARS
-    assert np.abs(np.array(graph.bars) - 2 * x * np.exp(-(x**2))).max() < 0.25
+    assert np.abs(np.array(graph.bars) - 2 * x * np.exp(-(x**2))).max() < 0.15
     assert float(graph.note.split("=")[1].split(";")[0]) == pytest.approx(gas.henderson(gas.AREA_FRACTION), rel=0.05)
 
 
 def test_the_equation_of_state_of_mixtures() -> None:
-    """Its second virial coefficient is exact: Z = 1 + (1 + <r>^2 / <r^2>) f at small f, from the excluded area pi (r_i + r_j)^2."""
+    """Its second virial coefficient is exact: Z = 1 + (1 + <r>^2 / <r^2>) f at small f, from the areas pi (r_i + r_j)^2."""
     radii, fraction = np.array([0.2, 0.5, 1.0, 1.0]), 1e-5
     excluded = np.pi * ((radii[:, None] + radii) ** 2).mean() / 2
     density = fraction / (np.pi * (radii**2).mean())

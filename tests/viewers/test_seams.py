@@ -1,4 +1,4 @@
-"""Pictures of periodic rooms: what reaches through a seam is on both sides, in bytes, in pixels, on the page and in a film of one file."""
+"""Pictures of periodic rooms: what reaches through a seam is on both sides, in pixels, on the page and in a film of one file."""
 
 from __future__ import annotations
 
