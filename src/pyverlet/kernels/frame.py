@@ -13,7 +13,7 @@ from pyverlet.compile.lanes import copy_row
 from pyverlet.kernels.bounds import box, circle
 from pyverlet.kernels.cage import hold
 from pyverlet.kernels.motion import leap
-from pyverlet.kernels.sweeps import push, relax
+from pyverlet.kernels.sweeps import push, push_all_smooth, relax, relax_all_smooth
 from pyverlet.kernels.tables import Circles, Law, Pairs
 
 CONTACTS, BOUNDS, VELOCITIES, INTEGRATE = 1, 2, 3, 4
@@ -76,16 +76,21 @@ def four_walls(room, circles, law, claims):
 # ---- substeps --------------------------------------------------------------------------------------------------------------
 
 
-@driver
-def project(circles, pairs, law, cut, looks, sets_out, claims):
+def _project(circles, pairs, law, cut, looks, sets_out, claims):
     """The first sweep over the pairs, called from Python, which has plain tuples."""
     push(Circles(*circles), Pairs(*pairs), Law(*law), cut, looks, sets_out, claims)
 
 
-@driver
-def still(circles, pairs, law, cut, marks, claims):
+def _still(circles, pairs, law, cut, marks, claims):
     """The second one."""
     relax(Circles(*circles), Pairs(*pairs), Law(*law), cut, marks, claims)
+
+
+_SMOOTH = {"push": push_all_smooth, "relax": relax_all_smooth}
+
+project = {False: driver(_project), True: driver(_project, **_SMOOTH)}
+still = {False: driver(_still), True: driver(_still, **_SMOOTH)}
+"""By whether the world is smooth."""
 
 
 def _substeps(substep, stop, last, circles, pairs, law, room, cut, looks, sets_out, checked, far, claims, spent, clock):
@@ -118,5 +123,9 @@ def _substeps(substep, stop, last, circles, pairs, law, room, cut, looks, sets_o
             return substep, True
 
 
-frames = {room: driver(_substeps, confine=room) for room in (open_space, smooth_cage, cage, four_walls)}
-"""Substeps in each kind of room."""
+frames = {
+    (room, smooth): driver(_substeps, confine=room, **(_SMOOTH if smooth else {}))
+    for room in (open_space, smooth_cage, cage, four_walls)
+    for smooth in (False, True)
+}
+"""Substeps in each kind of room, and of worlds that are `contact.SMOOTH` or not."""

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.compile.jit import kernel, parallel_kernel, prange, variant
 from pyverlet.compile.stealing import claim, none_claimed
 from pyverlet.kernels.bounds import AT_WALL, CARRIED, CARRIES
-from pyverlet.kernels.contact import mark_strip, push_strip, refine_strip, relax_strip
+from pyverlet.kernels.contact import SMOOTH, mark_strip, push_smooth, push_strip, refine_strip, relax_smooth, relax_strip
 from pyverlet.kernels.motion import arrive, set_out
 
 # Particles one thread takes at a time where each is on its own.
@@ -62,8 +62,7 @@ def _refine_some(first, stop, parity, circles, pairs, law):
             refine_strip(2 * half + parity, circles, pairs, law)
 
 
-@parallel_kernel
-def push(circles, pairs, law, cut, looks, sets_out, claims):
+def _push(circles, pairs, law, cut, looks, sets_out, claims):
     """The first sweep: impacts, and overlaps, and what has been slipped.
 
     cut: (2, threads + 1), which half s // 2 of the strips s with s % 2 = 0, and 1, each thread begins with. looks: 1 if packs
@@ -71,12 +70,12 @@ def push(circles, pairs, law, cut, looks, sets_out, claims):
     """
     n = circles.position.shape[0]
     chunks = (n + _CHUNK - 1) // _CHUNK
-    if sets_out != 0 or law.rubs != 0:
+    if sets_out != 0 or (not SMOOTH and law.rubs != 0):
         for c in prange(chunks):
             a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
             if sets_out != 0:
                 set_out(circles.position[a:b], circles.origin[a:b], circles.moved[a:b])
-            if law.rubs != 0:
+            if not SMOOTH and law.rubs != 0:
                 _clear(circles.turned, a, b)
                 _clear(circles.slid.reshape(-1), 2 * a, 2 * b)
     for parity in range(2):
@@ -91,12 +90,14 @@ def push(circles, pairs, law, cut, looks, sets_out, claims):
     for s in range(pairs.deeps.shape[0]):
         left += pairs.deeps[s]
     for parity in range(2):
+        if left == 0:
+            break
         if left < _FEW:
             _refine_some(0, cut[parity, -1], parity, circles, pairs, law)
         else:
             for part in prange(cut.shape[1] - 1):
                 _refine_some(cut[parity, part], cut[parity, part + 1], parity, circles, pairs, law)
-    if law.asks != 0:
+    if not SMOOTH:
         for c in prange(chunks):
             _arrive(c * _CHUNK, min((c + 1) * _CHUNK, n), circles, law)
     elif law.arrives != 0:
@@ -105,11 +106,10 @@ def push(circles, pairs, law, cut, looks, sets_out, claims):
             arrive(circles.position[a:b], circles.velocity[a:b], circles.origin[a:b], circles.moved[a:b], law.feed)
 
 
-@parallel_kernel
-def relax(circles, pairs, law, cut, marks, claims):
+def _relax(circles, pairs, law, cut, marks, claims):
     """The second sweep: touching pairs neither approach nor slip; if `marks` is 1, do what `mark_touching` does, too."""
     n = circles.position.shape[0]
-    if law.rubs != 0:
+    if not SMOOTH and law.rubs != 0:
         for c in prange((n + _CHUNK - 1) // _CHUNK):
             a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
             set_out(circles.position[a:b], circles.start[a:b], circles.moved[a:b])
@@ -124,6 +124,11 @@ def relax(circles, pairs, law, cut, marks, claims):
                     a = pairs.begin[s]
                     mark_strip(a, a + pairs.lanes[s], a, pairs.lane_i, pairs.lane_j, pairs.normal, circles.resting)
                 half = claim(claims, cut[parity], part)
+
+
+push, relax = parallel_kernel(_push), parallel_kernel(_relax)
+push_all_smooth = parallel_kernel(variant(_push, "smooth", SMOOTH=True, push_strip=push_smooth))
+relax_all_smooth = parallel_kernel(variant(_relax, "smooth", SMOOTH=True, relax_strip=relax_smooth))
 
 
 @parallel_kernel

@@ -208,11 +208,11 @@ class Wide:
 
     def push(self, state: Slots) -> None:
         """Impacts, overlaps and slips; circles are then where that has moved them."""
-        frame.project(self.circles, self.arrays, self.law, self.cut(), self.takes_looks(), 1, state.claims())
+        frame.project[not self.asks](self.circles, self.arrays, self.law, self.cut(), self.takes_looks(), 1, state.claims())
 
     def relax(self, state: Slots) -> None:
         """Touching circles neither approach nor slip."""
-        frame.still(self.circles, self.arrays, self.law, self._cut, 0, state.claims())
+        frame.still[not self.asks](self.circles, self.arrays, self.law, self._cut, 0, state.claims())
 
     def mark_resting(self, state: Slots) -> None:
         """Note in `state.resting` who touches another."""
