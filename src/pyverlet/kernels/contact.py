@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.compile.jit import kernel, variant
+from pyverlet.compile.jit import kernel
 from pyverlet.compile.lanes import (
     LANES,
     add_lanes,
@@ -38,11 +38,9 @@ from pyverlet.compile.lanes import (
 )
 from pyverlet.ground.constants import DEEP, DEEP_PART, DEEP_SWEEPS, FED, GRIP, LARGEST_PUSH, PUSHED
 from pyverlet.kernels.bounce import treat
+from pyverlet.kernels.kinds import BOUNCES, RUBS, for_each_kind
 from pyverlet.kernels.motion import IN_PILE
 from pyverlet.kernels.tables import MASS, MU, NEW, R_I, R_J, TURN_I, TURN_J, E
-
-SMOOTH = False
-"""Whether what is compiled is for worlds without any pair that may bounce or rub, where nobody listens to who meets."""
 
 
 def _push_strip(s, to, circles, pairs, law, looks):
@@ -61,15 +59,15 @@ def _push_strip(s, to, circles, pairs, law, looks):
         dx, dy = load(pairs.gap[0], k) + (xj - xi), load(pairs.gap[1], k) + (yj - yi)
         r, part = load(pairs.reach, k * law.varied), load(pairs.share, k * law.varied)
         distance = square_root(dx * dx + dy * dy)
-        if (k < close or not SMOOTH) and which_above(r, distance) == 0:
+        if (k < close or BOUNCES) and which_above(r, distance) == 0:
             store(pairs.normal[0], to + k, zero)
             store(pairs.normal[1], to + k, zero)
-            if not SMOOTH:
+            if BOUNCES:
                 store(pairs.depth, k, zero)
             continue
         done, at = 0, k * law.mixed
         mu = zero
-        if not SMOOTH:
+        if BOUNCES:
             e, mu = load(pairs.made_of[E], at), load(pairs.made_of[MU], at)
             live = which_above(e + mu, zero)
             if live != 0 or law.listens != 0:
@@ -98,9 +96,9 @@ def _push_strip(s, to, circles, pairs, law, looks):
         nx, ny = dx * per_metre, dy * per_metre
         push = pushed * depth
         cx, cy = nx * push, ny * push
-        if not SMOOTH:
+        if BOUNCES:
             store(pairs.depth, k, depth)
-            if law.rubs != 0 and which_above(mu, zero) != 0:
+            if RUBS and which_above(mu, zero) != 0:
                 # What the contact has slipped is answered as an overlap is, within the cone of friction.
                 slipped = load(pairs.slip, k)
                 cone = mu * push
@@ -185,8 +183,8 @@ def _relax_strip(s, to, circles, pairs, law):
     for k in range(begin, end, LANES):
         nx, ny = load(pairs.normal[0], to + k), load(pairs.normal[1], to + k)
         part = load(pairs.share, k * law.varied)
-        if (k < close or (not SMOOTH and law.rubs != 0)) and which_above(nx * nx + ny * ny, zero) == 0:
-            if not SMOOTH and law.rubs != 0:
+        if (k < close or RUBS) and which_above(nx * nx + ny * ny, zero) == 0:
+            if RUBS:
                 store(pairs.slip, k, new)
             continue
         xi, yi = take(velocity, lane_i, k)
@@ -194,13 +192,13 @@ def _relax_strip(s, to, circles, pairs, law):
         vx, vy = xj - xi, yj - yi
         speed, at = vx * nx + vy * ny, k * law.mixed
         struck = 0
-        if not SMOOTH:
+        if BOUNCES:
             fast = which_above(zero - speed, rest) & which_above(load(pairs.made_of[E], at), zero)
             if fast != 0:
                 struck = _struck(fast, k, circles, pairs)
                 speed = where_set(struck, zero, speed)
         cx, cy = speed * nx, speed * ny
-        if not SMOOTH and law.rubs != 0:
+        if RUBS:
             mu = load(pairs.made_of[MU], at)
             if which_above(mu, zero) != 0:
                 ri, rj = load(pairs.made_of[R_I], at), load(pairs.made_of[R_J], at)
@@ -230,12 +228,8 @@ def _relax_strip(s, to, circles, pairs, law):
                 store(pairs.slip, k, where_above(depth, zero, slipped, new))
         put(velocity, lane_i, k, xi + cx * part, yi + cy * part)
         put(velocity, lane_j, k, xj - cx * (one - part), yj - cy * (one - part))
-    if not SMOOTH and law.accounts != 0:
+    if BOUNCES and law.accounts != 0:
         pairs.spent[s, 1] += taken
-
-
-push_strip, push_smooth = kernel(_push_strip), kernel(variant(_push_strip, "smooth", SMOOTH=True))
-relax_strip, relax_smooth = kernel(_relax_strip), kernel(variant(_relax_strip, "smooth", SMOOTH=True))
 
 
 @kernel
@@ -258,3 +252,7 @@ def mark_strip(begin, end, to, lane_i, lane_j, normal, resting):
             bit = np.uint8(((touches >> lane) & 1) * IN_PILE)
             resting[lane_i[k + lane]] |= bit
             resting[lane_j[k + lane]] |= bit
+
+
+push_strip = for_each_kind(kernel, _push_strip)
+relax_strip = for_each_kind(kernel, _relax_strip)

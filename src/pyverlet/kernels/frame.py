@@ -8,12 +8,13 @@ stages in `world.profile`. A frame is compiled for a kind of room: `frames` has 
 from __future__ import annotations
 
 from pyverlet.compile.clock import note
-from pyverlet.compile.jit import driver, parallel_kernel, prange
+from pyverlet.compile.jit import driver, parallel_kernel, prange, variant
 from pyverlet.compile.lanes import copy_row
 from pyverlet.kernels.bounds import box, circle
 from pyverlet.kernels.cage import hold
+from pyverlet.kernels.kinds import for_each_kind
 from pyverlet.kernels.motion import leap
-from pyverlet.kernels.sweeps import push, push_all_smooth, relax, relax_all_smooth
+from pyverlet.kernels.sweeps import push, relax
 from pyverlet.kernels.tables import Circles, Law, Pairs
 
 CONTACTS, BOUNDS, VELOCITIES, INTEGRATE = 1, 2, 3, 4
@@ -86,13 +87,6 @@ def _still(circles, pairs, law, cut, marks, claims):
     relax(Circles(*circles), Pairs(*pairs), Law(*law), cut, marks, claims)
 
 
-_SMOOTH = {"push": push_all_smooth, "relax": relax_all_smooth}
-
-project = {False: driver(_project), True: driver(_project, **_SMOOTH)}
-still = {False: driver(_still), True: driver(_still, **_SMOOTH)}
-"""By whether the world is smooth."""
-
-
 def _substeps(substep, stop, last, circles, pairs, law, room, cut, looks, sets_out, checked, far, claims, spent, clock):
     """From after the integration of `substep`, whose list of pairs is good, up to the end of substep `stop` - 1.
 
@@ -123,9 +117,10 @@ def _substeps(substep, stop, last, circles, pairs, law, room, cut, looks, sets_o
             return substep, True
 
 
+project = for_each_kind(driver, _project, push=push)
+still = for_each_kind(driver, _still, relax=relax)
 frames = {
-    (room, smooth): driver(_substeps, confine=room, **(_SMOOTH if smooth else {}))
+    room: for_each_kind(driver, variant(_substeps, room.__name__, confine=room), push=push, relax=relax)
     for room in (open_space, smooth_cage, cage, four_walls)
-    for smooth in (False, True)
 }
-"""Substeps in each kind of room, and of worlds that are `contact.SMOOTH` or not."""
+"""Substeps in each kind of room, of each kind of world."""

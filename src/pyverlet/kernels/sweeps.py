@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.compile.jit import kernel, parallel_kernel, prange, variant
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.compile.stealing import claim, none_claimed
 from pyverlet.kernels.bounds import AT_WALL, CARRIED, CARRIES
-from pyverlet.kernels.contact import SMOOTH, mark_strip, push_smooth, push_strip, refine_strip, relax_smooth, relax_strip
+from pyverlet.kernels.contact import mark_strip, push_strip, refine_strip, relax_strip
+from pyverlet.kernels.kinds import BOUNCES, RUBS, for_each_kind
 from pyverlet.kernels.motion import arrive, set_out
 
 # Particles one thread takes at a time where each is on its own.
@@ -27,15 +28,14 @@ def _clear(numbers, a, b):
         numbers[i] = 0
 
 
-@kernel
-def _arrive(a, b, circles, law):
+def _settle(a, b, circles, law):
     """Of the circles from a up to b: pushes become places, and velocities; who has been fed so much carries weight."""
     zero, one = law.h - law.h, law.h / law.h
     limit = law.carried * law.carried
     for i in range(a, b):
         x = circles.moved[i, 0] - (circles.position[i, 0] - circles.origin[i, 0])
         y = circles.moved[i, 1] - (circles.position[i, 1] - circles.origin[i, 1])
-        if law.rubs != 0:
+        if RUBS:
             x, y = x + circles.slid[i, 0], y + circles.slid[i, 1]
         circles.position[i, 0] += x
         circles.position[i, 1] += y
@@ -44,11 +44,11 @@ def _arrive(a, b, circles, law):
         circles.velocity[i, 1] += y
         square = x * x + y * y
         circles.carries[i] = one if square > limit else zero
-        if law.rubs != 0:  # who rests against others, however lightly, ends the substep as they do
+        if RUBS:  # who rests against others, however lightly, ends the substep as they do
             circles.lift[i] = circles.leans[i] if square > zero else zero
     for i in range(a, b):
         circles.fed[i] = ((circles.fed[i] & (CARRIES | AT_WALL)) * CARRIED) | np.uint8(circles.carries[i])
-    if law.rubs != 0:
+    if RUBS:
         for i in range(a, b):
             circles.turn[i] = law.h * circles.spin[i] + circles.turned[i]
             circles.spin[i] += law.feed * circles.turned[i]
@@ -70,12 +70,12 @@ def _push(circles, pairs, law, cut, looks, sets_out, claims):
     """
     n = circles.position.shape[0]
     chunks = (n + _CHUNK - 1) // _CHUNK
-    if sets_out != 0 or (not SMOOTH and law.rubs != 0):
+    if sets_out != 0 or RUBS:
         for c in prange(chunks):
             a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
             if sets_out != 0:
                 set_out(circles.position[a:b], circles.origin[a:b], circles.moved[a:b])
-            if not SMOOTH and law.rubs != 0:
+            if RUBS:
                 _clear(circles.turned, a, b)
                 _clear(circles.slid.reshape(-1), 2 * a, 2 * b)
     for parity in range(2):
@@ -97,9 +97,9 @@ def _push(circles, pairs, law, cut, looks, sets_out, claims):
         else:
             for part in prange(cut.shape[1] - 1):
                 _refine_some(cut[parity, part], cut[parity, part + 1], parity, circles, pairs, law)
-    if not SMOOTH:
+    if BOUNCES:
         for c in prange(chunks):
-            _arrive(c * _CHUNK, min((c + 1) * _CHUNK, n), circles, law)
+            settle(c * _CHUNK, min((c + 1) * _CHUNK, n), circles, law)
     elif law.arrives != 0:
         for c in prange(chunks):
             a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
@@ -109,7 +109,7 @@ def _push(circles, pairs, law, cut, looks, sets_out, claims):
 def _relax(circles, pairs, law, cut, marks, claims):
     """The second sweep: touching pairs neither approach nor slip; if `marks` is 1, do what `mark_touching` does, too."""
     n = circles.position.shape[0]
-    if not SMOOTH and law.rubs != 0:
+    if RUBS:
         for c in prange((n + _CHUNK - 1) // _CHUNK):
             a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
             set_out(circles.position[a:b], circles.start[a:b], circles.moved[a:b])
@@ -126,11 +126,6 @@ def _relax(circles, pairs, law, cut, marks, claims):
                 half = claim(claims, cut[parity], part)
 
 
-push, relax = parallel_kernel(_push), parallel_kernel(_relax)
-push_all_smooth = parallel_kernel(variant(_push, "smooth", SMOOTH=True, push_strip=push_smooth))
-relax_all_smooth = parallel_kernel(variant(_relax, "smooth", SMOOTH=True, relax_strip=relax_smooth))
-
-
 @parallel_kernel
 def mark_touching(lanes, begin, lane_i, lane_j, normal, resting, cut):
     """`resting` gains IN_PILE for every circle of a touching pair."""
@@ -139,3 +134,8 @@ def mark_touching(lanes, begin, lane_i, lane_j, normal, resting, cut):
             for half in range(cut[parity, part], cut[parity, part + 1]):
                 a = begin[2 * half + parity]
                 mark_strip(a, a + lanes[2 * half + parity], a, lane_i, lane_j, normal, resting)
+
+
+settle = for_each_kind(kernel, _settle)
+push = for_each_kind(parallel_kernel, _push, push_strip=push_strip, settle=settle)
+relax = for_each_kind(parallel_kernel, _relax, relax_strip=relax_strip)

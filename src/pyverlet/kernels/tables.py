@@ -1,4 +1,4 @@
-"""What the kernels of contacts are handed: circles, pairs, and the law of a substep, each as a tuple by name.
+"""What the kernels of contacts are handed: circles, pairs, and the law of a substep, by name.
 
 Python hands over plain tuples, which are quicker to look through; drivers give them these names.
 """
@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pyverlet.compile.bundle import bundle
+
 NEW = np.inf
 """The slip of a pair that did not touch in the substep before. What it slips in its first one, it may have slipped before it
 met."""
@@ -18,7 +20,8 @@ E, MU, R_I, R_J, TURN_I, TURN_J, MASS = range(7)
 kg."""
 
 
-class Circles(NamedTuple):
+@bundle
+class Circles:
     """Circles by slot; what each is: `Slots`, and of contacts `Wide`."""
 
     position: Any
@@ -44,7 +47,8 @@ class Circles(NamedTuple):
     spent: Any
 
 
-class Pairs(NamedTuple):
+@bundle
+class Pairs:
     """Candidate pairs by lane, those of strip s from begin[s] to begin[s] + lanes[s]; what each is: `Wide`."""
 
     begin: Any

@@ -13,6 +13,7 @@ from pyverlet.ground import memory
 from pyverlet.ground.constants import CARRIED_WEIGHT, COLOURS, FED, LARGEST_PUSH, PUSHED
 from pyverlet.kernels import frame, packs, sweeps, tables
 from pyverlet.kernels.bounds import CARRIES
+from pyverlet.kernels.kinds import BOUNCING, ROUGH, SMOOTH
 from pyverlet.laws.contacts.broadphase import PairList, rows_of
 from pyverlet.state.state import Slots
 
@@ -59,6 +60,11 @@ class Wide:
         self._looks = True  # whether they are to be noted, once a frame
         self.spent = np.zeros((1, 2))
         self._hold_circles(0)
+
+    @property
+    def kind(self) -> str:
+        """Which kernels it takes: of `kernels.kinds`."""
+        return ROUGH if self.rubs else BOUNCING if self.asks else SMOOTH
 
     def _make_room(self, lanes: int) -> None:
         self.lane_i, self.lane_j = (memory.empty(lanes, np.uint32) for _ in range(2))
@@ -208,11 +214,11 @@ class Wide:
 
     def push(self, state: Slots) -> None:
         """Impacts, overlaps and slips; circles are then where that has moved them."""
-        frame.project[not self.asks](self.circles, self.arrays, self.law, self.cut(), self.takes_looks(), 1, state.claims())
+        frame.project[self.kind](self.circles, self.arrays, self.law, self.cut(), self.takes_looks(), 1, state.claims())
 
     def relax(self, state: Slots) -> None:
         """Touching circles neither approach nor slip."""
-        frame.still[not self.asks](self.circles, self.arrays, self.law, self._cut, 0, state.claims())
+        frame.still[self.kind](self.circles, self.arrays, self.law, self._cut, 0, state.claims())
 
     def mark_resting(self, state: Slots) -> None:
         """Note in `state.resting` who touches another."""
