@@ -19,13 +19,17 @@ class _Bundle(types.StructRef):  # type: ignore[misc]
 
 
 def bundle(described: type) -> Any:
-    """What a class with annotations describes, to be made and read by them in compiled code; `_fields`: their names, in order.
+    """What a class with annotations describes, to be made and read by them in compiled code.
 
     Reading a field counts who holds the array: outside of inner loops.
     """
-    names = tuple(described.__annotations__)
     kind = structref.register(type("Type", (_Bundle,), {"__module__": described.__module__}))
     kind.__qualname__ = f"{described.__qualname__}.Type"  # compiled code is kept on disk under the names of its types
-    described._fields, described.Type = names, kind  # type: ignore[attr-defined]
-    structref.define_constructor(described, kind, list(names))
+    described.Type = kind  # type: ignore[attr-defined]
+    structref.define_constructor(described, kind, fields(described))
     return described
+
+
+def fields(described: type) -> list[str]:
+    """Names of what is in a bundle, in order."""
+    return list(described.__annotations__)

@@ -7,6 +7,7 @@ stages in `world.profile`. A frame is compiled for a kind of room: `frames` has 
 
 from __future__ import annotations
 
+from pyverlet.compile.bundle import fields
 from pyverlet.compile.clock import note
 from pyverlet.compile.jit import driver, parallel_kernel, prange, variant
 from pyverlet.compile.lanes import copy_row
@@ -21,7 +22,7 @@ CONTACTS, BOUNDS, VELOCITIES, INTEGRATE = 1, 2, 3, 4
 STAGES = ("contacts", "bounds", "velocities", "integrate")
 """Names of the numbers above, less one, by which their time is noted."""
 
-NORMAL = Pairs._fields.index("normal")
+NORMAL = fields(Pairs).index("normal")
 """Where in the tuple of `Pairs` the normals are."""
 
 _CHUNK = 4096
@@ -120,7 +121,7 @@ def _substeps(substep, stop, last, circles, pairs, law, room, cut, looks, sets_o
 project = for_each_kind(driver, _project, push=push)
 still = for_each_kind(driver, _still, relax=relax)
 frames = {
-    room: for_each_kind(driver, variant(_substeps, room.__name__, confine=room), push=push, relax=relax)
+    room: for_each_kind(driver, variant(_substeps, room.function.__name__, confine=room), push=push, relax=relax)
     for room in (open_space, smooth_cage, cage, four_walls)
 }
 """Substeps in each kind of room, of each kind of world."""

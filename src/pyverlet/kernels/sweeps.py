@@ -14,6 +14,8 @@ from pyverlet.kernels.contact import mark_strip, push_strip, refine_strip, relax
 from pyverlet.kernels.kinds import BOUNCES, RUBS, for_each_kind
 from pyverlet.kernels.motion import arrive, set_out
 
+_ONE = np.uint64(1)
+
 # Particles one thread takes at a time where each is on its own.
 _CHUNK = 1024
 
@@ -28,30 +30,63 @@ def _clear(numbers, a, b):
         numbers[i] = 0
 
 
-def _settle(a, b, circles, law):
-    """Of the circles from a up to b: pushes become places, and velocities; who has been fed so much carries weight."""
-    zero, one = law.h - law.h, law.h / law.h
-    limit = law.carried * law.carried
-    for i in range(a, b):
-        x = circles.moved[i, 0] - (circles.position[i, 0] - circles.origin[i, 0])
-        y = circles.moved[i, 1] - (circles.position[i, 1] - circles.origin[i, 1])
+def _move(position, velocity, origin, moved, slid, feed):
+    """Pushes become places, and velocities, which `moved` then holds."""
+    x, v, start, way = position.reshape(-1), velocity.reshape(-1), origin.reshape(-1), moved.reshape(-1)
+    for k in range(x.shape[0]):
+        gone = way[k] - (x[k] - start[k])
         if RUBS:
-            x, y = x + circles.slid[i, 0], y + circles.slid[i, 1]
-        circles.position[i, 0] += x
-        circles.position[i, 1] += y
-        x, y = law.feed * x, law.feed * y
-        circles.velocity[i, 0] += x
-        circles.velocity[i, 1] += y
-        square = x * x + y * y
-        circles.carries[i] = one if square > limit else zero
-        if RUBS:  # who rests against others, however lightly, ends the substep as they do
-            circles.lift[i] = circles.leans[i] if square > zero else zero
-    for i in range(a, b):
-        circles.fed[i] = ((circles.fed[i] & (CARRIES | AT_WALL)) * CARRIED) | np.uint8(circles.carries[i])
+            gone = gone + slid[k]
+        x[k] += gone
+        gone = feed * gone
+        v[k] += gone
+        way[k] = gone
+
+
+@kernel
+def _weigh(fed, carried, carries):
+    """carries = 1 for who has been fed so much that it carries weight, else 0."""
+    v = fed.reshape(-1)
+    zero, one = carries.dtype.type(0), carries.dtype.type(1)
+    for k in range(carries.shape[0]):
+        i = np.uint64(2 * k)
+        carries[k] = one if v[i] * v[i] + v[i + _ONE] * v[i + _ONE] > carried * carried else zero
+
+
+@kernel
+def _lift(fed, leans, lift):
+    """Who rests against others, however lightly, ends the substep as they do."""
+    v, zero = fed.reshape(-1), lift.dtype.type(0)
+    for k in range(lift.shape[0]):
+        i = np.uint64(2 * k)
+        lean = leans[k]
+        lift[k] = lean if v[i] * v[i] + v[i + _ONE] * v[i + _ONE] > zero else zero
+
+
+@kernel
+def _remember(carries, fed):
+    """Who carries weight, and did in the substep before."""
+    for k in range(fed.shape[0]):
+        fed[k] = ((fed[k] & (CARRIES | AT_WALL)) * CARRIED) | np.uint8(carries[k])
+
+
+@kernel
+def _turn(spin, turned, turn, h, feed):
+    """turn = by how much each turns in this substep."""
+    for k in range(spin.shape[0]):
+        turn[k] = h * spin[k] + turned[k]
+        spin[k] += feed * turned[k]
+
+
+def _settle(a, b, circles, law):
+    """Of the circles from a up to b: where pushes have put them, and who carries weight."""
+    slid = circles.slid.reshape(-1)[2 * a : 2 * b]
+    _move(circles.position[a:b], circles.velocity[a:b], circles.origin[a:b], circles.moved[a:b], slid, law.feed)
+    _weigh(circles.moved[a:b], law.carried, circles.carries[a:b])
+    _remember(circles.carries[a:b], circles.fed[a:b])
     if RUBS:
-        for i in range(a, b):
-            circles.turn[i] = law.h * circles.spin[i] + circles.turned[i]
-            circles.spin[i] += law.feed * circles.turned[i]
+        _lift(circles.moved[a:b], circles.leans[a:b], circles.lift[a:b])
+        _turn(circles.spin[a:b], circles.turned[a:b], circles.turn[a:b], law.h, law.feed)
 
 
 @kernel
@@ -136,6 +171,6 @@ def mark_touching(lanes, begin, lane_i, lane_j, normal, resting, cut):
                 mark_strip(a, a + lanes[2 * half + parity], a, lane_i, lane_j, normal, resting)
 
 
-settle = for_each_kind(kernel, _settle)
+settle = for_each_kind(kernel, _settle, _move=for_each_kind(kernel, _move))
 push = for_each_kind(parallel_kernel, _push, push_strip=push_strip, settle=settle)
 relax = for_each_kind(parallel_kernel, _relax, relax_strip=relax_strip)
