@@ -22,7 +22,7 @@ kg."""
 
 @bundle
 class Circles:
-    """Circles by slot; what each is: `Slots`, and of contacts `Wide`."""
+    """Circles by slot; what each is: `Slots`, of contacts `Wide`, and the last four `Loans`: empty where nobody lends."""
 
     position: Any
     velocity: Any
@@ -45,6 +45,10 @@ class Circles:
     friction: Any
     hits: Any
     spent: Any
+    before: Any
+    spin_before: Any
+    lent: Any
+    busy: Any
 
 
 @bundle

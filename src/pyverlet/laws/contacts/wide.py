@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,13 @@ Array = NDArray[Any]
 
 _ROWS = tables.MASS + 1
 _ARRIVES = tables.Law._fields.index("arrives")
+
+
+class Inertia(NamedTuple):
+    """What `Loans` changes for the contacts of a substep: (n,) inverse masses, 1/kg, and where impacts note what they do."""
+
+    inverse_mass: Array
+    noted: tuple[Array, Array, Array, Array]
 
 
 class Wide:
@@ -59,6 +66,8 @@ class Wide:
         self._deeps = np.zeros(0, np.int64)  # packs of each strip that overlap deeply
         self._looks = True  # whether they are to be noted, once a frame
         self.spent = np.zeros((1, 2))
+        none = np.empty(0, dtype)
+        self._lent, self._nobody = False, (np.empty((0, 2), dtype), none, none, none)
         self._hold_circles(0)
 
     @property
@@ -173,10 +182,17 @@ class Wide:
 
     # ---- a substep ---------------------------------------------------------------------------------------------------------
 
-    def set_up(self, state: Slots, h: float, lag: float, strongest: float, rest_speed: float, *, accounts: bool) -> None:
+    def set_up(
+        self, state: Slots, h: float, lag: float, strongest: float, rest_speed: float, accounts: bool, lent: Inertia | None
+    ) -> None:
         """Everything that the sweeps of this substep, and of those that follow it alike, need: `circles`, `arrays` and `law`."""
-        if not self.fits(state):
+        if not self.fits(state) or (self._lent and lent is None):
             self.fit(state)
+        self._lent = lent is not None
+        if lent is not None:
+            packs.share_anew(
+                *self._lanes(), self.cut(), state.radius, lent.inverse_mass, self.share, self.made_of,
+            )  # fmt: skip
         if self.asks:
             np.bitwise_and(state.fed, CARRIES, out=self._carries, casting="unsafe")
         turn = self._turn if self.rubs else self._turn[:0]
@@ -186,7 +202,7 @@ class Wide:
         self.circles = (
             state.position, state.velocity, state.acceleration, state.inverse_mass, self.origin, self.moved, state.resting,
             state.spin, self._carries, state.fed, self._slid, self._turned, turn, self._lift, self._leans, state.start,
-            state.radius, state.restitution, state.friction, state.hits, state.spent,
+            state.radius, state.restitution, state.friction, state.hits, state.spent, *(lent.noted if lent else self._nobody),
         )  # fmt: skip
         carried = CARRIED_WEIGHT * strongest * h if strongest > 0 else np.inf
         self.law = (
@@ -211,6 +227,13 @@ class Wide:
     def has_marked(self) -> None:
         """Who rests has been marked in `state.resting`: the frame is over, and the next one looks anew."""
         self._looks = True
+
+    def touching(self) -> tuple[Array, Array, Array, Array, Array]:
+        """begin, lanes, lane_i, lane_j and normals of this substep: not 0 for pairs that touch and have not bounced."""
+        return *self._lanes(), self.normal
+
+    def _lanes(self) -> tuple[Array, Array, Array, Array]:
+        return self.begin, self.lanes, self.lane_i, self.lane_j
 
     def push(self, state: Slots) -> None:
         """Impacts, overlaps and slips; circles are then where that has moved them."""
