@@ -15,10 +15,8 @@ from __future__ import annotations
 from pyverlet.compile.jit import kernel
 from pyverlet.compile.lanes import LANES, load, lowest_bit, spread, which_above
 from pyverlet.kernels.clusters import join, settle
+from pyverlet.kernels.loans import PINNED
 from pyverlet.kernels.motion import IN_PILE
-
-# Bits of `touched`: another circle that has not bounced off; a pinned one.
-TOUCHED, PINNED = 1, 2
 
 # Of the squared pushes of walls: what of it is across their main direction, at least, if they push in several.
 _ACROSS = 1e-6
@@ -38,7 +36,7 @@ def set_out(velocity, acceleration, spin, held, h, before, spin_before):
 
 
 @kernel
-def cluster(begin, lanes, lane_i, lane_j, normal, inverse_mass, touched, root):
+def cluster(begin, lanes, lane_i, lane_j, normal, inverse_mass, root):
     """root[i]: the lowest member of the cluster of i, by the pairs that touch and have not bounced."""
     none = normal.dtype.type(0)
     zero = spread(none)
@@ -52,10 +50,7 @@ def cluster(begin, lanes, lane_i, lane_j, normal, inverse_mass, touched, root):
                 lane = lowest_bit(touches)
                 touches &= touches - 1
                 i, j = lane_i[k + lane], lane_j[k + lane]
-                if inverse_mass[i] == none or inverse_mass[j] == none:
-                    touched[i] |= PINNED
-                    touched[j] |= PINNED
-                else:
+                if inverse_mass[i] > none and inverse_mass[j] > none:
                     join(root, i, j)
     settle(root)
 

@@ -36,7 +36,7 @@ from pyverlet.compile.lanes import (
     where_zero,
     which_above,
 )
-from pyverlet.ground.constants import DEEP, DEEP_PART, DEEP_SWEEPS, FED, GRIP, LARGEST_PUSH, PUSHED
+from pyverlet.ground.constants import DEEP_PART, DEEP_SWEEPS, FED, GRIP, LARGEST_PUSH, PUSHED
 from pyverlet.kernels.bounce import treat
 from pyverlet.kernels.kinds import BOUNCES, RUBS, for_each_kind
 from pyverlet.kernels.motion import IN_PILE
@@ -44,10 +44,10 @@ from pyverlet.kernels.tables import MASS, MU, NEW, R_I, R_J, TURN_I, TURN_J, E
 
 
 def _push_strip(s, to, circles, pairs, law, looks):
-    """The first sweep over strip s; normals go to `to` and up. If it `looks`, it notes in `deep` what overlaps by over DEEP."""
+    """The first sweep over strip s; normals go to `to` and up. If it `looks`, it notes in `deep` what overlaps deeply."""
     moved, lane_i, lane_j = circles.moved, pairs.lane_i, pairs.lane_j
     real = moved.dtype.type
-    zero, one, limit = spread(real(0)), spread(real(1)), spread(real(DEEP))
+    zero, one, limit = spread(real(0)), spread(real(1)), spread(law.deep)
     pushed, most, rest = spread(real(PUSHED)), spread(law.most), spread(law.rest_speed)
     answer = spread(real(-GRIP * PUSHED / (3.0 * FED)))
     begin, end, count = pairs.begin[s], pairs.begin[s] + pairs.lanes[s], 0
@@ -126,13 +126,13 @@ def _push_strip(s, to, circles, pairs, law, looks):
 
 @kernel
 def refine_strip(s, circles, pairs, law):
-    """Part again, there and back, the packs in `deep` that still overlap by more than DEEP; `deeps` becomes how many those are.
+    """Part again, there and back, the packs in `deep` that still do so deeply; `deeps` becomes how many those are.
 
     Beyond LARGEST_PUSH it is no weight but a mistake, and has been pushed enough.
     """
     moved, lane_i, lane_j, count = circles.moved, pairs.lane_i, pairs.lane_j, pairs.deeps[s]
     real, first = moved.dtype.type, pairs.begin[s] // LANES
-    zero, one, near, nearest = spread(real(0)), spread(real(1)), spread(real(1 - DEEP)), spread(real(1 - LARGEST_PUSH))
+    zero, one, near, nearest = spread(real(0)), spread(real(1)), spread(real(1) - law.deep), spread(real(1 - LARGEST_PUSH))
     pushed = spread(real(DEEP_PART * PUSHED))
     for sweep in range(DEEP_SWEEPS):
         left = 0

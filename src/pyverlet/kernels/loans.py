@@ -22,6 +22,9 @@ from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.compile.lanes import LANES, larger, load, pick, place, smaller, spread, where_set, which_above
 from pyverlet.ground.constants import LENT
 
+# What a circle touches: another that has not bounced off; a pinned one.
+TOUCHED, PINNED = 1, 2
+
 # Of the own mass: less than this is no loan but the rounding of one.
 _NOTHING = 1e-7
 
@@ -65,11 +68,12 @@ def _share_strip(begin, end, lane_i, lane_j, normal, mass, inverse_mass, lent, b
         touches = which_above(nx * nx + ny * ny, zero)
         if touches == 0:
             continue
+        free = which_above(smaller(pick(inverse_mass, lane_i, k), pick(inverse_mass, lane_j, k)), zero)
         for lane in range(LANES):
             if (touches >> lane) & 1:
-                touched[lane_i[k + lane]] = 1
-                touched[lane_j[k + lane]] = 1
-        free = which_above(smaller(pick(inverse_mass, lane_i, k), pick(inverse_mass, lane_j, k)), zero)
+                mark = TOUCHED | (0 if (free >> lane) & 1 else PINNED)
+                touched[lane_i[k + lane]] |= mark
+                touched[lane_j[k + lane]] |= mark
         waits = which_above(larger(pick(busy, lane_i, k), pick(busy, lane_j, k)), zero)
         lends = touches & free & ~waits
         if lends != 0:
@@ -85,7 +89,8 @@ def _share_strip(begin, end, lane_i, lane_j, normal, mass, inverse_mass, lent, b
 def share(begin, lanes, lane_i, lane_j, normal, cut, mass, inverse_mass, lent, busy, touched):
     """Even out the inertia of each touching pair that has not bounced; nobody lends more than the part LENT of the own mass.
 
-    touched[i], 0 before, becomes 1 for who is in such a pair. cut: as for `kernels.sweeps.push`.
+    touched[i], 0 before, gains TOUCHED for who is in such a pair, and PINNED if one of them is pinned. cut: as for
+    `kernels.sweeps.push`.
     """
     for parity in range(2):
         for part in prange(cut.shape[1] - 1):

@@ -81,6 +81,7 @@ class Law(NamedTuple):
     any pair may bounce or rub, or somebody listens to who meets how fast. rubs, listens, accounts: likewise. arrives: 1 if what
     becomes of `moved` is to be added to positions and velocities when all pairs have been gone through, 0 if the room does that;
     always 1 where `asks`. feed: FED / PUSHED / h, 1/s. most: the largest part of the contact distance that a push may see.
+    deep: likewise, from which on an overlap is treated again.
     weight: whether an acceleration could stop a pair that parts. carried: m/s, by which a substep feeds the velocity of one that
     carries weight.
     """
@@ -96,6 +97,7 @@ class Law(NamedTuple):
     lag: Any
     feed: Any
     most: Any
+    deep: Any
     rest_speed: Any
     weight: Any
     carried: Any

@@ -36,8 +36,13 @@ class Loans:
         self._kept = Lent(np.empty(0, np.int32), np.empty(0, self._dtype), np.empty(0, self._dtype), np.empty(0, np.uint8))
         self._fit(0)
 
+    def begin_frame(self) -> None:
+        """Who hangs together is to be asked anew."""
+        self._joined = False
+
     def _fit(self, count: int) -> None:
         """Room for what lasts a substep."""
+        self._joined = False
         self._lighter, self._touched = np.empty(count, self._dtype), np.empty(count, np.uint8)
         self._before, self._spin_before = np.empty((count, 2), self._dtype), np.empty(count, self._dtype)
         self._unpushed = np.empty((count, 2), self._dtype)
@@ -92,8 +97,10 @@ class Loans:
         self._unpushed += change
 
     def join(self, state: Slots, wide: Wide) -> None:
-        """Walls have pushed: who hangs together, and is held by them."""
-        balance.cluster(*wide.touching(), state.inverse_mass, self._touched, self._root)
+        """Walls have pushed: who hangs together, and is held by them. Who does is asked once a frame: it hardly changes."""
+        if not self._joined:
+            balance.cluster(*wide.touching(), state.inverse_mass, self._root)
+            self._joined = True
         who = (state.inverse_mass, self._touched, self._root)
         balance.note_walls(state.velocity, self._unpushed, *who, self._sums, self._kept.held)
 

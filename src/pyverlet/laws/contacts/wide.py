@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pyverlet.compile import jit
 from pyverlet.compile.lanes import LANES
 from pyverlet.ground import memory
-from pyverlet.ground.constants import CARRIED_WEIGHT, COLOURS, FED, LARGEST_PUSH, PUSHED
+from pyverlet.ground.constants import CARRIED_WEIGHT, COLOURS, DEEP, DEEP_LENT, FED, LARGEST_PUSH, PUSHED
 from pyverlet.kernels import frame, packs, sweeps, tables
 from pyverlet.kernels.bounds import CARRIES
 from pyverlet.kernels.kinds import BOUNCING, ROUGH, SMOOTH
@@ -207,7 +207,7 @@ class Wide:
         carried = CARRIED_WEIGHT * strongest * h if strongest > 0 else np.inf
         self.law = (
             self._varied, self._mixed, int(self.asks), int(self.rubs), int(self._listens), int(accounts),
-            1, *state.reals(h, lag, FED / PUSHED / h, LARGEST_PUSH, rest_speed), int(strongest > 0),
+            1, *state.reals(h, lag, FED / PUSHED / h, LARGEST_PUSH, DEEP_LENT if lent else DEEP, rest_speed), int(strongest > 0),
             state.real(carried),
         )  # fmt: skip
         self.arrays = (
@@ -220,8 +220,8 @@ class Wide:
         self.law = (*self.law[:_ARRIVES], int(self.asks), *self.law[_ARRIVES + 1 :])
 
     def takes_looks(self) -> int:
-        """Whether the next sweep is to note who overlaps deeply, which it does once a frame."""
-        looks, self._looks = int(self._looks), False
+        """Whether the next sweep is to note who overlaps deeply: once a frame, or always where circles lend inertia."""
+        looks, self._looks = int(self._looks), self._lent
         return looks
 
     def has_marked(self) -> None:
