@@ -44,18 +44,34 @@ def weigh(mass, inverse_mass, lent, lighter):
 
 
 @kernel
-def pull(position, velocity, acceleration, inverse_mass, lighter, held, touched, kick, fall):
-    """Move each circle that walls hold, through others, and that is not `touched`, by what a (m / m' - 1) does to it: kick (s) in
-    the velocity, fall (s^2) in the position. So its weight is that of its own mass.
+def pull(position, acceleration, inverse_mass, lighter, held, fall):
+    """Move each circle that walls hold, through others, by what a (m / m' - 1) does to its position: so its weight
+    is that of its own mass. fall: s^2.
     """
     for i in range(position.shape[0]):
         w = inverse_mass[i]
-        if held[i] and not touched[i] and lighter[i] != w:
+        if held[i] and lighter[i] != w:
+            more = (lighter[i] / w - w / w) * fall
+            position[i, 0] += more * acceleration[i, 0]
+            position[i, 1] += more * acceleration[i, 1]
+
+
+@kernel
+def settle(position, velocity, acceleration, inverse_mass, lighter, held, touched, kick, fall):
+    """After `pull`, and contacts: do the same to velocities, kick (s), of who has touched another; take it back for the others.
+
+    Not before contacts: to those it is no motion, and would be an impact.
+    """
+    for i in range(position.shape[0]):
+        w = inverse_mass[i]
+        if held[i] and lighter[i] != w:
             more = lighter[i] / w - w / w
-            velocity[i, 0] += more * kick * acceleration[i, 0]
-            velocity[i, 1] += more * kick * acceleration[i, 1]
-            position[i, 0] += more * fall * acceleration[i, 0]
-            position[i, 1] += more * fall * acceleration[i, 1]
+            if touched[i]:
+                velocity[i, 0] += more * kick * acceleration[i, 0]
+                velocity[i, 1] += more * kick * acceleration[i, 1]
+            else:
+                position[i, 0] -= more * fall * acceleration[i, 0]
+                position[i, 1] -= more * fall * acceleration[i, 1]
 
 
 @kernel

@@ -173,7 +173,6 @@ class ContactSolver:
     def clear_notes(self) -> None:
         """A frame begins."""
         self._wide.spent.fill(0)
-        self._loans.begin_frame()
 
     @contextmanager
     def aside(self, state: Slots) -> Iterator[None]:

@@ -36,13 +36,8 @@ class Loans:
         self._kept = Lent(np.empty(0, np.int32), np.empty(0, self._dtype), np.empty(0, self._dtype), np.empty(0, np.uint8))
         self._fit(0)
 
-    def begin_frame(self) -> None:
-        """Who hangs together is to be asked anew."""
-        self._joined = False
-
     def _fit(self, count: int) -> None:
         """Room for what lasts a substep."""
-        self._joined = False
         self._lighter, self._touched = np.empty(count, self._dtype), np.empty(count, np.uint8)
         self._before, self._spin_before = np.empty((count, 2), self._dtype), np.empty(count, self._dtype)
         self._unpushed = np.empty((count, 2), self._dtype)
@@ -54,16 +49,12 @@ class Loans:
             self._follow(state)
         loans.weigh(state.mass, state.inverse_mass, self._kept.lent, self._lighter)
         # At rest a substep ends with the velocity -(1 - PUSHED / FED) a h: the same for all that way.
-        self._pull = state.real(h), state.real((state.drop - 1 + PUSHED / FED) * h * h)
+        # At rest a substep ends with the velocity -(1 - PUSHED / FED) a h: the same for all that way.
+        self._kick, self._fall = state.real(h), state.real((state.drop - 1 + PUSHED / FED) * h * h)
         held = self._kept.held
-        balance.set_out(state.velocity, state.acceleration, state.spin, held, self._pull[0], self._before, self._spin_before)
-        self._touched.fill(0)
-        self._pull_at(state, *self._pull)
+        balance.set_out(state.velocity, state.acceleration, state.spin, held, self._kick, self._before, self._spin_before)
+        loans.pull(state.position, state.acceleration, state.inverse_mass, self._lighter, held, self._fall)
         return self._lighter
-
-    def _pull_at(self, state: Slots, kick: Any, fall: Any) -> None:
-        bodies = (state.position, state.velocity, state.acceleration, state.inverse_mass, self._lighter, self._kept.held)
-        loans.pull(*bodies, self._touched, kick, fall)
 
     def noted(self) -> tuple[Array, Array, Array, Array]:
         """Where an impact notes what it does by masses of their own: before, spin_before, lent, busy."""
@@ -82,9 +73,11 @@ class Loans:
 
     def settle(self, state: Slots, wide: Wide, h: float) -> None:
         """Those that touch lend each other; those that do not have fallen by themselves."""
-        _, lent, busy, _ = self._kept
+        _, lent, busy, held = self._kept
+        self._touched.fill(0)
         loans.share(*wide.touching(), wide.cut(), state.mass, state.inverse_mass, lent, busy, self._touched)
-        self._pull_at(state, *(-x for x in self._pull))
+        bodies = (state.position, state.velocity, state.acceleration, state.inverse_mass, self._lighter, held)
+        loans.settle(*bodies, self._touched, self._kick, self._fall)
         loans.give_back(state.mass, state.real(min(h / LOAN_S, 1.0)), state.real(h), lent, busy)
 
     def free_of_walls(self, state: Slots) -> None:
@@ -97,10 +90,8 @@ class Loans:
         self._unpushed += change
 
     def join(self, state: Slots, wide: Wide) -> None:
-        """Walls have pushed: who hangs together, and is held by them. Who does is asked once a frame: it hardly changes."""
-        if not self._joined:
-            balance.cluster(*wide.touching(), state.inverse_mass, self._root)
-            self._joined = True
+        """Walls have pushed: who hangs together, and is held by them."""
+        balance.cluster(*wide.touching(), state.inverse_mass, self._root)
         who = (state.inverse_mass, self._touched, self._root)
         balance.note_walls(state.velocity, self._unpushed, *who, self._sums, self._kept.held)
 
