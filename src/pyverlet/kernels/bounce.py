@@ -21,16 +21,15 @@ def _carry(circles, i, x, y):
 
 
 @kernel
-def _own(circles, i, x, y, turn, bounced):
+def _own(circles, i, x, y, turn):
     """An impact, which changes the velocity of circle i by (x, y) and its spin by `turn`, goes by its own mass: `kernels.balance`
     need not make up for it. It lends and borrows nothing for a while.
     """
     circles.before[i, 0] += x
     circles.before[i, 1] += y
     circles.spin_before[i] += turn
-    if bounced:
-        circles.lent[i] = 0
-        circles.busy[i] = LOAN_S
+    circles.lent[i] = 0
+    circles.busy[i] = LOAN_S
 
 
 @kernel
@@ -78,8 +77,8 @@ def _bounce(i, j, dx, dy, reach, e, mu, ri, rj, circles, law, spent):
         if spent.shape[0] > 0:
             spent[1] += np.float64(rub) * (slip + 1.5 * (wi + wj) * rub)
     if circles.lent.shape[0] > 0:
-        _own(circles, i, -px * wi, -py * wi, turn_i, e > zero)
-        _own(circles, j, px * wj, py * wj, turn_j, e > zero)
+        _own(circles, i, -px * wi, -py * wi, turn_i)
+        _own(circles, j, px * wj, py * wj, turn_j)
     v[i, 0], v[i, 1] = v[i, 0] - px * wi, v[i, 1] - py * wi
     v[j, 0], v[j, 1] = v[j, 0] + px * wj, v[j, 1] + py * wj
     _carry(circles, i, -time * px * wi, -time * py * wi)
