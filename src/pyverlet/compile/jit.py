@@ -29,6 +29,7 @@ import numba
 from numba.core import event as numba_event
 from numba.extending import typeof_impl
 
+from pyverlet.compile import pool
 from pyverlet.ground import file_lock
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -130,14 +131,17 @@ _compiling = threading.RLock()
 """Held while a kernel is declared to Numba or called for the first time: Numba compiles one at a time in any case."""
 
 _launching = threading.Lock()
-"""Held by who launches threads where only one may."""
+"""Held by who launches threads where only one may: Numba's own pool, `workqueue`, ends the process when two do."""
 
 
-@cache
-def _one_launch_at_a_time() -> bool:
-    """Whether two Python threads may not both launch threads: Numba's own pool ends the process when they do."""
-    numba.get_num_threads()  # starts them
-    return bool(numba.threading_layer() == "workqueue")
+def _free_locks() -> None:
+    """A fork begins: whoever held them is not here."""
+    global _compiling, _launching
+    _compiling, _launching = threading.RLock(), threading.Lock()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_free_locks)
 
 
 class Kernel:
@@ -163,9 +167,9 @@ class Kernel:
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the variant for the threads in use."""
-        if not (self.parallel and threads_in_use() > 1):
+        if not (self.parallel and _in_use()[1]):
             return self._alone(*arguments)
-        if not _one_launch_at_a_time():
+        if pool.layer() != "workqueue":
             return self._together(*arguments)
         with _launching:
             return self._together(*arguments)
@@ -274,27 +278,46 @@ def max_threads() -> int:
 _chosen = threading.local()
 
 
-def use_threads(count: int) -> None:
-    """Let the parallel kernels called from this thread use `count` threads."""
-    if getattr(_chosen, "count", 0) != count:  # asking Numba takes as long as a stage of a small world
-        numba.set_num_threads(count)
-        _chosen.count = count
+def use_threads(count: int, most: int | None = None) -> None:
+    """Let the parallel kernels called from this thread use `count` threads, in a fork of a process that had several one.
+
+    most: as many as the same caller may use at other times. Where that is several, a single thread runs the code for several,
+    or a program that goes from one number to the other would have to compile everything twice.
+    """
+    wanted = pool.usable(count), pool.usable(count if most is None else most) > 1
+    if getattr(_chosen, "wanted", None) != wanted:  # asking Numba takes as long as a stage of a small world
+        if wanted[1]:  # one thread's own code asks nobody: a program of small worlds never starts the others
+            pool.layer()
+            numba.set_num_threads(wanted[0])
+        _chosen.wanted = wanted
+
+
+def _in_use() -> tuple[int, bool]:
+    """How many threads the parallel kernels called from this thread use, and whether they run the code for several."""
+    chosen: tuple[int, bool] | None = getattr(_chosen, "wanted", None)
+    if pool.usable(2) == 1:
+        return 1, False
+    if chosen is None:
+        pool.layer()
+        chosen = int(numba.get_num_threads()), int(numba.get_num_threads()) > 1
+    return chosen
 
 
 def threads_in_use() -> int:
     """How many the parallel kernels called from this thread use."""
-    return getattr(_chosen, "count", 0) or int(numba.get_num_threads())
+    return _in_use()[0]
 
 
 @contextlib.contextmanager
 def one_thread(only_if: bool = True) -> Iterator[None]:
     """Parallel kernels called inside use one thread: work that is too little to be worth a meeting."""
-    before = numba.get_num_threads()
-    use_threads(1 if only_if else before)
+    count, several = _in_use()
+    if only_if:
+        use_threads(1)
     try:
         yield
     finally:
-        use_threads(before)
+        use_threads(count, 2 if several else 1)
 
 
 class _CompileListener(numba_event.Listener):  # type: ignore[misc]
