@@ -170,9 +170,20 @@ class Kernel:
         if not (self.parallel and _in_use()[1]):
             return self._alone(*arguments)
         if pool.layer() != "workqueue":
-            return self._together(*arguments)
+            return self._masked(arguments)
         with _launching:
+            return self._masked(arguments)
+
+    def _masked(self, arguments: tuple[Any, ...]) -> Any:
+        """On as many threads as are in use; afterwards the user's own parallel functions have as many as before."""
+        count, before = threads_in_use(), numba.get_num_threads()
+        if count == before:
             return self._together(*arguments)
+        numba.set_num_threads(count)
+        try:
+            return self._together(*arguments)
+        finally:
+            numba.set_num_threads(before)
 
     @functools.cached_property
     def alone(self) -> Any:
@@ -285,11 +296,7 @@ def use_threads(count: int, most: int | None = None) -> None:
     or a program that goes from one number to the other would have to compile everything twice.
     """
     wanted = pool.usable(count), pool.usable(count if most is None else most) > 1
-    if getattr(_chosen, "wanted", None) != wanted:  # asking Numba takes as long as a stage of a small world
-        if wanted[1]:  # one thread's own code asks nobody: a program of small worlds never starts the others
-            pool.layer()
-            numba.set_num_threads(wanted[0])
-        _chosen.wanted = wanted
+    _chosen.wanted = wanted
 
 
 def _in_use() -> tuple[int, bool]:
