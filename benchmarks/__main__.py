@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 import pyverlet as pv
-from benchmarks import busy, data, materials, own, page, physics
+from benchmarks import busy, data, materials, own, page, physics, soak
 from benchmarks.engines import CAREFUL, DT, ENGINES, RADIUS, Array, Engine
 from pyverlet.scenes import report
 
@@ -136,6 +136,7 @@ def main() -> None:
     parser.add_argument("--scene", default="cage", help="page: what is shown")
     parser.add_argument("--seconds", type=float, default=12.0, help="page: how long each is watched")
     parser.add_argument("--threads", type=int, help="page: that the physics may use")
+    parser.add_argument("--minutes", type=float, default=60.0, help="soak: how long")
     parser.add_argument("--busy-frames", type=int, default=1200, help="busy: frames of each world")
     arguments = parser.parse_args()
     if arguments.table == "physics":
@@ -148,6 +149,10 @@ def main() -> None:
         return
     if arguments.table == "materials":
         materials.main((arguments.particles or [20_000])[0], arguments.csv)
+        return
+    if arguments.table == "soak":
+        if not soak.main(arguments.minutes):
+            sys.exit(1)
         return
     if arguments.table == "busy":
         if not busy.main((arguments.particles or [20_000])[0], arguments.busy_frames):

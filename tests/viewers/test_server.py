@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 import uvicorn
 from PIL import Image
+from starlette.websockets import WebSocket
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
@@ -217,6 +218,28 @@ def test_an_oversized_message_ends_its_tab_and_nothing_else(server: Server, tab:
                 rude.recv(5.0)
         assert rude.close_code == 1009
     assert tab.rate(0.5) > 30
+
+
+def test_a_tab_that_is_gone_before_it_is_refused_is_no_error(
+    server: Server, tab: Tab, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    # Starlette raises one error for a socket that breaks, and another for one that is known to be closed.
+    gone = RuntimeError('Cannot call "send" once a close message has been sent.')
+
+    async def send(self: WebSocket, data: bytes) -> None:
+        raise gone
+
+    with dial(server) as rude:
+        Tab(rude).frame()
+        monkeypatch.setattr(WebSocket, "send_bytes", send)
+        rude.send("{")
+        with contextlib.suppress(ConnectionClosed):
+            while True:
+                rude.recv(5.0)
+        monkeypatch.undo()
+    assert not [record for record in caplog.records if record.exc_info]
+    with dial(server) as other:
+        Tab(other).frame()
 
 
 def test_two_tabs_see_the_same_frames_and_one_steers_for_both(server: Server, tab: Tab) -> None:

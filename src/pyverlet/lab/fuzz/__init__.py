@@ -8,6 +8,6 @@ from pyverlet.lab.fuzz.draw import drawn
 from pyverlet.lab.fuzz.program import Program
 from pyverlet.lab.fuzz.run import Finding, fuzz
 from pyverlet.lab.fuzz.shrink import shrink
-from pyverlet.lab.fuzz.watch import Broken, check
+from pyverlet.lab.fuzz.watch import CHECKS, Broken, check
 
-__all__ = ["Broken", "Finding", "Program", "check", "drawn", "fuzz", "shrink"]
+__all__ = ["CHECKS", "Broken", "Finding", "Program", "check", "drawn", "fuzz", "shrink"]

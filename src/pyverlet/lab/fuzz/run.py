@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from pyverlet.ground.errors import InputError
@@ -29,19 +29,19 @@ class Finding:
     program: str | None = None
 
 
-def fuzz(worlds: int, seed: int = 0, *, small: bool = True) -> Iterator[Finding]:
+def fuzz(worlds: int, seed: int = 0, *, small: bool = True, without: Sequence[str] = ()) -> Iterator[Finding]:
     """Check the worlds of so many seeds, from `seed` on.
 
-    small: whether those that fail are made small, which takes some dozens of runs each.
+    small: whether those that fail are made small, which takes some dozens of runs each. without: checks that are not made.
     """
     for number in range(seed, seed + worlds):
-        yield look_at(drawn(number), small=small)
+        yield look_at(drawn(number), small=small, without=without)
 
 
-def look_at(program: Program, *, small: bool = True) -> Finding:
+def look_at(program: Program, *, small: bool = True, without: Sequence[str] = ()) -> Finding:
     """Check one."""
     try:
-        _run(program)
+        _run(program, without=without)
     except InputError as error:
         return Finding(program.seed, refused=str(error))
     except Broken as broken:
@@ -51,9 +51,9 @@ def look_at(program: Program, *, small: bool = True) -> Finding:
     return Finding(program.seed)
 
 
-def _run(program: Program, only: str | None = None) -> None:
+def _run(program: Program, only: str | None = None, without: Sequence[str] = ()) -> None:
     build, deed = program.functions()
-    check(build, deed, frames=program.frames, dt=program.seconds, only=only)
+    check(build, deed, frames=program.frames, dt=program.seconds, only=only, without=without)
 
 
 def _frame(program: Program, name: str) -> int | None:

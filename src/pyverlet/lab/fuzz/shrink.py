@@ -59,4 +59,6 @@ def _shorter(line: str) -> Iterator[str]:
             end += 1
         if line[name - 2 : name] == ", ":
             yield line[: name - 2] + line[end:]
+        elif line[name - 1] == "(" and line[end : end + 2] == ", ":
+            yield line[:name] + line[end + 2 :]
         start = line.find("=", start + 1)
