@@ -159,7 +159,7 @@ def main(minutes: float) -> bool:
                     change_scene(served.port, rng)
                 if minute % 4 == 1:
                     record(Path(folder))
-                medians = []
+                medians = [served.ask()["physics_median_ms"]]
                 while time.monotonic() < begin + 60 * minute:
                     time.sleep(2)
                     medians.append(served.ask()["physics_median_ms"])

@@ -36,6 +36,9 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 _COMPILED_FROM = ("compile", "kernels")
 
+_ROOM = 100_000_000
+"""Bytes that must be free where compiled kernels are kept: all of them are a third of it, and Numba does not bear a full disk."""
+
 _STALE_AFTER_S = 30 * 24 * 3600.0
 
 
@@ -75,6 +78,8 @@ def cache_dir() -> Path | None:
             folder.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=folder):
                 pass
+            if shutil.disk_usage(folder).free < _ROOM:
+                continue
         except (OSError, RuntimeError):
             continue
         _forget_stale(folder)
@@ -125,6 +130,18 @@ def _litter() -> Iterator[None]:
     finally:
         if collected:
             gc.enable()
+
+
+def _distrust(variant: str) -> bool:
+    """A kernel could not be called, and what was kept of it may be why: throw away all that is kept. Whether there was any.
+
+    Half a file, after a power cut, is an error of Python's `pickle` and says nothing about which file it is.
+    """
+    folder = cache_dir()
+    kept = list((folder / variant).rglob("*.nb?")) if folder else []
+    for path in kept:
+        path.unlink(missing_ok=True)
+    return bool(kept)
 
 
 _compiling = threading.RLock()
@@ -214,7 +231,16 @@ class Kernel:
         """The first call: no two processes compile a kernel at a time, and whoever comes second finds it on disk."""
         dispatcher = getattr(self, variant)
         with _compiling, turn(f"{variant} {self.function.__module__}.{self.function.__qualname__}"), _litter():
-            result = dispatcher(*arguments)
+            try:
+                result = dispatcher(*arguments)
+            except numba.core.errors.NumbaError:
+                raise
+            except Exception:
+                if not _distrust(variant):
+                    raise
+                del vars(self)[variant]
+                dispatcher = getattr(self, variant)
+                result = dispatcher(*arguments)
         setattr(self, f"_{variant}", dispatcher)
         return result
 
