@@ -150,7 +150,10 @@ def main(minutes: float) -> bool:
     for tab in tabs:
         tab.start()
     rows: list[Minute] = []
-    print(f"{'minute':>6}{'memory, MB':>12}{'files':>7}{'threads':>9}{'median, ms':>12}{'frames':>8}{'longest gap, ms':>17}", flush=True)
+    print(
+        f"{'minute':>6}{'memory, MB':>12}{'files':>7}{'threads':>9}{'median, ms':>12}{'frames':>8}{'longest gap, ms':>17}",
+        flush=True,
+    )
     try:
         with tempfile.TemporaryDirectory() as folder:
             begin, before = time.monotonic(), served.ask()["frames"]
@@ -168,7 +171,12 @@ def main(minutes: float) -> bool:
                 for tab in tabs:
                     tab.largest_gap = 0.0
                 row = Minute(
-                    minute, served.memory_mb(), served.files(), len(said["threads"]), statistics.median(medians), frames - before
+                    minute,
+                    served.memory_mb(),
+                    served.files(),
+                    len(said["threads"]),
+                    statistics.median(medians),
+                    frames - before if frames >= before else frames,  # a scene begins at 0
                 )
                 before = frames
                 rows.append(row)

@@ -50,7 +50,9 @@ def test_everything_there_is_gets_its_turn() -> None:
     assert [name for name in names.split() if name not in text] == []
 
 
-LIFTED = Program(3, 30, {"gravity": "(0, 0)"}, ("world.add(position=rng.random((n, 2)), radius=0.01, velocity=(1, 0))",), frames=12)
+LIFTED = Program(
+    3, 30, {"gravity": "(0, 0)"}, ("world.add(position=rng.random((n, 2)), radius=0.01, velocity=(1, 0))",), frames=12
+)
 
 
 @pytest.mark.parametrize(
@@ -82,7 +84,9 @@ def test_what_is_printed_fails_by_itself(tmp_path: Path) -> None:
 
 
 def test_leaving_out_stops_where_the_failure_would_go() -> None:
-    program = Program(0, 40, {"substeps": "3", "dtype": '"float64"'}, ("a", "f(b=1, c=(2, 3), d=4)", "e"), ((3, "x"), (9, "y")), 20)
+    program = Program(
+        0, 40, {"substeps": "3", "dtype": '"float64"'}, ("a", "f(b=1, c=(2, 3), d=4)", "e"), ((3, "x"), (9, "y")), 20
+    )
 
     def fails(simpler: Program) -> int | None:
         needed = simpler.count >= 7 and "c=(2, 3)" in "".join(simpler.lines) and (3, "x") in simpler.deeds

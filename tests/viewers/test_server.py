@@ -10,6 +10,7 @@ import socket
 import struct
 import threading
 import time
+import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -217,6 +218,22 @@ def test_an_oversized_message_ends_its_tab_and_nothing_else(server: Server, tab:
             while True:
                 rude.recv(5.0)
         assert rude.close_code == 1009
+    assert tab.rate(0.5) > 30
+
+
+@pytest.mark.parametrize("path", ["/../pyproject.toml", "/%2e%2e/web.py", "/page/index.html", "/etc/passwd", "/socket"])
+def test_nothing_but_the_page_is_served(server: Server, path: str) -> None:
+    with pytest.raises(urllib.error.HTTPError) as refused:
+        urllib.request.urlopen(server.http + path)
+    assert refused.value.code == 404
+    refused.value.close()
+
+
+def test_a_flood_of_commands_is_worked_off(server: Server, tab: Tab, world: pv.World, wait_until: WaitUntil) -> None:
+    with dial(server) as rude:
+        for k in range(5000):
+            rude.send(json.dumps({"type": "gravity", "x": k / 1000, "y": -9.81}))
+        wait_until(lambda: world.gravity[0] == pytest.approx(4.999))
     assert tab.rate(0.5) > 30
 
 

@@ -177,4 +177,6 @@ def drawn(seed: int) -> Program:
             lines += [kind(c) for _ in range(1 + len(c.some([0], most - 1)))]
     frames = c.one([20, 40, 60]) if count < 500 else 20
     deeds = sorted((int(c.rng.integers(1, frames)), _deed(c)) for _ in c.some([0], 4))
-    return Program(seed, count, settings, tuple(lines), tuple(deeds), frames, c.one(["1 / 60", "1 / 60", "1 / 240", "1 / 30", "1 / 15"]))
+    return Program(
+        seed, count, settings, tuple(lines), tuple(deeds), frames, c.one(["1 / 60", "1 / 60", "1 / 240", "1 / 30", "1 / 15"])
+    )

@@ -62,9 +62,7 @@ class Broken(Exception):
         self.check, self.frame = check, frame
 
 
-def check(
-    build: Build, deed: Deed, *, frames: int, dt: float, only: str | None = None, without: Sequence[str] = ()
-) -> None:
+def check(build: Build, deed: Deed, *, frames: int, dt: float, only: str | None = None, without: Sequence[str] = ()) -> None:
     """Run a world and hold it to what is promised.
 
     Args:
@@ -215,7 +213,9 @@ def _finite(world: World) -> bool:
 def _stay(world: World, frame: int) -> None:
     gone = np.flatnonzero(world.boundary.outside(world.position) & np.isfinite(world.mass))
     if len(gone):
-        raise Broken("room", frame, f"particle {gone[0]} of {len(world)} is at {world.position[gone[0]]}, {len(gone)} are outside")
+        raise Broken(
+            "room", frame, f"particle {gone[0]} of {len(world)} is at {world.position[gone[0]]}, {len(gone)} are outside"
+        )
 
 
 def _uniform(world: World) -> bool:
