@@ -43,7 +43,8 @@ class Row:
             return " / ".join(f"{ms:.2f}" for ms in times)
 
         ratio = ", ".join(f"{b / a:.2f}" for a, b in zip(self.one[:2], self.default[:2], strict=True))
-        return f"{self.world:<16}{self.busy:>5}  {told(self.one):<24}{told(self.default):<24}{ratio:<14}{'' if self.passed else 'FAIL'}"
+        said = "" if self.passed else "FAIL"
+        return f"{self.world:<16}{self.busy:>5}  {told(self.one):<24} {told(self.default):<24} {ratio:<14}{said}"
 
 
 @contextmanager

@@ -1,6 +1,6 @@
 """A served page for long, and whether anything grows: `python -m benchmarks soak --minutes 60`. Linux, whose /proc is read.
 
-Tabs come, draw, stall, vanish in the middle of a frame, send nonsense and floods; scenes change, and films are recorded beside it.
+Tabs come, draw, stall, vanish in the middle of a frame, send nonsense and floods; scenes change, and films are recorded.
 Each minute has a line: memory, open files and threads of the server, and its frames.
 """
 
@@ -94,9 +94,10 @@ class Tab(threading.Thread):
     def run(self) -> None:
         """Until told to stop."""
         while not self._stop_it.is_set():
-            with contextlib.suppress(ConnectionClosed, TimeoutError, OSError):
-                with connect(self._address, close_timeout=0.5) as connection:
-                    self._rng.choice([self._draw, self._draw, self._stall, self._vanish, self._nonsense, self._flood])(connection)
+            behave = self._rng.choice([self._draw, self._draw, self._stall, self._vanish, self._nonsense, self._flood])
+            gone = contextlib.suppress(ConnectionClosed, TimeoutError, OSError)
+            with gone, connect(self._address, close_timeout=0.5) as connection:
+                behave(connection)
             self._stop_it.wait(self._rng.uniform(0, 2))
 
     def _draw(self, connection: ClientConnection) -> None:

@@ -1,4 +1,4 @@
-"""What goes wrong with machines: killed in the middle, full disks, half files, many at once. Nothing saved is lost, nobody hangs."""
+"""What goes wrong with machines: killed in the middle, full disks, half files, many at once. Nothing saved is lost."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def said(code: str, cache: Path, **environment: str) -> str:
     [
         "with jit.watch_compiling(lambda: os.kill(os.getpid(), signal.SIGKILL)): call()",
         "os.replace = lambda *a: os.kill(os.getpid(), signal.SIGKILL); call()",
-        "import io; real = os.replace\ndef replace(a, b): real(a, b); os.kill(os.getpid(), signal.SIGKILL)\nos.replace = replace; call()",
+        "real = os.replace\nos.replace = lambda a, b: (real(a, b), os.kill(os.getpid(), signal.SIGKILL)); call()",
     ],
     ids=["compiling", "before a file is there", "after the first file"],
 )

@@ -22,8 +22,8 @@ _GAIN = 0.95
 """More threads stay if they take less than this part of the time of fewer: what is hardly gained others can use better."""
 
 _HOPELESS = 1.6
-"""Three of the last frames on more threads that took so many times as long as fewer do, and fewer it is: each such frame comes late on
-somebody's screen."""
+"""Three of the last frames on more threads that took so many times as long as fewer do, and fewer it is: each such frame comes
+late on somebody's screen."""
 
 _DISASTER = 8.0
 """One is enough if it took so many times as long: where a core is kept busy by somebody of a low priority, it may be seconds."""

@@ -104,8 +104,10 @@ def _link(c: _Chance) -> str:
     soft = f", damping={c.part()}{breaks}"
     kinds = [
         f"pv.Stick(circles, {c.one([pair, row])}{breaks})", f"pv.Rope(circles, {c.one([pair, row])}{breaks})",
-        f"pv.Spring(circles, {c.one([pair, row])}, stiffness={c.log(1, 1e4)}{soft})", f"pv.Stick(circles, {row}, compliance={c.log(1e-6, 1e-2)})",
-        f"pv.Pin(circles, rng.integers(n, size=1){breaks})", "pv.Angle(circles, np.arange(min(n, 12) - 2), np.arange(1, min(n, 12) - 1), "
+        f"pv.Spring(circles, {c.one([pair, row])}, stiffness={c.log(1, 1e4)}{soft})",
+        f"pv.Stick(circles, {row}, compliance={c.log(1e-6, 1e-2)})",
+        f"pv.Pin(circles, rng.integers(n, size=1){breaks})",
+        "pv.Angle(circles, np.arange(min(n, 12) - 2), np.arange(1, min(n, 12) - 1), "
         f"np.arange(2, min(n, 12)), compliance={c.log(1e-4, 1)})",
     ]  # fmt: skip
     return f"world.links.append({c.one(kinds)})"
@@ -136,7 +138,8 @@ def _obstacle(c: _Chance) -> str:
 
 def _force(c: _Chance) -> str:
     kinds = [
-        f"pv.Drag(linear={c.log(0.01, 2)})", f"pv.Drag(quadratic={c.log(0.01, 1)})", f"pv.PointSpring(stiffness={c.log(0.1, 10)})",
+        f"pv.Drag(linear={c.log(0.01, 2)})", f"pv.Drag(quadratic={c.log(0.01, 1)})",
+        f"pv.PointSpring(stiffness={c.log(0.1, 10)})",
         f"pv.Attractor(strength={c.log(1, 100)}, softening=1.0)", f"pv.ConstantForce({c.point(5)})",
         f"pv.Wind({c.point(5)}, linear={c.log(0.01, 1)})", "pv.Gravitation(strength=0.5, softening=0.5)",
     ]  # fmt: skip
@@ -156,7 +159,8 @@ def _deed(c: _Chance) -> str:
         "world.remove(np.arange(0, len(world), 3))", "world.remove(np.arange(len(world)) % 2 == 0)",
         f"world.velocity += {c.point(3)}", "world.velocity *= -1", "world.position[:1] = (0.1, 0.2)",
         "world.spin[:] = 3", "world.mass[:2] = np.inf", "world.mass[:] = 1", "world.radius *= 0.8",
-        f"world.gravity = {c.point(20)}", f"world.substeps = {c.one([1, 3, 8, 20])}", "[world.links.remove(link) for link in list(world.links)]",
+        f"world.gravity = {c.point(20)}", f"world.substeps = {c.one([1, 3, 8, 20])}",
+        "[world.links.remove(link) for link in list(world.links)]",
         "world.obstacles.clear()", "world.forces.clear()", "world.integrator = pv.VelocityVerlet()",
     ]  # fmt: skip
     return c.one(kinds)

@@ -49,7 +49,7 @@ _EDGE = 1e-5
 """Of the contact distance: pairs nearer than this to just touching may count or not, in float32."""
 
 
-class Broken(Exception):
+class Broken(Exception):  # noqa: N818  (a promise, not an error)
     """A promise that a world has broken.
 
     Attributes:
@@ -115,16 +115,16 @@ class _Noted:
     """Stands for a world to see whether a deed would touch it."""
 
     def __getattr__(self, name: str) -> object:
-        raise _Touched
+        raise _TouchedError
 
     def __setattr__(self, name: str, value: object) -> None:
-        raise _Touched
+        raise _TouchedError
 
     def __len__(self) -> int:
-        raise _Touched
+        raise _TouchedError
 
 
-class _Touched(Exception):
+class _TouchedError(Exception):
     pass
 
 
@@ -133,7 +133,7 @@ def _silent(deed: Deed, frames: range) -> bool:
     try:
         for frame in frames:
             deed(_Noted(), frame)  # type: ignore[arg-type]
-    except _Touched:
+    except _TouchedError:
         return False
     return True
 
