@@ -44,7 +44,8 @@ def test_everything_there_is_gets_its_turn() -> None:
     text = "\n".join(drawn(seed).source() for seed in range(2000))
     names = (
         "Circle Box Open BruteForce ledger events contacts sleep float64 PositionVerlet VelocityVerlet RK4 Yoshida4 "
-        "ExplicitEuler Stick Rope Spring Pin( Angle chain( rope( cloth( soft_body( Segment Capsule Disc Polygon Chain( Drag Wind PointSpring "
+        "ExplicitEuler Stick Rope Spring Pin( Angle chain( rope( cloth( soft_body( Segment Capsule Disc Polygon Chain( "
+        "Drag Wind PointSpring "
         "Attractor Gravitation ConstantForce Emitter Sink breaking_force np.inf world.remove world.gravity world.substeps"
     )
     assert [name for name in names.split() if name not in text] == []

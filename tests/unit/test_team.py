@@ -88,13 +88,6 @@ def test_one_thread_is_never_a_matter_of_trials() -> None:
 def test_numbers_that_are_tried() -> None:
     tried = {1: [1], 2: [1, 2], 3: [1, 2, 3], 4: [1, 2, 3, 4], 8: [1, 2, 4, 7, 8], 12: [1, 2, 4, 8, 11, 12]}
     assert {n: ladder(n) for n in tried} == tried
-        [1],
-        [1, 2],
-        [1, 2, 3],
-        [1, 2, 3, 4],
-        [1, 2, 4, 7, 8],
-        [1, 2, 4, 8, 11, 12],
-    ]
 
 
 @pytest.mark.skipif(jit.max_threads() < 2, reason="one core")
