@@ -51,9 +51,8 @@ def serve(
     """Show the world that `build` makes until Ctrl-C. See `pyverlet.viewers.serve`."""
     _refuse_running_loop()
     with contextlib.suppress(KeyboardInterrupt), _take_port(host, port) as listener:
-        with _patient_workers():
-            exhibit = Exhibit.of(build(), title)
-            _compile(exhibit)
+        exhibit = Exhibit.of(build(), title)
+        _compile(exhibit)
         session = Session(exhibit, dt=dt, repertoire=repertoire, stage=stage)
         if draws_here(session.latest.shape):
             Artist().jpeg(session.latest, Look())  # compiles what it needs: no tab shall wait for that
@@ -64,23 +63,6 @@ def serve(
                 # In a thread of its own: some browsers' launchers return only when the browser does.
                 threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
             session.run()  # here, in the thread that built the world: see there
-
-
-@contextlib.contextmanager
-def _patient_workers() -> Iterator[None]:
-    """Have OpenMP's workers, if they start in here, sleep while they wait for each other.
-
-    By default they spin, which is quicker on idle cores. A browser draws on the same machine: with two cores, a worker that
-    spins for one that is not running made frames of 20,000 circles 2 times and of 100,000 circles 7 times as long.
-    """
-    if "OMP_WAIT_POLICY" in os.environ or "GOMP_SPINCOUNT" in os.environ:
-        yield  # somebody has chosen
-        return
-    os.environ["OMP_WAIT_POLICY"] = "passive"
-    try:
-        yield
-    finally:
-        del os.environ["OMP_WAIT_POLICY"]
 
 
 @contextlib.contextmanager

@@ -183,7 +183,13 @@ class Tab:
                 else:
                     self._session.submit(request)
             except InputError as error:
-                await self._websocket.send_bytes(encode_refusal(str(error)))
+                await self._send(encode_refusal(str(error)))
+
+    async def _send(self, message: bytes) -> None:
+        try:
+            await self._websocket.send_bytes(message)
+        except RuntimeError as error:  # Starlette's word for a tab that has gone meanwhile
+            raise WebSocketDisconnect from error
 
     def _acknowledge(self, seq: int) -> None:
         if seq not in self._in_flight:
@@ -204,11 +210,11 @@ class Tab:
                 continue
             if frame.shape is not shape:
                 shape = frame.shape
-                await self._websocket.send_bytes(self._encoder.shape(shape))
+                await self._send(self._encoder.shape(shape))
             self._session.take(frame, velocity=look.moving)
             sent = (frame.seq, look)
             self._in_flight.append(frame.seq)
-            await self._websocket.send_bytes(await self._encode(frame, look))
+            await self._send(await self._encode(frame, look))
 
     async def _encode(self, frame: Frame, look: Look) -> bytes:
         if not draws_here(frame.shape):

@@ -35,6 +35,7 @@ from pyverlet.world.profile import Profile
 from pyverlet.world.queries import Queries
 from pyverlet.world.saved import Saved
 from pyverlet.world.substeps import Substeps
+from pyverlet.world.team import Team
 
 Array = NDArray[Any]
 
@@ -56,7 +57,7 @@ class World(Measures, Queries, Doors):
         contacts: note who touches what, where and how hard, in `contacts`, and for `force_on` and `pressure`.
         sleep: let circles at rest sleep until touched, at little cost; not with links, moving obstacles or forces but drag.
         ledger: keep account of where the energy goes, in `ledger`.
-        threads: at most this many for the parallel stages; None is as many as pay off. Never changes the result.
+        threads: at most this many for the parallel stages, and no more than measurably gain. Never changes the result.
 
     Attributes:
         forces: list of forces besides gravity; append and remove as you like.
@@ -100,10 +101,9 @@ class World(Measures, Queries, Doors):
         self.boundary = Open() if boundary is None else boundary
         self.collisions = collisions
         self.substeps = substeps
-        self.threads = threads
-        self.time, self.frames = 0.0, 0
+        self.threads, self.time, self.frames = threads, 0.0, 0
         self.profile, self._books = Profile(), Bookkeeper() if ledger else None
-        self._run, self._coarse = Substeps(), Coarse()
+        self._run, self._coarse, self._team = Substeps(), Coarse(), Team()
         self.onlooker: Callable[[Moment], None] | None = None
         """Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins."""
 
@@ -119,7 +119,7 @@ class World(Measures, Queries, Doors):
         h = checks.number("dt", dt, above=0.0) / self.substeps
         for actor in self.actors:
             actor.act(self, dt)
-        jit.use_threads(self.threads)
+        self._team.gather(self.threads, self.profile.frame_ms)
         self.profile.begin()
         books = self._open_books(h)
         self._frame(h, self._listen(h, books or self.profile.mark))
@@ -340,7 +340,7 @@ class World(Measures, Queries, Doors):
 
     @property
     def threads(self) -> int:
-        """Threads the parallel stages use; the result is the same for any number. Set None for as many as pay off."""
+        """Threads the parallel stages use at most, fewer where these do not gain: the result is the same for any number."""
         if self._threads is None:
             return jit.max_threads() if len(self) >= ALL_THREADS_FROM else 1
         return self._threads if len(self) >= ONE_THREAD_BELOW else 1
