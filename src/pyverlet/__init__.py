@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from pyverlet.data.trajectory import Trajectory, read_trajectory
     from pyverlet.data.worlds import Worlds
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _LATER = {
     "Trajectory": "pyverlet.data.trajectory",

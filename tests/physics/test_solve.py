@@ -123,7 +123,7 @@ def test_an_integrator_of_ones_own_may_drive_it() -> None:
     ],
 )
 def test_what_cannot_be_is_refused(changes: dict[str, Any], says: str) -> None:
-    given = {"F": lambda t, x, v: -x, "x0": [1.0, 0.0], "until": 1.0, "h": 0.1} | changes
+    given: dict[str, Any] = {"F": lambda t, x, v: -x, "x0": [1.0, 0.0], "until": 1.0, "h": 0.1} | changes
     with pytest.raises(pv.InputError, match=says):
         solve(**given)
 
