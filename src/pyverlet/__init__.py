@@ -44,11 +44,12 @@ from pyverlet.world.warmup import warm_up
 from pyverlet.world.world import World
 
 if TYPE_CHECKING:
+    from pyverlet import lab
     from pyverlet.data.sweep import sweep
     from pyverlet.data.trajectory import Trajectory, read_trajectory
     from pyverlet.data.worlds import Worlds
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _LATER = {
     "Trajectory": "pyverlet.data.trajectory",
@@ -64,17 +65,19 @@ __all__ = [
     "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel", "Panels", "Periodic", "Pin", "PointSpring", "Polygon",
     "PositionVerlet", "ProjectOnly", "PyverletError", "Rope", "Segment", "SemiImplicitEuler", "Sink", "Spring", "Stick",
     "TimeCorrectedVerlet", "Trajectory", "VelocityVerlet", "Wind", "World", "Worlds", "Yoshida4", "bridge", "builders",
-    "chain", "cloth", "errors", "force", "forces", "integrators", "load", "net", "read_trajectory", "rope", "save",
+    "chain", "cloth", "errors", "force", "forces", "integrators", "lab", "load", "net", "read_trajectory", "rope", "save",
     "scenes", "soft_body", "sweep", "view", "warm_up", "widget",
 ]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
-    # Classes that few programs need, loaded when they are first named.
+    # What few programs need, loaded when it is first named.
     if name in _LATER:
         value = getattr(import_module(_LATER[name]), name)
         globals()[name] = value
         return value
+    if name == "lab":
+        return import_module("pyverlet.lab")
     raise AttributeError(f"module 'pyverlet' has no attribute {name!r}")
 
 

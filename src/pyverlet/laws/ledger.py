@@ -29,6 +29,7 @@ class Ledger:
         links: taken by links: damping, and what stiff ones do not give back.
         projection: put in by moving overlapping circles apart, where contacts together gained more than they took in a frame.
         limiter: taken back by the energy limiter: what contacts had gained in a frame beyond what they may.
+        walls: work of a room that turns.
         outside: brought by what was done between frames: particles added, removed or written to, gravity changed.
         seam: m g L of each that fell through the seam of a periodic room, and is up again.
         residual: what is left over: the error of the integrator and, with forces that have no potential, of the trapezoidal rule
@@ -42,6 +43,7 @@ class Ledger:
     links: float = 0.0
     projection: float = 0.0
     limiter: float = 0.0
+    walls: float = 0.0
     outside: float = 0.0
     seam: float = 0.0
     residual: float = 0.0
@@ -143,15 +145,16 @@ class _Frame:
             return
         self._done("ledger")
 
-    def close(self, spent: tuple[float, float, float]) -> None:
-        """The frame has gone well; `spent` is what impacts, friction and the energy limiter say they have taken, J, negative."""
-        restitution, friction, limiter = spent
-        rest = self._contacts - restitution - friction - limiter
+    def close(self, spent: tuple[float, float, float, float]) -> None:
+        """The frame has gone well; `spent` is what impacts, friction, the energy limiter and the room say they have given, J."""
+        restitution, friction, limiter, walls = spent
+        rest = self._contacts - restitution - friction - limiter - walls
         self._open.restitution += restitution + min(rest, 0.0)
         self._open.friction += friction
         self._open.projection += max(rest, 0.0)
         self._open.limiter += limiter
         self._open.seam -= self._risen
+        self._open.walls += walls
         self._books.ledger, self._books._resting = self._open, self._resting - limiter
         self._books._energy = self._now.energy - self._risen
 

@@ -205,10 +205,10 @@ def _rounding(slots: Slots) -> float:
 def undriven(world: Any, h: float, h_last: float | None) -> bool:
     """Whether nothing but contacts and links could raise the energy of a world.
 
-    Forces have a potential or are drag, no obstacle moves, gravity does not point along a period, and the integrator does not
-    raise it either: of order 2 or more, and with a constant step, which `PositionVerlet` needs.
+    Forces have a potential or are drag, no obstacle or wall moves, gravity does not point along a period, and the integrator does
+    not raise it either: of order 2 or more, and with a constant step, which `PositionVerlet` needs.
     """
-    if world.integrator.order < 2 or h_last not in (None, h):
+    if world.integrator.order < 2 or h_last not in (None, h) or world.boundary.moves:
         return False
     if any(g != 0 and period > 0 for g, period in zip(world.gravity, world.boundary.seam.period, strict=True)):
         return False  # who falls for ever gains for ever

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.constants import STANDS_OUT
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import bounds, frame, meetings
+from pyverlet.laws.turning import surface
 from pyverlet.state.moves import bodies
 from pyverlet.state.seam import NONE, Seam
 from pyverlet.state.state import Slots
@@ -37,6 +39,11 @@ class Boundary(ABC):
     @abstractmethod
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         """Bounce or hold every circle that reaches beyond a wall. `lag`: seconds the velocity is behind the position."""
+
+    @property
+    def moves(self) -> bool:
+        """Whether its walls may do work."""
+        return False
 
     def compiled(self, state: Slots) -> tuple[Any, tuple[float, ...]] | None:
         """What `confine` does as a driver of `kernels.frame`, and the numbers it takes; None: Python has to call it."""
@@ -123,27 +130,42 @@ class Circle(_Walls):
         radius: of the cage, m.
         restitution: e of the wall, 0 to 1.
         friction: mu of the wall, 0 or more.
+        angular_velocity: rad/s it turns with about its centre, counter-clockwise: a drum, whose wall takes along what rubs on it.
     """
 
     def __init__(
-        self, *, center: Sequence[float] = (0.0, 0.0), radius: float, restitution: float = 0.0, friction: float = 0.0
+        self,
+        *,
+        center: Sequence[float] = (0.0, 0.0),
+        radius: float,
+        restitution: float = 0.0,
+        friction: float = 0.0,
+        angular_velocity: float = 0.0,
     ) -> None:
         super().__init__(restitution, friction)
         self.center = checks.vector("center", center)
         self.radius = checks.number("radius", radius, above=0.0)
+        self.angular_velocity = checks.number("angular_velocity", angular_velocity)
+
+    @property
+    def moves(self) -> bool:
+        return self.angular_velocity != 0.0 and self.friction > 0.0
 
     def walls(self) -> Sequence[float]:
-        return (meetings.ROUND, *self.center, self.radius, 0.0, self.restitution, self.friction)
+        # Whom an obstacle pushes to a wall that turns is held there, and rubbed where the wall itself is met.
+        return (meetings.ROUND, *self.center, self.radius, 0.0, self.restitution, 0.0 if self.moves else self.friction)
 
     def compiled(self, state: Slots) -> tuple[Any, tuple[float, ...]] | None:
-        if type(self) is not Circle:
+        if type(self) is not Circle or self.moves:
             return None
         if self.restitution == 0.0 == self.friction and state.smooth:
             return frame.smooth_cage, (*self.center, self.radius)
         return frame.cage, (*self.center, self.radius, self.restitution, self.friction)
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
-        self._confine(bounds.circle, (*self.center, self.radius), state, h, lag, rest_speed)
+        speed = self.angular_velocity * self.radius
+        with surface(state, speed, h) if self.moves else nullcontext():
+            self._confine(bounds.circle, (*self.center, self.radius), state, h, lag, rest_speed)
 
     def facing(self, position: Array) -> tuple[Array, Array]:
         way = self.center - position.astype(np.float64)
@@ -172,9 +194,9 @@ class Circle(_Walls):
         _fits(radius, self.radius, f"the radius of the cage, {self.radius:g} m")
 
     def __repr__(self) -> str:
-        return (
-            f"Circle(center={self.center}, radius={self.radius:g}, restitution={self.restitution:g}, friction={self.friction:g})"
-        )
+        turns = f", angular_velocity={self.angular_velocity:g}" if self.angular_velocity else ""
+        walls = f"restitution={self.restitution:g}, friction={self.friction:g}{turns}"
+        return f"Circle(center={self.center}, radius={self.radius:g}, {walls})"
 
 
 class Box(_Walls):

@@ -116,7 +116,7 @@ def laws(world: Any) -> Any:
 
     That is so with links, with obstacles that move, and with forces that may change with time: all but gravity and drag.
     """
-    moving = any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
+    moving = world.boundary.moves or any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
     if world.links or moving or not all(type(force) is Drag for force in world.forces):
         return None
     obstacles = tuple((id(obstacle), obstacle.revision) for obstacle in world.obstacles)

@@ -162,7 +162,7 @@ class Slots:
         resting: (n,) bits of `kernels.motion`: who held it in the last substep, a wall or, after a frame, another particle.
         hits: (n,) largest speed with which the circle met a wall in this frame, m/s; negative: none.
         spent: (n, 2) J that impacts on walls, and friction there, have taken in this frame, negative: to be summed, for rows stay
-            where they are when slots are reordered; empty unless somebody keeps account. taken: J, by the energy limiter.
+            where they are; empty unless somebody keeps account. taken: J, by the energy limiter. worked: J, brought by the room.
 
     Args:
         sleeps: whether particles may sleep.
@@ -173,7 +173,7 @@ class Slots:
         self.real = lru_cache(64)(dtype.type)
         self.reals = lru_cache(64)(lambda *numbers: tuple(map(dtype.type, numbers)))
         self._kept: dict[str, Array] = {}
-        self.drop, self.lean, self.total_mass, self.taken, self.given = 1.0, 0.0, 0.0, 0.0, 0
+        self.drop, self.lean, self.total_mass, self.taken, self.worked, self.given = 1.0, 0.0, 0.0, 0.0, 0.0, 0
         self.claims = Claims()
         self._resize(0)
 
@@ -303,7 +303,7 @@ class Slots:
     def clear_notes(self) -> None:
         """Forget what walls and friction have noted in the last frame."""
         self.hits.fill(-1)
-        self.taken = 0.0
+        self.taken = self.worked = 0.0
         if len(self.spent):
             self.spent.fill(0)
         if len(self.along):

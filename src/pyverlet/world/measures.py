@@ -155,12 +155,12 @@ class Measures(Particles):
             listed, virial = self._contacts.listed, self._contacts.virial
         return self._touches.frame(self._slots, self._state, h, self.boundary, self._course, listed, virial, told)
 
-    def _spent(self) -> tuple[float, float, float]:
-        """What impacts, friction and the energy limiter have taken in this frame, J, as they have noted; negative."""
+    def _spent(self) -> tuple[float, float, float, float]:
+        """What impacts, friction, the energy limiter and the room have given in this frame, J, as they have noted."""
         spent = self._slots.spent.sum(axis=0)
         if self._contacts:
             spent += self._contacts.spent()
-        return float(spent[0]), float(spent[1]), -self._slots.taken
+        return float(spent[0]), float(spent[1]), -self._slots.taken, self._slots.worked
 
     def momentum(self) -> Array:
         """(2,) sum of m v over all free particles, kg m/s."""
