@@ -65,17 +65,20 @@ def _impact_strip(
             time = impact_time(dx, dy, vx, vy, ax, ay, reach, h)
             dx -= time * (vx - half * time * ax)
             dy -= time * (vy - half * time * ay)
-            distance = np.sqrt(dx * dx + dy * dy)
+            # In float64, so that velocities are rounded once, as in `kernels.bounce`.
+            distance = np.sqrt(np.float64(dx) * dx + np.float64(dy) * dy)
             nx, ny = dx / distance, dy / distance
-            hit = -((vx - time * ax) * nx + (vy - time * ay) * ny)
+            ux = np.float64(velocity[j, 0]) - velocity[i, 0] + (np.float64(lag) - time) * ax
+            uy = np.float64(velocity[j, 1]) - velocity[i, 1] + (np.float64(lag) - time) * ay
+            hit = -(ux * nx + uy * ny)
             if hit > rest_speed:
                 bounce = _pair_restitution(restitution[i], restitution[j], e)
-                w = inverse_mass[i] + inverse_mass[j]
+                w = np.float64(inverse_mass[i]) + inverse_mass[j]
                 kick = (hit + bounce * hit) / w
                 meeting[k] = PARTING
                 impulse[k] = kick
                 part(position, velocity, inverse_mass, i, j, nx, ny, time * kick, kick)
-                spent[0] -= 0.5 * np.float64(hit) * hit * (1.0 - np.float64(bounce) * bounce) / w
+                spent[0] -= 0.5 * hit * hit * (1.0 - np.float64(bounce) * bounce) / w
             else:
                 meeting[k] = RESTING
 
