@@ -128,10 +128,10 @@ def test_elastic_gas_keeps_energy_and_angular_momentum(dtype: type) -> None:
 @pytest.mark.parametrize(("radius", "heavy"), [(0.5, 1.0), (0.4, 1.0), (0.4, 30.0)])
 def test_an_elastic_gas_in_float32_is_neither_heated_nor_cooled(radius: float, heavy: float) -> None:
     # An impact rounds four components of velocities, each by at most u |v|, u = 2^-24, evenly distributed: its energy is off by
-    # sum m v d, with the variance m^2 u^2 sum v^4 / 3. Of Maxwell's distribution, m <v^2> = T for each component, and <v^4> =
-    # 3 <v^2>^2, that is 4 u^2 T^2; those who meet are faster than others, which makes less than twice as much of it. If the errors
-    # have no preferred sign, N impacts of n circles, whose energy is n T, change it by 3 u sqrt(N) / n of it: a random walk. It
-    # was 10 to 40 times as much, always the same way, while normals were rounded.
+    # sum m v d, with the variance m^2 u^2 sum v^4 / 3. In Maxwell's distribution m <v^2> = T for each component, and <v^4> =
+    # 3 <v^2>^2: that is 4 u^2 T^2. Those who meet are faster than others, which makes at most twice as much of it. If the errors
+    # prefer no sign, N impacts of n circles, whose energy is n T, change it by 3 u sqrt(N) / n of it, a random walk. Normals
+    # that are rounded to float32 change it by some ten times as much, always one way.
     n = 300
     cage = radius * np.sqrt(n / 0.3)
     axis = np.arange(-cage, cage, 2.6 * radius)

@@ -129,9 +129,10 @@ def _rounded(b, like):
     """The circle b in the dtype of the number `like`."""
     f = rounded
     return Body(
-        f(b.x, like), f(b.y, like), f(b.vx, like), f(b.vy, like), f(b.ax, like), f(b.ay, like), f(b.spin, like), f(b.radius, like),
-        f(b.inverse_mass, like), f(b.restitution, like), f(b.friction, like), b.fed, b.resting, f(b.hit, like), b.to_impact,
-        b.to_friction, f(b.from_x, like), f(b.from_y, like), f(b.share, like), f(b.turn, like), f(b.lift, like),
+        f(b.x, like), f(b.y, like), f(b.vx, like), f(b.vy, like), f(b.ax, like), f(b.ay, like), f(b.spin, like),
+        f(b.radius, like), f(b.inverse_mass, like), f(b.restitution, like), f(b.friction, like), b.fed, b.resting,
+        f(b.hit, like), b.to_impact, b.to_friction, f(b.from_x, like), f(b.from_y, like), f(b.share, like), f(b.turn, like),
+        f(b.lift, like),
     )  # fmt: skip
 
 
@@ -228,7 +229,7 @@ def impact_time(dx, dy, vx, vy, ax, ay, reach, h):
 
 @kernel
 def _bounced(b, px, py, back_x, back_y, h, lag, e, mu, rest_speed):
-    """The circle b has met the wall of the cage at (px, py) from its centre, (back_x, back_y) from where it is: what becomes of it.
+    """The circle b has met the cage's wall at (px, py) from its centre, (back_x, back_y) from where it is: what becomes of it.
 
     In float64, so that it is rounded once: a normal in float32 is longer than 1, or shorter, and heats a gas or cools it.
     """
