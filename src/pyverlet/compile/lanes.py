@@ -173,16 +173,6 @@ def widen(typing: Any, a: Any) -> Any:
 
 
 @intrinsic  # type: ignore[untyped-decorator]
-def rounded(typing: Any, value: Any, like: Any) -> Any:
-    """One number, in the dtype of another."""
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return context.cast(builder, args[0], value, like)
-
-    return like(value, like), generate
-
-
-@intrinsic  # type: ignore[untyped-decorator]
 def add_lanes(typing: Any, a: Any, lanes: Any) -> Any:
     """The sum, in float64, of the first so many lanes, one after the other."""
 

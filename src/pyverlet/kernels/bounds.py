@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
-from pyverlet.compile.lanes import rounded
+from pyverlet.compile.rounding import rounded
 from pyverlet.ground.constants import FED, PUSHED
 
 BLOCK = 64

@@ -17,6 +17,7 @@ from pyverlet.kernels.bounds import AT_WALL, CARRIED, CARRIES
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast, PairList, Strips
 from pyverlet.laws.contacts.growth import Growth
 from pyverlet.laws.contacts.loans import Lent, Loans
+from pyverlet.laws.contacts.pegs import Pegs
 from pyverlet.laws.contacts.slips import Kept, Slips
 from pyverlet.laws.contacts.wide import Wide
 from pyverlet.laws.events import Events
@@ -83,7 +84,7 @@ class ContactSolver:
         self._sleep = sleep
         self._slips = Slips(dtype)
         self._loans = Loans(dtype)
-        self.growth = Growth()
+        self.growth, self._pegs = Growth(), Pegs()
         self.broad_phase.replacing = self._slips.stop
         if events is not None:
             self.broad_phase.list.listen()
@@ -131,6 +132,7 @@ class ContactSolver:
             self._uneven = bool(len(free)) and float(free.max()) > UNEVEN * float(free.min())
             self._lends &= self._uneven
             self._packed = False
+            self._pegs.look(state, self.broad_phase.list)
 
     def _pack(self, state: Slots) -> Wide:
         if not self._packed:
@@ -142,7 +144,7 @@ class ContactSolver:
 
     def steady(self, state: Slots) -> Strips | None:
         """Where strips stand, if a substep's contacts are but the two sweeps; None: there is more to them."""
-        alone = self._eight(state) and self._sleep is None and state.size is state.radius
+        alone = self._eight(state) and self._sleep is None and state.size is state.radius and not self._pegs
         return self.broad_phase.strips() if alone else None
 
     def set_up(self, state: Slots, h: float, lag: float, strongest: float) -> Wide:
@@ -156,6 +158,7 @@ class ContactSolver:
 
     def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
         """Move overlapping circles apart, let impacts bounce, note who touches, and let those grip each other."""
+        self._pegs.before(state, h)
         if self._eight(state):
             self.set_up(state, h, lag, strongest).push(state)
             return
@@ -202,10 +205,14 @@ class ContactSolver:
         state.fed[:] = (state.fed & (CARRIES | AT_WALL)) * CARRIED
 
     def still(self, state: Slots, h: float) -> None:
-        """Take from touching circles the velocity that projection has put in, and rub them."""
+        """Take from touching circles the velocity that projection has put in, rub them, and hold who is too large for a gap."""
         if self._eight(state):
             self._wide.relax(state)
-            return
+        else:
+            self._still_uneven(state, h)
+        self._pegs.hold(state)
+
+    def _still_uneven(self, state: Slots, h: float) -> None:
         pairs, real = self.broad_phase.list, state.real
         which = pairs.listed()
         moving = (state.position, state.velocity)
