@@ -6,6 +6,7 @@ import numpy as np
 
 from pyverlet.compile.jit import kernel
 from pyverlet.compile.lanes import LANES
+from pyverlet.ground.constants import LOAN_S
 from pyverlet.kernels.bounds import impact_time
 from pyverlet.kernels.tables import MU, R_I, R_J, E
 
@@ -26,6 +27,18 @@ def _kick(circles, i, x, y, time):
     circles.velocity[i, 0] = vx + x
     circles.velocity[i, 1] = vy + y
     _carry(circles, i, time * (circles.velocity[i, 0] - vx), time * (circles.velocity[i, 1] - vy))
+
+
+@kernel
+def _own(circles, i, x, y, turn):
+    """An impact, which changes the velocity of circle i by (x, y) and its spin by `turn`, goes by its own mass: `kernels.balance`
+    need not make up for it. It lends and borrows nothing for a while.
+    """
+    circles.before[i, 0] += x
+    circles.before[i, 1] += y
+    circles.spin_before[i] += turn
+    circles.lent[i] = 0
+    circles.busy[i] = LOAN_S
 
 
 @kernel
@@ -58,7 +71,7 @@ def _bounce(i, j, dx, dy, reach, e, mu, ri, rj, circles, law, spent):
     if not hit > law.rest_speed:
         return False
     kick = (hit + e * hit) / (np.float64(wi) + wj)
-    px, py = kick * nx, kick * ny
+    px, py, turn_i, turn_j = kick * nx, kick * ny, 0.0, 0.0
     if spent.shape[0] > 0:
         spent[0] -= 0.5 * hit * hit * (1.0 - np.float64(e) * e) / (np.float64(wi) + wj)
     if mu > zero:
@@ -67,10 +80,14 @@ def _bounce(i, j, dx, dy, reach, e, mu, ri, rj, circles, law, spent):
         rub = max(min(-slip / (3.0 * (np.float64(wi) + wj)), most), -most)
         px += rub * ny
         py -= rub * nx
-        circles.spin[i] += 2.0 * rub * wi / ri
-        circles.spin[j] += 2.0 * rub * wj / rj
+        turn_i, turn_j = 2.0 * rub * wi / ri, 2.0 * rub * wj / rj
+        circles.spin[i] += turn_i
+        circles.spin[j] += turn_j
         if spent.shape[0] > 0:
             spent[1] += rub * (slip + 1.5 * (np.float64(wi) + wj) * rub)
+    if circles.lent.shape[0] > 0:
+        _own(circles, i, -px * wi, -py * wi, turn_i)
+        _own(circles, j, px * wj, py * wj, turn_j)
     _kick(circles, i, -px * wi, -py * wi, time)
     _kick(circles, j, px * wj, py * wj, time)
     return True
