@@ -34,10 +34,11 @@ from pyverlet.laws.links import Angle, Area, Pin, Rope, Spring, Stick
 from pyverlet.laws.naive import ClampAndFlip, ProjectOnly
 from pyverlet.laws.obstacles import Capsule, Chain, Disc, Obstacle, Polygon, Segment
 from pyverlet.laws.rooms import Boundary, Box, Circle, Open
+from pyverlet.scenes.sliders import Slider, slider
 from pyverlet.state.group import Group
 from pyverlet.world import builders
 from pyverlet.world.actors import Actor, Emitter, Sink
-from pyverlet.world.builders import bridge, chain, cloth, net, rope, soft_body
+from pyverlet.world.builders import bridge, chain, cloth, fill, net, rope, soft_body
 from pyverlet.world.clock import Clock, FrameBudget
 from pyverlet.world.panels import Panel, Panels
 from pyverlet.world.warmup import warm_up
@@ -62,10 +63,10 @@ __all__ = [
     "ClampAndFlip", "Clock", "CoarseStepWarning", "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy",
     "Events", "ExplicitEuler", "Fast", "FrameBudget", "Gravitation", "Group", "InputError", "Integrator", "Ledger",
     "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel", "Panels", "Pin", "PointSpring", "Polygon", "PositionVerlet",
-    "ProjectOnly", "PyverletError", "Rope", "Segment", "SemiImplicitEuler", "Sink", "Spring", "Stick", "TimeCorrectedVerlet",
-    "Trajectory", "VelocityVerlet", "Wind", "World", "Worlds", "Yoshida4", "bridge", "builders", "chain", "cloth", "errors",
-    "force", "forces", "integrators", "load", "net", "read_trajectory", "rope", "save", "scenes", "soft_body", "sweep", "view",
-    "warm_up", "widget",
+    "ProjectOnly", "PyverletError", "Rope", "Segment", "SemiImplicitEuler", "Sink", "Slider", "Spring", "Stick",
+    "TimeCorrectedVerlet", "Trajectory", "VelocityVerlet", "Wind", "World", "Worlds", "Yoshida4", "bridge", "builders",
+    "chain", "cloth", "errors", "fill", "force", "forces", "integrators", "load", "net", "read_trajectory", "rope", "save",
+    "scenes", "slider", "soft_body", "sweep", "view", "warm_up", "widget",
 ]  # fmt: skip
 
 

@@ -28,6 +28,14 @@ from pyverlet.world.world import World
 DEFAULT_DT = 1 / 60
 DEFAULT_SECONDS = 5.0
 
+FIRST = """\
+pyverlet run                        circles fall into a heap, in a tab of your browser
+pyverlet list                       the other scenes: pyverlet run cloth
+pyverlet new mysketch.py            a scene of your own to start from, 25 lines
+pyverlet run mysketch.py --watch    see it, change it, save: the page follows
+pyverlet --help                     all commands; pyverlet run --help, all options of one"""
+"""What to type next, for whoever has typed nothing."""
+
 app = typer.Typer(
     name="pyverlet",
     help="Real-time 2D particle physics: thousands of circles that fall, bounce, roll and pile up.",
@@ -54,7 +62,7 @@ def _pyverlet(
     ] = False,
 ) -> None:
     if context.invoked_subcommand is None:
-        out.write(context.get_help())
+        out.write(FIRST)
 
 
 @app.command(name="list")

@@ -6,11 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
+from pyverlet.world.watched import Watched
+
 if TYPE_CHECKING:
     from pyverlet.world.world import World
 
 
-class Doors:
+class Doors(Watched):
     """What a world offers besides physics. Nothing is loaded before it is asked for."""
 
     def to_image(self: World, path: Any = None, **options: Any) -> NDArray[Any]:  # type: ignore[misc]
