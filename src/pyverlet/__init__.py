@@ -79,11 +79,14 @@ def __getattr__(name: str) -> Any:
     raise AttributeError(f"module 'pyverlet' has no attribute {name!r}")
 
 
-def view(world: World | Panels, **options: Any) -> None:
-    """Show a world, or several side by side, on a live page until Ctrl-C; see `pyverlet.viewers.view` for the options."""
+def view(world: World | Panels, **options: Any) -> Any:
+    """Show a world, or several side by side, on a live page until Ctrl-C; see `pyverlet.viewers.view` for the options.
+
+    With block=False it returns at once: a handle with `url` and `close()`.
+    """
     from pyverlet.viewers import view as view_page
 
-    view_page(world, **options)
+    return view_page(world, **options)
 
 
 def save(world: World, path: str | Path, **options: Any) -> None:

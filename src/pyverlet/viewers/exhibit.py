@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from pyverlet import scenes
 from pyverlet.laws.integrators import Integrator
 from pyverlet.scenes import Scene
+from pyverlet.scenes.sketch import SketchScene
+from pyverlet.viewers.answers import Answers
 from pyverlet.viewers.frames import Rect
 from pyverlet.world.panels import Panels
 from pyverlet.world.world import World
@@ -32,6 +34,8 @@ class Exhibit:
         scene: the name of the scene they are, or "" for worlds of the user's own.
         colours: (n, 3) bytes R, G, B, the circles' own; None leaves colours to the viewer.
         part: of the plane to show, metres; None shows the bounds, or where the circles are.
+        answers: what the program adds to the picture, and what it wants to know of; None: nothing.
+        countable: whether the scene can be built with another number of circles.
     """
 
     title: str
@@ -39,6 +43,8 @@ class Exhibit:
     scene: str = ""
     colours: NDArray[np.uint8] | None = None
     part: Rect | None = None
+    answers: Answers | None = None
+    countable: bool = True
 
     @classmethod
     def of(cls, shown: World | Panels | Exhibit, title: str) -> Exhibit:
@@ -94,4 +100,5 @@ class Repertoire:
         if scene.show.colours and len(panels) == 1:
             colours = scene.show.colours(settings, self._dt, progress)
         part = scene.show.view(settings) if scene.show.view else None
-        return Exhibit(scene.name, panels, scene.name, colours, part)
+        countable = not isinstance(scene, SketchScene) or scene.takes("particles")
+        return Exhibit(scene.name, panels, scene.name, colours, part, scene.sketch, countable)

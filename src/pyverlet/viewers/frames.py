@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pyverlet.kernels import wire
 from pyverlet.laws.rooms import Circle
 from pyverlet.picture.colour import USUAL_MULTIPLE
+from pyverlet.picture.pen import Drawing
 from pyverlet.viewers.sketch import NOTHING, Sketch
 
 if TYPE_CHECKING:
@@ -81,6 +82,10 @@ class Shape:
     """Name of the scene, or "" for worlds of the user's own."""
     scenes: tuple[tuple[str, str], ...]
     """Name and one line of each scene that can be picked; empty where none can."""
+    answers: tuple[str, ...]
+    """Of "keys" and "click", what the user's own program wants to know of."""
+    countable: bool
+    """Whether another number of circles can be asked for."""
     radius: NDArray[np.float32]
     """(n,) metres, read-only."""
     mass: NDArray[np.float32]
@@ -134,6 +139,14 @@ class Status:
     busy: str | None
     """What keeps the world from moving for now, such as building another."""
     error: str | None
+    complaint: str | None = None
+    """What is wrong with a sketch, while the world goes on."""
+    sliders: tuple[tuple[str, float, float, float, float], ...] = ()
+    """Name, ends, step and value of each slider that the program has made."""
+    watched: dict[str, float] = field(default_factory=dict)
+    """What is drawn beside the energy."""
+    undo: tuple[int, int] = (0, 0)
+    """How often one can undo, and redo."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,6 +172,8 @@ class Frame:
     whose: NDArray[np.int32] | None = None
     """(n,) which particle each row is of, between the substeps of a frame; None: row k is particle k."""
     whose_moving: NDArray[np.int32] | None = None
+    drawing: Drawing = ()
+    """What the user's own function has drawn over it; of the frame before, between its substeps."""
 
     def moved(self, moment: Moment, seq: int, status: Status, *, velocity: bool) -> Frame:
         """The same a little later, between two substeps; its velocities are those of this frame unless they are asked for."""

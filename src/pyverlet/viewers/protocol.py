@@ -24,26 +24,32 @@ from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
 from pyverlet.laws import integrators
+from pyverlet.picture.pen import Drawing, Stroke
 from pyverlet.viewers.commands import (
     MAX_PARTICLES,
     MAX_SUBSTEPS,
     Build,
+    Click,
     Command,
     Delete,
     Drag,
+    Key,
     Pause,
     Pin,
     Poke,
+    Redo,
     Release,
     Reset,
     SetFriction,
     SetGravity,
     SetIntegrator,
     SetRestitution,
+    SetSlider,
     SetSpeed,
     SetSubsteps,
     Spawn,
     Step,
+    Undo,
 )
 from pyverlet.viewers.frames import Frame, Rect, Shape, quantise
 from pyverlet.viewers.hands import POKE_RADIUS
@@ -119,8 +125,21 @@ def _head(kind: str, frame: Frame, part: Rect | None) -> dict[str, Any]:
         "view": frame.view if part is None else part,
         "room": frame.view,
         "obstacles": frame.obstacles.lines,
+        "drawing": written(frame.drawing),
         "status": dataclasses.asdict(frame.status),
     }
+
+
+def written(drawing: Drawing) -> list[Any]:
+    """What a `Pen` drew, ready for JSON: lines and areas [points, closed, filled, colour, px], texts [x, y, text, colour, px]."""
+    said: list[Any] = []
+    for mark in drawing:
+        colour = None if mark.colour is None else f"#{mark.colour:06x}"
+        if isinstance(mark, Stroke):
+            said.append([mark.points, mark.closed, mark.filled, colour, mark.width])
+        else:
+            said.append([mark.x, mark.y, mark.text, colour, mark.size])
+    return said
 
 
 def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = None) -> bytes:
@@ -146,6 +165,8 @@ def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = N
         "obstacles": shape.obstacles.lines,
         "scene": shape.scene,
         "scenes": shape.scenes,
+        "answers": shape.answers,
+        "countable": shape.countable,
         "integrators": list(integrators.BY_NAME),
         "count": len(shape.radius),
         "groups": [] if drawn_here else _runs(shape.group),
@@ -272,4 +293,9 @@ _MAKERS: dict[str, Callable[[Mapping[str, Any], int], Request]] = {
     "spawn": lambda m, hand: Spawn(hand, _real(m, "x"), _real(m, "y")),
     "delete": lambda m, hand: Delete(hand, _real(m, "x"), _real(m, "y"), _real(m, "reach")),
     "release": lambda m, hand: Release(hand),
+    "undo": lambda m, hand: Undo(),
+    "redo": lambda m, hand: Redo(),
+    "slider": lambda m, hand: SetSlider(_text(m, "name"), _real(m, "value")),
+    "key": lambda m, hand: Key(_text(m, "key")),
+    "click": lambda m, hand: Click(hand, _real(m, "x"), _real(m, "y"), _text(m, "button")),
 }
