@@ -17,7 +17,7 @@ from pyverlet.viewers.inbox import Inbox
 from pyverlet.viewers.rhythm import Audience
 
 if TYPE_CHECKING:
-    from pyverlet.viewers.exhibit import Exhibit, Repertoire
+    from pyverlet.viewers.exhibit import Exhibit
 
 STOP_TIMEOUT_S = 10.0
 """Longest wait for a frame under way when a session stops."""
@@ -38,7 +38,7 @@ class Door(ABC):
         """Step the worlds in the calling thread until somebody calls `stop`."""
 
     @abstractmethod
-    def _put_on(self, exhibit: Exhibit, repertoire: Repertoire | None) -> None:
+    def _put_on(self, exhibit: Exhibit) -> None:
         """In the thread that steps the worlds."""
 
     @abstractmethod
@@ -75,9 +75,9 @@ class Door(ABC):
 
         return unsubscribe
 
-    def put_on(self, exhibit: Exhibit, repertoire: Repertoire | None) -> None:
+    def put_on(self, exhibit: Exhibit) -> None:
         """Show something else from the next frame on; how the user looks at it stays."""
-        self._errands.put(partial(self._put_on, exhibit, repertoire))
+        self._errands.put(partial(self._put_on, exhibit))
         self._commands.put(None)
 
     def tell(self, *, complaint: str | None = None, busy: str | None = None) -> None:

@@ -220,9 +220,9 @@ class Session(Door):
         self._stage = self._staged(exhibit)
         self._fresh_start()
 
-    def _put_on(self, exhibit: Exhibit, repertoire: Repertoire | None) -> None:
+    def _put_on(self, exhibit: Exhibit) -> None:
         self._stage.hands.release_all()
-        self._repertoire, self._complaint, self._busy = repertoire, None, None
+        self._complaint = self._busy = None
         self._enter(exhibit)
         self._last = time.perf_counter()
         self._publish()

@@ -12,7 +12,6 @@ from typing import Any
 from pyverlet.ground.errors import PyverletError
 from pyverlet.ground.patience import Patience, TooLong, interrupt
 from pyverlet.laws.integrators import Integrator
-from pyverlet.scenes import SCENES
 from pyverlet.scenes.sketch import Sketch
 from pyverlet.viewers.exhibit import Exhibit, Repertoire
 from pyverlet.viewers.session import Session
@@ -58,16 +57,14 @@ class Workshop:
         self.fault: str | None = None
         """Why the last build has come to nothing."""
 
-    def build(self) -> tuple[Exhibit, Repertoire | None] | None:
-        """The sketch as it is now, and what can be picked beside it; None if that cannot be: see `fault`."""
+    def build(self) -> Exhibit | None:
+        """The sketch as it is now; None if that cannot be: see `fault`."""
         try:
             sketch = Sketch.read(self.path, self._sketch)
             self._sketch = sketch
             with Patience().within(self._patience):
                 scene = sketch.scene()
-                SCENES.setdefault(scene.name, scene)  # it may be picked on the page like the others
-                repertoire = Repertoire(scene, dt=self._dt, integrators=self._integrators, overrides=self._overrides)
-                exhibit = repertoire.open()
+                exhibit = Repertoire(scene, dt=self._dt, integrators=self._integrators, overrides=self._overrides).open()
             sketch.patience = Patience()  # a screen waits for what is called with each picture
         except TooLong:
             self.fault = f"{self.path.name} is not built after {self._patience:g} s"
@@ -79,12 +76,12 @@ class Workshop:
             self.fault = f"{self.path.name} needs more memory than there is"
             return None
         self.fault = None
-        return exhibit, repertoire
+        return exhibit
 
     def first(self) -> Exhibit:
         """The sketch, or an empty world while it cannot be built."""
         built = self.build()
-        return built[0] if built else Exhibit(self.path.stem, Panels([Panel("", World())]))
+        return built if built else Exhibit(self.path.stem, Panels([Panel("", World())]))
 
     @property
     def stamp(self) -> Stamp:
@@ -157,13 +154,13 @@ class Watcher:
         try:
             built = self._workshop.build()
             if built:
-                for world in built[0].panels.worlds:
+                for world in built.panels.worlds:
                     warm_up(world)  # so that the world before goes on meanwhile
         except TooLong:
             return
         if turn != self._turn:
             return
         if built:
-            self._session.put_on(*built)
+            self._session.put_on(built)
         else:
             self._session.tell(complaint=self._workshop.fault)

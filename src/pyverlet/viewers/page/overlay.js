@@ -4,6 +4,7 @@ import { drawObstacles, resizeCanvas } from "./backdrop.js";
 import { heat } from "./colour.js";
 import { touching } from "./contacts.js";
 import { GRID_MAX } from "./draw.js";
+import { drawMarksOf } from "./drawing.js";
 
 export const MOST_CONTACTS = 20000; // circles whose contacts are searched for: beyond, it would cost frames
 const LINK_PX = 1.6;
@@ -20,12 +21,13 @@ export class Overlay {
     this.links = 0;
     this.arrows = 0;
     this.marks = 0;
+    this.drawn = 0; // marks of the user's own program
   }
 
   /** `wants`: {velocities, contacts}; `colour(name)` is that of a custom property. */
   draw(shape, frame, camera, size, ratio, wants, colour, dark) {
     const pinned = frame.grid ? pins(shape.mass) : [];
-    const busy = shape.lines.length || frame.obstacles.length || frame.links || frame.turned || pinned.length || wants.velocities || wants.contacts;
+    const busy = shape.lines.length || frame.obstacles.length || frame.links || frame.turned || frame.drawing?.length || pinned.length || wants.velocities || wants.contacts;
     this.contacts = this.arrows = this.links = this.marks = 0;
     if (!busy && this.clean) return;
     this.clean = this.canvas.hidden = !busy;
@@ -35,7 +37,7 @@ export class Overlay {
     context.clearRect(0, 0, size.width, size.height);
     dashes(context, shape.lines, camera, colour("--soft"));
     drawObstacles(context, frame.obstacles, camera, colour);
-    if (!frame.grid) return;
+    if (!frame.grid) return void (this.drawn = drawMarksOf(context, frame.drawing ?? [], camera, colour("--text")));
     const place = camera.place(frame.view), sx = place.width / GRID_MAX, sy = place.height / GRID_MAX;
     const { grid } = frame, seen = (i) => grid[2 * i] && grid[2 * i + 1] && grid[2 * i] !== GRID_MAX && grid[2 * i + 1] !== GRID_MAX;
     const x = (i) => place.left + grid[2 * i] * sx, y = (i) => place.top + place.height - grid[2 * i + 1] * sy;
@@ -75,6 +77,7 @@ export class Overlay {
       context.arc(x(i), y(i), radius, 0, 2 * Math.PI);
     }
     context.fill();
+    this.drawn = drawMarksOf(context, frame.drawing ?? [], camera, colour("--text"));
   }
 }
 
