@@ -82,7 +82,9 @@ export class Own {
     box.className = "chart tall";
     canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label", `${name} over time`);
-    box.append(canvas);
+    const unseen = Object.assign(document.createElement("dt"), { className: "unseen", textContent: `${name}, curve` }), holder = document.createElement("dd");
+    holder.append(canvas);
+    box.append(unseen, holder);
     part.append(row, box);
     this.charts.set(name, { chart: new Chart(canvas, [colour]), text });
     return part;
