@@ -313,6 +313,43 @@ def test_what_a_hand_has_done_can_be_undone(page: Page, sketching: Start) -> Non
     mine.end()
 
 
+COLUMN = """
+import pyverlet as pv
+
+def build():
+    world = pv.World(boundary=pv.Box((0, 0), (1, 6)))
+    world.add(position=[(0.5, 0.5 + k) for k in range(4)], radius=0.5)
+    return world
+"""
+
+
+def test_forces_are_drawn_as_wide_as_they_are(page: Page, sketching: Start) -> None:
+    mine = sketching(COLUMN)
+    visit(page, mine.address)
+    page.get_by_test_id("theme").select_option("light")
+    page.get_by_test_id("forces").check()
+    assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.overlay.forces") == 4)  # three contacts, and the floor
+    script = """() => {
+        const canvas = document.querySelector("#overlay"), context = canvas.getContext("2d");
+        const ratio = canvas.width / canvas.clientWidth;
+        const wide = (y) => {
+            const [x0, top] = window.pyverlet.camera.toScreen(0, y), [x1] = window.pyverlet.camera.toScreen(1, y);
+            const { data } = context.getImageData(x0 * ratio, top * ratio, (x1 - x0) * ratio, 1);
+            return data.filter((v, k) => k % 4 == 3 && v > 128).length;
+        };
+        return [0.1, 1.0, 2.0, 3.0].map(wide);
+    }"""
+    # Below circle k hangs the weight of 4 - k: 4, 3, 2 and 1 of them.
+    assert comes_true(page, lambda: (found := page.evaluate(script))[0] > found[1] > found[2] > found[3] > 0)
+    page.get_by_test_id("forces").uncheck()
+    assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.overlay.forces") == 0)
+    page.get_by_test_id("colour").select_option("force")
+    assert comes_true(page, lambda: len({page.evaluate(f"() => window.pyverlet.ink({i})") for i in range(4)}) >= 3)
+    page.get_by_test_id("colour").select_option("group")
+    assert comes_true(page, lambda: len({page.evaluate(f"() => window.pyverlet.ink({i} >> 2)") for i in range(4)}) == 1)
+    mine.end()
+
+
 def test_two_on_one_port(sketching: Start, tmp_path: Path) -> None:
     mine = sketching(drops(3), "--watch")
     port = mine.address.rstrip("/").rpartition(":")[2]

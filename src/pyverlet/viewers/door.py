@@ -61,6 +61,10 @@ class Door(ABC):
         """
         self._audience.take(frame.seq, velocity=velocity)
 
+    def weigh(self, frame: Frame) -> None:
+        """Say that a viewer that has this frame looks at forces between circles."""
+        self._audience.weigh(frame.seq)
+
     def subscribe(self, listener: Callable[[], None]) -> Callable[[], None]:
         """Have `listener()` called on the physics thread after every new frame; it must return at once and not raise.
 

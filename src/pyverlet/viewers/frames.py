@@ -13,6 +13,8 @@ from pyverlet.kernels import wire
 from pyverlet.laws.rooms import Circle
 from pyverlet.picture.colour import USUAL_MULTIPLE
 from pyverlet.picture.pen import Drawing
+from pyverlet.viewers.forces import NONE as NO_CONTACTS
+from pyverlet.viewers.forces import Contacts
 from pyverlet.viewers.sketch import NOTHING, Sketch
 
 if TYPE_CHECKING:
@@ -27,6 +29,9 @@ GRID_MAX = 65535
 
 VELOCITY_MAX = 32767
 """Largest velocity component as a 16-bit number; the fastest circle has it."""
+
+PUSH_MULTIPLE = 6.0
+"""The hardest push that can be told, in terms of the mean."""
 
 VIEW_MARGIN = 0.03
 """Free space around the bounds, as a fraction of their longer side."""
@@ -174,6 +179,8 @@ class Frame:
     whose_moving: NDArray[np.int32] | None = None
     drawing: Drawing = ()
     """What the user's own function has drawn over it; of the frame before, between its substeps."""
+    contacts: Contacts = NO_CONTACTS
+    """Who pushes whom, where somebody looks at it; of a moment ago."""
 
     def moved(self, moment: Moment, seq: int, status: Status, *, velocity: bool) -> Frame:
         """The same a little later, between two substeps; its velocities are those of this frame unless they are asked for."""
@@ -203,6 +210,18 @@ class Frame:
         usual = USUAL_MULTIPLE * float(load.mean()) if len(load) else 0.0
         share = load * np.float32(255 / usual) if 0.0 < usual < np.inf else np.zeros_like(load)
         return np.asarray(np.clip(np.nan_to_num(share), 0, 255), dtype=np.uint8)
+
+    @cached_property
+    def push(self) -> tuple[NDArray[np.uint8], float]:
+        """(m,) how hard each contact pushes, in so many N: what is most is PUSH_MULTIPLE times the mean."""
+        force = self.contacts.force
+        unit = PUSH_MULTIPLE * float(force.mean()) / 255 if len(force) else 0.0
+        return np.asarray(np.clip(np.rint(force / np.float32(unit or 1.0)), 0, 255), np.uint8), unit
+
+    @cached_property
+    def lean(self) -> NDArray[np.uint8]:
+        """(m,) which way each contact's normal points, in 1/256 of a turn."""
+        return np.asarray(np.rint(self.contacts.angle * (128 / np.pi)).astype(np.int64).astype(np.uint8))
 
     @cached_property
     def grid(self) -> NDArray[np.uint16]:

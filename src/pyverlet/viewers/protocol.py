@@ -5,8 +5,9 @@
 - body, little-endian: of a shape n float32 radii, n float32 masses, n uint32 numbers, "apart" pairs of uint32, circles that do
   not collide, if "kinds" n pairs of uint32, category and mask, and if "coloured" n times three bytes R, G, B; of a frame n pairs
   of uint16 on the grid over "view", if the tab looks at velocities n pairs of int16 in units of "unit" m/s, of "links" two
-  uint32, who they join, each, and then a byte each, how hard they pull, and if "turned" n bytes, in 1/256 of a turn; of a picture
-  a JPEG.
+  uint32, who they join, each, and then a byte each, how hard they pull, if "turned" n bytes, in 1/256 of a turn, and of
+  "contacts" two uint32 each, then a byte each, how hard they push in units of "push" N, and a byte each, where the normal points;
+  of a picture a JPEG.
 """
 
 from __future__ import annotations
@@ -90,13 +91,14 @@ def decode(text: str, hand: int) -> Request:
     return maker(message, hand)
 
 
-def encode_frame(frame: Frame, part: Rect | None = None, *, velocity: bool = False) -> bytes:
+def encode_frame(frame: Frame, part: Rect | None = None, *, velocity: bool = False, force: bool = False) -> bytes:
     """A frame as one binary message.
 
     Args:
         frame: to encode.
         part: of the plane, metres; None is all that the camera shows.
         velocity: also send velocities.
+        force: also send who pushes whom.
     """
     grid = frame.grid if part is None else quantise(frame.position, part)
     head = _head("frame", frame, part)
@@ -110,6 +112,10 @@ def encode_frame(frame: Frame, part: Rect | None = None, *, velocity: bool = Fal
     if len(frame.turned):
         head["turned"] = True
         body += frame.turned.tobytes()
+    if force and len(frame.contacts.pairs):
+        push, head["push"] = frame.push
+        head["contacts"] = len(push)
+        body += frame.contacts.pairs.tobytes() + push.tobytes() + frame.lean.tobytes()
     return _join(head, body)
 
 
@@ -266,6 +272,7 @@ def _look(message: Mapping[str, Any]) -> Look:
         _text(message, "colour"),
         _flag(message, "dark"),
         _flag(message, "velocity"),
+        _flag({"force": False} | dict(message), "force"),
     )
 
 

@@ -152,6 +152,7 @@ class Session(Door):
         # With the frame before in mind: what is late by more than a picture is shown on its way.
         self._late = self._gauges.budget.last_ms * self._speed > 1000.0 * max(self._dt, PICTURE_S)
         self._before = self._stage.look()[0] if self._speed < 1.0 and not self._late else None
+        self._stage.forces.wanted = self._audience.looks_at_force(self._seq)
         try:
             self._stage.step(self._dt, self._look_on if self._late else None)
         except SketchError as error:
@@ -318,7 +319,7 @@ class Session(Door):
         position.flags.writeable = velocity.flags.writeable = False
         self._status = self._read()
         seen = (self._seq, self._shape, stage.layout.view, self._status, position, velocity, *stage.drawn())
-        return Frame(*seen, drawing=stage.drawing())
+        return Frame(*seen, drawing=stage.drawing(), contacts=stage.forces.now())
 
     def _read(self) -> Status:
         return self._gauges.read(

@@ -38,6 +38,7 @@ from pyverlet.viewers.commands import (
     Undo,
 )
 from pyverlet.viewers.exhibit import Exhibit
+from pyverlet.viewers.forces import Forces
 from pyverlet.viewers.frames import Camera, PanelShape, Shape, outline
 from pyverlet.viewers.hands import HandsOnPanels
 from pyverlet.viewers.history import History
@@ -61,7 +62,7 @@ class Stage:
         self.panels = exhibit.panels
         self.worlds = self.panels.worlds
         self.hands = HandsOnPanels(self.worlds)
-        self.history = History(self.panels)
+        self.history, self.forces = History(self.panels), Forces(self.worlds)
         self.complaint: str | None = None
         """What is wrong with the program, while the world goes on."""
         self._pinned = 0
@@ -111,7 +112,8 @@ class Stage:
         if len(self.worlds) == 1 and not any(obstacle.moves for obstacle in world.obstacles):
             world.onlooker = onlooker and partial(self._between, onlooker)
         try:
-            self.panels.step(dt)
+            with self.forces.look():
+                self.panels.step(dt)
         finally:
             world.onlooker = None
 

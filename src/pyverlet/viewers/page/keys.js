@@ -12,6 +12,7 @@ const SHORTCUTS = [
   [["c"], "next colouring", "colour"],
   [["v"], "velocities", "velocities"],
   [["t"], "contacts", "contacts"],
+  [["n"], "forces between circles", "forces"],
   [["+", "-"], "nearer, farther", "zoom", "repeats"],
   [["f"], "show all", "fit"],
   [["d"], "dark, light", "theme"],

@@ -7,6 +7,7 @@ import { GRID_MAX } from "./draw.js";
 import { drawMarksOf } from "./drawing.js";
 
 export const MOST_CONTACTS = 20000; // circles whose contacts are searched for: beyond, it would cost frames
+export const MOST_FORCES = 5000; // circles, see forces.py
 const LINK_PX = 1.6;
 const LOADS = 12; // shades that links are drawn in: a stroke for each
 const MARKED_PX = 4; // radius from which on a circle has a mark that shows how it has turned, as in pictures and films
@@ -21,13 +22,14 @@ export class Overlay {
     this.links = 0;
     this.arrows = 0;
     this.marks = 0;
+    this.forces = 0;
     this.drawn = 0; // marks of the user's own program
   }
 
   /** `wants`: {velocities, contacts}; `colour(name)` is that of a custom property. */
   draw(shape, frame, camera, size, ratio, wants, colour, dark) {
     const pinned = frame.grid ? pins(shape.mass) : [];
-    const busy = shape.lines.length || frame.obstacles.length || frame.links || frame.turned || frame.drawing?.length || pinned.length || wants.velocities || wants.contacts;
+    const busy = shape.lines.length || frame.obstacles.length || frame.links || frame.turned || frame.drawing?.length || pinned.length || wants.velocities || wants.contacts || wants.forces;
     this.contacts = this.arrows = this.links = this.marks = 0;
     if (!busy && this.clean) return;
     this.clean = this.canvas.hidden = !busy;
@@ -44,6 +46,7 @@ export class Overlay {
     const n = grid.length / 2;
     if (frame.turned) this.marks = drawMarks(context, frame.turned, shape.radius, camera.scale, { x, y, seen });
     this.links = drawLinks(context, frame, { x, y, seen }, dark);
+    this.forces = wants.forces ? drawForces(context, frame, shape.radius, camera.scale, { x, y, seen }, dark) : 0;
     context.beginPath();
     if (wants.contacts && n <= MOST_CONTACTS) {
       const xs = new Float64Array(n), ys = new Float64Array(n), rs = new Float64Array(n);
@@ -98,6 +101,33 @@ function drawLinks(context, { joined, strain }, at, dark) {
     }
     ink(context, shades[load], LINK_PX);
   }
+  return drawn;
+}
+
+/** Contacts as lines as wide as what pushes, through the middles of the circles; returns how many. */
+function drawForces(context, { touching, pushes, lean }, radius, scale, at, dark) {
+  if (!pushes?.length) return 0;
+  const shades = heat(LOADS, dark), groups = shades.map(() => []);
+  let usual = 0, drawn = 0;
+  for (let k = 0; k < pushes.length; k++) {
+    groups[(pushes[k] * LOADS) >> 8].push(k);
+    usual += radius[touching[2 * k]] / pushes.length;
+  }
+  context.lineCap = "round";
+  for (const [load, group] of groups.entries()) {
+    context.beginPath();
+    for (const k of group) {
+      const a = touching[2 * k], b = touching[2 * k + 1];
+      if (!at.seen(a) || !at.seen(b)) continue;
+      const angle = (lean[k] * Math.PI) / 128, reach = radius[a] * scale;
+      context.moveTo(at.x(a), at.y(a));
+      if (a === b) context.lineTo(at.x(a) + reach * Math.cos(angle), at.y(a) - reach * Math.sin(angle));
+      else context.lineTo(at.x(b), at.y(b));
+      drawn++;
+    }
+    ink(context, shades[load], Math.max(0.5, (1.6 * usual * scale * (load + 0.5)) / LOADS));
+  }
+  context.lineCap = "butt";
   return drawn;
 }
 

@@ -10,7 +10,7 @@ import { Controls } from "./controls.js";
 import { GRID_MAX } from "./draw.js";
 import { fillSheet, listen } from "./keys.js";
 import { Numbers } from "./numbers.js";
-import { MOST_CONTACTS, Overlay } from "./overlay.js";
+import { MOST_CONTACTS, MOST_FORCES, Overlay } from "./overlay.js";
 import { Own } from "./own.js";
 import { Panels } from "./panels.js";
 import { read, written } from "./permalink.js";
@@ -92,7 +92,9 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     panels.build(shape.panels);
     const pictures = shape.drawnHere && "Not drawn over pictures: of so many circles the server sends no more than these";
     offer("velocities", pictures);
-    offer("contacts", pictures || (shape.count > MOST_CONTACTS && `Drawn for at most ${MOST_CONTACTS} circles; here are ${shape.count}`));
+    const over = (most) => shape.count > most && `Drawn for at most ${most} circles; here are ${shape.count}`;
+    offer("contacts", pictures || over(MOST_CONTACTS));
+    offer("forces", pictures || (film && "A film does not know them") || over(MOST_FORCES));
     notice(shape.note);
     paint();
   }
@@ -102,7 +104,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     camera.fit();
     $("title").textContent = shape.title;
     if (address) document.title = `${shape.title} · pyverlet`;
-    for (const option of $("colour").options) option.disabled = option.value === "picture" && !shape.coloured;
+    for (const option of $("colour").options) option.disabled = (option.value === "picture" && !shape.coloured) || (option.value === "force" && Boolean(film || shape.count > MOST_FORCES));
     if (shape.coloured || $("colour").value === "picture") $("colour").value = shape.coloured ? "picture" : "order";
     controls.begin(shape);
     numbers.begin(shape);
@@ -156,7 +158,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
       camera.room = frame.room;
       if (!begun) arrive();
       if (before && frame.status.time < before.status.time) startOver();
-      if (frame.grid) inks.follow(frame.velocity, frame.unit, frame.status.time);
+      if (frame.grid) inks.follow(frame.velocity, frame.unit, frame.status.time), inks.weigh(frame);
       drawCircles();
       send("ack", { seq: frame.seq });
       numbers.count(frame.status, now);
@@ -186,7 +188,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     measure();
     circles.place(camera.place(frame.view));
     backdrop.draw(shape, camera, size(), ratio(), root.dataset.theme, colour);
-    overlay.draw(shape, frame, camera, size(), ratio(), { velocities: $("velocities").checked, contacts: $("contacts").checked }, colour, root.dataset.theme === "dark");
+    overlay.draw(shape, frame, camera, size(), ratio(), { velocities: $("velocities").checked, contacts: $("contacts").checked, forces: $("forces").checked }, colour, root.dataset.theme === "dark");
     panels.layout(camera.place(camera.room));
     capture.frame();
   }
@@ -226,6 +228,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
       colour: by,
       dark: dark(),
       velocity: !shape.drawnHere && (isLively(by) || $("velocities").checked),
+      force: !shape.drawnHere && $("forces").checked,
     };
     const text = JSON.stringify(wish);
     if (text === lookSent) return;
@@ -240,8 +243,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     const { number } = shape, ever = (number.at(-1) ?? 0) + 1; // circles keep their colours when others come and go
     inks.begin($("colour").value, shape, shape.panels.length ? (i) => panels.within(i) : (i) => [number[i], ever], dark());
     if (!frame) return;
-    if (frame.grid) inks.follow(frame.velocity, frame.unit, frame.status.time);
-    if (frame.grid) drawCircles();
+    if (frame.grid) inks.follow(frame.velocity, frame.unit, frame.status.time), inks.weigh(frame), drawCircles();
     refresh();
   }
 
@@ -312,6 +314,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     theme: () => (($("theme").value = dark() ? "light" : "dark"), $("theme").dispatchEvent(new Event("change"))),
     velocities: () => flip("velocities"),
     contacts: () => flip("contacts"),
+    forces: () => flip("forces"),
     zoom: (key) => (camera.zoom(key === "+" ? STEP_ZOOM : 1 / STEP_ZOOM, camera.free.left + camera.free.width / 2, camera.free.top + camera.free.height / 2), zoomed()),
     fit: () => (camera.fit(), zoomed()),
     async copy() {
@@ -344,7 +347,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
       numbersStale = true;
     });
   }
-  for (const id of ["velocities", "contacts"]) $(id).addEventListener("change", () => (refresh(), $(id).blur()));
+  for (const id of ["velocities", "contacts", "forces"]) $(id).addEventListener("change", () => (refresh(), $(id).blur()));
   for (const tool of tools()) tool.addEventListener("change", () => ((root.dataset.tool = tool.value), tool.blur()));
   $("sheet-close").addEventListener("click", () => $("sheet").close());
   fillSheet($("sheet").querySelector("tbody"), act, film);
