@@ -40,6 +40,10 @@ def test_all_of_it_is_within_reach(page: Page, program: Serve, size: tuple[int, 
             assert box["x"] >= 0
             assert box["x"] + box["width"] <= size[0]
 
+    page.get_by_test_id("help").click()
+    assert page.get_by_test_id("sheet").evaluate("(sheet) => sheet.scrollWidth - sheet.clientWidth") == 0
+    page.keyboard.press("Escape")
+
     # Everything that can be used can be tabbed to, and has a name.
     usable = "aside button:visible:enabled, aside select:visible, aside input:visible, aside summary:visible"
     wanted = set(page.locator(usable).evaluate_all("(all) => all.map((each) => each.id || each.value || each.textContent)"))

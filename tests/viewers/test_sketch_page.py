@@ -189,6 +189,22 @@ def test_one_that_loops_for_ever_is_told_of(page: Page, sketching: Start) -> Non
     mine.end()
 
 
+@pytest.mark.slow
+def test_modules_beside_it_are_watched_and_bring_no_change_of_their_own(page: Page, sketching: Start, tmp_path: Path) -> None:
+    beside = tmp_path / "many_beside.py"
+    beside.write_text("MANY = 4\n", encoding="utf-8")
+    mine = sketching(drops(5), "--watch")
+    visit(page, mine.address)
+    mine.save("import many_beside\n" + drops(5).replace("particles=5", "particles=many_beside.MANY"))
+    assert has(page, 4)
+    page.wait_for_timeout(700)  # some looks at the files: that there is one more is no reason to begin anew
+    assert comes_true(page, lambda: number(page, "time") > 0.4)
+    beside.write_text("MANY = 6  # more\n", encoding="utf-8")
+    assert has(page, 6)
+    mine.end()
+
+
+@pytest.mark.slow
 def test_one_that_is_wrong_from_the_start_comes_when_it_is_mended(page: Page, sketching: Start) -> None:
     mine = sketching("import nothing_of_that_name\n", "--watch")
     page.goto(mine.address)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -28,7 +29,8 @@ SAY_S = 1.0
 PATIENCE_S = 10.0
 """A sketch that is not done by then is given up; see --patience."""
 
-Stamp = tuple[tuple[int, int], ...]
+Stamp = tuple[int, int]
+"""When a file was saved, and how large it is."""
 
 
 class Workshop:
@@ -83,19 +85,18 @@ class Workshop:
         built = self.build()
         return built if built else Exhibit(self.path.stem, Panels([Panel("", World())]))
 
-    @property
-    def stamp(self) -> Stamp:
-        """Changes when one of the sketch's files is saved."""
+    def stamps(self) -> dict[Path, Stamp]:
+        """Of the sketch's files as they are now; without those that are not there, or still empty: they are being saved."""
         files = self._sketch.files if self._sketch else [self.path]
-        return tuple(sorted({_stamp(file) for file in files}))
+        return {file: stamp for file in files if (stamp := _stamp(file))}
 
 
-def _stamp(file: Path) -> tuple[int, int]:
+def _stamp(file: Path) -> Stamp | None:
     try:
         found = file.stat()
     except OSError:  # some editors take the old one away first
-        return 0, 0
-    return found.st_mtime_ns, found.st_size
+        return None
+    return (found.st_mtime_ns, found.st_size) if found.st_size else None
 
 
 class Watcher:
@@ -110,6 +111,7 @@ class Watcher:
         self._workshop, self._session = workshop, session
         self._ended = threading.Event()
         self._builder: threading.Thread | None = None
+        self._lock, self._interruptible = threading.Lock(), False
         self._turn = 0
 
     @contextmanager
@@ -126,41 +128,44 @@ class Watcher:
             thread.join(10 * LOOK_S)
 
     def _look(self) -> None:
-        known, began = self._workshop.stamp, 0.0
+        known, began = self._workshop.stamps(), 0.0
         while not self._ended.wait(LOOK_S):
-            now = self._workshop.stamp
-            if now != known and (0, 0) not in now:
-                known, began = now, time.monotonic()
+            now = self._workshop.stamps()
+            if any(known[file] != stamp for file, stamp in now.items() if file in known):
+                began = time.monotonic()
                 self._build()
+            known |= now  # files that a build has brought along are news, but no change
             building = self._builder is not None and self._builder.is_alive()
             if building and began and time.monotonic() - began > SAY_S:
                 self._session.tell(complaint=self._workshop.fault, busy=f"building {self._workshop.path.name}")
                 began = 0.0
-            if not building:
-                known = self._known_after(known, now)
-
-    def _known_after(self, known: Stamp, now: Stamp) -> Stamp:
-        """A sketch that was run may have brought files with it that were not watched before."""
-        return known if len(known) == len(self._workshop.stamp) else self._workshop.stamp if known == now else known
 
     def _build(self) -> None:
-        if self._builder is not None:
-            interrupt(self._builder)  # what it builds is old
+        with self._lock:
+            if self._interruptible and self._builder is not None:
+                interrupt(self._builder)  # what it builds is old
         self._turn += 1
         self._builder = threading.Thread(target=self._put_on, args=(self._turn,), name="pyverlet-build", daemon=True)
         self._builder.start()
 
     def _put_on(self, turn: int) -> None:
-        try:
-            built = self._workshop.build()
+        with contextlib.suppress(TooLong):
+            self._interruptible = True
+            try:
+                built = self._workshop.build()
+            finally:
+                with self._lock:
+                    self._interruptible = False
+            fault = self._workshop.fault
             if built:
-                for world in built.panels.worlds:
-                    warm_up(world)  # so that the world before goes on meanwhile
-        except TooLong:
-            return
-        if turn != self._turn:
-            return
-        if built:
-            self._session.put_on(built)
-        else:
-            self._session.tell(complaint=self._workshop.fault)
+                try:
+                    for world in built.panels.worlds:
+                        warm_up(world)  # so that the world before goes on meanwhile
+                except PyverletError as error:  # such as a force that does not compile
+                    built, fault = None, str(error)
+            if turn != self._turn:
+                return
+            if built:
+                self._session.put_on(built)
+            else:
+                self._session.tell(complaint=fault)
