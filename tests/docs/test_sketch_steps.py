@@ -95,7 +95,7 @@ def test_every_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
         watched.end()
         browser.close()
     assert errors == []
-    shown = Image.open(ROOT / "docs" / "images" / "sketch.png")
-    assert shown.size == Image.open(tmp_path / "mysketch.png").size
+    with Image.open(ROOT / "docs" / "images" / "sketch.png") as shown, Image.open(tmp_path / "mysketch.png") as made:
+        assert shown.size == made.size
     assert (tmp_path / "mysketch.html").stat().st_size > 10_000
     assert (tmp_path / "study" / "table.csv").exists()

@@ -256,7 +256,8 @@ def test_a_still_picture_and_a_film_are_saved(page: Page, sketching: Start, tmp_
         page.get_by_test_id("still").click()
     saved.value.save_as(tmp_path / "still.png")
     assert saved.value.suggested_filename == "mine.png"
-    pixels = np.asarray(Image.open(tmp_path / "still.png").convert("RGB"))
+    with Image.open(tmp_path / "still.png") as still:
+        pixels = np.asarray(still.convert("RGB"))
     assert pixels.shape == (480, 800, 3)
     assert len(np.unique(pixels.reshape(-1, 3), axis=0)) > 20  # the ground, the room, circles, a drawing
     red = (pixels[..., 0] > 200) & (pixels[..., 1:] < 60).all(axis=-1)
