@@ -21,6 +21,7 @@ from pyverlet.ground.errors import InputError, PyverletError
 from pyverlet.ground.progress import Progress
 from pyverlet.laws.integrators import BY_NAME
 from pyverlet.scenes import report
+from pyverlet.scenes.sketch import SketchScene
 
 __all__ = ["app"]
 
@@ -41,6 +42,14 @@ def _counts(text: str) -> list[int]:
     if twice := [count for count in counts if counts.count(count) > 1]:
         raise InputError(f"substeps names {twice[0]} twice; allowed is each once")
     return counts
+
+
+def _own_precision(scene: scenes.Scene) -> dict[str, None]:
+    """No dtype for a sketch that takes none: its world is compared as it is built, and that is said."""
+    if not isinstance(scene, SketchScene) or scene.takes("dtype"):
+        return {}
+    out.note(f"{scene.name} is compared in the precision it is built with, since its build() takes no dtype")
+    return {"dtype": None}
 
 
 @app.command()
@@ -68,7 +77,7 @@ def compare(
     if plot is not None:
         figures.check_can_plot(plot)
     with Progress("frame") as progress:
-        runs = lab.compare(chosen, methods, counts, frames=frames, dt=dt, progress=progress)
+        runs = lab.compare(chosen, methods, counts, frames=frames, dt=dt, progress=progress, **_own_precision(chosen))
     if plot is not None:
         from pyverlet.lab.comparison_figure import figure
 

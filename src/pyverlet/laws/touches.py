@@ -9,7 +9,7 @@ lines of contact: pushes only, the smallest that explain what each has got. A so
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,25 @@ _SWEEPS = 300
 
 _STAGES = {"contacts": 0, "velocities": 0, "bounds": 1, "obstacles": 2}
 """Whose doing it is when a stage has changed velocities: circles', the room's, obstacles'."""
+
+
+class Noted(NamedTuple):
+    """What is known of a frame, by the order of the user's particles in it."""
+
+    number: Array
+    """(n,) what each is called."""
+    position: Floats
+    """(n, 2) m."""
+    radius: Floats
+    """(n,) m."""
+    free: NDArray[np.bool_]
+    """(n,) not pinned."""
+    got: Floats
+    """(3, n, 2) N s, what circles, walls and obstacles have given to each."""
+    pairs: Array
+    """(k, 2) that may touch."""
+    dt: float
+    """s, of the frame."""
 
 
 class Touches:
@@ -116,6 +135,13 @@ class Touches:
         found = self.array_of_then()
         mine = found[found["obstacle"] == self._end.number_of(what)]
         return np.asarray(vectors(mine).sum(axis=0) / self._end.dt)
+
+    def noted(self) -> Noted | None:
+        """What was noted of the last frame, before anything is made of it; None if there was no frame."""
+        end = self._end
+        if end is None:
+            return None
+        return Noted(end._numbers, end._position, end._radius, end._free, end.given, end._pairs, end.dt)
 
     def array_of_then(self) -> Array:
         """TOUCH by the indices of then."""

@@ -8,7 +8,7 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,9 @@ from pyverlet.laws.integrators import Integrator, PositionVerlet
 from pyverlet.scenes._graph import Gauge
 from pyverlet.world.panels import Pace, Panel, Panels, every_frame
 from pyverlet.world.world import World
+
+if TYPE_CHECKING:
+    from pyverlet.scenes.sketch import Sketch
 
 Floats = NDArray[np.float64]
 
@@ -138,6 +141,7 @@ class Scene:
         variants: the worlds it shows side by side; empty for one world.
         line: height in metres of a line drawn across the scene.
         document: what the file says that the scene was read from; None for scenes with a name.
+        sketch: the Python file it was read from; None for all others.
     """
 
     name: str
@@ -149,6 +153,7 @@ class Scene:
     variants: tuple[Variant, ...] = ()
     line: float | None = None
     document: dict[str, Any] | None = None
+    sketch: Sketch | None = None
 
     @property
     def description(self) -> str:

@@ -140,7 +140,9 @@ class Artist:
             name = "order"
         if self._colouring_of != (name, shape):
             self._colouring_of = (name, shape)
-            self._colouring = Fixed(shape.colours) if shape.colours is not None and name == "picture" else COLOURINGS[name]()
+            own = shape.colours if name == "picture" else None
+            # Forces are not worked out for so many.
+            self._colouring = COLOURINGS.get(name, ByOrigin)() if own is None else Fixed(own)
             self._still = None
         # Most say the same in every frame. Velocities have to be sorted, which takes as long as all the drawing.
         if name in ("speed", "energy") or self._still is None or self._still[0] is not theme:

@@ -13,8 +13,11 @@ from pyverlet.kernels import wire
 from pyverlet.laws.rooms import Circle
 from pyverlet.picture import across
 from pyverlet.picture.colour import USUAL_MULTIPLE
+from pyverlet.picture.pen import Drawing
 from pyverlet.scenes._graph import Graph
 from pyverlet.state.seam import Seam
+from pyverlet.viewers.forces import NONE as NO_CONTACTS
+from pyverlet.viewers.forces import Contacts
 from pyverlet.viewers.sketch import NOTHING, Sketch
 
 if TYPE_CHECKING:
@@ -29,6 +32,9 @@ GRID_MAX = 65535
 
 VELOCITY_MAX = 32767
 """Largest velocity component as a 16-bit number; the fastest circle has it."""
+
+PUSH_MULTIPLE = 6.0
+"""The hardest push that can be told, in terms of the mean."""
 
 VIEW_MARGIN = 0.03
 """Free space around the bounds, as a fraction of their longer side."""
@@ -84,6 +90,10 @@ class Shape:
     """Name of the scene, or "" for worlds of the user's own."""
     scenes: tuple[tuple[str, str], ...]
     """Name and one line of each scene that can be picked; empty where none can."""
+    answers: tuple[str, ...]
+    """Of "keys" and "click", what the user's own program wants to know of."""
+    countable: bool
+    """Whether another number of circles can be asked for."""
     radius: NDArray[np.float32]
     """(n,) metres, read-only."""
     mass: NDArray[np.float32]
@@ -141,6 +151,14 @@ class Status:
     error: str | None
     graph: Graph | None = None
     """What the scene measures, beside a curve."""
+    complaint: str | None = None
+    """What is wrong with a sketch, while the world goes on."""
+    sliders: tuple[tuple[str, float, float, float, float], ...] = ()
+    """Name, ends, step and value of each slider that the program has made."""
+    watched: dict[str, float] = field(default_factory=dict)
+    """What is drawn beside the energy."""
+    undo: tuple[int, int] = (0, 0)
+    """How often one can undo, and redo."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,6 +184,10 @@ class Frame:
     whose: NDArray[np.int32] | None = None
     """(n,) which particle each row is of, between the substeps of a frame; None: row k is particle k."""
     whose_moving: NDArray[np.int32] | None = None
+    drawing: Drawing = ()
+    """What the user's own function has drawn over it; of the frame before, between its substeps."""
+    contacts: Contacts = NO_CONTACTS
+    """Who pushes whom, where somebody looks at it; of a moment ago."""
 
     def moved(self, moment: Moment, seq: int, status: Status, *, velocity: bool) -> Frame:
         """The same a little later, between two substeps; its velocities are those of this frame unless they are asked for."""
@@ -195,6 +217,18 @@ class Frame:
         usual = USUAL_MULTIPLE * float(load.mean()) if len(load) else 0.0
         share = load * np.float32(255 / usual) if 0.0 < usual < np.inf else np.zeros_like(load)
         return np.asarray(np.clip(np.nan_to_num(share), 0, 255), dtype=np.uint8)
+
+    @cached_property
+    def push(self) -> tuple[NDArray[np.uint8], float]:
+        """(m,) how hard each contact pushes, in so many N: what is most is PUSH_MULTIPLE times the mean."""
+        force = self.contacts.force
+        unit = PUSH_MULTIPLE * float(force.mean()) / 255 if len(force) else 0.0
+        return np.asarray(np.clip(np.rint(force / np.float32(unit or 1.0)), 0, 255), np.uint8), unit
+
+    @cached_property
+    def lean(self) -> NDArray[np.uint8]:
+        """(m,) which way each contact's normal points, in 1/256 of a turn."""
+        return np.asarray(np.rint(self.contacts.angle * (128 / np.pi)).astype(np.int64).astype(np.uint8))
 
     @cached_property
     def grid(self) -> NDArray[np.uint16]:

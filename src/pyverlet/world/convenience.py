@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
+from pyverlet.world.watched import Watched
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
 
 
-class Doors:
+class Doors(Watched):
     """What a world offers besides physics. Nothing is loaded before it is asked for."""
 
     def run(self: World, *, seconds: float, dt: float = 1 / 60) -> None:  # type: ignore[misc]

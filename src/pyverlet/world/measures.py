@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -144,6 +145,16 @@ class Measures(Particles):
         if self._touches is None:
             raise InputError("contacts are off in this world; allowed is a world built with World(contacts=True)")
         return self._touches
+
+    @contextmanager
+    def noting_contacts(self) -> Iterator[Touches]:
+        """Frames meanwhile note contacts, as those of a world built with World(contacts=True) do; what is there to read them."""
+        before = self._touches
+        self._touches = Touches() if before is None else before
+        try:
+            yield self._touches
+        finally:
+            self._touches = before
 
     def _listen(self, h: float, told: Callable[[str], None]) -> Callable[[str], None]:
         """Who is told of the stages of a frame: `told`, and before it those who note contacts."""

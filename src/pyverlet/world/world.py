@@ -36,6 +36,7 @@ from pyverlet.world.queries import Queries
 from pyverlet.world.saved import Saved
 from pyverlet.world.substeps import Substeps
 from pyverlet.world.team import Team
+from pyverlet.world.turns import in_turn
 
 Array = NDArray[Any]
 
@@ -90,18 +91,15 @@ class World(Measures, Queries, Doors):
         self._state = State(checks.floating("dtype", dtype))
         self._h_last: float | None = None  # substep of the frame before; None: the integrator starts anew
         self._slots = Slots(self._state.dtype, sleeps=sleep)
-        self.links = Links(self._state)
+        self.links, self.forces, self.obstacles = Links(self._state), ForceList(), Obstacles()
         self._events, self._touches = Events() if events else None, Touches() if contacts else None
         self._sleep = Sleep() if sleep else None
-        self.forces = ForceList()
         self._force_sum, self.actors = ForceSum(checks.vector("gravity", gravity), self.forces), list[Actor]()
-        self.obstacles = Obstacles()
         self._course = Course(self.obstacles)
         self.integrator = PositionVerlet() if integrator is None else integrator
         self.boundary = Open() if boundary is None else boundary
-        self.collisions = collisions
-        self.substeps = substeps
-        self.threads, self.time, self.frames = threads, 0.0, 0
+        self.collisions, self.substeps, self.threads = collisions, substeps, threads
+        self.time, self.frames = 0.0, 0
         self.profile, self._books = Profile(), Bookkeeper() if ledger else None
         self._run, self._coarse, self._team = Substeps(), Coarse(), Team()
         self.onlooker: Callable[[Moment], None] | None = None
@@ -109,6 +107,7 @@ class World(Measures, Queries, Doors):
 
     # ---- one frame -----------------------------------------------------------------------------------------------------
 
+    @in_turn
     def step(self, dt: float) -> None:
         """Advance by one frame of dt seconds, in `substeps` steps of h = dt / substeps.
 
@@ -352,6 +351,7 @@ class World(Measures, Queries, Doors):
 
     # ---- save and restore ----------------------------------------------------------------------------------------------
 
+    @in_turn
     def save(self) -> Saved:
         """A copy of everything that moves; `restore` continues from it with the same bits."""
         return Saved(
@@ -370,6 +370,7 @@ class World(Measures, Queries, Doors):
             links=self.links.save(),
         )
 
+    @in_turn
     def restore(self, saved: Saved) -> None:
         """Go back to what `save` returned, with the particles of then: groups added since are dead, removed ones live again.
 

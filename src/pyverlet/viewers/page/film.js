@@ -5,7 +5,7 @@ import { message, Reel } from "./reel.js";
 import { tell } from "./text.js";
 
 const JUMP_S = 1; // of the arrow keys
-const ABSENT = { weightless: null, tool: null, copy: null }; // what is done to a world, or with a server
+const ABSENT = { weightless: null, tool: null, copy: null, undo: null, redo: null }; // what is done to a world, or with a server
 const FASTER = [2, 4, 8]; // times real time
 
 /** Plays a reel: where it is, how fast it goes, and what it tells the page. */

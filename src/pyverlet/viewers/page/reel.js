@@ -116,7 +116,7 @@ export function message({ chunk, row }, seq, part, after, share, shape) {
   const coarse = Math.ceil(most / SHORT), velocity = Int16Array.from(units, (value) => value / coarse);
   const time = head.status.time + between * (between && after.chunk.frames[after.row].status.time - head.status.time);
   return {
-    kind: "frame", seq, view: part ?? head.room, room: head.room, obstacles: head.obstacles, status: { ...head.status, time },
+    kind: "frame", seq, view: part ?? head.room, room: head.room, obstacles: head.obstacles, drawing: head.drawing, status: { ...head.status, time },
     grid, copies, velocity, unit: unit * coarse, links: head.links, joined: head.pairs, strain: head.strain,
   };
 }
