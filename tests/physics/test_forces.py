@@ -47,6 +47,20 @@ def test_linear_drag_slows_exponentially() -> None:
     assert ball.velocity[0] == pytest.approx(np.array([4, -3]) * np.exp(-2.0), abs=5 * (2 * H) ** 2)
 
 
+@pytest.mark.parametrize("integrator", [pv.SemiImplicitEuler(), pv.PositionVerlet(), pv.VelocityVerlet()], ids=repr)
+def test_resistance_stiffer_than_a_substep_turns_nobody_round(integrator: pv.Integrator) -> None:
+    # c |v| h / m = 2 * 1000 * (1/120) / 1e-3 = 16,667: so many times as fast c v^2 for a whole substep would throw it back.
+    world = pv.World(gravity=(0, 0), integrator=integrator, substeps=8)
+    ball = world.add(position=(0, 0), velocity=(1000.0, 0.0), radius=0.1, mass=1e-3)
+    world.forces.append(pv.Drag(quadratic=2.0))
+    speed = 1000.0
+    for _ in range(20):
+        world.step(1 / 15)
+        assert -1e-3 <= ball.velocity[0, 0] <= speed
+        speed = float(ball.velocity[0, 0])
+    assert speed < 0.03  # where c v h / m = 1/2 the law itself takes over; by then v0 / (1 + c v0 t / m) = 4e-4
+
+
 def test_quadratic_drag_slows_as_one_over_t() -> None:
     # v = v0 / (1 + c v0 t / m)
     world = lone_world(pv.Drag(quadratic=0.3))

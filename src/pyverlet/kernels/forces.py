@@ -15,14 +15,20 @@ _BLOCK = 4096
 
 
 @kernel
-def drag(force, velocity, wind, linear, quadratic):
-    """F = -(linear + quadratic |u|) u with u = v - wind; `wind` has a row for each particle, or one for all."""
-    many = wind.shape[0] > 1
+def drag(force, velocity, wind, inverse_mass, linear, quadratic, h):
+    """F = -(linear + quadratic |u|) u with u = v - wind; `wind` has a row for each particle, or one for all.
+
+    No more than m u / 2 h, which takes half of u in a substep of h seconds: resistance turns nobody round. With m u / h
+    integrators of Stormer's kind, which reckon with the acceleration of the substep before, swing for ever.
+    """
+    many, half = wind.shape[0] > 1, force.dtype.type(0.5)
     for i in range(velocity.shape[0]):
         k = i if many else 0
         ux = velocity[i, 0] - wind[k, 0]
         uy = velocity[i, 1] - wind[k, 1]
         c = linear + quadratic * np.sqrt(ux * ux + uy * uy)
+        if c * inverse_mass[i] * h > half:
+            c = half / (inverse_mass[i] * h)
         force[i, 0] -= c * ux
         force[i, 1] -= c * uy
 

@@ -154,7 +154,7 @@ class Slots:
         turn, lift: empty unless circles rub each other: (n,) rad by which each turns in this substep, and (n,) s; times -a that
             is the velocity with which circles at rest against others end a substep, for others 0.
         along: (n, 2) m/s^2, the acceleration left to circles that an obstacle holds, for others 0; empty without obstacles.
-        drop: a circle at rest falls drop * a h^2 in a substep; depends on the integrator.
+        drop: a circle at rest falls drop * a h^2 in a substep of h seconds; depends on the integrator.
         fed: (n,) bits: CARRIES where a contact at rest fed the velocity in the last substep, AT_WALL where a wall was touched
             in it, CARRIED and WAS_AT_WALL the same in the one before. Kept only if circles bounce.
         island, calm: (n,) number of a sleeper's island, -1 if awake, and s it has been calm; empty where nobody may sleep.
@@ -174,6 +174,7 @@ class Slots:
         self.reals = lru_cache(64)(lambda *numbers: tuple(map(dtype.type, numbers)))
         self._kept: dict[str, Array] = {}
         self.drop, self.lean, self.total_mass, self.taken, self.worked, self.given = 1.0, 0.0, 0.0, 0.0, 0.0, 0
+        self.h = 0.0
         self.claims = Claims()
         self._resize(0)
 

@@ -130,7 +130,7 @@ class World(Measures, Queries, Doors):
         """The table of contents of the engine. `done` is called with the name of each stage as it ends."""
         state, forces, integrator = self._slots, self._force_sum, self.integrator
         contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course or None
-        lag, state.drop, run = integrator.velocity_lag * h, integrator.drop, self._run.begin(contacts)
+        lag, state.drop, state.h, run = integrator.velocity_lag * h, integrator.drop, h, self._run.begin(contacts)
         parts: list[Any] = [part for part in (contacts, links, course) if part]
         compiled = contacts and not (links or course) and done == self.profile.mark
         if not self._open(h, done):

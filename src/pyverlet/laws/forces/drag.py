@@ -17,7 +17,7 @@ Field = Callable[[NDArray[Any], NDArray[Any], float], Any]
 
 
 class Drag:
-    """Resistance of a medium at rest: F = -(linear + quadratic |v|) v.
+    """Resistance of a medium at rest: F = -(linear + quadratic |v|) v, and no more than takes half of v in a substep.
 
     A fall ends at m g / linear or at sqrt(m g / quadratic), m/s.
 
@@ -35,7 +35,7 @@ class Drag:
 
     def apply(self, state: Slots, t: float) -> None:
         wind = self._wind(state, t)
-        forces.drag(state.force, state.velocity, wind, state.real(self.linear), state.real(self.quadratic))
+        forces.drag(state.force, state.velocity, wind, state.inverse_mass, *state.reals(self.linear, self.quadratic, state.h))
 
     def _wind(self, state: Slots, t: float) -> NDArray[Any]:
         return np.zeros((1, 2), state.dtype)
