@@ -18,14 +18,20 @@ from pyverlet.world.world import World
 
 QUICK, ALL = 24, 300
 
-OPEN = ("links", "finite")
-"""Checks that fail in worlds with links: energy that soft ones bring (seeds 48, 61, 98), a cloth beside drag (41)."""
+OPEN = ("links",)
+"""A check that fails in worlds with links: energy that soft ones bring (seeds 43, 48, 61, 98)."""
 
 
 @pytest.mark.parametrize("seed", range(0, QUICK, 8))
 def test_some_random_worlds(seed: int) -> None:
     for finding in fuzz.fuzz(8, seed, small=False, without=OPEN):
         assert finding.check is None, f"seed {finding.seed}: {finding.check}"
+
+
+@pytest.mark.parametrize("seed", [41, 168])  # light circles beside drag stiffer than a substep
+def test_seeds_that_once_failed(seed: int) -> None:
+    (finding,) = fuzz.fuzz(1, seed, small=False, without=OPEN)
+    assert finding.check is None, finding.check
 
 
 @pytest.mark.slow
