@@ -115,9 +115,10 @@ def test_a_gas_that_begins_with_equal_speeds_has_maxwells_in_the_end() -> None:
         graph = gauge(world)
     square = (world.velocity.astype(float) ** 2).sum(axis=1)
     assert stats.kstest(square / square.mean(), "expon").pvalue > 0.01
-    # 600 circles, new speeds some eight times in two seconds, and f / 8 of them in a bar: 0.04 is the standard deviation.
+    # 600 circles, new speeds some eight times in two seconds, and f / 8 of them in a bar: 0.04 is the standard deviation,
+    # and of 30 bars one is off by four of them once in 500 runs.
     x = (np.arange(gas.BARS) + 0.5) * gas.MOST / gas.BARS
-    assert np.abs(np.array(graph.bars) - 2 * x * np.exp(-(x**2))).max() < 0.15
+    assert np.abs(np.array(graph.bars) - 2 * x * np.exp(-(x**2))).max() < 0.2
     assert float(graph.note.split("=")[1].split(";")[0]) == pytest.approx(gas.henderson(gas.AREA_FRACTION), rel=0.05)
 
 

@@ -39,6 +39,7 @@ def scale(out, factor):
         out[i] *= factor
 
 fill_alone = fill.alone
+numba.get_num_threads()  # starts the pool: code from the disk that asks which thread it is crashes without one
 
 @driver
 def inner(out, who, value):

@@ -235,6 +235,8 @@ class Kernel:
                 result = dispatcher(*arguments)
             except numba.core.errors.NumbaError:
                 raise
+            except OSError:  # it is compiled, and could not be kept: the disk is full, say
+                result = dispatcher(*arguments)
             except Exception:
                 if not _distrust(variant):
                     raise

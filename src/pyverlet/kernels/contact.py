@@ -69,7 +69,7 @@ def _push_strip(s, to, circles, pairs, law, looks):
         mu = zero
         if BOUNCES:
             e, mu = load(pairs.made_of[E], at), load(pairs.made_of[MU], at)
-            live = which_above(e + mu, zero)
+            live = which_above(e + spread(law.grazes) * mu, zero)
             if live != 0 or law.listens != 0:
                 vxi, vyi = take(circles.velocity, lane_i, k)
                 vxj, vyj = take(circles.velocity, lane_j, k)

@@ -82,7 +82,8 @@ class Law(NamedTuple):
     becomes of `moved` is to be added to positions and velocities when all pairs have been gone through, 0 if the room does that;
     always 1 where `asks`. feed: FED / PUSHED / h, 1/s. most: the largest part of the contact distance that a push may see.
     deep: likewise, from which on an overlap is treated again.
-    weight: whether an acceleration could stop a pair that parts. carried: m/s, by which a substep feeds the velocity of one that
+    grazes: 1 if a pair without restitution may be an impact, for friction's
+    sake, 0 where inertia is lent. weight: whether an acceleration could stop a pair that parts. carried: m/s, by which a substep feeds the velocity of one that
     carries weight.
     """
 
@@ -99,5 +100,6 @@ class Law(NamedTuple):
     most: Any
     deep: Any
     rest_speed: Any
+    grazes: Any
     weight: Any
     carried: Any

@@ -37,5 +37,5 @@ class Coarse:
                 f"particle {most} moves by {way[most]:.2g} of its radius in a substep, and all by {mean:.2g} (root mean square): "
                 f"a gas loses pressure beyond {GAS_STEP:g}; allowed are substeps of at least {needed}",
                 CoarseStepWarning,
-                stacklevel=4,  # who has called World.step
+                stacklevel=5,  # who has called World.step, which waits for its turn
             )

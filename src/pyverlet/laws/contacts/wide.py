@@ -219,7 +219,7 @@ class Wide:
         carried = CARRIED_WEIGHT * strongest * h if strongest > 0 else np.inf
         self.law = (
             self._varied, self._mixed, int(self.asks), int(self.rubs), int(self._listens), int(accounts or self.weighs),
-            1, *state.reals(h, lag, FED / PUSHED / h, LARGEST_PUSH, DEEP_LENT if lent else DEEP, rest_speed), int(strongest > 0),
+            1, *state.reals(h, lag, FED / PUSHED / h, LARGEST_PUSH, DEEP_LENT if lent else DEEP, rest_speed, 0.0 if lent else 1.0), int(strongest > 0),
             state.real(carried),
         )  # fmt: skip
         self.arrays = (
