@@ -83,8 +83,8 @@ class Law(NamedTuple):
     always 1 where `asks`. feed: FED / PUSHED / h, 1/s. most: the largest part of the contact distance that a push may see.
     deep: likewise, from which on an overlap is treated again.
     grazes: 1 if a pair without restitution may be an impact, for friction's
-    sake, 0 where inertia is lent. weight: whether an acceleration could stop a pair that parts. carried: m/s, by which a substep feeds the velocity of one that
-    carries weight.
+    sake, 0 where inertia is lent. weight: whether an acceleration could stop a pair that parts. carried: m/s, by which a substep
+    feeds the velocity of one that carries weight.
     """
 
     varied: Any

@@ -217,9 +217,10 @@ class Wide:
             state.radius, state.restitution, state.friction, state.hits, state.spent, *(lent.noted if lent else self._nobody),
         )  # fmt: skip
         carried = CARRIED_WEIGHT * strongest * h if strongest > 0 else np.inf
+        deep, grazes = (DEEP_LENT, 0.0) if lent else (DEEP, 1.0)
         self.law = (
             self._varied, self._mixed, int(self.asks), int(self.rubs), int(self._listens), int(accounts or self.weighs),
-            1, *state.reals(h, lag, FED / PUSHED / h, LARGEST_PUSH, DEEP_LENT if lent else DEEP, rest_speed, 0.0 if lent else 1.0), int(strongest > 0),
+            1, *state.reals(h, lag, FED / PUSHED / h, LARGEST_PUSH, deep, rest_speed, grazes), int(strongest > 0),
             state.real(carried),
         )  # fmt: skip
         self.arrays = (
