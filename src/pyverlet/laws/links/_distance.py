@@ -12,7 +12,7 @@ from pyverlet.kernels import shapes
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import Floats, Link, several, stiffness_of
 from pyverlet.laws.links._pool import Pool
-from pyverlet.laws.links._rows import ChainPool
+from pyverlet.laws.links._chains import ChainPool
 
 
 class Distance(Link):
@@ -62,7 +62,7 @@ class Distance(Link):
         return shapes.distance
 
     def _new_pool(self) -> Pool:
-        return ChainPool(shapes.distance, turn=0)
+        return ChainPool(turn=0)
 
     def _columns(self) -> dict[str, Any]:
         return {

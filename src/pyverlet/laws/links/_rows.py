@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from pyverlet.ground.constants import LINK_COLOURS
-from pyverlet.kernels import chains, links, runs
+from pyverlet.kernels import links, runs
 from pyverlet.laws.links._link import Array
 from pyverlet.laws.links._pool import MOVING, Pool
 from pyverlet.laws.links._work import Work
@@ -138,43 +138,17 @@ class RowPool(Pool):
     def stored(self, position: Array) -> float:
         row, soft, value = self._row, self._soft, self._soft_value
         self.measure(position, *self._soft_rows, value, self._soft_gradient, self._soft_bend)
-        return _stored(row["stiffness"][soft], row["upper"][soft], row["intact"][soft], value)
+        return stored_in(row["stiffness"][soft], row["upper"][soft], row["intact"][soft], value)
 
     def energy(self, position: Array) -> float:
         rows, first, particle = self.rows, self.first, self.entries["particle"]
         value, bend, gradient = np.empty(len(rows)), np.empty(len(rows)), np.empty((len(particle), 2))
         self.measure(position, first, particle, rows["rest"], 0, len(rows), value, gradient, bend)
         soft = np.isfinite(rows["stiffness"])
-        return _stored(rows["stiffness"][soft], rows["upper"][soft], rows["intact"][soft], value[soft])
+        return stored_in(rows["stiffness"][soft], rows["upper"][soft], rows["intact"][soft], value[soft])
 
 
-class ChainPool(RowPool):
-    """Links of two particles' distance: those that follow each other are solved at once, as kernels.chains does."""
-
-    def _find_runs(self, first: Array, entry: Array, particles: int) -> Array:
-        run_of = np.empty(len(self.rows), np.int64)
-        runs.find_runs(first, entry, self.rows["intact"], particles, run_of)
-        return run_of
-
-    def pack(self, work: Work) -> None:
-        super().pack(work)
-        count = len(self.rows)
-        nodes = count + len(self._run)
-        self._active, self._inverse = np.zeros(count, np.uint8), np.zeros((nodes, 4))
-        self._carried, self._move = np.zeros((2, nodes, 2))
-        self._right, self._step = np.zeros((2, count))
-
-    def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
-        row = self._row
-        chains.sweep(
-            back, skip, self._colour[: self.colours + 1], self._run, work.position, self._first, self._particle, work.weight,
-            row["rest"], row["upper"], row["intact"], row["value"], self._gradient, self._along, row["turn"], row["bend"],
-            row["bow"], row["give"], row["offset"], self._active, self._right, self._inverse, self._carried, self._move,
-            self._step, row["lam"],
-        )  # fmt: skip
-
-
-def _stored(stiffness: Array, upper: Array, intact: Array, value: Array) -> float:
+def stored_in(stiffness: Array, upper: Array, intact: Array, value: Array) -> float:
     """Energy of rows of finite stiffness, J: none of the broken, nor of slack ropes."""
     pulled = (intact != 0) & ~((upper <= 0.0) & (value < 0.0))
     return 0.5 * float(np.sum(np.where(pulled, stiffness * value * value, 0.0)))
