@@ -7,10 +7,9 @@ import numpy as np
 from pyverlet.compile import jit
 from pyverlet.compile.lanes import LANES
 from pyverlet.ground.constants import LINK_COLOURS, LINKS_ONE_THREAD_BELOW
-from pyverlet.kernels import chains, runs, shapes
+from pyverlet.kernels import chain_rows, chains, runs
 from pyverlet.laws.links._link import Array
-from pyverlet.laws.links._pool import Pool
-from pyverlet.laws.links._rows import stored_in
+from pyverlet.laws.links._pool import MOVING, Pool
 from pyverlet.laws.links._work import Work
 
 
@@ -44,7 +43,7 @@ class ChainPool(Pool):
         self._place = np.empty(count, np.int64)
         self._place[self._source[self._source >= 0][::-1]] = np.flatnonzero(self._source >= 0)[::-1]
         self._ends = entry.reshape(-1, 2)
-        self._row = np.zeros((len(chains.COLUMNS), len(self._source)))
+        self._row = np.zeros((len(chain_rows.COLUMNS), len(self._source)))
         self._strength = np.full(len(self._source), np.inf)
         self._bowed = np.zeros(len(opens), np.uint8)
         parts = 1 if len(work) < LINKS_ONE_THREAD_BELOW else jit.max_threads()
@@ -65,28 +64,25 @@ class ChainPool(Pool):
 
     def begin(self) -> None:
         row, source, rows = self._row, self._source, self.rows
-        here = source >= 0
         if self.changed:
-            self.changed = False
+            self.changed, here = False, source >= 0
             stiffness, rope = rows["stiffness"][source], here & np.isfinite(rows["upper"][source])
             soft = here & np.isfinite(stiffness)
-            row[chains.REST], row[chains.DAMPING] = rows["rest"][source] * here, rows["damping"][source] * here
-            row[chains.ROPE], row[chains.SOFT], row[chains.STIFFNESS] = rope, soft, np.where(soft, stiffness, 0.0)
+            row[chain_rows.REST], row[chain_rows.DAMPING] = rows["rest"][source] * here, rows["damping"][source] * here
+            row[chain_rows.ROPE], row[chain_rows.SOFT], row[chain_rows.STIFFNESS] = rope, soft, np.where(soft, stiffness, 0.0)
             self._strength[:] = rows["strength"][source]
             self._brittle = bool(np.isfinite(self._strength).any())
-            kinds = (chains.ROPES * rope + chains.SOFTS * soft).astype(np.uint8)
+            kinds = (chain_rows.ROPES * rope + chain_rows.SOFTS * soft).astype(np.uint8)
             self._holds = np.bitwise_or.reduceat(kinds, self._start[:-1]) if len(kinds) else kinds
-            self._soft = np.flatnonzero(np.isfinite(rows["stiffness"]))
-            self.gives = bool(len(self._soft))
-        row[chains.INTACT] = here & (rows["intact"][source] != 0)
-        row[chains.FORCE], row[chains.LAST] = rows["force"][source] * here, rows["last"][source] * here
+            self.gives = bool(soft.any())
+        chain_rows.take_up(source, row, *(rows[name] for name in MOVING))
 
     def before(self, work: Work, h: float) -> None:
-        chains.prepare(self._start, self._node, self._holds, self._bowed, self._row, work.start, work.earlier, work.weight, h)
+        chain_rows.prepare(self._start, self._node, self._holds, self._bowed, self._row, work.start, work.earlier, work.weight, h)
 
     def ahead(self, work: Work) -> None:
         if self.gives:
-            chains.ahead(self._colour, self._start, self._node, self._holds, self._row, work.position, work.weight)
+            chain_rows.ahead(self._colour, self._start, self._node, self._holds, self._row, work.position, work.weight)
 
     def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
         chains.sweep(
@@ -94,34 +90,35 @@ class ChainPool(Pool):
             work.weight, self._rooms,
         )  # fmt: skip
 
+    def passes(self, work: Work, times: int) -> None:
+        chains.passes(
+            times, self.gives, self._colour, self._start, self._node, self._holds, self._lanes, self._bowed, self._row,
+            work.position, work.weight, self._rooms,
+        )  # fmt: skip
+
     def snap(self, work: Work, h: float) -> Array:
-        chains.note_force(self._row, h)
+        chain_rows.note_force(self._row, h)
         if not self._brittle:
             return np.empty(0, np.int64)
-        hard = np.flatnonzero((np.abs(self._row[chains.FORCE]) > self._strength) & (self._row[chains.INTACT] != 0.0))
-        self._row[chains.INTACT, hard] = 0.0
+        hard = np.flatnonzero((np.abs(self._row[chain_rows.FORCE]) > self._strength) & (self._row[chain_rows.INTACT] != 0.0))
+        self._row[chain_rows.INTACT, hard] = 0.0
         return np.unique(self._source[hard])
 
     def pulled(self) -> Array:
-        return self._row[chains.FORCE][self._place]
+        return self._row[chain_rows.FORCE][self._place]
 
     def end(self) -> None:
-        row, intact = self._row[:, self._place], self._row[chains.INTACT][self._place] != 0.0
-        self.rows["intact"][:] = intact
-        self.rows["force"][:] = np.where(intact, row[chains.FORCE], 0.0)
-        self.rows["last"][:] = np.where(intact, row[chains.LAST], 0.0)
+        chain_rows.hand_over(self._place, self._row, *(self.rows[name] for name in MOVING))
 
     def stored(self, position: Array) -> float:
-        return self._energy(position, self._ends[self._soft], self._row[chains.INTACT][self._place[self._soft]])
+        return self._energy(position, self._ends, chain_rows.intact(self._place, self._row))
 
     def energy(self, position: Array) -> float:
-        soft = np.flatnonzero(np.isfinite(self.rows["stiffness"]))
-        return self._energy(position, self.entries["particle"].reshape(-1, 2)[soft], self.rows["intact"][soft], soft)
+        return self._energy(position, self.entries["particle"].reshape(-1, 2), self.rows["intact"])
 
-    def _energy(self, position: Array, ends: Array, intact: Array, soft: Array | None = None) -> float:
-        soft, rows = self._soft if soft is None else soft, self.rows
-        value = np.hypot(*(position[ends[:, 1]] - position[ends[:, 0]]).T) - rows["rest"][soft]
-        return stored_in(rows["stiffness"][soft], rows["upper"][soft], intact, value)
+    def _energy(self, position: Array, ends: Array, intact: Array) -> float:
+        rows = self.rows
+        return float(chain_rows.energy(position, ends, rows["rest"], rows["upper"], rows["stiffness"], intact))
 
 
 def _place(order: Array, opens: Array) -> Array:

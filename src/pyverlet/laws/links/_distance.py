@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike
 
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import shapes
+from pyverlet.laws.links._chains import ChainPool
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import Floats, Link, several, stiffness_of
 from pyverlet.laws.links._pool import Pool
-from pyverlet.laws.links._chains import ChainPool
 
 
 class Distance(Link):

@@ -138,17 +138,17 @@ class RowPool(Pool):
     def stored(self, position: Array) -> float:
         row, soft, value = self._row, self._soft, self._soft_value
         self.measure(position, *self._soft_rows, value, self._soft_gradient, self._soft_bend)
-        return stored_in(row["stiffness"][soft], row["upper"][soft], row["intact"][soft], value)
+        return _stored(row["stiffness"][soft], row["upper"][soft], row["intact"][soft], value)
 
     def energy(self, position: Array) -> float:
         rows, first, particle = self.rows, self.first, self.entries["particle"]
         value, bend, gradient = np.empty(len(rows)), np.empty(len(rows)), np.empty((len(particle), 2))
         self.measure(position, first, particle, rows["rest"], 0, len(rows), value, gradient, bend)
         soft = np.isfinite(rows["stiffness"])
-        return stored_in(rows["stiffness"][soft], rows["upper"][soft], rows["intact"][soft], value[soft])
+        return _stored(rows["stiffness"][soft], rows["upper"][soft], rows["intact"][soft], value[soft])
 
 
-def stored_in(stiffness: Array, upper: Array, intact: Array, value: Array) -> float:
+def _stored(stiffness: Array, upper: Array, intact: Array, value: Array) -> float:
     """Energy of rows of finite stiffness, J: none of the broken, nor of slack ropes."""
     pulled = (intact != 0) & ~((upper <= 0.0) & (value < 0.0))
     return 0.5 * float(np.sum(np.where(pulled, stiffness * value * value, 0.0)))
