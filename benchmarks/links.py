@@ -1,8 +1,8 @@
 """What hangs together, beside others: `python -m benchmarks links`.
 
 The same circles, masses, pegs and links for every engine: a cloth, ropes with heavy loads, a heap of soft bodies, contacts on.
-All take turns in one process, on one thread, sleeping off. Beside the time a frame stands by how much what is rigid is stretched, a
-moment after the world has come to rest; for the smallest stretch of the others their own smaller steps.
+All take turns in one process, on one thread, sleeping off. Beside the time a frame stands by how much what is rigid is stretched.
+The others take smaller steps too, for what they stretch depends on that.
 """
 
 from __future__ import annotations
@@ -57,6 +57,11 @@ class Linked:
         return float(away.mean()), float(away.max())
 
 
+def _pairs(a: Array, b: Array) -> Array:
+    """(k, 2) of two arrays of indices."""
+    return np.column_stack((a.ravel(), b.ravel()))
+
+
 @dataclass(frozen=True)
 class Row:
     """One engine with one of them."""
@@ -72,14 +77,13 @@ class Row:
 
 
 def cloth(columns: int = 50, rows: int = 30, pegs: int = 9) -> Linked:
-    """Sticks across and down, springs on the diagonals, hanging from pegs."""
+    """Sticks across and down, springs on the diagonals, hanging from pegs. 1 kg: lighter, these springs explode in pymunk."""
     x, y = np.meshgrid(SPACING * np.arange(columns), -SPACING * np.arange(rows))
     n = np.arange(columns * rows).reshape(rows, columns)
-    pair = lambda a, b: np.column_stack((a.ravel(), b.ravel()))  # noqa: E731
-    sticks = np.concatenate((pair(n[:, :-1], n[:, 1:]), pair(n[:-1].T, n[1:].T)))
-    springs = np.concatenate((pair(n[:-1, :-1], n[1:, 1:]), pair(n[:-1, 1:], n[1:, :-1])))
+    sticks = np.concatenate((_pairs(n[:, :-1], n[:, 1:]), _pairs(n[:-1].T, n[1:].T)))
+    springs = np.concatenate((_pairs(n[:-1, :-1], n[1:, 1:]), _pairs(n[:-1, 1:], n[1:, :-1])))
     peg = np.unique(np.linspace(0, columns - 1, pegs).astype(int))
-    return Linked("cloth", np.column_stack((x.ravel(), y.ravel())), np.full(n.size, 0.05), peg, sticks, springs, 600.0, 0.0)
+    return Linked("cloth", np.column_stack((x.ravel(), y.ravel())), np.full(n.size, 1.0), peg, sticks, springs, 600.0, 1.0)
 
 
 def ropes(count: int = 100, links: int = 20) -> Linked:
@@ -102,9 +106,8 @@ def soft_bodies(count: int = 60, corners: int = 16) -> Linked:
     position = np.concatenate([ring + wide * np.array((k % 6, k // 6)) for k in range(count)])
     k, first = np.arange(corners), corners * np.arange(count)
     near, across = np.column_stack((k, (k + 1) % corners)), np.column_stack((k[: corners // 2], k[corners // 2 :]))
-    every = lambda pairs: (first[:, None, None] + pairs).reshape(-1, 2)  # noqa: E731
     return Linked(
-        "soft bodies", position, np.full(len(position), 0.05), np.zeros(0, int), every(near), every(across), 60.0, 0.2,
+        "soft bodies", position, np.full(len(position), 0.05), np.zeros(0, int), *((first[:, None, None] + pairs).reshape(-1, 2) for pairs in (near, across)), 60.0, 0.2,
         floor=-size - 2 * RADIUS,
     )  # fmt: skip
 

@@ -8,14 +8,14 @@ its force acts along (kernels.links), the steps of lam satisfy
 for each row: tridiagonal, eliminated from its first row on. What the rows so far leave of the mobility of the present one's first
 node is a = w (near / pivot), a sum of what gives: in that form nothing large cancels.
 
-A taut link also resists being turned, as a string does: by its tension over its length, `bow`. Without it a light rope would be
-thrown sideways by its own tension as soon as substeps are too long for its fastest swing. Where that matters (`bow` > 0) each link
-is a 2 x 2 matrix B = d n^T / give + bow (1 - n n^T), and the run is eliminated node by node: X is what the nodes so far put against
-a move of the present one; beyond the link that is X (X + B)^-1 B, as for springs in series.
+A taut link also resists being turned, as a string does: by its tension over its length, `bow`. Without it a light rope would
+be thrown sideways by its own tension as soon as substeps are too long for its fastest swing. Where that matters (`bow` > 0) each
+link is a 2 x 2 matrix B = d n^T / give + bow (1 - n n^T), and the run is eliminated node by node: X is what the nodes so far put
+against a move of the present one; beyond the link that is X (X + B)^-1 B, as for springs in series.
 
 Eight runs of one colour are a pack: they share no particle. Number k of lane l in a pack is item 8 k + l of it. A run that is
-shorter than its pack repeats its last node, with rows that are broken; a pack that has fewer runs repeats its last one: both lanes
-write the same. The items of the rows of pack p are start[p] to start[p + 1]; those of its nodes begin at start[p] + 8 p.
+shorter than its pack repeats its last node, with rows that are broken; a pack that has fewer runs repeats its last one: both
+lanes write the same. The items of the rows of pack p are start[p] to start[p + 1]; those of its nodes begin at start[p] + 8 p.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ from pyverlet.kernels.chain_rows import AX, AY, BOW, GIVE, INTACT, LAM, OFFSET, 
 _SWEEPS = 4
 
 SCRATCH = 17
-"""Columns of room for one pack: of each row n, 1 / length, right, active, step, two of elimination; of each node its weight, move,
-and six of elimination more."""
+"""Columns of room for one pack: of each row n, 1 / length, right, active, step, two of elimination; of each node its weight,
+move, and six of elimination more."""
 
 _NX, _NY, _BEND, _RIGHT, _ACTIVE, _STEP, _Z, _U, _W, _MX, _MY, _G0, _G1, _I = range(14)
 
@@ -201,7 +201,7 @@ def _slack_changes(begin, end, row, room):
 
 @kernel
 def _sweep(begin, end, lane, node, row, position, weight, shift):
-    """One link of a run after the other, back and forth: less exact, but safe when links turn too far to be solved as straight."""
+    """One link of a run after the other, back and forth: less exact, but safe where links turn too far."""
     for sweep in range(_SWEEPS):
         for s in range(begin + lane, end, LANES):
             r = s if sweep % 2 == 0 else begin + end - LANES + 2 * lane - s

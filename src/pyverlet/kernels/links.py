@@ -135,9 +135,9 @@ def snap(force, strength, intact):
 def look_back(slot, position, velocity, inverse_mass, before, calm, h, start, earlier, weight):
     """Copy who is linked: where a substep starts; `earlier`, where everybody was a substep ago; the inverse mass.
 
-    That is by the velocity, or `before`, by memory, where rest has put another velocity in. Contacts at rest carry weight by small
-    velocities that move nobody, and links would take them for motion. calm: (k,) m/s, by how much the velocity may differ from the
-    way gone and still be of that kind; beyond it there was an impact. NaN: unknown.
+    That is by the velocity, or `before`, by memory, where rest has put another velocity in. Contacts at rest carry weight by
+    small velocities that move nobody, and links would take them for motion. calm: (k,) m/s, by how much the velocity may differ
+    from the way gone and still be of that kind; beyond it there was an impact. NaN: unknown.
     """
     for k in prange(slot.shape[0]):
         s = slot[k]

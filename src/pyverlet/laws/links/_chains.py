@@ -105,7 +105,7 @@ class ChainPool(Pool):
         return np.unique(self._source[hard])
 
     def pulled(self) -> Array:
-        return self._row[chain_rows.FORCE][self._place]
+        return np.asarray(self._row[chain_rows.FORCE][self._place])
 
     def end(self) -> None:
         chain_rows.hand_over(self._place, self._row, *(self.rows[name] for name in MOVING))
