@@ -203,7 +203,7 @@ class OneByOne:
                 for k, i, j in [lane for lane in self.lanes if lane[0] in pack]:
                     d, reach = self.gap(k, i, j), s.size[i] + s.size[j]
                     distance = np.sqrt(d[0] * d[0] + d[1] * d[1])
-                    excess = max(real(1 - DEEP) * reach - distance, real(0))
+                    excess = max((real(1) - real(DEEP)) * reach - distance, real(0))
                     if distance <= real(1 - LARGEST_PUSH) * reach:
                         excess, distance = real(0), reach
                     pushes.append((i, j, d * (real(DEEP_PART * PUSHED) * excess / distance), self.made_of(i, j)[2], excess))
@@ -287,14 +287,14 @@ def test_eight_at_once_are_one_by_one(seed: int, n: int, spread: float, dtype: A
         setattr(other, name, getattr(slots, name).copy())
     other.size = other.radius
     strongest = rng.choice([0.0, 9.81])
-    wide.set_up(slots, H, 0.5 * H, strongest, 4 * strongest * H, accounts=False)
+    wide.set_up(slots, H, 0.5 * H, strongest, 4 * strongest * H, False, None)
     pairs = [(int(i), int(j)) for i, j in wide.pairs()]
     memory = {pair: slots.real(rng.normal(0, 1e-3)) for pair in dict.fromkeys(pairs) if rng.random() < 0.7}
     if wide.rubs:
         wide.hold_slips()
         where = np.concatenate([np.arange(a, a + k) for a, k in zip(wide.begin, wide.lanes, strict=False)])
         wide.slip[where] = [memory.get(pair, np.inf) for pair in pairs]
-        wide.set_up(slots, H, 0.5 * H, strongest, 4 * strongest * H, accounts=False)
+        wide.set_up(slots, H, 0.5 * H, strongest, 4 * strongest * H, False, None)
     reference = OneByOne(other, wide, memory)
     wide.cut()
     wide.push(slots)
@@ -318,7 +318,7 @@ def test_coincident_centres_part(dtype: Any) -> None:
     slots.position[:] = 3.0
     slots.velocity[:] = 0.0
     _, packs = packed(slots, Fast())
-    packs.set_up(slots, H, 0.0, 0.0, 0.0, accounts=False)
+    packs.set_up(slots, H, 0.0, 0.0, 0.0, False, None)
     packs.push(slots)
     # LARGEST_PUSH of the contact distance at most is seen, PUSHED of it is taken.
     parted = np.hypot(*(slots.position[1] - slots.position[0]))

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.ground.constants import FED_UNEVEN as FED
-from pyverlet.ground.constants import LENT
+from pyverlet.ground.constants import FED, LENT
 
 G = 9.81
 H = 1 / 480

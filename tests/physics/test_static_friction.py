@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.kernels.friction import NEW
+from pyverlet.kernels.tables import NEW
 
 RADIUS = 0.5
 LIMIT = np.tan(np.radians(15))  # 0.268

@@ -26,7 +26,7 @@ def test_the_hash_sees_an_edit_in_any_kernel_and_no_other(tmp_path: Path) -> Non
     (copy / "world" / "world.py").write_text("# edited")
     assert jit.sources_hash(copy) == before
     for name in (
-        "kernels/contacts.py",
+        "kernels/contact.py",
         "kernels/motion.py",
         "ground/constants.py",
         "compile/jit.py",

@@ -237,6 +237,14 @@ def _declared(kernel: Kernel) -> Any:
     return kernel
 
 
+def variant(function: Callable[..., Any], name: str, **names: Any) -> Callable[..., Any]:
+    """The same function by another `name`, where `names` of its module are something else: constants, or other kernels.
+
+    What a constant rules out is not compiled: one text serves as several kernels.
+    """
+    return _bound(function, names, f"_{name}")
+
+
 def kernel(function: Function) -> Function:
     """Compile on first call, to one thread's code; may be called from other kernels."""
     return _declared(Kernel(function))  # type: ignore[no-any-return]

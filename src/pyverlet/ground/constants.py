@@ -108,9 +108,6 @@ FED: Final = 1.6
 it keeps neighbours from undoing each other's push, more than all of it is stiffer: it holds the same weight with less overlap.
 docs/design/contacts.md has the comparison."""
 
-FED_UNEVEN: Final = 2.0
-"""FED of smooth inelastic circles of very unequal masses, which are still solved pair by pair."""
-
 CARRIED_WEIGHT: Final = 0.25
 """Of |a| h: a circle whose velocity a substep feeds by more than this carries weight. One that rests on others is fed 1 at least;
 one that touches a neighbour by a rounding error, nothing to speak of."""
@@ -120,7 +117,7 @@ GRIP: Final = 0.8
 friction stood still from 0.8 on; at 0.5 single circles crept; at 1 a few in a box had a spin that turned nobody, at 1.6 many."""
 
 UNEVEN: Final = 20.0
-"""Ratio of masses from which on circles lend each other inertia, and contacts are refined: the overlap that a light circle needs
+"""Ratio of masses from which on circles lend each other inertia: the overlap that a light circle needs
 to carry a heavy one goes with it. Up to 20, piles do without; radii of 1:4 and equal density are 16."""
 
 LENT: Final = 0.75
@@ -131,18 +128,14 @@ LOAN_S: Final = 0.1
 """s within which loans of inertia go back, and for which who has bounced has none. At 0.02 they come and go with contacts that
 tremble; at 0.02 and at 0.2 unequal circles with e = 0.5 still trembled after 40 s."""
 
-REFINED_FROM: Final = 0.01
-REFINED: Final = 0.25
-REFINEMENTS: Final = 4
-"""Of overlap that a sweep leaves beyond this part of the contact distance, this part is treated again, so many times. All of it
-at once, or all of the overlap of pairs beyond, made piles tremble."""
-
 DEEP: Final = 0.025
 DEEP_PART: Final = 0.25
 DEEP_SWEEPS: Final = 8
-"""The same for circles that neither bounce nor rub, of nearly equal masses: where chains of force meet, single contacts carry 20
-times the mean. Of overlap beyond DEEP of the contact distance DEEP_PART is treated again, so often: 10 contacts of 50,000. Half
-of it six times was as stiff, and piles moved more."""
+"""Where chains of force meet, single contacts carry 20 times the mean. Of overlap beyond DEEP of the contact distance DEEP_PART
+is treated again, so often: 10 contacts of 50,000. Half of it six times was as stiff, and piles moved more."""
+
+DEEP_LENT: Final = 0.01
+"""The same DEEP where circles lend each other inertia: light ones carry heavy ones there."""
 
 LINK_GIVE: Final = 1e-7
 """What a rigid link gives way, as a part of what its particles do: a straight chain between two walls has no rigid solution."""

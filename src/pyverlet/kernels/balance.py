@@ -13,11 +13,10 @@ between a wall and a heavy one have their own small inertia against it, and cont
 from __future__ import annotations
 
 from pyverlet.compile.jit import kernel
+from pyverlet.compile.lanes import LANES, load, lowest_bit, spread, which_above
 from pyverlet.kernels.clusters import join, settle
+from pyverlet.kernels.loans import PINNED
 from pyverlet.kernels.motion import IN_PILE
-
-# Bits of `touched`: another circle that has not bounced off; a pinned one.
-TOUCHED, PINNED = 1, 2
 
 # Of the squared pushes of walls: what of it is across their main direction, at least, if they push in several.
 _ACROSS = 1e-6
@@ -37,20 +36,21 @@ def set_out(velocity, acceleration, spin, held, h, before, spin_before):
 
 
 @kernel
-def cluster(first, pair_i, pair_j, touching, impulse, touches, inverse_mass, touched, root):
+def cluster(begin, lanes, lane_i, lane_j, normal, inverse_mass, root):
     """root[i]: the lowest member of the cluster of i, by the pairs that touch and have not bounced."""
-    zero = inverse_mass.dtype.type(0)
+    none = normal.dtype.type(0)
+    zero = spread(none)
     for i in range(root.shape[0]):
         root[i] = i
-    for s in range(first.shape[0]):
-        a = first[s]
-        for t in range(a, a + touches[s]):
-            if not impulse[t] < zero:
-                i, j = pair_i[a + touching[t]], pair_j[a + touching[t]]
-                if inverse_mass[i] == zero or inverse_mass[j] == zero:
-                    touched[i] |= PINNED
-                    touched[j] |= PINNED
-                else:
+    for s in range(lanes.shape[0]):
+        for k in range(begin[s], begin[s] + lanes[s], LANES):
+            nx, ny = load(normal[0], k), load(normal[1], k)
+            touches = which_above(nx * nx + ny * ny, zero)
+            while touches != 0:
+                lane = lowest_bit(touches)
+                touches &= touches - 1
+                i, j = lane_i[k + lane], lane_j[k + lane]
+                if inverse_mass[i] > none and inverse_mass[j] > none:
                     join(root, i, j)
     settle(root)
 
@@ -73,10 +73,10 @@ def note_walls(velocity, unpushed, inverse_mass, touched, root, sums, held):
         dx, dy = velocity[i, 0] - unpushed[i, 0], velocity[i, 1] - unpushed[i, 1]
         if touched[i] and (dx != 0 or dy != 0 or touched[i] & PINNED) and inverse_mass[i] > 0:
             pinned = 1.0 if touched[i] & PINNED else 0.0
-            to = sums[root[i]]
-            to[_XX] += dx * dx + pinned
-            to[_XY] += dx * dy
-            to[_YY] += dy * dy + pinned
+            r = root[i]
+            sums[r, _XX] += dx * dx + pinned
+            sums[r, _XY] += dx * dy
+            sums[r, _YY] += dy * dy + pinned
     for i in range(root.shape[0]):
         held[i] = touched[i] != 0 and inverse_mass[i] > 0 and sums[root[i], _XX] + sums[root[i], _YY] > 0
 

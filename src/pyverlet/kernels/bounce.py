@@ -6,6 +6,7 @@ import numpy as np
 
 from pyverlet.compile.jit import kernel
 from pyverlet.compile.lanes import LANES
+from pyverlet.ground.constants import LOAN_S
 from pyverlet.kernels.bounds import impact_time
 from pyverlet.kernels.tables import MU, R_I, R_J, E
 
@@ -17,6 +18,18 @@ def _carry(circles, i, x, y):
     circles.moved[i, 0] += to_x - circles.position[i, 0]
     circles.moved[i, 1] += to_y - circles.position[i, 1]
     circles.position[i, 0], circles.position[i, 1] = to_x, to_y
+
+
+@kernel
+def _own(circles, i, x, y, turn):
+    """An impact, which changes the velocity of circle i by (x, y) and its spin by `turn`, goes by its own mass: `kernels.balance`
+    need not make up for it. It lends and borrows nothing for a while.
+    """
+    circles.before[i, 0] += x
+    circles.before[i, 1] += y
+    circles.spin_before[i] += turn
+    circles.lent[i] = 0
+    circles.busy[i] = LOAN_S
 
 
 @kernel
@@ -49,7 +62,7 @@ def _bounce(i, j, dx, dy, reach, e, mu, ri, rj, circles, law, spent):
     if not hit > law.rest_speed:
         return False
     kick = (hit + e * hit) / (wi + wj)
-    px, py = kick * nx, kick * ny
+    px, py, turn_i, turn_j = kick * nx, kick * ny, zero, zero
     if spent.shape[0] > 0:
         spent[0] -= half * np.float64(hit) * hit * (1.0 - np.float64(e) * e) / (wi + wj)
     if mu > zero:
@@ -58,10 +71,14 @@ def _bounce(i, j, dx, dy, reach, e, mu, ri, rj, circles, law, spent):
         rub = max(min(-slip / (three * (wi + wj)), most), -most)
         px += rub * ny
         py -= rub * nx
-        circles.spin[i] += two * rub * wi / ri
-        circles.spin[j] += two * rub * wj / rj
+        turn_i, turn_j = two * rub * wi / ri, two * rub * wj / rj
+        circles.spin[i] += turn_i
+        circles.spin[j] += turn_j
         if spent.shape[0] > 0:
             spent[1] += np.float64(rub) * (slip + 1.5 * (wi + wj) * rub)
+    if circles.lent.shape[0] > 0:
+        _own(circles, i, -px * wi, -py * wi, turn_i)
+        _own(circles, j, px * wj, py * wj, turn_j)
     v[i, 0], v[i, 1] = v[i, 0] - px * wi, v[i, 1] - py * wi
     v[j, 0], v[j, 1] = v[j, 0] + px * wj, v[j, 1] + py * wj
     _carry(circles, i, -time * px * wi, -time * py * wi)

@@ -14,14 +14,13 @@ import numpy as np
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.ground.constants import FED, PUSHED
+from pyverlet.kernels.beyond import beyond_box, beyond_circle
 
-BLOCK = 64
-"""Circles looked at together for whether any of them is at a wall: hardly any is."""
+_CHUNK = 1024
+"""Circles one thread takes at a time."""
 
 REFLECTIONS = 8
 """Times a circle may bounce off the walls of a room in one substep."""
-
-_ONE, _TWO = np.uint64(1), np.uint64(2)
 
 # What is noted of a circle in `fed`: a contact at rest has fed its velocity, a wall has touched it; in this substep, or the last.
 CARRIES, AT_WALL, CARRIED, WAS_AT_WALL = 1, 2, 4, 8
@@ -263,36 +262,22 @@ def _at_box(b, x0, y0, x1, y1, h, lag, e, mu, rest_speed):
 
 
 @kernel
-def _beyond_circle(x0, y0, size, position, radius, first, stop, flag):
-    """Flag the circles from `first` to `stop` that reach beyond the cage; whether there are any. No branch, so in vectors."""
-    x = position.reshape(-1)
-    found = False
-    for k in range(first, stop):
-        i = np.uint64(k)  # spares the check for a negative index, which vectors cannot take
-        dx, dy, room = x[_TWO * i] - x0, x[_TWO * i + _ONE] - y0, size - radius[i]
-        beyond = dx * dx + dy * dy > room * room
-        flag[i] = beyond
-        found |= beyond
-    return found
-
-
-@kernel
-def _beyond_box(x0, y0, x1, y1, position, radius, first, stop, flag):
-    """The same for a box."""
-    x = position.reshape(-1)
-    zero = x0 - x0
-    found = False
-    for k in range(first, stop):
-        i = np.uint64(k)
-        px, py, r = x[_TWO * i], x[_TWO * i + _ONE], radius[i]
-        beyond = (x0 + r - px > zero) | (px - (x1 - r) > zero) | (y0 + r - py > zero) | (py - (y1 - r) > zero)
-        flag[i] = beyond
-        found |= beyond
-    return found
-
-
-# The loops make the tuple themselves, and only for circles at a wall: from Python it is slow to hand over. Until a circle has met
-# the wall, `resting` is where it is flagged.
+def _circle_some(
+    x0, y0, size, first, stop, position, velocity, acceleration, spin, radius, inverse_mass, restitution,
+    friction, fed, resting, hits, spent, start, turn, lift, h, lag, e, mu, rest_speed,
+):  # fmt: skip
+    """What `circle` does, for the circles from `first` up to `stop`."""
+    resting[first:stop] = 0
+    found = np.empty(_CHUNK, np.uint32)
+    for k in range(beyond_circle(x0, y0, size, position, radius, inverse_mass, first, stop, found)):
+        i = found[k]
+        # Made here, and only for circles at a wall: a tuple is slow to hand over.
+        body = look(
+            i, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
+            start, turn, lift,
+        )  # fmt: skip
+        body = _at_cage(body, x0, y0, size, h, lag, e, mu, rest_speed)
+        put(i, body, position, velocity, spin, fed, resting, hits, spent, turn)
 
 
 @parallel_kernel
@@ -301,20 +286,31 @@ def circle(
     spent, start, turn, lift, h, lag, e, mu, rest_speed,
 ):  # fmt: skip
     """A cage: all circles stay inside that of radius `size` about (x0, y0). position to lift: what `look` takes."""
-    zero = h - h
-    for block in prange((radius.shape[0] + BLOCK - 1) // BLOCK):
-        first, stop = block * BLOCK, min((block + 1) * BLOCK, radius.shape[0])
-        if _beyond_circle(x0, y0, size, position, radius, first, stop, resting):
-            for i in range(first, stop):
-                if resting[i] != 0:
-                    resting[i] = 0
-                    if inverse_mass[i] > zero:
-                        body = look(
-                            i, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting,
-                            hits, spent, start, turn, lift,
-                        )  # fmt: skip
-                        body = _at_cage(body, x0, y0, size, h, lag, e, mu, rest_speed)
-                        put(i, body, position, velocity, spin, fed, resting, hits, spent, turn)
+    for chunk in prange((radius.shape[0] + _CHUNK - 1) // _CHUNK):
+        _circle_some(
+            x0, y0, size, chunk * _CHUNK, min((chunk + 1) * _CHUNK, radius.shape[0]), position, velocity, acceleration,
+            spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent, start, turn, lift, h, lag, e, mu,
+            rest_speed,
+        )  # fmt: skip
+
+
+@kernel
+def _box_some(
+    x0, y0, x1, y1, first, stop, position, velocity, acceleration, spin, radius, inverse_mass, restitution,
+    friction, fed, resting, hits, spent, start, turn, lift, h, lag, e, mu, rest_speed,
+):  # fmt: skip
+    """What `box` does, for the circles from `first` up to `stop`."""
+    resting[first:stop] = 0
+    found = np.empty(_CHUNK, np.uint32)
+    for k in range(beyond_box(x0, y0, x1, y1, position, radius, inverse_mass, first, stop, found)):
+        i = found[k]
+        # Made here, and only for circles at a wall: a tuple is slow to hand over.
+        body = look(
+            i, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
+            start, turn, lift,
+        )  # fmt: skip
+        body = _at_box(body, x0, y0, x1, y1, h, lag, e, mu, rest_speed)
+        put(i, body, position, velocity, spin, fed, resting, hits, spent, turn)
 
 
 @parallel_kernel
@@ -323,17 +319,9 @@ def box(
     spent, start, turn, lift, h, lag, e, mu, rest_speed,
 ):  # fmt: skip
     """Four walls; in a corner both axes act, one after the other. position to lift: what `look` takes."""
-    zero = h - h
-    for block in prange((radius.shape[0] + BLOCK - 1) // BLOCK):
-        first, stop = block * BLOCK, min((block + 1) * BLOCK, radius.shape[0])
-        if _beyond_box(x0, y0, x1, y1, position, radius, first, stop, resting):
-            for i in range(first, stop):
-                if resting[i] != 0:
-                    resting[i] = 0
-                    if inverse_mass[i] > zero:
-                        body = look(
-                            i, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting,
-                            hits, spent, start, turn, lift,
-                        )  # fmt: skip
-                        body = _at_box(body, x0, y0, x1, y1, h, lag, e, mu, rest_speed)
-                        put(i, body, position, velocity, spin, fed, resting, hits, spent, turn)
+    for chunk in prange((radius.shape[0] + _CHUNK - 1) // _CHUNK):
+        _box_some(
+            x0, y0, x1, y1, chunk * _CHUNK, min((chunk + 1) * _CHUNK, radius.shape[0]), position, velocity, acceleration,
+            spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent, start, turn, lift, h, lag, e, mu,
+            rest_speed,
+        )  # fmt: skip

@@ -12,8 +12,6 @@ from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.compile.lanes import (
     LANES,
     larger,
-    load,
-    load_rows,
     pick,
     place,
     put,
@@ -22,37 +20,13 @@ from pyverlet.compile.lanes import (
     square_root,
     take,
     where_zero,
-    which_above,
 )
 from pyverlet.compile.stealing import claim_evenly, none_claimed
+from pyverlet.kernels.beyond import beyond_circle
 from pyverlet.kernels.motion import arrive
 
 # Circles one thread takes at a time.
 _CHUNK = 2048
-
-
-@kernel
-def _find(x0, y0, size, position, radius, inverse_mass, first, stop, found):
-    """List the free circles from `first` up to `stop` that reach beyond the cage; returns how many."""
-    number = 0
-    packed = stop - (stop - first) % LANES
-    centre_x, centre_y, whole = spread(x0), spread(y0), spread(size)
-    for k in range(first, packed, LANES):
-        x, y = load_rows(position, k)
-        dx, dy, room = x - centre_x, y - centre_y, whole - load(radius, k)
-        beyond = which_above(dx * dx + dy * dy, room * room)
-        lane = 0
-        while beyond != 0:  # hardly ever
-            found[number] = k + lane
-            number += (beyond & 1) & (inverse_mass[k + lane] > 0)
-            beyond >>= 1
-            lane += 1
-    for i in range(packed, stop):
-        dx, dy, room = position[i, 0] - x0, position[i, 1] - y0, size - radius[i]
-        if dx * dx + dy * dy > room * room and inverse_mass[i] > 0:
-            found[number] = i
-            number += 1
-    return number
 
 
 @kernel
@@ -121,7 +95,7 @@ def hold_some(
     for first in range(begin, end, _CHUNK):
         stop = min(first + _CHUNK, end)
         resting[first:stop] = 0
-        number = _find(x0, y0, size, position, radius, inverse_mass, first, stop, found)
+        number = beyond_circle(x0, y0, size, position, radius, inverse_mass, first, stop, found)
         if number > 0:
             for k in range(number):
                 resting[found[k]] = 1

@@ -36,18 +36,18 @@ from pyverlet.compile.lanes import (
     where_zero,
     which_above,
 )
-from pyverlet.ground.constants import DEEP, DEEP_PART, DEEP_SWEEPS, FED, GRIP, LARGEST_PUSH, PUSHED
+from pyverlet.ground.constants import DEEP_PART, DEEP_SWEEPS, FED, GRIP, LARGEST_PUSH, PUSHED
 from pyverlet.kernels.bounce import treat
+from pyverlet.kernels.kinds import BOUNCES, RUBS, for_each_kind
 from pyverlet.kernels.motion import IN_PILE
 from pyverlet.kernels.tables import MASS, MU, NEW, R_I, R_J, TURN_I, TURN_J, E
 
 
-@kernel
-def push_strip(s, to, circles, pairs, law, looks):
-    """The first sweep over strip s; normals go to `to` and up. If it `looks`, it notes in `deep` what overlaps by over DEEP."""
+def _push_strip(s, to, circles, pairs, law, looks):
+    """The first sweep over strip s; normals go to `to` and up. If it `looks`, it notes in `deep` what overlaps deeply."""
     moved, lane_i, lane_j = circles.moved, pairs.lane_i, pairs.lane_j
     real = moved.dtype.type
-    zero, one, limit = spread(real(0)), spread(real(1)), spread(real(DEEP))
+    zero, one, limit = spread(real(0)), spread(real(1)), spread(law.deep)
     pushed, most, rest = spread(real(PUSHED)), spread(law.most), spread(law.rest_speed)
     answer = spread(real(-GRIP * PUSHED / (3.0 * FED)))
     begin, end, count = pairs.begin[s], pairs.begin[s] + pairs.lanes[s], 0
@@ -59,15 +59,15 @@ def push_strip(s, to, circles, pairs, law, looks):
         dx, dy = load(pairs.gap[0], k) + (xj - xi), load(pairs.gap[1], k) + (yj - yi)
         r, part = load(pairs.reach, k * law.varied), load(pairs.share, k * law.varied)
         distance = square_root(dx * dx + dy * dy)
-        if (k < close or law.asks != 0) and which_above(r, distance) == 0:
+        if (k < close or BOUNCES) and which_above(r, distance) == 0:
             store(pairs.normal[0], to + k, zero)
             store(pairs.normal[1], to + k, zero)
-            if law.asks != 0:
+            if BOUNCES:
                 store(pairs.depth, k, zero)
             continue
         done, at = 0, k * law.mixed
         mu = zero
-        if law.asks != 0:
+        if BOUNCES:
             e, mu = load(pairs.made_of[E], at), load(pairs.made_of[MU], at)
             live = which_above(e + mu, zero)
             if live != 0 or law.listens != 0:
@@ -96,9 +96,9 @@ def push_strip(s, to, circles, pairs, law, looks):
         nx, ny = dx * per_metre, dy * per_metre
         push = pushed * depth
         cx, cy = nx * push, ny * push
-        if law.asks != 0:
+        if BOUNCES:
             store(pairs.depth, k, depth)
-            if law.rubs != 0 and which_above(mu, zero) != 0:
+            if RUBS and which_above(mu, zero) != 0:
                 # What the contact has slipped is answered as an overlap is, within the cone of friction.
                 slipped = load(pairs.slip, k)
                 cone = mu * push
@@ -126,13 +126,13 @@ def push_strip(s, to, circles, pairs, law, looks):
 
 @kernel
 def refine_strip(s, circles, pairs, law):
-    """Part again, there and back, the packs in `deep` that still overlap by more than DEEP; `deeps` becomes how many those are.
+    """Part again, there and back, the packs in `deep` that still do so deeply; `deeps` becomes how many those are.
 
     Beyond LARGEST_PUSH it is no weight but a mistake, and has been pushed enough.
     """
     moved, lane_i, lane_j, count = circles.moved, pairs.lane_i, pairs.lane_j, pairs.deeps[s]
     real, first = moved.dtype.type, pairs.begin[s] // LANES
-    zero, one, near, nearest = spread(real(0)), spread(real(1)), spread(real(1 - DEEP)), spread(real(1 - LARGEST_PUSH))
+    zero, one, near, nearest = spread(real(0)), spread(real(1)), spread(real(1) - law.deep), spread(real(1 - LARGEST_PUSH))
     pushed = spread(real(DEEP_PART * PUSHED))
     for sweep in range(DEEP_SWEEPS):
         left = 0
@@ -170,8 +170,7 @@ def _struck(bits, k, circles, pairs):
     return struck
 
 
-@kernel
-def relax_strip(s, to, circles, pairs, law):
+def _relax_strip(s, to, circles, pairs, law):
     """The second sweep over strip s: no approach, and no slip but what friction cannot hold, between circles that touch."""
     velocity, lane_i, lane_j = circles.velocity, pairs.lane_i, pairs.lane_j
     real = velocity.dtype.type
@@ -184,8 +183,8 @@ def relax_strip(s, to, circles, pairs, law):
     for k in range(begin, end, LANES):
         nx, ny = load(pairs.normal[0], to + k), load(pairs.normal[1], to + k)
         part = load(pairs.share, k * law.varied)
-        if (k < close or law.rubs != 0) and which_above(nx * nx + ny * ny, zero) == 0:
-            if law.rubs != 0:
+        if (k < close or RUBS) and which_above(nx * nx + ny * ny, zero) == 0:
+            if RUBS:
                 store(pairs.slip, k, new)
             continue
         xi, yi = take(velocity, lane_i, k)
@@ -193,13 +192,13 @@ def relax_strip(s, to, circles, pairs, law):
         vx, vy = xj - xi, yj - yi
         speed, at = vx * nx + vy * ny, k * law.mixed
         struck = 0
-        if law.asks != 0:
+        if BOUNCES:
             fast = which_above(zero - speed, rest) & which_above(load(pairs.made_of[E], at), zero)
             if fast != 0:
                 struck = _struck(fast, k, circles, pairs)
                 speed = where_set(struck, zero, speed)
         cx, cy = speed * nx, speed * ny
-        if law.rubs != 0:
+        if RUBS:
             mu = load(pairs.made_of[MU], at)
             if which_above(mu, zero) != 0:
                 ri, rj = load(pairs.made_of[R_I], at), load(pairs.made_of[R_J], at)
@@ -229,7 +228,7 @@ def relax_strip(s, to, circles, pairs, law):
                 store(pairs.slip, k, where_above(depth, zero, slipped, new))
         put(velocity, lane_i, k, xi + cx * part, yi + cy * part)
         put(velocity, lane_j, k, xj - cx * (one - part), yj - cy * (one - part))
-    if law.accounts != 0:
+    if BOUNCES and law.accounts != 0:
         pairs.spent[s, 1] += taken
 
 
@@ -253,3 +252,7 @@ def mark_strip(begin, end, to, lane_i, lane_j, normal, resting):
             bit = np.uint8(((touches >> lane) & 1) * IN_PILE)
             resting[lane_i[k + lane]] |= bit
             resting[lane_j[k + lane]] |= bit
+
+
+push_strip = for_each_kind(kernel, _push_strip)
+relax_strip = for_each_kind(kernel, _relax_strip)

@@ -7,11 +7,13 @@ stages in `world.profile`. A frame is compiled for a kind of room: `frames` has 
 
 from __future__ import annotations
 
+from pyverlet.compile.bundle import fields
 from pyverlet.compile.clock import note
-from pyverlet.compile.jit import driver, parallel_kernel, prange
+from pyverlet.compile.jit import driver, parallel_kernel, prange, variant
 from pyverlet.compile.lanes import copy_row
 from pyverlet.kernels.bounds import box, circle
 from pyverlet.kernels.cage import hold
+from pyverlet.kernels.kinds import for_each_kind
 from pyverlet.kernels.motion import leap
 from pyverlet.kernels.sweeps import push, relax
 from pyverlet.kernels.tables import Circles, Law, Pairs
@@ -20,7 +22,7 @@ CONTACTS, BOUNDS, VELOCITIES, INTEGRATE = 1, 2, 3, 4
 STAGES = ("contacts", "bounds", "velocities", "integrate")
 """Names of the numbers above, less one, by which their time is noted."""
 
-NORMAL = Pairs._fields.index("normal")
+NORMAL = fields(Pairs).index("normal")
 """Where in the tuple of `Pairs` the normals are."""
 
 _CHUNK = 4096
@@ -76,14 +78,12 @@ def four_walls(room, circles, law, claims):
 # ---- substeps --------------------------------------------------------------------------------------------------------------
 
 
-@driver
-def project(circles, pairs, law, cut, looks, sets_out, claims):
+def _project(circles, pairs, law, cut, looks, sets_out, claims):
     """The first sweep over the pairs, called from Python, which has plain tuples."""
     push(Circles(*circles), Pairs(*pairs), Law(*law), cut, looks, sets_out, claims)
 
 
-@driver
-def still(circles, pairs, law, cut, marks, claims):
+def _still(circles, pairs, law, cut, marks, claims):
     """The second one."""
     relax(Circles(*circles), Pairs(*pairs), Law(*law), cut, marks, claims)
 
@@ -118,5 +118,10 @@ def _substeps(substep, stop, last, circles, pairs, law, room, cut, looks, sets_o
             return substep, True
 
 
-frames = {room: driver(_substeps, confine=room) for room in (open_space, smooth_cage, cage, four_walls)}
-"""Substeps in each kind of room."""
+project = for_each_kind(driver, _project, push=push)
+still = for_each_kind(driver, _still, relax=relax)
+frames = {
+    room: for_each_kind(driver, variant(_substeps, room.function.__name__, confine=room), push=push, relax=relax)
+    for room in (open_space, smooth_cage, cage, four_walls)
+}
+"""Substeps in each kind of room, of each kind of world."""

@@ -24,8 +24,11 @@ from typing import Any, NamedTuple
 from pyverlet.compile.jit import driver, kernel, parallel_kernel, prange
 from pyverlet.kernels.cage import hold_some
 from pyverlet.kernels.contact import mark_strip, push_strip, refine_strip, relax_strip
+from pyverlet.kernels.kinds import SMOOTH
 from pyverlet.kernels.motion import any_strayed, arrive, kick_drift, set_out
 from pyverlet.kernels.tables import Circles, Law, Pairs
+
+_push_strip, _relax_strip = push_strip[SMOOTH], relax_strip[SMOOTH]
 
 BEHIND = 5
 """Strips by which the last stage is behind the first, and that a border leaves for later on both of its sides."""
@@ -72,7 +75,7 @@ def _settle(s, t, circles, law, room, strips):
 
 @kernel
 def _still(s, circles, pairs, law, strips):
-    relax_strip(s, strips.place[s], circles, pairs, law)
+    _relax_strip(s, strips.place[s], circles, pairs, law)
     if strips.marks != 0:
         a = pairs.begin[s]
         mark_strip(a, a + pairs.lanes[s], strips.place[s], pairs.lane_i, pairs.lane_j, pairs.normal, circles.resting)
@@ -96,7 +99,7 @@ def _share_of_strips(first, stop, circles, pairs, law, room, strips):
             _set_out(k, min(k + 2, stop), circles, strips)
         for s in (k, k - 1):
             if first <= s < stop - above:
-                push_strip(s, strips.place[s], circles, pairs, law, strips.looks)
+                _push_strip(s, strips.place[s], circles, pairs, law, strips.looks)
         for s in (k - 2, k - 3):
             if first + 2 * below <= s < stop - 3 * above:
                 _refine(s, circles, pairs, law)
@@ -115,7 +118,7 @@ def _share_of_strips(first, stop, circles, pairs, law, room, strips):
 @kernel
 def _border(s, circles, pairs, law, room, strips):
     """What two threads have left to be done below and above strip s, the first of one of them."""
-    push_strip(s - 1, strips.place[s - 1], circles, pairs, law, strips.looks)
+    _push_strip(s - 1, strips.place[s - 1], circles, pairs, law, strips.looks)
     for t in (s - 2, s, s - 3, s - 1, s + 1):
         _refine(t, circles, pairs, law)
     _settle(s - 3, s + 3, circles, law, room, strips)

@@ -8,7 +8,8 @@ its weight. So those that touch even out their inertia m', the sum of which stay
   of how far that has moved the circle only the part PUSHED / FED, for the velocities with which circles at rest end a substep
   stay as they are.
 - Who touches nobody has that undone, and falls as everything does; what was lent goes back within LOAN_S.
-- Who bounces has its own mass at once, and lends and borrows nothing for LOAN_S: impacts go by the true masses.
+- Impacts go by the true masses (`kernels.bounce`). Who has bounced has its own from the next substep on, and lends and borrows
+  nothing for LOAN_S.
 
 To change the masses of particles that hardly move is common in calculations of granular matter (Thornton and Antony 1998,
 Quasi-static deformation of particulate media, have more of it everywhere); here the sum is kept, and kernels.balance sees to it
@@ -18,8 +19,11 @@ that momentum is.
 from __future__ import annotations
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.compile.lanes import LANES, larger, load, pick, place, smaller, spread, where_set, which_above
 from pyverlet.ground.constants import LENT
-from pyverlet.kernels.impacts import PARTING
+
+# What a circle touches: another that has not bounced off; a pinned one.
+TOUCHED, PINNED = 1, 2
 
 # Of the own mass: less than this is no loan but the rounding of one.
 _NOTHING = 1e-7
@@ -40,77 +44,83 @@ def weigh(mass, inverse_mass, lent, lighter):
 
 
 @kernel
-def recall(inverse_mass, first, count, pair_i, pair_j, meeting, impulse, wait, lent, busy, lighter):
-    """After `impacts`: give those that have bounced their own inertia, and let them lend none for `wait` seconds."""
-    for parity in range(2):
-        for half in range((first.shape[0] + 1 - parity) // 2):
-            s = 2 * half + parity
-            for k in range(first[s], first[s] + count[s]):
-                if meeting[k] == PARTING and impulse[k] > 0:
-                    for p in (pair_i[k], pair_j[k]):
-                        lent[p] = 0
-                        busy[p] = wait
-                        lighter[p] = inverse_mass[p]
-
-
-@kernel
-def _pull(position, velocity, acceleration, inverse_mass, lighter, held, kick, fall, i):
-    """Move circle i by what a (m / m' - 1) does to it: kick (s) in the velocity, fall (s^2) in the position."""
-    w = inverse_mass[i]
-    if held[i] and lighter[i] != w:
-        more = lighter[i] / w - w / w
-        velocity[i, 0] += more * kick * acceleration[i, 0]
-        velocity[i, 1] += more * kick * acceleration[i, 1]
-        position[i, 0] += more * fall * acceleration[i, 0]
-        position[i, 1] += more * fall * acceleration[i, 1]
-
-
-@kernel
-def keep_weight(position, velocity, acceleration, inverse_mass, lighter, held, kick, fall):
-    """Let the weight of each circle that walls hold, through others, be that of its own mass."""
+def pull(position, acceleration, inverse_mass, lighter, held, fall):
+    """Move each circle that walls hold, through others, by what a (m / m' - 1) does to its position: so its weight
+    is that of its own mass. fall: s^2.
+    """
     for i in range(position.shape[0]):
-        _pull(position, velocity, acceleration, inverse_mass, lighter, held, kick, fall, i)
+        w = inverse_mass[i]
+        if held[i] and lighter[i] != w:
+            more = (lighter[i] / w - w / w) * fall
+            position[i, 0] += more * acceleration[i, 0]
+            position[i, 1] += more * acceleration[i, 1]
 
 
 @kernel
-def _share_strip(mass, inverse_mass, pair_i, pair_j, touching, impulse, lent, busy, touched):
-    zero = mass.dtype.type(0)
-    half = mass.dtype.type(0.5)
-    least = mass.dtype.type(1 - LENT)
-    for t in range(touching.shape[0]):
-        if impulse[t] < zero:
+def settle(position, velocity, acceleration, inverse_mass, lighter, held, touched, kick, fall):
+    """After `pull`, and contacts: do the same to velocities, kick (s), of who has touched another; take it back for the others.
+
+    Not before contacts: to those it is no motion, and would be an impact.
+    """
+    for i in range(position.shape[0]):
+        w = inverse_mass[i]
+        if held[i] and lighter[i] != w:
+            more = lighter[i] / w - w / w
+            if touched[i]:
+                velocity[i, 0] += more * kick * acceleration[i, 0]
+                velocity[i, 1] += more * kick * acceleration[i, 1]
+            else:
+                position[i, 0] -= more * fall * acceleration[i, 0]
+                position[i, 1] -= more * fall * acceleration[i, 1]
+
+
+@kernel
+def _share_strip(begin, end, lane_i, lane_j, normal, mass, inverse_mass, lent, busy, touched):
+    """The pairs that touch and have not bounced, in the lanes from `begin` up to `end`."""
+    real = mass.dtype.type
+    zero, half, least = spread(real(0)), spread(real(0.5)), spread(real(1 - LENT))
+    for k in range(begin, end, LANES):
+        nx, ny = load(normal[0], k), load(normal[1], k)
+        touches = which_above(nx * nx + ny * ny, zero)
+        if touches == 0:
             continue
-        i, j = pair_i[touching[t]], pair_j[touching[t]]
-        touched[i] = 1
-        touched[j] = 1
-        if inverse_mass[i] > zero and inverse_mass[j] > zero and not busy[i] > zero and not busy[j] > zero:
-            mi, mj = mass[i] + lent[i], mass[j] + lent[j]
-            flow = max(min(half * (mi - mj), mi - least * mass[i]), least * mass[j] - mj)
-            lent[i] -= flow
-            lent[j] += flow
+        free = which_above(smaller(pick(inverse_mass, lane_i, k), pick(inverse_mass, lane_j, k)), zero)
+        for lane in range(LANES):
+            if (touches >> lane) & 1:
+                mark = TOUCHED | (0 if (free >> lane) & 1 else PINNED)
+                touched[lane_i[k + lane]] |= mark
+                touched[lane_j[k + lane]] |= mark
+        waits = which_above(larger(pick(busy, lane_i, k), pick(busy, lane_j, k)), zero)
+        lends = touches & free & ~waits
+        if lends != 0:
+            mi, mj = pick(mass, lane_i, k), pick(mass, lane_j, k)
+            li, lj = pick(lent, lane_i, k), pick(lent, lane_j, k)
+            flow = larger(smaller(half * ((mi + li) - (mj + lj)), (mi + li) - least * mi), least * mj - (mj + lj))
+            flow = where_set(lends, flow, zero)
+            place(lent, lane_i, k, li - flow)
+            place(lent, lane_j, k, lj + flow)
 
 
 @parallel_kernel
-def share(mass, inverse_mass, first, count, pair_i, pair_j, touching, impulse, touches, lent, busy, touched):
+def share(begin, lanes, lane_i, lane_j, normal, cut, mass, inverse_mass, lent, busy, touched):
     """Even out the inertia of each touching pair that has not bounced; nobody lends more than the part LENT of the own mass.
 
-    touched[i], 0 before, becomes 1 for who is in such a pair.
+    touched[i], 0 before, gains TOUCHED for who is in such a pair, and PINNED if one of them is pinned. cut: as for
+    `kernels.sweeps.push`.
     """
     for parity in range(2):
-        for half in prange((first.shape[0] + 1 - parity) // 2):
-            s = 2 * half + parity
-            a, b = first[s], first[s] + count[s]
-            t = a + touches[s]
-            _share_strip(mass, inverse_mass, pair_i[a:b], pair_j[a:b], touching[a:t], impulse[a:t], lent, busy, touched)
+        for part in prange(cut.shape[1] - 1):
+            for half in range(cut[parity, part], cut[parity, part + 1]):
+                a = begin[2 * half + parity]
+                b = a + lanes[2 * half + parity]
+                _share_strip(a, b, lane_i, lane_j, normal, mass, inverse_mass, lent, busy, touched)
 
 
 @kernel
-def settle(position, velocity, acceleration, mass, inverse_mass, lighter, held, kick, fall, touched, back, h, lent, busy):
-    """Let those that touch nobody fall as they would have, and give the part `back` of every loan back."""
-    for i in range(position.shape[0]):
-        if not touched[i]:
-            _pull(position, velocity, acceleration, inverse_mass, lighter, held, -kick, -fall, i)
+def give_back(mass, part, h, lent, busy):
+    """Give this part of every loan back; h: s, that have gone by."""
+    for i in range(mass.shape[0]):
         busy[i] = max(busy[i] - h, h - h)
-        lent[i] -= back * lent[i]
+        lent[i] -= part * lent[i]
         if abs(lent[i]) < mass.dtype.type(_NOTHING) * mass[i]:
             lent[i] = h - h

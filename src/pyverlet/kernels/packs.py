@@ -15,6 +15,7 @@ import numpy as np
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.compile.lanes import ALL, LANES, larger, pick, spread, store, take, which_above
 from pyverlet.ground.constants import CLOSE
+from pyverlet.kernels.tables import MASS, TURN_I, TURN_J
 
 # Golden angle, rad: coincident centres part in directions spread evenly over the circle.
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
@@ -149,3 +150,27 @@ def compose(begin, lanes, lane_i, lane_j, radius, inverse_mass, restitution, fri
             made_of[2, k], made_of[3, k] = radius[i], radius[j]
             made_of[4, k], made_of[5, k] = two * part / radius[i], two * (two / two - part) / radius[j]
             made_of[6, k] = two / two / (wi + wj)
+
+
+@kernel
+def _share_strip(begin, end, lane_i, lane_j, radius, inverse_mass, share, made_of):
+    real = share.dtype.type
+    one, two = spread(real(1)), spread(real(2))
+    for k in range(begin, end, LANES):
+        wi, wj = pick(inverse_mass, lane_i, k), pick(inverse_mass, lane_j, k)
+        part = wi / (wi + wj)
+        store(share, k, part)
+        if made_of.shape[1] > 0:
+            store(made_of[TURN_I], k, two * part / pick(radius, lane_i, k))
+            store(made_of[TURN_J], k, two * (one - part) / pick(radius, lane_j, k))
+            store(made_of[MASS], k, one / (wi + wj))
+
+
+@parallel_kernel
+def share_anew(begin, lanes, lane_i, lane_j, cut, radius, inverse_mass, share, made_of):
+    """What of `share_out` and `compose` goes by inverse masses, when these have changed. cut: as for `kernels.sweeps.push`."""
+    for parity in range(2):
+        for part in prange(cut.shape[1] - 1):
+            for half in range(cut[parity, part], cut[parity, part + 1]):
+                a = begin[2 * half + parity]
+                _share_strip(a, a + lanes[2 * half + parity], lane_i, lane_j, radius, inverse_mass, share, made_of)

@@ -11,7 +11,10 @@ from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.compile.stealing import claim, none_claimed
 from pyverlet.kernels.bounds import AT_WALL, CARRIED, CARRIES
 from pyverlet.kernels.contact import mark_strip, push_strip, refine_strip, relax_strip
+from pyverlet.kernels.kinds import BOUNCES, RUBS, for_each_kind
 from pyverlet.kernels.motion import arrive, set_out
+
+_ONE = np.uint64(1)
 
 # Particles one thread takes at a time where each is on its own.
 _CHUNK = 1024
@@ -27,31 +30,63 @@ def _clear(numbers, a, b):
         numbers[i] = 0
 
 
+def _move(position, velocity, origin, moved, slid, feed):
+    """Pushes become places, and velocities, which `moved` then holds."""
+    x, v, start, way = position.reshape(-1), velocity.reshape(-1), origin.reshape(-1), moved.reshape(-1)
+    for k in range(x.shape[0]):
+        gone = way[k] - (x[k] - start[k])
+        if RUBS:
+            gone = gone + slid[k]
+        x[k] += gone
+        gone = feed * gone
+        v[k] += gone
+        way[k] = gone
+
+
 @kernel
-def _arrive(a, b, circles, law):
-    """Of the circles from a up to b: pushes become places, and velocities; who has been fed so much carries weight."""
-    zero, one = law.h - law.h, law.h / law.h
-    limit = law.carried * law.carried
-    for i in range(a, b):
-        x = circles.moved[i, 0] - (circles.position[i, 0] - circles.origin[i, 0])
-        y = circles.moved[i, 1] - (circles.position[i, 1] - circles.origin[i, 1])
-        if law.rubs != 0:
-            x, y = x + circles.slid[i, 0], y + circles.slid[i, 1]
-        circles.position[i, 0] += x
-        circles.position[i, 1] += y
-        x, y = law.feed * x, law.feed * y
-        circles.velocity[i, 0] += x
-        circles.velocity[i, 1] += y
-        square = x * x + y * y
-        circles.carries[i] = one if square > limit else zero
-        if law.rubs != 0:  # who rests against others, however lightly, ends the substep as they do
-            circles.lift[i] = circles.leans[i] if square > zero else zero
-    for i in range(a, b):
-        circles.fed[i] = ((circles.fed[i] & (CARRIES | AT_WALL)) * CARRIED) | np.uint8(circles.carries[i])
-    if law.rubs != 0:
-        for i in range(a, b):
-            circles.turn[i] = law.h * circles.spin[i] + circles.turned[i]
-            circles.spin[i] += law.feed * circles.turned[i]
+def _weigh(fed, carried, carries):
+    """carries = 1 for who has been fed so much that it carries weight, else 0."""
+    v = fed.reshape(-1)
+    zero, one = carries.dtype.type(0), carries.dtype.type(1)
+    for k in range(carries.shape[0]):
+        i = np.uint64(2 * k)
+        carries[k] = one if v[i] * v[i] + v[i + _ONE] * v[i + _ONE] > carried * carried else zero
+
+
+@kernel
+def _lift(fed, leans, lift):
+    """Who rests against others, however lightly, ends the substep as they do."""
+    v, zero = fed.reshape(-1), lift.dtype.type(0)
+    for k in range(lift.shape[0]):
+        i = np.uint64(2 * k)
+        lean = leans[k]
+        lift[k] = lean if v[i] * v[i] + v[i + _ONE] * v[i + _ONE] > zero else zero
+
+
+@kernel
+def _remember(carries, fed):
+    """Who carries weight, and did in the substep before."""
+    for k in range(fed.shape[0]):
+        fed[k] = ((fed[k] & (CARRIES | AT_WALL)) * CARRIED) | np.uint8(carries[k])
+
+
+@kernel
+def _turn(spin, turned, turn, h, feed):
+    """turn = by how much each turns in this substep."""
+    for k in range(spin.shape[0]):
+        turn[k] = h * spin[k] + turned[k]
+        spin[k] += feed * turned[k]
+
+
+def _settle(a, b, circles, law):
+    """Of the circles from a up to b: where pushes have put them, and who carries weight."""
+    slid = circles.slid.reshape(-1)[2 * a : 2 * b]
+    _move(circles.position[a:b], circles.velocity[a:b], circles.origin[a:b], circles.moved[a:b], slid, law.feed)
+    _weigh(circles.moved[a:b], law.carried, circles.carries[a:b])
+    _remember(circles.carries[a:b], circles.fed[a:b])
+    if RUBS:
+        _lift(circles.moved[a:b], circles.leans[a:b], circles.lift[a:b])
+        _turn(circles.spin[a:b], circles.turned[a:b], circles.turn[a:b], law.h, law.feed)
 
 
 @kernel
@@ -62,8 +97,7 @@ def _refine_some(first, stop, parity, circles, pairs, law):
             refine_strip(2 * half + parity, circles, pairs, law)
 
 
-@parallel_kernel
-def push(circles, pairs, law, cut, looks, sets_out, claims):
+def _push(circles, pairs, law, cut, looks, sets_out, claims):
     """The first sweep: impacts, and overlaps, and what has been slipped.
 
     cut: (2, threads + 1), which half s // 2 of the strips s with s % 2 = 0, and 1, each thread begins with. looks: 1 if packs
@@ -71,12 +105,12 @@ def push(circles, pairs, law, cut, looks, sets_out, claims):
     """
     n = circles.position.shape[0]
     chunks = (n + _CHUNK - 1) // _CHUNK
-    if sets_out != 0 or law.rubs != 0:
+    if sets_out != 0 or RUBS:
         for c in prange(chunks):
             a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
             if sets_out != 0:
                 set_out(circles.position[a:b], circles.origin[a:b], circles.moved[a:b])
-            if law.rubs != 0:
+            if RUBS:
                 _clear(circles.turned, a, b)
                 _clear(circles.slid.reshape(-1), 2 * a, 2 * b)
     for parity in range(2):
@@ -91,25 +125,26 @@ def push(circles, pairs, law, cut, looks, sets_out, claims):
     for s in range(pairs.deeps.shape[0]):
         left += pairs.deeps[s]
     for parity in range(2):
+        if left == 0:
+            break
         if left < _FEW:
             _refine_some(0, cut[parity, -1], parity, circles, pairs, law)
         else:
             for part in prange(cut.shape[1] - 1):
                 _refine_some(cut[parity, part], cut[parity, part + 1], parity, circles, pairs, law)
-    if law.asks != 0:
+    if BOUNCES:
         for c in prange(chunks):
-            _arrive(c * _CHUNK, min((c + 1) * _CHUNK, n), circles, law)
+            settle(c * _CHUNK, min((c + 1) * _CHUNK, n), circles, law)
     elif law.arrives != 0:
         for c in prange(chunks):
             a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
             arrive(circles.position[a:b], circles.velocity[a:b], circles.origin[a:b], circles.moved[a:b], law.feed)
 
 
-@parallel_kernel
-def relax(circles, pairs, law, cut, marks, claims):
+def _relax(circles, pairs, law, cut, marks, claims):
     """The second sweep: touching pairs neither approach nor slip; if `marks` is 1, do what `mark_touching` does, too."""
     n = circles.position.shape[0]
-    if law.rubs != 0:
+    if RUBS:
         for c in prange((n + _CHUNK - 1) // _CHUNK):
             a, b = c * _CHUNK, min((c + 1) * _CHUNK, n)
             set_out(circles.position[a:b], circles.start[a:b], circles.moved[a:b])
@@ -134,3 +169,8 @@ def mark_touching(lanes, begin, lane_i, lane_j, normal, resting, cut):
             for half in range(cut[parity, part], cut[parity, part + 1]):
                 a = begin[2 * half + parity]
                 mark_strip(a, a + lanes[2 * half + parity], a, lane_i, lane_j, normal, resting)
+
+
+settle = for_each_kind(kernel, _settle, _move=for_each_kind(kernel, _move))
+push = for_each_kind(parallel_kernel, _push, push_strip=push_strip, settle=settle)
+relax = for_each_kind(parallel_kernel, _relax, relax_strip=relax_strip)

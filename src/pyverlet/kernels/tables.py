@@ -1,4 +1,4 @@
-"""What the kernels of contacts are handed: circles, pairs, and the law of a substep, each as a tuple by name.
+"""What the kernels of contacts are handed: circles, pairs, and the law of a substep, by name.
 
 Python hands over plain tuples, which are quicker to look through; drivers give them these names.
 """
@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pyverlet.compile.bundle import bundle
+
 NEW = np.inf
 """The slip of a pair that did not touch in the substep before. What it slips in its first one, it may have slipped before it
 met."""
@@ -18,8 +20,9 @@ E, MU, R_I, R_J, TURN_I, TURN_J, MASS = range(7)
 kg."""
 
 
-class Circles(NamedTuple):
-    """Circles by slot; what each is: `Slots`, and of contacts `Wide`."""
+@bundle
+class Circles:
+    """Circles by slot; what each is: `Slots`, of contacts `Wide`, and the last four `Loans`: empty where nobody lends."""
 
     position: Any
     velocity: Any
@@ -42,9 +45,14 @@ class Circles(NamedTuple):
     friction: Any
     hits: Any
     spent: Any
+    before: Any
+    spin_before: Any
+    lent: Any
+    busy: Any
 
 
-class Pairs(NamedTuple):
+@bundle
+class Pairs:
     """Candidate pairs by lane, those of strip s from begin[s] to begin[s] + lanes[s]; what each is: `Wide`."""
 
     begin: Any
@@ -73,6 +81,7 @@ class Law(NamedTuple):
     any pair may bounce or rub, or somebody listens to who meets how fast. rubs, listens, accounts: likewise. arrives: 1 if what
     becomes of `moved` is to be added to positions and velocities when all pairs have been gone through, 0 if the room does that;
     always 1 where `asks`. feed: FED / PUSHED / h, 1/s. most: the largest part of the contact distance that a push may see.
+    deep: likewise, from which on an overlap is treated again.
     weight: whether an acceleration could stop a pair that parts. carried: m/s, by which a substep feeds the velocity of one that
     carries weight.
     """
@@ -88,6 +97,7 @@ class Law(NamedTuple):
     lag: Any
     feed: Any
     most: Any
+    deep: Any
     rest_speed: Any
     weight: Any
     carried: Any

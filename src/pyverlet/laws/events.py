@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.kernels import events as kernels
-from pyverlet.laws.contacts.broadphase import PairList
 from pyverlet.laws.contacts.wide import Wide
 from pyverlet.laws.obstacles import Course
 from pyverlet.laws.rooms import Boundary
@@ -78,14 +77,7 @@ class Events:
 
     # ---- what the engine tells ---------------------------------------------------------------------------------------
 
-    def listen(self, state: Slots, pairs: PairList, lag: float) -> None:
-        """After the broad phase, before contacts change a velocity: who overlaps, and how fast do they meet?"""
-        which = pairs.listed()
-        kernels.listen(
-            state.position, state.velocity, state.acceleration, state.size, state.real(lag), *which, pairs.closing
-        )  # fmt: skip
-
-    def collect(self, state: Slots, pairs: PairList | Wide) -> None:
+    def collect(self, state: Slots, pairs: Wide) -> None:
         """The list of pairs is about to change, or the frame ends: keep what was heard."""
         room = int(pairs.listed()[1].sum())
         keys, speeds = np.empty(room, np.int64), np.empty(room)

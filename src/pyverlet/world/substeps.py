@@ -69,7 +69,7 @@ class Substeps:
         if smooth and not wide.asks and len(state) >= FUSED_FROM and strips.in_order:
             return self._strip_by_strip(world, contacts, wide, strips, shape, substep, leaps=leaps)
         stop, looks = world.substeps if leaps else substep + 1, wide.takes_looks()
-        reached, self.leapt = frame.frames[confine](
+        reached, self.leapt = frame.frames[confine][wide.kind](
             substep, stop, last, wide.circles, wide.arrays, wide.law, tuple(map(state.real, shape)), wide.cut(), looks,
             int(out is not wide.moved), strips.checked, state.real(strips.allowed * strips.allowed), state.claims(),
             world.profile.spent(frame.STAGES), (clock.address(), clock.tick()),

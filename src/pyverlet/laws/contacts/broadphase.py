@@ -33,58 +33,23 @@ Array = NDArray[Any]
 
 
 class PairList:
-    """Candidate pairs by strip: slots pair_i[k], pair_j[k] for k in first[s] to first[s] + count[s].
+    """Candidate pairs by strip: slots pair_i[k], pair_j[k] for k in first[s] to first[s] + count[s]."""
 
-    `meeting`, `touching` and `impulse` are where the contact solver notes, by strip too, how each stands, which of them touch and
-    how hard; `spent` (strips, 2) what energy impacts and friction have taken, J. `closing` is where events are noted, and empty
-    unless somebody listens to them. `slip`, `slipped` and `held` are for friction, and empty without: how far a pair has slipped,
-    m, and by touching pair how far it had before this substep, and the impulse that answered it, N s.
-    """
-
-    def __init__(self, dtype: np.dtype[Any]) -> None:
-        self._dtype = dtype
-        self.listening = False
-        self.first = np.zeros(0, np.int64)
-        self.count = np.zeros(0, np.int64)
-        self.touches = np.zeros(0, np.int64)
-        self.spent = np.zeros((0, 2))
-        self.slip = self.slipped = self.held = np.empty(0, dtype)
+    def __init__(self) -> None:
+        self.set_strips(0)
         self.make_room(0)
 
     def make_room(self, pairs: int) -> None:
         """Room for at least this many pairs."""
-        self.pair_i = np.empty(pairs, np.uint32)
-        self.pair_j = np.empty(pairs, np.uint32)
-        self.meeting, self.touching, self.impulse = np.empty(0, np.uint8), np.empty(0, np.uint32), np.empty(0, self._dtype)
-        self.closing = np.full(pairs if self.listening else 0, -1, self._dtype)
-
-    def listen(self) -> None:
-        """Note events from now on."""
-        self.listening = True
-        self.closing = np.full(len(self.pair_i), -1, self._dtype)
-
-    def hold_notes(self) -> None:
-        """Room for `meeting`, `touching` and `impulse`; the values are anything."""
-        pairs = len(self.pair_i)
-        if len(self.meeting) != pairs:
-            self.meeting, self.touching = np.empty(pairs, np.uint8), np.empty(pairs, np.uint32)
-            self.impulse = np.empty(pairs, self._dtype)
+        self.pair_i, self.pair_j = np.empty(pairs, np.uint32), np.empty(pairs, np.uint32)
 
     def listed(self) -> tuple[Array, Array, Array, Array]:
         """first, count, pair_i, pair_j: where the pairs are, for kernels."""
         return self.first, self.count, self.pair_i, self.pair_j
 
-    def hold_slips(self) -> None:
-        """Room for what friction notes; the values are anything."""
-        if len(self.slip) != len(self.pair_i):
-            self.slip, self.slipped, self.held = (np.empty(len(self.pair_i), self._dtype) for _ in range(3))
-
     def set_strips(self, strips: int) -> None:
         """Begin a new list of this many strips."""
-        self.first, self.count, self.touches = (np.zeros(strips, np.int64) for _ in range(3))
-        spent = self.spent.sum(axis=0)
-        self.spent = np.zeros((strips, 2))
-        self.spent[0] = spent
+        self.first, self.count = np.zeros(strips, np.int64), np.zeros(strips, np.int64)
 
     def pairs(self) -> Array:
         """(k, 2) slots of all candidate pairs; a copy, for tests and measurements."""
@@ -173,7 +138,7 @@ class BruteForce:
 
 class _AllPairs(BroadPhase):
     def __init__(self, dtype: np.dtype[Any]) -> None:
-        self.list = PairList(dtype)
+        self.list = PairList()
 
     def update(self, state: Slots) -> None:
         if self.replacing:
@@ -223,7 +188,7 @@ class Fast:
 
 class _SortedCells(BroadPhase):
     def __init__(self, dtype: np.dtype[Any], skin: float | None) -> None:
-        self.list = PairList(dtype)
+        self.list = PairList()
         self.skin_diameters = SKIN if skin is None else skin
         self._adapts = skin is None
         self._room = 4  # pairs kept free for each particle; six neighbours make three pairs

@@ -10,15 +10,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pyverlet.ground import checks
-from pyverlet.ground.constants import FED, FED_UNEVEN, LARGEST_PUSH, PUSHED, REST_ACCELERATIONS, UNEVEN
+from pyverlet.ground.constants import FED, PUSHED, REST_ACCELERATIONS, UNEVEN
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import contacts, friction, impacts, refine
-from pyverlet.kernels.bounds import AT_WALL, CARRIED, CARRIES
+from pyverlet.kernels import overlap
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast, PairList, Strips
 from pyverlet.laws.contacts.growth import Growth
 from pyverlet.laws.contacts.loans import Lent, Loans
 from pyverlet.laws.contacts.slips import Kept, Slips
-from pyverlet.laws.contacts.wide import Wide
+from pyverlet.laws.contacts.wide import Inertia, Wide
 from pyverlet.laws.events import Events
 from pyverlet.laws.sleep import Sleep
 from pyverlet.state.moves import pick_falling
@@ -77,7 +76,7 @@ class ContactSolver:
         self._seen = 0
         self._wide = Wide(dtype, settings.restitution, settings.friction, listens=events is not None)
         self._packed = False
-        self._uneven = False  # whether masses differ so much that contacts need loans of inertia, and to be refined
+        self._uneven = False  # whether masses differ so much that contacts need loans of inertia
         self._lends = False  # in this substep
         self._events = events
         self._sleep = sleep
@@ -86,7 +85,6 @@ class ContactSolver:
         self.growth = Growth()
         self.broad_phase.replacing = self._slips.stop
         if events is not None:
-            self.broad_phase.list.listen()
             self.broad_phase.renewing = lambda state, pairs: self.collect(state)
 
     def fit(self, state: Slots) -> None:
@@ -112,17 +110,13 @@ class ContactSolver:
         while self._sleep and self._sleep.touched(state, self.broad_phase.list):
             self.broad_phase.renew(state)
             self._list(state)
-        if self._events is not None and self._uneven:
-            self._events.listen(state, self.broad_phase.list, lag)
 
     def collect(self, state: Slots) -> None:
         """Tell the events who has met, and how fast."""
-        if self._events is not None:
-            self._events.collect(state, self._wide if self._packed else self.broad_phase.list)
+        if self._events is not None and self._packed:
+            self._events.collect(state, self._wide)
 
     def _list(self, state: Slots) -> None:
-        if self._packed and not self._eight(state):  # they were a frame ago, and the pairs may have gone
-            self.broad_phase.forget()
         self.broad_phase.update(state)
         if self._seen != self.broad_phase.rebuilds:
             self._seen = self.broad_phase.rebuilds
@@ -142,92 +136,42 @@ class ContactSolver:
 
     def steady(self, state: Slots) -> Strips | None:
         """Where strips stand, if a substep's contacts are but the two sweeps; None: there is more to them."""
-        alone = self._eight(state) and self._sleep is None and state.size is state.radius
+        alone = not self._uneven and self._sleep is None and state.size is state.radius
         return self.broad_phase.strips() if alone else None
 
-    def set_up(self, state: Slots, h: float, lag: float, strongest: float) -> Wide:
+    def set_up(self, state: Slots, h: float, lag: float, strongest: float, lent: Inertia | None = None) -> Wide:
         """The pairs of now, with all that their sweeps need in this substep."""
         wide = self._pack(state)
         if self._rubs(state):
             self._slips.start(wide, state.particle)
         rest_speed = REST_ACCELERATIONS * strongest * h
-        wide.set_up(state, h, lag, strongest, rest_speed, accounts=len(state.spent) > 0)
+        wide.set_up(state, h, lag, strongest, rest_speed, len(state.spent) > 0, lent)
         return wide
 
     def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
-        """Move overlapping circles apart, let impacts bounce, note who touches, and let those grip each other."""
-        if self._eight(state):
-            self.set_up(state, h, lag, strongest).push(state)
-            return
-        pairs, real = self.broad_phase.list, state.real
-        pairs.hold_notes()
-        moving, lends = (state.position, state.velocity), self._uneven and strongest > 0
-        self._lends = lends
-        self._lighter = self._loans.begin(state) if lends else state.inverse_mass
-        bodies = (state.size, self._lighter)
-        which = pairs.listed()
-        fed = self._fed(state)
-        push = (real(fed / h), real(LARGEST_PUSH))
-        notes = (pairs.touching, pairs.impulse, pairs.touches)
-        if self._bounces(state):
-            self._bounce(state, h, lag, REST_ACCELERATIONS * strongest * h)
-            if lends:
-                self._loans.recall(state, pairs)
-        if lends:
-            self._loans.keep_weight(state, h, fed)
-        if not self._bounces(state):
-            contacts.project(*moving, *bodies, *which, *push, *notes)
-        else:
-            slow = real(1 / h if strongest > 0 else 0.0)
-            contacts.project_resting(*moving, *bodies, *which, *push, slow, pairs.meeting, state.fed, *notes)
-        if self._uneven:
-            refine.refine(*moving, *bodies, *which, *push, *notes)
-        if lends:
-            self._loans.settle(state, pairs, h)
-        if self._rubs(state):
-            self._slips.start(pairs, state.particle)
-            state.note_turn(h)
-            where = (*moving, state.spin, state.turn, state.lift, state.radius, self._lighter, state.friction)
-            numbers = (real(h), real(self.settings.friction), real(self._leaning(state, h)))
-            friction.grip(*where, *which, *numbers, *notes, pairs.slip, pairs.slipped, pairs.held, pairs.spent)
-        if lends:
+        """Let impacts bounce, move other overlapping circles apart, note who touches, and let those grip each other."""
+        self._lends = self._uneven and strongest > 0
+        lent = Inertia(self._loans.begin(state, h), self._loans.noted()) if self._lends else None
+        wide = self.set_up(state, h, lag, strongest, lent)
+        wide.push(state)
+        if self._lends:
+            self._loans.settle(state, wide, h)
             self._loans.free_of_walls(state)
-
-    def _bounce(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
-        pairs, real = self.broad_phase.list, state.real
-        moving, bodies = (state.position, state.velocity, state.acceleration), (state.size, state.inverse_mass, state.restitution)
-        which = pairs.listed()
-        settings = (real(h), real(lag), real(self.settings.restitution), real(rest_speed))
-        impacts.impacts(*moving, *bodies, *which, *settings, state.fed, pairs.meeting, pairs.impulse, pairs.spent)
-        state.fed[:] = (state.fed & (CARRIES | AT_WALL)) * CARRIED
 
     def still(self, state: Slots, h: float) -> None:
         """Take from touching circles the velocity that projection has put in, and rub them."""
-        if self._eight(state):
-            self._wide.relax(state)
-            return
-        pairs, real = self.broad_phase.list, state.real
-        which = pairs.listed()
-        moving = (state.position, state.velocity)
-        notes = (pairs.touching, pairs.impulse, pairs.touches)
         if self._lends:
-            self._loans.join(state, pairs)
-        if self._rubs(state):
-            where = (state.start, *moving, state.spin, state.turn, state.radius, self._lighter, state.friction)
-            numbers = (real(h), real(self.settings.friction))
-            friction.rub(*where, *which, *numbers, *notes, pairs.slip, pairs.slipped, pairs.held, pairs.spent)
-        else:
-            contacts.still_resting(*moving, self._lighter, *which, *notes)
+            self._loans.join(state, self._wide)
+        self._wide.relax(state)
         if self._lends:
-            self._loans.balance(state, rubs=self._rubs(state))
+            self._loans.balance(state, rubs=self._wide.rubs)
 
     def spent(self) -> Any:
         """(2,) J that impacts, and friction, have taken in this frame, negative."""
-        return self.broad_phase.list.spent.sum(axis=0) + self._wide.spent.sum(axis=0)
+        return self._wide.spent.sum(axis=0)
 
     def clear_notes(self) -> None:
         """A frame begins."""
-        self.broad_phase.list.spent.fill(0)
         self._wide.spent.fill(0)
 
     @contextmanager
@@ -266,25 +210,6 @@ class ContactSolver:
         self._slips.renumber(now)
         self._loans.renumber(now)
 
-    def _eight(self, state: Slots) -> bool:
-        """Whether contacts are solved eight at a time."""
-        return not self._uneven
-
-    def _leaning(self, state: Slots, h: float) -> float:
-        """s; times -a it is the velocity that a circle at rest against others ends a substep with."""
-        return self._lean(state) * h
-
-    def _lean(self, state: Slots) -> float:
-        """The same, in substeps."""
-        return state.drop - PUSHED / self._fed(state)
-
-    def _fed(self, state: Slots) -> float:
-        """What velocities are fed, of an overlap."""
-        return FED_UNEVEN if self._uneven and not (self._rubs(state) or self._bounces(state)) else FED
-
-    def _bounces(self, state: Slots) -> bool:
-        return self.settings.restitution > 0.0 or state.most_restitution > 0.0
-
     def _rubs(self, state: Slots) -> bool:
         return self.settings.friction > 0.0 or state.most_friction > 0.0
 
@@ -295,24 +220,15 @@ class ContactSolver:
 
         before: how the frame began. lag: seconds the velocity is behind. marked: who touches another is known to rest already.
         """
-        state.lean = self._lean(state)
+        state.lean = state.drop - PUSHED / FED
         if not marked:
-            self._mark_resting(state)
+            self._wide.mark_resting(state)
         if self._lends:
             self._loans.let_fall(state)
         else:
             pick_falling(state, before.velocity, lag, dt)
         if self._sleep and self._sleep.end(state, self.broad_phase.list, dt, float(np.hypot(*gravity))):
             self.broad_phase.forget()  # it has no use for pairs among sleepers
-
-    def _mark_resting(self, state: Slots) -> None:
-        """Note in `state.resting` who touches another without bouncing off it."""
-        if self._eight(state):
-            self._wide.mark_resting(state)
-            return
-        pairs = self.broad_phase.list
-        notes = (pairs.touching, pairs.impulse, pairs.touches)
-        contacts.mark_touching(pairs.first, pairs.pair_i, pairs.pair_j, *notes, state.resting)
 
 
 def find_contacts(state: State, method: Fast | BruteForce) -> np.ndarray[Any, np.dtype[np.int64]]:
@@ -333,7 +249,7 @@ def measure_overlap(state: State, unlist: Unlist) -> Overlap:
     slots, phase = _listed(state, Fast(skin=0.0))
     pairs = phase.list
     unlist(pairs, slots.particle)
-    number, total, largest = contacts.overlaps(slots.position, slots.radius, *pairs.listed())
+    number, total, largest = overlap.overlaps(slots.position, slots.radius, *pairs.listed())
     return Overlap(total / number if number else 0.0, largest, number)
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pyverlet.ground.constants import GROWTH, PACE_FRAMES, SMALLEST, SURPLUS_SOUGHT
-from pyverlet.kernels import contacts
+from pyverlet.kernels import overlap
 from pyverlet.laws.contacts.broadphase import PairList
 from pyverlet.state.state import Slots
 
@@ -25,7 +25,7 @@ class Growth:
     def fit(self, state: Slots, pairs: PairList, fresh: np.ndarray) -> None:
         """Shrink those marked in `fresh` (n,), and whom they overlap, until they just touch."""
         which = pairs.listed()
-        contacts.fit(state.position, state.radius, *which, fresh, state.real(SMALLEST), state.grown)
+        overlap.fit(state.position, state.radius, *which, fresh, state.real(SMALLEST), state.grown)
         state.resize()
 
     def grow(self, state: Slots, h: float) -> None:

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground.constants import LOAN_S, PUSHED
+from pyverlet.ground.constants import FED, LOAN_S, PUSHED
 from pyverlet.kernels import balance, loans
-from pyverlet.laws.contacts.broadphase import PairList
+from pyverlet.laws.contacts.wide import Wide
 from pyverlet.state.state import Slots
 
 Array = NDArray[Any]
@@ -43,12 +43,22 @@ class Loans:
         self._unpushed = np.empty((count, 2), self._dtype)
         self._root, self._sums, self._open_to = np.empty(count, np.int64), np.empty((count, 10)), np.empty(count, np.uint8)
 
-    def begin(self, state: Slots) -> Array:
-        """(n,) inverse masses with which this substep's contacts are solved."""
+    def begin(self, state: Slots, h: float) -> Array:
+        """(n,) inverse masses with which this substep's contacts are solved; each is pulled at by its own weight all the same."""
         if self._kept.particle is not state.particle:
             self._follow(state)
         loans.weigh(state.mass, state.inverse_mass, self._kept.lent, self._lighter)
+        # At rest a substep ends with the velocity -(1 - PUSHED / FED) a h: the same for all that way.
+        # At rest a substep ends with the velocity -(1 - PUSHED / FED) a h: the same for all that way.
+        self._kick, self._fall = state.real(h), state.real((state.drop - 1 + PUSHED / FED) * h * h)
+        held = self._kept.held
+        balance.set_out(state.velocity, state.acceleration, state.spin, held, self._kick, self._before, self._spin_before)
+        loans.pull(state.position, state.acceleration, state.inverse_mass, self._lighter, held, self._fall)
         return self._lighter
+
+    def noted(self) -> tuple[Array, Array, Array, Array]:
+        """Where an impact notes what it does by masses of their own: before, spin_before, lent, busy."""
+        return self._before, self._spin_before, self._kept.lent, self._kept.busy
 
     def _follow(self, state: Slots) -> None:
         """Slots were reordered, or particles have come or gone."""
@@ -61,30 +71,14 @@ class Loans:
         self._kept = Lent(state.particle, *columns)
         self._fit(len(state))
 
-    def recall(self, state: Slots, pairs: PairList) -> None:
-        """Those that have bounced in this substep do so with a mass of their own."""
-        which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j, pairs.meeting, pairs.impulse)
-        loans.recall(state.inverse_mass, *which, state.real(LOAN_S), self._kept.lent, self._kept.busy, self._lighter)
-
-    def keep_weight(self, state: Slots, h: float, fed: float) -> None:
-        """Let the integration have pulled at each circle with its own weight. fed: what velocities are fed, of an overlap."""
-        # At rest a substep ends with the velocity -(1 - PUSHED / fed) a h: the same for all that way.
-        self._pull = state.real(h), state.real((state.drop - 1 + PUSHED / fed) * h * h)
-        moving = (state.position, state.velocity, state.acceleration)
-        held = self._kept.held
-        balance.set_out(state.velocity, state.acceleration, state.spin, held, self._pull[0], self._before, self._spin_before)
-        loans.keep_weight(*moving, state.inverse_mass, self._lighter, held, *self._pull)
-
-    def settle(self, state: Slots, pairs: PairList, h: float) -> None:
+    def settle(self, state: Slots, wide: Wide, h: float) -> None:
         """Those that touch lend each other; those that do not have fallen by themselves."""
         _, lent, busy, held = self._kept
-        which = (pairs.first, pairs.count, pairs.pair_i, pairs.pair_j, pairs.touching, pairs.impulse, pairs.touches)
         self._touched.fill(0)
-        loans.share(state.mass, state.inverse_mass, *which, lent, busy, self._touched)
-        moving, masses = (state.position, state.velocity, state.acceleration), (state.mass, state.inverse_mass, self._lighter)
-        loans.settle(
-            *moving, *masses, held, *self._pull, self._touched, state.real(min(h / LOAN_S, 1.0)), state.real(h), lent, busy
-        )
+        loans.share(*wide.touching(), wide.cut(), state.mass, state.inverse_mass, lent, busy, self._touched)
+        bodies = (state.position, state.velocity, state.acceleration, state.inverse_mass, self._lighter, held)
+        loans.settle(*bodies, self._touched, self._kick, self._fall)
+        loans.give_back(state.mass, state.real(min(h / LOAN_S, 1.0)), state.real(h), lent, busy)
 
     def free_of_walls(self, state: Slots) -> None:
         """Contacts have been solved; what changes velocities from now on is walls."""
@@ -95,10 +89,9 @@ class Loans:
         self._before += change
         self._unpushed += change
 
-    def join(self, state: Slots, pairs: PairList) -> None:
+    def join(self, state: Slots, wide: Wide) -> None:
         """Walls have pushed: who hangs together, and is held by them."""
-        which = (pairs.first, pairs.pair_i, pairs.pair_j, pairs.touching, pairs.impulse, pairs.touches)
-        balance.cluster(*which, state.inverse_mass, self._touched, self._root)
+        balance.cluster(*wide.touching(), state.inverse_mass, self._root)
         who = (state.inverse_mass, self._touched, self._root)
         balance.note_walls(state.velocity, self._unpushed, *who, self._sums, self._kept.held)
 

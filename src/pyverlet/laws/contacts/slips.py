@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.kernels import friction
+from pyverlet.kernels import slips
 
 Array = NDArray[Any]
 
@@ -21,7 +21,7 @@ class Kept(NamedTuple):
 
 
 class Holder(Protocol):
-    """A list of pairs that can hold their slips: `PairList`, or `Packs` where friction is solved eight pairs at a time."""
+    """A list of pairs that can hold their slips."""
 
     slip: Array
 
@@ -54,7 +54,7 @@ class Slips:
             self._holder, self._owner = holder, particle.copy()
             low, high, slip = self._kept
             begin = np.concatenate((np.zeros(1, np.int64), np.cumsum(np.bincount(low, minlength=len(particle)))))
-            friction.give_slips(*holder.listed(), holder.slip, self._owner, begin, high, slip)
+            slips.give_slips(*holder.listed(), holder.slip, self._owner, begin, high, slip)
 
     def stop(self) -> None:
         """The list is about to be made anew, or another is to hold the slips: keep them."""
@@ -67,7 +67,7 @@ class Slips:
         room = int(count.sum())
         kept = Kept(np.empty(room, np.int32), np.empty(room, np.int32), np.empty(room, self._dtype))
         begin = np.empty(int(self._owner.max(initial=-1)) + 2, np.int64)
-        found = friction.take_slips(first, count, pair_i, pair_j, holder.slip, self._owner, begin, *kept)
+        found = slips.take_slips(first, count, pair_i, pair_j, holder.slip, self._owner, begin, *kept)
         return Kept(*(array[:found] for array in kept))
 
     def renumber(self, now: Array) -> None:

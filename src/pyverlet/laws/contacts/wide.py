@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from pyverlet.compile import jit
 from pyverlet.compile.lanes import LANES
 from pyverlet.ground import memory
-from pyverlet.ground.constants import CARRIED_WEIGHT, COLOURS, FED, LARGEST_PUSH, PUSHED
+from pyverlet.ground.constants import CARRIED_WEIGHT, COLOURS, DEEP, DEEP_LENT, FED, LARGEST_PUSH, PUSHED
 from pyverlet.kernels import frame, packs, sweeps, tables
 from pyverlet.kernels.bounds import CARRIES
+from pyverlet.kernels.kinds import BOUNCING, ROUGH, SMOOTH
 from pyverlet.laws.contacts.broadphase import PairList, rows_of
 from pyverlet.state.state import Slots
 
@@ -20,6 +21,13 @@ Array = NDArray[Any]
 
 _ROWS = tables.MASS + 1
 _ARRIVES = tables.Law._fields.index("arrives")
+
+
+class Inertia(NamedTuple):
+    """What `Loans` changes for the contacts of a substep: (n,) inverse masses, 1/kg, and where impacts note what they do."""
+
+    inverse_mass: Array
+    noted: tuple[Array, Array, Array, Array]
 
 
 class Wide:
@@ -58,7 +66,14 @@ class Wide:
         self._deeps = np.zeros(0, np.int64)  # packs of each strip that overlap deeply
         self._looks = True  # whether they are to be noted, once a frame
         self.spent = np.zeros((1, 2))
+        none = np.empty(0, dtype)
+        self._lent, self._nobody = False, (np.empty((0, 2), dtype), none, none, none)
         self._hold_circles(0)
+
+    @property
+    def kind(self) -> str:
+        """Which kernels it takes: of `kernels.kinds`."""
+        return ROUGH if self.rubs else BOUNCING if self.asks else SMOOTH
 
     def _make_room(self, lanes: int) -> None:
         self.lane_i, self.lane_j = (memory.empty(lanes, np.uint32) for _ in range(2))
@@ -167,10 +182,17 @@ class Wide:
 
     # ---- a substep ---------------------------------------------------------------------------------------------------------
 
-    def set_up(self, state: Slots, h: float, lag: float, strongest: float, rest_speed: float, *, accounts: bool) -> None:
+    def set_up(
+        self, state: Slots, h: float, lag: float, strongest: float, rest_speed: float, accounts: bool, lent: Inertia | None
+    ) -> None:
         """Everything that the sweeps of this substep, and of those that follow it alike, need: `circles`, `arrays` and `law`."""
-        if not self.fits(state):
+        if not self.fits(state) or (self._lent and lent is None):
             self.fit(state)
+        self._lent = lent is not None
+        if lent is not None:
+            packs.share_anew(
+                *self._lanes(), self.cut(), state.radius, lent.inverse_mass, self.share, self.made_of,
+            )  # fmt: skip
         if self.asks:
             np.bitwise_and(state.fed, CARRIES, out=self._carries, casting="unsafe")
         turn = self._turn if self.rubs else self._turn[:0]
@@ -180,12 +202,12 @@ class Wide:
         self.circles = (
             state.position, state.velocity, state.acceleration, state.inverse_mass, self.origin, self.moved, state.resting,
             state.spin, self._carries, state.fed, self._slid, self._turned, turn, self._lift, self._leans, state.start,
-            state.radius, state.restitution, state.friction, state.hits, state.spent,
+            state.radius, state.restitution, state.friction, state.hits, state.spent, *(lent.noted if lent else self._nobody),
         )  # fmt: skip
         carried = CARRIED_WEIGHT * strongest * h if strongest > 0 else np.inf
         self.law = (
             self._varied, self._mixed, int(self.asks), int(self.rubs), int(self._listens), int(accounts),
-            1, *state.reals(h, lag, FED / PUSHED / h, LARGEST_PUSH, rest_speed), int(strongest > 0),
+            1, *state.reals(h, lag, FED / PUSHED / h, LARGEST_PUSH, DEEP_LENT if lent else DEEP, rest_speed), int(strongest > 0),
             state.real(carried),
         )  # fmt: skip
         self.arrays = (
@@ -198,21 +220,28 @@ class Wide:
         self.law = (*self.law[:_ARRIVES], int(self.asks), *self.law[_ARRIVES + 1 :])
 
     def takes_looks(self) -> int:
-        """Whether the next sweep is to note who overlaps deeply, which it does once a frame."""
-        looks, self._looks = int(self._looks), False
+        """Whether the next sweep is to note who overlaps deeply: once a frame, or always where circles lend inertia."""
+        looks, self._looks = int(self._looks), self._lent
         return looks
 
     def has_marked(self) -> None:
         """Who rests has been marked in `state.resting`: the frame is over, and the next one looks anew."""
         self._looks = True
 
+    def touching(self) -> tuple[Array, Array, Array, Array, Array]:
+        """begin, lanes, lane_i, lane_j and normals of this substep: not 0 for pairs that touch and have not bounced."""
+        return *self._lanes(), self.normal
+
+    def _lanes(self) -> tuple[Array, Array, Array, Array]:
+        return self.begin, self.lanes, self.lane_i, self.lane_j
+
     def push(self, state: Slots) -> None:
         """Impacts, overlaps and slips; circles are then where that has moved them."""
-        frame.project(self.circles, self.arrays, self.law, self.cut(), self.takes_looks(), 1, state.claims())
+        frame.project[self.kind](self.circles, self.arrays, self.law, self.cut(), self.takes_looks(), 1, state.claims())
 
     def relax(self, state: Slots) -> None:
         """Touching circles neither approach nor slip."""
-        frame.still(self.circles, self.arrays, self.law, self._cut, 0, state.claims())
+        frame.still[self.kind](self.circles, self.arrays, self.law, self._cut, 0, state.claims())
 
     def mark_resting(self, state: Slots) -> None:
         """Note in `state.resting` who touches another."""

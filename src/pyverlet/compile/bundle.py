@@ -1,0 +1,35 @@
+"""Many arrays under one name, handed from kernel to kernel as a single pointer.
+
+To a compiled function an array is ten numbers and a count of who holds it. A tuple of forty is copied for every call, which in a
+world of ten circles takes longer than what is called does. Numba's structrefs are kept in memory once and handed on.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import types
+from numba.experimental import structref
+
+
+class _Bundle(types.StructRef):  # type: ignore[misc]
+    def preprocess_fields(self, fields: Any) -> Any:
+        """A field is what its type says, not the one value it is known to have where it is made."""
+        return tuple((name, types.unliteral(kind)) for name, kind in fields)
+
+
+def bundle(described: type) -> Any:
+    """What a class with annotations describes, to be made and read by them in compiled code.
+
+    Reading a field counts who holds the array: outside of inner loops.
+    """
+    kind = structref.register(type("Type", (_Bundle,), {"__module__": described.__module__}))
+    kind.__qualname__ = f"{described.__qualname__}.Type"  # compiled code is kept on disk under the names of its types
+    described.Type = kind  # type: ignore[attr-defined]
+    structref.define_constructor(described, kind, fields(described))
+    return described
+
+
+def fields(described: type) -> list[str]:
+    """Names of what is in a bundle, in order."""
+    return list(described.__annotations__)
