@@ -106,10 +106,9 @@ def soft_bodies(count: int = 60, corners: int = 16) -> Linked:
     position = np.concatenate([ring + wide * np.array((k % 6, k // 6)) for k in range(count)])
     k, first = np.arange(corners), corners * np.arange(count)
     near, across = np.column_stack((k, (k + 1) % corners)), np.column_stack((k[: corners // 2], k[corners // 2 :]))
-    return Linked(
-        "soft bodies", position, np.full(len(position), 0.05), np.zeros(0, int), *((first[:, None, None] + pairs).reshape(-1, 2) for pairs in (near, across)), 60.0, 0.2,
-        floor=-size - 2 * RADIUS,
-    )  # fmt: skip
+    sticks, springs = ((first[:, None, None] + pairs).reshape(-1, 2) for pairs in (near, across))
+    none, mass = np.zeros(0, int), np.full(len(position), 0.05)
+    return Linked("soft bodies", position, mass, none, sticks, springs, 60.0, 0.2, floor=-size - 2 * RADIUS)
 
 
 class Peer(Protocol):
