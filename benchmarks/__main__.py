@@ -4,7 +4,8 @@
 `python -m benchmarks own` what pyverlet promises about its own speed, `python -m benchmarks materials` what
 restitution, friction, masses and services cost, `python -m benchmarks links` what
 hangs together costs and how far it is stretched, `python -m benchmarks page` how fast the live page is,
-`python -m benchmarks data` what it costs to keep worlds, to step many, and to sweep settings.
+`python -m benchmarks data` what it costs to keep worlds, to step many, and to sweep settings, `python -m benchmarks busy` what
+frames take beside other programs, and `python -m benchmarks soak` whether anything grows in a page that is served for long.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 import pyverlet as pv
-from benchmarks import data, links, materials, own, page, physics
+from benchmarks import busy, data, links, materials, own, page, physics, soak
 from benchmarks.engines import CAREFUL, DT, ENGINES, RADIUS, Array, Engine
 from pyverlet.scenes import report
 
@@ -124,7 +125,7 @@ def main() -> None:
     parser.add_argument(
         "table",
         nargs="?",
-        choices=("speed", "physics", "own", "page", "materials", "links", "data"),
+        choices=("speed", "physics", "own", "page", "materials", "links", "data", "busy", "soak"),
         default="speed",
         help="what to compare",
     )
@@ -136,6 +137,8 @@ def main() -> None:
     parser.add_argument("--scene", default="cage", help="page: what is shown")
     parser.add_argument("--seconds", type=float, default=12.0, help="page: how long each is watched")
     parser.add_argument("--threads", type=int, help="page: that the physics may use")
+    parser.add_argument("--minutes", type=float, default=60.0, help="soak: how long")
+    parser.add_argument("--busy-frames", type=int, default=1200, help="busy: frames of each world")
     arguments = parser.parse_args()
     if arguments.table == "physics":
         print(machine())
@@ -150,6 +153,14 @@ def main() -> None:
         return
     if arguments.table == "links":
         links.main(arguments.csv)
+        return
+    if arguments.table == "soak":
+        if not soak.main(arguments.minutes):
+            sys.exit(1)
+        return
+    if arguments.table == "busy":
+        if not busy.main((arguments.particles or [20_000])[0], arguments.busy_frames):
+            sys.exit(1)
         return
     if arguments.table == "data":
         if not data.main((arguments.particles or [1_000_000])[0]):

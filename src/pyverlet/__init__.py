@@ -33,22 +33,24 @@ from pyverlet.laws.ledger import Ledger
 from pyverlet.laws.links import Angle, Area, Pin, Rope, Spring, Stick
 from pyverlet.laws.naive import ClampAndFlip, ProjectOnly
 from pyverlet.laws.obstacles import Capsule, Chain, Disc, Obstacle, Polygon, Segment
-from pyverlet.laws.rooms import Boundary, Box, Circle, Open
+from pyverlet.laws.rooms import Boundary, Box, Circle, Open, Periodic
+from pyverlet.scenes.sliders import Slider, slider
 from pyverlet.state.group import Group
 from pyverlet.world import builders
 from pyverlet.world.actors import Actor, Emitter, Sink
-from pyverlet.world.builders import bridge, chain, cloth, net, rope, soft_body
+from pyverlet.world.builders import bridge, chain, cloth, fill, net, rope, soft_body
 from pyverlet.world.clock import Clock, FrameBudget
 from pyverlet.world.panels import Panel, Panels
 from pyverlet.world.warmup import warm_up
 from pyverlet.world.world import World
 
 if TYPE_CHECKING:
+    from pyverlet import lab
     from pyverlet.data.sweep import sweep
     from pyverlet.data.trajectory import Trajectory, read_trajectory
     from pyverlet.data.worlds import Worlds
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _LATER = {
     "Trajectory": "pyverlet.data.trajectory",
@@ -61,28 +63,33 @@ __all__ = [
     "RK4", "Actor", "Angle", "Area", "Attractor", "Boundary", "Box", "BruteForce", "Capsule", "Chain", "Circle",
     "ClampAndFlip", "Clock", "CoarseStepWarning", "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy",
     "Events", "ExplicitEuler", "Fast", "FrameBudget", "Gravitation", "Group", "InputError", "Integrator", "Ledger",
-    "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel", "Panels", "Pin", "PointSpring", "Polygon", "PositionVerlet",
-    "ProjectOnly", "PyverletError", "Rope", "Segment", "SemiImplicitEuler", "Sink", "Spring", "Stick", "TimeCorrectedVerlet",
-    "Trajectory", "VelocityVerlet", "Wind", "World", "Worlds", "Yoshida4", "bridge", "builders", "chain", "cloth", "errors",
-    "force", "forces", "integrators", "load", "net", "read_trajectory", "rope", "save", "scenes", "soft_body", "sweep", "view",
-    "warm_up", "widget",
+    "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel", "Panels", "Periodic", "Pin", "PointSpring", "Polygon",
+    "PositionVerlet", "ProjectOnly", "PyverletError", "Rope", "Segment", "SemiImplicitEuler", "Sink", "Slider", "Spring", "Stick",
+    "TimeCorrectedVerlet", "Trajectory", "VelocityVerlet", "Wind", "World", "Worlds", "Yoshida4", "bridge", "builders",
+    "chain", "cloth", "errors", "fill", "force", "forces", "integrators", "lab", "load", "net", "read_trajectory", "rope", "save",
+    "scenes", "slider", "soft_body", "sweep", "view", "warm_up", "widget",
 ]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
-    # Classes that few programs need, loaded when they are first named.
+    # What few programs need, loaded when it is first named.
     if name in _LATER:
         value = getattr(import_module(_LATER[name]), name)
         globals()[name] = value
         return value
+    if name == "lab":
+        return import_module("pyverlet.lab")
     raise AttributeError(f"module 'pyverlet' has no attribute {name!r}")
 
 
-def view(world: World | Panels, **options: Any) -> None:
-    """Show a world, or several side by side, on a live page until Ctrl-C; see `pyverlet.viewers.view` for the options."""
+def view(world: World | Panels, **options: Any) -> Any:
+    """Show a world, or several side by side, on a live page until Ctrl-C; see `pyverlet.viewers.view` for the options.
+
+    With block=False it returns at once: a handle with `url` and `close()`.
+    """
     from pyverlet.viewers import view as view_page
 
-    view_page(world, **options)
+    return view_page(world, **options)
 
 
 def save(world: World, path: str | Path, **options: Any) -> None:

@@ -136,7 +136,7 @@ def test_list(run: Any) -> None:
 
 def test_version_and_help(run: Any) -> None:
     assert run("--version")[:2] == (0, f"pyverlet {__version__}\n")
-    code, out, _ = run()
+    code, out, _ = run("--help")
     assert code == 0
     for command in ("run", "bench", "list"):
         assert command in out

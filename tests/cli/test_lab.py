@@ -99,7 +99,7 @@ def test_compare_as_a_table(run: Any) -> None:
     assert [row.split()[:2] for row in rows] == [["3", "rk4"], ["3", "yoshida4"]]
 
 
-@pytest.mark.parametrize("scene", ["fall", "bounce-order", "box"])
+@pytest.mark.parametrize("scene", ["fall", "bounce-order", pytest.param("box", marks=pytest.mark.slow)])
 def test_compare_draws(run: Any, tmp_path: Path, scene: str) -> None:
     pytest.importorskip("matplotlib")
     picture = tmp_path / "out.png"
@@ -205,3 +205,56 @@ def test_bad_input_is_one_sentence(run: Any, line: str, says: str) -> None:
     assert says in err
     assert err.startswith("pyverlet: ")
     assert err.count("\n") == 1
+
+
+# ---- a problem of one's own ----
+
+MINE_TO_SOLVE = """
+import numpy as np
+from pyverlet.lab import Equation
+
+three = Equation(lambda t, x, v: -4.0 * x, x0=[1.0, 2.0, 3.0], exact=lambda t: (
+    np.cos(2 * t) * np.array([1.0, 2.0, 3.0]), -2 * np.sin(2 * t) * np.array([1.0, 2.0, 3.0])))
+unknown = Equation(lambda t, x, v: -np.sin(x), x0=1.0, name="swing")
+wrong = Equation(lambda t, x, v: -x / 0, x0=1.0)
+short = Equation(lambda t, x, v: -x, x0=[1.0, 2.0], exact=lambda t: (1.0, 2.0))
+"""
+
+
+@pytest.fixture
+def problems(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    (tmp_path / "my_problems.py").write_text(MINE_TO_SOLVE, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    return "my_problems"
+
+
+@pytest.mark.parametrize(("name", "called"), [("three", "three"), ("unknown", "swing")])
+def test_order_on_a_problem_of_ones_own(run: Any, problems: str, name: str, called: str) -> None:
+    code, out, err = run("order", "--problem", f"{problems}:{name}", "--integrators", "velocity-verlet,rk4", "--json")
+    assert code == 0, err
+    found = {each["method"]: each["problems"] for each in json.loads(out)["methods"]}
+    assert found["velocity-verlet"][called]["order"] == pytest.approx(2.0, abs=0.1)
+    assert found["rk4"][called]["order"] == pytest.approx(4.0, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("gone", "has no gone; allowed is module:name, a pyverlet.lab.Equation"),
+        ("np", "a pyverlet.lab.Equation"),
+        ("wrong", "whose functions fail (ZeroDivisionError"),
+        ("short", "exact returns shapes () and (); allowed are two of the shape of x0, (2,)"),
+    ],
+)
+def test_a_problem_that_is_none_is_refused(run: Any, problems: str, name: str, says: str) -> None:
+    code, out, err = run("order", "--problem", f"{problems}:{name}", "--integrators", "rk4")
+    assert (code, out) == (2, "")
+    assert says in err
+    assert "Traceback" not in err
+
+
+def test_a_figure_of_a_problem_of_ones_own(run: Any, problems: str, tmp_path: Path) -> None:
+    code, _, err = run("order", "--problem", f"{problems}:three", "--integrators", "rk4", "--plot", "one.png")
+    assert code == 0, err
+    assert (tmp_path / "one.png").stat().st_size > 10_000

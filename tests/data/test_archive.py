@@ -24,6 +24,7 @@ ARRAYS = {
     "few": np.array([True, False]),
     "zeros": np.array([0.0] * 99 + [-0.0]),  # equal, but not in their bits
     "nan": np.full(100, np.nan),
+    "drawn": np.array([(0.0, -9.81), (-0.0, -9.81), (np.nan, 3.0)], np.float32)[np.arange(100) % 7 % 3],
 }
 
 
@@ -46,7 +47,8 @@ def test_there_and_back(tmp_path: Path) -> None:
     assert not np.shares_memory(arrays["full"], arrays["twin"])
     with zipfile.ZipFile(path) as file:
         assert {info.filename for info in file.infolist()} == {
-            "full.npy", "alike.npy", "empty.npy", "few.npy", "zeros.npy", "nan.npy", "snapshot.json",
+            "full.npy", "alike.npy", "empty.npy", "few.npy", "zeros.npy", "zeros.rows.npy", "nan.npy", "drawn.npy",
+            "drawn.rows.npy", "snapshot.json",
         }  # fmt: skip
 
 
@@ -74,6 +76,22 @@ def test_tables_that_lie(table: Any, tmp_path: Path) -> None:
     with zipfile.ZipFile(path, "w") as file:
         file.writestr("a.npy", member.getvalue())
         file.writestr("snapshot.json", json.dumps(table))
+    with pytest.raises(InputError, match="no sound file"):
+        archive.read(path)
+
+
+@pytest.mark.parametrize(
+    ("rows", "which", "there"),
+    [(3, [0, 1, 3, 0], 3), (5, [0] * 4, 5), (0, [0] * 4, 0), (2, [0] * 4, 3), ("2", [0] * 4, 2), (True, [0] * 4, 1)],
+)
+def test_rows_that_are_not_there(rows: Any, which: list[int], there: int, tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    with zipfile.ZipFile(path, "w") as file:
+        for name, array in (("a", np.array(which, "<u2")), ("a.rows", np.zeros(there))):
+            member = io.BytesIO()
+            np.save(member, array)
+            file.writestr(f"{name}.npy", member.getvalue())
+        file.writestr("snapshot.json", json.dumps(index([4], rows=rows)))
     with pytest.raises(InputError, match="no sound file"):
         archive.read(path)
 

@@ -16,8 +16,9 @@ from pyverlet.laws.forces import Grip, Push
 ROOM = pv.Box((0, 0), (2, 1), restitution=0.5, friction=0.25)
 
 THINGS: list[Any] = [
+    pv.Periodic((0, 1), (4, 3), axes="x", restitution=0.2),
     pv.Open(), pv.Circle(center=(1, 2), radius=3.0, restitution=0.1, friction=0.2), ROOM, pv.ClampAndFlip(pv.Box((0, 0), (1, 1))),
-    pv.ProjectOnly(pv.Circle(radius=2)), pv.Fast(), pv.Fast(skin=0.1), pv.BruteForce(),
+    pv.ProjectOnly(pv.Circle(radius=2, angular_velocity=1.5)), pv.Fast(), pv.Fast(skin=0.1), pv.BruteForce(),
     pv.Collisions(restitution=0.3, friction=0.6, method=pv.BruteForce()),
     *(cls() for cls in pv.integrators.BY_NAME.values()), pv.PositionVerlet(naive_start=True),
     pv.Attractor(strength=2, softening=0.1), pv.ConstantForce((1, 2)), pv.Drag(linear=0.1), pv.Wind((1, 0), quadratic=0.5),

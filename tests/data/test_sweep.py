@@ -47,6 +47,12 @@ def small(out: Path, grid: Any = GRID, **options: Any) -> Study:
     return pv.sweep("box", grid, out=out, **given)
 
 
+@pytest.fixture(autouse=True)
+def _importable(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processes that are started find this module by its name, however pytest was."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2]))
+
+
 @pytest.fixture(scope="module")
 def serial(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder: Path = tmp_path_factory.mktemp("serial") / "study"
@@ -168,6 +174,48 @@ def test_killed_and_started_again_it_comes_to_the_same(tmp_path: Path) -> None:
     assert (cut / "table.csv").read_bytes() == (whole / "table.csv").read_bytes()
 
 
+ORPHANED = """
+import sys
+sys.path.insert(0, sys.argv[2])
+import test_sweep
+if __name__ == "__main__":
+    test_sweep.small(test_sweep.Path(sys.argv[1]), {"seed": range(3000)}, measure=test_sweep.process).run(processes=2)
+"""
+
+
+def process(world: pv.World) -> int:
+    return os.getpid()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
+def test_processes_end_with_a_coordinator_that_is_killed(tmp_path: Path) -> None:
+    script = tmp_path / "orphaned.py"
+    script.write_text(ORPHANED)
+    command = [sys.executable, str(script), str(tmp_path / "study"), str(Path(__file__).parent)]
+    with subprocess.Popen(command, stderr=subprocess.DEVNULL) as run:
+        until = time.monotonic() + 120
+        while time.monotonic() < until and run.poll() is None and count_rows(tmp_path / "study") < 30:
+            time.sleep(0.01)
+        run.kill()
+    rows = (tmp_path / "study" / "rows.jsonl").read_text().splitlines()
+    left = {json.loads(row)["values"]["value"] for row in rows[:-1]}
+    assert left
+    while left and time.monotonic() < until:
+        left = {number for number in left if lives(number)}
+        time.sleep(0.05)
+    assert not left
+
+
+def lives(number: int) -> bool:
+    """Whether there is a process of that number that has not ended."""
+    try:
+        os.kill(number, 0)
+    except ProcessLookupError:
+        return False
+    status = Path(f"/proc/{number}/stat")
+    return not (status.exists() and status.read_text().rsplit(")", 1)[1].split()[0] == "Z")
+
+
 def count_rows(folder: Path) -> int:
     path = folder / "rows.jsonl"
     return path.read_bytes().count(b"\n") if path.exists() else 0
@@ -207,6 +255,10 @@ def test_bad_input_gets_a_sentence_and_loses_nothing(serial: Path, tmp_path: Pat
     refused("has a study whose scene is 'box'", scene="cage", out=serial)
     refused("has a study whose frames is 6", seconds=0.2, out=serial)
     refused("has a study whose settings", particles=13, out=serial)
+    pv.scenes.get("box").write(tmp_path / "mine.toml")
+    written = pv.scenes.read(tmp_path / "mine.toml")
+    pv.sweep(written, {"friction": [0.0]}, out=tmp_path / "other", seconds=0.1)
+    refused("has a study whose scene is another 'box'; allowed is a new folder$", out=tmp_path / "other")
     (tmp_path / "file").write_text("")
     refused("cannot be used", out=tmp_path / "file" / "study")
     (tmp_path / "odd").mkdir()
@@ -325,7 +377,7 @@ def test_dask_with_a_worker_that_is_killed(tmp_path: Path) -> None:
         with ThreadPoolExecutor(1) as beside:
             study = small(tmp_path / "dask", grid)
             running = beside.submit(study.run, client.get_executor(pure=False), workers=2)
-            while count_rows(tmp_path / "dask") < 100:
+            while count_rows(tmp_path / "dask") < 100 and not running.done():
                 time.sleep(0.01)
             os.kill(victim, signal.SIGKILL)
             running.result()

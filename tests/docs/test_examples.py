@@ -31,7 +31,10 @@ SLOW = ("pyverlet bench --particles 20000", "pyverlet record galton ", "pyverlet
 
 def commands() -> list[str]:
     """Every line of the shell blocks, and every row of the README's table, that starts with our command."""
-    shell = [line for page in PAGES for _, source in blocks(page, "sh") for line in source.splitlines()]
+    # The steps of a sketch build on each other: test_sketch_steps.py.
+    shell = [
+        line for page in PAGES if page.name != "sketch.md" for _, source in blocks(page, "sh") for line in source.splitlines()
+    ]
     table = re.findall(r"^\| `(pyverlet [^`]*)`", (ROOT / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
     return sorted({line for line in shell + table if line.startswith("pyverlet ")})
 
@@ -45,7 +48,13 @@ def shown(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Any]:
         build()
         shown.append(options)
 
-    monkeypatch.setattr(pyverlet, "view", lambda world, **options: shown.append((world, options)))
+    real = pyverlet.view
+
+    def view(world: Any, **options: Any) -> Any:
+        shown.append((world, options))
+        return None if options.get("block", True) else real(world, **options)
+
+    monkeypatch.setattr(pyverlet, "view", view)
     monkeypatch.setattr(pyverlet.viewers, "serve", serve)
     monkeypatch.setattr(pyverlet.viewers.window, "show", serve)
     monkeypatch.chdir(tmp_path)

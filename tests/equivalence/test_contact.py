@@ -110,25 +110,25 @@ class OneByOne:
         a, w = s.acceleration[j] - s.acceleration[i], s.inverse_mass
         v = s.velocity[j] - s.velocity[i] + law.lag * a
         time = impact_time.function(*d, *v, *a, reach, law.h)  # type: ignore[attr-defined]
-        d = d - time * (v - real(0.5) * time * a)
-        distance = np.sqrt(d[0] * d[0] + d[1] * d[1])
-        n = d / distance
-        v = v - time * a
+        d = (d - time * (v - real(0.5) * time * a)).astype(np.float64)
+        n = d / np.sqrt(d[0] * d[0] + d[1] * d[1])
+        v = s.velocity[j].astype(np.float64) - s.velocity[i] + (np.float64(law.lag) - time) * a
         hit = -(v[0] * n[0] + v[1] * n[1])
         if not hit > law.rest_speed:
             return False
-        kick = (hit + e * hit) / (w[i] + w[j])
+        wide = np.float64(w[i]) + w[j]
+        kick = (hit + e * hit) / wide
         p = kick * n
         if mu > 0:
-            slides = v[0] * n[1] - v[1] * n[0] + s.spin[i] * s.radius[i] + s.spin[j] * s.radius[j]
-            rub = max(min(-slides / (real(3) * (w[i] + w[j])), mu * kick), -mu * kick)
-            p = np.array([p[0] + rub * n[1], p[1] - rub * n[0]], s.dtype)
-            s.spin[i] += real(2) * rub * w[i] / s.radius[i]
-            s.spin[j] += real(2) * rub * w[j] / s.radius[j]
-        s.velocity[i] -= p * w[i]
-        s.velocity[j] += p * w[j]
-        self.carry(i, -time * p * w[i])
-        self.carry(j, time * p * w[j])
+            slides = v[0] * n[1] - v[1] * n[0] + np.float64(s.spin[i]) * s.radius[i] + np.float64(s.spin[j]) * s.radius[j]
+            rub = max(min(-slides / (3.0 * wide), mu * kick), -mu * kick)
+            p = np.array([p[0] + rub * n[1], p[1] - rub * n[0]])
+            s.spin[i] += 2.0 * rub * w[i] / s.radius[i]
+            s.spin[j] += 2.0 * rub * w[j] / s.radius[j]
+        for circle, by in ((i, -p * w[i]), (j, p * w[j])):
+            before = s.velocity[circle].copy()
+            s.velocity[circle] = (before + by).astype(s.dtype)
+            self.carry(circle, time * (s.velocity[circle] - before))
         return True
 
     def make_room(self, i: int, j: int, d: Any, reach: Any) -> None:

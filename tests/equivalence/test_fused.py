@@ -107,7 +107,7 @@ def test_the_bits_are_those_of_the_long_way(expected: pv.World, threads: int, fu
     assert world._contacts.broad_phase.rebuilds > 50
 
 
-@pytest.mark.parametrize("parts", [2, 3, 5])
+@pytest.mark.parametrize("parts", [2, 3, pytest.param(5, marks=pytest.mark.slow)])
 def test_borders_between_threads_change_no_bit(parts: int, monkeypatch: pytest.MonkeyPatch, by_strips: Fusing) -> None:
     # As many parts as a machine with more cores would have; those of two threads may be done by one.
     monkeypatch.setattr(grids, "STRIP_PARTICLES", 32)  # rows enough for as many

@@ -36,7 +36,7 @@ json.dump(hashes, sys.stdout)
 """
 
 
-@pytest.mark.parametrize("seconds", [0.5, pytest.param(2.0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seconds", [0.35, pytest.param(2.0, marks=pytest.mark.slow)])
 def test_threads_do_not_change_a_bit(seconds: float) -> None:
     # The lowest meet the wall after a quarter of a second.
     run = subprocess.run(

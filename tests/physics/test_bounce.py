@@ -125,6 +125,31 @@ def test_elastic_gas_keeps_energy_and_angular_momentum(dtype: type) -> None:
     assert world.escaped() == 0
 
 
+@pytest.mark.parametrize(("radius", "heavy"), [(0.5, 1.0), (0.4, 1.0), (0.4, 30.0)])
+def test_an_elastic_gas_in_float32_is_neither_heated_nor_cooled(radius: float, heavy: float) -> None:
+    # An impact rounds four components of velocities, each by at most u |v|, u = 2^-24, evenly distributed: its energy is off by
+    # sum m v d, with the variance m^2 u^2 sum v^4 / 3. In Maxwell's distribution m <v^2> = T for each component, and <v^4> =
+    # 3 <v^2>^2: that is 4 u^2 T^2. Those who meet are faster than others, which makes at most twice as much of it. If the errors
+    # prefer no sign, N impacts of n circles, whose energy is n T, change it by 3 u sqrt(N) / n of it, a random walk. Normals
+    # that are rounded to float32 change it by some ten times as much, always one way.
+    n = 300
+    cage = radius * np.sqrt(n / 0.3)
+    axis = np.arange(-cage, cage, 2.6 * radius)
+    position = np.array([(x, y) for x in axis for y in axis if np.hypot(x, y) < cage - 1.2 * radius])[:n]
+    mass = np.where(np.arange(n) % 2, 1.0, heavy)
+    world = pv.World(
+        gravity=(0, 0), boundary=pv.Circle(radius=cage, restitution=1.0), collisions=pv.Collisions(restitution=1.0), events=True
+    )
+    velocity = 4 * radius * np.random.default_rng(0).normal(0, 1, position.shape)
+    world.add(position=position, velocity=velocity / np.sqrt(mass)[:, None], radius=radius, mass=mass)
+    energy, impacts = world.energy().total, 0
+    for _ in range(900):
+        world.step(1 / 60)
+        impacts += len(world.events.begin)
+    assert impacts > 5_000
+    assert world.energy().total == pytest.approx(energy, rel=4 * 3 * 2.0**-24 * np.sqrt(impacts) / n)
+
+
 def test_two_equal_circles_exchange_their_velocities() -> None:
     world = pv.World(gravity=(0, 0), collisions=pv.Collisions(restitution=1.0), dtype=np.float64)
     balls = world.add(position=[(0, 0), (3, 0)], velocity=[(2, 0), (0, 0)], radius=RADIUS)

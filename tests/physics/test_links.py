@@ -234,7 +234,7 @@ def test_angle_swings_like_a_torsion_spring() -> None:
     assert np.diff(crossings).mean() == pytest.approx(period, rel=2e-3)
 
 
-@pytest.mark.parametrize("substeps", [4, 8, 32])
+@pytest.mark.parametrize("substeps", [4, 8, pytest.param(32, marks=pytest.mark.slow)])
 def test_beam_bends_as_far_at_any_substeps(substeps: int) -> None:
     # A cantilever of rigid links, nearly straight: joint k turns by compliance times the torque of all weights beyond it, and
     # takes the end down by that times its arm.

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from pyverlet import scenes
-from pyverlet.scenes import galton, orbit
+from pyverlet.scenes import galton, gas, orbit
 
 
 def assert_binomial(counts: NDArray[np.float64], least: float) -> None:
@@ -101,3 +101,30 @@ def test_the_belts_carry_all_grains_into_the_pit() -> None:
     # A disc that landed backwards may roll on the spot for ever, v + w r = u with v = 0: nothing resists rolling.
     assert (world.position[:, 1] < 3.0).mean() > 0.9
     assert world.escaped() == 0
+
+
+def test_a_gas_that_begins_with_equal_speeds_has_maxwells_in_the_end() -> None:
+    """In two dimensions m v^2 / 2 k T is distributed exponentially; impacts take some ten collision times of 0.15 s."""
+    world = scenes.get("gas").world(particles=600)
+    square = (world.velocity.astype(float) ** 2).sum(axis=1)
+    assert stats.kstest(square / square.mean(), "expon").pvalue < 1e-9
+    gauge = gas.Thermometer()
+    world.run(seconds=1.0)
+    for _ in range(120):
+        world.step(1 / 60)
+        graph = gauge(world)
+    square = (world.velocity.astype(float) ** 2).sum(axis=1)
+    assert stats.kstest(square / square.mean(), "expon").pvalue > 0.01
+    # 600 circles, new speeds some eight times in two seconds, and f / 8 of them in a bar: 0.04 is the standard deviation.
+    x = (np.arange(gas.BARS) + 0.5) * gas.MOST / gas.BARS
+    assert np.abs(np.array(graph.bars) - 2 * x * np.exp(-(x**2))).max() < 0.15
+    assert float(graph.note.split("=")[1].split(";")[0]) == pytest.approx(gas.henderson(gas.AREA_FRACTION), rel=0.05)
+
+
+def test_the_equation_of_state_of_mixtures() -> None:
+    """Its second virial coefficient is exact: Z = 1 + (1 + <r>^2 / <r^2>) f at small f, from the areas pi (r_i + r_j)^2."""
+    radii, fraction = np.array([0.2, 0.5, 1.0, 1.0]), 1e-5
+    excluded = np.pi * ((radii[:, None] + radii) ** 2).mean() / 2
+    density = fraction / (np.pi * (radii**2).mean())
+    assert gas.state(fraction, radii) - 1 == pytest.approx(excluded * density, rel=1e-4)
+    assert gas.state(0.4, np.ones(3)) == gas.henderson(0.4)

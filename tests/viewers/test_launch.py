@@ -78,24 +78,6 @@ def test_sigterm_ends_the_program_as_usual() -> None:
     assert "Traceback" not in err
 
 
-@pytest.mark.parametrize("chosen", [None, "active"])
-def test_workers_are_patient_unless_somebody_chose(monkeypatch: pytest.MonkeyPatch, chosen: str | None) -> None:
-    for name in ("OMP_WAIT_POLICY", "GOMP_SPINCOUNT"):
-        monkeypatch.delenv(name, raising=False)
-    if chosen:
-        monkeypatch.setenv("OMP_WAIT_POLICY", chosen)
-    seen = []
-
-    def build() -> pv.World:
-        seen.append(os.environ.get("OMP_WAIT_POLICY"))
-        return pv.World(substeps=0)
-
-    with pytest.raises(pv.InputError):
-        serve(build, scene_name="cage", port=0, open_browser=False)
-    assert seen == [chosen or "passive"]
-    assert os.environ.get("OMP_WAIT_POLICY") == chosen
-
-
 @pytest.mark.skipif(os.name != "posix", reason="a browser that is a shell script")
 @pytest.mark.parametrize(("screen", "opens"), [({"DISPLAY": ":7"}, True), ({}, False)])
 def test_the_browser_opens_by_itself_where_there_is_a_screen(tmp_path: Path, screen: dict[str, str], opens: bool) -> None:

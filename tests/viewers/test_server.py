@@ -10,6 +10,7 @@ import socket
 import struct
 import threading
 import time
+import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ import numpy as np
 import pytest
 import uvicorn
 from PIL import Image
+from starlette.websockets import WebSocket
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
@@ -217,6 +219,44 @@ def test_an_oversized_message_ends_its_tab_and_nothing_else(server: Server, tab:
                 rude.recv(5.0)
         assert rude.close_code == 1009
     assert tab.rate(0.5) > 30
+
+
+@pytest.mark.parametrize("path", ["/../pyproject.toml", "/%2e%2e/web.py", "/page/index.html", "/etc/passwd", "/socket"])
+def test_nothing_but_the_page_is_served(server: Server, path: str) -> None:
+    with pytest.raises(urllib.error.HTTPError) as refused:
+        urllib.request.urlopen(server.http + path)
+    assert refused.value.code == 404
+    refused.value.close()
+
+
+def test_a_flood_of_commands_is_worked_off(server: Server, tab: Tab, world: pv.World, wait_until: WaitUntil) -> None:
+    with dial(server) as rude:
+        for k in range(5000):
+            rude.send(json.dumps({"type": "gravity", "x": k / 1000, "y": -9.81}))
+        wait_until(lambda: world.gravity[0] == pytest.approx(4.999))
+    assert tab.rate(0.5) > 30
+
+
+def test_a_tab_that_is_gone_before_it_is_refused_is_no_error(
+    server: Server, tab: Tab, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    # Starlette raises one error for a socket that breaks, and another for one that is known to be closed.
+    gone = RuntimeError('Cannot call "send" once a close message has been sent.')
+
+    async def send(self: WebSocket, data: bytes) -> None:
+        raise gone
+
+    with dial(server) as rude:
+        Tab(rude).frame()
+        monkeypatch.setattr(WebSocket, "send_bytes", send)
+        rude.send("{")
+        with contextlib.suppress(ConnectionClosed):
+            while True:
+                rude.recv(5.0)
+        monkeypatch.undo()
+    assert not [record for record in caplog.records if record.exc_info]
+    with dial(server) as other:
+        Tab(other).frame()
 
 
 def test_two_tabs_see_the_same_frames_and_one_steers_for_both(server: Server, tab: Tab) -> None:

@@ -17,9 +17,10 @@ from pyverlet.cli import _print as out
 from pyverlet.cli import _show as show
 from pyverlet.cli._integrators import integrators
 from pyverlet.data.trajectory import Trajectory
+from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.progress import Progress
-from pyverlet.scenes import Scene, Settings, report
+from pyverlet.scenes import Scene, Settings, report, sketch
 from pyverlet.scenes.report import Report
 from pyverlet.viewers import DEFAULT_PORT
 from pyverlet.world.panels import Panel, Panels
@@ -27,6 +28,14 @@ from pyverlet.world.world import World
 
 DEFAULT_DT = 1 / 60
 DEFAULT_SECONDS = 5.0
+
+FIRST = """\
+pyverlet run                        circles fall into a heap, in a tab of your browser
+pyverlet list                       the other scenes: pyverlet run cloth
+pyverlet new mysketch.py            a scene of your own to start from, 25 lines
+pyverlet run mysketch.py --watch    see it, change it, save: the page follows
+pyverlet --help                     all commands; pyverlet run --help, all options of one"""
+"""What to type next, for whoever has typed nothing."""
 
 app = typer.Typer(
     name="pyverlet",
@@ -54,7 +63,7 @@ def _pyverlet(
     ] = False,
 ) -> None:
     if context.invoked_subcommand is None:
-        out.write(context.get_help())
+        out.write(FIRST)
 
 
 @app.command(name="list")
@@ -87,6 +96,11 @@ def run(
     as_json: options.Json = False,
     trajectory: options.Trajectory = None,
     every: options.Every = None,
+    watch: Annotated[bool, typer.Option("--watch", help="Build a sketch anew whenever it is saved; the page stays.")] = False,
+    patience: Annotated[
+        float | None,
+        typer.Option(parser=options.real, help="Seconds a watched sketch may build.", metavar="S", show_default="10"),
+    ] = None,
     journal: Annotated[
         Path | None,
         typer.Option(help="Keep all that is done on the page, for `pyverlet replay`.", metavar="FILE", show_default=False),
@@ -108,7 +122,6 @@ def run(
 
     --seconds, --frames, --json, --trajectory and --plot ask for a run that ends, and imply --headless.
     """
-    chosen = scenes.get(scene)
     overrides = options.overrides(
         particles=particles,
         substeps=substeps,
@@ -122,8 +135,26 @@ def run(
         picture=picture,
     )
     methods = integrators(integrator)
-    chosen.settings(**overrides)  # refuse what is wrong before anything starts
     ends = headless or as_json or plot or trajectory or seconds is not None or frames is not None
+    if patience is not None and not watch:
+        raise InputError(f"patience is {patience:g}; allowed is none without --watch")
+    if watch:
+        if Path(scene).suffix.lower() != sketch.SUFFIX:
+            raise InputError(f"watch is asked for with {scene!r}; allowed is a sketch, such as mysketch.py")
+        if ends or window or journal:
+            raise InputError("watch is asked for with a run that ends, a window or a journal; allowed is the page alone")
+        show.watched(
+            Path(scene),
+            integrators=methods,
+            overrides={**overrides, "ledger": ledger},
+            dt=dt,
+            port=DEFAULT_PORT if port is None else port,
+            open_browser=not no_open,
+            patience=None if patience is None else checks.number("patience", patience, above=0.0),
+        )
+        return
+    chosen = scenes.get(scene)
+    chosen.settings(**overrides)  # refuse what is wrong before anything starts
     if every is not None and trajectory is None:
         raise InputError(f"every is {every}; allowed is none without --trajectory")
     if journal and (ends or window):

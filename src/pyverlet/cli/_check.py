@@ -1,4 +1,4 @@
-"""`pyverlet check physics`: every promise about the physics, measured on this machine."""
+"""`pyverlet check`: `physics`, every promise about the physics, measured on this machine; `fuzz`, random worlds held to them."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import typer
 
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
+from pyverlet.ground.errors import InputError
 from pyverlet.ground.progress import Progress
-from pyverlet.lab import physics
+from pyverlet.lab import fuzz, physics
 
 FAILED = 1
 
@@ -50,6 +51,39 @@ def check_physics(
         out.write_json({"full": full, "passed": len(rows) - failed, "failed": failed, "checks": [row.as_dict() for row in rows]})
     else:
         out.write(f"{len(rows) - failed} of {len(rows)} pass")
+    if failed:
+        raise typer.Exit(FAILED)
+
+
+@app.command(name="fuzz")
+def check_fuzz(
+    worlds: Annotated[int, typer.Option(help="How many.", min=1)] = 100,
+    seed: Annotated[int, typer.Option(help="Of the first; the others have the numbers after it.", min=0)] = 0,
+    without: Annotated[
+        list[str] | None, typer.Option(help="Leave out this check; may be repeated.", metavar="NAME", show_default=False)
+    ] = None,
+    as_json: options.Json = False,
+) -> None:
+    """Run random worlds of everything there is, and hold each to what is promised of all. Exit code 1 if one fails.
+
+    A world that fails is printed as a program, made as small as can be, that fails in the same way.
+    """
+    for name in without or ():
+        if name not in fuzz.CHECKS:
+            raise InputError(f"--without is {name!r}; allowed are {', '.join(fuzz.CHECKS)}")
+    found: list[fuzz.Finding] = []
+    with Progress("fuzz") as progress:
+        for finding in fuzz.fuzz(worlds, seed, without=without or ()):
+            found.append(finding)
+            progress(len(found), worlds)
+            if finding.check and not as_json:
+                out.write(f"# seed {finding.seed}: {finding.check}\n{finding.program}")
+    failed, refused = (sum(map(bool, which)) for which in ([f.check for f in found], [f.refused for f in found]))
+    if as_json:
+        out.write_json({"worlds": worlds, "seed": seed, "failed": failed, "refused": refused,
+                        "findings": [vars(finding) for finding in found if finding.check]})  # fmt: skip
+    else:
+        out.write(f"{worlds - failed - refused} of {worlds} worlds hold, {failed} fail, {refused} cannot be built")
     if failed:
         raise typer.Exit(FAILED)
 

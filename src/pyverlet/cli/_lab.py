@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -11,12 +14,14 @@ from pyverlet import scenes
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.cli._app import DEFAULT_DT, app
+from pyverlet.cli._imported import imported, what
 from pyverlet.cli._integrators import integrators
 from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
+from pyverlet.ground.errors import InputError, PyverletError
 from pyverlet.ground.progress import Progress
 from pyverlet.laws.integrators import BY_NAME
 from pyverlet.scenes import report
+from pyverlet.scenes.sketch import SketchScene
 
 __all__ = ["app"]
 
@@ -37,6 +42,14 @@ def _counts(text: str) -> list[int]:
     if twice := [count for count in counts if counts.count(count) > 1]:
         raise InputError(f"substeps names {twice[0]} twice; allowed is each once")
     return counts
+
+
+def _own_precision(scene: scenes.Scene) -> dict[str, None]:
+    """No dtype for a sketch that takes none: its world is compared as it is built, and that is said."""
+    if not isinstance(scene, SketchScene) or scene.takes("dtype"):
+        return {}
+    out.note(f"{scene.name} is compared in the precision it is built with, since its build() takes no dtype")
+    return {"dtype": None}
 
 
 @app.command()
@@ -64,7 +77,7 @@ def compare(
     if plot is not None:
         figures.check_can_plot(plot)
     with Progress("frame") as progress:
-        runs = lab.compare(chosen, methods, counts, frames=frames, dt=dt, progress=progress)
+        runs = lab.compare(chosen, methods, counts, frames=frames, dt=dt, progress=progress, **_own_precision(chosen))
     if plot is not None:
         from pyverlet.lab.comparison_figure import figure
 
@@ -88,6 +101,12 @@ def compare(
 @app.command()
 def order(
     names: Names = EVERY,
+    problem: Annotated[
+        str | None,
+        typer.Option(
+            help="One of your own in place of the four, a pyverlet.lab.Equation.", metavar="MODULE:NAME", show_default=False
+        ),
+    ] = None,
     plot: Plot = None,
     as_json: options.Json = False,
 ) -> None:
@@ -95,16 +114,17 @@ def order(
     from pyverlet.lab import figures
     from pyverlet.lab import order as lab
 
-    methods = lab.methods(integrators(names))
+    methods, problems = lab.methods(integrators(names)), _problems(problem)
     if plot is not None:
         figures.check_can_plot(plot)
     with Progress("method") as progress:
         orders = []
         for done, method in enumerate(methods):
-            orders += lab.table([method])
+            with _own(problem):
+                orders += lab.table([method], problems)
             progress(done + 1, len(methods))
     if plot is not None:
-        figures.save(lab.figure(orders), plot)
+        figures.save(lab.figure(orders, problems), plot)
         out.note(f"wrote {plot}")
     if as_json:
         out.write_json({"within": lab.WITHIN, "methods": [each.as_dict() for each in orders]})
@@ -116,6 +136,34 @@ def order(
         expected = "none" if each.method.expected is None else str(each.method.expected)
         rows.append((each.method.label, expected, *fitted, "as expected" if each.as_expected else "NOT AS EXPECTED"))
     out.write(out.columns(head, rows))
+
+
+def _problems(path: str | None) -> list[Any]:
+    """The problem at an import path, or the four there are."""
+    from pyverlet.lab.problems import PROBLEMS, Equation, Problem
+
+    if path is None:
+        return list(PROBLEMS.values())
+    allowed = "allowed is module:name, a pyverlet.lab.Equation"
+    found = imported("problem", path, allowed)
+    if not isinstance(found, Equation | Problem):
+        raise InputError(f"problem is {path!r}, which is {found!r}; {allowed}")
+    if found.name == Equation.name:
+        found = replace(found, name=path.partition(":")[2])
+    return [found]
+
+
+@contextmanager
+def _own(problem: str | None) -> Iterator[None]:
+    """What goes wrong in a problem of the user's own is said in a sentence."""
+    try:
+        yield
+    except PyverletError:
+        raise
+    except Exception as error:
+        if problem is None:
+            raise
+        raise InputError(f"problem is {problem!r}, whose functions fail ({what(error)})") from error
 
 
 @app.command()

@@ -47,7 +47,7 @@ def real(text: str) -> float:
 
 
 SceneName = Annotated[
-    str, typer.Argument(metavar="SCENE", help="Name of a scene, see `pyverlet list`, or a file, .toml or .json.")
+    str, typer.Argument(metavar="SCENE", help="Name of a scene, see `pyverlet list`, or a file: a sketch, .py, or .toml, .json.")
 ]
 Particles = Annotated[int | None, typer.Option(parser=whole, help="Number of circles.", metavar="N", show_default=False)]
 Substeps = Annotated[int | None, typer.Option(parser=whole, help="Substeps a frame.", metavar="N", show_default=False)]

@@ -90,6 +90,7 @@ def record(
             colour=given,
             theme=options.THEMES[theme],
             part=show.view(settings) if show.view else None,
+            draw=chosen.sketch.drawn if chosen.sketch and chosen.sketch.has("draw") else None,
             progress=progress,
         )
     length = f", {done.seconds:.4g} s" if done.pictures > 1 else ""

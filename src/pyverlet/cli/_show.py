@@ -5,12 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pyverlet.cli import _print as out
+from pyverlet.ground.errors import InputError
+from pyverlet.ground.patience import Patience
 from pyverlet.ground.progress import Progress
 from pyverlet.laws.integrators import Integrator
 from pyverlet.scenes import SCENES, Scene, Settings
+from pyverlet.scenes.sketch import Sketch
+
+if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
+    from pyverlet.viewers.session import Session
 
 
 def page(
@@ -24,6 +32,12 @@ def page(
     journal: Path | None,
 ) -> None:
     """Show the scene on the live page until Ctrl-C, and keep what happens there in a journal if one is asked for."""
+    if journal is not None and scene.sketch is not None and scene.sketch.answers:
+        raise InputError(
+            f"journal is '{journal}' for {scene.sketch.name}, which has functions or sliders; allowed is a scene without"
+        )
+    if scene.sketch is not None:
+        scene.sketch.patience = Patience()  # a screen waits for what is called with each picture
     from pyverlet.viewers import serve
     from pyverlet.viewers.exhibit import Exhibit, Repertoire
 
@@ -45,6 +59,32 @@ def page(
     out.note(f"'{journal}' holds {kept.frame:,} frames: pyverlet replay '{journal}'")
 
 
+def watched(
+    path: Path,
+    *,
+    integrators: Sequence[Integrator],
+    overrides: Mapping[str, Any],
+    dt: float,
+    port: int,
+    open_browser: bool,
+    patience: float | None,
+) -> None:
+    """Show a sketch on the live page until Ctrl-C, and build it anew whenever it is saved."""
+    from pyverlet.viewers import serve
+    from pyverlet.viewers.watching import PATIENCE_S, Watcher, Workshop
+
+    workshop = Workshop(
+        path, dt=dt, integrators=integrators, overrides=overrides, patience=PATIENCE_S if patience is None else patience
+    )
+    Sketch.read(path)  # one that is not there is told here, not on a page
+
+    def beside(session: Session) -> AbstractContextManager[None]:
+        return Watcher(workshop, session).at_work()
+
+    options: dict[str, Any] = {"port": port, "open_browser": open_browser, "dt": dt, "beside": beside}
+    serve(workshop.first, scene_name=path.stem, **options)
+
+
 def window(scene: Scene, settings: Settings, *, dt: float) -> None:
     """Show the scene's world, the first of several, in a window until it is closed."""
     from pyverlet.picture import Fixed
@@ -59,4 +99,5 @@ def window(scene: Scene, settings: Settings, *, dt: float) -> None:
             colour = Fixed(scene.show.colours(settings, dt, progress))
     out.note(viewer.KEYS)
     part = scene.show.view(settings) if scene.show.view else None
-    viewer.show(partial(scene.build, settings), title=scene.name, dt=dt, colour=colour, part=part)
+    draw = scene.sketch.drawn if scene.sketch else None
+    viewer.show(partial(scene.build, settings), title=scene.name, dt=dt, colour=colour, part=part, draw=draw)

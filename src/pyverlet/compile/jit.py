@@ -29,11 +29,15 @@ import numba
 from numba.core import event as numba_event
 from numba.extending import typeof_impl
 
+from pyverlet.compile import pool
 from pyverlet.ground import file_lock
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _COMPILED_FROM = ("compile", "kernels")
+
+_ROOM = 100_000_000
+"""Bytes that must be free where compiled kernels are kept: all of them are a third of it, and Numba does not bear a full disk."""
 
 _STALE_AFTER_S = 30 * 24 * 3600.0
 
@@ -74,6 +78,8 @@ def cache_dir() -> Path | None:
             folder.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=folder):
                 pass
+            if shutil.disk_usage(folder).free < _ROOM:
+                continue
         except (OSError, RuntimeError):
             continue
         _forget_stale(folder)
@@ -126,18 +132,33 @@ def _litter() -> Iterator[None]:
             gc.enable()
 
 
+def _distrust(variant: str) -> bool:
+    """A kernel could not be called, and what was kept of it may be why: throw away all that is kept. Whether there was any.
+
+    Half a file, after a power cut, is an error of Python's `pickle` and says nothing about which file it is.
+    """
+    folder = cache_dir()
+    kept = list((folder / variant).rglob("*.nb?")) if folder else []
+    for path in kept:
+        path.unlink(missing_ok=True)
+    return bool(kept)
+
+
 _compiling = threading.RLock()
 """Held while a kernel is declared to Numba or called for the first time: Numba compiles one at a time in any case."""
 
 _launching = threading.Lock()
-"""Held by who launches threads where only one may."""
+"""Held by who launches threads where only one may: Numba's own pool, `workqueue`, ends the process when two do."""
 
 
-@cache
-def _one_launch_at_a_time() -> bool:
-    """Whether two Python threads may not both launch threads: Numba's own pool ends the process when they do."""
-    numba.get_num_threads()  # starts them
-    return bool(numba.threading_layer() == "workqueue")
+def _free_locks() -> None:
+    """A fork begins: whoever held them is not here."""
+    global _compiling, _launching
+    _compiling, _launching = threading.RLock(), threading.Lock()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_free_locks)
 
 
 class Kernel:
@@ -163,12 +184,23 @@ class Kernel:
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the variant for the threads in use."""
-        if not (self.parallel and threads_in_use() > 1):
+        if not (self.parallel and _in_use()[1]):
             return self._alone(*arguments)
-        if not _one_launch_at_a_time():
-            return self._together(*arguments)
+        if pool.layer() != "workqueue":
+            return self._masked(arguments)
         with _launching:
+            return self._masked(arguments)
+
+    def _masked(self, arguments: tuple[Any, ...]) -> Any:
+        """On as many threads as are in use; afterwards the user's own parallel functions have as many as before."""
+        count, before = threads_in_use(), numba.get_num_threads()
+        if count == before:
             return self._together(*arguments)
+        numba.set_num_threads(count)
+        try:
+            return self._together(*arguments)
+        finally:
+            numba.set_num_threads(before)
 
     @functools.cached_property
     def alone(self) -> Any:
@@ -199,7 +231,16 @@ class Kernel:
         """The first call: no two processes compile a kernel at a time, and whoever comes second finds it on disk."""
         dispatcher = getattr(self, variant)
         with _compiling, turn(f"{variant} {self.function.__module__}.{self.function.__qualname__}"), _litter():
-            result = dispatcher(*arguments)
+            try:
+                result = dispatcher(*arguments)
+            except numba.core.errors.NumbaError:
+                raise
+            except Exception:
+                if not _distrust(variant):
+                    raise
+                del vars(self)[variant]
+                dispatcher = getattr(self, variant)
+                result = dispatcher(*arguments)
         setattr(self, f"_{variant}", dispatcher)
         return result
 
@@ -282,27 +323,42 @@ def max_threads() -> int:
 _chosen = threading.local()
 
 
-def use_threads(count: int) -> None:
-    """Let the parallel kernels called from this thread use `count` threads."""
-    if getattr(_chosen, "count", 0) != count:  # asking Numba takes as long as a stage of a small world
-        numba.set_num_threads(count)
-        _chosen.count = count
+def use_threads(count: int, most: int | None = None) -> None:
+    """Let the parallel kernels called from this thread use `count` threads, in a fork of a process that had several one.
+
+    most: as many as the same caller may use at other times. Where that is several, a single thread runs the code for several,
+    or a program that goes from one number to the other would have to compile everything twice.
+    """
+    wanted = pool.usable(count), pool.usable(count if most is None else most) > 1
+    _chosen.wanted = wanted
+
+
+def _in_use() -> tuple[int, bool]:
+    """How many threads the parallel kernels called from this thread use, and whether they run the code for several."""
+    chosen: tuple[int, bool] | None = getattr(_chosen, "wanted", None)
+    if pool.usable(2) == 1:
+        return 1, False
+    if chosen is None:
+        pool.layer()
+        chosen = int(numba.get_num_threads()), int(numba.get_num_threads()) > 1
+    return chosen
 
 
 def threads_in_use() -> int:
     """How many the parallel kernels called from this thread use."""
-    return getattr(_chosen, "count", 0) or int(numba.get_num_threads())
+    return _in_use()[0]
 
 
 @contextlib.contextmanager
 def one_thread(only_if: bool = True) -> Iterator[None]:
     """Parallel kernels called inside use one thread: work that is too little to be worth a meeting."""
-    before = numba.get_num_threads()
-    use_threads(1 if only_if else before)
+    count, several = _in_use()
+    if only_if:
+        use_threads(1)
     try:
         yield
     finally:
-        use_threads(before)
+        use_threads(count, 2 if several else 1)
 
 
 class _CompileListener(numba_event.Listener):  # type: ignore[misc]

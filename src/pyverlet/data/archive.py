@@ -1,7 +1,8 @@
 """Named arrays and a table in one file: npz without pickles, and the table in it as JSON.
 
-`numpy.load` reads it, too. Arrays are stored as they are, but for three kinds: rows that are all alike stand there once, numbers
-that count up are told by the first, and of arrays that are equal to others only the name is kept. The table's `arrays` says so.
+`numpy.load` reads it, too. Arrays are stored as they are, but for four kinds: rows that are all alike stand there once, numbers
+that count up are told by the first, of arrays that are equal to others only the name is kept, and where few rows differ each of
+these stands there once, beside numbers that say which it is. The table's `arrays` tells how each is stored.
 Nothing is allocated before it is known that the file is large enough for it, and nothing used before its checksum is right.
 """
 
@@ -33,6 +34,13 @@ _EXPANDS = 64
 
 _FEW = 16
 """Rows that are not worth an entry of their own."""
+
+_PALETTE = 4096
+"""Different rows at most that are stored once each; and rows that are looked at to see whether there may be so few."""
+
+_CODE = np.dtype("<u2")
+_ROWS = ".rows"
+"""After the name of an array: its different rows."""
 
 _DTYPES = {"|b1", "|u1", "<u4", "<i4", "<i8", "<f4", "<f8"}
 _CHUNK = 1 << 22
@@ -71,20 +79,41 @@ def _shared(arrays: dict[str, Array]) -> tuple[dict[str, dict[str, Any]], dict[s
     """How each is stored, and those that are."""
     index: dict[str, dict[str, Any]] = {}
     stored: dict[str, Array] = {}
+    first: dict[str, Array] = {}
     for name, array in arrays.items():
         index[name], kept = _whole(array), array
         if len(array) > _FEW:
-            twin = next((other for other, old in stored.items() if _equal(old, array)), None)
+            twin = next((other for other, old in first.items() if _equal(old, array)), None)
             if twin is not None:
                 index[name]["same_as"] = twin
                 continue
+            first[name] = array
             if _equal(array[1:], array[:-1]):
                 index[name]["repeated"], kept = True, array[:1]
             elif array.dtype.kind == "i" and array.ndim == 1 and array[-1] - array[0] == len(array) - 1 and _counts(array):
                 index[name]["counts_from"] = int(array[0])
                 continue
+            elif (rows := _palette(array)) is not None:
+                index[name]["rows"], kept = len(rows), np.searchsorted(rows, _as_numbers(array)).astype(_CODE)
+                stored[name + _ROWS] = rows.view(array.dtype).reshape(-1, *array.shape[1:])
         stored[name] = kept
     return index, stored
+
+
+def _as_numbers(array: Array) -> Array:
+    """(n,) the bits of each row; empty if a row has other than 4 or 8 bytes."""
+    size = array.nbytes // len(array)
+    return array.reshape(-1).view(f"<u{size}") if size in (4, 8) else np.empty(0, np.uint64)
+
+
+def _palette(array: Array) -> Array | None:
+    """The different rows, as numbers in order; None if there are more than _PALETTE, or so many that it would save nothing."""
+    numbers = _as_numbers(array)
+    if not len(numbers) or len(np.unique(numbers[:: max(len(numbers) // _PALETTE, 1)])) > _PALETTE // 4:
+        return None
+    rows = np.unique(numbers)
+    fits = len(rows) <= _PALETTE and rows.nbytes + _CODE.itemsize * len(numbers) < 0.9 * array.nbytes
+    return rows if fits else None
 
 
 def _counts(array: Array) -> bool:
@@ -139,9 +168,15 @@ def read_from(file: BinaryIO, size: int) -> tuple[dict[str, Any], dict[str, Arra
                 arrays[name] = arrays[how["same_as"]].copy()
             elif "counts_from" in how:
                 arrays[name] = np.arange(len(_empty(how)), dtype=how["dtype"]) + np.dtype(how["dtype"]).type(how["counts_from"])
+            elif "rows" in how:
+                names -= {f"{name}.npy", f"{name}{_ROWS}.npy"}
+                arrays[name] = _drawn(archive, name, how)
             else:
                 names.discard(f"{name}.npy")
-                arrays[name] = _member(archive, name, how)
+                shape = tuple(how["shape"])
+                stored = (1, *shape[1:]) if how.get("repeated") else shape
+                array = _member(archive, name, stored, np.dtype(how["dtype"]))
+                arrays[name] = np.broadcast_to(array, shape).copy() if how.get("repeated") else array
             if arrays[name].shape != tuple(how["shape"]) or arrays[name].dtype.str != how["dtype"]:
                 raise ValueError(f"{name} is not as the table says")
         if names != {_TABLE}:
@@ -163,16 +198,25 @@ def _empty(how: dict[str, Any]) -> Array:
     return np.empty(how["shape"], how["dtype"])
 
 
-def _member(archive: zipfile.ZipFile, name: str, how: dict[str, Any]) -> Array:
-    shape = tuple(how["shape"])
-    stored = (1, *shape[1:]) if how.get("repeated") else shape
+def _drawn(archive: zipfile.ZipFile, name: str, how: dict[str, Any]) -> Array:
+    """An array of which each different row is stored once."""
+    shape, rows = tuple(how["shape"]), how["rows"]
+    if type(rows) is not int or not 0 < rows <= min(_PALETTE, shape[0]):
+        raise ValueError(f"{name} has {rows!r} different rows")
+    which = _member(archive, name, shape[:1], _CODE)
+    if which.max() >= rows:
+        raise ValueError(f"{name} has a row that is none of its {rows}")
+    return _member(archive, name + _ROWS, (rows, *shape[1:]), np.dtype(how["dtype"]))[which]
+
+
+def _member(archive: zipfile.ZipFile, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> Array:
     with archive.open(f"{name}.npy") as member:
         if np.lib.format.read_magic(member) != (1, 0):
             raise ValueError(f"{name} is of another version")
         header = np.lib.format.read_array_header_1_0(member)
-        if header != (stored, False, np.dtype(how["dtype"])) or not shape:
+        if header != (shape, False, dtype) or not shape:
             raise ValueError(f"{name} is not as the table says")
-        array: Array = np.empty(stored, how["dtype"])
+        array: Array = np.empty(shape, dtype)
         room, at = array.reshape(-1).view(np.uint8).data, 0
         while at < len(room):
             piece = member.read(min(_CHUNK, len(room) - at))
@@ -182,7 +226,7 @@ def _member(archive: zipfile.ZipFile, name: str, how: dict[str, Any]) -> Array:
             at += len(piece)
         if member.read(1):
             raise ValueError(f"{name} goes on too long")
-    return np.broadcast_to(array, shape).copy() if how.get("repeated") else array
+    return array
 
 
 def _brief(error: BaseException) -> str:

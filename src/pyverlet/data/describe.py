@@ -83,8 +83,9 @@ def _kind(
 # ---- what there is -----------------------------------------------------------------------------------------------------
 
 _kind(rooms.Open)
-_kind(rooms.Circle, "center", "radius", "restitution", "friction")
+_kind(rooms.Circle, "center", "radius", "restitution", "friction", "angular_velocity")
 _kind(rooms.Box, "lower", "upper", "restitution", "friction")
+_kind(rooms.Periodic, "lower", "upper", "axes", "restitution", "friction")
 _kind(naive.ClampAndFlip, "room")
 _kind(naive.ProjectOnly, "room")
 

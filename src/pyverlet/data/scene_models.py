@@ -81,6 +81,7 @@ _BY_NAME: dict[str, Any] = {
     "points": list[Vector],
     "outline": list[Vector] | Disc,
     "point": Vector | list[Vector] | None,
+    "axes": Literal["xy", "x", "y"],
 }
 
 
@@ -94,7 +95,7 @@ def _fields(what: Callable[..., Any], *, skip: tuple[str, ...] = ()) -> dict[str
         default = parameter.default
         if default is parameter.empty:
             fields[name] = (kind, ...)
-        elif isinstance(default, int | float | tuple | None):
+        elif isinstance(default, int | float | tuple | str | None):
             # Infinity is said by leaving the key out: JSON has none.
             fields[name] = (kind, default) if default not in (float("inf"),) else (kind | None, None)
         else:
@@ -119,7 +120,7 @@ def _models(base: type | tuple[type, ...]) -> list[type[BaseModel]]:
 _walls = _models((rooms.Box, rooms.Circle))
 Walls: Any = _one_of(_walls)
 _ANNOTATED["Box | Circle"] = Walls
-Room: Any = _one_of([*_walls, *_models((rooms.Open, naive.ClampAndFlip, naive.ProjectOnly))])
+Room: Any = _one_of([*_walls, *_models((rooms.Open, rooms.Periodic, naive.ClampAndFlip, naive.ProjectOnly))])
 _ANNOTATED["Boundary"] = Room
 Method: Any = _one_of(_models((Fast, BruteForce)))
 Integrators: Any = _one_of(_models(Integrator))

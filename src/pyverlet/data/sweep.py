@@ -83,10 +83,18 @@ def _checked(grid: Any) -> Mapping[str, Sequence[Any]]:
     for name, values in grid.items():
         if isinstance(values, str | bytes) or not hasattr(values, "__iter__") or not len(list(values)):
             raise InputError(f"{name} of the grid is {values!r}; allowed are one value or more, in a list")
-        known = [plain(name, value) for value in values]
-        if twice := [value for number, value in enumerate(known) if value in known[:number]]:
-            raise InputError(f"{name} of the grid has {twice[0]!r} twice; allowed is each once")
+        known: set[Any] = set()
+        for value in values:
+            if (found := _hashable(plain(name, value))) in known:
+                raise InputError(f"{name} of the grid has {plain(name, value)!r} twice; allowed is each once")
+            known.add(found)
     return grid
+
+
+def _hashable(value: Any) -> Any:
+    if isinstance(value, dict):
+        return tuple((key, _hashable(part)) for key, part in sorted(value.items()))
+    return tuple(map(_hashable, value)) if isinstance(value, list) else value
 
 
 def basics(world: World) -> dict[str, float]:

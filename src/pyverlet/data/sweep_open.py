@@ -11,7 +11,8 @@ from pyverlet.data.describe import TYPE, Builder
 from pyverlet.data.sweep import Measure, Study, basics
 from pyverlet.data.sweep_plan import SCENE_FILE, Plan
 from pyverlet.ground.errors import InputError
-from pyverlet.scenes import Scene, get
+from pyverlet.scenes import Scene, Settings, get
+from pyverlet.scenes.sketch import Given, Sketch, SketchScene
 from pyverlet.world.world import World
 
 
@@ -59,11 +60,29 @@ class Unknown:
         return {}
 
 
+class _Absent(Sketch):
+    """A sketch of which only the name is known, and what was in it; nothing is run because a file says so."""
+
+    def __init__(self, name: str, digest: str) -> None:
+        super().__init__(Path(name), b"")
+        self._digest = digest
+
+    @property
+    def digest(self) -> str:
+        return self._digest
+
+    def build(self, settings: Settings) -> World:
+        raise InputError(f"the study is of the sketch {self.name}; allowed is `pyverlet sweep run {self.name}` with its folder")
+
+
 def _scene(told: Any, folder: str | Path) -> Scene:
     if isinstance(told, str):
         return get(told)
     if "format" in told:  # a document: `Study` has written it there
         return get(str(Path(folder) / SCENE_FILE))
+    if "sketch" in told:
+        absent = _Absent(told["sketch"], told["source"])
+        return SketchScene(told["name"], "", absent.build, Given(), sketch=absent)
     raise InputError(f"'{folder}' is a study of a scene of its program's own; allowed is pyverlet.sweep with that scene")
 
 

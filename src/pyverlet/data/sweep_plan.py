@@ -100,6 +100,8 @@ def _scene(scene: Scene) -> Any:
     document = getattr(scene, "document", None)
     if document is not None:
         return memory.plain(memory.pack(document))
+    if scene.sketch is not None:
+        return {"name": scene.name, "sketch": scene.sketch.name, "source": scene.sketch.digest}
     build = scene.build
     return {"name": scene.name, "build": f"{build.__module__}:{getattr(build, '__qualname__', type(build).__qualname__)}"}
 

@@ -64,13 +64,21 @@ def open_folder(folder: Path, plan: Plan) -> None:
         for name, value in about.items():
             theirs = known.get(name) if isinstance(known, dict) else None
             if theirs != value:
-                raise InputError(f"'{folder}' has a study whose {name} is {theirs!r}, not {value!r}; allowed is a new folder")
+                there, here = _briefly(theirs), _briefly(value)
+                other = f"is {there}, not {here}" if there != here else f"is another {there}"
+                raise InputError(f"'{folder}' has a study whose {name} {other}; allowed is a new folder")
     wanted = json.dumps({**about, "grid": plan.described_grid()}, indent=1).encode() + b"\n"
     if known is None or path.read_bytes() != wanted:
         if known is None and getattr(plan.scene, "document", None) is not None:
             plan.scene.write(folder / SCENE_FILE)
         with replacing(path) as file:
             file.write(wanted)
+
+
+def _briefly(value: Any) -> str:
+    """Of a scene's document its name; of anything else the beginning."""
+    text = repr(value["name"] if isinstance(value, dict) and "name" in value else value)
+    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 @contextlib.contextmanager

@@ -10,7 +10,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor, wait
 from dataclasses import replace
 from functools import lru_cache
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
+from threading import Thread
 from time import perf_counter
 from typing import Any
 
@@ -147,7 +148,19 @@ class _Pool(ProcessPoolExecutor):
     """Processes of this machine. They are not forked: threads of a parallel kernel do not survive that."""
 
     def __init__(self, count: int) -> None:
-        super().__init__(count, get_context("spawn"))
+        super().__init__(count, get_context("spawn"), _watch_parent)
+
+
+def _watch_parent() -> None:
+    """End with the process that started this one, however that ends: killed, it leaves nobody who would tell."""
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
 
 
 class _Dispatcher:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.picture import ByOrigin, Colouring, Theme, View
+from pyverlet.picture import ByOrigin, Colouring, Theme, View, across
 from pyverlet.picture.marks import MARKED_PX
 
 if TYPE_CHECKING:
@@ -77,9 +77,15 @@ class Arrays:
     def now(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
         """Positions (n, 2), radii, angles, colours (n,): contiguous, and writable, as ctypes asks of memory it is to look at."""
         world = self._world
+        position, radius, angle, seam = world.position, world.radius, world.angle, world.boundary.seam
+        colours = self._colour.colours(world, self._theme)
+        if seam:  # who reaches through it is drawn on both sides
+            owner, place = across.copies(position, radius, seam)
+            position, colours = np.concatenate((position, place)), np.concatenate((colours, colours[owner]))
+            radius, angle = np.concatenate((radius, radius[owner])), np.concatenate((angle, angle[owner]))
         return (
-            np.ascontiguousarray(world.position, dtype=np.float32),
-            np.ascontiguousarray(world.radius, dtype=np.float32),
-            np.remainder(world.angle, 2 * np.pi, dtype=np.float64).astype(np.float32),
-            np.require(self._colour.colours(world, self._theme), requirements=["C", "W"]),
+            np.ascontiguousarray(position, dtype=np.float32),
+            np.ascontiguousarray(radius, dtype=np.float32),
+            np.remainder(angle, 2 * np.pi, dtype=np.float64).astype(np.float32),
+            np.require(colours, requirements=["C", "W"]),
         )

@@ -40,7 +40,7 @@ def beyond_circle(x0, y0, size, position, radius, inverse_mass, first, stop, fou
 @kernel
 def beyond_box(x0, y0, x1, y1, position, radius, inverse_mass, first, stop, found):
     """The same for a box."""
-    number, zero = 0, x0 - x0
+    number, zero = 0, position.dtype.type(0)  # not x0 - x0: a wall may be infinitely far away
     packed = stop - (stop - first) % LANES
     left, right, floor, ceiling, none = spread(x0), spread(x1), spread(y0), spread(y1), spread(zero)
     for k in range(first, packed, LANES):

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.compile.rounding import rounded
 from pyverlet.ground.constants import FED, PUSHED
 from pyverlet.kernels.beyond import beyond_box, beyond_circle
 
@@ -112,6 +113,29 @@ def noted(b, resting):
 
 
 @kernel
+def wide(b):
+    """The circle b in float64."""
+    f = np.float64
+    return Body(
+        f(b.x), f(b.y), f(b.vx), f(b.vy), f(b.ax), f(b.ay), f(b.spin), f(b.radius), f(b.inverse_mass), f(b.restitution),
+        f(b.friction), b.fed, b.resting, f(b.hit), f(b.to_impact), f(b.to_friction), f(b.from_x), f(b.from_y), f(b.share),
+        f(b.turn), f(b.lift),
+    )  # fmt: skip
+
+
+@kernel
+def _rounded(b, like):
+    """The circle b in the dtype of the number `like`."""
+    f = rounded
+    return Body(
+        f(b.x, like), f(b.y, like), f(b.vx, like), f(b.vy, like), f(b.ax, like), f(b.ay, like), f(b.spin, like),
+        f(b.radius, like), f(b.inverse_mass, like), f(b.restitution, like), f(b.friction, like), b.fed, b.resting,
+        f(b.hit, like), b.to_impact, b.to_friction, f(b.from_x, like), f(b.from_y, like), f(b.share, like), f(b.turn, like),
+        f(b.lift, like),
+    )  # fmt: skip
+
+
+@kernel
 def meet(b, nx, ny, depth, h, lag, e, mu, rest_speed):
     """The circle b is `depth` > 0 beyond a wall of normal (nx, ny): what becomes of it, bounced or held, with friction mu.
 
@@ -203,6 +227,19 @@ def impact_time(dx, dy, vx, vy, ax, ay, reach, h):
 
 
 @kernel
+def _bounced(b, px, py, back_x, back_y, h, lag, e, mu, rest_speed):
+    """The circle b has met the cage's wall at (px, py) from its centre, (back_x, back_y) from where it is: what becomes of it.
+
+    In float64, so that it is rounded once: a normal in float32 is longer than 1, or shorter, and heats a gas or cools it.
+    """
+    f = np.float64
+    reached = np.sqrt(f(px) * px + f(py) * py)
+    nx, ny = -px / reached, -py / reached
+    depth = max(back_x * nx + back_y * ny, 0.0)
+    return _rounded(meet(wide(b), nx, ny, depth, f(h), f(lag), f(e), f(mu), f(rest_speed)), h)
+
+
+@kernel
 def _at_cage(b, x0, y0, size, h, lag, e, mu, rest_speed):
     """The circle b is beyond the wall of the cage: what becomes of it."""
     zero = h - h
@@ -221,6 +258,11 @@ def _at_cage(b, x0, y0, size, h, lag, e, mu, rest_speed):
             time = impact_time(dx, dy, vx, vy, b.ax, b.ay, room, h)
             px = dx - time * (vx - half * time * b.ax)
             py = dy - time * (vy - half * time * b.ay)
+            if max(e, b.restitution) > zero:
+                b = _bounced(b, px, py, px - dx, py - dy, h, lag, e, mu, rest_speed)
+                if b.resting != 0:
+                    break
+                continue
             reached = np.sqrt(px * px + py * py)
             nx, ny = -px / reached, -py / reached
             depth = max((px - dx) * nx + (py - dy) * ny, zero)

@@ -20,6 +20,7 @@ from pyverlet.compile.lanes import (
     which_above,
 )
 from pyverlet.ground.constants import LINK_BOWED, LINK_GIVE, LINK_MEMORY_S, LINK_RESOLVED
+from pyverlet.kernels.seam import nearest, nearest_lanes
 
 COLUMNS = (
     "rest", "rope", "stiffness", "soft", "damping", "intact", "force", "last", "lam", "give", "offset", "turn", "bow", "along_x",
@@ -40,7 +41,7 @@ def _settled(s):
 
 
 @kernel
-def _prepare_pack(p, start, node, holds, row, position, earlier, weight, h):
+def _prepare_pack(p, start, node, holds, row, position, period_x, period_y, earlier, weight, h):
     """From where a substep starts, and a substep `earlier`: what the rows of a pack are to satisfy. See kernels.links."""
     zero, one, tiny = spread(0.0), spread(1.0), spread(1e-12)
     hh, soft = spread(h * h), holds[p] & SOFTS
@@ -53,7 +54,7 @@ def _prepare_pack(p, start, node, holds, row, position, earlier, weight, h):
     for k in range(begin, end, LANES):
         xj, yj = take(position, node, k + shift + LANES)
         wj = pick(weight, node, k + shift + LANES)
-        dx, dy = xj - xi, yj - yi
+        dx, dy = nearest_lanes(xj - xi, period_x), nearest_lanes(yj - yi, period_y)
         length = square_root(dx * dx + dy * dy)
         bend = one / larger(length, tiny)
         store(row[AX], k, where_zero(length, one, dx * bend))
@@ -68,7 +69,7 @@ def _prepare_pack(p, start, node, holds, row, position, earlier, weight, h):
         give, offset, lam = spread(LINK_GIVE) * ww, zero, zero
         if soft:
             uj, vj = take(earlier, node, k + shift + LANES)
-            ex, ey = uj - ui, vj - vi
+            ex, ey = nearest_lanes(uj - ui, period_x), nearest_lanes(vj - vi, period_y)
             ui, vi = uj, vj
             here, slack = load(row[SOFT], k), load(row[ROPE], k)
             stiffness, damping = load(row[STIFFNESS], k), load(row[DAMPING], k)
@@ -94,10 +95,10 @@ def _prepare_pack(p, start, node, holds, row, position, earlier, weight, h):
 
 
 @parallel_kernel
-def prepare(start, node, holds, bowed, row, position, earlier, weight, h):
+def prepare(start, node, holds, bowed, row, position, period_x, period_y, earlier, weight, h):
     """Before the integrator moves: every row's equation C+ + offset + give lam = 0, and which packs resist being turned."""
     for p in prange(holds.shape[0]):
-        bowed[p] = _prepare_pack(p, start, node, holds, row, position, earlier, weight, h)
+        bowed[p] = _prepare_pack(p, start, node, holds, row, position, period_x, period_y, earlier, weight, h)
 
 
 @kernel
@@ -173,14 +174,14 @@ def intact(place, row):
 
 
 @kernel
-def energy(position, ends, rest, upper, stiffness, intact):
+def energy(position, period_x, period_y, ends, rest, upper, stiffness, intact):
     """Energy of rows of finite stiffness, J: none of the broken, nor of slack ropes. ends: (rows, 2) rows of `position`."""
     total = 0.0
     for r in range(ends.shape[0]):
         if not (intact[r] and stiffness[r] < np.inf):
             continue
         i, j = ends[r, 0], ends[r, 1]
-        dx, dy = position[j, 0] - position[i, 0], position[j, 1] - position[i, 1]
+        dx, dy = nearest(position[j, 0] - position[i, 0], period_x), nearest(position[j, 1] - position[i, 1], period_y)
         value = np.sqrt(dx * dx + dy * dy) - rest[r]
         if value > 0.0 or upper[r] > 0.0:
             total += stiffness[r] * value * value

@@ -40,6 +40,7 @@ from pyverlet.compile.lanes import (
 )
 from pyverlet.ground.constants import LINK_ROUNDS, LINK_TAUT, LINK_TURN
 from pyverlet.kernels.chain_rows import AX, AY, BOW, GIVE, INTACT, LAM, OFFSET, REST, ROPE, ROPES, TURN, ahead
+from pyverlet.kernels.seam import nearest, nearest_lanes
 
 _SWEEPS = 4
 
@@ -54,7 +55,7 @@ _HEAVY = 1e-40
 
 
 @kernel
-def _measure_pack(p, start, node, row, position, weight, room):
+def _measure_pack(p, start, node, row, position, period_x, period_y, weight, room):
     """How the rows of a pack stand now, in `room`, and who of them pulls; the direction of the force follows them."""
     zero, one, half = spread(0.0), spread(1.0), spread(0.5)
     begin, end, shift = start[p], start[p + 1], LANES * p
@@ -64,7 +65,8 @@ def _measure_pack(p, start, node, row, position, weight, room):
     for k in range(begin, end, LANES):
         xj, yj = take(position, node, k + shift + LANES)
         wj = pick(weight, node, k + shift + LANES)
-        dx, dy, rest = xj - xi, yj - yi, load(row[REST], k)
+        dx, dy = nearest_lanes(xj - xi, period_x), nearest_lanes(yj - yi, period_y)
+        rest = load(row[REST], k)
         length = square_root(dx * dx + dy * dy)
         bend = one / larger(length, spread(1e-12))
         nx, ny = where_zero(length, one, dx * bend), dy * bend
@@ -200,7 +202,7 @@ def _slack_changes(begin, end, row, room):
 
 
 @kernel
-def _sweep(begin, end, lane, node, row, position, weight, shift):
+def _sweep(begin, end, lane, node, row, position, period_x, period_y, weight, shift):
     """One link of a run after the other, back and forth: less exact, but safe where links turn too far."""
     for sweep in range(_SWEEPS):
         for s in range(begin + lane, end, LANES):
@@ -208,7 +210,8 @@ def _sweep(begin, end, lane, node, row, position, weight, shift):
             if row[INTACT, r] == 0.0:
                 continue
             i, j = node[r + shift], node[r + shift + LANES]
-            dx, dy = position[j, 0] - position[i, 0], position[j, 1] - position[i, 1]
+            dx = nearest(position[j, 0] - position[i, 0], period_x)
+            dy = nearest(position[j, 1] - position[i, 1], period_y)
             length = np.sqrt(dx * dx + dy * dy)
             ww = weight[i] + weight[j]
             if length == 0.0 or ww == 0.0:
@@ -251,9 +254,9 @@ def _move_pack(p, start, node, row, position, room):
 
 
 @kernel
-def _solve_pack(p, start, node, holds, lanes, bowed, row, position, weight, room):
+def _solve_pack(p, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, room):
     begin, end = start[p], start[p + 1]
-    _measure_pack(p, start, node, row, position, weight, room)
+    _measure_pack(p, start, node, row, position, period_x, period_y, weight, room)
     ropes = holds[p] & ROPES
     for _ in range(LINK_ROUNDS):
         if bowed[p] and end - begin > LANES:
@@ -266,22 +269,22 @@ def _solve_pack(p, start, node, holds, lanes, bowed, row, position, weight, room
     if far != 0:
         for lane in range(lanes[p]):
             if (far >> lane) & 1:
-                _sweep(begin, end, lane, node, row, position, weight, LANES * p)
+                _sweep(begin, end, lane, node, row, position, period_x, period_y, weight, LANES * p)
         for lane in range(lanes[p], LANES):  # those that repeat the last run
             for k in range(begin, end, LANES):
                 row[LAM, k + lane] = row[LAM, k + lanes[p] - 1]
 
 
 @parallel_kernel
-def _solve(first, stop, start, node, holds, lanes, bowed, row, position, weight, rooms):
+def _solve(first, stop, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms):
     parts = rooms.shape[0]
     for part in prange(parts):
         for p in range(first + part, stop, parts):
-            _solve_pack(p, start, node, holds, lanes, bowed, row, position, weight, rooms[part])
+            _solve_pack(p, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms[part])
 
 
 @driver
-def sweep(back, skip, colour, start, node, holds, lanes, bowed, row, position, weight, rooms):
+def sweep(back, skip, colour, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms):
     """Solve all packs, colour by colour or `back` from the last one, without the first colour on the way if `skip`.
 
     Colour c is packs colour[c] to colour[c + 1], which share no particle. rooms: (parts, SCRATCH, items of the longest pack's
@@ -290,16 +293,16 @@ def sweep(back, skip, colour, start, node, holds, lanes, bowed, row, position, w
     colours = colour.shape[0] - 1
     for n in range(1 if skip else 0, colours):
         c = colours - 1 - n if back else n
-        _solve(colour[c], colour[c + 1], start, node, holds, lanes, bowed, row, position, weight, rooms)
+        _solve(colour[c], colour[c + 1], start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms)
 
 
 @driver
-def passes(times, gives, colour, start, node, holds, lanes, bowed, row, position, weight, rooms):
+def passes(times, gives, colour, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms):
     """There and back so many times, from the lam that rows start from; once, one way, where there is a single colour."""
     if gives:
         ahead(colour, start, node, holds, row, position, weight)
     several = colour.shape[0] > 2
     for _ in range(times if several else 1):
-        sweep(False, False, colour, start, node, holds, lanes, bowed, row, position, weight, rooms)
+        sweep(False, False, colour, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms)
         if several:
-            sweep(True, True, colour, start, node, holds, lanes, bowed, row, position, weight, rooms)
+            sweep(True, True, colour, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet.compile.jit import kernel
+from pyverlet.kernels.seam import nearest
 
 
 @kernel
@@ -24,7 +25,7 @@ def join(root, i, j):
 
 
 @kernel
-def join_met(position, moved, size, inverse_mass, first, count, pair_i, pair_j, near, root):
+def join_met(position, moved, size, period_x, period_y, inverse_mass, first, count, pair_i, pair_j, near, root):
     """Join the listed pairs that may have touched while they moved by `moved` (n, 2), m, and both are free.
 
     That is: whose gap, beyond `near` times their contact distance, is no longer than what they have moved against each other.
@@ -34,7 +35,8 @@ def join_met(position, moved, size, inverse_mass, first, count, pair_i, pair_j, 
         for k in range(first[s], first[s] + count[s]):
             i, j = pair_i[k], pair_j[k]
             if inverse_mass[i] > zero and inverse_mass[j] > zero:
-                dx, dy = position[j, 0] - position[i, 0], position[j, 1] - position[i, 1]
+                dx = nearest(position[j, 0] - position[i, 0], period_x)
+                dy = nearest(position[j, 1] - position[i, 1], period_y)
                 mx, my = moved[j, 0] - moved[i, 0], moved[j, 1] - moved[i, 1]
                 reach = near * (size[i] + size[j]) + np.sqrt(mx * mx + my * my)
                 if dx * dx + dy * dy < reach * reach:

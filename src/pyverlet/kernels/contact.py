@@ -179,7 +179,7 @@ def _relax_strip(s, to, circles, pairs, law):
     memory, rest = spread(real(3) * law.h / real(GRIP)), spread(law.rest_speed)
     begin, end = pairs.begin[s], pairs.begin[s] + pairs.lanes[s]
     close, to = begin + pairs.apart[s], to - begin
-    taken = 0.0
+    taken = lever = 0.0
     for k in range(begin, end, LANES):
         nx, ny = load(pairs.normal[0], to + k), load(pairs.normal[1], to + k)
         part = load(pairs.share, k * law.varied)
@@ -197,6 +197,10 @@ def _relax_strip(s, to, circles, pairs, law):
             if fast != 0:
                 struck = _struck(fast, k, circles, pairs)
                 speed = where_set(struck, zero, speed)
+            if law.accounts != 0:  # what was fed, too, has pushed them apart
+                given = where_set(struck, zero, fed * load(pairs.depth, k)) - speed
+                squeezed = load(pairs.made_of[MASS], at) * load(pairs.reach, k * law.varied) * given
+                lever += add_lanes(squeezed, _distinct(lane_i, lane_j, k))
         cx, cy = speed * nx, speed * ny
         if RUBS:
             mu = load(pairs.made_of[MU], at)
@@ -230,6 +234,7 @@ def _relax_strip(s, to, circles, pairs, law):
         put(velocity, lane_j, k, xj - cx * (one - part), yj - cy * (one - part))
     if BOUNCES and law.accounts != 0:
         pairs.spent[s, 1] += taken
+        pairs.spent[s, 2] += lever
 
 
 @kernel

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.kernels.seam import nearest
 
 _BLOCK = 4096
 """Particles that one thread takes at a time."""
@@ -27,13 +28,13 @@ def drag(force, velocity, wind, linear, quadratic):
 
 
 @kernel
-def attract(force, position, inverse_mass, x, y, strength, softening):
+def attract(force, position, inverse_mass, x, y, strength, softening, period_x, period_y):
     """F = m strength d / (|d|^2 + softening^2)^(3/2), d from the particle to (x, y); none on a particle at that very point."""
     zero = strength - strength
     one = force.dtype.type(1)
     for i in range(position.shape[0]):
-        dx = x - position[i, 0]
-        dy = y - position[i, 1]
+        dx = nearest(x - position[i, 0], period_x)
+        dy = nearest(y - position[i, 1], period_y)
         square = dx * dx + dy * dy + softening * softening
         cube = np.float64(square) * np.sqrt(np.float64(square))  # of float32 it underflows at 1e-15 m
         if cube > 0.0 and inverse_mass[i] > zero:
@@ -43,7 +44,7 @@ def attract(force, position, inverse_mass, x, y, strength, softening):
 
 
 @parallel_kernel
-def gravitate(force, position, mass, slot, strength, softening):
+def gravitate(force, position, mass, slot, strength, softening, period_x, period_y):
     """Every pair of the particles in these slots attracts: F = strength m_i m_j d / (|d|^2 + softening^2)^(3/2).
 
     Each particle sums over all others in the order of `slot`, in float64: one writer each, so the same bits on any threads.
@@ -58,8 +59,8 @@ def gravitate(force, position, mass, slot, strength, softening):
             fx = fy = 0.0
             for other in range(slot.shape[0]):
                 j = slot[other]
-                dx = np.float64(position[j, 0]) - x
-                dy = np.float64(position[j, 1]) - y
+                dx = nearest(np.float64(position[j, 0]) - x, period_x)
+                dy = nearest(np.float64(position[j, 1]) - y, period_y)
                 square = dx * dx + dy * dy + square_of_softening
                 cube = square * np.sqrt(square)
                 if cube > 0.0 and mass[j] < np.inf:  # it underflows before the square does
@@ -71,13 +72,13 @@ def gravitate(force, position, mass, slot, strength, softening):
 
 
 @kernel
-def gravitational_potential(position, mass, softening):
+def gravitational_potential(position, mass, softening, period_x, period_y):
     """Sum over pairs of -m_i m_j / sqrt(|d|^2 + softening^2), in float64; to be multiplied by the strength."""
     total = 0.0
     for i in range(mass.shape[0]):
         for j in range(i):
-            dx = position[j, 0] - position[i, 0]
-            dy = position[j, 1] - position[i, 1]
+            dx = nearest(position[j, 0] - position[i, 0], period_x)
+            dy = nearest(position[j, 1] - position[i, 1], period_y)
             square = dx * dx + dy * dy + softening * softening
             if square > 0.0 and mass[i] < np.inf and mass[j] < np.inf:
                 total -= mass[i] * mass[j] / np.sqrt(square)

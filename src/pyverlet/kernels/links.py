@@ -21,6 +21,7 @@ import numpy as np
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.ground.constants import LINK_GIVE, LINK_MEMORY_S, LINK_RESOLVED
+from pyverlet.kernels.seam import image_near
 
 
 @kernel
@@ -132,20 +133,23 @@ def snap(force, strength, intact):
 
 
 @parallel_kernel
-def look_back(slot, position, velocity, inverse_mass, before, calm, h, start, earlier, weight):
+def look_back(slot, position, velocity, inverse_mass, period_x, period_y, before, calm, h, start, earlier, weight):
     """Copy who is linked: where a substep starts; `earlier`, where everybody was a substep ago; the inverse mass.
 
     That is by the velocity, or `before`, by memory, where rest has put another velocity in. Contacts at rest carry weight by
     small velocities that move nobody, and links would take them for motion. calm: (k,) m/s, by how much the velocity may differ
-    from the way gone and still be of that kind; beyond it there was an impact. NaN: unknown.
+    from the way gone and still be of that kind; beyond it there was an impact. NaN: unknown. In a periodic room `before` may be
+    another image of where they were.
     """
     for k in prange(slot.shape[0]):
         s = slot[k]
         start[k, 0], start[k, 1] = position[s, 0], position[s, 1]
         x, y = start[k, 0] - h * np.float64(velocity[s, 0]), start[k, 1] - h * np.float64(velocity[s, 1])
-        dx, dy, most = x - before[k, 0], y - before[k, 1], h * calm[k]
+        bx = image_near(before[k, 0], start[k, 0], period_x)
+        by = image_near(before[k, 1], start[k, 1], period_y)
+        dx, dy, most = x - bx, y - by, h * calm[k]
         if dx * dx + dy * dy <= most * most:
-            x, y = before[k, 0], before[k, 1]
+            x, y = bx, by
         earlier[k, 0], earlier[k, 1] = x, y
         weight[k] = inverse_mass[s]
 

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
-from pyverlet.kernels.bounds import Body, look, meet, moved, noted, put
+from pyverlet.kernels.bounds import look, meet, moved, noted, put, wide
 from pyverlet.kernels.obstacles import search, tolerance
 
 MEETINGS, BOUNCES = 256, 8
@@ -57,17 +57,6 @@ class Surface(NamedTuple):
     """n . v of a circle that stays at it, m/s."""
     which: Any
     """Segment, ROOM or NOBODY."""
-
-
-@kernel
-def _wide(b):
-    """The circle b in float64."""
-    f = np.float64
-    return Body(
-        f(b.x), f(b.y), f(b.vx), f(b.vy), f(b.ax), f(b.ay), f(b.spin), f(b.radius), f(b.inverse_mass), f(b.restitution),
-        f(b.friction), b.fed, b.resting, f(b.hit), f(b.to_impact), f(b.to_friction), f(b.from_x), f(b.from_y), f(b.share),
-        f(b.turn), f(b.lift),
-    )  # fmt: skip
 
 
 @kernel
@@ -310,7 +299,7 @@ def collide(
         if inverse_mass[i] > 0 and not _alone(
             before[i, 0], before[i, 1], position[i, 0], position[i, 1], x0, y0, cell, columns, rows, start
         ):
-            b = _wide(
+            b = wide(
                 look(
                     i, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits,
                     spent, before, turn, lift,

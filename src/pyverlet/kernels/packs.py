@@ -74,6 +74,13 @@ def _choose(pair_i, pair_j, used, number, lane_i, lane_j):
 
 
 @kernel
+def aside(zero, i, j):
+    """A hair, m, in a direction of the pair's own."""
+    angle = _GOLDEN_ANGLE * (i + j)
+    return zero + _ASIDE * np.cos(angle), zero + _ASIDE * np.sin(angle)
+
+
+@kernel
 def _measure(origin, radius, lane_i, lane_j, gap_x, gap_y):
     """From i to j of every lane, m; of coincident ones a hair in a direction of their own.
 
@@ -93,9 +100,7 @@ def _measure(origin, radius, lane_i, lane_j, gap_x, gap_y):
         if which_above(larger(dx * dx, dy * dy), zero) != ALL:
             for lane in range(k, k + LANES):
                 if gap_x[lane] == 0 and gap_y[lane] == 0:
-                    angle = _GOLDEN_ANGLE * (lane_i[lane] + lane_j[lane])
-                    gap_x[lane] = _ASIDE * np.cos(angle)
-                    gap_y[lane] = _ASIDE * np.sin(angle)
+                    gap_x[lane], gap_y[lane] = aside(gap_x[lane], lane_i[lane], lane_j[lane])
     return apart
 
 

@@ -18,6 +18,7 @@ from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.compile.lanes import LANES, count_bits, load, lowest_bit, spread, which_above, write_all, write_chosen
 from pyverlet.ground.constants import CLOSE, COLOURS, COLUMNS, ROUNDING
 from pyverlet.kernels.grid import before_row, cell_number
+from pyverlet.kernels.seam import nearest
 
 _ALL = (1 << COLOURS) - 1
 
@@ -217,13 +218,13 @@ def count_far(position, radius, first, count, pair_i, pair_j, gap, step):
 
 
 @kernel
-def list_all_pairs(position, radius, inverse_mass, category, mask, pair_i, pair_j):
+def list_all_pairs(position, radius, period_x, period_y, inverse_mass, category, mask, pair_i, pair_j):
     """The readable reference, O(n^2): every overlapping pair, in natural order. Returns how many, also beyond the room."""
     found = 0
     for i in range(position.shape[0]):
         for j in range(i + 1, position.shape[0]):
-            dx = position[j, 0] - position[i, 0]
-            dy = position[j, 1] - position[i, 1]
+            dx = nearest(position[j, 0] - position[i, 0], period_x)
+            dy = nearest(position[j, 1] - position[i, 1], period_y)
             reach = radius[i] + radius[j]
             if dx * dx + dy * dy < reach * reach and _accept(category, mask, inverse_mass, i, j):
                 if found < pair_i.shape[0]:

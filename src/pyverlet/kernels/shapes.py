@@ -12,14 +12,21 @@ import math
 import numpy as np
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.kernels.seam import nearest
 
 
 @kernel
-def measure_distance(r, e, position, particle, rest, value, gradient, bend):
+def _way(position, i, j, period_x, period_y):
+    """From i to j, m."""
+    return nearest(position[j, 0] - position[i, 0], period_x), nearest(position[j, 1] - position[i, 1], period_y)
+
+
+@kernel
+def measure_distance(r, e, position, period_x, period_y, particle, rest, value, gradient, bend):
     """One row of `distance`."""
     i, j = particle[e], particle[e + 1]
-    dx = position[j, 0] - position[i, 0]
-    dy = position[j, 1] - position[i, 1]
+    dx = nearest(position[j, 0] - position[i, 0], period_x)
+    dy = nearest(position[j, 1] - position[i, 1], period_y)
     length = math.sqrt(dx * dx + dy * dy)
     if length > 0.0:
         nx, ny = dx / length, dy / length
@@ -34,20 +41,20 @@ def measure_distance(r, e, position, particle, rest, value, gradient, bend):
 
 
 @parallel_kernel
-def distance(position, first, particle, rest, begin, end, value, gradient, bend):
+def distance(position, period_x, period_y, first, particle, rest, begin, end, value, gradient, bend):
     """C = |x_j - x_i| - rest, m."""
     for r in prange(begin, end):
-        measure_distance(r, first[r], position, particle, rest, value, gradient, bend)
+        measure_distance(r, first[r], position, period_x, period_y, particle, rest, value, gradient, bend)
 
 
 @parallel_kernel
-def angle(position, first, particle, rest, begin, end, value, gradient, bend):
+def angle(position, period_x, period_y, first, particle, rest, begin, end, value, gradient, bend):
     """C = angle from j -> i to j -> k, counter-clockwise, minus rest, in -pi to pi, rad."""
     for r in prange(begin, end):
         e = first[r]
         i, j, k = particle[e], particle[e + 1], particle[e + 2]
-        ax, ay = position[i, 0] - position[j, 0], position[i, 1] - position[j, 1]
-        bx, by = position[k, 0] - position[j, 0], position[k, 1] - position[j, 1]
+        ax, ay = nearest(position[i, 0] - position[j, 0], period_x), nearest(position[i, 1] - position[j, 1], period_y)
+        bx, by = nearest(position[k, 0] - position[j, 0], period_x), nearest(position[k, 1] - position[j, 1], period_y)
         turn = math.atan2(ax * by - ay * bx, ax * bx + ay * by) - rest[r]
         value[r] = turn - 2.0 * math.pi * np.floor(turn / (2.0 * math.pi) + 0.5)
         a2, b2 = max(ax * ax + ay * ay, 1e-300), max(bx * bx + by * by, 1e-300)
@@ -61,18 +68,18 @@ def angle(position, first, particle, rest, begin, end, value, gradient, bend):
 
 
 @parallel_kernel
-def area(position, first, particle, rest, begin, end, value, gradient, bend):
+def area(position, period_x, period_y, first, particle, rest, begin, end, value, gradient, bend):
     """C = area of the ring, positive if it runs counter-clockwise, minus rest, m^2 (the shoelace formula)."""
     for r in prange(begin, end):
         a, b = first[r], first[r + 1]
-        x0, y0 = position[particle[a], 0], position[particle[a], 1]  # a corner near by: far from the origin digits would cancel
-        twice = 0.0
+        # From corner to corner, each the nearest image of the one before; seen from the first, for far away digits would cancel.
+        twice = x = y = 0.0
+        bx, by = _way(position, particle[b - 1], particle[a], period_x, period_y)
         for e in range(a, b):
-            before = particle[e - 1] if e > a else particle[b - 1]
-            after = particle[e + 1] if e + 1 < b else particle[a]
-            here = particle[e]
-            gradient[e, 0] = 0.5 * (position[after, 1] - position[before, 1])
-            gradient[e, 1] = 0.5 * (position[before, 0] - position[after, 0])
-            twice += (position[here, 0] - x0) * (position[after, 1] - y0) - (position[after, 0] - x0) * (position[here, 1] - y0)
+            ax, ay = _way(position, particle[e], particle[e + 1] if e + 1 < b else particle[a], period_x, period_y)
+            gradient[e, 0] = 0.5 * (by + ay)
+            gradient[e, 1] = -0.5 * (bx + ax)
+            twice += x * ay - ax * y
+            x, y, bx, by = x + ax, y + ay, ax, ay
         value[r] = 0.5 * twice - rest[r]
         bend[r] = 0.5

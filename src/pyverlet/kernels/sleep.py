@@ -6,6 +6,7 @@ import numpy as np
 
 from pyverlet.compile.jit import kernel
 from pyverlet.kernels.clusters import find_root, join
+from pyverlet.kernels.seam import nearest
 
 
 @kernel
@@ -20,7 +21,7 @@ def count_calm(velocity, spin, radius, island, limit, dt, calm):
 
 
 @kernel
-def find_islands(position, size, inverse_mass, calm, first, count, pair_i, pair_j, near, after, root):
+def find_islands(position, size, period_x, period_y, inverse_mass, calm, first, count, pair_i, pair_j, near, after, root):
     """root[i]: the lowest slot of the island of i, if all of it has been calm for `after` seconds; else -1.
 
     An island is what hangs together by pairs nearer than `near` times their contact distance (union-find). Pinned circles and
@@ -33,7 +34,8 @@ def find_islands(position, size, inverse_mass, calm, first, count, pair_i, pair_
         for k in range(first[s], first[s] + count[s]):
             i, j = pair_i[k], pair_j[k]
             if inverse_mass[i] > zero and inverse_mass[j] > zero:
-                dx, dy = position[j, 0] - position[i, 0], position[j, 1] - position[i, 1]
+                dx = nearest(position[j, 0] - position[i, 0], period_x)
+                dy = nearest(position[j, 1] - position[i, 1], period_y)
                 reach = near * (size[i] + size[j])
                 if dx * dx + dy * dy < reach * reach:
                     join(root, i, j)
@@ -47,14 +49,15 @@ def find_islands(position, size, inverse_mass, calm, first, count, pair_i, pair_
 
 
 @kernel
-def touch(position, size, island, first, count, pair_i, pair_j, touched):
+def touch(position, size, period_x, period_y, island, first, count, pair_i, pair_j, touched):
     """Set touched[i] = 1 for sleepers that overlap somebody awake; returns how many such pairs there are."""
     found = 0
     for s in range(first.shape[0]):
         for k in range(first[s], first[s] + count[s]):
             i, j = pair_i[k], pair_j[k]
             if (island[i] < 0) != (island[j] < 0):
-                dx, dy = position[j, 0] - position[i, 0], position[j, 1] - position[i, 1]
+                dx = nearest(position[j, 0] - position[i, 0], period_x)
+                dy = nearest(position[j, 1] - position[i, 1], period_y)
                 reach = size[i] + size[j]
                 if dx * dx + dy * dy < reach * reach:
                     touched[j if island[i] < 0 else i] = 1

@@ -1,1 +1,8 @@
-"""The laboratory: worlds measured against what is known on paper."""
+"""The laboratory: equations of motion solved, and worlds and integrators measured against what is known on paper."""
+
+from __future__ import annotations
+
+from pyverlet.lab.problems import Equation
+from pyverlet.lab.solver import Solution, solve
+
+__all__ = ["Equation", "Solution", "solve"]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pyverlet.lab import figures
-from pyverlet.lab.problems import PROBLEMS, Floats, Problem
+from pyverlet.lab.problems import PROBLEMS, Equation, Floats, Problem
 from pyverlet.laws.integrators import Integrator, PositionVerlet, TimeCorrectedVerlet
 
 if TYPE_CHECKING:
@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 
 FRAMES = (80, 160, 320, 640)
 """Steps in which the same second is made."""
-
-ROUNDING = 1e-13
-"""Errors below it are rounding, not method: they are left out of the fit."""
 
 JITTER = 0.3
 """By how much a jittering step is longer or shorter than the mean, at most."""
@@ -97,22 +94,21 @@ def steps(frames: int, seconds: float = 1.0, jitter: float = 0.0) -> Floats:
     return np.asarray(dts * (seconds / dts.sum()))
 
 
-def largest_error(integrator: Integrator, problem: Problem, dts: Floats) -> float:
+def largest_error(integrator: Integrator, problem: Problem | Equation, dts: Floats) -> float:
     """Largest distance from the solution, over position and velocity and over all steps."""
-    world = problem.world(integrator)
-    worst = 0.0
-    for dt in dts:
-        world.step(dt)
-        position, velocity = problem.exact(world.time)
-        worst = max(worst, float(np.hypot(*np.hypot(world.position[0] - position, world.velocity[0] - velocity))))
-    return worst
+    found = problem.motion(integrator, dts)
+    exact = problem.solution(found.times)
+    squares = [((a - b) ** 2).reshape(len(a), -1).sum(axis=1) for a, b in zip(found[1:], exact, strict=True)]
+    return float(np.sqrt(sum(squares)).max())
 
 
-def measure(integrator: Integrator, problem: Problem, *, jitter: float = 0.0, frames: Sequence[int] = FRAMES) -> Convergence:
+def measure(
+    integrator: Integrator, problem: Problem | Equation, *, jitter: float = 0.0, frames: Sequence[int] = FRAMES
+) -> Convergence:
     """Make the same time in more and more steps and fit the order."""
     errors = np.array([largest_error(integrator, problem, steps(n, problem.seconds, jitter)) for n in frames])
     h = problem.seconds / np.array(frames, dtype=np.float64)
-    known = errors > ROUNDING
+    known = errors > problem.rounding
     order = float(np.polyfit(np.log(h[known]), np.log(errors[known]), 1)[0]) if np.count_nonzero(known) > 1 else None
     return Convergence(h, errors, order)
 
@@ -132,32 +128,33 @@ def methods(integrators: Sequence[Integrator]) -> list[Method]:
     return rows
 
 
-def table(rows: Sequence[Method], problems: Sequence[Problem] = tuple(PROBLEMS.values())) -> list[Orders]:
+def table(rows: Sequence[Method], problems: Sequence[Problem | Equation] = tuple(PROBLEMS.values())) -> list[Orders]:
     """Measure every method on every problem."""
     return [
         Orders(row, {problem.name: measure(row.integrator, problem, jitter=row.jitter) for problem in problems}) for row in rows
     ]
 
 
-def figure(orders: Sequence[Orders]) -> Figure:
+def figure(orders: Sequence[Orders], problems: Sequence[Problem | Equation] = tuple(PROBLEMS.values())) -> Figure:
     """One log-log panel a problem: error against step, and how steep order 1, 2 and 4 are. Needs the extra `plot`."""
     from matplotlib.figure import Figure
 
-    names = list(orders[0].convergence)
-    picture = Figure(figsize=(11.0, 8.0), dpi=150, layout="constrained")
-    panels = np.ravel(picture.subplots(2, -(-len(names) // 2), sharex=True))
-    for axes, name in zip(panels, names, strict=True):
+    rows = 1 if len(problems) == 1 else 2
+    picture = Figure(figsize=(11.0, 4.0 * rows), dpi=150, layout="constrained")
+    panels = np.ravel(picture.subplots(rows, -(-len(problems) // rows), sharex=True))
+    for axes, problem in zip(panels, problems, strict=True):
+        name = problem.name
         for number, each in enumerate(orders):
             found = each.convergence[name]
             dashes = ":" if each.method.jitter else "--" if "," in each.method.label else "-"
             axes.loglog(found.h, found.error, ls=dashes, lw=1.4, ms=5, label=each.method.label, **figures.style(number))
-        axes.set(title=f"{name}:  {PROBLEMS[name].law}", ylabel="largest error (SI units)")
-        axes.set_xticks(found.h, [f"1/{round(1 / h)}" for h in found.h])
+        axes.set(title=f"{name}:  {problem.law}", ylabel="largest error (SI units)")
+        axes.set_xticks(found.h, [f"1/{1 / h:.4g}" for h in found.h])
         axes.set_xticks([], minor=True)
         axes.margins(x=0.14)
         figures.tidy(axes)
         _write_slopes(axes, [each.convergence[name] for each in orders])
-    for axes in panels[-2:]:
+    for axes in panels[-len(panels) // rows :]:
         axes.set_xlabel("length of a step h (s)")
     handles, labels = panels[0].get_legend_handles_labels()
     picture.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)

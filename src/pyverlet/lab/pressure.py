@@ -13,6 +13,7 @@ from pyverlet.lab.physics._worlds import RADIUS
 from pyverlet.lab.table import Table
 from pyverlet.laws.contacts.collisions import Collisions
 from pyverlet.laws.rooms import Box
+from pyverlet.scenes.gas import henderson
 from pyverlet.state.state import Slots
 from pyverlet.world.world import World
 
@@ -81,11 +82,6 @@ def measure(fraction: float, step: float, *, seconds: float) -> Pressed:
     pressure = room.impulse / ((world.time - start) * 4 * inner)
     heat = 2 * world.energy().kinetic / (2 * count)  # k T = m <v^2> / 2
     return Pressed(fraction, step, pressure * inner**2 / (count * heat), overlap)
-
-
-def henderson(fraction: float) -> float:
-    """Z of hard discs by Henderson's equation of state (1975), good to a per cent below an area fraction of 0.6."""
-    return (1 + fraction**2 / 8) / (1 - fraction) ** 2
 
 
 def table(*, seconds: float, progress: Callable[[int, int], None] | None = None) -> Table:

@@ -1,4 +1,7 @@
-"""Four motions with a solution on paper, to measure integrators against. Units are SI, the mass is 1 kg."""
+"""What integrators are measured against: four motions with a solution on paper, and equations of one's own.
+
+Units are SI, the mass is 1 kg.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from pyverlet.ground.errors import InputError
+from pyverlet.lab.solver import Acceleration, Solution, solve
 from pyverlet.laws.forces import Drag, PointSpring
-from pyverlet.laws.integrators import Integrator
+from pyverlet.laws.integrators import RK4, Integrator
 from pyverlet.state.state import Slots, State
 from pyverlet.world.world import World
 
@@ -39,6 +44,11 @@ class Problem:
     gravity: tuple[float, float] = (0.0, 0.0)
     seconds: float = 1.0
 
+    @property
+    def rounding(self) -> float:
+        """Errors below it are rounding, not method: they are left out of the fit."""
+        return ROUNDING
+
     def world(self, integrator: Integrator) -> World:
         """The particle at time 0, one substep a frame, in float64."""
         world = World(gravity=self.gravity, integrator=integrator, collisions=None, substeps=1, dtype=np.float64)
@@ -46,6 +56,76 @@ class Problem:
         world.add(position=position, velocity=velocity, mass=1.0)
         world.forces.append(self.force())
         return world
+
+    def motion(self, integrator: Integrator, dts: Floats) -> Solution:
+        """What an integrator makes of it, after each of these steps (n,), s."""
+        world = self.world(integrator)
+        found = [(0.0, *self.exact(0.0))]
+        for dt in dts:
+            world.step(dt)
+            found.append((world.time, world.position[0].copy(), world.velocity[0].copy()))
+        return Solution(*map(np.array, zip(*found, strict=True)))
+
+    def solution(self, times: Floats) -> tuple[Floats, Floats]:
+        """(n, 2) the exact positions and velocities at these times (n,)."""
+        return _stacked(self.exact, times)
+
+
+FINER = 4
+"""Steps of the reference in each step that is judged: its error is then 4^4 = 256 times smaller than that of RK4 itself."""
+
+ROUNDING, ROUNDING_OF_REFERENCE = 1e-13, 1e-12
+"""Errors below it are rounding, not method: of a step, and beside a reference that has made so many."""
+
+
+@dataclass(frozen=True)
+class Equation:
+    """x'' = F(t, x, x') of one's own, to measure integrators on: `pyverlet order --problem module:name`.
+
+    Attributes:
+        F: as for `pyverlet.lab.solve`.
+        x0: as there, at time 0.
+        v0: as there.
+        exact: of t in s: position and velocity in the shape of x0. None: what `RK4` makes of it in four times as many steps, good
+            enough for methods up to order 4.
+        seconds: how long errors are measured.
+        name: as in tables.
+        law: as over figures.
+    """
+
+    F: Acceleration
+    x0: ArrayLike
+    v0: ArrayLike = 0.0
+    exact: Callable[[float], tuple[ArrayLike, ArrayLike]] | None = None
+    seconds: float = 1.0
+    name: str = "equation"
+    law: str = "x'' = F(t, x, x')"
+
+    @property
+    def rounding(self) -> float:
+        """Errors below it are rounding, not method."""
+        return ROUNDING if self.exact is not None else ROUNDING_OF_REFERENCE
+
+    def motion(self, integrator: Integrator, dts: Floats) -> Solution:
+        """What an integrator makes of it, after each of these steps (n,), s."""
+        return solve(self.F, x0=self.x0, v0=self.v0, h=dts, integrator=integrator)
+
+    def solution(self, times: Floats) -> tuple[Floats, Floats]:
+        """The positions and velocities at these times (n,) from 0, exact or nearly so."""
+        if self.exact is not None:
+            positions, velocities = _stacked(self.exact, times)
+            wanted = (len(times), *np.shape(self.x0))
+            if not positions.shape == velocities.shape == wanted:
+                shapes = f"{positions.shape[1:]} and {velocities.shape[1:]}"
+                raise InputError(f"exact returns shapes {shapes}; allowed are two of the shape of x0, {wanted[1:]}")
+            return positions, velocities
+        fine = solve(self.F, x0=self.x0, v0=self.v0, h=np.repeat(np.diff(times) / FINER, FINER), integrator=RK4())
+        return fine.positions[::FINER], fine.velocities[::FINER]
+
+
+def _stacked(exact: Callable[[float], tuple[ArrayLike, ArrayLike]], times: Floats) -> tuple[Floats, Floats]:
+    positions, velocities = zip(*(exact(float(t)) for t in times), strict=True)
+    return np.array(positions, np.float64), np.array(velocities, np.float64)
 
 
 def _upright(y: float, v: float) -> Phase:

@@ -139,7 +139,7 @@ class Place(NamedTuple):
         e = state.restitution.astype(float)
         if len(pair):
             a, b = met["a"][pair], met["b"][pair]
-            way = x[b] - x[a]
+            way = self.room.seam.nearest(x[b] - x[a])
             far = np.hypot(*way.T)
             normal = way / np.maximum(far, 1e-300)[:, None]
             both = np.maximum(*(np.where(e[k] >= 0, e[k], self.restitution) for k in (a, b)))
@@ -153,7 +153,7 @@ class Place(NamedTuple):
         return found
 
     def _write(self, found: Array, rows: Array, point: Array, normal: Array, e: Array, weight: Array) -> None:
-        found["point"][rows], found["normal"][rows] = point, normal
+        found["point"][rows], found["normal"][rows] = self.room.seam.wrapped(point), normal
         found["impulse"][rows] = (1 + e) * found["speed"][rows] / np.where(weight > 0, weight, np.inf)
 
     def _nearest(self, x: Array, found: Array, rows: Array) -> tuple[Array, Array, Array]:

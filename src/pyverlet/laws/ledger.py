@@ -29,7 +29,9 @@ class Ledger:
         links: taken by links: damping, and what stiff ones do not give back.
         projection: put in by moving overlapping circles apart, where contacts together gained more than they took in a frame.
         limiter: taken back by the energy limiter: what contacts had gained in a frame beyond what they may.
+        walls: work of a room that turns.
         outside: brought by what was done between frames: particles added, removed or written to, gravity changed.
+        seam: m g L of each that fell through the seam of a periodic room, and is up again.
         residual: what is left over: the error of the integrator and, with forces that have no potential, of the trapezoidal rule
             their work is summed by.
     """
@@ -41,7 +43,9 @@ class Ledger:
     links: float = 0.0
     projection: float = 0.0
     limiter: float = 0.0
+    walls: float = 0.0
     outside: float = 0.0
+    seam: float = 0.0
     residual: float = 0.0
 
     @property
@@ -100,13 +104,16 @@ class _Frame:
         self._contacts, self._resting = 0.0, books._resting
         self._now = _Instant(0.0, 0.0, {})
         self._settled = False  # whether positions are final in this substep
+        self._risen = 0.0
 
     def __call__(self, stage: str) -> None:
         self._done(stage)
         if stage == "gather":
             self._state.keep_account()
             self._now = self._look(0.0)
-            self._open.outside += self._now.energy - self._books._energy
+            risen = self._beyond_seam()
+            self._open.outside += self._now.energy - risen - self._books._energy
+            self._open.seam += risen
         elif stage == "integrate":
             self._t += self._h
             self._settled = False
@@ -133,19 +140,32 @@ class _Frame:
             before, self._now = self._now, self._look(0.0)
             self._resting = self._now.energy - before.energy
             self._contacts += self._resting
+            self._risen = self._beyond_seam()
         else:
             return
         self._done("ledger")
 
-    def close(self, spent: tuple[float, float, float]) -> None:
-        """The frame has gone well; `spent` is what impacts, friction and the energy limiter say they have taken, J, negative."""
-        restitution, friction, limiter = spent
-        rest = self._contacts - restitution - friction - limiter
+    def close(self, spent: tuple[float, float, float, float]) -> None:
+        """The frame has gone well; `spent` is what impacts, friction, the energy limiter and the room say they have given, J."""
+        restitution, friction, limiter, walls = spent
+        rest = self._contacts - restitution - friction - limiter - walls
         self._open.restitution += restitution + min(rest, 0.0)
         self._open.friction += friction
         self._open.projection += max(rest, 0.0)
         self._open.limiter += limiter
-        self._books.ledger, self._books._energy, self._books._resting = self._open, self._now.energy, self._resting - limiter
+        self._open.seam -= self._risen
+        self._open.walls += walls
+        self._books.ledger, self._books._resting = self._open, self._resting - limiter
+        self._books._energy = self._now.energy - self._risen
+
+    def _beyond_seam(self) -> float:
+        """J by which particles are higher where a frame has them than where their images inside a periodic room are."""
+        s, g = self._state, np.array(self._gravity)
+        if not (g * s.seam.period).any():
+            return 0.0
+        free = np.isfinite(s.mass)
+        beyond = s.position[free].astype(float) - s.seam.wrapped(s.position[free])
+        return -float(s.mass[free].astype(float) @ (beyond @ g))
 
     def _look(self, lag: float, *, moved: bool = True, works: bool = True) -> _Instant:
         """Now. moved: whether positions may have changed since `_now`. works: whether the power of forces is asked for."""

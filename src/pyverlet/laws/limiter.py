@@ -103,10 +103,11 @@ class Watch:
         start, order = self._start, slots.particle
         mass = np.where(slots.inverse_mass > 0, slots.mass, 0).astype(float)
         x, v = slots.position.astype(float), slots.velocity.astype(float)
-        moved = x - start.position[order]
+        moved = slots.seam.nearest(x - start.position[order])
         before, pull = self._pulls(slots, mass)
         lift = -0.5 * ((before + pull) * moved).sum(axis=1)
         cluster = self._clusters(slots, listed, moved)
+        x = x[cluster] + slots.seam.nearest(x - x[cluster])  # across the seam they hang together, too
         add = _Sums(cluster)
         gain = np.maximum(add(_kinetic(mass, v, slots.radius, slots.spin) - self._kinetic()[order] + lift), 0)
         if self._forces.forces:  # what has touched nobody has its gain from the integrator
@@ -167,7 +168,8 @@ class Watch:
     def _clusters(self, slots: Slots, listed: Listed, moved: Array) -> Array:
         """(n,) lowest slot of the cluster that each slot belongs to."""
         root = np.arange(len(slots))
-        bodies = (slots.position, moved.astype(slots.dtype), slots.size, slots.inverse_mass)
+        period_x, period_y = slots.reals(*slots.seam.period)
+        bodies = (slots.position, moved.astype(slots.dtype), slots.size, period_x, period_y, slots.inverse_mass)
         clusters.join_met(*bodies, *listed, slots.real(SLEEP_NEAR), root)
         if self._links:
             rows, _ = self._links.pulls()
@@ -203,11 +205,13 @@ def _rounding(slots: Slots) -> float:
 def undriven(world: Any, h: float, h_last: float | None) -> bool:
     """Whether nothing but contacts and links could raise the energy of a world.
 
-    Forces have a potential or are drag, no obstacle moves, and the integrator does not raise it either: of order 2 or more, and
-    with a constant step, which `PositionVerlet` needs.
+    Forces have a potential or are drag, no obstacle or wall moves, gravity does not point along a period, and the integrator does
+    not raise it either: of order 2 or more, and with a constant step, which `PositionVerlet` needs.
     """
-    if world.integrator.order < 2 or h_last not in (None, h):
+    if world.integrator.order < 2 or h_last not in (None, h) or world.boundary.moves:
         return False
+    if any(g != 0 and period > 0 for g, period in zip(world.gravity, world.boundary.seam.period, strict=True)):
+        return False  # who falls for ever gains for ever
     if world.forces and not all(isinstance(force, Conservative | Drag) for force in world.forces):
         return False
     return not world.obstacles or not any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)

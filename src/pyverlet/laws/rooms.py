@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,9 @@ from pyverlet.ground import checks
 from pyverlet.ground.constants import STANDS_OUT
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import bounds, frame, meetings
+from pyverlet.laws.turning import surface
+from pyverlet.state.moves import bodies
+from pyverlet.state.seam import NONE, Seam
 from pyverlet.state.state import Slots
 
 Array = NDArray[Any]
@@ -24,11 +28,22 @@ Extent = tuple[float, float, float, float]
 
 
 class Boundary(ABC):
-    """What the world asks of its bounds."""
+    """What the world asks of its bounds.
+
+    Attributes:
+        seam: where the room joins on to itself; nowhere, unless it is periodic.
+    """
+
+    seam: Seam = NONE
 
     @abstractmethod
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         """Bounce or hold every circle that reaches beyond a wall. `lag`: seconds the velocity is behind the position."""
+
+    @property
+    def moves(self) -> bool:
+        """Whether its walls may do work."""
+        return False
 
     def compiled(self, state: Slots) -> tuple[Any, tuple[float, ...]] | None:
         """What `confine` does as a driver of `kernels.frame`, and the numbers it takes; None: Python has to call it."""
@@ -97,7 +112,7 @@ class _Walls(Boundary):
 
     def _confine(self, kernel: Any, shape: Sequence[float], state: Slots, h: float, lag: float, rest_speed: float) -> None:
         shape, laws = self._rounded(shape, state, h, lag, rest_speed)
-        kernel(*shape, *state.bodies(), *laws)
+        kernel(*shape, *bodies(state), *laws)
 
     def _rounded(self, shape: Sequence[float], state: Slots, h: float, lag: float, rest_speed: float) -> tuple[Any, Any]:
         """The numbers of `shape`, and h, lag, e, mu and rest_speed, in the dtype of the state."""
@@ -115,27 +130,42 @@ class Circle(_Walls):
         radius: of the cage, m.
         restitution: e of the wall, 0 to 1.
         friction: mu of the wall, 0 or more.
+        angular_velocity: rad/s it turns with about its centre, counter-clockwise: a drum, whose wall takes along what rubs on it.
     """
 
     def __init__(
-        self, *, center: Sequence[float] = (0.0, 0.0), radius: float, restitution: float = 0.0, friction: float = 0.0
+        self,
+        *,
+        center: Sequence[float] = (0.0, 0.0),
+        radius: float,
+        restitution: float = 0.0,
+        friction: float = 0.0,
+        angular_velocity: float = 0.0,
     ) -> None:
         super().__init__(restitution, friction)
         self.center = checks.vector("center", center)
         self.radius = checks.number("radius", radius, above=0.0)
+        self.angular_velocity = checks.number("angular_velocity", angular_velocity)
+
+    @property
+    def moves(self) -> bool:
+        return self.angular_velocity != 0.0 and self.friction > 0.0
 
     def walls(self) -> Sequence[float]:
-        return (meetings.ROUND, *self.center, self.radius, 0.0, self.restitution, self.friction)
+        # Whom an obstacle pushes to a wall that turns is held there, and rubbed where the wall itself is met.
+        return (meetings.ROUND, *self.center, self.radius, 0.0, self.restitution, 0.0 if self.moves else self.friction)
 
     def compiled(self, state: Slots) -> tuple[Any, tuple[float, ...]] | None:
-        if type(self) is not Circle:
+        if type(self) is not Circle or self.moves:
             return None
         if self.restitution == 0.0 == self.friction and state.smooth:
             return frame.smooth_cage, (*self.center, self.radius)
         return frame.cage, (*self.center, self.radius, self.restitution, self.friction)
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
-        self._confine(bounds.circle, (*self.center, self.radius), state, h, lag, rest_speed)
+        speed = self.angular_velocity * self.radius
+        with surface(state, speed, h) if self.moves else nullcontext():
+            self._confine(bounds.circle, (*self.center, self.radius), state, h, lag, rest_speed)
 
     def facing(self, position: Array) -> tuple[Array, Array]:
         way = self.center - position.astype(np.float64)
@@ -164,9 +194,9 @@ class Circle(_Walls):
         _fits(radius, self.radius, f"the radius of the cage, {self.radius:g} m")
 
     def __repr__(self) -> str:
-        return (
-            f"Circle(center={self.center}, radius={self.radius:g}, restitution={self.restitution:g}, friction={self.friction:g})"
-        )
+        turns = f", angular_velocity={self.angular_velocity:g}" if self.angular_velocity else ""
+        walls = f"restitution={self.restitution:g}, friction={self.friction:g}{turns}"
+        return f"Circle(center={self.center}, radius={self.radius:g}, {walls})"
 
 
 class Box(_Walls):
@@ -225,6 +255,109 @@ class Box(_Walls):
 
     def __repr__(self) -> str:
         return f"Box({self.lower}, {self.upper}, restitution={self.restitution:g}, friction={self.friction:g})"
+
+
+class Periodic(_Walls):
+    """A room without an end: who leaves on one side comes in on the other, and circles meet across the seam.
+
+    Positions are those inside the room. Whatever has a distance, contacts, links, forces between particles and to points, and
+    questions, takes that to the nearest image.
+
+    Args:
+        lower: (x0, y0), the lower left corner, m.
+        upper: (x1, y1), the upper right corner, m.
+        axes: in which directions the room is periodic: "xy", or "x" or "y" alone, with walls in the other direction.
+        restitution: e of the walls, where there are any, 0 to 1.
+        friction: mu of the walls, where there are any, 0 or more.
+
+    Raises:
+        InputError: an argument is outside what is allowed; from `World.add`, a circle is larger than half a period.
+    """
+
+    def __init__(
+        self,
+        lower: Sequence[float],
+        upper: Sequence[float],
+        *,
+        axes: str = "xy",
+        restitution: float = 0.0,
+        friction: float = 0.0,
+    ) -> None:
+        super().__init__(restitution, friction)
+        self.lower, self.upper = checks.vector("lower", lower), checks.vector("upper", upper)
+        if axes not in ("xy", "x", "y"):
+            raise InputError(f"axes is {axes!r}; allowed are 'xy', 'x' and 'y'")
+        self.axes = axes
+        (x0, y0), (x1, y1) = self.lower, self.upper
+        if not (x0 < x1 and y0 < y1):
+            raise InputError(f"upper is {self.upper}; allowed is a corner above and to the right of lower, {self.lower}")
+        self.seam = Seam(x0, y0, x1 - x0 if "x" in axes else 0.0, y1 - y0 if "y" in axes else 0.0)
+
+    @property
+    def _box(self) -> tuple[float, float, float, float]:
+        """Its walls as those of a box; infinitely far away where it has none."""
+        (x0, y0), (x1, y1), inf = self.lower, self.upper, float("inf")
+        return (
+            *((-inf, y0, inf, y1) if self.axes == "x" else (x0, -inf, x1, inf) if self.axes == "y" else (-inf, -inf, inf, inf)),
+        )
+
+    def walls(self) -> Sequence[float]:
+        return (meetings.RECTANGLE, *self._box, self.restitution, self.friction)
+
+    def compiled(self, state: Slots) -> tuple[Any, tuple[float, ...]] | None:
+        if type(self) is not Periodic:
+            return None
+        if self.axes == "xy":
+            return frame.open_space, ()
+        return frame.four_walls, (*self._box, self.restitution, self.friction)
+
+    def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
+        if self.axes == "xy":
+            state.resting[:] = 0
+        else:
+            self._confine(bounds.box, self._box, state, h, lag, rest_speed)
+
+    def facing(self, position: Array) -> tuple[Array, Array] | None:
+        """Numbered as the walls of a `Box`: left, right, floor, ceiling."""
+        if self.axes == "xy":
+            return None
+        (x, y), (x0, y0, x1, y1) = position.astype(np.float64).T, self._box
+        into = np.array([(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
+        return np.column_stack((x - x0, x1 - x, y - y0, y1 - y)), np.broadcast_to(into, (len(position), 4, 2))
+
+    def perimeter(self) -> float | None:
+        """Length of its walls, m; None without any."""
+        return {"x": 2 * self.seam.period_x, "y": 2 * self.seam.period_y, "xy": None}[self.axes]
+
+    def extent(self) -> Extent:
+        return (*self.lower, *self.upper)
+
+    def outside(self, position: Array) -> Array:
+        """Nobody is, in a direction without walls: every place there has an image inside."""
+        x0, y0, x1, y1 = self._box
+        inside = (position >= (x0, y0)) & (position <= (x1, y1))
+        return np.asarray(~inside.all(axis=1))
+
+    def put_in(self, position: Array, radius: Array) -> Array:
+        (x0, y0, x1, y1), where = self._box, self.seam.wrapped(np.ascontiguousarray(position))
+        low, high = np.array((x0, y0)) + radius[:, None], np.array((x1, y1)) - radius[:, None]
+        inside = np.clip(where, low, high)
+        out = np.abs(inside - where) > STANDS_OUT * radius[:, None]
+        return np.where(out, inside.astype(position.dtype), where)
+
+    def check(self, radius: Array) -> None:
+        half = 0.5 * self.seam.shortest
+        wrong = np.flatnonzero(2 * radius > half * (1 + 1e-6))
+        if len(wrong):
+            k = int(wrong[0])
+            raise InputError(f"radius[{k}] is {radius[k]:g} m; allowed is at most a quarter of the room's period, {half / 2:g} m")
+        if self.axes != "xy":
+            half = 0.5 * (self.upper[1] - self.lower[1] if self.axes == "x" else self.upper[0] - self.lower[0])
+            _fits(radius, half, f"half the distance of the walls, {half:g} m")
+
+    def __repr__(self) -> str:
+        walls = "" if self.axes == "xy" else f", axes={self.axes!r}, restitution={self.restitution:g}, friction={self.friction:g}"
+        return f"Periodic({self.lower}, {self.upper}{walls})"
 
 
 def _fits(radius: Array, room: float, room_is: str) -> None:

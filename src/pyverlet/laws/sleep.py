@@ -70,8 +70,8 @@ class Sleep:
         if not self._members:
             return False
         touched = np.zeros(len(slots), np.uint8)
-        which = pairs.listed()
-        if not kernels.touch(slots.position, slots.size, slots.island, *which, touched):
+        (period_x, period_y), which = slots.reals(*slots.seam.period), pairs.listed()
+        if not kernels.touch(slots.position, slots.size, period_x, period_y, slots.island, *which, touched):
             return False
         return self._wake(slots, np.isin(slots.island, slots.island[touched == 1]))
 
@@ -85,9 +85,9 @@ class Sleep:
             return False
         root = np.empty(len(slots), np.int64)
         which = pairs.listed()
-        kernels.find_islands(
-            slots.position, slots.size, slots.inverse_mass, slots.calm, *which, real(SLEEP_NEAR), np.float32(SLEEP_AFTER_S), root
-        )
+        period_x, period_y = slots.reals(*slots.seam.period)
+        bodies = (slots.position, slots.size, period_x, period_y, slots.inverse_mass, slots.calm)
+        kernels.find_islands(*bodies, *which, real(SLEEP_NEAR), np.float32(SLEEP_AFTER_S), root)
         sleeper = root >= 0
         if not sleeper.any():
             return False
@@ -116,7 +116,7 @@ def laws(world: Any) -> Any:
 
     That is so with links, with obstacles that move, and with forces that may change with time: all but gravity and drag.
     """
-    moving = any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
+    moving = world.boundary.moves or any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
     if world.links or moving or not all(type(force) is Drag for force in world.forces):
         return None
     obstacles = tuple((id(obstacle), obstacle.revision) for obstacle in world.obstacles)

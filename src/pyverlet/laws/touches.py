@@ -9,7 +9,7 @@ lines of contact: pushes only, the smallest that explain what each has got. A so
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,25 @@ _STAGES = {"contacts": 0, "velocities": 0, "bounds": 1, "obstacles": 2}
 """Whose doing it is when a stage has changed velocities: circles', the room's, obstacles'."""
 
 
+class Noted(NamedTuple):
+    """What is known of a frame, by the order of the user's particles in it."""
+
+    number: Array
+    """(n,) what each is called."""
+    position: Floats
+    """(n, 2) m."""
+    radius: Floats
+    """(n,) m."""
+    free: NDArray[np.bool_]
+    """(n,) not pinned."""
+    got: Floats
+    """(3, n, 2) N s, what circles, walls and obstacles have given to each."""
+    pairs: Array
+    """(k, 2) that may touch."""
+    dt: float
+    """s, of the frame."""
+
+
 class Touches:
     """The contacts of the last frame. Indices are those of its end."""
 
@@ -54,10 +73,12 @@ class Touches:
         self._heard: list[tuple[Array, Array, Floats]] = []
         self._found: Array | None = None
         self._end: _End | None = None
+        self._virial = 0.0
 
     def frame(
         self, state: Slots, users: State, h: float, room: Boundary, course: Course,
-        listed: Callable[[], tuple[Array, Array, Array, Array]] | None, done: Callable[[str], None],
+        listed: Callable[[], tuple[Array, Array, Array, Array]] | None, virial: Callable[[], float] | None,
+        done: Callable[[str], None],
     ) -> Callable[[str], None]:  # fmt: skip
         """A frame of substeps of h seconds, to be told of each stage; it passes on what it is told to `done`.
 
@@ -66,6 +87,7 @@ class Touches:
             h: s.
             room, course: walls and obstacles.
             listed: says which pairs may touch, as first, count, pair_i, pair_j; None if there are no collisions.
+            virial: says what contacts between circles come to, N s m; None where that is not known.
             done: told of each stage.
         """
         before, steps = state.velocity, 0
@@ -82,7 +104,7 @@ class Touches:
             elif stage == "finish":
                 pairs = np.empty((0, 2), np.int64) if listed is None else _rows(*listed(), state.particle)
                 self._end = _End(state, users.number.copy(), self._given, self._heard, room, course, pairs, steps * h)
-                self._found = None
+                self._found, self._virial = None, virial() if virial else 0.0
             before = state.velocity.copy()
 
         return told
@@ -114,6 +136,13 @@ class Touches:
         mine = found[found["obstacle"] == self._end.number_of(what)]
         return np.asarray(vectors(mine).sum(axis=0) / self._end.dt)
 
+    def noted(self) -> Noted | None:
+        """What was noted of the last frame, before anything is made of it; None if there was no frame."""
+        end = self._end
+        if end is None:
+            return None
+        return Noted(end._numbers, end._position, end._radius, end._free, end.given, end._pairs, end.dt)
+
     def array_of_then(self) -> Array:
         """TOUCH by the indices of then."""
         assert self._end is not None
@@ -127,6 +156,10 @@ class Touches:
             return 0.0
         found = self.array_of_then()
         return float(found["impulse"][found["wall"] >= 0].sum() / self._end.dt)
+
+    def virial(self) -> float:
+        """J, sum over contacts between circles of force times distance, averaged over the frame."""
+        return 0.0 if self._end is None else self._virial / self._end.dt
 
 
 class _End:
@@ -190,7 +223,7 @@ class _End:
         found["wall"], found["obstacle"] = (wall, NOBODY) if whose == 1 else (NOBODY, wall)
         out = -into[circle, wall]
         found["normal"] = out
-        found["point"] = x[circle] + (r[circle] + gap[circle, wall])[:, None] * out
+        found["point"] = self._room.seam.wrapped(x[circle] + (r[circle] + gap[circle, wall])[:, None] * out)
         _write(found, share)
         return np.asarray(found[(found["impulse"] != 0) | (found["rub"] != 0)])
 
@@ -203,14 +236,18 @@ class _End:
             a, b = pairs.T
             normal = self._normals(pairs)
             found["a"], found["b"], found["wall"], found["obstacle"] = a, b, NOBODY, NOBODY
-            gap = np.hypot(*(self._position[b] - self._position[a]).T) - self._radius[a] - self._radius[b]
+            gap = np.hypot(*self._way(pairs).T) - self._radius[a] - self._radius[b]
             found["normal"] = normal
-            found["point"] = self._position[a] + (self._radius[a] + 0.5 * gap)[:, None] * normal
+            found["point"] = self._room.seam.wrapped(self._position[a] + (self._radius[a] + 0.5 * gap)[:, None] * normal)
             _write(found, -impulse)
         return found
 
+    def _way(self, pairs: Array) -> Floats:
+        """(k, 2) from a to b, m."""
+        return np.asarray(self._room.seam.nearest(self._position[pairs[:, 1]] - self._position[pairs[:, 0]]))
+
     def _normals(self, pairs: Array) -> Floats:
-        way = self._position[pairs[:, 1]] - self._position[pairs[:, 0]]
+        way = self._way(pairs)
         return np.asarray(way / np.maximum(np.hypot(*way.T), 1e-300)[:, None])
 
     def _told(self) -> tuple[Array, Floats]:
@@ -230,7 +267,7 @@ class _End:
         pairs = pairs[touched[pairs].all(axis=1) & self._free[pairs].any(axis=1)]
         if len(pairs):
             a, b = pairs.T
-            gap = np.hypot(*(self._position[b] - self._position[a]).T) - self._radius[a] - self._radius[b]
+            gap = np.hypot(*self._way(pairs).T) - self._radius[a] - self._radius[b]
             speed = np.hypot(*(self._velocity[b] - self._velocity[a]).T)
             pairs = pairs[gap <= self.dt * speed + 0.01 * (self._radius[a] + self._radius[b])]
         push = np.zeros(0)

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from pyverlet.picture.colour import ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Fixed, Groups
 from pyverlet.picture.palette import DARK, LIGHT, Theme
+from pyverlet.picture.pen import Pen
 from pyverlet.picture.raster import Raster
 from pyverlet.picture.view import View, nearest
 
 __all__ = [
-    "DARK", "LIGHT", "ByEnergy", "ByMass", "ByOrigin", "BySpeed", "Colouring", "Fixed", "Groups", "Raster", "Theme", "View",
-    "nearest",
+    "DARK", "LIGHT", "ByEnergy", "ByMass", "ByOrigin", "BySpeed", "Colouring", "Fixed", "Groups", "Pen", "Raster", "Theme",
+    "View", "nearest",
 ]  # fmt: skip

@@ -33,10 +33,15 @@ class Theme:
     obstacle: int
     grid: int
     dark: bool
+    text: int
 
 
-DARK = Theme("dark", ground=0x0F1216, inside=0x171B21, wall=0x4A5460, obstacle=0x5B6673, grid=0x1C2128, dark=True)
-LIGHT = Theme("light", ground=0xF3F4F6, inside=0xFFFFFF, wall=0xAAB3BF, obstacle=0x98A2AF, grid=0xE6E9ED, dark=False)
+DARK = Theme(
+    "dark", ground=0x0F1216, inside=0x171B21, wall=0x4A5460, obstacle=0x5B6673, grid=0x1C2128, dark=True, text=0xE8ECF1
+)  # fmt: skip
+LIGHT = Theme(
+    "light", ground=0xF3F4F6, inside=0xFFFFFF, wall=0xAAB3BF, obstacle=0x98A2AF, grid=0xE6E9ED, dark=False, text=0x1B222B
+)
 
 
 def packed(rgb: NDArray[Any]) -> Packed:

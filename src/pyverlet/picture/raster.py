@@ -13,9 +13,10 @@ from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import lines, raster
 from pyverlet.laws.obstacles import Outline
-from pyverlet.picture import marks
+from pyverlet.picture import across, ink, marks
 from pyverlet.picture.colour import by_force
 from pyverlet.picture.palette import DARK, Packed, Theme, swapped
+from pyverlet.picture.pen import Drawing
 from pyverlet.picture.view import View
 
 if TYPE_CHECKING:
@@ -63,7 +64,9 @@ class Raster:
         self._ground: Packed = np.empty_like(self._pixels)
         self._obstacles: Any = None
 
-    def draw(self, world: World, view: View, *, outlines: Lines = (), colours: Packed) -> NDArray[np.uint8]:
+    def draw(
+        self, world: World, view: View, *, outlines: Lines = (), colours: Packed, drawing: Drawing = ()
+    ) -> NDArray[np.uint8]:
         """A picture of `world`.
 
         Args:
@@ -71,17 +74,27 @@ class Raster:
             view: of this raster's size.
             outlines: closed lines of the bounds, metres.
             colours: (n,) R + G << 8 + B << 16, from a `Colouring`.
+            drawing: of a `Pen`, over all else.
 
         Returns:
             (height, width, 4) bytes R, G, B, A: a view on the buffer, good until the next call. A is what part of a pixel circles
             cover; R, G, B are complete without it.
         """
         obstacles = world.obstacles.outlines()
-        links = world.links.segments() if len(world.links) else None
-        return self.discs(
-            world.position, world.radius, view, outlines=outlines, obstacles=obstacles, colours=colours, links=links,
-            angle=world.angle,
-        )  # fmt: skip
+        links, seam = world.links.segments() if len(world.links) else None, world.boundary.seam
+        position, radius, angle = world.position, world.radius, world.angle
+        if seam:
+            owner, place = across.copies(position, radius, seam)
+            position, colours = np.concatenate((position, place)), np.concatenate((colours, colours[owner]))
+            radius, angle = np.concatenate((radius, radius[owner])), np.concatenate((angle, angle[owner]))
+            obstacles = across.outlines(obstacles, seam)
+            links = links and across.lines(world.position[world.links.pulls()[0]], links[1], seam)
+        picture = self.discs(
+            position, radius, view, outlines=outlines, obstacles=obstacles, colours=colours, links=links, angle=angle
+        )
+        if drawing:
+            ink.put(self._pixels, drawing, view, self.theme)
+        return picture
 
     def discs(
         self, position: NDArray[Any], radius: NDArray[Any], view: View, *,

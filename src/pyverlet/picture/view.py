@@ -81,7 +81,7 @@ def nearest(world: World, point: NDArray[Any], reach: float) -> int | None:
     """The particle whose rim is nearest to `point` (2,), if within `reach`; metres. Inside a circle is nearer than its rim."""
     if not len(world):
         return None
-    x, y = (world.position - np.asarray(point, dtype=world.position.dtype)).T
+    x, y = world.boundary.seam.nearest(world.position - np.asarray(point, dtype=world.position.dtype)).T
     gap = np.hypot(x, y) - world.radius
     found = int(np.argmin(gap))
     return found if gap[found] <= reach else None

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, Interrupted, PyverletError
 from pyverlet.picture import DARK, Colouring, Theme
+from pyverlet.picture.pen import Draw
 from pyverlet.record import _films
 from pyverlet.scenes.report import frame_count
 from pyverlet.viewers.frames import Rect
@@ -105,6 +106,7 @@ def to_video(
     colour: Colouring | None = None,
     theme: Theme = DARK,
     part: Rect | None = None,
+    draw: Draw | None = None,
     progress: Progress | None = None,
 ) -> Recorded:
     """Step `world` and record it.
@@ -123,6 +125,7 @@ def to_video(
             colourings of your own as they are at first.
         theme: `pyverlet.picture.DARK` or `LIGHT`.
         part: of the plane to show, (x0, y0, x1, y1) in metres; by default the bounds, or where the particles are.
+        draw: a function of (world, pen), a `pyverlet.picture.Pen`, that draws over each picture.
         progress: called as progress(done, total) after every picture.
 
     Raises:
@@ -130,7 +133,8 @@ def to_video(
         Interrupted: Ctrl-C; the file holds what was recorded until then, and plays.
         PyverletError: the disk is full; likewise.
     """
-    return shoot(world, plan(path, seconds=seconds, fps=fps, size=size), colour=colour, theme=theme, part=part, progress=progress)
+    film_plan = plan(path, seconds=seconds, fps=fps, size=size)
+    return shoot(world, film_plan, colour=colour, theme=theme, part=part, draw=draw, progress=progress)
 
 
 def shoot(
@@ -140,13 +144,14 @@ def shoot(
     colour: Colouring | None = None,
     theme: Theme = DARK,
     part: Rect | None = None,
+    draw: Draw | None = None,
     progress: Progress | None = None,
 ) -> Recorded:
     """Carry out a plan; see `to_video`."""
     check_look(colour, theme)
     film_plan.film.check_colour(colour)
     film = film_plan.film(film_plan.path, film_plan.size, film_plan.fps)
-    picture = film.watch(world, colour=colour, theme=theme, part=part)
+    picture = film.watch(world, colour=colour, theme=theme, part=part, draw=draw)
     before, total = film_plan.frames_before, film_plan.frames_before + film_plan.pictures
     with _interruptions() as interrupted:
         try:
@@ -183,6 +188,7 @@ def to_image(
     colour: Colouring | None = None,
     theme: Theme = DARK,
     part: Rect | None = None,
+    draw: Draw | None = None,
 ) -> NDArray[np.uint8]:
     """A picture of `world` as it is now: (height, width, 3) bytes R, G, B, written to `path` as well if there is one.
 
@@ -193,6 +199,7 @@ def to_image(
         colour: what the colours say; by default where each circle started.
         theme: `pyverlet.picture.DARK` or `LIGHT`.
         part: of the plane to show, (x0, y0, x1, y1) in metres; by default the bounds, or where the particles are.
+        draw: a function of (world, pen), a `pyverlet.picture.Pen`, that draws over each picture.
 
     Raises:
         InputError: an argument is outside what is allowed, or the file cannot be written.
@@ -202,7 +209,7 @@ def to_image(
         if not _is_still(Path(path)):
             raise InputError(f"path is '{path}'; allowed is a name that ends in {_films.PICTURE}")
         film = _films.film_for(Path(path))(Path(path), size, 1)
-    pixels = np.ascontiguousarray(Painter(world, size=size, colour=colour, theme=theme, part=part).paint()[..., :3])
+    pixels = np.ascontiguousarray(Painter(world, size=size, colour=colour, theme=theme, part=part, draw=draw).paint()[..., :3])
     if film:
         film.add(pixels)
         if film.error:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
 from pyverlet.picture import Colouring, Theme
+from pyverlet.picture.pen import Draw
 from pyverlet.picture.raster import check_size
 from pyverlet.record import _reel
 from pyverlet.record._disk import Disk
@@ -59,9 +60,11 @@ class Film(ABC):
     def check_colour(cls, colour: Colouring | None) -> None:
         """Raise InputError where this kind of file cannot show such colours."""
 
-    def watch(self, world: World, *, colour: Colouring | None, theme: Theme, part: Rect | None) -> Callable[[], Any]:
+    def watch(
+        self, world: World, *, colour: Colouring | None, theme: Theme, part: Rect | None, draw: Draw | None = None
+    ) -> Callable[[], Any]:
         """What gives a picture of the world, as it is whenever that is called, in the form that `add` takes."""
-        return Painter(world, size=self.size, colour=colour, theme=theme, part=part).paint
+        return Painter(world, size=self.size, colour=colour, theme=theme, part=part, draw=draw).paint
 
     def __init__(self, path: Path, size: tuple[int, int], fps: int) -> None:
         self.path, self.size, self.fps = path, size, fps
@@ -240,8 +243,10 @@ class Page(Film):
         self._disk = Disk(path)
         self._reel = _reel.Reel(fps)
 
-    def watch(self, world: World, *, colour: Colouring | None, theme: Theme, part: Rect | None) -> Callable[[], Any]:
-        watch = _reel.Watch(world, title=self.path.stem, fps=self.fps, colour=colour, theme=theme, part=part)
+    def watch(
+        self, world: World, *, colour: Colouring | None, theme: Theme, part: Rect | None, draw: Draw | None = None
+    ) -> Callable[[], Any]:
+        watch = _reel.Watch(world, title=self.path.stem, fps=self.fps, colour=colour, theme=theme, part=part, draw=draw)
         look, name = _reel.page_colour(colour), "dark" if theme.dark else "light"
         self._write([bundle.film(self.path.stem, fps=self.fps, colour=look, theme=name)])
         return watch.picture

@@ -18,11 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
-from pyverlet.picture import ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Groups, Theme
+from pyverlet.picture import ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Groups, Pen, Theme
+from pyverlet.picture.pen import Draw
 from pyverlet.viewers.exhibit import Exhibit
 from pyverlet.viewers.frames import Frame, Rect, Shape, Status
 from pyverlet.viewers.gauges import Gauges
-from pyverlet.viewers.protocol import encode_shape, finite
+from pyverlet.viewers.protocol import encode_shape, finite, written
 from pyverlet.viewers.stage import Stage
 from pyverlet.world.clock import FrameBudget
 from pyverlet.world.panels import Panels
@@ -70,14 +71,19 @@ class Watch:
         colour: what the colours say at first; the page offers all.
         theme: dark or light, which decides on colours of the user's own.
         part: of the plane to show, m.
+        draw: what is drawn over it.
     """
 
-    def __init__(self, world: World, *, title: str, fps: int, colour: Colouring | None, theme: Theme, part: Rect | None) -> None:
+    def __init__(
+        self, world: World, *, title: str, fps: int, colour: Colouring | None, theme: Theme, part: Rect | None,
+        draw: Draw | None = None,
+    ) -> None:  # fmt: skip
         rgb = None
         if page_colour(colour) == "picture" and colour is not None:
             packed = colour.colours(world, theme)
             rgb = np.stack([(packed >> shift) & 255 for shift in (0, 8, 16)], axis=1).astype(np.uint8)
         self._stage = Stage(Exhibit(title, Panels.of(world), colours=rgb, part=part))
+        self._world, self._draw = world, draw
         self._gauges, self._budget, self._dt = Gauges(FrameBudget()), FrameBudget().limit_ms, 1.0 / fps
         self._version: object = None
         self._shape: Any = None
@@ -93,7 +99,13 @@ class Watch:
         self._seq += 1
         status = self._gauges.read(stage, dropped=0, speed=1.0, paused=False, busy=None, error=None, at_once=True)
         place = stage.place(positions)
-        return Frame(self._seq, self._shape, stage.layout.view, status, place, velocity, stage.moving(), *stage.links())
+        pen = Pen()
+        if self._draw:
+            self._draw(self._world, pen)
+        return Frame(
+            self._seq, self._shape, stage.layout.view, status, place, velocity, stage.moving(), *stage.links(),
+            drawing=pen.drawing,
+        )  # fmt: skip
 
 
 class Reel:
@@ -149,6 +161,7 @@ class Reel:
                 "status": _status(frame.status),
                 "room": frame.view,
                 "obstacles": frame.obstacles.lines,
+                "drawing": written(frame.drawing),
                 "links": len(frame.joined),
             }
             if before is None or not np.array_equal(before, frame.joined):

@@ -17,15 +17,18 @@ from pyverlet.scenes import (
     cage_brute_force,
     cloth,
     conveyor,
+    drum,
     energy,
     fall,
     frame_rate,
     galton,
+    gas,
     hourglass,
     image,
     newton_cradle,
     orbit,
     rope_bridge,
+    sketch,
     soft_bodies,
     wrecking_ball,
 )
@@ -42,8 +45,10 @@ SCENES: dict[str, Scene] = {
         image.SCENE,
         galton.SCENE,
         hourglass.SCENE,
+        gas.SCENE,
         orbit.SCENE,
         conveyor.SCENE,
+        drum.SCENE,
         bounce_euler.SCENE,
         bounce_order.SCENE,
         bounce_rest.SCENE,
@@ -63,23 +68,25 @@ SCENES: dict[str, Scene] = {
 
 
 def read(path: str | Path) -> Scene:
-    """The scene of a file, .toml or .json: `docs/data.md` says what may stand in it.
+    """The scene of a file: .toml or .json, `docs/data.md` says what may stand in it, or a sketch, .py, `docs/sketch.md`.
 
     Raises:
         InputError: the file cannot be read, or something in it is wrong; for a key that is unknown, with the nearest known one.
     """
+    if Path(path).suffix.lower() == sketch.SUFFIX:
+        return sketch.Sketch.read(path).scene()
     from pyverlet.data import scene_file
 
     return scene_file.read(path)
 
 
 def get(name: str) -> Scene:
-    """The scene called `name`, or that of a file if the name ends in .toml or .json.
+    """The scene called `name`, or that of a file if the name ends in .toml, .json or .py.
 
     Raises:
         InputError: there is none; the message suggests the nearest and names the known ones.
     """
-    if name.lower().endswith((".toml", ".json")):
+    if name.lower().endswith((".toml", ".json", sketch.SUFFIX)):
         return read(name)
     if name in SCENES:
         return SCENES[name]

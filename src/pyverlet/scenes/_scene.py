@@ -8,7 +8,7 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,12 @@ from pyverlet.ground.errors import InputError
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.collisions import Collisions
 from pyverlet.laws.integrators import Integrator, PositionVerlet
+from pyverlet.scenes._graph import Gauge
 from pyverlet.world.panels import Pace, Panel, Panels, every_frame
 from pyverlet.world.world import World
+
+if TYPE_CHECKING:
+    from pyverlet.scenes.sketch import Sketch
 
 Floats = NDArray[np.float64]
 
@@ -69,8 +73,8 @@ class Settings:
         checks.fraction("restitution", self.restitution)
         checks.number("friction", self.friction, least=0.0)
 
-    def empty_world(self, boundary: Any) -> World:
-        """A world with these settings inside `boundary`, still without circles."""
+    def empty_world(self, boundary: Any, **more: Any) -> World:
+        """A world with these settings inside `boundary`, still without circles; `more`: of `World`, what users do not set."""
         collisions = None
         if self.collisions is not None:
             collisions = Collisions(restitution=self.restitution, friction=self.friction, method=self.collisions)
@@ -83,6 +87,7 @@ class Settings:
             dtype=self.dtype,
             threads=self.threads,
             ledger=self.ledger,
+            **more,
         )
 
 
@@ -95,11 +100,13 @@ class Show:
             progress(done, total) is called while that takes long. A scene that has it takes a picture.
         view: the part of the plane to show, (x0, y0, x1, y1) in metres.
         seconds: how long it is worth watching, s.
+        graph: of (settings): what measures the world as it runs, for a graph beside it.
     """
 
     colours: Callable[[Settings, float, Callable[[int, int], None] | None], NDArray[np.uint8]] | None = None
     view: Callable[[Settings], tuple[float, float, float, float]] | None = None
     seconds: Callable[[Settings], float] | None = None
+    graph: Callable[[Settings], Gauge] | None = None
 
 
 @dataclass(frozen=True)
@@ -134,6 +141,7 @@ class Scene:
         variants: the worlds it shows side by side; empty for one world.
         line: height in metres of a line drawn across the scene.
         document: what the file says that the scene was read from; None for scenes with a name.
+        sketch: the Python file it was read from; None for all others.
     """
 
     name: str
@@ -145,6 +153,7 @@ class Scene:
     variants: tuple[Variant, ...] = ()
     line: float | None = None
     document: dict[str, Any] | None = None
+    sketch: Sketch | None = None
 
     @property
     def description(self) -> str:

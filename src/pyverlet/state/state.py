@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pyverlet.compile.stealing import Claims
 from pyverlet.ground import memory
 from pyverlet.kernels import motion
+from pyverlet.state import seam
 from pyverlet.state.unchanged import Unchanged
 
 Array = NDArray[Any]
@@ -48,6 +49,7 @@ class State:
         version: how often particles were added or removed.
     """
 
+    seam = seam.NONE
     position: Array
     velocity: Array
     acceleration: Array
@@ -160,7 +162,7 @@ class Slots:
         resting: (n,) bits of `kernels.motion`: who held it in the last substep, a wall or, after a frame, another particle.
         hits: (n,) largest speed with which the circle met a wall in this frame, m/s; negative: none.
         spent: (n, 2) J that impacts on walls, and friction there, have taken in this frame, negative: to be summed, for rows stay
-            where they are when slots are reordered; empty unless somebody keeps account. taken: J, by the energy limiter.
+            where they are; empty unless somebody keeps account. taken: J, by the energy limiter. worked: J, brought by the room.
 
     Args:
         sleeps: whether particles may sleep.
@@ -171,7 +173,7 @@ class Slots:
         self.real = lru_cache(64)(dtype.type)
         self.reals = lru_cache(64)(lambda *numbers: tuple(map(dtype.type, numbers)))
         self._kept: dict[str, Array] = {}
-        self.drop, self.lean, self.total_mass, self.taken, self.given = 1.0, 0.0, 0.0, 0.0, 0
+        self.drop, self.lean, self.total_mass, self.taken, self.worked, self.given = 1.0, 0.0, 0.0, 0.0, 0.0, 0
         self.claims = Claims()
         self._resize(0)
 
@@ -215,6 +217,7 @@ class Slots:
     restitution: Array
     friction: Array
     inverse_mass: Array
+    seam = seam.NONE  # in a periodic room positions run on beyond it within a frame
     fed: Array
     island: Array
     calm: Array
@@ -239,6 +242,7 @@ class Slots:
         if len(state) != len(self):
             self._keep(slice(None))
             self._resize(len(state))
+        self.seam = state.seam
         given = (state.position, state.velocity, state.acceleration, state.spin)
         if not self._given_back.recall(given):  # a user who has changed nothing need not wait for it to be copied again
             motion.take_motion(self.position, self.velocity, self.acceleration, self.spin, *given, self.particle)
@@ -299,7 +303,7 @@ class Slots:
     def clear_notes(self) -> None:
         """Forget what walls and friction have noted in the last frame."""
         self.hits.fill(-1)
-        self.taken = 0.0
+        self.taken = self.worked = 0.0
         if len(self.spent):
             self.spent.fill(0)
         if len(self.along):
@@ -322,6 +326,8 @@ class Slots:
 
     def scatter(self, state: State, dt: float) -> None:
         """Copy what a frame of dt seconds changes back to the user's arrays."""
+        if self.seam:
+            self.seam.wrap(self.position)
         given, moved = (state.position, state.velocity, state.acceleration, state.spin), (self.position, self.velocity)
         motion.put_motion(*moved, self.acceleration, self.spin, *given, state.angle, 0.5 * dt, self.particle)
         self._given_back.remember(given)
@@ -332,6 +338,7 @@ class Slots:
     def in_users_order(self) -> State:
         """A state with the positions, velocities, spins, radii and masses of now."""
         state, names = State(self.dtype), (*_ROWS, "spin", "radius", "mass")
+        state.seam = self.seam
         values = {name: np.empty_like(getattr(self, name)) for name in names}
         for name, array in values.items():
             array[self.particle] = getattr(self, name)
@@ -379,22 +386,13 @@ class Slots:
         """Whether circles neither bounce nor rub by themselves, nor rub each other."""
         return self.most_restitution <= 0.0 and not len(self.turn)
 
-    def bodies(self) -> tuple[Array, ...]:
-        """What walls need of the particles: the arrays that `kernels.bounds.look` takes, in that order."""
-        return (
-            self.position, self.velocity, self.acceleration, self.spin, self.radius, self.inverse_mass, self.restitution,
-            self.friction, self.fed, self.resting, self.hits, self.spent, self.start, self.turn, self.lift,
-        )  # fmt: skip
-
     def slot_of(self, particle: int) -> int:
         """The slot that holds the user's particle."""
+        return int(self.slots_of(particle))
+
+    def slots_of(self, particles: Any) -> Any:
+        """(k,) slots that hold these of the user's particles."""
         if self._slot_of is None:
             self._slot_of = np.empty_like(self.particle)
             self._slot_of[self.particle] = np.arange(len(self), dtype=self.particle.dtype)
-        return int(self._slot_of[particle])
-
-    def slots_of(self, particles: Array) -> Array:
-        """(k,) slots that hold these of the user's particles."""
-        if len(particles):
-            self.slot_of(0)
-        return np.zeros(0, np.int32) if self._slot_of is None else self._slot_of[particles]
+        return self._slot_of[particles]

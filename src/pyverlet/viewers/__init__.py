@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 if TYPE_CHECKING:
     from pyverlet.viewers.exhibit import Exhibit, Repertoire
+    from pyverlet.viewers.handle import Page
     from pyverlet.world.panels import Panels
     from pyverlet.world.world import World
 
@@ -15,31 +17,80 @@ __all__ = ["serve", "view", "widget"]
 DEFAULT_PORT = 8000
 
 
+@overload
 def view(
     world: World | Panels,
     *,
-    port: int = DEFAULT_PORT,
+    block: Literal[True] = ...,
+    port: int | None = ...,
+    open_browser: bool = ...,
+    title: str = ...,
+    dt: float = ...,
+    draw: Callable[..., Any] | None = ...,
+    keys: Callable[..., Any] | None = ...,
+    click: Callable[..., Any] | None = ...,
+) -> None: ...
+@overload
+def view(
+    world: World | Panels,
+    *,
+    block: Literal[False],
+    port: int | None = ...,
+    open_browser: bool = ...,
+    title: str = ...,
+    dt: float = ...,
+    draw: Callable[..., Any] | None = ...,
+    keys: Callable[..., Any] | None = ...,
+    click: Callable[..., Any] | None = ...,
+) -> Page: ...
+def view(
+    world: World | Panels,
+    *,
+    block: bool = True,
+    port: int | None = None,
     open_browser: bool = True,
     title: str = "pyverlet",
     dt: float = 1 / 60,
-) -> None:
-    """Show `world` on a live page until Ctrl-C, stepping it in real time.
+    draw: Callable[..., Any] | None = None,
+    keys: Callable[..., Any] | None = None,
+    click: Callable[..., Any] | None = None,
+) -> Page | None:
+    """Show `world` on a live page, stepping it in real time.
 
-    The page's reset goes back to the state the world has now. Where there is no screen the address is printed instead.
+    The page's reset goes back to the state the world has now. Where there is no screen the address is printed instead. Sliders
+    that the program has made (`pyverlet.slider`) are on the page, and so is what the world was told to `watch`.
 
     Args:
-        world: the world, or the panels, to step and show; nobody else may touch it until this returns.
-        port: TCP port on this machine, 1 to 65535; 0 takes any free one.
+        world: the world, or the panels, to step and show.
+        block: until Ctrl-C, and nobody else may touch the world meanwhile; False returns at once, and shares it.
+        port: TCP port on this machine, 1 to 65535; 0 takes any free one. 8000 unless said, and any free one without `block`.
         open_browser: open a tab when there is a screen to open it on.
         title: heading of the page.
         dt: simulated seconds per frame.
+        draw: of (world, pen), a `pyverlet.picture.Pen`: called for each picture, draws over it.
+        keys: of (world, key): called when a key is pressed on the page, named as in browsers: "a", " ", "ArrowLeft".
+        click: of (world, point, button): called when somebody clicks; (2,) m, and "left", "middle" or "right".
+
+    Returns:
+        None; without `block` a handle with `url` and `close()`.
 
     Raises:
-        InputError: the port is taken or not a port, or dt is not positive.
+        InputError: the port is taken or not a port, or another argument is outside what is allowed.
     """
-    from pyverlet.viewers import launch
+    from pyverlet.viewers.answers import Functions
+    from pyverlet.viewers.exhibit import Exhibit
 
-    launch.serve(lambda: world, title=title, host="127.0.0.1", port=port, open_browser=open_browser, dt=dt)
+    shown = Exhibit.of(world, title)
+    shown = replace(shown, answers=Functions(draw=draw, keys=keys, click=click))
+    if block:
+        from pyverlet.viewers import launch
+
+        where = DEFAULT_PORT if port is None else port
+        launch.serve(lambda: shown, title=title, host="127.0.0.1", port=where, open_browser=open_browser, dt=dt)
+        return None
+    from pyverlet.viewers.handle import Page
+
+    return Page(shown, host="127.0.0.1", port=0 if port is None else port, open_browser=open_browser, dt=dt)
 
 
 def serve(

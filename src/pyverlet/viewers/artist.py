@@ -94,17 +94,18 @@ class Artist:
         size = fit(part, (look.width, look.height))
         if self._raster is None or (self._raster.size, self._raster.theme) != (size, theme):
             self._raster = Raster(size, theme=theme)
-        colours, radius = self._in_rows(frame, self._colours(frame, look.colour, theme))
+        own = self._colours(frame, look.colour, theme)
+        (colours, radius), (owner, place) = self._in_rows(frame, own), frame.copies
         view = View(part[0], part[3], size[0] / (part[2] - part[0]), *size)
         return self._raster.discs(
-            frame.rows,
-            radius,
+            np.concatenate((frame.rows, place)) if len(owner) else frame.rows,
+            np.concatenate((radius, frame.shape.radius[owner])) if len(owner) else radius,
             view,
             outlines=frame.shape.outlines,
             obstacles=self._obstacles(frame),
-            colours=colours,
-            links=(frame.position[frame.joined], frame.force) if len(frame.joined) else None,
-            angle=self._angles(frame),
+            colours=np.concatenate((colours, own[owner])) if len(owner) else colours,
+            links=frame.segments if len(frame.joined) else None,
+            angle=self._angles(frame, owner),
         )
 
     def _in_rows(self, frame: Frame, colours: Packed) -> tuple[Packed, NDArray[np.float32]]:
@@ -119,11 +120,12 @@ class Artist:
             self._still_sorted = (colours, colours[whose])
         return self._still_sorted[1], self._sorted[2]
 
-    def _angles(self, frame: Frame) -> NDArray[np.float64] | None:
-        """How the circles of the frame's rows have turned, rad; None as long as nobody has."""
+    def _angles(self, frame: Frame, owner: NDArray[np.uint32]) -> NDArray[np.float64] | None:
+        """How the circles of the frame's rows, and copies of `owner`, have turned, rad; None as long as nobody has."""
         if not len(frame.turned):
             return None
-        return np.asarray((frame.turned if frame.whose is None else frame.turned[frame.whose]) * (np.pi / 128), float)
+        turned = frame.turned if frame.whose is None else frame.turned[frame.whose]
+        return np.asarray(np.concatenate((turned, frame.turned[owner])) * (np.pi / 128), float)
 
     def _obstacles(self, frame: Frame) -> Sequence[Outline]:
         """All of them; the same object as long as none has moved, which the raster then need not draw again."""
@@ -138,7 +140,9 @@ class Artist:
             name = "order"
         if self._colouring_of != (name, shape):
             self._colouring_of = (name, shape)
-            self._colouring = Fixed(shape.colours) if shape.colours is not None and name == "picture" else COLOURINGS[name]()
+            own = shape.colours if name == "picture" else None
+            # Forces are not worked out for so many.
+            self._colouring = COLOURINGS.get(name, ByOrigin)() if own is None else Fixed(own)
             self._still = None
         # Most say the same in every frame. Velocities have to be sorted, which takes as long as all the drawing.
         if name in ("speed", "energy") or self._still is None or self._still[0] is not theme:

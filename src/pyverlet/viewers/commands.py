@@ -27,6 +27,12 @@ MAX_STEPS = 600
 FARTHEST = 1e9
 """m. Hands further out than this would leave what float32 can tell."""
 
+LONGEST_KEY = 24
+"""Letters of a key's name."""
+
+BUTTONS = ("left", "middle", "right")
+"""Of a mouse."""
+
 SLOWEST = 1 / 64
 """Least speed: a second takes a minute."""
 
@@ -199,5 +205,52 @@ class Release:
     hand: int
 
 
+@dataclass(frozen=True, slots=True)
+class Undo:
+    """Go back to before the last thing that a hand did; time goes back, too."""
+
+
+@dataclass(frozen=True, slots=True)
+class Redo:
+    """Go to where the last Undo was asked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetSlider:
+    """Move a slider of the user's program."""
+
+    name: str
+    value: float
+
+    def __post_init__(self) -> None:
+        checks.number("value", self.value)
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """Tell the user's program of a key, called as browsers do: "a", " ", "ArrowLeft"."""
+
+    key: str
+
+    def __post_init__(self) -> None:
+        if not 0 < len(self.key) <= LONGEST_KEY:
+            raise InputError(f"key is {self.key[:40]!r}; allowed is the name of one, such as 'a' or 'ArrowLeft'")
+
+
+@dataclass(frozen=True, slots=True)
+class Click(_AtPoint):
+    """Tell the user's program of a click at (x, y), metres, with the "left", "middle" or "right" button."""
+
+    button: str = "left"
+
+    def __post_init__(self) -> None:
+        _AtPoint.__post_init__(self)
+        if self.button not in BUTTONS:
+            raise InputError(f"button is {self.button[:40]!r}; allowed are {', '.join(BUTTONS)}")
+
+
 Setting = SetGravity | SetSubsteps | SetRestitution | SetFriction | SetIntegrator
-Command = Pause | Step | Reset | SetSpeed | Build | Setting | Drag | Poke | Pin | Spawn | Delete | Release
+Answered = SetSlider | Key | Click
+Command = (
+    Pause | Step | Reset | SetSpeed | Build | Setting | Drag | Poke | Pin | Spawn | Delete | Release | Undo | Redo | Answered
+)

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from pyverlet import scenes
 from pyverlet.laws.integrators import Integrator
 from pyverlet.scenes import Scene
+from pyverlet.scenes._graph import Gauge
+from pyverlet.scenes.sketch import SketchScene
+from pyverlet.viewers.answers import Answers
 from pyverlet.viewers.frames import Rect
 from pyverlet.world.panels import Panels
 from pyverlet.world.world import World
@@ -32,6 +35,9 @@ class Exhibit:
         scene: the name of the scene they are, or "" for worlds of the user's own.
         colours: (n, 3) bytes R, G, B, the circles' own; None leaves colours to the viewer.
         part: of the plane to show, metres; None shows the bounds, or where the circles are.
+        graph: what measures the one world for a graph beside it; None shows none.
+        answers: what the program adds to the picture, and what it wants to know of; None: nothing.
+        countable: whether the scene can be built with another number of circles.
     """
 
     title: str
@@ -39,6 +45,9 @@ class Exhibit:
     scene: str = ""
     colours: NDArray[np.uint8] | None = None
     part: Rect | None = None
+    graph: Gauge | None = None
+    answers: Answers | None = None
+    countable: bool = True
 
     @classmethod
     def of(cls, shown: World | Panels | Exhibit, title: str) -> Exhibit:
@@ -94,4 +103,6 @@ class Repertoire:
         if scene.show.colours and len(panels) == 1:
             colours = scene.show.colours(settings, self._dt, progress)
         part = scene.show.view(settings) if scene.show.view else None
-        return Exhibit(scene.name, panels, scene.name, colours, part)
+        graph = scene.show.graph(settings) if scene.show.graph and len(panels) == 1 else None
+        countable = not isinstance(scene, SketchScene) or scene.takes("particles")
+        return Exhibit(scene.name, panels, scene.name, colours, part, graph, scene.sketch, countable)

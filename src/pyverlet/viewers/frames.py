@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 
 from pyverlet.kernels import wire
 from pyverlet.laws.rooms import Circle
+from pyverlet.picture import across
 from pyverlet.picture.colour import USUAL_MULTIPLE
+from pyverlet.picture.pen import Drawing
+from pyverlet.scenes._graph import Graph
+from pyverlet.state.seam import Seam
+from pyverlet.viewers.forces import NONE as NO_CONTACTS
+from pyverlet.viewers.forces import Contacts
 from pyverlet.viewers.sketch import NOTHING, Sketch
 
 if TYPE_CHECKING:
@@ -26,6 +32,9 @@ GRID_MAX = 65535
 
 VELOCITY_MAX = 32767
 """Largest velocity component as a 16-bit number; the fastest circle has it."""
+
+PUSH_MULTIPLE = 6.0
+"""The hardest push that can be told, in terms of the mean."""
 
 VIEW_MARGIN = 0.03
 """Free space around the bounds, as a fraction of their longer side."""
@@ -81,6 +90,10 @@ class Shape:
     """Name of the scene, or "" for worlds of the user's own."""
     scenes: tuple[tuple[str, str], ...]
     """Name and one line of each scene that can be picked; empty where none can."""
+    answers: tuple[str, ...]
+    """Of "keys" and "click", what the user's own program wants to know of."""
+    countable: bool
+    """Whether another number of circles can be asked for."""
     radius: NDArray[np.float32]
     """(n,) metres, read-only."""
     mass: NDArray[np.float32]
@@ -95,6 +108,8 @@ class Shape:
     """(k, 2) circles that do not collide with each other since a link says so."""
     colours: NDArray[np.uint8] | None
     """(n, 3) bytes R, G, B, the circles' own, if they have any; read-only."""
+    seams: tuple[tuple[int, int, Seam], ...] = ()
+    """Periodic worlds: number of the first circle, how many, and where in the picture the room joins on to itself."""
 
 
 @dataclass(frozen=True)
@@ -134,6 +149,16 @@ class Status:
     busy: str | None
     """What keeps the world from moving for now, such as building another."""
     error: str | None
+    graph: Graph | None = None
+    """What the scene measures, beside a curve."""
+    complaint: str | None = None
+    """What is wrong with a sketch, while the world goes on."""
+    sliders: tuple[tuple[str, float, float, float, float], ...] = ()
+    """Name, ends, step and value of each slider that the program has made."""
+    watched: dict[str, float] = field(default_factory=dict)
+    """What is drawn beside the energy."""
+    undo: tuple[int, int] = (0, 0)
+    """How often one can undo, and redo."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,6 +184,10 @@ class Frame:
     whose: NDArray[np.int32] | None = None
     """(n,) which particle each row is of, between the substeps of a frame; None: row k is particle k."""
     whose_moving: NDArray[np.int32] | None = None
+    drawing: Drawing = ()
+    """What the user's own function has drawn over it; of the frame before, between its substeps."""
+    contacts: Contacts = NO_CONTACTS
+    """Who pushes whom, where somebody looks at it; of a moment ago."""
 
     def moved(self, moment: Moment, seq: int, status: Status, *, velocity: bool) -> Frame:
         """The same a little later, between two substeps; its velocities are those of this frame unless they are asked for."""
@@ -190,12 +219,45 @@ class Frame:
         return np.asarray(np.clip(np.nan_to_num(share), 0, 255), dtype=np.uint8)
 
     @cached_property
+    def push(self) -> tuple[NDArray[np.uint8], float]:
+        """(m,) how hard each contact pushes, in so many N: what is most is PUSH_MULTIPLE times the mean."""
+        force = self.contacts.force
+        unit = PUSH_MULTIPLE * float(force.mean()) / 255 if len(force) else 0.0
+        return np.asarray(np.clip(np.rint(force / np.float32(unit or 1.0)), 0, 255), np.uint8), unit
+
+    @cached_property
+    def lean(self) -> NDArray[np.uint8]:
+        """(m,) which way each contact's normal points, in 1/256 of a turn."""
+        return np.asarray(np.rint(self.contacts.angle * (128 / np.pi)).astype(np.int64).astype(np.uint8))
+
+    @cached_property
     def grid(self) -> NDArray[np.uint16]:
         """(n, 2) positions on the 16-bit grid over `view`, as `quantise` makes it.
 
         Computed when first asked for, by whoever sends the frame, so that the physics thread never pays for it.
         """
         return quantise(self.position, self.view)
+
+    @cached_property
+    def copies(self) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
+        """Circles that reach through the seam of a periodic room, once more: (k,) which, and (k, 2) where, m."""
+        found = [(np.empty(0, np.uint32), np.empty((0, 2), np.float32))]
+        for first, count, seam in self.shape.seams:
+            mine = slice(first, first + count)
+            owner, place = across.copies(self.position[mine], self.shape.radius[mine], seam)
+            found.append((owner + np.uint32(first), place))
+        owners, places = zip(*found, strict=True)
+        return np.concatenate(owners), np.concatenate(places)
+
+    @cached_property
+    def segments(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Links as lines, (m, 2, 2) in m, and (m,) what they pull with, N; those through a seam from both of their ends."""
+        ends, force, found = self.position[self.joined], self.force, []
+        for first, count, seam in self.shape.seams:
+            mine = (self.joined[:, 0] >= first) & (self.joined[:, 0] < first + count)
+            found.append(across.lines(ends[mine], force[mine], seam))
+            ends, force = ends[~mine], force[~mine]
+        return np.concatenate([ends, *(lines for lines, _ in found)]), np.concatenate([force, *(pulls for _, pulls in found)])
 
     @cached_property
     def velocity_unit(self) -> float:
@@ -268,7 +330,9 @@ class Camera:
         if extents:
             lowest, highest = np.min(extents, axis=0), np.max(extents, axis=0)
             x0, y0, x1, y1 = (float(value) for value in (*lowest[:2], *highest[2:]))
-            margin = VIEW_MARGIN * max(x1 - x0, y1 - y0)
+            # Through a seam circles reach out of the room.
+            out = max((1.1 * float(world.radius.max(initial=0.0)) for world in worlds if world.boundary.seam), default=0.0)
+            margin = max(VIEW_MARGIN * max(x1 - x0, y1 - y0), out)
             self._fixed = (x0 - margin, y0 - margin, x1 + margin, y1 + margin)
             return
         _, _, reach = _middle_and_reach(np.concatenate([world.position for world in worlds]))

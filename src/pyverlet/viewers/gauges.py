@@ -52,7 +52,16 @@ class Gauges:
         return (end - start) / max(ended - began, 1e-9)
 
     def read(
-        self, stage: Stage, *, dropped: int, speed: float, paused: bool, busy: str | None, error: str | None, at_once: bool
+        self,
+        stage: Stage,
+        *,
+        dropped: int,
+        speed: float,
+        paused: bool,
+        busy: str | None,
+        error: str | None,
+        at_once: bool,
+        complaint: str | None = None,
     ) -> Status:
         """The numbers now. Slow ones are of a moment ago, unless wanted `at_once`."""
         now = time.perf_counter()
@@ -85,6 +94,11 @@ class Gauges:
             paused=paused,
             busy=busy,
             error=error,
+            graph=stage.exhibit.graph and stage.exhibit.graph(stage.worlds[0]),
+            complaint=complaint or stage.complaint,
+            sliders=stage.sliders(),
+            watched=self._watched,
+            undo=stage.history.depth,
         )
 
     def _read_slow(self, stage: Stage) -> None:
@@ -95,6 +109,7 @@ class Gauges:
         self._links = sum(float(energy.links) for energy in energies)
         self._energies = tuple(float(energy.total) for energy in energies)
         self._percentiles = (float(self.budget.median_ms), float(self.budget.p95_ms))
+        self._watched = stage.watched()
 
 
 def _booked(stage: Stage) -> dict[str, float] | None:

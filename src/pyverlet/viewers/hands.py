@@ -45,8 +45,8 @@ class Hands:
         self._held: dict[int, Grip | Push | None] = {}
         self._aim: dict[int, tuple[float, float]] = {}
 
-    def drag(self, hand: int, x: float, y: float, reach: float) -> None:
-        """Aim this hand at (x, y), metres.
+    def drag(self, hand: int, x: float, y: float, reach: float) -> bool:
+        """Aim this hand at (x, y), metres; whether it holds anything.
 
         An unused hand first takes the particle whose rim is nearest, if within `reach` metres.
         """
@@ -54,6 +54,7 @@ class Hands:
             particle = nearest(self._world, np.array([x, y]), reach)
             self._hold(hand, None if particle is None else self._grip(particle, x, y))
         self._aim[hand] = (x, y)
+        return self._held[hand] is not None
 
     def poke(self, hand: int, x: float, y: float, view_size: float) -> None:
         """Push everything around (x, y), metres, away from it. `view_size`, metres, sets how wide."""
@@ -84,7 +85,7 @@ class Hands:
 
     def _leashed(self, particle: int, aim: tuple[float, float], leash: float) -> tuple[float, float]:
         x, y = (float(value) for value in self._world.position[particle])
-        dx, dy = aim[0] - x, aim[1] - y
+        dx, dy = self._world.boundary.seam.nearest(np.array(aim) - (x, y))
         shorten = min(1.0, leash / max(float(np.hypot(dx, dy)), 1e-30))
         return (x + dx * shorten, y + dy * shorten)
 
@@ -110,10 +111,10 @@ class HandsOnPanels:
         self._pins = [Pins() for _ in worlds]
         self._panel: dict[int, int] = {}
 
-    def drag(self, hand: int, x: float, y: float, reach: float, layout: Layout) -> None:
+    def drag(self, hand: int, x: float, y: float, reach: float, layout: Layout) -> bool:
         """As `Hands.drag`."""
         panel, x, y = self._take(hand, x, y, layout)
-        self._hands[panel].drag(hand, x, y, reach)
+        return self._hands[panel].drag(hand, x, y, reach)
 
     def poke(self, hand: int, x: float, y: float, view_size: float, layout: Layout) -> None:
         """As `Hands.poke`."""

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from pyverlet.world.panels import Panels
     from pyverlet.world.world import World
 
+ENDS, STAYS = "Ctrl-C ends it", "close() ends it"
+
 GOODBYE_S = 1
 """Whole seconds open tabs get to hang up."""
 
@@ -47,44 +49,30 @@ def serve(
     dt: float,
     repertoire: Repertoire | None = None,
     stage: Callable[[Exhibit], Stage] = Stage,
+    beside: Callable[[Session], contextlib.AbstractContextManager[None]] | None = None,
 ) -> None:
-    """Show the world that `build` makes until Ctrl-C. See `pyverlet.viewers.serve`."""
+    """Show the world that `build` makes until Ctrl-C. See `pyverlet.viewers.serve`.
+
+    What `beside` makes of the session is entered while it runs.
+    """
     _refuse_running_loop()
-    with contextlib.suppress(KeyboardInterrupt), _take_port(host, port) as listener:
-        with _patient_workers():
-            exhibit = Exhibit.of(build(), title)
-            _compile(exhibit)
+    with contextlib.suppress(KeyboardInterrupt), take_port(host, port) as listener:
+        exhibit = Exhibit.of(build(), title)
+        compile_for(exhibit)
         session = Session(exhibit, dt=dt, repertoire=repertoire, stage=stage)
         if draws_here(session.latest.shape):
             Artist().jpeg(session.latest, Look())  # compiles what it needs: no tab shall wait for that
-        with _on_air(session, listener, only_loopback=host in LOOPBACK_NAMES), _ended_by_signals(session):
-            address = _address(host, listener)
-            _announce(title, address, host, open_browser)
+        with on_air(session, listener, only_loopback=host in LOOPBACK_NAMES), _ended_by_signals(session):
+            url = address(host, listener)
+            announce(title, url, host, open_browser)
             if open_browser and has_screen():
-                # In a thread of its own: some browsers' launchers return only when the browser does.
-                threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
-            session.run()  # here, in the thread that built the world: see there
+                open_tab(url)
+            with beside(session) if beside else contextlib.nullcontext():
+                session.run()  # here, in the thread that built the world: see there
 
 
 @contextlib.contextmanager
-def _patient_workers() -> Iterator[None]:
-    """Have OpenMP's workers, if they start in here, sleep while they wait for each other.
-
-    By default they spin, which is quicker on idle cores. A browser draws on the same machine: with two cores, a worker that
-    spins for one that is not running made frames of 20,000 circles 2 times and of 100,000 circles 7 times as long.
-    """
-    if "OMP_WAIT_POLICY" in os.environ or "GOMP_SPINCOUNT" in os.environ:
-        yield  # somebody has chosen
-        return
-    os.environ["OMP_WAIT_POLICY"] = "passive"
-    try:
-        yield
-    finally:
-        del os.environ["OMP_WAIT_POLICY"]
-
-
-@contextlib.contextmanager
-def _on_air(session: Session, listener: socket.socket, *, only_loopback: bool) -> Iterator[None]:
+def on_air(session: Session, listener: socket.socket, *, only_loopback: bool) -> Iterator[None]:
     """Serve the page from a thread. Should the server fail, the session ends and the error is raised here."""
     server = uvicorn.Server(server_config(session, only_loopback=only_loopback))
     failures: list[BaseException] = []
@@ -160,7 +148,17 @@ def has_screen() -> bool:
     return not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def _take_port(host: str, port: int) -> socket.socket:
+def open_tab(url: str) -> None:
+    """In the user's browser. In a thread of its own: some browsers' launchers return only when the browser does."""
+    threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
+
+
+def take_port(host: str, port: int) -> socket.socket:
+    """A socket that listens there.
+
+    Raises:
+        InputError: that cannot be.
+    """
     checks.whole("port", port, least=0, most=65535)
     try:
         family, kind, protocol, _, where = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
@@ -189,7 +187,8 @@ def _why_not(error: OSError, host: str, port: int) -> str:
     return f"host is {host!r}, which cannot be listened on ({error.strerror}); allowed is an address of this machine"
 
 
-def _compile(exhibit: Exhibit) -> None:
+def compile_for(exhibit: Exhibit) -> None:
+    """All that its worlds need."""
     from pyverlet import warm_up
 
     with Progress("compiling kernels, once") as progress:
@@ -197,17 +196,19 @@ def _compile(exhibit: Exhibit) -> None:
             warm_up(each, progress)
 
 
-def _address(host: str, listener: socket.socket) -> str:
+def address(host: str, listener: socket.socket) -> str:
+    """Of the page."""
     name = f"[{host}]" if ":" in host else host
     return f"http://{name}:{listener.getsockname()[1]}/"
 
 
-def _announce(title: str, address: str, host: str, open_browser: bool) -> None:
-    sys.stdout.write(f"{title}: {address}   (Ctrl-C ends it)\n")
+def announce(title: str, url: str, host: str, open_browser: bool, *, blocks: bool = True) -> None:
+    """Say where to look."""
+    sys.stdout.write(f"{title}: {url}   ({ENDS if blocks else STAYS})\n")
     if host in LOOPBACK_NAMES and not (open_browser and has_screen()):
-        port = address.rstrip("/").rpartition(":")[2]
+        port = url.rstrip("/").rpartition(":")[2]
         tunnel = f"ssh -L {port}:{host}:{port} {_user()}@{socket.gethostname()}"
-        sys.stdout.write(f"from another machine: {tunnel}   then open {address} there\n")
+        sys.stdout.write(f"from another machine: {tunnel}   then open {url} there\n")
     sys.stdout.flush()
 
 

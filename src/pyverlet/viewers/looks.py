@@ -9,8 +9,9 @@ from pyverlet.ground.errors import InputError
 from pyverlet.viewers.commands import FARTHEST
 from pyverlet.viewers.frames import Rect
 
-COLOURINGS = ("order", "speed", "mass", "group", "energy", "picture")
-"""What a circle's colour may say: its place in the order of adding, speed, mass, group, kinetic energy, or what it was given."""
+COLOURINGS = ("order", "speed", "mass", "group", "energy", "force", "picture")
+"""What a circle's colour may say: its place in the order of adding, speed, mass, group, kinetic energy, what it is pushed with,
+or what it was given."""
 
 LARGEST_SIDE = 4096
 """Pixels: no screen is larger, and a slip must not ask for gigabytes."""
@@ -32,6 +33,7 @@ class Look:
         colour: one of COLOURINGS.
         dark: whether the page is.
         velocity: whether the tab needs to know velocities.
+        force: whether it shows what circles push each other with.
     """
 
     part: Rect | None = None
@@ -40,6 +42,12 @@ class Look:
     colour: str = "order"
     dark: bool = True
     velocity: bool = False
+    force: bool = False
+
+    @property
+    def pushes(self) -> bool:
+        """Whether what is drawn depends on forces between circles."""
+        return self.force or self.colour == "force"
 
     @property
     def moving(self) -> bool:

@@ -130,7 +130,9 @@ class Widget(anywidget.AnyWidget):
     def _encode(self, frame: Frame, look: Look) -> bytes:
         if draws_here(frame.shape):
             return encode_picture(frame, look.part, self._artist.jpeg(frame, look))
-        return encode_frame(frame, look.part, velocity=look.velocity)
+        if look.pushes:
+            self._session.weigh(frame)
+        return encode_frame(frame, look.part, velocity=look.velocity, force=look.pushes)
 
     # -- where widgets do not run -------------------------------------------------------------------------------------
 

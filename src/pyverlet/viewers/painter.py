@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
-from pyverlet.picture import DARK, ByOrigin, Colouring, Raster, Theme, View
+from pyverlet.picture import DARK, ByOrigin, Colouring, Pen, Raster, Theme, View
+from pyverlet.picture.pen import Draw, Drawing
 from pyverlet.viewers.frames import Camera, Rect, outline
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ class Painter:
         colour: what the colours say; by default where each circle started.
         theme: `picture.DARK` or `picture.LIGHT`.
         part: of the plane to show, (x0, y0, x1, y1) in metres; by default the bounds, or where the particles are.
+        draw: a function of (world, pen) that draws over each picture.
 
     Attributes:
         view: the part of the plane on the last picture; before the first, that of the world as it is.
@@ -45,9 +47,13 @@ class Painter:
         colour: Colouring | None = None,
         theme: Theme = DARK,
         part: Rect | None = None,
+        draw: Draw | None = None,
     ) -> None:
         check_look(colour, theme)
+        if draw is not None and not callable(draw):
+            raise InputError(f"draw is {draw!r}; allowed is a function of (world, pen)")
         self._world = world
+        self._draw = draw
         self._raster = Raster(size, theme=theme)
         self._colour = ByOrigin() if colour is None else colour
         self._camera = Camera(world)
@@ -71,7 +77,12 @@ class Painter:
             self._outlines = outline(self._boundary)
         self.view = self._look() if view is None else view
         colours = self._colour.colours(self._world, self._raster.theme)
-        return self._raster.draw(self._world, self.view, outlines=self._outlines, colours=colours)
+        drawing: Drawing = ()
+        if self._draw:
+            pen = Pen()
+            self._draw(self._world, pen)
+            drawing = pen.drawing
+        return self._raster.draw(self._world, self.view, outlines=self._outlines, colours=colours, drawing=drawing)
 
     def _look(self) -> View:
         part = self._camera.view(self._world.position) if self._part is None else self._part

@@ -4,9 +4,11 @@
 - head: JSON padded with spaces, {"kind": "shape" | "frame" | "picture" | "refused", ...}.
 - body, little-endian: of a shape n float32 radii, n float32 masses, n uint32 numbers, "apart" pairs of uint32, circles that do
   not collide, if "kinds" n pairs of uint32, category and mask, and if "coloured" n times three bytes R, G, B; of a frame n pairs
-  of uint16 on the grid over "view", if the tab looks at velocities n pairs of int16 in units of "unit" m/s, of "links" two
-  uint32, who they join, each, and then a byte each, how hard they pull, and if "turned" n bytes, in 1/256 of a turn; of a picture
-  a JPEG.
+  of uint16 on the grid over "view", if the tab looks at velocities n pairs of int16 in units of "unit" m/s, of "copies", circles
+  that reach through a seam and are drawn once more, a uint32 each, whose they are, and then a pair of uint16, of "links" two
+  uint32, who they join, each, and then a byte each, how hard they pull, if "turned" n bytes, in 1/256 of a turn, and of
+  "contacts" two uint32 each, then a byte each, how hard they push in units of "push" N, and a byte each, where the normal points;
+  of a picture a JPEG.
 """
 
 from __future__ import annotations
@@ -24,26 +26,32 @@ from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
 from pyverlet.laws import integrators
+from pyverlet.picture.pen import Drawing, Stroke
 from pyverlet.viewers.commands import (
     MAX_PARTICLES,
     MAX_SUBSTEPS,
     Build,
+    Click,
     Command,
     Delete,
     Drag,
+    Key,
     Pause,
     Pin,
     Poke,
+    Redo,
     Release,
     Reset,
     SetFriction,
     SetGravity,
     SetIntegrator,
     SetRestitution,
+    SetSlider,
     SetSpeed,
     SetSubsteps,
     Spawn,
     Step,
+    Undo,
 )
 from pyverlet.viewers.frames import Frame, Rect, Shape, quantise
 from pyverlet.viewers.hands import POKE_RADIUS
@@ -84,13 +92,14 @@ def decode(text: str, hand: int) -> Request:
     return maker(message, hand)
 
 
-def encode_frame(frame: Frame, part: Rect | None = None, *, velocity: bool = False) -> bytes:
+def encode_frame(frame: Frame, part: Rect | None = None, *, velocity: bool = False, force: bool = False) -> bytes:
     """A frame as one binary message.
 
     Args:
         frame: to encode.
         part: of the plane, metres; None is all that the camera shows.
         velocity: also send velocities.
+        force: also send who pushes whom.
     """
     grid = frame.grid if part is None else quantise(frame.position, part)
     head = _head("frame", frame, part)
@@ -98,12 +107,20 @@ def encode_frame(frame: Frame, part: Rect | None = None, *, velocity: bool = Fal
     if velocity:
         head["unit"] = frame.velocity_unit
         body += frame.velocity_grid.tobytes()
+    owner, place = frame.copies
+    if len(owner):
+        head["copies"] = len(owner)
+        body += owner.tobytes() + quantise(place, frame.view if part is None else part).tobytes()
     if len(frame.joined):
         head["links"] = len(frame.joined)
         body += frame.joined.tobytes() + frame.strain.tobytes()
     if len(frame.turned):
         head["turned"] = True
         body += frame.turned.tobytes()
+    if force and len(frame.contacts.pairs):
+        push, head["push"] = frame.push
+        head["contacts"] = len(push)
+        body += frame.contacts.pairs.tobytes() + push.tobytes() + frame.lean.tobytes()
     return _join(head, body)
 
 
@@ -119,8 +136,21 @@ def _head(kind: str, frame: Frame, part: Rect | None) -> dict[str, Any]:
         "view": frame.view if part is None else part,
         "room": frame.view,
         "obstacles": frame.obstacles.lines,
+        "drawing": written(frame.drawing),
         "status": dataclasses.asdict(frame.status),
     }
+
+
+def written(drawing: Drawing) -> list[Any]:
+    """What a `Pen` drew, ready for JSON: lines and areas [points, closed, filled, colour, px], texts [x, y, text, colour, px]."""
+    said: list[Any] = []
+    for mark in drawing:
+        colour = None if mark.colour is None else f"#{mark.colour:06x}"
+        if isinstance(mark, Stroke):
+            said.append([mark.points, mark.closed, mark.filled, colour, mark.width])
+        else:
+            said.append([mark.x, mark.y, mark.text, colour, mark.size])
+    return said
 
 
 def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = None) -> bytes:
@@ -140,12 +170,15 @@ def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = N
         "bounded": shape.bounded,
         "parted": shape.parted,
         "outlines": shape.outlines,
+        "seams": shape.seams,
         "lines": shape.lines,
         "panels": [dataclasses.asdict(panel) for panel in shape.panels],
         "differing": shape.differing,
         "obstacles": shape.obstacles.lines,
         "scene": shape.scene,
         "scenes": shape.scenes,
+        "answers": shape.answers,
+        "countable": shape.countable,
         "integrators": list(integrators.BY_NAME),
         "count": len(shape.radius),
         "groups": [] if drawn_here else _runs(shape.group),
@@ -245,6 +278,7 @@ def _look(message: Mapping[str, Any]) -> Look:
         _text(message, "colour"),
         _flag(message, "dark"),
         _flag(message, "velocity"),
+        _flag({"force": False} | dict(message), "force"),
     )
 
 
@@ -272,4 +306,9 @@ _MAKERS: dict[str, Callable[[Mapping[str, Any], int], Request]] = {
     "spawn": lambda m, hand: Spawn(hand, _real(m, "x"), _real(m, "y")),
     "delete": lambda m, hand: Delete(hand, _real(m, "x"), _real(m, "y"), _real(m, "reach")),
     "release": lambda m, hand: Release(hand),
+    "undo": lambda m, hand: Undo(),
+    "redo": lambda m, hand: Redo(),
+    "slider": lambda m, hand: SetSlider(_text(m, "name"), _real(m, "value")),
+    "key": lambda m, hand: Key(_text(m, "key")),
+    "click": lambda m, hand: Click(hand, _real(m, "x"), _real(m, "y"), _text(m, "button")),
 }

@@ -9,6 +9,10 @@ KEEN = 10
 """Pictures that have velocities of their own after a viewer has asked for some."""
 
 
+KEEN_ON_FORCES = 60
+"""The same for forces, which are worked out a few times a second."""
+
+
 class Rhythm:
     """As many pictures a second as a screen shows, made at moments that do not fit that pace: between two substeps.
 
@@ -32,13 +36,21 @@ class Audience:
     """What viewers have taken, and what they look at. Told from any thread."""
 
     def __init__(self) -> None:
-        self._newest = self._velocity_until = 0
+        self._newest = self._velocity_until = self._force_until = 0
 
     def take(self, seq: int, *, velocity: bool) -> None:
         """A viewer has this picture, and looks at velocities or does not."""
         self._newest = max(self._newest, seq)
         if velocity:
             self._velocity_until = max(self._velocity_until, seq + KEEN)
+
+    def weigh(self, seq: int) -> None:
+        """A viewer that has this picture looks at forces."""
+        self._force_until = max(self._force_until, seq + KEEN_ON_FORCES)
+
+    def looks_at_force(self, seq: int) -> bool:
+        """Whether this picture needs forces."""
+        return seq <= self._force_until
 
     def has(self, seq: int) -> bool:
         """Whether anybody has this picture."""

@@ -8,11 +8,9 @@ frames go.
 from __future__ import annotations
 
 import logging
-import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,14 +19,15 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.constants import FRAME_BUDGET_MS
 from pyverlet.ground.errors import PyverletError
+from pyverlet.scenes.sketch import SketchError
 from pyverlet.viewers import commands as asked
 from pyverlet.viewers import levers
 from pyverlet.viewers.commands import Command
+from pyverlet.viewers.door import Door
 from pyverlet.viewers.exhibit import Exhibit, Repertoire
 from pyverlet.viewers.frames import Frame, Shape, Status
 from pyverlet.viewers.gauges import Gauges
-from pyverlet.viewers.inbox import Inbox
-from pyverlet.viewers.rhythm import PICTURE_S, Audience, Rhythm
+from pyverlet.viewers.rhythm import PICTURE_S, Rhythm
 from pyverlet.viewers.stage import Stage
 from pyverlet.world.clock import Clock, FrameBudget
 from pyverlet.world.moments import Moment
@@ -45,11 +44,8 @@ MAX_CATCH_UP = 4
 IDLE_S = 0.1
 """Longest nap while nothing moves: on some systems Ctrl-C waits for it to end."""
 
-STOP_TIMEOUT_S = 10.0
-"""Longest wait for a frame under way when a session stops."""
 
-
-class Session:
+class Session(Door):
     """Runs one world in real time: in the calling thread with `run`, or in one of its own as a context manager.
 
     Several worlds side by side run as one: every command is for all of them, but a hand works in the one it touches.
@@ -78,78 +74,21 @@ class Session:
     ) -> None:
         self._dt = checks.number("dt", dt, above=0.0)
         self._budget_ms = checks.number("budget_ms", budget_ms, above=0.0)
+        super().__init__()
         self._repertoire = repertoire
         self._staged = stage
-        self._commands = Inbox()
-        self._listeners: tuple[Callable[[], None], ...] = ()
-        self._listeners_lock = threading.Lock()
-        self._thread: threading.Thread | None = None
-        self._stopping = threading.Event()
         self._paused = False
         self._speed = 1.0
         self._busy: str | None = None
         self._error: str | None = None
+        self._complaint: str | None = None
         self._before: list[NDArray[np.float32]] | None = None
         self._shape: Shape
         self._seq = self._begun = 0
-        self._rhythm, self._audience, self._last = Rhythm(), Audience(), time.perf_counter()
+        self._rhythm, self._last = Rhythm(), time.perf_counter()
         self._enter(Exhibit.of(world, title))
         self.latest: Frame = self._picture()
         """The newest frame. Replaced, never changed; read it from any thread."""
-
-    # -- for viewers, from any thread ---------------------------------------------------------------------------------
-
-    def submit(self, command: Command) -> None:
-        """Ask for something. Returns at once; the physics thread does it between two frames, in the order asked.
-
-        A world that is slow takes another gravity, or where a hand that is down moves, between two substeps.
-        """
-        self._commands.put(command)
-
-    def take(self, frame: Frame, *, velocity: bool = False) -> None:
-        """Say that a viewer has this frame and would like the next: a world that is slow makes some between its substeps then.
-
-        Args:
-            frame: that it has.
-            velocity: whether it looks at velocities. Frames made between substeps have new ones only if somebody does.
-        """
-        self._audience.take(frame.seq, velocity=velocity)
-
-    def subscribe(self, listener: Callable[[], None]) -> Callable[[], None]:
-        """Have `listener()` called on the physics thread after every new frame; it must return at once and not raise.
-
-        Returns a function that ends the subscription.
-        """
-        with self._listeners_lock:
-            self._listeners = (*self._listeners, listener)
-
-        def unsubscribe() -> None:
-            with self._listeners_lock:
-                self._listeners = tuple(other for other in self._listeners if other is not listener)
-
-        return unsubscribe
-
-    def start(self) -> None:
-        """Run in a thread of the session's own."""
-        if self._thread is not None:
-            raise RuntimeError("a session starts once")
-        # A daemon: should a frame ever hang, Ctrl-C still ends the process.
-        self._thread = threading.Thread(target=self.run, name="pyverlet-physics", daemon=True)
-        self._thread.start()
-
-    def stop(self) -> None:
-        """Have the frame under way be the last; wait for it if the session has its own thread. Twice is once."""
-        self._stopping.set()
-        self._commands.put(None)
-        if self._thread is not None:
-            self._thread.join(STOP_TIMEOUT_S)
-
-    def __enter__(self) -> Session:
-        self.start()
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self.stop()
 
     # -- the physics thread -------------------------------------------------------------------------------------------
 
@@ -160,14 +99,15 @@ class Session:
         a parallel kernel, and with two teams alive every frame takes twice as long.
         """
         self._last = time.perf_counter()
-        while not self._stopping.is_set():
-            wait = self.turn()
-            if self._held():
-                self._obey_next()
-            elif wait > 0.0:
-                # Sleeping, not waiting on the queue: on some systems a timed wait only wakes at every 15 ms.
-                time.sleep(wait)
-        self._stage.hands.release_all()
+        with self._errands.by_this_thread():
+            while not self._stopping.is_set():
+                wait = self.turn()
+                if self._held():
+                    self._obey_next()
+                elif wait > 0.0:
+                    # Sleeping, not waiting on the queue: on some systems a timed wait only wakes at every 15 ms.
+                    time.sleep(wait)
+            self._stage.hands.release_all()
 
     def turn(self, *, longest: float | None = None) -> float:
         """Obey what was asked, make the frames that are due since the last turn, and publish.
@@ -178,6 +118,7 @@ class Session:
         Returns:
             Seconds until the next frame is due.
         """
+        self._errands.run()
         if self._obey_all() and self._held():
             self._publish()
         now = time.perf_counter()
@@ -211,8 +152,11 @@ class Session:
         # With the frame before in mind: what is late by more than a picture is shown on its way.
         self._late = self._gauges.budget.last_ms * self._speed > 1000.0 * max(self._dt, PICTURE_S)
         self._before = self._stage.look()[0] if self._speed < 1.0 and not self._late else None
+        self._stage.forces.wanted = self._audience.looks_at_force(self._seq)
         try:
             self._stage.step(self._dt, self._look_on if self._late else None)
+        except SketchError as error:
+            self._error = None if self._stage.mend(error) else str(error)
         except PyverletError as error:
             self._error = str(error)
         except Exception as error:  # a user's own force may raise anything
@@ -276,6 +220,17 @@ class Session:
     def _enter(self, exhibit: Exhibit) -> None:
         self._stage = self._staged(exhibit)
         self._fresh_start()
+
+    def _put_on(self, exhibit: Exhibit) -> None:
+        self._stage.hands.release_all()
+        self._complaint = self._busy = None
+        self._enter(exhibit)
+        self._last = time.perf_counter()
+        self._publish()
+
+    def _say(self, complaint: str | None, busy: str | None) -> None:
+        self._complaint, self._busy = complaint, busy
+        self._publish()
 
     def _fresh_start(self) -> None:
         self._error = None
@@ -363,7 +318,8 @@ class Session:
         position = stage.place(self._between(positions))
         position.flags.writeable = velocity.flags.writeable = False
         self._status = self._read()
-        return Frame(self._seq, self._shape, stage.layout.view, self._status, position, velocity, *stage.drawn())
+        seen = (self._seq, self._shape, stage.layout.view, self._status, position, velocity, *stage.drawn())
+        return Frame(*seen, drawing=stage.drawing(), contacts=stage.forces.now())
 
     def _read(self) -> Status:
         return self._gauges.read(
@@ -373,6 +329,7 @@ class Session:
             paused=self._paused,
             busy=self._busy,
             error=self._error,
+            complaint=self._complaint,
             at_once=self._held(),
         )
 
@@ -382,7 +339,8 @@ class Session:
         if self._speed == 1.0 or self._paused or before is None or list(map(len, before)) != list(map(len, now)):
             return now
         alpha = np.float32(self._clock.alpha)
-        return [a + alpha * (b - a) for a, b in zip(before, now, strict=True)]
+        seams = [world.boundary.seam for world in self._stage.worlds]
+        return [seam.wrapped(a + alpha * seam.nearest(b - a)) for a, b, seam in zip(before, now, seams, strict=True)]
 
 
 class _Stopped(Exception):  # noqa: N818  (no error: somebody has asked for it)

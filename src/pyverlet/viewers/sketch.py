@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pyverlet.laws.obstacles import Outline
+from pyverlet.picture import across
 
 if TYPE_CHECKING:
     from pyverlet.viewers.layout import Layout
@@ -47,14 +48,15 @@ class Sketcher:
     def draw(self, layout: Layout) -> Sketch:
         """As they are now."""
         found = [
-            (layout.offset(k), obstacle.drawn())
+            (layout.offset(k), obstacle.drawn(), world.boundary.seam)
             for k, world in enumerate(self._worlds)
             for obstacle in world.obstacles
             if obstacle.moves == self._moving
         ]
-        drawn = [outlines for _, outlines in found]
+        drawn = [outlines for _, outlines, _ in found]
         if len(drawn) != len(self._drawn) or any(a is not b for a, b in zip(drawn, self._drawn, strict=True)):
             self._drawn = drawn
-            moved = (Outline(points + offset, filled) for offset, outlines in found for points, filled in outlines)
+            images = [(offset, across.outlines(outlines, seam)) for offset, outlines, seam in found]
+            moved = (Outline(points + offset, filled) for offset, outlines in images for points, filled in outlines)
             self._sketch = Sketch(tuple(moved)) if drawn else NOTHING
         return self._sketch

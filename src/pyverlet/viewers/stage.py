@@ -9,27 +9,40 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.ground.errors import InputError
+from pyverlet.picture import Pen
+from pyverlet.picture.pen import Drawing
+from pyverlet.scenes.sketch import SketchError, Updates
+from pyverlet.state.seam import Seam
 from pyverlet.state.state import EVERYONE
 from pyverlet.viewers import levers
 from pyverlet.viewers.commands import (
+    Answered,
+    Click,
     Command,
     Delete,
     Drag,
+    Key,
     Pin,
     Poke,
+    Redo,
     Release,
     Reset,
     SetFriction,
     SetGravity,
     SetIntegrator,
     SetRestitution,
+    SetSlider,
     SetSubsteps,
     Setting,
     Spawn,
+    Undo,
 )
 from pyverlet.viewers.exhibit import Exhibit
+from pyverlet.viewers.forces import Forces
 from pyverlet.viewers.frames import Camera, PanelShape, Shape, outline
 from pyverlet.viewers.hands import HandsOnPanels
+from pyverlet.viewers.history import History
 from pyverlet.viewers.layout import Layout
 from pyverlet.viewers.sketch import Sketch, Sketcher
 from pyverlet.world.moments import Moment
@@ -50,6 +63,9 @@ class Stage:
         self.panels = exhibit.panels
         self.worlds = self.panels.worlds
         self.hands = HandsOnPanels(self.worlds)
+        self.history, self.forces = History(self.panels), Forces(self.worlds)
+        self.complaint: str | None = None
+        """What is wrong with the program, while the world goes on."""
         self._pinned = 0
         self._apart: list[NDArray[Any]] = []
         self._parted = 0  # how often these have changed
@@ -97,7 +113,8 @@ class Stage:
         if len(self.worlds) == 1 and not any(obstacle.moves for obstacle in world.obstacles):
             world.onlooker = onlooker and partial(self._between, onlooker)
         try:
-            self.panels.step(dt)
+            with self.forces.look():
+                self.panels.step(dt)
         finally:
             world.onlooker = None
 
@@ -116,20 +133,99 @@ class Stage:
         match command:
             case SetGravity() | SetSubsteps() | SetRestitution() | SetFriction() | SetIntegrator():
                 self.pull(command)
+            case Drag() | Poke() | Pin() | Spawn() | Delete():
+                self.history.open(command.hand)
+                self.history.close(command.hand, changed=self._handle(command))
+                if isinstance(command, Pin):
+                    self.history.release(command.hand)
+            case Release(hand):
+                self.hands.release(hand)
+                self.history.release(hand)
+            case Undo() | Redo():
+                self.hands.release_all()
+                self._pinned += self.history.undo() if isinstance(command, Undo) else self.history.redo()
+            case SetSlider() | Key() | Click():
+                self._answer(command)
+            case Reset():
+                self.reset()
+
+    def _handle(self, command: Drag | Poke | Pin | Spawn | Delete) -> bool:
+        """What a hand does; whether that is anything."""
+        known = [world.version for world in self.worlds]
+        match command:
             case Drag(hand, x, y, reach):
-                self.hands.drag(hand, x, y, reach, self.layout)
+                return self.hands.drag(hand, x, y, reach, self.layout)
             case Poke(hand, x, y):
                 self.hands.poke(hand, x, y, self.view_size, self.layout)
+                return True
             case Pin(_, x, y, reach):
-                self._pinned += self.hands.pin(x, y, reach, self.layout)
+                pinned = self.hands.pin(x, y, reach, self.layout)
+                self._pinned += pinned
+                return pinned
             case Spawn(_, x, y):
                 self.hands.spawn(x, y, self.layout)
             case Delete(_, x, y, reach):
                 self.hands.delete(x, y, reach, self.layout)
-            case Release(hand):
-                self.hands.release(hand)
-            case Reset():
-                self.reset()
+        return known != [world.version for world in self.worlds]
+
+    # -- the user's program ---------------------------------------------------------------------------------------------
+
+    def _answer(self, command: Answered) -> None:
+        """Tell the program what the user did."""
+        answers, world = self.exhibit.answers, self.worlds[0]
+        match command:
+            case SetSlider(name, value):
+                if answers and (slider := answers.sliders.get(name)):
+                    slider.value = min(max(value, slider.low), slider.high)
+            case Key(key):
+                self._call("keys", world, key)
+            case Click(_, x, y, button):
+                panel = self.layout.at(x, y)
+                dx, dy = self.layout.offset(panel)
+                self._call("click", self.worlds[panel], np.array([x - dx, y - dy]), button)
+
+    def _call(self, hook: str, *arguments: Any) -> None:
+        """One of the program's functions; one that fails is not called any more, and the world goes on."""
+        if self.exhibit.answers is None:
+            return
+        try:
+            self.exhibit.answers.call(hook, *arguments)
+        except InputError as error:
+            self.complaint = str(error)
+
+    def drawing(self) -> Drawing:
+        """What the program draws over this picture."""
+        if self.exhibit.answers is None or not self.exhibit.answers.has("draw"):
+            return ()
+        marks: Drawing = ()
+        for k, world in enumerate(self.worlds):
+            pen = Pen(self.layout.offset(k))
+            self._call("draw", world, pen)
+            marks += pen.drawing
+        return marks
+
+    def sliders(self) -> tuple[tuple[str, float, float, float, float], ...]:
+        """Name, ends, step and value of each."""
+        board = self.exhibit.answers.sliders if self.exhibit.answers else {}
+        return tuple((each.name, each.low, each.high, each.step, each.value) for each in list(board.values()))
+
+    def watched(self) -> dict[str, float]:
+        """What the worlds were told to watch; of the same name, the first world's."""
+        found: dict[str, float] = {}
+        for world in self.worlds:
+            try:
+                found = world.read_watched() | found
+            except InputError as error:
+                self.complaint = str(error)
+        return found
+
+    def mend(self, error: SketchError) -> bool:
+        """Go on without the `update` of a sketch that has failed; whether that is possible."""
+        self.complaint = str(error)
+        before = sum(len(world.actors) for world in self.worlds)
+        for world in self.worlds:
+            world.actors[:] = [actor for actor in world.actors if not isinstance(actor, Updates)]
+        return sum(len(world.actors) for world in self.worlds) < before
 
     def takes_at_once(self, command: Command | None) -> bool:
         """Whether this may be done between two substeps: gravity and hands that hold something are asked for in each of them.
@@ -177,6 +273,7 @@ class Stage:
         """Back to the start; settings stay."""
         self.hands.release_all()
         self.panels.restore(self._saved)
+        self.history = History(self.panels)
         self._pinned += 1  # masses are what they were
         self.look_anew()
 
@@ -185,6 +282,7 @@ class Stage:
         outlines: list[tuple[tuple[float, float], ...]] = []
         lines: list[tuple[tuple[float, float], tuple[float, float]]] = []
         panels: list[PanelShape] = []
+        seams: list[tuple[int, int, Seam]] = []
         first, starts = 0, []
         for k, (panel, world) in enumerate(zip(self.panels, self.worlds, strict=True)):
             dx, dy = self.layout.offset(k)
@@ -193,6 +291,8 @@ class Stage:
                 lines.append(((extent[0] + dx, self.panels.line + dy), (extent[2] + dx, self.panels.line + dy)))
             if len(self.panels) > 1:
                 panels.append(PanelShape(panel.name, first, len(world), self._start_energies[k], self.layout.strip(k)))
+            if seam := world.boundary.seam:
+                seams.append((first, len(world), seam._replace(low_x=seam.low_x + dx, low_y=seam.low_y + dy)))
             starts.append(first)
             first += len(world)
         return Shape(
@@ -208,6 +308,8 @@ class Stage:
             obstacles=self._standing.draw(self.layout),
             scene=self.exhibit.scene,
             scenes=scenes,
+            answers=tuple(name for name in ("keys", "click") if self.exhibit.answers and self.exhibit.answers.has(name)),
+            countable=self.exhibit.countable,
             radius=_kept(np.concatenate([world.radius for world in self.worlds], dtype=np.float32)),
             mass=_kept(np.concatenate([world.mass for world in self.worlds], dtype=np.float32)),
             number=_kept(np.concatenate([world.number for world in self.worlds], dtype=np.uint32, casting="unsafe")),
@@ -217,6 +319,7 @@ class Stage:
                 np.concatenate([pairs + start for pairs, start in zip(self._apart, starts, strict=True)]).astype(np.uint32)
             ),
             colours=self._colours(),
+            seams=tuple(seams),
         )
 
     def _bounded(self) -> bool:

@@ -111,16 +111,16 @@ class _Encoder:
 
     def __init__(self) -> None:
         self._frame: Frame | None = None
-        self._frames: dict[tuple[Rect | None, bool], bytes] = {}
+        self._frames: dict[tuple[Rect | None, bool, bool], bytes] = {}
         self._shape: Shape | None = None
         self._shape_bytes = b""
 
     def frame(self, frame: Frame, look: Look) -> bytes:
         if frame is not self._frame:
             self._frame, self._frames = frame, {}
-        key = (look.part, look.velocity)
+        key = (look.part, look.velocity, look.pushes)
         if key not in self._frames:
-            self._frames[key] = encode_frame(frame, look.part, velocity=look.velocity)
+            self._frames[key] = encode_frame(frame, look.part, velocity=look.velocity, force=look.pushes)
         return self._frames[key]
 
     def shape(self, shape: Shape) -> bytes:
@@ -183,7 +183,13 @@ class Tab:
                 else:
                     self._session.submit(request)
             except InputError as error:
-                await self._websocket.send_bytes(encode_refusal(str(error)))
+                await self._send(encode_refusal(str(error)))
+
+    async def _send(self, message: bytes) -> None:
+        try:
+            await self._websocket.send_bytes(message)
+        except RuntimeError as error:  # Starlette's word for a tab that has gone meanwhile
+            raise WebSocketDisconnect from error
 
     def _acknowledge(self, seq: int) -> None:
         if seq not in self._in_flight:
@@ -204,11 +210,13 @@ class Tab:
                 continue
             if frame.shape is not shape:
                 shape = frame.shape
-                await self._websocket.send_bytes(self._encoder.shape(shape))
+                await self._send(self._encoder.shape(shape))
             self._session.take(frame, velocity=look.moving)
+            if look.pushes:
+                self._session.weigh(frame)
             sent = (frame.seq, look)
             self._in_flight.append(frame.seq)
-            await self._websocket.send_bytes(await self._encode(frame, look))
+            await self._send(await self._encode(frame, look))
 
     async def _encode(self, frame: Frame, look: Look) -> bytes:
         if not draws_here(frame.shape):

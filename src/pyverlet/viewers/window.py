@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, PyverletError
 from pyverlet.picture import DARK, Colouring, Theme, View
+from pyverlet.picture.pen import Draw
 from pyverlet.picture.raster import check_size
 from pyverlet.viewers.frames import Rect
 from pyverlet.viewers.hands import Hands
@@ -44,7 +45,7 @@ class Window:
         title: in the title bar.
         dt: simulated seconds a frame, and the pace.
         size: (width, height) at the start, pixels.
-        colour, theme, part: as for `pyverlet.record.to_video`.
+        colour, theme, part, draw: as for `pyverlet.record.to_video`.
 
     Raises:
         InputError: an argument is outside what is allowed, or the extra `window` is missing.
@@ -61,10 +62,11 @@ class Window:
         colour: Colouring | None = None,
         theme: Theme = DARK,
         part: Rect | None = None,
+        draw: Draw | None = None,
     ) -> None:
         check_extra()
         self._world, self._title, self._dt = world, title, checks.number("dt", dt, above=0.0)
-        self._new_painter: Callable[[tuple[int, int]], Painter] = partial(_painter, world, colour, theme, part)
+        self._new_painter: Callable[[tuple[int, int]], Painter] = partial(_painter, world, colour, theme, part, draw)
         self._painter = self._new_painter(check_size(size))
         self._saved = world.save()
         self._hands = Hands(world)
@@ -213,8 +215,10 @@ class Window:
         return (view.left, view.top - view.height / view.scale, view.left + view.width / view.scale, view.top)
 
 
-def _painter(world: World, colour: Colouring | None, theme: Theme, part: Rect | None, size: tuple[int, int]) -> Painter:
-    return Painter(world, size=size, colour=colour, theme=theme, part=part)
+def _painter(
+    world: World, colour: Colouring | None, theme: Theme, part: Rect | None, draw: Draw | None, size: tuple[int, int]
+) -> Painter:
+    return Painter(world, size=size, colour=colour, theme=theme, part=part, draw=draw)
 
 
 def check_extra() -> None:

@@ -95,11 +95,9 @@ class Emitter(Actor):
         allowed = world.is_free(places)
         places, sizes, near = places[allowed], sizes[allowed], self._near(world)
         taken = np.zeros(len(places), bool)
-        found = int(
-            placing.free_places(
-                places, sizes, world.position[near].astype(np.float64), world.radius[near].astype(np.float64), wanted, taken
-            )
-        )
+        there = world.position[near].astype(np.float64), world.radius[near].astype(np.float64)
+        period_x, period_y = map(float, world.boundary.seam.period)
+        found = int(placing.free_places(places, sizes, *there, period_x, period_y, wanted, taken))
         if found:
             weight = {"mass": self.mass, "density": self.density}
             world.add(position=places[taken], velocity=self.velocity, radius=sizes[taken], **weight)  # type: ignore[arg-type]
@@ -128,7 +126,8 @@ class Emitter(Actor):
     def _near(self, world: World) -> NDArray[np.intp]:
         """Indices of the world's particles that may reach into the region."""
         x0, y0, x1, y1 = self.region.extent()
-        (x, y), r = world.position.T, world.radius
+        middle = np.array(((x0 + x1) / 2, (y0 + y1) / 2))
+        (x, y), r = (middle + world.boundary.seam.nearest(world.position - middle)).T, world.radius
         return np.flatnonzero((x + r > x0) & (x - r < x1) & (y + r > y0) & (y - r < y1))
 
 

@@ -6,12 +6,21 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
+from pyverlet.ground import checks
+from pyverlet.world.watched import Watched
+
 if TYPE_CHECKING:
     from pyverlet.world.world import World
 
 
-class Doors:
+class Doors(Watched):
     """What a world offers besides physics. Nothing is loaded before it is asked for."""
+
+    def run(self: World, *, seconds: float, dt: float = 1 / 60) -> None:  # type: ignore[misc]
+        """Advance by as many frames of dt as come nearest to `seconds`."""
+        seconds = checks.number("seconds", seconds, least=0.0)
+        for _ in range(round(seconds / checks.number("dt", dt, above=0.0))):
+            self.step(dt)
 
     def to_image(self: World, path: Any = None, **options: Any) -> NDArray[Any]:  # type: ignore[misc]
         """A picture of the world now, (height, width, 3) bytes R, G, B; see `pyverlet.record.to_image` for path and options."""

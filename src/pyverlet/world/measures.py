@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -117,13 +118,24 @@ class Measures(Particles):
     def pressure(self) -> float:
         """N/m, what circles push the walls of the room with along their normals, over their length; of the last frame.
 
+        A room without walls that is periodic has the pressure of the virial theorem: the sum of m |v - u|^2, with the velocity u
+        of all together, and of what pushes each pair of circles that meet times their distance, over twice the area. Links and
+        forces between particles are left out.
+
         Raises:
-            InputError: the room has no walls of a known length, or the world notes no contacts.
+            InputError: the room has neither walls of a known length nor periods, or the world notes no contacts.
         """
         touches, length = self._noting(), self.boundary.perimeter()
-        if length is None:
-            raise InputError(f"boundary is {self.boundary!r}; allowed is a pyverlet.Box or a pyverlet.Circle, to have a pressure")
-        return touches.pushed() / length
+        if length is not None:
+            return touches.pushed() / length
+        if not self.boundary.seam:
+            allowed = "a pyverlet.Box, Circle or Periodic"
+            raise InputError(f"boundary is {self.boundary!r}; allowed is {allowed}, to have a pressure")
+        free = np.isfinite(self.mass)
+        mass, velocity = self.mass[free].astype(float), self.velocity[free].astype(float)
+        stream = mass @ velocity / max(mass.sum(), 1e-300)
+        motion = float((mass[:, None] * (velocity - stream) ** 2).sum())
+        return (motion + touches.virial()) / (2 * self.boundary.seam.period_x * self.boundary.seam.period_y)
 
     def _place(self) -> Place:
         """What circles may meet, for the events of a frame."""
@@ -134,19 +146,32 @@ class Measures(Particles):
             raise InputError("contacts are off in this world; allowed is a world built with World(contacts=True)")
         return self._touches
 
+    @contextmanager
+    def noting_contacts(self) -> Iterator[Touches]:
+        """Frames meanwhile note contacts, as those of a world built with World(contacts=True) do; what is there to read them."""
+        before = self._touches
+        self._touches = Touches() if before is None else before
+        try:
+            yield self._touches
+        finally:
+            self._touches = before
+
     def _listen(self, h: float, told: Callable[[str], None]) -> Callable[[str], None]:
         """Who is told of the stages of a frame: `told`, and before it those who note contacts."""
         if self._touches is None:
             return told
-        listed = self._contacts.listed if self._contacts and len(self) > 1 else None
-        return self._touches.frame(self._slots, self._state, h, self.boundary, self._course, listed, told)
+        listed = virial = None
+        if self._contacts and len(self) > 1:
+            self._contacts.weigh(bool(self.boundary.seam) and self.boundary.perimeter() is None)
+            listed, virial = self._contacts.listed, self._contacts.virial
+        return self._touches.frame(self._slots, self._state, h, self.boundary, self._course, listed, virial, told)
 
-    def _spent(self) -> tuple[float, float, float]:
-        """What impacts, friction and the energy limiter have taken in this frame, J, as they have noted; negative."""
+    def _spent(self) -> tuple[float, float, float, float]:
+        """What impacts, friction, the energy limiter and the room have given in this frame, J, as they have noted."""
         spent = self._slots.spent.sum(axis=0)
         if self._contacts:
             spent += self._contacts.spent()
-        return float(spent[0]), float(spent[1]), -self._slots.taken
+        return float(spent[0]), float(spent[1]), -self._slots.taken, self._slots.worked
 
     def momentum(self) -> Array:
         """(2,) sum of m v over all free particles, kg m/s."""

@@ -34,7 +34,7 @@ class Moment:
 
     def positions(self) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
         """Copies of positions (n, 2) in m, in the engine's order, and whose each row is: less than half the work of `look`."""
-        return np.array(self._slots.position, dtype=np.float32), self._slots.particle
+        return np.array(self._slots.seam.wrapped(self._slots.position), dtype=np.float32), self._slots.particle
 
     def look(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
         """Copies of positions (n, 2) in m and velocities (n, 2) in m/s, in the engine's order, and whose each row is."""
@@ -42,4 +42,6 @@ class Moment:
         position, velocity = np.empty((2, len(slots), 2), np.float32)
         lag = slots.real(self._lag)
         wire.copy_moving(slots.position, slots.velocity, slots.acceleration, slots.resting, lag, position, velocity)
+        if slots.seam:
+            slots.seam.wrap(position)
         return position, velocity, slots.particle  # reordering makes a new one, and leaves this as it is

@@ -16,11 +16,12 @@ from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.group import Column, Group
 from pyverlet.state.state import EVERYONE, Slots, State
+from pyverlet.world.turns import Shared, in_turn
 
 Array = NDArray[Any]
 
 
-class Particles:
+class Particles(Shared):
     """The particles of a world. Its arrays are views, in the order the particles were added."""
 
     _state: State
@@ -33,6 +34,7 @@ class Particles:
     obstacles: Obstacles
     _course: Course
 
+    @in_turn
     def add(
         self,
         *,
@@ -123,6 +125,7 @@ class Particles:
                 f"position[{k}] is ({x:g}, {y:g}) m, {what}; allowed are free places, and all with allow_overlap=True"
             )
 
+    @in_turn
     def remove(self, which: Group | ArrayLike) -> None:
         """Remove particles. Groups keep the others, whose indices close ranks.
 

@@ -274,7 +274,7 @@ def _books(facts: Facts) -> Bookkeeper:
     books = Bookkeeper()
     books._energy, books._resting = (checks.number(name, facts[name]) for name in ("energy", "resting"))
     accounts = Ledger().as_dict()
-    books.ledger = Ledger(**{name: checks.number(name, facts["ledger"][name]) for name in accounts})
+    books.ledger = Ledger(**{name: checks.number(name, facts["ledger"].get(name, 0.0)) for name in accounts})
     return books
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,7 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import grid, motion, queries
+from pyverlet.state.seam import Seam
 from pyverlet.state.state import State
+from pyverlet.world.images import PERIODS, Images, left_in_room
 
 _ask: Any = queries
 _grid: Any = grid
@@ -53,7 +56,11 @@ class Queries:
         found = np.full(len(where), -1, np.int64)
         if len(self._state):
             reach = float(self._state.radius.max())
-            _ask.at_points(where, reach, *_cells(self._state, len(where)), self._state.position, self._state.radius, found)
+            seen = Images.of(self._state, reach)
+            _ask.at_points(
+                self._state.seam.wrapped(where), reach, *_cells(seen.position, len(where)), seen.position, seen.radius, found
+            )
+            found = seen.named(found)
         return found
 
     def in_box(self, lower: ArrayLike, upper: ArrayLike) -> Indices:
@@ -101,7 +108,7 @@ class Queries:
         Args:
             origin: (q, 2) or (2,), m.
             direction: (q, 2) or (2,) where they go; its length does not matter.
-            length: m, how far they reach, or (q,).
+            length: m, how far they reach, or (q,). In a periodic room they go on through the seam, for 100 rooms at most.
         """
         start, heading = checks.rows("origin", origin, np.dtype(float)), checks.rows("direction", direction, np.dtype(float))
         start, heading = _alike("origin", start, "direction", heading)
@@ -109,20 +116,25 @@ class Queries:
         if (wrong := np.flatnonzero(norm == 0)).size:
             raise InputError(f"direction[{wrong[0]}] is (0.0, 0.0); allowed is a direction other than 0")
         heading = heading / norm[:, None]
-        far = checks.column("length", length, np.dtype(float), len(start))
+        far = np.array(checks.column("length", length, np.dtype(float), len(start)))
         if (wrong := np.flatnonzero(~(far >= 0))).size:
             raise InputError(f"length[{wrong[0]}] is {far[wrong[0]]:g}; allowed is a number of at least 0")
         index, distance, normal = np.full(len(start), -1, np.int64), np.full(len(start), np.inf), np.zeros((len(start), 2))
         if len(self._state):
             s = self._state
-            _ask.rays(
-                start, heading, far, float(s.radius.max()), *_cells(s, len(start)), s.position, s.radius, index, distance
-            )  # fmt: skip
-            hit = index >= 0
-            rim = start[hit] + distance[hit, None] * heading[hit] - s.position[index[hit]]
-            out = np.hypot(*rim.T)[:, None]
-            # From the very centre of a particle every way out is as good: against the ray.
-            normal[hit] = np.divide(rim, out, out=-heading[hit], where=out > 0)
+            reach = float(s.radius.max())
+            seen = Images.of(s, reach)
+            cells = _cells(seen.position, len(start))
+            for rays, at, gone, left in _pieces(start, heading, far, s.seam):
+                piece, way = np.full(len(rays), -1, np.int64), np.full(len(rays), np.inf)
+                _ask.rays(at, heading[rays], left, reach, *cells, seen.position, seen.radius, piece, way)
+                hit = piece >= 0
+                index[rays[hit]], distance[rays[hit]] = seen.named(piece[hit]), gone[hit] + way[hit]
+                rim = at[hit] + way[hit, None] * heading[rays[hit]] - seen.position[piece[hit]]
+                out = np.hypot(*rim.T)[:, None]
+                # From the very centre of a particle every way out is as good: against the ray.
+                normal[rays[hit]] = np.divide(rim, out, out=-heading[rays[hit]], where=out > 0)
+                far[rays[hit]] = -1.0  # no further
         return RayHits(index, distance, normal)
 
     def nearest(self, points: ArrayLike, k: int = 1) -> Nearest:
@@ -131,26 +143,86 @@ class Queries:
         count = checks.whole("k", k)
         index, square = np.full((len(where), count), -1, np.int64), np.full((len(where), count), np.inf)
         if len(self._state):
-            _ask.nearest(where, *_cells(self._state, len(where)), self._state.position, index, square)
+            position, seam = self._state.seam.wrapped(self._state.position), self._state.seam
+            cells, inside = _cells(position, len(where)), seam.wrapped(where)
+            for shift in seam.images():
+                seen, far = np.full_like(index, -1), np.full_like(square, np.inf)
+                _ask.nearest(inside - shift, *cells, position, seen, far)
+                index, square = _nearer(index, square, seen, far)
         return Nearest(index, np.sqrt(square))
 
     def _in(self, low: Floats, high: Floats, middle: Floats, size: Floats, *, many: bool) -> Indices:
-        found, room = 0, 64
-        query, particle = (np.zeros(0, np.int64) for _ in range(2))
+        pairs, seam = np.zeros((0, 2), np.int64), self._state.seam
         if len(self._state):
-            cells = _cells(self._state, len(low))
-            while room > len(query):
-                query, particle = (np.empty(room, np.int64) for _ in range(2))
-                found = int(_ask.in_regions(low, high, middle, size, *cells, self._state.position, query, particle))
-                room = max(room, found)
-        order = np.lexsort((particle[:found], query[:found]))
-        pairs = np.column_stack((query[:found], particle[:found]))[order]
+            position = self._state.position
+            if seam:
+                position = seam.wrapped(position)
+                low, high, middle = _in_first_room(low, high, middle, size, seam)
+            cells = _cells(position, len(low))
+            rows = [_regions(low - shift, high - shift, middle - shift, size, cells, position) for shift in seam.images()]
+            pairs = np.concatenate(rows)
+            pairs = np.unique(pairs, axis=0) if seam else pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
         return pairs if many else np.ascontiguousarray(pairs[:, 1])
 
 
-def _cells(state: State, questions: int) -> tuple[Any, ...]:
+def _regions(low: Floats, high: Floats, middle: Floats, size: Floats, cells: tuple[Any, ...], position: NDArray[Any]) -> Indices:
+    """(k, 2) rows of region and particle, in no order."""
+    found, room = 0, 64
+    query, particle = (np.zeros(0, np.int64) for _ in range(2))
+    while room > len(query):
+        query, particle = (np.empty(room, np.int64) for _ in range(2))
+        found = int(_ask.in_regions(low, high, middle, size, *cells, position, query, particle))
+        room = max(room, found)
+    return np.column_stack((query[:found], particle[:found]))
+
+
+def _in_first_room(low: Floats, high: Floats, middle: Floats, size: Floats, seam: Seam) -> tuple[Floats, Floats, Floats]:
+    """Regions moved by whole periods into the room, or beside it; no box wider than that."""
+    where = np.where(np.isfinite(size)[:, None], middle, low)
+    move = seam.wrapped(where) - where
+    low, high, middle = low + move, high + move, middle + move
+    for axis, (corner, period) in enumerate(((seam.low_x, seam.period_x), (seam.low_y, seam.period_y))):
+        wide = (high[:, axis] - low[:, axis] >= period) & np.isinf(size) if period > 0 else np.zeros(len(low), bool)
+        low[wide, axis], high[wide, axis] = corner, corner + period
+    return low, high, middle
+
+
+def _nearer(index: Indices, square: Floats, other: Indices, far: Floats) -> tuple[Indices, Floats]:
+    """Of two lists of nearest particles (q, k) the nearest of both, each particle once."""
+    both, distance = np.concatenate((index, other), axis=1), np.concatenate((square, far), axis=1)
+    order = np.lexsort((both, distance), axis=1)
+    both, distance = np.take_along_axis(both, order, 1), np.take_along_axis(distance, order, 1)
+    named = np.argsort(both, axis=1, kind="stable")  # of equal particles the nearer one comes first
+    again = np.zeros(both.shape, bool)
+    sorted_by_name = np.take_along_axis(both, named, 1)
+    np.put_along_axis(again, named[:, 1:], (np.diff(sorted_by_name, axis=1) == 0) & (sorted_by_name[:, 1:] >= 0), 1)
+    distance[again], both[again] = np.inf, -1
+    order = np.argsort(distance, axis=1, kind="stable")[:, : index.shape[1]]
+    return np.take_along_axis(both, order, 1), np.take_along_axis(distance, order, 1)
+
+
+def _pieces(start: Floats, heading: Floats, far: Floats, seam: Seam) -> Iterator[tuple[Indices, Floats, Floats, Floats]]:
+    """Rays in pieces that stay in the room, as far as `far` lets them: which, from where, how far they have come and go on."""
+    if not seam:
+        yield np.arange(len(start)), start, np.zeros(len(start)), far.copy()
+        return
+    at, gone = seam.wrapped(start), np.zeros(len(start))
+    for k in range(PERIODS):
+        rays = np.flatnonzero(far > gone if k else far >= 0)
+        if not len(rays):
+            return
+        ahead = np.minimum(left_in_room(at[rays], heading[rays], seam), far[rays] - gone[rays])
+        yield rays, at[rays], gone[rays], ahead
+        if not np.isfinite(ahead).all():
+            far[rays[np.isinf(ahead)]] = -1.0
+            ahead = np.where(np.isinf(ahead), 0.0, ahead)
+        at[rays] = seam.entered(at[rays] + ahead[:, None] * heading[rays], heading[rays])
+        gone[rays] += ahead
+
+
+def _cells(position: NDArray[Any], questions: int) -> tuple[Any, ...]:
     """Cells over all centres with about one particle in each, as the kernels take them; one for all where that is cheaper."""
-    position, member = state.position, np.arange(len(state))
+    member = np.arange(len(position))
     if motion.first_non_finite(position) >= 0:
         member = np.flatnonzero(np.isfinite(position).all(axis=1))
         position = position[member]

@@ -35,6 +35,8 @@ from pyverlet.world.profile import Profile
 from pyverlet.world.queries import Queries
 from pyverlet.world.saved import Saved
 from pyverlet.world.substeps import Substeps
+from pyverlet.world.team import Team
+from pyverlet.world.turns import in_turn
 
 Array = NDArray[Any]
 
@@ -48,7 +50,7 @@ class World(Measures, Queries, Doors):
     Args:
         gravity: (x, y), m/s^2.
         integrator: how positions and velocities advance over a substep.
-        boundary: Circle, Box or Open.
+        boundary: Circle, Box, Periodic or Open.
         collisions: how particles collide; None lets them pass through each other.
         substeps: steps of length h = dt / substeps in one call of `step`.
         dtype: float32 or float64, of all arrays.
@@ -56,7 +58,7 @@ class World(Measures, Queries, Doors):
         contacts: note who touches what, where and how hard, in `contacts`, and for `force_on` and `pressure`.
         sleep: let circles at rest sleep until touched, at little cost; not with links, moving obstacles or forces but drag.
         ledger: keep account of where the energy goes, in `ledger`.
-        threads: at most this many for the parallel stages; None is as many as pay off. Never changes the result.
+        threads: at most this many for the parallel stages, and no more than measurably gain. Never changes the result.
 
     Attributes:
         forces: list of forces besides gravity; append and remove as you like.
@@ -89,26 +91,23 @@ class World(Measures, Queries, Doors):
         self._state = State(checks.floating("dtype", dtype))
         self._h_last: float | None = None  # substep of the frame before; None: the integrator starts anew
         self._slots = Slots(self._state.dtype, sleeps=sleep)
-        self.links = Links(self._state)
+        self.links, self.forces, self.obstacles = Links(self._state), ForceList(), Obstacles()
         self._events, self._touches = Events() if events else None, Touches() if contacts else None
         self._sleep = Sleep() if sleep else None
-        self.forces = ForceList()
         self._force_sum, self.actors = ForceSum(checks.vector("gravity", gravity), self.forces), list[Actor]()
-        self.obstacles = Obstacles()
         self._course = Course(self.obstacles)
         self.integrator = PositionVerlet() if integrator is None else integrator
         self.boundary = Open() if boundary is None else boundary
-        self.collisions = collisions
-        self.substeps = substeps
-        self.threads = threads
+        self.collisions, self.substeps, self.threads = collisions, substeps, threads
         self.time, self.frames = 0.0, 0
         self.profile, self._books = Profile(), Bookkeeper() if ledger else None
-        self._run, self._coarse = Substeps(), Coarse()
+        self._run, self._coarse, self._team = Substeps(), Coarse(), Team()
         self.onlooker: Callable[[Moment], None] | None = None
         """Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins."""
 
     # ---- one frame -----------------------------------------------------------------------------------------------------
 
+    @in_turn
     def step(self, dt: float) -> None:
         """Advance by one frame of dt seconds, in `substeps` steps of h = dt / substeps.
 
@@ -119,7 +118,7 @@ class World(Measures, Queries, Doors):
         h = checks.number("dt", dt, above=0.0) / self.substeps
         for actor in self.actors:
             actor.act(self, dt)
-        jit.use_threads(self.threads)
+        self._team.gather(self.threads, self.profile.frame_ms)
         self.profile.begin()
         books = self._open_books(h)
         self._frame(h, self._listen(h, books or self.profile.mark))
@@ -174,12 +173,6 @@ class World(Measures, Queries, Doors):
         """Who looks after the energy of this frame, if nothing but contacts, links and obstacles could raise it."""
         return Watch(self._state, self._force_sum, self.links, self.boundary) if undriven(self, h, self._h_last) else None
 
-    def run(self, *, seconds: float, dt: float = 1 / 60) -> None:
-        """Advance by as many frames of dt as come nearest to `seconds`."""
-        seconds = checks.number("seconds", seconds, least=0.0)
-        for _ in range(round(seconds / checks.number("dt", dt, above=0.0))):
-            self.step(dt)
-
     def _open(self, h: float, done: Callable[[str], None]) -> bool:
         """Take up what users have set, and begin; False if nobody is awake."""
         if self.links.begin() and self._contacts:
@@ -201,6 +194,8 @@ class World(Measures, Queries, Doors):
         if not self._slots.most_friction < np.inf:
             checks.at_most("friction", self._state.friction, float(np.finfo(self.dtype).max))
         if not changed:
+            if self._contacts:
+                self._contacts.broad_phase.follow(self._slots)
             return
         try:
             checks.positive("radius", self._state.radius)
@@ -315,7 +310,7 @@ class World(Measures, Queries, Doors):
 
     @property
     def boundary(self) -> Boundary:
-        """The room: Circle, Box, Open or your own."""
+        """The room: Circle, Box, Periodic, Open or your own."""
         return self._boundary
 
     @boundary.setter
@@ -323,7 +318,10 @@ class World(Measures, Queries, Doors):
         if not isinstance(value, Boundary):
             raise InputError(f"boundary is {value!r}; allowed is an object such as pyverlet.Circle(radius=10) or pyverlet.Open()")
         value.check(self._state.radius)
-        self._boundary = value
+        self.links.check(value.seam)
+        if value.seam != self._state.seam and (contacts := getattr(self, "_contacts", None)):  # its list is about other images
+            contacts.broad_phase.forget()
+        self._boundary, self._state.seam, self._course.seam = value, value.seam, value.seam
 
     @property
     def collisions(self) -> Collisions | None:
@@ -341,7 +339,7 @@ class World(Measures, Queries, Doors):
 
     @property
     def threads(self) -> int:
-        """Threads the parallel stages use; the result is the same for any number. Set None for as many as pay off."""
+        """Threads the parallel stages use at most, fewer where these do not gain: the result is the same for any number."""
         if self._threads is None:
             return jit.max_threads() if len(self) >= ALL_THREADS_FROM else 1
         return self._threads if len(self) >= ONE_THREAD_BELOW else 1
@@ -353,6 +351,7 @@ class World(Measures, Queries, Doors):
 
     # ---- save and restore ----------------------------------------------------------------------------------------------
 
+    @in_turn
     def save(self) -> Saved:
         """A copy of everything that moves; `restore` continues from it with the same bits."""
         return Saved(
@@ -371,6 +370,7 @@ class World(Measures, Queries, Doors):
             links=self.links.save(),
         )
 
+    @in_turn
     def restore(self, saved: Saved) -> None:
         """Go back to what `save` returned, with the particles of then: groups added since are dead, removed ones live again.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 
 from pyverlet.ground.errors import InputError
-from pyverlet.lab.physics import bounce, energy, friction, gas, lost, rest, sizes
+from pyverlet.lab.physics import bounce, endless, energy, friction, gas, lost, rest, sizes
 from pyverlet.lab.physics._check import Check, Result, Row
 
 __all__ = ["CHECKS", "Check", "Result", "Row", "named"]
@@ -22,6 +22,10 @@ CHECKS: tuple[Check, ...] = (
     Check("gas-energy", gas.energy, {"particles": 1000, "seconds": 10}, full={"seconds": 60}),
     Check("gas-angular-momentum", gas.angular_momentum, {"particles": 1000, "seconds": 10}, full={"seconds": 60}),
     Check("gas-speeds", gas.speeds, {"particles": 1000, "seconds": 10}, full={"seconds": 60}),
+    Check("gas-periodic", endless.kept, {"particles": 1000, "seconds": 5, "fraction": 0.3},
+          full={"seconds": 60, "fraction": 0.5}),
+    Check("gas-pressure", endless.pressure, {"particles": 400, "seconds": 3, "fraction": 0.3},
+          full={"particles": 900, "seconds": 10, "fraction": 0.5}),
     Check("rest-cage", rest.cage, {"particles": 2000, "seconds": 30}, full={"particles": 20_000}),
     Check("rest-substeps", rest.substeps, {"particles": 1000, "seconds": 15}, full={"particles": 20_000, "seconds": 30}),
     Check("rest-column", rest.column, {"particles": 100, "seconds": 60}),

@@ -25,6 +25,7 @@ from pyverlet.ground.constants import (
     WORTH_LOOKING,
 )
 from pyverlet.kernels import pairs as kernels
+from pyverlet.laws.contacts.crowd import Crowd, free_skin
 from pyverlet.laws.contacts.grids import Grids
 from pyverlet.state.moves import strayed
 from pyverlet.state.state import Slots
@@ -104,6 +105,9 @@ class BroadPhase(ABC):
     def forget(self) -> None:
         """The list is no longer valid (particles, radii or masses changed)."""
 
+    def follow(self, state: Slots) -> None:
+        """A frame begins in a periodic room: places are to be those images that the list is about."""
+
     def lasts(self) -> tuple[Any, ...] | None:
         """What `update` depends on, if as long as it does nothing it is but calls of kernels; None: there is more to it."""
         return None
@@ -154,11 +158,9 @@ class _AllPairs(BroadPhase):
 
     def _fill(self, state: Slots) -> int:
         pairs = self.list
-        found = int(
-            kernels.list_all_pairs(
-                state.position, state.radius, state.inverse_mass, state.category, state.mask, pairs.pair_i, pairs.pair_j
-            )
-        )
+        period_x, period_y = state.reals(*state.seam.period)
+        who = (state.inverse_mass, state.category, state.mask)
+        found = int(kernels.list_all_pairs(state.position, state.radius, period_x, period_y, *who, pairs.pair_i, pairs.pair_j))
         pairs.set_strips(1)
         pairs.count[0] = found
         return found
@@ -226,6 +228,14 @@ class _SortedCells(BroadPhase):
         in_order = not self._grids.falls and len(self._grids.levels.base) == 1
         return Strips(self._held, self._checked, self._allowed, in_order)
 
+    def follow(self, state: Slots) -> None:
+        if not state.seam or self._allowed < 0:
+            return
+        state.seam.follow(state.position, self._checked)
+        if state.seam.strays(state.position):  # the farther a crowd has drifted, the fewer digits are left
+            state.seam.wrap(state.position)
+            self._allowed = -1.0
+
     def forget(self) -> None:
         self._allowed = -1.0
         self._mean_radius = 0.0
@@ -278,40 +288,52 @@ class _SortedCells(BroadPhase):
         self._age, self._allowed = 0, -1.0  # until it is done: somebody may break it off
         if not self._mean_radius:
             self._mean_radius = float(state.radius.mean(dtype=np.float64))
-        skin = self.skin_diameters * 2.0 * self._mean_radius
-        self._half_skin = 0.5 * skin
-        self._grids = self._worn = Grids(state.position, state.radius, skin, worn=self._worn)
-        # Strip by strip all slots are gone through, and those of a strip must stand together.
-        if self._grids.falls > (UNSORTED * len(state) if len(state) < FUSED_FROM else 0):
-            state.reorder(self._grids.order)
-            self._grids.renumber()
-        self._fill(state, state.real(skin))
+        crowd = self._sort(state)
+        skin = 2.0 * self._half_skin
+        self._fill(crowd, state.real(skin + crowd.rounding))
         self.built = self._checked = memory.copy(state.position)
         self._allowed = self._half_skin
-        which = (self.list.first, self.list.count, self.list.pair_i, self.list.pair_j)
-        looked, far = kernels.count_far(state.position, state.radius, *which, state.real(skin / SKIN_STEP), SAMPLE)
+        which = self.list.listed()
+        looked, far = kernels.count_far(crowd.position, crowd.radius, *which, state.real(skin / SKIN_STEP), SAMPLE)
         self._excess = far / max(looked, 1) * int(self.list.count.sum()) / max(len(state), 1)
+        crowd.bring_home(which, self._grids)
 
-    def _fill(self, state: Slots, skin: Any) -> None:
-        pairs, cells = self.list, self._grids
+    def _sort(self, state: Slots) -> Crowd:
+        """Stand the circles, and their copies across a seam, in cells; slots are reordered if many are out of order."""
+        for _ in range(2):
+            skin = min(self.skin_diameters * 2.0 * self._mean_radius, free_skin(state))
+            self._half_skin = 0.5 * skin
+            crowd = Crowd.of(state, skin)
+            self._grids = self._worn = Grids(crowd.position, crowd.radius, skin, worn=self._worn, crowd=crowd)
+            # Strip by strip all slots are gone through, and those of a strip must stand together.
+            if not self._grids.falls > (UNSORTED * len(state) if len(state) < FUSED_FROM else 0):
+                break
+            state.reorder(crowd.originals(self._grids.order))
+            if not crowd.copies:
+                self._grids.renumber()
+                return Crowd.of(state, skin)
+        return crowd
+
+    def _fill(self, crowd: Crowd, skin: Any) -> None:
+        pairs, cells, count = self.list, self._grids, len(crowd.radius)
         rows, held = cells.strips()
         self._held = held
-        picky = len(state.category) > 0 or not state.inverse_mass.all()
+        picky = len(crowd.category) > 0 or not crowd.inverse_mass.all()
         pairs.set_strips(len(rows) - 1)
-        if len(pairs.pair_i) != self._room * len(state):
-            pairs.make_room(self._room * len(state))
+        if len(pairs.pair_i) != self._room * count:
+            pairs.make_room(self._room * count)
         while True:
             first = held * self._room
-            self._spot = memory.room(self._spot, size := 3 * (len(state) + LANES))
-            self._used = memory.room(self._used, len(state))
-            spot, used = self._spot[:size].reshape(3, -1), self._used[: len(state)]
+            self._spot = memory.room(self._spot, size := 3 * (count + LANES))
+            self._used = memory.room(self._used, count)
+            spot, used = self._spot[:size].reshape(3, -1), self._used[:count]
             kernels.list_pairs(
-                state.position, state.radius, cells.order, cells.levels, cells.start, rows, first, skin,
-                picky, state.category, state.mask, state.inverse_mass,
+                crowd.position, crowd.radius, cells.order, cells.levels, cells.start, rows, first, skin,
+                picky, crowd.category, crowd.mask, crowd.inverse_mass,
                 spot, used, pairs.pair_i, pairs.pair_j, pairs.count,
             )  # fmt: skip
             if (pairs.count <= np.diff(first)).all():
                 pairs.first[:] = first[:-1]
                 return
             self._room = int(np.ceil(1.25 * (pairs.count / np.maximum(np.diff(held), 1)).max()))
-            pairs.make_room(self._room * len(state))
+            pairs.make_room(self._room * count)

@@ -16,6 +16,7 @@ from pyverlet.kernels import overlap
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast, PairList, Strips
 from pyverlet.laws.contacts.growth import Growth
 from pyverlet.laws.contacts.loans import Lent, Loans
+from pyverlet.laws.contacts.pegs import Pegs
 from pyverlet.laws.contacts.slips import Kept, Slips
 from pyverlet.laws.contacts.wide import Inertia, Wide
 from pyverlet.laws.events import Events
@@ -82,7 +83,7 @@ class ContactSolver:
         self._sleep = sleep
         self._slips = Slips(dtype)
         self._loans = Loans(dtype)
-        self.growth = Growth()
+        self.growth, self._pegs = Growth(), Pegs()
         self.broad_phase.replacing = self._slips.stop
         if events is not None:
             self.broad_phase.renewing = lambda state, pairs: self.collect(state)
@@ -122,13 +123,15 @@ class ContactSolver:
             self._seen = self.broad_phase.rebuilds
             self._unlist(self.broad_phase.list, state.particle)
             free = state.inverse_mass[state.inverse_mass > 0]
-            self._uneven = bool(len(free)) and float(free.max()) > UNEVEN * float(free.min())
+            # Loans of inertia know of no seam.
+            self._uneven = bool(len(free)) and float(free.max()) > UNEVEN * float(free.min()) and not state.seam
             self._lends &= self._uneven
             self._packed = False
+            self._pegs.look(state, self.broad_phase.list)
 
     def _pack(self, state: Slots) -> Wide:
         if not self._packed:
-            self._wide.take(self.broad_phase.list, self.broad_phase.built, state.radius)
+            self._wide.take(self.broad_phase.list, self.broad_phase.built, state.radius, state.seam)
             self._packed = True
             if self._sleep is None:
                 self.broad_phase.release()
@@ -136,7 +139,7 @@ class ContactSolver:
 
     def steady(self, state: Slots) -> Strips | None:
         """Where strips stand, if a substep's contacts are but the two sweeps; None: there is more to them."""
-        alone = not self._uneven and self._sleep is None and state.size is state.radius
+        alone = not (self._uneven or self._sleep is not None or self._pegs) and state.size is state.radius
         return self.broad_phase.strips() if alone else None
 
     def set_up(self, state: Slots, h: float, lag: float, strongest: float, lent: Inertia | None = None) -> Wide:
@@ -150,6 +153,7 @@ class ContactSolver:
 
     def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
         """Let impacts bounce, move other overlapping circles apart, note who touches, and let those grip each other."""
+        self._pegs.before(state, h)
         self._lends = self._uneven and strongest > 0
         lent = Inertia(self._loans.begin(state, h), self._loans.noted()) if self._lends else None
         wide = self.set_up(state, h, lag, strongest, lent)
@@ -159,16 +163,25 @@ class ContactSolver:
             self._loans.free_of_walls(state)
 
     def still(self, state: Slots, h: float) -> None:
-        """Take from touching circles the velocity that projection has put in, and rub them."""
+        """Take from touching circles the velocity that projection has put in, rub them, and hold who is too large for a gap."""
         if self._lends:
             self._loans.join(state, self._wide)
         self._wide.relax(state)
         if self._lends:
             self._loans.balance(state, rubs=self._wide.rubs)
+        self._pegs.hold(state)
 
     def spent(self) -> Any:
         """(2,) J that impacts, and friction, have taken in this frame, negative."""
-        return self._wide.spent.sum(axis=0)
+        return self._wide.spent[:, :2].sum(axis=0)
+
+    def weigh(self, asked: bool) -> None:
+        """Whether somebody asks for the virial."""
+        self._wide.weigh(asked)
+
+    def virial(self) -> float:
+        """Sum over all contacts of this frame of what pushes them apart times their distance, N s m."""
+        return float(self._wide.spent[:, 2].sum())
 
     def clear_notes(self) -> None:
         """A frame begins."""
@@ -237,7 +250,7 @@ def find_contacts(state: State, method: Fast | BruteForce) -> np.ndarray[Any, np
     pairs = phase.list.pairs()
     a, b = slots.position[pairs[:, 0]].astype(np.float64), slots.position[pairs[:, 1]].astype(np.float64)
     reach = slots.radius[pairs].astype(np.float64).sum(axis=1)
-    touching = pairs[np.hypot(*(a - b).T) < reach]
+    touching = pairs[np.hypot(*state.seam.nearest(a - b).T) < reach]
     named = np.sort(slots.particle[touching].astype(np.int64), axis=1)
     return named[np.lexsort(named.T[::-1])]
 
@@ -249,7 +262,7 @@ def measure_overlap(state: State, unlist: Unlist) -> Overlap:
     slots, phase = _listed(state, Fast(skin=0.0))
     pairs = phase.list
     unlist(pairs, slots.particle)
-    number, total, largest = overlap.overlaps(slots.position, slots.radius, *pairs.listed())
+    number, total, largest = overlap.overlaps(slots.position, slots.radius, *map(float, slots.seam.period), *pairs.listed())
     return Overlap(total / number if number else 0.0, largest, number)
 
 

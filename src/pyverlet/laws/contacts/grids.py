@@ -20,8 +20,12 @@ from pyverlet.ground.constants import (
     STRIPS,
 )
 from pyverlet.kernels import grid
+from pyverlet.laws.contacts.crowd import Crowd
 
 Array = NDArray[Any]
+
+_ROUNDED = 1e-3
+"""Rows by which kernels may see the seam lower than it is."""
 
 
 class Grids:
@@ -31,6 +35,7 @@ class Grids:
 
     Args:
         worn: grids that nobody needs any more: their memory is taken over.
+        crowd: whose these are; None: all are circles of their own.
 
     Attributes:
         levels: the grids, as kernels take them.
@@ -39,7 +44,9 @@ class Grids:
         falls: how often `order` falls: 0 if the positions are in that order already, n / 2 if they are in none.
     """
 
-    def __init__(self, position: Array, radius: Array, skin: float, worn: Grids | None = None) -> None:
+    def __init__(
+        self, position: Array, radius: Array, skin: float, worn: Grids | None = None, crowd: Crowd | None = None
+    ) -> None:
         self.levels = _fit(position, radius, skin)
         cells, count = int((self.levels.width * self.levels.height).sum()), len(position)
         # Of a million circles these are 24 MB, and the system takes as long to give them anew as they take to be filled.
@@ -53,6 +60,9 @@ class Grids:
         grid.count_level_cells(position, radius, self.levels, self._cell[:count], self.start)
         self.falls = int(grid.sort_by_cell(self._cell[:count], self.start, self.order))
         self._first: Any = None
+        self._above, self._known = (crowd.above, crowd.known) if crowd else (np.inf, np.inf)
+        if crowd and crowd.copies:
+            self.falls = int(np.count_nonzero(np.diff(crowd.originals(self.order)) < 0))
 
     def renumber(self) -> None:
         """The rows of `position` are in the order of the cells now."""
@@ -64,7 +74,14 @@ class Grids:
         """(strips + 1,) first row of each strip, and how many circles stand in all before it."""
         row, held = np.empty(STRIPS + 1, np.int64), np.empty(STRIPS + 1, np.int64)
         strips = grid.cut_strips(self.levels, self.start, max(len(self.order) // STRIPS, STRIP_PARTICLES), row, held)
-        return row[: strips + 1], held[: strips + 1]
+        row, held = row[: strips + 1], held[: strips + 1]
+        if self._above < np.inf:
+            # Across the seam the last strip writes to the first: it has all rows near the seam, and is an odd one or the only.
+            top = (self._above - float(self.levels.y0)) * float(self.levels.along[0])
+            kept = np.flatnonzero(row[:-1] <= max(top - 1.0 - _ROUNDED, 0.0))
+            kept = kept[: len(kept) - len(kept) % 2] if len(kept) > 1 else kept
+            row, held = np.append(row[kept], row[-1]), np.append(held[kept], held[-1])
+        return row, held
 
     def slack(self, position: Array, built: Array, skin: float) -> float:
         """How much nearer any pair that was farther apart than `skin` may still come before it can touch, m; negative: too near.
@@ -81,7 +98,7 @@ class Grids:
         boxes = (self._first, self._own, self._smaller)
         grid.bound_displacements(position, built, self.order, self.levels, self.start, *boxes)
         near, far = grid.spreads(self.levels, *boxes)
-        gap = (BLOCK_ROWS / self.levels.along - 2 * self.levels.largest).min()
+        gap = min((BLOCK_ROWS / self.levels.along - 2 * self.levels.largest).min(), self._known)
         return min(skin - float(near), float(gap) - float(far))
 
 

@@ -24,8 +24,8 @@ class Growth:
 
     def fit(self, state: Slots, pairs: PairList, fresh: np.ndarray) -> None:
         """Shrink those marked in `fresh` (n,), and whom they overlap, until they just touch."""
-        which = pairs.listed()
-        overlap.fit(state.position, state.radius, *which, fresh, state.real(SMALLEST), state.grown)
+        (period_x, period_y), which = state.reals(*state.seam.period), pairs.listed()
+        overlap.fit(state.position, state.radius, period_x, period_y, *which, fresh, state.real(SMALLEST), state.grown)
         state.resize()
 
     def grow(self, state: Slots, h: float) -> None:

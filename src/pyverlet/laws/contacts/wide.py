@@ -14,7 +14,9 @@ from pyverlet.ground.constants import CARRIED_WEIGHT, COLOURS, DEEP, DEEP_LENT, 
 from pyverlet.kernels import frame, packs, sweeps, tables
 from pyverlet.kernels.bounds import CARRIES
 from pyverlet.kernels.kinds import BOUNCING, ROUGH, SMOOTH
+from pyverlet.kernels.seam import close_gaps
 from pyverlet.laws.contacts.broadphase import PairList, rows_of
+from pyverlet.state.seam import NONE, Seam
 from pyverlet.state.state import Slots
 
 Array = NDArray[Any]
@@ -46,7 +48,9 @@ class Wide:
         normal: (2, room) of pairs that touch, for others 0. depth: (room,) their overlap, m.
         slip: (room,) what contacts have slipped, m. held: (room,) m by which friction has answered it in this substep.
         closing: (room,) largest speed of approach since the last `collect`, m/s; negative: has not touched.
-        spent: (strips, 2) J that impacts, and friction, have taken in this frame, negative.
+        spent: (strips, 3) J that impacts, and friction, have taken in this frame, negative; and the virial of contacts: sum of
+            what pushes each pair apart times their distance, N s m.
+        weighs: whether that is asked for.
         asks: whether any pair may bounce or rub, or somebody listens. rubs: whether any may rub.
     """
 
@@ -54,7 +58,7 @@ class Wide:
         self._dtype = dtype
         self._settings = restitution, friction
         self._listens = listens
-        self.asks = self.rubs = False
+        self.asks = self.rubs = self.weighs = False
         self.begin = np.zeros(1, np.int64)
         self.lanes = self.apart = np.zeros(0, np.int64)
         self._make_room(0)
@@ -65,7 +69,7 @@ class Wide:
         self._varied = self._mixed = 0
         self._deeps = np.zeros(0, np.int64)  # packs of each strip that overlap deeply
         self._looks = True  # whether they are to be noted, once a frame
-        self.spent = np.zeros((1, 2))
+        self.spent = np.zeros((1, 3))
         none = np.empty(0, dtype)
         self._lent, self._nobody = False, (np.empty((0, 2), dtype), none, none, none)
         self._hold_circles(0)
@@ -86,7 +90,7 @@ class Wide:
         self._carries, self._lift, self._leans, self._turned, self._turn = (np.zeros(count, self._dtype) for _ in range(5))
         self._slid = np.zeros((count, 2), self._dtype)
 
-    def take(self, pairs: PairList, origin: Array, radius: Array) -> None:
+    def take(self, pairs: PairList, origin: Array, radius: Array, seam: Seam = NONE) -> None:
         """Pack a new list; origin: (n, 2) positions it was made from; radius: (n,) m."""
         need = pairs.count + self._spare
         self.lanes, self.apart = (np.empty(len(pairs.count), np.int64) for _ in range(2))
@@ -100,13 +104,16 @@ class Wide:
             if (self.lanes <= need).all():
                 break
             need = np.maximum(need, self.lanes)
+        if seam:
+            period, packed = map(self._dtype.type, seam.period), (self.begin, self.lanes, self.lane_i, self.lane_j, radius)
+            close_gaps(*packed, *period, self.gap, self.apart)
         self._spare = 2 * max(int((self.lanes - pairs.count).max(initial=0)), LANES)
         self._cut = np.empty((2, 0), np.int64)
         self.origin = origin
         self.moved = memory.empty(origin.shape, origin.dtype)
         self._known = None
         self._deeps, self._looks = np.zeros(len(pairs.count), np.int64), True
-        spent, self.spent = self.spent.sum(axis=0), np.zeros((max(len(self.lanes), 1), 2))
+        spent, self.spent = self.spent.sum(axis=0), np.zeros((max(len(self.lanes), 1), 3))
         self.spent[0] = spent
         if self._listens:
             self.closing = np.full(len(self.lane_i), -1, self._dtype)
@@ -142,6 +149,11 @@ class Wide:
         """Nobody rubs any more."""
         self.slip = self.held = self.slip[:0]
 
+    def weigh(self, asked: bool) -> None:
+        """Whether somebody asks for the virial."""
+        if asked != self.weighs:
+            self.weighs, self._known = asked, None
+
     # ---- what circles are made of ----------------------------------------------------------------------------------------
 
     def fits(self, state: Slots) -> bool:
@@ -155,7 +167,7 @@ class Wide:
         self._varied = int(any(_differ(values) for values in (size, state.radius, inverse_mass)))
         self._mixed = int(self._varied or _differ(state.restitution) or _differ(state.friction))
         self.rubs = max(mu, state.most_friction) > 0.0
-        self.asks = self._listens or self.rubs or max(e, state.most_restitution) > 0.0
+        self.asks = self._listens or self.weighs or self.rubs or max(e, state.most_restitution) > 0.0
         if self._varied:
             self.reach, self.share = (memory.empty(len(self.lane_i), self._dtype) for _ in range(2))
             packs.share_out(self.begin, self.lanes, self.lane_i, self.lane_j, size, inverse_mass, self.reach, self.share)
@@ -206,7 +218,7 @@ class Wide:
         )  # fmt: skip
         carried = CARRIED_WEIGHT * strongest * h if strongest > 0 else np.inf
         self.law = (
-            self._varied, self._mixed, int(self.asks), int(self.rubs), int(self._listens), int(accounts),
+            self._varied, self._mixed, int(self.asks), int(self.rubs), int(self._listens), int(accounts or self.weighs),
             1, *state.reals(h, lag, FED / PUSHED / h, LARGEST_PUSH, DEEP_LENT if lent else DEEP, rest_speed), int(strongest > 0),
             state.real(carried),
         )  # fmt: skip

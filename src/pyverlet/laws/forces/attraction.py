@@ -31,11 +31,11 @@ class Attractor:
         self.softening = checks.number("softening", softening, least=0.0)
 
     def apply(self, state: Slots, t: float) -> None:
-        law = map(state.real, (*self.center, self.strength, self.softening))
+        law = map(state.real, (*self.center, self.strength, self.softening, *state.seam.period))
         forces.attract(state.force, state.position, state.inverse_mass, *law)
 
     def potential(self, state: State) -> float:
-        distance = np.hypot(*(state.position.astype(np.float64) - self.center).T)
+        distance = np.hypot(*state.seam.nearest(state.position.astype(np.float64) - self.center).T)
         apart = np.hypot(distance, self.softening)
         felt = (apart > 0) & np.isfinite(state.mass)
         return -self.strength * float(np.sum(state.mass[felt] / apart[felt]))
@@ -62,10 +62,13 @@ class Gravitation:
     def apply(self, state: Slots, t: float) -> None:
         members = np.arange(len(state)) if self.group is None else self.group.index
         forces.gravitate(
-            state.force, state.position, state.mass, state.slots_of(members), self.strength, state.real(self.softening)
-        )
+            state.force, state.position, state.mass, state.slots_of(members), self.strength, state.real(self.softening),
+            *map(float, state.seam.period),
+        )  # fmt: skip
 
     def potential(self, state: State) -> float:
         where = slice(None) if self.group is None else self.group.index
         position, mass = state.position[where].astype(np.float64), state.mass[where].astype(np.float64)
-        return self.strength * float(forces.gravitational_potential(position, mass, self.softening))
+        return self.strength * float(
+            forces.gravitational_potential(position, mass, self.softening, *map(float, state.seam.period))
+        )

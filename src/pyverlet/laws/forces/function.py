@@ -40,14 +40,15 @@ class FunctionForce:
             InputError: it does not compile, or returns something other than two numbers.
             NonFiniteError: it returned NaN or infinity.
         """
-        if forces.call(self._code.native().force(state.dtype), state.force, state.position, state.velocity, state.mass, float(t)):
+        where, native = state.seam.wrapped(state.position), self._code.native().force(state.dtype)
+        if forces.call(native, state.force, where, state.velocity, state.mass, float(t)):
             self._blame(state, t)
 
     def _blame(self, state: Slots, t: float) -> None:
         """Find the first particle it fails for, and say what it did there."""
         for particle in range(len(state)):
             slot = state.slot_of(particle)
-            given = [float(v) for v in (*state.position[slot], *state.velocity[slot], state.mass[slot], t)]
+            given = [float(v) for v in (*state.seam.wrapped(state.position)[slot], *state.velocity[slot], state.mass[slot], t)]
             try:
                 value = tuple(map(float, self._code.native().call(*given)))
             except Exception as error:  # whatever the user's code raises

@@ -38,7 +38,7 @@ class Grip:
         if not np.isfinite(mass):
             return
         w = 2.0 * np.pi * self.frequency
-        reach = np.asarray(self.target, state.dtype) - state.position[slot]
+        reach = state.seam.nearest(np.asarray(self.target, state.dtype) - state.position[slot])
         pull = reach * (self.strength * w**2) - 2.0 * w * state.velocity[slot]
         state.force[slot] += mass * pull
 
@@ -65,7 +65,7 @@ class Push:
         self.acceleration = checks.number("acceleration", acceleration)
 
     def apply(self, state: Slots, t: float) -> None:
-        offset = state.position - np.asarray(self.center, state.dtype)
+        offset = state.seam.nearest(state.position - np.asarray(self.center, state.dtype))
         distance = np.hypot(offset[:, 0], offset[:, 1])
         near = np.flatnonzero((distance < self.radius) & (distance > 0) & np.isfinite(state.mass))
         strength = self.acceleration * state.mass[near] * (1 / distance[near] - 1 / self.radius)

@@ -31,10 +31,10 @@ class PointSpring:
 
     def apply(self, state: Slots, t: float) -> None:
         where = slice(None) if self.group is None else state.slots_of(self.group.index)
-        state.force[where] -= self.stiffness * (state.position[where] - np.asarray(self.center, state.dtype))
+        state.force[where] -= self.stiffness * state.seam.nearest(state.position[where] - np.asarray(self.center, state.dtype))
 
     def potential(self, state: State) -> float:
         where = slice(None) if self.group is None else self.group.index
         free = np.isfinite(state.mass[where])
-        offset = state.position[where][free].astype(np.float64) - self.center
+        offset = state.seam.nearest(state.position[where][free].astype(np.float64) - self.center)
         return float(0.5 * self.stiffness * np.sum(offset * offset))

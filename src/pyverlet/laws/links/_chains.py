@@ -11,6 +11,7 @@ from pyverlet.kernels import chain_rows, chains, runs
 from pyverlet.laws.links._link import Array
 from pyverlet.laws.links._pool import MOVING, Pool
 from pyverlet.laws.links._work import Work
+from pyverlet.state.seam import Seam
 
 
 class ChainPool(Pool):
@@ -78,7 +79,10 @@ class ChainPool(Pool):
         chain_rows.take_up(source, row, *(rows[name] for name in MOVING))
 
     def before(self, work: Work, h: float) -> None:
-        chain_rows.prepare(self._start, self._node, self._holds, self._bowed, self._row, work.start, work.earlier, work.weight, h)
+        chain_rows.prepare(
+            self._start, self._node, self._holds, self._bowed, self._row, work.start, *work.seam.period, work.earlier,
+            work.weight, h,
+        )  # fmt: skip
 
     def ahead(self, work: Work) -> None:
         if self.gives:
@@ -87,13 +91,13 @@ class ChainPool(Pool):
     def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
         chains.sweep(
             back, skip, self._colour, self._start, self._node, self._holds, self._lanes, self._bowed, self._row, work.position,
-            work.weight, self._rooms,
+            *work.seam.period, work.weight, self._rooms,
         )  # fmt: skip
 
     def passes(self, work: Work, times: int) -> None:
         chains.passes(
             times, self.gives, self._colour, self._start, self._node, self._holds, self._lanes, self._bowed, self._row,
-            work.position, work.weight, self._rooms,
+            work.position, *work.seam.period, work.weight, self._rooms,
         )  # fmt: skip
 
     def snap(self, work: Work, h: float) -> Array:
@@ -110,15 +114,15 @@ class ChainPool(Pool):
     def end(self) -> None:
         chain_rows.hand_over(self._place, self._row, *(self.rows[name] for name in MOVING))
 
-    def stored(self, position: Array) -> float:
-        return self._energy(position, self._ends, chain_rows.intact(self._place, self._row))
+    def stored(self, position: Array, seam: Seam) -> float:
+        return self._energy(position, seam, self._ends, chain_rows.intact(self._place, self._row))
 
-    def energy(self, position: Array) -> float:
-        return self._energy(position, self.entries["particle"].reshape(-1, 2), self.rows["intact"])
+    def energy(self, position: Array, seam: Seam) -> float:
+        return self._energy(position, seam, self.entries["particle"].reshape(-1, 2), self.rows["intact"])
 
-    def _energy(self, position: Array, ends: Array, intact: Array) -> float:
+    def _energy(self, position: Array, seam: Seam, ends: Array, intact: Array) -> float:
         rows = self.rows
-        return float(chain_rows.energy(position, ends, rows["rest"], rows["upper"], rows["stiffness"], intact))
+        return float(chain_rows.energy(position, *seam.period, ends, rows["rest"], rows["upper"], rows["stiffness"], intact))
 
 
 def _place(order: Array, opens: Array) -> Array:

@@ -13,6 +13,7 @@ from pyverlet.laws.links._chains import ChainPool
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import Floats, Link, several, stiffness_of
 from pyverlet.laws.links._pool import Pool
+from pyverlet.state.seam import NONE, Seam
 
 
 class Distance(Link):
@@ -37,7 +38,7 @@ class Distance(Link):
         count = len(particles)
         if length is None:
             a, b = state.position[particles[:, 0]].astype(np.float64), state.position[particles[:, 1]].astype(np.float64)
-            self._length: Floats = np.hypot(*(b - a).T)
+            self._length: Floats = np.hypot(*state.seam.nearest(b - a).T)
         else:
             self._length = several(kind, "length", length, count)
         self._stiffness = stiffness_of(kind, count, stiffness, compliance)
@@ -54,8 +55,20 @@ class Distance(Link):
 
     @length.setter
     def length(self, value: ArrayLike) -> None:
-        self._length = several(type(self).__name__, "length", value, len(self))
+        before, self._length = self._length, several(type(self).__name__, "length", value, len(self))
+        try:
+            self._check(self._state.seam if self._pool is not None else NONE)
+        except InputError:
+            self._length = before
+            raise
         self._change("rest", self._length)
+
+    def _check(self, seam: Seam) -> None:
+        half = 0.5 * seam.shortest
+        if (wrong := np.flatnonzero(self._length > half)).size:
+            k = int(wrong[0])
+            what = f"{type(self).__name__}: length[{k}] is {self._length[k]:g} m"
+            raise InputError(f"{what}; allowed is at most half a period of the room, {half:g} m")
 
     @property
     def _family(self) -> Any:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.state.seam import Seam
 from pyverlet.state.state import State
 
 if TYPE_CHECKING:
@@ -67,6 +68,9 @@ class Link(ABC):
             row = int(np.flatnonzero(gone.any(axis=1))[0])
             raise InputError(f"{self!r} joins, in its row {row}, a particle that was removed; allowed are those of the world")
         self.particles = where
+
+    def _check(self, seam: Seam) -> None:
+        """Raise InputError if these do not fit into a room with this seam."""
 
     def _change(self, column: str, value: Any) -> None:
         """Write a column of the pool, if these are in a world."""

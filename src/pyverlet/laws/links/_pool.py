@@ -10,6 +10,7 @@ import numpy as np
 from pyverlet.laws.links._link import Array
 from pyverlet.laws.links._table import Table
 from pyverlet.laws.links._work import Work
+from pyverlet.state.seam import Seam
 
 MOVING = ("intact", "force", "last")
 """Columns that a frame changes."""
@@ -114,9 +115,9 @@ class Pool(ABC):
         """The frame is good: write force and who is intact into the table."""
 
     @abstractmethod
-    def energy(self, position: Array) -> float:
+    def energy(self, position: Array, seam: Seam) -> float:
         """Energy stored in soft links at (n, 2) positions in the user's order, J."""
 
     @abstractmethod
-    def stored(self, position: Array) -> float:
+    def stored(self, position: Array, seam: Seam) -> float:
         """The same in the middle of a frame, of the rows that are intact then, at (m, 2) positions in the order of `Work`."""

@@ -11,6 +11,7 @@ from pyverlet.kernels import links, runs
 from pyverlet.laws.links._link import Array
 from pyverlet.laws.links._pool import MOVING, Pool
 from pyverlet.laws.links._work import Work
+from pyverlet.state.seam import Seam
 
 Measure = Callable[..., None]
 """A function of kernels.shapes, or one of its form."""
@@ -79,8 +80,8 @@ class RowPool(Pool):
     def before(self, work: Work, h: float) -> None:
         row, which = self._row, (self._first, self._particle, self._row["rest"], 0, len(self._order))
         if self.gives:
-            self.measure(work.earlier, *which, row["earlier"], self._gradient, row["bend"])
-        self.measure(work.start, *which, row["start"], self._along, row["bend"])
+            self.measure(work.earlier, *work.seam.period, *which, row["earlier"], self._gradient, row["bend"])
+        self.measure(work.start, *work.seam.period, *which, row["start"], self._along, row["bend"])
         links.prepare(
             self._first, self._particle, work.weight, row["stiffness"], row["damping"], row["upper"], h, row["start"],
             row["earlier"], self._along, row["bend"], row["force"], row["last"], row["give"],
@@ -111,7 +112,7 @@ class RowPool(Pool):
         for a, b in parts[1:] if skip else parts:
             begin, end = int(self._run[a]), int(self._run[b])
             which = (self._first, self._particle, row["rest"], begin, end)
-            self.measure(work.position, *which, row["value"], self._gradient, row["bend"])
+            self.measure(work.position, *work.seam.period, *which, row["value"], self._gradient, row["bend"])
             links.solve_rows(
                 begin, end, work.position, self._first, self._particle, work.weight, row["upper"], row["intact"], row["value"],
                 self._gradient, self._along, row["turn"], row["give"], row["offset"], row["lam"],
@@ -135,15 +136,15 @@ class RowPool(Pool):
         for name in MOVING:
             self.rows[name][self._order] = np.where(self._row["intact"], self._row[name], 0)
 
-    def stored(self, position: Array) -> float:
+    def stored(self, position: Array, seam: Seam) -> float:
         row, soft, value = self._row, self._soft, self._soft_value
-        self.measure(position, *self._soft_rows, value, self._soft_gradient, self._soft_bend)
+        self.measure(position, *seam.period, *self._soft_rows, value, self._soft_gradient, self._soft_bend)
         return _stored(row["stiffness"][soft], row["upper"][soft], row["intact"][soft], value)
 
-    def energy(self, position: Array) -> float:
+    def energy(self, position: Array, seam: Seam) -> float:
         rows, first, particle = self.rows, self.first, self.entries["particle"]
         value, bend, gradient = np.empty(len(rows)), np.empty(len(rows)), np.empty((len(particle), 2))
-        self.measure(position, first, particle, rows["rest"], 0, len(rows), value, gradient, bend)
+        self.measure(position, *seam.period, first, particle, rows["rest"], 0, len(rows), value, gradient, bend)
         soft = np.isfinite(rows["stiffness"])
         return _stored(rows["stiffness"][soft], rows["upper"][soft], rows["intact"][soft], value[soft])
 

@@ -18,6 +18,7 @@ from pyverlet.laws.contacts.broadphase import PairList
 from pyverlet.laws.links._link import Array, Link
 from pyverlet.laws.links._pool import Pool
 from pyverlet.laws.links._work import Past, Work
+from pyverlet.state.seam import Seam
 from pyverlet.state.state import Slots, State
 
 AnyLink = TypeVar("AnyLink", bound=Link)
@@ -63,6 +64,7 @@ class Links:
         if link._pool is not None:
             raise InputError(f"{link!r} is in a world already; allowed is a new one")
         link._find()
+        link._check(self._state.seam)
         family = link._family
         if family not in self._pools:
             self._pools[family] = link._new_pool()
@@ -79,6 +81,11 @@ class Links:
         """Append each of them."""
         for link in links:
             self.append(link)
+
+    def check(self, seam: Seam) -> None:
+        """Raise InputError if one of them does not fit into a room with this seam."""
+        for link in self._links:
+            link._check(seam)
 
     def remove(self, link: Link) -> None:
         """Take a link out.
@@ -251,7 +258,7 @@ class Links:
     def energy(self, state: State | None = None) -> float:
         """Energy stored in links that give, J, of the world's state or of another of the same particles."""
         position = (self._state if state is None else state).position.astype(np.float64)
-        return sum(pool.energy(position) for pool in self._order)
+        return sum(pool.energy(position, self._state.seam) for pool in self._order)
 
     def stored(self, state: Slots) -> float:
         """The same in the middle of a frame, J, where the particles are now, without those that have broken in it."""
@@ -259,12 +266,17 @@ class Links:
             return 0.0
         with self._threads():
             position = self._work.where(state)
-            return sum(pool.stored(position) for pool in self._order if pool.gives)
+            return sum(pool.stored(position, state.seam) for pool in self._order if pool.gives)
 
     def segments(self) -> tuple[Array, Array]:
-        """Links as lines, without the broken: ends (m, 2, 2) in m, and what each pulls with (m,) in N, negative if it pushes."""
+        """Links as lines, without the broken: ends (m, 2, 2) in m, and what each pulls with (m,) in N, negative if it pushes.
+
+        Across the seam of a periodic room a line runs on out of it, to the nearest image of its second end.
+        """
         pairs, force = self.pulls()
-        return self._state.position[pairs], force
+        ends = self._state.position[pairs]
+        ends[:, 1] = ends[:, 0] + self._state.seam.nearest(ends[:, 1] - ends[:, 0])
+        return ends, force
 
     def pulls(self) -> tuple[Array, Array]:
         """The same by particle: (m, 2) indices in place of ends, for who has their positions of the same moment."""

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from pyverlet.ground.constants import REST_ACCELERATIONS
 from pyverlet.kernels import links, motion
+from pyverlet.state.seam import NONE
 from pyverlet.state.state import Slots, State
 
 Array = NDArray[Any]
@@ -52,6 +53,7 @@ class Work:
         self._slot = np.zeros(len(particle), np.int64)
         self._calm = np.full(len(particle), np.nan)
         self._h = 0.0
+        self.seam = NONE
         self._order: Array | None = None
 
     def __len__(self) -> int:
@@ -69,6 +71,7 @@ class Work:
     def begin(self, state: State, past: Past | None) -> None:
         """A frame begins: take up what is remembered of those who are where they were left."""
         self._calm.fill(np.nan)
+        self.seam = state.seam
         if past is None or not len(past.number):
             return
         number, where = state.number[self.particle], state.position[self.particle]
@@ -87,8 +90,9 @@ class Work:
         before = self.start
         self.start, self._spare = self._spare, before
         links.look_back(
-            slot, state.position, state.velocity, state.inverse_mass, before, self._calm, h, self.start, self.earlier, self.weight
-        )
+            slot, state.position, state.velocity, state.inverse_mass, *self.seam.period, before, self._calm, h, self.start,
+            self.earlier, self.weight,
+        )  # fmt: skip
 
     def take(self, state: Slots) -> None:
         """After the integrator and the contacts."""

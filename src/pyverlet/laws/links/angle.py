@@ -42,7 +42,7 @@ class Angle(Link):
         count = len(particles)
         if angle is None:
             i, j, k = (state.position[particles[:, n]].astype(np.float64) for n in range(3))
-            (ax, ay), (bx, by) = (i - j).T, (k - j).T
+            (ax, ay), (bx, by) = state.seam.nearest(i - j).T, state.seam.nearest(k - j).T
             self._angle: Floats = np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
         else:
             self._angle = self._angles(angle)

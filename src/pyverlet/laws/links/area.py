@@ -40,6 +40,9 @@ class Area(Link):
     ) -> None:
         state, particles = parse_ring("Area", group, ring)
         corners = state.position[particles].astype(np.float64)
+        if state.seam:  # each corner is the nearest image of the one before
+            sides = state.seam.nearest(np.diff(corners, axis=0, prepend=corners[:1]))
+            corners = corners[0] + np.cumsum(sides, axis=0)
         now = signed_area(corners)
         if crossing := first_crossing(corners):
             a, b = crossing

@@ -13,6 +13,7 @@ from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import Array, Floats, Link, several, stiffness_of
 from pyverlet.laws.links._pool import Pool
 from pyverlet.laws.links._work import Work
+from pyverlet.state.seam import Seam
 
 
 class Pin(Link):
@@ -99,10 +100,11 @@ class _PinPool(Pool):
         pass
 
     def tie(self, work: Work, h: float) -> None:
-        rows = self.rows
+        rows, here = self.rows, work.start[self._particle]
+        self._point = here + work.seam.nearest(rows["point"] - here)
         ties.tie(
-            work.position, work.weight, work.start, work.earlier, self._particle, rows["point"], rows["stiffness"],
-            rows["damping"], self._intact, h, self._give, self._offset,
+            work.position, work.weight, work.start, work.earlier, self._particle, self._point, rows["stiffness"], rows["damping"],
+            self._intact, h, self._give, self._offset,
         )  # fmt: skip
 
     def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
@@ -111,7 +113,7 @@ class _PinPool(Pool):
     def snap(self, work: Work, h: float) -> Array:
         before = self._intact.copy()
         pulled = (self._intact, self._give, self._offset, self._lam)
-        ties.pull_of_ties(work.position, self._particle, self.rows["point"], *pulled)
+        ties.pull_of_ties(work.position, self._particle, self._point, *pulled)
         links.note_force(self._force, self._last, self._lam, h)
         links.snap(self._force, self.rows["strength"], self._intact)
         return np.flatnonzero(before != self._intact)
@@ -123,14 +125,14 @@ class _PinPool(Pool):
         self.rows["intact"][:] = self._intact
         self.rows["force"][:] = np.where(self._intact, self._force, 0.0)
 
-    def stored(self, position: Array) -> float:
-        return self._energy(position, self._particle, self._intact)
+    def stored(self, position: Array, seam: Seam) -> float:
+        return self._energy(position, self._particle, self._intact, seam)
 
-    def energy(self, position: Array) -> float:
-        return self._energy(position, self.entries["particle"], self.rows["intact"])
+    def energy(self, position: Array, seam: Seam) -> float:
+        return self._energy(position, self.entries["particle"], self.rows["intact"], seam)
 
-    def _energy(self, position: Array, particle: Array, intact: Array) -> float:
+    def _energy(self, position: Array, particle: Array, intact: Array, seam: Seam) -> float:
         rows = self.rows
         soft = np.isfinite(rows["stiffness"]) & (intact != 0)
-        away = position[particle[soft]] - rows["point"][soft]
+        away = seam.nearest(position[particle[soft]] - rows["point"][soft])
         return 0.5 * float(np.sum(rows["stiffness"][soft] * np.sum(away * away, axis=1)))

@@ -12,6 +12,8 @@ from pyverlet.kernels import meetings
 from pyverlet.kernels import obstacles as kernels
 from pyverlet.laws.obstacles._base import Obstacle, Obstacles
 from pyverlet.laws.rooms import Boundary
+from pyverlet.state.moves import bodies
+from pyverlet.state.seam import NONE
 from pyverlet.state.state import Slots
 
 Array = NDArray[Any]
@@ -22,14 +24,18 @@ class Course:
 
     Args:
         obstacles: the world's list, looked at anew at the beginning of each frame.
+
+    Attributes:
+        seam: of the room. In a periodic one there are images of all obstacles beside it: circles run on beyond it within a frame.
     """
 
     def __init__(self, obstacles: Obstacles) -> None:
         self._obstacles = obstacles
         self._seen: list[Obstacle] = []
         self._revision = 0
-        self._bodies = np.zeros(0, kernels.BODY)
-        self._segments = np.zeros(0, kernels.SEGMENT)
+        self.seam = self._imaged = NONE
+        self._own_bodies = self._bodies = np.zeros(0, kernels.BODY)
+        self._own_segments = self._segments = np.zeros(0, kernels.SEGMENT)
         self._moving: list[int] = []
         self._binned_for = -1.0  # largest radius the cells were filled for; negative: fill them anew
         self._cells: tuple[Any, ...] = ()
@@ -41,7 +47,7 @@ class Course:
 
     def begin(self) -> None:
         """At the beginning of a frame: look what has changed."""
-        if self._seen != self._obstacles:  # the same objects: obstacles are equal to themselves alone
+        if self._seen != self._obstacles or self._imaged != self.seam:  # the same objects: they are equal to themselves alone
             self._build()
         if not self._seen:
             return
@@ -54,7 +60,7 @@ class Course:
                     self._refresh(k)
         self._revision = newest
         self._moving = [k for k, obstacle in enumerate(self._seen) if obstacle.moves]
-        self._binned_for = -1.0
+        self._imagine()
 
     def covering(self, position: Array) -> NDArray[np.int64]:
         """(n,) which obstacle has each of these (n, 2) points inside it, m, -1 for none."""
@@ -63,7 +69,8 @@ class Course:
         if self._seen:
             kernels.place(self._segments, self._bodies, 0.0, 0.0)
             self._binned_for = -1.0  # cells are filled where segments are, and have been placed for another substep
-            kernels.covered(self._segments, position.astype(np.float64), by)
+            kernels.covered(self._segments, self.seam.wrapped(position.astype(np.float64)), by)
+            by[by >= 0] %= len(self._seen)
         return by
 
     def seen(self) -> list[Obstacle]:
@@ -74,8 +81,8 @@ class Course:
         """For each segment as it stood last: number of its obstacle, start (k, 2), direction (k, 2), length, rounding; metres."""
         s = self._segments
         return (
-            s["body"].copy(), np.column_stack((s["bx"], s["by"])), np.column_stack((s["bc"], s["bs"])), s["length"].copy(),
-            s["rounding"].copy(),
+            s["body"] % max(len(self._seen), 1), np.column_stack((s["bx"], s["by"])), np.column_stack((s["bc"], s["bs"])),
+            s["length"].copy(), s["rounding"].copy(),
         )  # fmt: skip
 
     def facing(self, position: Array) -> tuple[Array, Array]:
@@ -103,16 +110,19 @@ class Course:
         if time == 0.0 or self._order is not state.particle:  # every new order is a new array
             self._order, self._rest = state.particle, np.zeros_like(state.position)
         taken = (walls, state.along, self._rest)
-        collide(self._segments, self._bodies, time + h, *self._cells, *taken, *state.bodies(), *numbers, state.drop)
+        collide(self._segments, self._bodies, time + h, *self._cells, *taken, *bodies(state), *numbers, state.drop)
 
     def end(self, dt: float) -> None:
         """At the end of a frame that went well: the obstacles are where they moved to."""
         for k in self._moving:
-            body = self._bodies[k]
+            body = self._own_bodies[k]
             body["x"] += dt * body["vx"]
             body["y"] += dt * body["vy"]
             body["angle"] += dt * body["spin"]
+            body["x"], body["y"] = self.seam.wrapped(np.array([[body["x"], body["y"]]]))[0]
             self._seen[k].carry((float(body["x"]), float(body["y"])), float(body["angle"]))
+        if self._moving and self.seam:
+            self._imagine()
 
     def _build(self) -> None:
         self._seen = list(self._obstacles)
@@ -121,25 +131,39 @@ class Course:
                 obstacle.table = _lowered(obstacle)
         # As bytes: putting hundreds of arrays of records together takes milliseconds.
         parts = [obstacle.table.view(np.uint8) for obstacle in self._seen]
-        self._segments = np.concatenate([np.zeros(0, np.uint8), *parts]).view(kernels.SEGMENT)
+        self._own_segments = np.concatenate([np.zeros(0, np.uint8), *parts]).view(kernels.SEGMENT)
         count = [len(obstacle.table) for obstacle in self._seen]
         self._first = np.concatenate(([0], np.cumsum(count, dtype=np.int64)))
-        self._segments["body"] = np.repeat(np.arange(len(count)), count)
-        self._segments["first"] = np.repeat(self._first[:-1], count)
-        self._bodies = np.array([_body(obstacle) for obstacle in self._seen], kernels.BODY)
+        self._own_segments["body"] = np.repeat(np.arange(len(count)), count)
+        self._own_segments["first"] = np.repeat(self._first[:-1], count)
+        self._own_bodies = np.array([_body(obstacle) for obstacle in self._seen], kernels.BODY)
         surfaces = [(obstacle.restitution, obstacle.friction, obstacle.surface_speed) for obstacle in self._seen]
         for name, column in zip(("restitution", "friction", "belt"), zip(*surfaces, strict=True), strict=bool(surfaces)):
-            self._segments[name] = np.repeat(column, count)
-        self._revision = -1
+            self._own_segments[name] = np.repeat(column, count)
+        self._revision, self._imaged = -1, self.seam
         self._moving = []
 
     def _refresh(self, k: int) -> None:
         obstacle = self._seen[k]
-        self._bodies[k] = _body(obstacle)
-        part = self._segments[self._first[k] : self._first[k + 1]]
+        self._own_bodies[k] = _body(obstacle)
+        part = self._own_segments[self._first[k] : self._first[k + 1]]
         part["restitution"] = obstacle.restitution
         part["friction"] = obstacle.friction
         part["belt"] = obstacle.surface_speed
+
+    def _imagine(self) -> None:
+        """The obstacles and, in a periodic room, their images beside it; their cells are to be filled anew."""
+        self._binned_for = -1.0
+        self._bodies, self._segments = self._own_bodies, self._own_segments
+        if not self.seam:
+            return
+        shift, count, sides = self.seam.images(), len(self._own_bodies), len(self._own_segments)
+        self._bodies, self._segments = np.tile(self._bodies, len(shift)), np.tile(self._segments, len(shift))
+        self._bodies["x"] += np.repeat(shift[:, 0], count)
+        self._bodies["y"] += np.repeat(shift[:, 1], count)
+        number = np.repeat(np.arange(len(shift)), sides)
+        self._segments["body"] += count * number
+        self._segments["first"] += sides * number
 
     def _bin(self, largest: float) -> None:
         """Fill cells with the segments near them, so that nobody looks at the others."""

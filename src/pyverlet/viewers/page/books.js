@@ -8,7 +8,9 @@ const MEANS = {
   links: "taken by links: damping, and what stiff ones do not give back",
   projection: "put in by moving overlapping circles apart",
   limiter: "taken back by the energy limiter, of what contacts had gained too much",
+  walls: "brought by a room that turns",
   outside: "what the circles had at the start, and what was done between frames",
+  seam: "of circles that fell through the seam of a periodic room, and are up again",
   residual: "left over: the error of the integrator",
 };
 

@@ -89,6 +89,20 @@ export class Inks {
     for (let i = 0; i < logarithm.length; i++) this.ink[i] = this.lut[shade(scale ? Math.min((logarithm[i] - low) * scale, STEPS - 1) | 0 : 0, i)];
   }
 
+  /** By what each circle is pushed with, of all it touches; a frame without forces leaves the colours as they are. */
+  weigh({ touching, pushes }) {
+    if (this.colouring !== "force" || !pushes?.length) return;
+    const { ink, lut } = this, load = new Float32Array(ink.length);
+    for (let k = 0; k < pushes.length; k++) {
+      load[touching[2 * k]] += pushes[k];
+      if (touching[2 * k] !== touching[2 * k + 1]) load[touching[2 * k + 1]] += pushes[k];
+    }
+    let sum = 0;
+    for (const value of load) sum += value;
+    const full = (STEPS - 1) / (USUAL_MULTIPLE * (sum / ink.length) || Infinity);
+    for (let i = 0; i < ink.length; i++) ink[i] = lut[shade(Math.min(STEPS - 1, (load[i] * full) | 0), i)];
+  }
+
   /** Colours that change with every frame: (n, 2) velocities in whole `unit` m/s, at this time in s. */
   follow(velocity, unit, time) {
     if (!isLively(this.colouring) || !velocity) return;

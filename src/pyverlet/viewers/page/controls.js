@@ -75,7 +75,8 @@ export class Controls {
     this.#options("scene", shape.scenes.map(([name, summary]) => ({ value: name, title: summary })));
     this.#options("integrator", shape.integrators.map((name) => ({ value: name })));
     this.#id("scene").value = shape.scene;
-    for (const id of ["scene-field", "count-field"]) this.#id(id).hidden = !shape.scenes.length;
+    this.#id("scene-field").hidden = !shape.scenes.length;
+    this.#id("count-field").hidden = !shape.scenes.length || shape.countable === false;
   }
 
   /** Show what the server has. */

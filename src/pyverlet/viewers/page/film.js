@@ -5,7 +5,7 @@ import { message, Reel } from "./reel.js";
 import { tell } from "./text.js";
 
 const JUMP_S = 1; // of the arrow keys
-const ABSENT = { weightless: null, tool: null, copy: null }; // what is done to a world, or with a server
+const ABSENT = { weightless: null, tool: null, copy: null, undo: null, redo: null }; // what is done to a world, or with a server
 const FASTER = [2, 4, 8]; // times real time
 
 /** Plays a reel: where it is, how fast it goes, and what it tells the page. */
@@ -55,6 +55,7 @@ class Player {
       this.reel.shape(here.chunk.shape).then((shape) => {
         this.busy = false;
         this.shape = here.chunk.shape;
+        this.about = shape;
         this.sent = "";
         this.hear(shape);
         this.show();
@@ -66,7 +67,7 @@ class Player {
     this.moved(this);
     if (wish === this.sent) return;
     this.sent = wish;
-    const frame = message(here, ++this.seq, this.part, next, fine);
+    const frame = message(here, ++this.seq, this.part, next, fine, this.about);
     frame.status = { ...frame.status, paused: this.paused, speed: this.speed, pace: this.paused ? null : this.speed };
     this.hear(frame);
   }

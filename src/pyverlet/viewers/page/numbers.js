@@ -2,6 +2,7 @@
 
 import { fillBooks } from "./books.js";
 import { Chart } from "./chart.js";
+import { fillGraph } from "./graph.js";
 
 const STAGES = ["gather", "integrate", "broad phase", "contacts", "bounds", "velocities", "scatter"]; // as in World.step
 const OTHER = "other"; // stages that came later than this page
@@ -62,6 +63,7 @@ export class Numbers {
     this.energies.draw();
     this.stages.draw();
     fillBooks(this.#id("ledger"), status.ledger, signed);
+    fillGraph(this.#id("graph"), status.graph);
     this.#legend(status.stages);
   }
 

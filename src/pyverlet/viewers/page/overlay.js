@@ -3,9 +3,12 @@
 import { drawObstacles, resizeCanvas } from "./backdrop.js";
 import { heat } from "./colour.js";
 import { touching } from "./contacts.js";
+import { nearest, periods } from "./copies.js";
 import { GRID_MAX } from "./draw.js";
+import { drawMarksOf } from "./drawing.js";
 
 export const MOST_CONTACTS = 20000; // circles whose contacts are searched for: beyond, it would cost frames
+export const MOST_FORCES = 5000; // circles, see forces.py
 const LINK_PX = 1.6;
 const LOADS = 12; // shades that links are drawn in: a stroke for each
 const MARKED_PX = 4; // radius from which on a circle has a mark that shows how it has turned, as in pictures and films
@@ -20,12 +23,14 @@ export class Overlay {
     this.links = 0;
     this.arrows = 0;
     this.marks = 0;
+    this.forces = 0;
+    this.drawn = 0; // marks of the user's own program
   }
 
   /** `wants`: {velocities, contacts}; `colour(name)` is that of a custom property. */
   draw(shape, frame, camera, size, ratio, wants, colour, dark) {
     const pinned = frame.grid ? pins(shape.mass) : [];
-    const busy = shape.lines.length || frame.obstacles.length || frame.links || frame.turned || pinned.length || wants.velocities || wants.contacts;
+    const busy = shape.lines.length || frame.obstacles.length || frame.links || frame.turned || frame.drawing?.length || pinned.length || wants.velocities || wants.contacts || wants.forces;
     this.contacts = this.arrows = this.links = this.marks = 0;
     if (!busy && this.clean) return;
     this.clean = this.canvas.hidden = !busy;
@@ -35,13 +40,16 @@ export class Overlay {
     context.clearRect(0, 0, size.width, size.height);
     dashes(context, shape.lines, camera, colour("--soft"));
     drawObstacles(context, frame.obstacles, camera, colour);
-    if (!frame.grid) return;
-    const place = camera.place(frame.view), sx = place.width / GRID_MAX, sy = place.height / GRID_MAX;
-    const { grid } = frame, seen = (i) => grid[2 * i] && grid[2 * i + 1] && grid[2 * i] !== GRID_MAX && grid[2 * i + 1] !== GRID_MAX;
-    const x = (i) => place.left + grid[2 * i] * sx, y = (i) => place.top + place.height - grid[2 * i + 1] * sy;
+    if (!frame.grid) return void (this.drawn = drawMarksOf(context, frame.drawing ?? [], camera, colour("--text")));
+    const place = camera.place(frame.view);
+    const { grid } = frame, { x, y, seen } = scaled(grid, place);
     const n = grid.length / 2;
-    if (frame.turned) this.marks = drawMarks(context, frame.turned, shape.radius, camera.scale, { x, y, seen });
-    this.links = drawLinks(context, frame, { x, y, seen }, dark);
+    if (frame.turned) {
+      this.marks = drawMarks(context, frame.turned, shape.radius, camera.scale, { x, y, seen });
+      if (frame.copies) this.marks += drawMarks(context, ...copied(frame, shape.radius), camera.scale, scaled(frame.copies.places, place));
+    }
+    this.links = drawLinks(context, frame, { x, y, seen }, dark, periods(shape.seams, n)?.map((metres) => metres * camera.scale));
+    this.forces = wants.forces ? drawForces(context, frame, shape.radius, camera.scale, { x, y, seen }, dark) : 0;
     context.beginPath();
     if (wants.contacts && n <= MOST_CONTACTS) {
       const xs = new Float64Array(n), ys = new Float64Array(n), rs = new Float64Array(n);
@@ -75,11 +83,25 @@ export class Overlay {
       context.arc(x(i), y(i), radius, 0, 2 * Math.PI);
     }
     context.fill();
+    this.drawn = drawMarksOf(context, frame.drawing ?? [], camera, colour("--text"));
   }
 }
 
-/** Links as lines in the colour of their pull; returns how many. `at`: where a circle is on the screen. */
-function drawLinks(context, { joined, strain }, at, dark) {
+/** Where the circles of a grid are on the screen, and which are in sight; `place`: where the grid is. */
+function scaled(grid, place) {
+  const sx = place.width / GRID_MAX, sy = place.height / GRID_MAX;
+  return {
+    seen: (i) => grid[2 * i] && grid[2 * i + 1] && grid[2 * i] !== GRID_MAX && grid[2 * i + 1] !== GRID_MAX,
+    x: (i) => place.left + grid[2 * i] * sx,
+    y: (i) => place.top + place.height - grid[2 * i + 1] * sy,
+  };
+}
+
+/** How the copies of a frame have turned, and their radii. */
+const copied = ({ turned, copies }, radius) => [Uint8Array.from(copies.owner, (i) => turned[i]), Float32Array.from(copies.owner, (i) => radius[i])];
+
+/** Links as lines in the colour of their pull; returns how many. `at`: where a circle is on the screen; `period`: (2n,) or undefined. */
+function drawLinks(context, { joined, strain }, at, dark, period) {
   if (!strain?.length) return 0;
   const shades = heat(LOADS, dark), groups = shades.map(() => []);
   for (let k = 0; k < strain.length; k++) groups[(strain[k] * LOADS) >> 8].push(k);
@@ -89,12 +111,44 @@ function drawLinks(context, { joined, strain }, at, dark) {
     for (const k of group) {
       const a = joined[2 * k], b = joined[2 * k + 1];
       if (!at.seen(a) || !at.seen(b)) continue;
+      const dx = at.x(b) - at.x(a), dy = at.y(b) - at.y(a), nx = nearest(dx, period?.[2 * a]), ny = nearest(dy, period?.[2 * a + 1]);
       context.moveTo(at.x(a), at.y(a));
-      context.lineTo(at.x(b), at.y(b));
+      context.lineTo(at.x(a) + nx, at.y(a) + ny);
+      if (nx !== dx || ny !== dy) {
+        context.moveTo(at.x(b), at.y(b));
+        context.lineTo(at.x(b) - nx, at.y(b) - ny);
+      }
       drawn++;
     }
     ink(context, shades[load], LINK_PX);
   }
+  return drawn;
+}
+
+/** Contacts as lines as wide as what pushes, through the middles of the circles; returns how many. */
+function drawForces(context, { touching, pushes, lean }, radius, scale, at, dark) {
+  if (!pushes?.length) return 0;
+  const shades = heat(LOADS, dark), groups = shades.map(() => []);
+  let usual = 0, drawn = 0;
+  for (let k = 0; k < pushes.length; k++) {
+    groups[(pushes[k] * LOADS) >> 8].push(k);
+    usual += radius[touching[2 * k]] / pushes.length;
+  }
+  context.lineCap = "round";
+  for (const [load, group] of groups.entries()) {
+    context.beginPath();
+    for (const k of group) {
+      const a = touching[2 * k], b = touching[2 * k + 1];
+      if (!at.seen(a) || !at.seen(b)) continue;
+      const angle = (lean[k] * Math.PI) / 128, reach = radius[a] * scale;
+      context.moveTo(at.x(a), at.y(a));
+      if (a === b) context.lineTo(at.x(a) + reach * Math.cos(angle), at.y(a) - reach * Math.sin(angle));
+      else context.lineTo(at.x(b), at.y(b));
+      drawn++;
+    }
+    ink(context, shades[load], Math.max(0.5, (1.6 * usual * scale * (load + 0.5)) / LOADS));
+  }
+  context.lineCap = "butt";
   return drawn;
 }
 

@@ -4,11 +4,14 @@
 import { Backdrop } from "./backdrop.js";
 import { Camera } from "./camera.js";
 import { Inks, isLively } from "./colour.js";
+import { Capture } from "./capture.js";
+import { Circles } from "./circles.js";
 import { Controls } from "./controls.js";
-import { GRID_MAX, makeRenderer } from "./draw.js";
+import { GRID_MAX } from "./draw.js";
 import { fillSheet, listen } from "./keys.js";
 import { Numbers } from "./numbers.js";
-import { MOST_CONTACTS, Overlay } from "./overlay.js";
+import { MOST_CONTACTS, MOST_FORCES, Overlay } from "./overlay.js";
+import { Own } from "./own.js";
 import { Panels } from "./panels.js";
 import { read, written } from "./permalink.js";
 import { Pointer } from "./pointer.js";
@@ -30,7 +33,7 @@ const NAMES = { canvas: "Canvas2D", webgl2: "WebGL2" };
  */
 export function mount(root, connect, { address = null, renderer: wanted = "auto", film = null } = {}) {
   const $ = (id) => root.querySelector(`#${id}`);
-  const stage = $("stage"), photo = $("photo"), renderer = makeRenderer(stage, wanted), photographs = photo.getContext("bitmaprenderer");
+  const circles = new Circles($("stage"), $("photo"), wanted), { renderer } = circles;
   const darkness = matchMedia("(prefers-color-scheme: dark)");
   const backdrop = new Backdrop($("backdrop")), overlay = new Overlay($("overlay")), camera = new Camera(), inks = new Inks();
   const panels = new Panels($("panels"), root), numbers = new Numbers(root);
@@ -40,9 +43,8 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   let frame = null; // the frame on screen
   let last = null; // its numbers, or those of the frame before while there is none
   const pending = new Queue(); // newer ones
-  let radiusPx = new Float32Array(0), radiusFor = 0; // radii in pixels of the stage, at how many pixels a metre
   let arrived = 0, newest = 0; // messages so far, and which of them is on show or about to be
-  let lookSent = "", placed = "", stale = true, numbersDue = 0, numbersStale = false, ticked = 0, beat = QUICK_MS, measured = false, awake = false, alarm = 0;
+  let lookSent = "", stale = true, numbersDue = 0, numbersStale = false, ticked = 0, beat = QUICK_MS, measured = false, awake = false, alarm = 0;
   let open = false, begun = false, linking = false, stopped = false;
 
   // -- the connection -------------------------------------------------------------------------------------------------
@@ -83,16 +85,16 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     measured = false; // panels have a header
     frame = null;
     pending.clear();
-    radiusFor = 0;
+    circles.forget(shape.drawnHere);
     Object.assign(camera, { bounded: shape.bounded && !shape.parted, parted: shape.parted });
     if (other) begin();
     controls.shape = shape;
     panels.build(shape.panels);
-    $("stage").hidden = shape.drawnHere;
-    $("photo").hidden = !shape.drawnHere;
     const pictures = shape.drawnHere && "Not drawn over pictures: of so many circles the server sends no more than these";
     offer("velocities", pictures);
-    offer("contacts", pictures || (shape.count > MOST_CONTACTS && `Drawn for at most ${MOST_CONTACTS} circles; here are ${shape.count}`));
+    const over = (most) => shape.count > most && `Drawn for at most ${most} circles; here are ${shape.count}`;
+    offer("contacts", pictures || over(MOST_CONTACTS));
+    offer("forces", pictures || (film && "A film does not know them") || over(MOST_FORCES));
     notice(shape.note);
     paint();
   }
@@ -102,7 +104,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     camera.fit();
     $("title").textContent = shape.title;
     if (address) document.title = `${shape.title} · pyverlet`;
-    for (const option of $("colour").options) option.disabled = option.value === "picture" && !shape.coloured;
+    for (const option of $("colour").options) option.disabled = (option.value === "picture" && !shape.coloured) || (option.value === "force" && Boolean(film || shape.count > MOST_FORCES));
     if (shape.coloured || $("colour").value === "picture") $("colour").value = shape.coloured ? "picture" : "order";
     controls.begin(shape);
     numbers.begin(shape);
@@ -156,7 +158,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
       camera.room = frame.room;
       if (!begun) arrive();
       if (before && frame.status.time < before.status.time) startOver();
-      if (frame.grid) inks.follow(frame.velocity, frame.unit, frame.status.time);
+      if (frame.grid) inks.follow(frame.velocity, frame.unit, frame.status.time), inks.weigh(frame);
       drawCircles();
       send("ack", { seq: frame.seq });
       numbers.count(frame.status, now);
@@ -175,43 +177,30 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     if (numbersStale) alarm = setTimeout(wake, Math.max(numbersDue - now, 0));
   }
 
-  /** The circles, onto a canvas just as large as the part of the world that the frame shows. */
   function drawCircles() {
-    if (frame.bitmap) {
-      const { width, height } = frame.bitmap;
-      if (photo.width !== width || photo.height !== height) Object.assign(photo, { width, height });
-      photographs.transferFromImageBitmap(frame.bitmap);
-      return;
-    }
-    if (frame.grid.length !== 2 * shape.radius.length) return;
     measure();
-    const { width, height } = camera.place(frame.view);
-    const [across, down] = [Math.max(1, Math.round(width * ratio())), Math.max(1, Math.round(height * ratio()))];
-    if (stage.width !== across || stage.height !== down || !renderer.ready) {
-      Object.assign(stage, { width: across, height: down });
-      renderer.resize(across, down);
-      renderer.ready = true;
-    }
-    const pixels = camera.scale * ratio();
-    if (radiusFor !== pixels) {
-      radiusFor = pixels;
-      radiusPx = shape.radius.map((metres) => metres * pixels);
-    }
-    renderer.draw(frame.grid, radiusPx, inks.ink);
+    circles.draw(frame, shape, camera, ratio(), inks.ink);
   }
 
   /** What lies behind, over and beside the circles; and the canvas of the circles to its place. */
   function drawRest() {
     stale = false;
     measure();
-    const place = camera.place(frame.view), there = Object.values(place).join();
-    if (there !== placed) {
-      placed = there; // what did not change costs nothing: this runs with every frame
-      for (const canvas of [stage, photo]) for (const [side, value] of Object.entries(place)) canvas.style[side] = `${value}px`;
-    }
+    circles.place(camera.place(frame.view));
     backdrop.draw(shape, camera, size(), ratio(), root.dataset.theme, colour);
-    overlay.draw(shape, frame, camera, size(), ratio(), { velocities: $("velocities").checked, contacts: $("contacts").checked }, colour, root.dataset.theme === "dark");
+    overlay.draw(shape, frame, camera, size(), ratio(), { velocities: $("velocities").checked, contacts: $("contacts").checked, forces: $("forces").checked }, colour, root.dataset.theme === "dark");
     panels.layout(camera.place(camera.room));
+    capture.frame();
+  }
+
+  /** The picture without the controls, at once: what a canvas of WebGL shows is gone after the tick that drew it. */
+  function compose(context, { width, height }, pixels) {
+    drawCircles();
+    context.setTransform(pixels, 0, 0, pixels, 0, 0);
+    context.drawImage($("backdrop"), 0, 0, width, height);
+    const place = camera.place(frame.view), canvas = shape.drawnHere ? $("photo") : $("stage");
+    if (canvas.width && canvas.height) context.drawImage(canvas, place.left, place.top, place.width, place.height);
+    if (!$("overlay").hidden) context.drawImage($("overlay"), 0, 0, width, height);
   }
 
   /** The part of the page that the controls leave free. */
@@ -239,6 +228,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
       colour: by,
       dark: dark(),
       velocity: !shape.drawnHere && (isLively(by) || $("velocities").checked),
+      force: !shape.drawnHere && $("forces").checked,
     };
     const text = JSON.stringify(wish);
     if (text === lookSent) return;
@@ -253,8 +243,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     const { number } = shape, ever = (number.at(-1) ?? 0) + 1; // circles keep their colours when others come and go
     inks.begin($("colour").value, shape, shape.panels.length ? (i) => panels.within(i) : (i) => [number[i], ever], dark());
     if (!frame) return;
-    if (frame.grid) inks.follow(frame.velocity, frame.unit, frame.status.time);
-    if (frame.grid) drawCircles();
+    if (frame.grid) inks.follow(frame.velocity, frame.unit, frame.status.time), inks.weigh(frame), drawCircles();
     refresh();
   }
 
@@ -273,14 +262,17 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     if (open) link(status.error ? "lost" : status.paused ? "held" : "live", status.error ? "stopped" : status.paused ? "paused" : pace(status));
     $("busy").hidden = !status.busy;
     tell($("busy"), status.busy ?? "");
-    notice(status.error ? `${status.error}. Reset starts over.` : shape.note);
+    notice(status.error ? `${status.error}. Reset starts over.` : status.complaint ?? shape.note);
     controls.follow(status);
+    own.follow(status);
+    [$("undo").disabled, $("redo").disabled] = (status.undo ?? [0, 0]).map((depth) => !depth);
     if (linking && address) history.replaceState(null, "", `#${settings()}`);
   }
 
   function startOver() {
     numbers.clear();
     panels.clear();
+    own.clear();
   }
 
   const settings = () => written(shape, last, { colour: $("colour").value, theme: $("theme").value });
@@ -297,7 +289,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
 
   // -- controls -------------------------------------------------------------------------------------------------------
 
-  const controls = new Controls(root, send, () => (linking = true));
+  const controls = new Controls(root, send, () => (linking = true)), own = new Own(root, send), capture = new Capture($("film"), compose);
   const tools = () => [...root.querySelectorAll("[name=tool]")];
   const flip = (id) => !$(id).disabled && $(id).click();
   let before = null; // gravity before it was switched off
@@ -306,6 +298,10 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     pause: () => send("pause", { on: !last?.paused }),
     step: () => send("step"),
     reset: () => send("reset"),
+    undo: () => send("undo"),
+    redo: () => send("redo"),
+    still: () => frame && capture.still(shape.title, size(), ratio()),
+    film: () => frame && capture.kind && capture.film(shape.title, size(), ratio()),
     slower: () => controls.next("speed"),
     turn: (key) => controls.set("angle", ((controls.get("angle") + (key === "ArrowLeft" ? -STEP_TURN : STEP_TURN) + 540) % 360) - 180),
     weightless() {
@@ -318,6 +314,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     theme: () => (($("theme").value = dark() ? "light" : "dark"), $("theme").dispatchEvent(new Event("change"))),
     velocities: () => flip("velocities"),
     contacts: () => flip("contacts"),
+    forces: () => flip("forces"),
     zoom: (key) => (camera.zoom(key === "+" ? STEP_ZOOM : 1 / STEP_ZOOM, camera.free.left + camera.free.width / 2, camera.free.top + camera.free.height / 2), zoomed()),
     fit: () => (camera.fit(), zoomed()),
     async copy() {
@@ -336,7 +333,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     },
   };
   if (film) Object.assign(act, film);
-  for (const id of ["pause", "step", "reset", "fit", "copy", "help", "fold"]) {
+  for (const id of ["pause", "step", "reset", "undo", "redo", "still", "film", "fit", "copy", "help", "fold"]) {
     $(id).addEventListener("click", (event) => {
       act[id]();
       if (event.detail) $(id).blur(); // after a click with the mouse, space is pause again and not this button
@@ -350,11 +347,11 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
       numbersStale = true;
     });
   }
-  for (const id of ["velocities", "contacts"]) $(id).addEventListener("change", () => (refresh(), $(id).blur()));
+  for (const id of ["velocities", "contacts", "forces"]) $(id).addEventListener("change", () => (refresh(), $(id).blur()));
   for (const tool of tools()) tool.addEventListener("change", () => ((root.dataset.tool = tool.value), tool.blur()));
   $("sheet-close").addEventListener("click", () => $("sheet").close());
   fillSheet($("sheet").querySelector("tbody"), act, film);
-  listen(address || film ? document : root, root, act);
+  listen(address || film ? document : root, root, act, (key, again) => shape?.answers?.includes("keys") && (again || send("key", { key }), true));
 
   const zoomed = () => ((numbersStale = true), refresh());
 
@@ -388,6 +385,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     groups: () => shape.groups,
     ink: (i) => inks.ink[i],
     overlay,
+    capture,
     camera,
     /** The element is gone. */
     stop() {

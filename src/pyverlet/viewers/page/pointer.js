@@ -3,6 +3,7 @@
 const REACH_PX = 9; // a near miss still takes the circle
 const FINGER_PX = 18; // fingers are wider than mice
 const WHEEL = 0.0015; // a notch of 100 zooms by 15 %
+const BUTTON_NAMES = ["left", "middle", "right"];
 const POUR = 2.2; // circles poured by a moving mouse are so many radii of the usual circle apart
 
 export class Pointer {
@@ -23,7 +24,7 @@ export class Pointer {
   }
 
   letGo() {
-    if (this.hand === "drag" || this.hand === "poke") this.page.send("release");
+    if (this.hand && this.hand !== "move") this.page.send("release");
     this.hand = null;
     this.ring.hidden = true;
     this.root.classList.remove("holding");
@@ -46,6 +47,7 @@ export class Pointer {
     if (this.hand || event.button > 2) return;
     const tool = event.button || event.altKey ? "move" : event.shiftKey ? "poke" : this.page.tool();
     const [left, top] = this.#at(event), [x, y] = this.page.camera.toWorld(left, top);
+    if (this.page.shape().answers?.includes("click")) this.page.send("click", { x, y, button: BUTTON_NAMES[event.button] });
     if (tool === "pin") return this.page.send("pin", { x, y, reach: this.#reach(event) });
     this.hand = tool;
     this.last = null;

@@ -1,5 +1,6 @@
 // A film, as record/_reel.py wrote it: blocks in the page's own elements, unpacked when they are wanted.
 
+import { copiesOf, nearest, periods } from "./copies.js";
 import { GRID_MAX } from "./draw.js";
 import { unpack } from "./wire.js";
 
@@ -96,25 +97,26 @@ function unfold(bytes, planes, size) {
 
 /**
  * A frame message, as the live page gets it. part: of the plane, or null. after: {chunk, row} of the next frame and share: how much
- * of the way there, for what is between two frames.
+ * of the way there, for what is between two frames. shape: of these circles.
  */
-export function message({ chunk, row }, seq, part, after, share) {
+export function message({ chunk, row }, seq, part, after, share, shape) {
   const { n, step, unit } = chunk, head = chunk.frames[row], [x0, y0, x1, y1] = part ?? head.room;
   const between = after?.chunk.n === n && after.chunk.shape === chunk.shape ? share : 0;
   const now = chunk.position.subarray(2 * row * n, 2 * (row + 1) * n);
   const next = between ? after.chunk.position.subarray(2 * after.row * n, 2 * (after.row + 1) * n) : now;
   const grid = new Uint16Array(2 * n), low = [x0, y0], scale = [GRID_MAX / (x1 - x0), GRID_MAX / (y1 - y0)];
-  for (let i = 0; i < 2 * n; i++) {
-    const metres = (now[i] + between * (next[i] - now[i])) * step;
-    grid[i] = Math.min(Math.max(Math.round((metres - low[i & 1]) * scale[i & 1]), 0), GRID_MAX);
-  }
+  const period = periods(shape?.seams, n), metres = (i) => (now[i] + between * nearest(next[i] - now[i], period?.[i] / step)) * step;
+  const onGrid = (value, axis) => Math.min(Math.max(Math.round((value - low[axis]) * scale[axis]), 0), GRID_MAX);
+  for (let i = 0; i < 2 * n; i++) grid[i] = onGrid(metres(i), i & 1);
+  const { owner, places } = period ? copiesOf(shape, (i) => metres(2 * i), (i) => metres(2 * i + 1)) : { owner: [] };
+  const copies = owner.length ? { owner: Uint32Array.from(owner), places: Uint16Array.from(places, (value, k) => onGrid(value, k & 1)) } : null;
   let most = 1;
   const units = chunk.velocity.subarray(2 * row * n, 2 * (row + 1) * n);
   for (const value of units) most = Math.max(most, Math.abs(value));
   const coarse = Math.ceil(most / SHORT), velocity = Int16Array.from(units, (value) => value / coarse);
   const time = head.status.time + between * (between && after.chunk.frames[after.row].status.time - head.status.time);
   return {
-    kind: "frame", seq, view: part ?? head.room, room: head.room, obstacles: head.obstacles, status: { ...head.status, time },
-    grid, velocity, unit: unit * coarse, links: head.links, joined: head.pairs, strain: head.strain,
+    kind: "frame", seq, view: part ?? head.room, room: head.room, obstacles: head.obstacles, drawing: head.drawing, status: { ...head.status, time },
+    grid, copies, velocity, unit: unit * coarse, links: head.links, joined: head.pairs, strain: head.strain,
   };
 }

@@ -6,9 +6,10 @@ from pyverlet.world.builders._built import Built, Sheet
 from pyverlet.world.builders.bridge import bridge
 from pyverlet.world.builders.chain import chain
 from pyverlet.world.builders.cloth import cloth
+from pyverlet.world.builders.fill import Filling, fill
 from pyverlet.world.builders.net import net
 from pyverlet.world.builders.outline import box, disc
 from pyverlet.world.builders.rope import rope
 from pyverlet.world.builders.soft_body import soft_body
 
-__all__ = ["Built", "Sheet", "box", "bridge", "chain", "cloth", "disc", "net", "rope", "soft_body"]
+__all__ = ["Built", "Filling", "Sheet", "box", "bridge", "chain", "cloth", "disc", "fill", "net", "rope", "soft_body"]

@@ -1,0 +1,68 @@
+"""A limit on how long a piece of Python may take: for code of the user's that may loop for ever."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import threading
+import time
+from collections.abc import Iterator
+
+LOOK_S = 0.2
+"""How often somebody looks at the clock."""
+
+
+class TooLong(BaseException):
+    """Raised in the code that took too long, at the line where it was."""
+
+
+class Patience:
+    """Interrupts what runs in a `within` for too long, between two of its steps in Python; of one thread at a time.
+
+    A thread that waits in C (`time.sleep`, a compiled kernel) is interrupted when it comes back. The interpreter's own means are
+    used for it: `PyThreadState_SetAsyncExc`, of Python's C API.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._armed = threading.Event()
+        self._deadline: float | None = None
+        self._thread = 0
+        self._watcher: threading.Thread | None = None
+
+    @contextlib.contextmanager
+    def within(self, seconds: float) -> Iterator[None]:
+        """Raise `TooLong` in the calling thread if the block takes longer; again each time that it goes on all the same."""
+        if self._watcher is None:
+            self._watcher = threading.Thread(target=self._watch, name="pyverlet-patience", daemon=True)
+            self._watcher.start()
+        with self._lock:
+            self._thread, self._deadline = threading.get_ident(), time.monotonic() + seconds
+        self._armed.set()
+        try:
+            yield
+        finally:
+            self._deadline = None
+            with self._lock:
+                self._armed.clear()
+                if self._thread < 0:  # raised perhaps, and not arrived yet
+                    _raise(-self._thread, None)
+
+    def _watch(self) -> None:
+        while True:
+            self._armed.wait()
+            time.sleep(LOOK_S)
+            with self._lock:
+                if self._deadline is not None and time.monotonic() > self._deadline:
+                    self._thread = -abs(self._thread)
+                    _raise(abs(self._thread), TooLong)
+
+
+def interrupt(thread: threading.Thread) -> None:
+    """Raise `TooLong` in a thread that nobody waits for any more."""
+    if thread.ident is not None and thread.is_alive():
+        _raise(thread.ident, TooLong)
+
+
+def _raise(thread: int, kind: type[BaseException] | None) -> None:
+    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), None if kind is None else ctypes.py_object(kind))

@@ -1,0 +1,74 @@
+"""A world as a program: lines that build it, and what is done to it while it runs. What is printed is what was run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+import pyverlet as pv
+from pyverlet.world.world import World
+
+Build = Callable[[int | None], World]
+"""A world on at most so many threads."""
+
+Deed = Callable[[World, int], None]
+"""Does to a world what is due before a frame of this number."""
+
+_INDENT = "    "
+
+
+@dataclass(frozen=True)
+class Program:
+    """A world and its history.
+
+    Attributes:
+        seed: of all that the lines draw by chance.
+        count: circles, `n` in the lines.
+        settings: arguments of `pv.World`, as they are written.
+        lines: statements that fill `world`, in terms of `n` and `rng`.
+        deeds: (frame, statement) what is done to `world` before this frame.
+        frames: how many are stepped.
+        dt: s, as it is written.
+    """
+
+    seed: int
+    count: int
+    settings: Mapping[str, str] = field(default_factory=dict)
+    lines: tuple[str, ...] = ()
+    deeds: tuple[tuple[int, str], ...] = ()
+    frames: int = 40
+    dt: str = "1 / 60"
+
+    @property
+    def body(self) -> str:
+        """The two functions: `build(threads)` and `deed(world, frame)`."""
+        settings = ", ".join(f"{name}={value}" for name, value in {**self.settings, "threads": "threads"}.items())
+        built = [f"rng, n = np.random.default_rng({self.seed}), {self.count}", f"world = pv.World({settings})", *self.lines]
+        done = [f"if frame == {frame}:\n{_INDENT * 2}{statement}" for frame, statement in self.deeds]
+        functions = [("build(threads)", [*built, "return world"]), ("deed(world, frame)", done or ["pass"])]
+        return "\n\n\n".join(
+            f"def {head}:\n" + "\n".join(_INDENT + line for line in statements) for head, statements in functions
+        )
+
+    def source(self, only: str | None = None) -> str:
+        """The whole program, to be run by itself; `only`: the check that fails."""
+        chosen = f", only={only!r}" if only else ""
+        return (
+            "import numpy as np\n\nimport pyverlet as pv\nfrom pyverlet.lab import fuzz\n\n\n"
+            f"{self.body}\n\n\nfuzz.check(build, deed, frames={self.frames}, dt={self.dt}{chosen})\n"
+        )
+
+    def functions(self) -> tuple[Build, Deed]:
+        """`build` and `deed`, compiled from what is printed."""
+        names: dict[str, Any] = {"np": np, "pv": pv}
+        exec(compile(self.body, "<fuzzed world>", "exec"), names)
+        return names["build"], names["deed"]
+
+    @property
+    def seconds(self) -> float:
+        """A frame, s."""
+        top, _, bottom = self.dt.partition("/")
+        return float(top) / float(bottom or 1)

@@ -1,0 +1,66 @@
+"""Many random worlds, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from pyverlet.ground.errors import InputError
+from pyverlet.lab.fuzz.draw import drawn
+from pyverlet.lab.fuzz.program import Program
+from pyverlet.lab.fuzz.shrink import shrink
+from pyverlet.lab.fuzz.watch import Broken, check
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One world.
+
+    Attributes:
+        seed: of `drawn`.
+        refused: why it could not be built, for two of the things drawn do not go together; None if it could.
+        check: the promise that was broken, in which frame and how; None if all hold.
+        program: the smallest that breaks it; None if all hold.
+    """
+
+    seed: int
+    refused: str | None = None
+    check: str | None = None
+    program: str | None = None
+
+
+def fuzz(worlds: int, seed: int = 0, *, small: bool = True, without: Sequence[str] = ()) -> Iterator[Finding]:
+    """Check the worlds of so many seeds, from `seed` on.
+
+    small: whether those that fail are made small, which takes some dozens of runs each. without: checks that are not made.
+    """
+    for number in range(seed, seed + worlds):
+        yield look_at(drawn(number), small=small, without=without)
+
+
+def look_at(program: Program, *, small: bool = True, without: Sequence[str] = ()) -> Finding:
+    """Check one."""
+    try:
+        _run(program, without=without)
+    except InputError as error:
+        return Finding(program.seed, refused=str(error))
+    except Broken as broken:
+        name = broken.check
+        least = shrink(program, lambda simpler: _frame(simpler, name)) if small else program
+        return Finding(program.seed, check=str(broken), program=least.source(only=name))
+    return Finding(program.seed)
+
+
+def _run(program: Program, only: str | None = None, without: Sequence[str] = ()) -> None:
+    build, deed = program.functions()
+    check(build, deed, frames=program.frames, dt=program.seconds, only=only, without=without)
+
+
+def _frame(program: Program, name: str) -> int | None:
+    try:
+        _run(program, name)
+    except Broken as broken:
+        return broken.frame if broken.check == name else None
+    except Exception:  # what is left out was needed by what stays
+        return None
+    return None

@@ -1,0 +1,276 @@
+"""What is promised of every world, looked at in each frame of one.
+
+`finite`      nothing is NaN or infinite
+`room`        nobody who is free leaves a closed room
+`energy`      never rises by more than 1e-4 of its scale in a frame where nothing drives the world
+`links`       nor does it in a world with links
+`momentum`    stays where nothing outside acts
+`ledger`      its accounts add up to the energy
+`contacts`    the circles that overlap are those that plain NumPy finds, pair by pair
+`bits`        a second run, on two threads where there are enough circles, ends with the same bits
+`restore`     so does what goes on from `save` and `restore`
+`file`        and from a file
+`error`       nothing but `InputError` is raised
+"""
+
+from __future__ import annotations
+
+import tempfile
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from pyverlet.compile import jit
+from pyverlet.data import snapshot
+from pyverlet.ground.errors import InputError, NonFiniteError
+from pyverlet.lab.fuzz.program import Build, Deed
+from pyverlet.lab.physics.energy import MOST, scale
+from pyverlet.laws.forces import ConstantForce, Drag, Wind
+from pyverlet.laws.limiter import undriven
+from pyverlet.laws.links import Pin
+from pyverlet.laws.rooms import Open
+from pyverlet.world.world import World
+
+CHECKS = ("finite", "room", "energy", "links", "momentum", "ledger", "contacts", "bits", "restore", "file", "error")
+
+_CLOSED = 1e-6
+"""Of the scale: what the accounts of a ledger may differ by from the energy. Both are summed in float64."""
+
+_FALL_S = 1.0
+"""s: without walls the scale of the energy is that of a fall of a second."""
+
+_MOMENTUM = 16.0
+"""Rounding errors of each velocity in a substep: one for each pair a circle is in, and it is in six, two sweeps and a few."""
+
+_EDGE = 1e-5
+"""Of the contact distance: pairs nearer than this to just touching may count or not, in float32."""
+
+
+class Broken(Exception):  # noqa: N818  (a promise, not an error)
+    """A promise that a world has broken.
+
+    Attributes:
+        check: which, a name of the list above.
+        frame: before which frames had gone well.
+    """
+
+    def __init__(self, check: str, frame: int, what: str) -> None:
+        super().__init__(f"{check}, frame {frame}: {what}")
+        self.check, self.frame = check, frame
+
+
+def check(build: Build, deed: Deed, *, frames: int, dt: float, only: str | None = None, without: Sequence[str] = ()) -> None:
+    """Run a world and hold it to what is promised.
+
+    Args:
+        build: makes it, on at most so many threads.
+        deed: does to it what is due before a frame.
+        frames: how many are run.
+        dt: s, each.
+        only: the one check to be made; None makes all.
+        without: checks that are not made.
+
+    Raises:
+        Broken: a promise does not hold.
+        InputError: the program asks for what is not allowed.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a gas too coarse is meant
+        _check(build, deed, frames, dt, frozenset(CHECKS if only is None else [only]) - set(without))
+
+
+def _check(build: Build, deed: Deed, frames: int, dt: float, made: frozenset[str]) -> None:
+    world = build(1)
+    half = frames // 2
+    for frame in range(half):
+        _frame(world, deed, frame, dt, made)
+    saved, file = world.save(), None
+    if "file" in made and not world.actors and _is_plain(world):
+        file = _through_a_file(world)
+    for frame in range(half, frames):
+        _frame(world, deed, frame, dt, made)
+    end = world.state_hash()
+    if "contacts" in made:
+        _compare_contacts(world, frames)
+    if "bits" in made:
+        other = build(min(2, jit.max_threads()))
+        _run(other, deed, range(frames), dt)
+        _same("bits", frames, end, other.state_hash())
+    if not _silent(deed, range(half, frames)):
+        return
+    if file:
+        _run(file, deed, range(half, frames), dt)
+        _same("file", half, end, file.state_hash())
+    if "restore" in made:
+        with _told("restore", half):
+            world.restore(saved)
+        _run(world, deed, range(half, frames), dt)
+        _same("restore", half, end, world.state_hash())
+
+
+class _Noted:
+    """Stands for a world to see whether a deed would touch it."""
+
+    def __getattr__(self, name: str) -> object:
+        raise _TouchedError
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise _TouchedError
+
+    def __len__(self) -> int:
+        raise _TouchedError
+
+
+class _TouchedError(Exception):
+    pass
+
+
+def _silent(deed: Deed, frames: range) -> bool:
+    """Whether nothing is done to the world in these frames. Laws that were changed are no part of what `restore` brings back."""
+    try:
+        for frame in frames:
+            deed(_Noted(), frame)  # type: ignore[arg-type]
+    except _TouchedError:
+        return False
+    return True
+
+
+def _is_plain(world: World) -> bool:
+    return len(world) < 1000
+
+
+def _through_a_file(world: World) -> World:
+    with tempfile.TemporaryDirectory() as folder, _told("file", world.frames):
+        path = Path(folder) / "world.pvsnap"
+        snapshot.save(world, path)
+        return snapshot.load(path, exact=True)
+
+
+def _run(world: World, deed: Deed, frames: range, dt: float) -> None:
+    for frame in frames:
+        deed(world, frame)
+        world.step(dt)
+
+
+def _same(name: str, frame: int, one: str, other: str) -> None:
+    if one != other:
+        raise Broken(name, frame, f"{one} and {other}")
+
+
+@contextmanager
+def _told(name: str, frame: int) -> Iterator[None]:
+    """Errors inside are those of this check; `InputError` too, for the program has asked for nothing there."""
+    try:
+        yield
+    except NonFiniteError as error:
+        raise Broken("finite", frame, str(error)) from error
+    except Exception as error:
+        raise Broken(name, frame, f"{type(error).__name__}: {error}") from error
+
+
+def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str]) -> None:
+    before_deed = (world.version, world.substeps)
+    energy_then = world.energy().total
+    deed(world, frame)
+    looks: list[Callable[[], None]] = []
+    touched = before_deed != (world.version, world.substeps) or energy_then != world.energy().total
+    touched |= frame == 0 and len(world.obstacles) > 0  # which lift whoever starts inside them
+    h = dt / world.substeps
+    about_energy = "links" if world.links else "energy"
+    if about_energy in made and not (world.actors or touched) and undriven(world, h, world._h_last) and _uniform(world):
+        looks.append(_energy(about_energy, world, frame))
+    if "momentum" in made and not world.actors and _alone(world):
+        looks.append(_momentum(world, frame))
+    try:
+        world.step(dt)
+    except NonFiniteError as error:
+        raise Broken("finite", frame, str(error)) from error
+    except InputError:
+        raise
+    except Exception as error:
+        raise Broken("error", frame, f"{type(error).__name__}: {error}") from error
+    for look in looks:
+        look()
+    if "finite" in made and not _finite(world):
+        raise Broken("finite", frame, "a value is NaN or infinite")
+    if "room" in made and not isinstance(world.boundary, Open):
+        _stay(world, frame)
+    if "ledger" in made and world.keeps_ledger:
+        now = world.energy().total
+        size = scale(world, _FALL_S) + abs(now)
+        if abs(world.ledger.total - now) > _CLOSED * size:
+            raise Broken("ledger", frame, f"accounts add up to {world.ledger.total:.9g} J, energy is {now:.9g} J")
+
+
+def _finite(world: World) -> bool:
+    columns = (world.position, world.velocity, world.spin, world.angle)
+    return all(bool(np.isfinite(column).all()) for column in columns)
+
+
+def _stay(world: World, frame: int) -> None:
+    gone = np.flatnonzero(world.boundary.outside(world.position) & np.isfinite(world.mass))
+    if len(gone):
+        raise Broken(
+            "room", frame, f"particle {gone[0]} of {len(world)} is at {world.position[gone[0]]}, {len(gone)} are outside"
+        )
+
+
+def _uniform(world: World) -> bool:
+    """Forces of which integrators of order 2 make no error: those that are the same everywhere, and drag."""
+    return all(isinstance(force, ConstantForce | Drag) and not isinstance(force, Wind) for force in world.forces)
+
+
+def _energy(name: str, world: World, frame: int) -> Callable[[], None]:
+    before = world.energy()
+    size = scale(world, _FALL_S) + abs(before.links)
+
+    def look() -> None:
+        rise = world.energy().total - before.total
+        if rise > MOST * size:
+            raise Broken(name, frame, f"up by {rise / size:.2e} of the scale, {rise:.4g} J")
+
+    return look
+
+
+def _alone(world: World) -> bool:
+    """Whether nothing outside acts on who is in it."""
+    held = any(isinstance(link, Pin) for link in world.links) or not np.isfinite(world.mass).all()
+    return not (held or any(world.gravity) or world.forces or world.obstacles) and isinstance(world.boundary, Open)
+
+
+def _momentum(world: World, frame: int) -> Callable[[], None]:
+    before = world.momentum()
+    eps = float(np.finfo(world.dtype).eps)
+
+    def size() -> float:
+        return float((world.mass.astype(float) * np.hypot(*world.velocity.astype(float).T)).sum())
+
+    moved = size()
+
+    def look() -> None:
+        change = float(np.hypot(*(world.momentum() - before)))
+        allowed = _MOMENTUM * eps * world.substeps * max(moved, size())
+        if change > allowed:
+            raise Broken("momentum", frame, f"changed by {change:.3g} N s, rounding explains {allowed:.3g}")
+
+    return look
+
+
+def _compare_contacts(world: World, frame: int) -> None:
+    """`overlap` finds its pairs by the cells that contacts use."""
+    if len(world) < 2 or world.links or (world.category != 1).any():
+        return
+    place, radius, free = world.position.astype(float), world.radius.astype(float), np.isfinite(world.mass)
+    surely = maybe = 0
+    for k in range(len(world) - 1):
+        reach = radius[k] + radius[k + 1 :]
+        apart = np.hypot(*(place[k + 1 :] - place[k]).T)
+        counts = free[k] | free[k + 1 :]
+        surely += int(((apart < (1 - _EDGE) * reach) & counts).sum())
+        maybe += int(((apart < (1 + _EDGE) * reach) & counts).sum())
+    found = world.overlap().contacts
+    if not surely <= found <= maybe:
+        raise Broken("contacts", frame, f"{found} pairs overlap by the cells, {surely} to {maybe} pair by pair")

@@ -1,0 +1,181 @@
+"""x'' = F(t, x, x') for any F and in any number of dimensions, by the integrators that worlds use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyverlet.compile import jit
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError, NonFiniteError
+from pyverlet.laws.integrators import Integrator, PositionVerlet
+from pyverlet.state.state import Slots, State
+
+Floats = NDArray[np.float64]
+Acceleration = Callable[[float, Any, Any], ArrayLike]
+"""F(t, x, v): the acceleration at time t of what is at x with velocity v, both in the shape of x0; floats if that is a number."""
+
+_MOST_NUMBERS = 1e9
+"""In what is returned: 8 GB. More is a slip of the keyboard in h."""
+
+
+class Solution(NamedTuple):
+    """What `solve` has found, at the start and after each step.
+
+    Attributes:
+        times: (n,) s.
+        positions: (n, *shape of x0).
+        velocities: (n, *shape of x0).
+    """
+
+    times: Floats
+    positions: Floats
+    velocities: Floats
+
+
+def solve(
+    F: Acceleration,  # noqa: N803  (as in x'' = F(t, x, x'))
+    *,
+    x0: ArrayLike,
+    v0: ArrayLike = 0.0,
+    until: float | None = None,
+    h: float | ArrayLike,
+    integrator: Integrator | None = None,
+    start: float = 0.0,
+) -> Solution:
+    """Solve x'' = F(t, x, x') from x(start) = x0 and x'(start) = v0, in float64.
+
+    Args:
+        F: called as F(t, x, v), returns the acceleration in the shape of x0: metres and seconds, or radians, or whatever x is in.
+            It may keep and change what it is given.
+        x0: a number or an array of any shape.
+        v0: in the shape of x0, or one number for all.
+        until: when to end, s, later than `start`. None with an array for `h`, which says it.
+        h: length of a step, s. Steps are a little shorter where that makes `until` the end of one. Or (n,) of each step.
+        integrator: as for a world, or your own; None is `PositionVerlet()`.
+        start: s.
+
+    Returns:
+        times, positions and velocities, at the start and after each step.
+
+    Raises:
+        InputError: an argument is outside what is allowed, or F returns something else than numbers in the shape of x0.
+        NonFiniteError: positions have grown without bounds.
+    """
+    if not callable(F):
+        raise InputError(f"F is {F!r}; allowed is a function F(t, x, v) that returns an acceleration")
+    method = PositionVerlet() if integrator is None else integrator
+    if not isinstance(method, Integrator):
+        raise InputError(f"integrator is {integrator!r}; allowed is an object such as pyverlet.RK4()")
+    x, v = _phase("x0", x0), _phase("v0", v0)
+    if v.shape not in ((), x.shape):
+        raise InputError(f"v0 has shape {v.shape}; allowed is that of x0, {x.shape}, or one number")
+    start = checks.number("start", start)
+    times = _times(start, until, h)
+    if len(times) * max(x.size, 1) > _MOST_NUMBERS:
+        raise InputError(f"h makes {len(times) - 1} steps; allowed are at most {_MOST_NUMBERS:g} numbers in what is returned")
+    return _solve(F, x, np.broadcast_to(v, x.shape), times, method)
+
+
+def _solve(F: Acceleration, x: Floats, v: Floats, times: Floats, integrator: Integrator) -> Solution:  # noqa: N803
+    found = Solution(times, np.empty((len(times), *x.shape)), np.empty((len(times), *x.shape)))
+    slots, forces = _slots(x, v), _Accelerations(F, x.shape)
+    found.positions[0], found.velocities[0] = x, v
+    h_last = None
+    with jit.one_thread():
+        for k, h in enumerate(map(float, np.diff(times))):
+            integrator.begin(slots, forces, times[k], h, h_last)
+            integrator.step(slots, forces, times[k], h)
+            integrator.end(slots, h)
+            found.positions[k + 1] = forces.shaped(slots.position)
+            found.velocities[k + 1] = forces.shaped(slots.velocity)
+            h_last = h
+            if not np.isfinite(slots.position).all():
+                component = int(np.flatnonzero(~np.isfinite(slots.position.ravel()))[0])
+                says = f"x has left the finite numbers at time {times[k + 1]:.6g}; steps are {h:g} long, shorter ones may do"
+                raise NonFiniteError(component, "integrate", float(times[k + 1]), says)
+    return found
+
+
+def _phase(name: str, value: ArrayLike) -> Floats:
+    try:
+        array = np.array(value, np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} is {value!r}; allowed is a number or an array of numbers") from None
+    if not np.isfinite(array).all():
+        raise InputError(f"{name} is {value!r}; allowed are finite numbers")
+    return array
+
+
+def _times(start: float, until: float | None, h: float | ArrayLike) -> Floats:
+    """(n + 1,) when steps begin and end."""
+    try:
+        lengths = np.asarray(h, np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"h is {h!r}; allowed is a number, or an array of the length of each step") from None
+    if lengths.ndim == 0:
+        if until is None:
+            raise InputError("until is None; allowed is a number, unless h is an array of the length of each step")
+        step, span = checks.number("h", float(lengths), above=0.0), checks.number("until", until, above=start) - start
+        if span / step > _MOST_NUMBERS:
+            raise InputError(f"h is {step:g}; allowed is at least {span / _MOST_NUMBERS:g}, a billionth of the whole")
+        # A span of so many h but for rounding is that many steps.
+        return np.linspace(start, start + span, max(1, int(np.ceil(span / step * (1 - 1e-12)))) + 1)
+    if until is not None:
+        raise InputError(f"until is {until} beside an array for h; allowed is None, for h says when to end")
+    if lengths.ndim != 1 or not len(lengths):
+        raise InputError(f"h has shape {lengths.shape}; allowed is a number, or (n,) lengths of steps")
+    checks.positive("h", lengths)
+    return start + np.concatenate(([0.0], np.cumsum(lengths)))
+
+
+def _slots(x: Floats, v: Floats) -> Slots:
+    """The components of x, two a row, as if they were particles; a last one without a partner has a 0 beside it."""
+    rows = {"position": x, "velocity": v}
+    count = max(1, (x.size + 1) // 2)
+    for name, given in rows.items():
+        rows[name] = np.zeros((count, 2))
+        rows[name].reshape(-1)[: x.size] = given.reshape(-1)
+    state, slots = State(np.dtype(np.float64)), Slots(np.dtype(np.float64))
+    rows["acceleration"] = np.full((count, 2), np.nan)
+    state.append(rows | {"spin": np.zeros(count), "mass": np.ones(count), "radius": np.ones(count)})
+    slots.gather(state)
+    return slots
+
+
+class _Accelerations:
+    """What integrators call, as `laws.forces.ForceSum` is for a world."""
+
+    velocity_dependent = True
+
+    def __init__(self, F: Acceleration, shape: tuple[int, ...]) -> None:  # noqa: N803
+        self._function, self._shape, self._size = F, shape, int(np.prod(shape))
+
+    def shaped(self, rows: Floats) -> Any:
+        """A copy of these rows in the shape of x0; a float if that is a number."""
+        flat = rows.reshape(-1)[: self._size]
+        return flat.reshape(self._shape).copy() if self._shape else float(flat[0])
+
+    def __call__(self, state: Slots, t: float) -> None:
+        given = self._function(float(t), self.shaped(state.position), self.shaped(state.velocity))
+        try:
+            a = np.asarray(given, np.float64)
+        except (TypeError, ValueError):
+            raise InputError(
+                f"F returns {given!r} at time {t:g}; allowed are numbers in the shape of x0, {self._shape}"
+            ) from None
+        if a.shape != self._shape:
+            raise InputError(f"F returns an array of shape {a.shape} at time {t:g}; allowed is the shape of x0, {self._shape}")
+        state.acceleration.fill(0)
+        state.acceleration.reshape(-1)[: self._size] = a.reshape(-1)
+
+    def kick_drift(self, state: Slots, t: float, h: float, ahead: float = 0.0) -> None:
+        before = state.acceleration.copy() if ahead else None
+        self(state, t)
+        if before is not None:
+            state.velocity -= ahead * before
+        state.velocity += h * state.acceleration
+        state.position += h * state.velocity

@@ -1,0 +1,60 @@
+"""What is drawn twice, or four times, in a periodic room: circles that reach through its seam, and links that do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.laws.obstacles import Outline
+from pyverlet.state.seam import Seam
+
+Array = NDArray[Any]
+
+
+def copies(position: Array, radius: Array, seam: Seam) -> tuple[NDArray[np.uint32], Array]:
+    """Circles (n, 2) and (n,), m, inside a periodic room, of which a part reaches into another image of it.
+
+    Returns:
+        (k,) whose image it is, and (k, 2) where that stands, m.
+    """
+    owner, place = [np.empty(0, np.uint32)], [np.empty((0, 2), position.dtype)]
+    low, period = np.array((seam.low_x, seam.low_y)), np.array(seam.period)
+    near = np.zeros((len(position), 2), np.int8)  # to which side each is to be moved
+    for axis in range(2):
+        if period[axis] > 0:
+            x = position[:, axis]
+            near[:, axis] = (x - low[axis] < radius).astype(np.int8) - (low[axis] + period[axis] - x < radius)
+    for ways in ((1, 0), (0, 1), (1, 1)):
+        who = np.flatnonzero((near[:, np.array(ways, bool)] != 0).all(axis=1))
+        owner.append(who.astype(np.uint32))
+        place.append((position[who] + near[who] * ways * period).astype(position.dtype))
+    return np.concatenate(owner), np.concatenate(place)
+
+
+def lines(ends: Array, force: Array, seam: Seam) -> tuple[Array, Array]:
+    """Links (m, 2, 2) in m and what they pull with, and once more, from their second end, those that reach through the seam."""
+    way = seam.nearest(ends[:, 1] - ends[:, 0])
+    there = ends.copy()
+    there[:, 1] = ends[:, 0] + way
+    through = np.flatnonzero(np.abs(there[:, 1] - ends[:, 1]).max(axis=1, initial=0) > 0.25 * seam.shortest)
+    back = ends[through][:, ::-1].copy()
+    back[:, 1] = back[:, 0] - way[through]
+    return np.concatenate((there, back)), np.concatenate((force, force[through]))
+
+
+def outlines(drawn: Sequence[Outline], seam: Seam) -> list[Outline]:
+    """These, and again those that reach into another image of the room."""
+    if not seam:
+        return list(drawn)
+    low, high = np.array((seam.low_x, seam.low_y)), np.array((seam.low_x + seam.period_x, seam.low_y + seam.period_y))
+    periodic, found = np.array(seam.period) > 0, []
+    for points, filled in drawn:
+        for shift in seam.images():
+            moved = points + shift
+            inside = ((moved.max(axis=0) > low) & (moved.min(axis=0) < high)) | ~periodic
+            if inside.all() or not shift.any():
+                found.append(Outline(moved, filled))
+    return found

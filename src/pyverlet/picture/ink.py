@@ -1,0 +1,77 @@
+"""The drawing of a `Pen` onto pixels."""
+
+from __future__ import annotations
+
+import importlib.util
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.ground.errors import InputError
+from pyverlet.kernels import lines, raster
+from pyverlet.picture.palette import Packed, Theme, swapped
+from pyverlet.picture.pen import Drawing, Lettering, Stroke
+from pyverlet.picture.view import View
+
+SLICES = 8
+"""Lines a row of pixels is cut into where something is filled: steps of an eighth at rims that lie flat."""
+
+
+def put(pixels: Packed, drawing: Drawing, view: View, theme: Theme) -> None:
+    """Draw on (h, w) pixels of the view, in the order in which it was drawn.
+
+    Raises:
+        InputError: there is text, and Pillow is missing.
+    """
+    for mark in drawing:
+        colour = swapped(theme.text if mark.colour is None else mark.colour)
+        if isinstance(mark, Lettering):
+            _write(pixels, mark, view, colour)
+        elif mark.filled:
+            _fill(pixels, mark, view, colour)
+        else:
+            _line(pixels, mark, view, colour)
+
+
+def _line(pixels: Packed, mark: Stroke, view: View, colour: int) -> None:
+    points = np.array(mark.points)
+    if mark.closed:
+        points = np.concatenate((points, points[:1]))
+    ends = np.stack((points[:-1], points[1:]), axis=1)
+    lines.lines(pixels, ends, np.full(len(ends), colour, np.uint32), view.left, view.top, view.scale, mark.width / 2)
+
+
+def _fill(pixels: Packed, mark: Stroke, view: View, colour: int) -> None:
+    points = (np.array(mark.points) - (view.left, view.top)) * (view.scale, -view.scale)
+    cover = np.zeros(pixels.shape, dtype=np.float32)
+    raster.fill(cover, np.column_stack((points, np.roll(points, -1, axis=0))), SLICES)
+    raster.tint(pixels, cover, np.uint32(colour))
+
+
+def _write(pixels: Packed, mark: Lettering, view: View, colour: int) -> None:
+    letters = _letters(mark.text, mark.size)
+    (height, width), (rows, columns) = letters.shape, pixels.shape
+    left = round((mark.x - view.left) * view.scale)
+    top = round((view.top - mark.y) * view.scale - height / 2)
+    x0, y0, x1, y1 = max(left, 0), max(top, 0), min(left + width, columns), min(top + height, rows)
+    if x0 >= x1 or y0 >= y1:
+        return
+    part = np.ascontiguousarray(pixels[y0:y1, x0:x1])
+    raster.tint(part, np.ascontiguousarray(letters[y0 - top : y1 - top, x0 - left : x1 - left]), np.uint32(colour))
+    pixels[y0:y1, x0:x1] = part
+
+
+@lru_cache(256)
+def _letters(text: str, size: float) -> NDArray[np.float32]:
+    """(h, w) what part of each pixel a text covers."""
+    if importlib.util.find_spec("PIL") is None:
+        raise InputError("text in a picture needs 'PIL', which is not installed: pip install 'pyverlet[record]'")
+    from PIL import Image, ImageDraw, ImageFont
+
+    font: Any = ImageFont.load_default(size)
+    left, top, right, bottom = ImageDraw.Draw(Image.new("L", (1, 1))).multiline_textbbox((0, 0), text, font=font)
+    picture = Image.new("L", (max(1, int(right - left) + 2), max(1, int(bottom - top) + 2)))
+    ImageDraw.Draw(picture).multiline_text((1 - left, 1 - top), text, fill=255, font=font)
+    return np.asarray(np.asarray(picture) / 255, np.float32)

@@ -1,0 +1,134 @@
+"""What a user's own `draw(world, pen)` draws over a picture, in metres: the same on the page, in films and in pictures."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
+
+if TYPE_CHECKING:
+    from pyverlet.world.world import World
+
+MOST_POINTS = 50_000
+"""Of all that is drawn over one picture: it travels with each."""
+
+CORNERS = 64
+"""Of a circle: off by 0.1 % of its radius."""
+
+WIDTH_PX, SIZE_PX = 2.0, 14.0
+"""Of lines and of texts unless said."""
+
+Colour = str | Sequence[float] | None
+"""`"#rrggbb"`, (R, G, B) from 0 to 255, or None for what can be read on the ground."""
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """A line through points, metres; closed, it may be filled."""
+
+    points: tuple[tuple[float, float], ...]
+    closed: bool
+    filled: bool
+    colour: int | None
+    """0xRRGGBB; None is the theme's."""
+    width: float
+    """Pixels."""
+
+
+@dataclass(frozen=True)
+class Lettering:
+    """A text that begins at a point, metres, its middle at that height."""
+
+    x: float
+    y: float
+    text: str
+    colour: int | None
+    size: float
+    """Height in pixels."""
+
+
+Drawing = tuple[Stroke | Lettering, ...]
+
+Draw = Callable[["World", "Pen"], None]
+"""A user's function that draws over a picture of a world."""
+
+
+class Pen:
+    """Draws over a picture: given to `draw(world, pen)`, anew for each. Points in metres; widths and sizes in pixels.
+
+    A `colour` is "#rrggbb", (R, G, B) from 0 to 255, or None for one that can be read on the ground.
+
+    Args:
+        offset: what to add to points, m: where a world stands beside others.
+    """
+
+    def __init__(self, offset: tuple[float, float] = (0.0, 0.0)) -> None:
+        self._offset = np.array(offset)
+        self._marks: list[Stroke | Lettering] = []
+        self._points = 0
+
+    @property
+    def drawing(self) -> Drawing:
+        """What has been drawn so far."""
+        return tuple(self._marks)
+
+    def line(self, start: ArrayLike, end: ArrayLike, *, colour: Colour = None, width: float = WIDTH_PX) -> None:
+        """A line from one point to another."""
+        self._stroke(np.array([_point("start", start), _point("end", end)]), False, False, colour, width)
+
+    def polyline(self, points: ArrayLike, *, colour: Colour = None, width: float = WIDTH_PX) -> None:
+        """A line through points (n, 2)."""
+        self._stroke(checks.rows("points", points, np.dtype(float)), False, False, colour, width)
+
+    def polygon(self, points: ArrayLike, *, colour: Colour = None, width: float = WIDTH_PX, fill: bool = False) -> None:
+        """A closed line through points (n, 2), or with `fill` all that is inside."""
+        self._stroke(checks.rows("points", points, np.dtype(float)), True, fill, colour, width)
+
+    def circle(
+        self, center: ArrayLike, radius: float, *, colour: Colour = None, width: float = WIDTH_PX, fill: bool = False
+    ) -> None:
+        """A circle of this radius, m, or with `fill` a disc."""
+        angle = np.linspace(0.0, 2 * np.pi, CORNERS, endpoint=False)
+        ring = checks.number("radius", radius, least=0.0) * np.column_stack((np.cos(angle), np.sin(angle)))
+        self._stroke(_point("center", center) + ring, True, fill, colour, width)
+
+    def text(self, point: ArrayLike, text: Any, *, colour: Colour = None, size: float = SIZE_PX) -> None:
+        """A text that begins at a point, `size` pixels high."""
+        x, y = (_point("point", point) + self._offset).tolist()
+        self._count(1)
+        said = str(text)[:1000]
+        self._marks.append(Lettering(x, y, said, _rgb(colour), checks.number("size", size, above=0.0)))
+
+    def _stroke(self, points: Any, closed: bool, filled: bool, colour: Colour, width: float) -> None:
+        self._count(len(points))
+        where = tuple(map(tuple, np.asarray(points + self._offset, float).tolist()))
+        self._marks.append(Stroke(where, closed, bool(filled), _rgb(colour), checks.number("width", width, above=0.0)))
+
+    def _count(self, points: int) -> None:
+        self._points += points
+        if self._points > MOST_POINTS:
+            raise InputError(f"the drawing has {self._points:,} points; allowed are {MOST_POINTS:,} over one picture")
+
+
+def _point(name: str, value: ArrayLike) -> Any:
+    return np.array(checks.vector(name, np.asarray(value)))
+
+
+def _rgb(colour: Colour) -> int | None:
+    if colour is None:
+        return None
+    if isinstance(colour, str) and re.fullmatch("#[0-9a-fA-F]{6}", colour):
+        return int(colour[1:], 16)
+    if not isinstance(colour, str):
+        parts: Any = np.asarray(colour)
+        if parts.shape == (3,) and parts.dtype.kind in "iuf" and ((parts >= 0) & (parts <= 255)).all():
+            red, green, blue = (int(part) for part in parts)
+            return red << 16 | green << 8 | blue
+    raise InputError(f"colour is {colour!r}; allowed are '#rrggbb' and (R, G, B) from 0 to 255")

@@ -1,0 +1,33 @@
+"""A histogram beside a curve, live: what a scene measures, and what theory says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from pyverlet.world.world import World
+
+
+@dataclass(frozen=True)
+class Graph:
+    """What is on show.
+
+    Attributes:
+        title: one line above it.
+        axis: what is along x, from 0 to `most`.
+        most: value of x at the right end.
+        bars: heights of bars as wide as each other, from x = 0 on; of the same scale as the curve.
+        curve: heights at as many places, evenly spaced from x = 0 to `most`.
+        note: one line below it.
+    """
+
+    title: str
+    axis: str
+    most: float
+    bars: tuple[float, ...]
+    curve: tuple[float, ...]
+    note: str
+
+
+Gauge = Callable[[World], Graph]
+"""Called with the world for each picture; it may remember what it has seen."""

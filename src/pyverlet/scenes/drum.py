@@ -1,0 +1,64 @@
+"""Grains flow in a rotating drum: its rough wall carries them up, and down the slope they run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pyverlet.laws.rooms import Circle
+from pyverlet.scenes import _start
+from pyverlet.scenes._scene import Scene, Settings, Show
+from pyverlet.world.world import World
+
+RADIUS = 0.05
+"""Root mean square radius of the grains, m."""
+
+FILLING = 0.4
+"""Part of the drum's area that the grains cover."""
+
+FROUDE = 0.01
+"""w^2 R / g, what the turning does beside gravity: at a hundredth grains roll down a slope that is nearly straight."""
+
+GRAVITY = 9.81
+
+
+def drum_radius(particles: int) -> float:
+    """R, m."""
+    return float(RADIUS * np.sqrt(particles / FILLING))
+
+
+def angular_velocity(particles: int) -> float:
+    """w, rad/s, clockwise."""
+    return -float(np.sqrt(FROUDE * GRAVITY / drum_radius(particles)))
+
+
+def build(settings: Settings) -> World:
+    """1,500 rough grains of 5 cm in a drum that turns with w^2 R / g = 0.01.
+
+    Friction on the wall carries them up on one side until the heap is as steep as it can stand. From then on grains run down its
+    slope as fast as the wall brings new ones. On average they are so far beside the lowest point that the torque of the
+    wall, its power P / w, holds their weight: M g x = P / w.
+    """
+    rng = np.random.default_rng(settings.seed)
+    radii = _start.draw_radii(rng, settings.particles, settings.radius_spread, RADIUS)
+    radius = drum_radius(settings.particles)
+    while (centres := _start.in_circle(rng, radii, radius)) is None:
+        radius *= 1.01
+    world = settings.empty_world(
+        Circle(
+            radius=radius,
+            restitution=settings.restitution,
+            friction=settings.friction,
+            angular_velocity=angular_velocity(settings.particles),
+        )
+    )
+    world.add(position=centres, radius=radii, mass=(radii / RADIUS) ** 2)
+    return world
+
+
+SCENE = Scene(
+    "drum",
+    "rough grains run down the slope in a drum that turns",
+    build,
+    Settings(particles=1_500, friction=0.6, restitution=0.1, radius_spread=1.5),
+    show=Show(seconds=lambda settings: 15.0),
+)

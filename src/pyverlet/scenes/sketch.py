@@ -1,0 +1,333 @@
+"""Sketches: a Python file of the user's own as a scene.
+
+A sketch has `build()`, which returns a world, or a `SCENE`. It may have `update(world, dt)`, called before each frame;
+`draw(world, pen)`, which draws over the picture; `keys(world, key)` and `click(world, point, button)`, which answer the user.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import hashlib
+import importlib
+import importlib.util
+import inspect
+import linecache
+import sys
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from pyverlet.ground.errors import InputError, Interrupted
+from pyverlet.ground.patience import Patience, TooLong
+from pyverlet.scenes._scene import Scene, Settings
+from pyverlet.scenes.sliders import Board, board
+from pyverlet.world.actors import Actor
+from pyverlet.world.world import World
+
+SUFFIX = ".py"
+
+HOOKS = ("update", "draw", "keys", "click")
+"""Functions that a sketch may have besides `build`."""
+
+LARGEST = 4_000_000
+"""Bytes of a sketch."""
+
+HOOK_S = 3.0
+"""Longest that one of them may take: a screen waits for it."""
+
+_AFTERWARDS = ("substeps", "integrator", "gravity", "threads", "restitution", "friction", "collisions")
+"""Settings that a world takes after it was built."""
+
+
+class SketchError(InputError):
+    """Something in a sketch is wrong; the message says where."""
+
+
+class Sketch:
+    """The code of a file, run when it is first needed.
+
+    Args:
+        path: of the file.
+        source: what is in it.
+        before: what the file was when it was last run: sliders stay where the user has left them.
+
+    Attributes:
+        name: of the file, without its folder.
+        files: of the sketch and of the modules beside it that it has imported.
+    """
+
+    def __init__(self, path: Path, source: bytes, before: Sketch | None = None) -> None:
+        self.path, self.source, self.name = Path(path), source, Path(path).name
+        self.sliders: Board = {}
+        self.patience: Patience | None = None
+        self._left: Board = dict(before.sliders) if before else {}
+        self._brought: dict[str, Path] = dict(before._brought) if before else {}
+        self._module: ModuleType | None = None
+        self._built = False
+        self._off: set[str] = set()
+
+    @classmethod
+    def read(cls, path: str | Path, before: Sketch | None = None) -> Sketch:
+        """The sketch in a file.
+
+        Raises:
+            InputError: it cannot be read.
+        """
+        path = Path(path)
+        try:
+            source = path.read_bytes()
+        except OSError as error:
+            raise InputError(f"path is '{path}', which cannot be read: {error.strerror or error}") from None
+        if len(source) > LARGEST:
+            raise InputError(f"'{path}' has {len(source):,} bytes; allowed are {LARGEST:,}")
+        return cls(path, source, before)
+
+    def __reduce__(self) -> tuple[type[Sketch], tuple[Path, bytes]]:
+        return Sketch, (self.path.resolve(), self.source)  # another process runs it anew
+
+    @property
+    def digest(self) -> str:
+        """32 hex digits of what is in the file."""
+        return hashlib.blake2b(self.source, digest_size=16).hexdigest()
+
+    @property
+    def module(self) -> ModuleType:
+        """The sketch, run."""
+        if self._module is None:
+            self._module = self._run()
+        return self._module
+
+    @property
+    def files(self) -> list[Path]:
+        """Those whose change is a change of the sketch."""
+        return [self.path, *self._brought.values()]
+
+    def has(self, hook: str) -> bool:
+        """Whether there is such a function, and it has not failed."""
+        return hook not in self._off and callable(getattr(self.module, hook, None))
+
+    @property
+    def answers(self) -> bool:
+        """Whether what the user does reaches the sketch: then its worlds are more than what they started with."""
+        return bool(self.sliders) or any(self.has(hook) for hook in ("update", "keys", "click"))
+
+    def drawn(self, world: World, pen: Any) -> None:
+        """Have the sketch draw over a picture of its world, if it does; for films and pictures, which stop where it fails."""
+        self.call("draw", world, pen)
+
+    def call(self, hook: str, *arguments: Any, of: ModuleType | None = None) -> None:
+        """Call one of HOOKS, of the last world that was built unless said.
+
+        Raises:
+            SketchError: it has raised something, or looped too long; it is not called any more.
+        """
+        if not self.has(hook):
+            return
+        function = getattr(of or self.module, hook)
+        try:
+            with self.at_work(), self.patience.within(HOOK_S) if self.patience else nullcontext():
+                function(*arguments)
+        except SketchError as error:
+            self._off.add(hook)
+            raise SketchError(f"{error} ({hook} is not called any more)") from None
+
+    def build(self, settings: Settings) -> World:
+        """The sketch's world. Settings it does not take are set on the world that it has built, where that is possible.
+
+        Raises:
+            SketchError: it has raised something, or returned something else.
+            InputError: a setting is given that neither the sketch nor a world takes.
+        """
+        if self._built:  # what stands at the top of the file starts anew as well, so that every build is the same
+            self._left, self._module = self.sliders, None
+        scene = getattr(self.module, "SCENE", None)
+        self._built = True
+        with self.at_work():
+            world = scene.build(settings) if isinstance(scene, Scene) else self._made(settings)
+        if self.has("update"):
+            world.actors.append(Updates(self, self.module))
+        return world
+
+    def scene(self) -> Scene:
+        """The sketch as a scene; runs it, but builds nothing yet.
+
+        Raises:
+            SketchError: it cannot be run, or has neither `build` nor `SCENE`.
+        """
+        module = self.module
+        for hook in HOOKS:
+            if getattr(module, hook, None) is not None and not callable(getattr(module, hook)):
+                raise SketchError(f"{self.name}: {hook} is {getattr(module, hook)!r}; allowed is a function")
+        scene = getattr(module, "SCENE", None)
+        if scene is not None:
+            if not isinstance(scene, Scene):
+                raise SketchError(f"{self.name}: SCENE is {scene!r}; allowed is a pyverlet.scenes.Scene")
+            return dataclasses.replace(scene, build=self.build, sketch=self)
+        if not callable(getattr(module, "build", None)):
+            near = difflib.get_close_matches("build", [name for name in vars(module) if callable(getattr(module, name))], n=1)
+            hint = f" (did you mean {near[0]!r}?)" if near else ""
+            raise SketchError(
+                f"{self.name} has no build(){hint}; allowed is a function `def build():` that returns a pyverlet.World"
+            )
+        summary = next(iter((inspect.getdoc(module) or f"from {self.name}").splitlines()), "")
+        return SketchScene(self.path.stem, summary, self.build, self._defaults(), sketch=self)
+
+    def _run(self) -> ModuleType:
+        folder = self.path.resolve().parent
+        if str(folder) not in sys.path:
+            sys.path.insert(0, str(folder))  # as for a script: what lies beside it can be imported
+        for name in self._brought:
+            sys.modules.pop(name, None)  # it may have changed, too
+        known = set(sys.modules)
+        name = self.path.stem if self.path.stem not in sys.modules else f"pyverlet_sketch_{self.path.stem}"
+        spec = importlib.util.spec_from_loader(name, None, origin=str(self.path))
+        assert spec
+        module = importlib.util.module_from_spec(spec)
+        module.__file__ = str(self.path.resolve())
+        before, sys.modules[name] = sys.modules.get(name), module  # for classes that want to know where they are from
+        linecache.checkcache(module.__file__)
+        importlib.invalidate_caches()
+        self.sliders = {}
+        try:
+            with self.at_work():
+                exec(compile(self.source, module.__file__, "exec"), module.__dict__)
+        finally:
+            if before is not None:
+                sys.modules[name] = before
+            self._brought |= {new: file for new in set(sys.modules) - known - {name} if (file := _beside(new, folder))}
+        for kept in self.sliders.values():
+            if (left := self._left.get(kept.name)) is not None and left.made_as == kept.made_as:
+                kept.value = left.value
+        return module
+
+    def _defaults(self) -> Given:
+        """What `build` takes unless something else is given, as far as that is settings."""
+        build = self.module.build
+        known = {field.name for field in dataclasses.fields(Settings)}
+        values: dict[str, Any] = {}
+        for name, parameter in inspect.signature(build).parameters.items():
+            if name == "settings":
+                continue
+            if name not in known:
+                if parameter.default is parameter.empty and parameter.kind not in (
+                    parameter.VAR_POSITIONAL,
+                    parameter.VAR_KEYWORD,
+                ):
+                    raise SketchError(
+                        f"{self.name}: build takes {name!r}; allowed are `settings`, a Settings, and some of "
+                        f"{', '.join(sorted(known))}"
+                    )
+            elif parameter.default is not parameter.empty:
+                values[name] = parameter.default
+        with self.at_work():
+            return Given(**values)
+
+    def _made(self, settings: Settings) -> World:
+        taken = inspect.signature(self.module.build).parameters
+        given = settings.given if isinstance(settings, Given) else frozenset(_AFTERWARDS)
+        refused = sorted(given - set(taken) - set(_AFTERWARDS)) if "settings" not in taken else []
+        if refused:
+            name, value = refused[0], getattr(settings, refused[0])
+            said = getattr(value, "__name__", value)
+            raise InputError(f"{name} is {said}, which build() of {self.name} does not take; allowed is `def build({name}=...):`")
+        values: dict[str, Any] = {name: settings if name == "settings" else getattr(settings, name) for name in taken
+                                  if name == "settings" or hasattr(settings, name)}  # fmt: skip
+        world = self.module.build(**values)
+        if not isinstance(world, World):
+            what = "nothing" if world is None else repr(world)
+            raise SketchError(f"{self.name}: build() returned {what}; allowed is a pyverlet.World: `return world`")
+        if "settings" not in taken:
+            for name in sorted((given - set(taken)) & set(_AFTERWARDS)):
+                _set(world, name, getattr(settings, name))
+        return world
+
+    @contextmanager
+    def at_work(self) -> Iterator[None]:
+        """Code of the sketch runs: sliders are its own, and what it raises says where."""
+        try:
+            with board(self.sliders):
+                yield
+        except (SketchError, Interrupted):
+            raise
+        except Exception as error:
+            raise SketchError(self._told(error)) from error
+        except SystemExit as error:
+            where = f"{self.name}{self._line(error)}"
+            raise SketchError(f"{where} ends the program; allowed is build(), which returns a world") from None
+        except TooLong as error:
+            raise SketchError(f"{self.name}{self._line(error)} does not come back; does it loop for ever?") from None
+
+    def _told(self, error: Exception) -> str:
+        if isinstance(error, SyntaxError):
+            where = f", line {error.lineno}" if error.lineno and error.filename and Path(error.filename).name == self.name else ""
+            return f"{self.name}{where}: {error.msg}"
+        said = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
+        return f"{self.name}{self._line(error)}: {said}"
+
+    def _line(self, error: BaseException) -> str:
+        """Where in the sketch it was, or in a module beside it."""
+        frames = traceback.extract_tb(error.__traceback__)
+        own = [frame for frame in frames if Path(frame.filename).resolve() == self.path.resolve()]
+        return f", line {own[-1].lineno}" if own else ""
+
+
+@dataclass(frozen=True)
+class Given(Settings):
+    """Settings that know which of them somebody has asked for."""
+
+    given: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class SketchScene(Scene):
+    """A scene made by `build()`."""
+
+    def settings(self, **overrides: Any) -> Settings:
+        """As `Scene.settings`."""
+        named = frozenset(name for name, value in overrides.items() if value is not None and (name, value) != ("ledger", False))
+        settings = super().settings(**overrides)
+        assert isinstance(settings, Given)
+        return dataclasses.replace(settings, given=settings.given | named)
+
+    def takes(self, name: str) -> bool:
+        """Whether the sketch has a use for a setting when it builds."""
+        assert self.sketch
+        taken = inspect.signature(self.sketch.module.build).parameters
+        return name in taken or "settings" in taken
+
+
+class Updates(Actor):
+    """Calls `update(world, dt)` of a sketch before each frame."""
+
+    def __init__(self, sketch: Sketch, module: ModuleType) -> None:
+        self._sketch, self._module = sketch, module
+
+    def act(self, world: World, dt: float) -> None:
+        self._sketch.call("update", world, dt, of=self._module)
+
+
+def _set(world: World, name: str, value: Any) -> None:
+    """One of _AFTERWARDS."""
+    if name in ("restitution", "friction"):
+        if world.collisions is not None:
+            world.collisions = dataclasses.replace(world.collisions, **{name: value})
+        if hasattr(world.boundary, name):
+            setattr(world.boundary, name, value)
+    elif name == "collisions":
+        if value is None or world.collisions is None:
+            world.collisions = None
+        else:
+            world.collisions = dataclasses.replace(world.collisions, method=value)
+    else:
+        setattr(world, name, value)
+
+
+def _beside(name: str, folder: Path) -> Path | None:
+    """The file of a module, if that lies in this folder or below it."""
+    file = getattr(sys.modules[name], "__file__", None)
+    return Path(file) if file and Path(file).is_relative_to(folder) else None

@@ -1,0 +1,83 @@
+"""Where a periodic room joins on to itself: who leaves on one side comes in on the other."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.kernels import seam as kernels
+
+Array = NDArray[Any]
+
+
+class Seam(NamedTuple):
+    """A corner (x, y) of the room and its period (x, y), m; 0 in a direction that has none."""
+
+    low_x: float = 0.0
+    low_y: float = 0.0
+    period_x: float = 0.0
+    period_y: float = 0.0
+
+    def __bool__(self) -> bool:
+        return self.period_x > 0 or self.period_y > 0
+
+    @property
+    def period(self) -> tuple[float, float]:
+        """(x, y), m, as kernels take it."""
+        return self.period_x, self.period_y
+
+    @property
+    def shortest(self) -> float:
+        """The shortest period there is, m; infinite without any."""
+        return min((period for period in self.period if period > 0), default=np.inf)
+
+    def images(self) -> Array:
+        """(k, 2) m from a room to itself and to those around it that are its images; itself first."""
+        ways = [(0, -1, 1) if period > 0 else (0,) for period in self.period]
+        return np.array([(i * self.period_x, j * self.period_y) for i in ways[0] for j in ways[1]], float)
+
+    def nearest(self, way: Array) -> Array:
+        """(..., 2) of these differences of places, m, the images that are nearest to 0; themselves where there is no period."""
+        if not self:
+            return way
+        period = np.asarray(self.period, way.dtype)
+        return np.asarray(way - period * np.rint(np.divide(way, period, out=np.zeros_like(way), where=period > 0)))
+
+    def wrapped(self, position: Array) -> Array:
+        """(n, 2) the images of these places inside the room, m; the same array without a seam."""
+        if not self:
+            return position
+        out = np.empty_like(position)
+        kernels.wrap(position, *map(position.dtype.type, self), out)
+        return out
+
+    def wrap(self, position: Array) -> None:
+        """Put these places (n, 2) inside the room."""
+        kernels.wrap(position, *map(position.dtype.type, self), position)
+
+    def entered(self, position: Array, heading: Array) -> Array:
+        """(n, 2) places at the rim of the room, m, but at the side where `heading` (n, 2) leads into it."""
+        out = position.copy()
+        for axis, (low, period) in enumerate(((self.low_x, self.period_x), (self.low_y, self.period_y))):
+            if period > 0:
+                leaves = np.isclose(out[:, axis], low + period, rtol=0, atol=1e-12 * period) & (heading[:, axis] > 0)
+                out[leaves, axis] = low
+                leaves = np.isclose(out[:, axis], low, rtol=0, atol=1e-12 * period) & (heading[:, axis] < 0)
+                out[leaves, axis] = low + period
+        return out
+
+    def strays(self, position: Array) -> bool:
+        """Whether any of these places (n, 2) is farther than a period from the middle of the room."""
+        low = np.array((self.low_x, self.low_y), position.dtype)
+        away = np.abs(position - low - 0.5 * np.asarray(self.period, position.dtype))
+        return bool(((away > self.period) & (np.asarray(self.period) > 0)).any())
+
+    def follow(self, position: Array, reference: Array) -> None:
+        """These places (n, 2) become the images nearest to `reference` (n, 2)."""
+        kernels.follow(position, reference, *map(position.dtype.type, self.period))
+
+
+NONE = Seam()
+"""Of rooms that do not join on to themselves."""

@@ -1,0 +1,116 @@
+"""What other threads may ask of a session, at any time."""
+
+from __future__ import annotations
+
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from functools import partial
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from pyverlet.viewers.commands import Command
+from pyverlet.viewers.errands import Errands
+from pyverlet.viewers.frames import Frame
+from pyverlet.viewers.inbox import Inbox
+from pyverlet.viewers.rhythm import Audience
+
+if TYPE_CHECKING:
+    from pyverlet.viewers.exhibit import Exhibit
+
+STOP_TIMEOUT_S = 10.0
+"""Longest wait for a frame under way when a session stops."""
+
+
+class Door(ABC):
+    """The narrow door of a session: from any thread."""
+
+    def __init__(self) -> None:
+        self._commands, self._errands, self._audience = Inbox(), Errands(), Audience()
+        self._listeners: tuple[Callable[[], None], ...] = ()
+        self._listeners_lock = threading.Lock()
+        self._thread: threading.Thread | None = None
+        self._stopping = threading.Event()
+
+    @abstractmethod
+    def run(self) -> None:
+        """Step the worlds in the calling thread until somebody calls `stop`."""
+
+    @abstractmethod
+    def _put_on(self, exhibit: Exhibit) -> None:
+        """In the thread that steps the worlds."""
+
+    @abstractmethod
+    def _say(self, complaint: str | None, busy: str | None) -> None:
+        """Likewise."""
+
+    def submit(self, command: Command) -> None:
+        """Ask for something. Returns at once; the physics thread does it between two frames, in the order asked.
+
+        A world that is slow takes another gravity, or where a hand that is down moves, between two substeps.
+        """
+        self._commands.put(command)
+
+    def take(self, frame: Frame, *, velocity: bool = False) -> None:
+        """Say that a viewer has this frame and would like the next: a world that is slow makes some between its substeps then.
+
+        Args:
+            frame: that it has.
+            velocity: whether it looks at velocities. Frames made between substeps have new ones only if somebody does.
+        """
+        self._audience.take(frame.seq, velocity=velocity)
+
+    def weigh(self, frame: Frame) -> None:
+        """Say that a viewer that has this frame looks at forces between circles."""
+        self._audience.weigh(frame.seq)
+
+    def subscribe(self, listener: Callable[[], None]) -> Callable[[], None]:
+        """Have `listener()` called on the physics thread after every new frame; it must return at once and not raise.
+
+        Returns a function that ends the subscription.
+        """
+        with self._listeners_lock:
+            self._listeners = (*self._listeners, listener)
+
+        def unsubscribe() -> None:
+            with self._listeners_lock:
+                self._listeners = tuple(other for other in self._listeners if other is not listener)
+
+        return unsubscribe
+
+    def put_on(self, exhibit: Exhibit) -> None:
+        """Show something else from the next frame on; how the user looks at it stays."""
+        self._errands.put(partial(self._put_on, exhibit))
+        self._commands.put(None)
+
+    def tell(self, *, complaint: str | None = None, busy: str | None = None) -> None:
+        """What is wrong with the program that made the worlds, or keeps them waiting, while they go on; None: nothing."""
+        self._errands.put(partial(self._say, complaint, busy))
+        self._commands.put(None)
+
+    def held(self) -> AbstractContextManager[None]:
+        """Meanwhile the worlds stand between two frames, and are the caller's."""
+        return self._errands.held(lambda: self._commands.put(None))
+
+    def start(self) -> None:
+        """Run in a thread of the session's own."""
+        if self._thread is not None:
+            raise RuntimeError("a session starts once")
+        # A daemon: should a frame ever hang, Ctrl-C still ends the process.
+        self._thread = threading.Thread(target=self.run, name="pyverlet-physics", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Have the frame under way be the last; wait for it if the session has its own thread. Twice is once."""
+        self._stopping.set()
+        self._commands.put(None)
+        if self._thread is not None:
+            self._thread.join(STOP_TIMEOUT_S)
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.stop()

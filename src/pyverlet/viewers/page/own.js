@@ -1,0 +1,92 @@
+// What the user's own program has on the page: its sliders, and the numbers it watches.
+
+import { Chart } from "./chart.js";
+import { tell } from "./text.js";
+
+const MINE_MS = 400; // a slider in the user's hand does not follow the server
+const WATCH_COLOURS = ["--accent", "--kinetic", "--potential", "--links"];
+
+const short = (value) => (value === null || value === undefined ? "–" : String(Number(value.toPrecision(4))));
+
+export class Own {
+  /** `send(type, fields)`: to the server. */
+  constructor(root, send) {
+    this.sliders = root.querySelector("#own");
+    this.curves = root.querySelector("#watched");
+    this.send = send;
+    this.made = "";
+    this.named = "";
+    this.held = new Map();
+    this.charts = new Map();
+  }
+
+  /** Show what the server has. */
+  follow({ sliders = [], watched = {} }) {
+    const made = JSON.stringify(sliders.map(([name, low, high, step]) => [name, low, high, step]));
+    if (made !== this.made) {
+      this.made = made;
+      this.sliders.replaceChildren(...sliders.map((slider) => this.#slider(slider)));
+      this.sliders.parentElement.hidden = !sliders.length;
+    }
+    sliders.forEach(([name, , , , value], k) => {
+      const label = this.sliders.children[k];
+      if (this.held.has(name)) return;
+      label.querySelector("input").value = value;
+      tell(label.querySelector("b"), short(value));
+    });
+    const names = Object.keys(watched);
+    if (names.join("\n") !== this.named) {
+      this.named = names.join("\n");
+      this.charts.clear();
+      this.curves.replaceChildren(...names.map((name, k) => this.#curve(name, k)));
+    }
+    for (const [name, value] of Object.entries(watched)) {
+      const { chart, text } = this.charts.get(name);
+      tell(text, short(value));
+      chart.push(value);
+      chart.draw();
+    }
+  }
+
+  /** Time starts over. */
+  clear() {
+    for (const { chart } of this.charts.values()) chart.clear();
+  }
+
+  #slider([name, low, high, step, value]) {
+    const label = document.createElement("label"), said = document.createElement("span"), output = document.createElement("output");
+    const input = Object.assign(document.createElement("input"), { type: "range", min: low, max: high, step: step || "any", value });
+    label.className = "slider";
+    said.textContent = name;
+    output.append(document.createElement("b"));
+    input.dataset.testid = `slider-${name}`;
+    input.addEventListener("input", () => {
+      clearTimeout(this.held.get(name));
+      this.held.set(name, setTimeout(() => this.held.delete(name), MINE_MS));
+      this.send("slider", { name, value: Number(input.value) });
+      tell(output.firstChild, short(Number(input.value)));
+    });
+    label.append(said, output, input);
+    return label;
+  }
+
+  #curve(name, k) {
+    const colour = WATCH_COLOURS[k % WATCH_COLOURS.length], part = document.createDocumentFragment(), row = document.createElement("div");
+    const key = Object.assign(document.createElement("i"), { className: "key" }), term = document.createElement("dt"), value = document.createElement("dd");
+    const text = document.createElement("b"), box = document.createElement("div"), canvas = document.createElement("canvas");
+    key.style.background = `var(${colour})`;
+    term.append(key, name);
+    text.dataset.testid = `watched-${name}`;
+    value.append(text);
+    row.append(term, value);
+    box.className = "chart tall";
+    canvas.setAttribute("role", "img");
+    canvas.setAttribute("aria-label", `${name} over time`);
+    const unseen = Object.assign(document.createElement("dt"), { className: "unseen", textContent: `${name}, curve` }), holder = document.createElement("dd");
+    holder.append(canvas);
+    box.append(unseen, holder);
+    part.append(row, box);
+    this.charts.set(name, { chart: new Chart(canvas, [colour]), text });
+    return part;
+  }
+}

@@ -1,0 +1,171 @@
+"""A sketch on show that is built anew whenever it is saved, while the page stays."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from pyverlet.ground.errors import PyverletError
+from pyverlet.ground.patience import Patience, TooLong, interrupt
+from pyverlet.laws.integrators import Integrator
+from pyverlet.scenes.sketch import Sketch
+from pyverlet.viewers.exhibit import Exhibit, Repertoire
+from pyverlet.viewers.session import Session
+from pyverlet.world.panels import Panel, Panels
+from pyverlet.world.warmup import warm_up
+from pyverlet.world.world import World
+
+LOOK_S = 0.1
+"""How often the files are looked at."""
+
+SAY_S = 1.0
+"""A build that takes longer is told of on the page."""
+
+PATIENCE_S = 10.0
+"""A sketch that is not done by then is given up; see --patience."""
+
+Stamp = tuple[int, int]
+"""When a file was saved, and how large it is."""
+
+
+class Workshop:
+    """Builds a sketch, again and again.
+
+    Args:
+        path: of its file.
+        dt: simulated seconds a frame.
+        integrators: in place of the sketch's; several stand side by side.
+        overrides: settings, as for `Scene.settings`.
+        patience: seconds a build may take.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        dt: float,
+        integrators: Sequence[Integrator] = (),
+        overrides: Mapping[str, Any] | None = None,
+        patience: float = PATIENCE_S,
+    ) -> None:
+        self.path, self._dt, self._integrators, self._overrides = path, dt, integrators, overrides
+        self._patience = patience
+        self._sketch: Sketch | None = None
+        self.fault: str | None = None
+        """Why the last build has come to nothing."""
+
+    def build(self) -> Exhibit | None:
+        """The sketch as it is now; None if that cannot be: see `fault`."""
+        try:
+            sketch = Sketch.read(self.path, self._sketch)
+            self._sketch = sketch
+            with Patience().within(self._patience):
+                scene = sketch.scene()
+                exhibit = Repertoire(scene, dt=self._dt, integrators=self._integrators, overrides=self._overrides).open()
+            sketch.patience = Patience()  # a screen waits for what is called with each picture
+        except TooLong:
+            self.fault = f"{self.path.name} is not built after {self._patience:g} s"
+            return None
+        except PyverletError as error:
+            self.fault = str(error)
+            return None
+        except MemoryError:
+            self.fault = f"{self.path.name} needs more memory than there is"
+            return None
+        self.fault = None
+        return exhibit
+
+    def first(self) -> Exhibit:
+        """The sketch, or an empty world while it cannot be built."""
+        built = self.build()
+        return built if built else Exhibit(self.path.stem, Panels([Panel("", World())]))
+
+    def stamps(self) -> dict[Path, Stamp]:
+        """Of the sketch's files as they are now; without those that are not there, or still empty: they are being saved."""
+        files = self._sketch.files if self._sketch else [self.path]
+        return {file: stamp for file in files if (stamp := _stamp(file))}
+
+
+def _stamp(file: Path) -> Stamp | None:
+    try:
+        found = file.stat()
+    except OSError:  # some editors take the old one away first
+        return None
+    return (found.st_mtime_ns, found.st_size) if found.st_size else None
+
+
+class Watcher:
+    """Looks at the files of a sketch, and has it built in a thread of its own when one is saved.
+
+    Args:
+        workshop: which has built what is on show.
+        session: that shows it.
+    """
+
+    def __init__(self, workshop: Workshop, session: Session) -> None:
+        self._workshop, self._session = workshop, session
+        self._ended = threading.Event()
+        self._builder: threading.Thread | None = None
+        self._lock, self._interruptible = threading.Lock(), False
+        self._turn = 0
+
+    @contextmanager
+    def at_work(self) -> Iterator[None]:
+        """Meanwhile it looks."""
+        if self._workshop.fault:
+            self._session.tell(complaint=self._workshop.fault)
+        thread = threading.Thread(target=self._look, name="pyverlet-watch", daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            self._ended.set()
+            thread.join(10 * LOOK_S)
+
+    def _look(self) -> None:
+        known, began = self._workshop.stamps(), 0.0
+        while not self._ended.wait(LOOK_S):
+            now = self._workshop.stamps()
+            if any(known[file] != stamp for file, stamp in now.items() if file in known):
+                began = time.monotonic()
+                self._build()
+            known |= now  # files that a build has brought along are news, but no change
+            building = self._builder is not None and self._builder.is_alive()
+            if building and began and time.monotonic() - began > SAY_S:
+                self._session.tell(complaint=self._workshop.fault, busy=f"building {self._workshop.path.name}")
+                began = 0.0
+
+    def _build(self) -> None:
+        with self._lock:
+            if self._interruptible and self._builder is not None:
+                interrupt(self._builder)  # what it builds is old
+        self._turn += 1
+        self._builder = threading.Thread(target=self._put_on, args=(self._turn,), name="pyverlet-build", daemon=True)
+        self._builder.start()
+
+    def _put_on(self, turn: int) -> None:
+        with contextlib.suppress(TooLong):
+            self._interruptible = True
+            try:
+                built = self._workshop.build()
+            finally:
+                with self._lock:
+                    self._interruptible = False
+            fault = self._workshop.fault
+            if built:
+                try:
+                    for world in built.panels.worlds:
+                        warm_up(world)  # so that the world before goes on meanwhile
+                except PyverletError as error:  # such as a force that does not compile
+                    built, fault = None, str(error)
+            if turn != self._turn:
+                return
+            if built:
+                self._session.put_on(built)
+            else:
+                self._session.tell(complaint=fault)

@@ -1,0 +1,158 @@
+"""Where circles may be put: inside a room or a polygon, clear of obstacles and of circles that are there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyverlet.ground.errors import InputError
+from pyverlet.kernels import grid, queries
+from pyverlet.laws.links.area import signed_area
+from pyverlet.laws.obstacles import Obstacle, Polygon
+from pyverlet.laws.rooms import Boundary
+from pyverlet.world.builders.outline import inside, simple_polygon
+from pyverlet.world.world import World
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+_grid: Any = grid
+_ask: Any = queries
+
+ROUNDING = 1e-9
+"""Of what is touched: a circle that just fits is not refused for the last digit."""
+
+SAMPLES = 400
+"""Points along each side of the grid by which the free part of an area is counted: to about a thousandth of it."""
+
+
+class Region:
+    """A room or polygon, less what is in the way.
+
+    Args:
+        where: `Box`, `Circle` or a boundary of your own with walls; a `Polygon`, or the (n, 2) corners of any simple polygon, m.
+        avoid: a world, whose obstacles and circles are left free, or obstacles.
+    """
+
+    def __init__(self, where: Any, avoid: World | Iterable[Obstacle]) -> None:
+        if isinstance(avoid, World):
+            self._there = (avoid.position.astype(np.float64), avoid.radius.astype(np.float64))
+        else:
+            self._there = (np.zeros((0, 2)), np.zeros(0))
+        self._obstacles = list(avoid.obstacles if isinstance(avoid, World) else avoid)
+        for k, obstacle in enumerate(self._obstacles):
+            if not isinstance(obstacle, Obstacle):
+                raise InputError(f"avoid[{k}] is {obstacle!r}; allowed are a world, and a list of obstacles")
+        self._gap, self.extent = _walls(where)
+
+    def free(self, points: Floats, radius: Floats) -> Flags:
+        """(k,) whether circles of these radii (k,) about points (k, 2) are inside and overlap neither obstacle nor circle."""
+        found = self._gap(points) >= radius * (1 - ROUNDING)
+        for obstacle in self._obstacles:
+            reach = float(radius.max(initial=0.0))
+            near = np.flatnonzero(found & _near(obstacle, points, reach))
+            found[near] = _clearance(obstacle, points[near]) >= radius[near]
+        if len(self._there[0]):
+            hit = overlapping(points, radius, *self._there)
+            found[np.unique(hit[:, 0])] = False
+        return np.asarray(found)
+
+    def area(self) -> float:
+        """Of what is inside and in no obstacle, m^2, counted on a grid of points."""
+        x0, y0, x1, y1 = self.extent
+        across, up = (np.arange(SAMPLES) + 0.5) / SAMPLES * (x1 - x0) + x0, (np.arange(SAMPLES) + 0.5) / SAMPLES * (y1 - y0) + y0
+        points = np.stack(np.meshgrid(across, up), axis=-1).reshape(-1, 2)
+        share = float(self.free(points, np.zeros(len(points))).mean())
+        return share * (x1 - x0) * (y1 - y0)
+
+
+def overlapping(points: Floats, radius: Floats, position: Floats, size: Floats) -> NDArray[np.int64]:
+    """(m, 2) rows (k, i): the circle about points[k] (k, 2) overlaps that about position[i] (n, 2); radii (k,) and (n,), m."""
+    if not len(points) or not len(position):
+        return np.zeros((0, 2), np.int64)
+    reach = radius + float(size.max())
+    (x0, y0), (x1, y1) = position.min(axis=0), position.max(axis=0)
+    cell = max(2.0 * float(size.max()), (x1 - x0) / 2_000, (y1 - y0) / 2_000) or 1.0
+    columns, rows = int((x1 - x0) / cell) + 1, int((y1 - y0) / cell) + 1
+    number, start = np.empty(len(position), np.int32), np.empty(columns * rows + 2, np.int64)
+    order = np.empty(len(position), np.int32)
+    _grid.count_cells(position, x0, y0, 1 / cell, columns, rows, number, start)
+    _grid.sort_by_cell(number, start, order)
+    member, room, found = order.astype(np.int64), 8 * len(points), np.inf
+    far = reach[:, None]
+    while found > room:
+        room = room if found == np.inf else int(found)
+        query, particle = np.empty(room, np.int64), np.empty(room, np.int64)
+        found = int(
+            _ask.in_regions(
+                points - far, points + far, points, reach, x0, y0, cell, columns, rows, start, member, position, query, particle
+            )
+        )
+    pairs = np.column_stack((query[: int(found)], particle[: int(found)]))
+    between = np.hypot(*(points[pairs[:, 0]] - position[pairs[:, 1]]).T)
+    return np.asarray(pairs[between < (radius[pairs[:, 0]] + size[pairs[:, 1]]) * (1 - ROUNDING)])
+
+
+def _walls(where: Any) -> tuple[Callable[[Floats], Floats], tuple[float, float, float, float]]:
+    """How far inside a point is, m, negative outside; and the extent."""
+    if isinstance(where, Boundary):
+        extent = where.extent()
+        facing = where.facing(np.zeros((1, 2)))
+        if extent is None or facing is None:
+            raise InputError(f"where is {where!r}; allowed is a room with walls, such as pyverlet.Box, or a polygon")
+
+        def gap(points: Floats) -> Floats:
+            distance = where.facing(points)
+            assert distance is not None
+            return np.where(where.outside(points), -1.0, distance[0].min(axis=1))
+
+        return gap, tuple(map(float, extent))  # type: ignore[return-value]
+    corners = where.points if isinstance(where, Polygon) else _polygon(where)
+    (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
+
+    def within(points: Floats) -> Floats:
+        return np.where(inside(corners, points), _to_segments(points, corners, closed=True), -1.0)
+
+    return within, (float(x0), float(y0), float(x1), float(y1))
+
+
+def _polygon(where: ArrayLike) -> Floats:
+    try:
+        corners = simple_polygon("where", where)
+    except InputError as error:
+        raise InputError(f"{error} (or a room, such as pyverlet.Box)") from None
+    assert signed_area(corners) > 0
+    return corners
+
+
+def _near(obstacle: Obstacle, points: Floats, reach: float) -> Flags:
+    """Whether each point is in the box about the obstacle, widened by `reach`."""
+    corners, far = obstacle.points, obstacle._parts().rounding + reach
+    low, high = corners.min(axis=0) - far, corners.max(axis=0) + far
+    return np.asarray(((points >= low) & (points <= high)).all(axis=1))
+
+
+def _clearance(obstacle: Obstacle, points: Floats) -> Floats:
+    """(k,) from each point to the surface of the obstacle, m, negative inside."""
+    parts, corners = obstacle._parts(), obstacle.points
+    distance = _to_segments(points, corners, closed=parts.closed) - parts.rounding
+    if parts.convex:
+        distance = np.where(inside(corners, points), -1.0, distance)
+    return np.asarray(distance)
+
+
+def _to_segments(points: Floats, corners: Floats, *, closed: bool) -> Floats:
+    """(k,) from each point to the nearest of the segments between corners, m."""
+    nearest = np.full(len(points), np.inf)
+    starts, ends = (corners, np.roll(corners, -1, axis=0)) if closed else (corners[:-1], corners[1:])
+    if len(corners) == 1:
+        starts = ends = corners
+    for a, b in zip(starts, ends, strict=True):
+        along, way = b - a, points - a
+        length2 = float(along @ along)
+        share = np.clip(way @ along / length2, 0.0, 1.0) if length2 > 0 else np.zeros(len(points))
+        nearest = np.minimum(nearest, np.hypot(*(way - share[:, None] * along).T))
+    return nearest

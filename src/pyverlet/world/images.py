@@ -1,0 +1,58 @@
+"""Particles as questions see them: in a periodic room each has an image in every room beside it."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.state.seam import Seam
+from pyverlet.state.state import State
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+PERIODS = 100
+"""Rooms that a ray passes through at most: in some directions it would go on for ever, and hit nothing."""
+
+
+class Images(NamedTuple):
+    """Centres (m, 2) and radii (m,) in m, and whose image each is."""
+
+    position: NDArray[Any]
+    radius: NDArray[Any]
+    owner: Indices | None
+
+    @classmethod
+    def of(cls, state: State, reach: float) -> Images:
+        """All particles and, of a periodic room, those images that are within `reach`, m, of it."""
+        seam = state.seam
+        if not seam:
+            return cls(state.position, state.radius, None)
+        inside = seam.wrapped(state.position)
+        low, high = np.array((seam.low_x, seam.low_y)), np.array((seam.low_x + seam.period_x, seam.low_y + seam.period_y))
+        periodic = np.array(seam.period) > 0
+        places, owners = [inside], [np.arange(len(state))]
+        for shift in seam.images()[1:]:
+            moved = inside + shift
+            near = np.flatnonzero((((moved >= low - reach) & (moved <= high + reach)) | ~periodic).all(axis=1))
+            places.append(moved[near].astype(inside.dtype))
+            owners.append(near)
+        owner = np.concatenate(owners)
+        return cls(np.concatenate(places), state.radius[owner], owner)
+
+    def named(self, found: Indices) -> Indices:
+        """Particles in place of images; -1 stays."""
+        return found if self.owner is None else np.where(found >= 0, self.owner[found], -1)
+
+
+def left_in_room(start: Floats, heading: Floats, seam: Seam) -> Floats:
+    """(q,) m that a ray from inside a periodic room goes on before it leaves it; infinite if it does not."""
+    far = np.full(len(start), np.inf)
+    for axis, (low, period) in enumerate(((seam.low_x, seam.period_x), (seam.low_y, seam.period_y))):
+        if period > 0:
+            d = heading[:, axis]
+            edge = np.where(d > 0, low + period, low) - start[:, axis]
+            far = np.minimum(far, np.divide(edge, d, out=np.full(len(d), np.inf), where=d != 0))
+    return np.asarray(np.maximum(far, 0.0))

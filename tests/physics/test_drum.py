@@ -1,0 +1,108 @@
+"""A round room that turns: Coulomb friction against closed forms, the work of the wall, and grains that flow."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet import scenes
+from pyverlet.laws.sleep import laws
+
+G, MU, MASS, SPEED = 9.81, 0.2, 2.0, 1.0
+WIDE = 1000.0
+"""Radius of a drum whose floor is flat, m: within the 0.03 m of these tests it pulls back by g x / R = 3e-4 m/s^2."""
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_a_disc_at_rest_is_taken_along_and_spun_up(way: int) -> None:
+    # Friction mu m g accelerates the disc by mu g and its rim by 2 mu g (I = m r^2 / 2), until they add up to the speed u of the
+    # wall, at t = u / (3 mu g): v = u / 3, r w = 2 u / 3. The wall does the work J u = m u^2 / 3; half of it becomes heat.
+    room = pv.Circle(radius=WIDE, friction=MU, angular_velocity=way * SPEED / WIDE)
+    world = pv.World(boundary=room, dtype=np.float64, ledger=True)
+    disc = world.add(position=(0, 0.5 - WIDE), radius=0.5, mass=MASS)
+    start = world.energy().total
+    h = 1 / 60 / world.substeps
+    grips = SPEED / (3 * MU * G)
+    for _ in range(30):
+        world.step(1 / 60)
+        slips = min(world.time, grips)
+        # A step's error in the velocity, mu g h, and what the bend of the floor pulls back by.
+        least = MU * G * h + 3e-4 * world.time
+        assert way * disc.velocity[0, 0] == pytest.approx(MU * G * slips, abs=least)
+        assert way * disc.spin[0] * 0.5 == pytest.approx(2 * MU * G * slips, abs=2 * least)
+    account = world.ledger
+    assert account is not None
+    assert account.walls == pytest.approx(MASS * SPEED**2 / 3, rel=1e-3)
+    assert account.friction == pytest.approx(-MASS * SPEED**2 / 6, rel=1e-3)
+    assert world.energy().total - start == pytest.approx(MASS * SPEED**2 / 6, rel=1e-3)
+    assert account.total == pytest.approx(world.energy().total, rel=1e-12)
+    assert abs(account.residual) < 1e-9 * abs(start)
+
+
+def test_a_bounce_on_a_running_wall_rubs_as_coulomb_says() -> None:
+    # Falling at v on a wall that runs at u: the impulse along the normal is (1 + e) m v, so friction gives mu (1 + e) v at most.
+    room = pv.Circle(radius=WIDE, restitution=0.5, friction=MU, angular_velocity=100 / WIDE)
+    world = pv.World(gravity=(0, 0), boundary=room, dtype=np.float64)
+    disc = world.add(position=(0, 1 - WIDE), velocity=(0, -2), radius=0.5)
+    world.run(seconds=0.5)
+    given = MU * (1 + 0.5) * 2
+    assert disc.velocity[0] == pytest.approx([given, 0.5 * 2], rel=1e-3)
+    assert disc.spin[0] == pytest.approx(2 * given / 0.5, rel=1e-3)
+
+
+def test_without_friction_it_is_a_cage() -> None:
+    def bits(speed: float) -> str:
+        world = pv.World(boundary=pv.Circle(radius=3, angular_velocity=speed))
+        world.add(position=np.random.default_rng(1).uniform(-1, 1, (20, 2)), radius=0.1, allow_overlap=True)
+        world.run(seconds=0.5)
+        return world.state_hash()
+
+    assert bits(0.0) == bits(7.0)
+
+
+def test_who_does_not_touch_it_keeps_every_bit_of_its_spin() -> None:
+    world = pv.World(gravity=(0, 0), boundary=pv.Circle(radius=3, friction=1.0, angular_velocity=1 / 3))
+    free = world.add(position=(0, 0), radius=0.1, spin=np.float32(0.1))
+    world.run(seconds=0.2)
+    assert free.spin[0] == np.float32(0.1)
+
+
+def test_nobody_sleeps_in_it() -> None:
+    world = pv.World(boundary=pv.Circle(radius=3, friction=0.5, angular_velocity=1.0), sleep=True)
+    assert laws(world) is None
+    world.boundary = pv.Circle(radius=3, friction=0.5)
+    assert laws(world) is not None
+
+
+@pytest.mark.parametrize("wrong", ["fast", np.nan])
+def test_what_cannot_turn_is_refused(wrong: Any) -> None:
+    with pytest.raises(pv.InputError, match="angular_velocity is"):
+        pv.Circle(radius=1, angular_velocity=wrong)
+
+
+def test_grains_flow_down_a_slope_that_the_torque_of_the_wall_holds_up() -> None:
+    world = scenes.get("drum").world(particles=200, ledger=True)
+    room, mass = world.boundary, world.mass.astype(float)
+    assert isinstance(room, pv.Circle)
+    world.run(seconds=4.0)
+    account, start, turning = world.ledger, world.time, world.angular_momentum()
+    assert account is not None
+    worked, across, angles = account.walls, [], []
+    for _ in range(240):
+        world.step(1 / 60)
+        x, y = mass @ world.position / mass.sum()
+        across.append(x)
+        angles.append(np.degrees(np.arctan2(x, -y)))
+    # The moment of all that acts on the grains is what their angular momentum changes by: P / w - M g x, averaged over the time.
+    account, seconds = world.ledger, world.time - start
+    assert account is not None
+    wall = (account.walls - worked) / room.angular_velocity / seconds
+    weight = mass.sum() * G * np.mean(across)
+    # What is left: forces of a substep are taken at its end, mean positions of frames at theirs.
+    assert wall - weight == pytest.approx((world.angular_momentum() - turning) / seconds, abs=0.01 * abs(weight))
+    assert 15 < -np.mean(angles) < 40  # the slope of heaps of rough discs in a drum that turns slowly, clockwise
+    assert abs(account.residual) < 1e-4 * account.walls
+    assert world.escaped() == 0

@@ -1,0 +1,434 @@
+"""A periodic room is the same everywhere: what happens across its seam is what happens in its middle."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet.lab.physics import endless
+from pyverlet.laws.contacts.collisions import find_contacts
+
+LOWER, PERIOD = np.array([-4.0, 1.0]), np.array([12.0, 9.0])
+MIDDLE = LOWER + PERIOD / 2
+CORNERS = [(0.0, 0.0), (6.0, 0.0), (0.0, 4.5), (6.0, 4.5), (-6.0, 4.5)]
+"""Moves that bring what is in the middle there, over one seam, over the other, and over both."""
+
+
+def _room(axes: str = "xy", **walls: Any) -> pv.Periodic:
+    return pv.Periodic(tuple(LOWER), tuple(LOWER + PERIOD), axes=axes, **walls)
+
+
+def _world(**options: Any) -> pv.World:
+    return pv.World(**{"gravity": (0, 0), "boundary": _room(), "dtype": np.float64, **options})
+
+
+def _apart(a: np.ndarray, b: np.ndarray) -> float:
+    """Largest distance of the nearest images, m."""
+    way = a - b
+    return float(np.abs(way - PERIOD * np.rint(way / PERIOD)).max())
+
+
+# ---- contacts ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", [pv.Fast(), pv.BruteForce()])
+@pytest.mark.parametrize("laws", [{"restitution": 1.0}, {"restitution": 0.5, "friction": 0.4}, {}])
+def test_two_that_meet_across_the_seam(laws: dict[str, Any], method: Any) -> None:
+    """The same two circles, moved: same velocities, same spins, and places as far apart, to rounding of coordinates of 13 m."""
+    found = []
+    for move in CORNERS:
+        world = _world(collisions=pv.Collisions(method=method, **laws))
+        place = MIDDLE + np.array([(-0.9, 0.1), (0.6, -0.1)]) + move
+        two = world.add(position=place, velocity=[(3.0, 0.2), (-2.0, 0.0)], radius=[0.5, 0.7], mass=[1.0, 2.5], spin=[4.0, -1.0])
+        for _ in range(30):
+            world.step(1 / 60)
+        found.append((two.velocity.copy(), two.spin.copy(), two.position - move))
+        assert ((two.position >= LOWER) & (two.position < LOWER + PERIOD)).all()
+    (velocity, spin, place), *others = found
+    assert abs(velocity[0, 0] - 3.0) > 0.5  # they did meet
+    for other in others:
+        assert other[0] == pytest.approx(velocity, abs=1e-12)
+        assert other[1] == pytest.approx(spin, abs=1e-12)
+        assert _apart(other[2], place) < 1e-12
+
+
+@pytest.mark.parametrize("laws", [{"restitution": 0.8, "friction": 0.3}, {}])
+def test_everything_moved_alike(laws: dict[str, Any]) -> None:
+    """A crowd of all sizes moved by any vector has the same contacts, and goes on alike: to rounding, for half a second."""
+    rng = np.random.default_rng(2)
+    place, velocity = rng.uniform(LOWER, LOWER + PERIOD, (150, 2)), rng.normal(0, 1, (150, 2))
+    radius = rng.uniform(0.05, 0.4, 150)
+    worlds = []
+    for move in np.array([(0.0, 0.0), (3.7, -2.2), (-50.3, 41.9)]):
+        world = _world(collisions=pv.Collisions(**laws))
+        world.add(position=place + move, velocity=velocity, radius=radius, mass=radius**2)
+        worlds.append((world, move))
+    first = worlds[0][0]
+    for frames in (0, 2):
+        for world, _ in worlds:
+            for _ in range(frames):
+                world.step(1 / 60)
+        contacts = find_contacts(first._state, pv.Fast())
+        assert len(contacts) > 20
+        for world, move in worlds[1:]:
+            assert np.array_equal(find_contacts(world._state, pv.Fast()), contacts)
+            assert _apart(world.position - move, first.position) < 1e-9
+            assert world.velocity == pytest.approx(first.velocity, abs=1e-7)
+
+
+def test_a_stream_keeps_its_digits() -> None:
+    """At 300 m/s around a room of 12 m for 600 rounds: everyone stays inside, the stream as fast, contacts as they are."""
+    world = _world(dtype=np.float32, collisions=pv.Collisions(restitution=1.0))
+    rng = np.random.default_rng(3)
+    velocity = rng.normal(0, 0.5, (40, 2))
+    place = LOWER + (np.column_stack(np.divmod(np.arange(40), 5)) + 0.5) * PERIOD / (8, 5)
+    world.add(position=place, velocity=velocity - velocity.mean(axis=0) + (300.0, 0.0), radius=0.4)
+    world.run(seconds=24.0)
+    assert world.escaped() == 0
+    assert ((world.position >= LOWER) & (world.position <= LOWER + PERIOD)).all()
+    # In float32 a velocity of 300 m/s has a last digit of 3e-5; 40 circles met some hundred times.
+    assert world.momentum() / 40 == pytest.approx((300.0, 0.0), abs=2e-3)
+    assert world.overlap().max < 0.02
+
+
+# Energy, momentum and pressure of a gas at one density are among the promises, which `test_check.py` runs.
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fraction", [0.1, 0.5])
+def test_a_gas_keeps_energy_and_momentum_for_a_minute(fraction: float) -> None:
+    found = endless.kept(1000, 60.0, fraction)
+    assert found.passed, found.measured
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fraction", [0.1, 0.2, 0.3, 0.4, 0.5])
+def test_pressure_of_hard_discs_at_all_densities(fraction: float) -> None:
+    """Also by Z = 1 / (1 - 2 f + (2 f_c - 1) (f / f_c)^2), f_c = pi sqrt(3) / 6 (Santos, Lopez de Haro and Yuste 1995)."""
+    found, close = endless.pressure(900, 10.0, fraction), np.pi * np.sqrt(3) / 6
+    assert found.passed, found.measured
+    theory = 1 / (1 - 2 * fraction + (2 * close - 1) * (fraction / close) ** 2)
+    assert found.values["measured"] == pytest.approx(theory, rel=0.02)
+
+
+def test_pressure_does_not_depend_on_the_stream() -> None:
+    """Galileo: u does not count. And the pressure of those that meet nobody is the sum of m |v - u|^2 over twice the area."""
+    world = _world(contacts=True)
+    world.add(position=[(0, 3), (3, 7)], velocity=[(101, 2), (99, 0)], radius=0.1, mass=2.0)
+    world.step(1 / 60)
+    assert world.pressure() == pytest.approx(2 * 2.0 * (1 + 1) / (2 * 12 * 9))
+
+
+def test_pressure_of_a_pile_without_weight() -> None:
+    """Two circles pressed together across the seam by a constant force f at distance d: the virial is f d."""
+    world = _world(contacts=True)
+    two = world.add(position=[(7.6, 5), (-3.5, 5)], radius=0.5, mass=1.0)  # touching once they have come nearer by 0.1 m at most
+    two.position[1, 0] = -3.4
+    world.forces.append(pv.ConstantForce((5.0, 0.0), group=None))
+    world.forces.append(_Against(two, 10.0))
+    world.run(seconds=2.0)
+    mean = 0.0
+    for _ in range(60):
+        world.step(1 / 60)
+        mean += world.pressure() / 60
+    reach = float(np.abs(_way(two.position[1] - two.position[0])[0]))
+    assert mean * 2 * 12 * 9 == pytest.approx(5.0 * reach, rel=0.01)
+
+
+class _Against:
+    """A force f to the left on the second of a group."""
+
+    velocity_dependent = False
+
+    def __init__(self, group: Any, force: float) -> None:
+        self.group, self.force = group, force
+
+    def apply(self, state: Any, t: float) -> None:
+        state.force[state.slots_of(self.group.index)[1], 0] -= self.force
+
+
+def _way(way: np.ndarray) -> np.ndarray:
+    return np.asarray(way - PERIOD * np.rint(way / PERIOD))
+
+
+# ---- walls in one direction -------------------------------------------------------------------------------------------
+
+
+def test_walls_in_the_other_direction() -> None:
+    """A ball on a floor that has no ends: e = 1 keeps its height, and friction makes it roll: 2/3 of its speed is left."""
+    world = _world(gravity=(0, -10), boundary=_room("x", restitution=1.0), collisions=None)
+    ball = world.add(position=(0, 5), velocity=(7, 0), radius=0.5)
+    highest = 0.0
+    for _ in range(600):
+        world.step(1 / 60)
+        highest = max(highest, ball.position[0, 1])
+    assert highest == pytest.approx(5.0, abs=0.02)
+    assert ball.velocity[0, 0] == 7.0
+    assert world.escaped() == 0
+    rolls = _world(gravity=(0, -10), boundary=_room("x", friction=0.5), collisions=None)
+    ball = rolls.add(position=(0, 1.5), velocity=(6, 0), radius=0.5)
+    rolls.run(seconds=4.0)
+    assert ball.velocity[0] == pytest.approx((4.0, 0.0), abs=1e-3)
+    assert ball.spin[0] == pytest.approx(-4.0 / 0.5, abs=1e-2)
+
+
+def test_a_pile_lies_across_the_seam() -> None:
+    """A row that fills the period rests, and who lies on two of it across the seam rests too: h = sqrt(3) r above."""
+    world = _world(gravity=(0, -10), boundary=_room("x", friction=0.5), collisions=pv.Collisions(friction=0.5))
+    row = world.add(position=np.column_stack((np.arange(12) - 3.5, np.full(12, 1.5))), radius=0.5)
+    top = world.add(position=(8.0, 1.5 + np.sqrt(3) / 2), radius=0.5)
+    world.run(seconds=3.0)
+    assert np.abs(row.velocity).max() < 1e-2
+    assert np.abs(top.velocity).max() < 1e-2
+    assert top.position[0, 1] == pytest.approx(1.5 + np.sqrt(3) / 2, abs=0.02)
+    assert abs(_way(top.position[0] - (8.0, 0.0))[0]) < 0.02
+
+
+def test_walls_have_a_pressure() -> None:
+    """Weight over length: m g / (2 L) of the two walls together, for those at rest on one."""
+    world = _world(gravity=(0, -10), boundary=_room("x"), contacts=True)
+    world.add(position=[(0, 1.5), (7.9, 1.5)], radius=0.5, mass=3.0)
+    world.run(seconds=1.0)
+    assert world.pressure() == pytest.approx(2 * 3.0 * 10 / (2 * 12), rel=1e-3)
+    assert set(world.contacts["wall"]) == {2}  # the floor has the number of a Box's
+
+
+# ---- energy ---------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ends", [None, 0.5])
+def test_the_ledger_closes(ends: float | None) -> None:
+    """Down a slope without an end, with impacts, friction and drag: the accounts sum to the energy, `seam` is m g L a passage."""
+    world = _world(gravity=(4, -9), boundary=_room("x", restitution=0.5, friction=0.1), ledger=True)
+    rng = np.random.default_rng(4)
+    grains = world.add(position=rng.uniform((-3.5, 2), (7.5, 9), (40, 2)), radius=0.3, restitution=ends, friction=0.3)
+    world.forces.append(pv.Drag(linear=0.3))
+    rounds, before = np.zeros(40), grains.position[:, 0].copy()
+    for _ in range(180):
+        world.step(1 / 60)
+        rounds -= np.rint((grains.position[:, 0] - before) / 12.0)
+        before = grains.position[:, 0].copy()
+    book = world.ledger
+    assert rounds.sum() > 20
+    assert book.seam == pytest.approx(4 * 12.0 * rounds.sum(), rel=1e-9)
+    assert book.total == pytest.approx(world.energy().total, rel=1e-9)
+    assert book.outside == pytest.approx(_start(rng_seed=4), rel=1e-9)
+    assert abs(book.residual) < 0.05 * abs(book.drag)
+
+
+def _start(rng_seed: int) -> float:
+    place = np.random.default_rng(rng_seed).uniform((-3.5, 2), (7.5, 9), (40, 2))
+    return float(-(place @ (4, -9)).sum())
+
+
+# ---- links ----------------------------------------------------------------------------------------------------------------
+
+
+def _pair_of(kind: Any, **options: Any) -> Any:
+    def build(world: pv.World, move: Any) -> pv.Group:
+        two = world.add(
+            position=MIDDLE + np.array([(-1.0, 0.2), (1.0, -0.1)]) + move, velocity=[(1, 2), (-2, -1)], radius=0.2, mass=[1, 2]
+        )
+        world.links.append(kind(two, 0, 1, **options))
+        return two
+
+    return build
+
+
+def _ring(world: pv.World, move: Any) -> pv.Group:
+    """It swings from wide to high, with its area: what it moves by is far above rounding, and nothing is taken back from it."""
+    angle = 2 * np.pi * np.arange(10) / 10
+    out = np.column_stack((np.cos(angle), np.sin(angle)))
+    ring = world.add(position=MIDDLE + 1.5 * out + move, velocity=(1.0, 0.5) + out * (0.5, -0.5), radius=0.2)
+    turn = (np.arange(10) + 1) % 10
+    world.links.append(pv.Spring(ring, np.arange(10), turn, stiffness=400.0))
+    world.links.append(pv.Area(ring))
+    return ring
+
+
+def _beam(world: pv.World, move: Any) -> pv.Group:
+    beam = world.add(
+        position=MIDDLE + np.array([(-1, 0), (0, 0.3), (1, 0)]) + move, velocity=[(0, 1), (0, -2), (0, 1)], radius=0.2
+    )
+    world.links.append(pv.Stick(beam, [0, 1], [1, 2]))
+    world.links.append(pv.Angle(beam, 0, 1, 2, angle=np.pi, compliance=0.01))
+    return beam
+
+
+def _pinned(world: pv.World, move: Any) -> pv.Group:
+    ball = world.add(position=MIDDLE + np.array((0.4, 0.3)) + move, velocity=(2, 1), radius=0.2)
+    world.links.append(pv.Pin(ball, 0, point=MIDDLE + move, compliance=0.02))
+    return ball
+
+
+@pytest.mark.parametrize(
+    "build",
+    [_pair_of(pv.Stick), _pair_of(pv.Spring, stiffness=50.0, damping=0.1), _pair_of(pv.Rope, length=2.1), _ring, _beam, _pinned],
+    ids=["stick", "spring", "rope", "area", "angle", "pin"],
+)
+def test_links_across_the_seam(build: Any) -> None:
+    """As in the middle of the room, for a second in which they swing around; energies alike, and what the links pull with.
+
+    A pull is a way over h^2, and 1e-9 m of rounding are 2e-4 N at h = 1/480 s.
+    """
+    found = []
+    for move in CORNERS:
+        world = _world()
+        group = build(world, np.array(move))
+        for _ in range(60):
+            world.step(1 / 60)
+        found.append((group.velocity.copy(), group.position - move, world.energy().links, [link.force for link in world.links]))
+    (velocity, place, energy, force), *others = found
+    for other in others:
+        assert other[0] == pytest.approx(velocity, abs=1e-9)
+        assert _apart(other[1], place) < 1e-9
+        assert other[2] == pytest.approx(energy, abs=1e-9)
+        assert np.concatenate(other[3]) == pytest.approx(np.concatenate(force), abs=1e-3)
+
+
+def test_a_chain_around_the_room() -> None:
+    """Closed across the seam it can be stretched by nothing: 12 springs of 0.9 m over 12 m pull with k (1 - 0.9) N for ever."""
+    world = _world()
+    chain = world.add(position=np.column_stack((np.arange(12) - 3.5, np.full(12, 5.0))), radius=0.2, velocity=(3.0, 0))
+    spring = world.links.append(pv.Spring(chain, np.arange(12), (np.arange(12) + 1) % 12, length=0.9, stiffness=20.0))
+    world.run(seconds=5.0)
+    assert spring.force == pytest.approx(20.0 * 0.1, abs=1e-6)
+    assert chain.velocity == pytest.approx(np.tile((3.0, 0.0), (12, 1)), abs=1e-9)
+    ends = world.links.segments()[0]
+    assert np.hypot(*(ends[:, 1] - ends[:, 0]).T) == pytest.approx(1.0, abs=1e-9)
+
+
+# ---- forces, events, sleep ---------------------------------------------------------------------------------------------
+
+
+def test_forces_take_the_nearest_image() -> None:
+    """Two that attract each other, one on each side of the seam, and a point that does: as in the middle."""
+    found = []
+    for move in CORNERS:
+        world = _world(collisions=None)
+        two = world.add(position=MIDDLE + np.array([(-1.0, 0.3), (1.0, 0)]) + move, velocity=[(0, 1), (0, -1)], radius=0.1)
+        world.forces.append(pv.Gravitation(strength=3.0))
+        world.forces.append(pv.Attractor(center=tuple(MIDDLE + np.array((0.5, 1.0)) + move), strength=2.0, softening=0.1))
+        world.forces.append(pv.PointSpring(center=tuple(MIDDLE - np.array((0.5, 1.0)) + move), stiffness=1.0))
+        energy = world.energy().total
+        world.run(seconds=1.0)
+        assert world.energy().total == pytest.approx(energy, abs=2e-2)
+        found.append((two.velocity.copy(), world.energy().total))
+    for velocity, total in found[1:]:
+        assert velocity == pytest.approx(found[0][0], abs=1e-9)
+        assert total == pytest.approx(found[0][1], abs=1e-9)
+
+
+def test_events_and_touches_across_the_seam() -> None:
+    """Two that hit each other at x = 8, where the room ends: the point is there, the normal from one to the other."""
+    world = _world(collisions=pv.Collisions(restitution=1.0), events=True, contacts=True)
+    world.add(position=[(7.0, 5.0), (-3.0, 5.0)], velocity=[(3.0, 0), (-3.0, 0)], radius=0.5, mass=2.0)
+    hits: list[Any] = []
+    touches: list[Any] = []
+    for _ in range(30):
+        world.step(1 / 60)
+        hits.extend(world.events.hit.copy())
+        touches.extend(world.contacts.copy())
+    (hit,) = hits
+    assert (hit["a"], hit["b"]) == (0, 1)
+    assert hit["speed"] == pytest.approx(6.0)
+    assert hit["normal"] == pytest.approx((1, 0))
+    assert min(abs(hit["point"][0] - 8.0), abs(hit["point"][0] + 4.0)) < 0.1
+    assert hit["point"][1] == pytest.approx(5.0)
+    (touch,) = touches
+    assert touch["impulse"] == pytest.approx(2 * 2.0 * 3.0)
+    assert touch["normal"] == pytest.approx((1, 0))
+    assert LOWER[0] <= touch["point"][0] < LOWER[0] + PERIOD[0]
+
+
+def test_sleepers_wake_across_the_seam() -> None:
+    world = _world(gravity=(0, -10), boundary=_room("x"), sleep=True)
+    sleeper = world.add(position=[(7.8, 1.5), (3.0, 1.5)], radius=0.5)
+    world.run(seconds=2.0)
+    assert world.asleep.all()
+    world.add(position=(-1.0, 1.5), velocity=(-3.0, 0), radius=0.5)
+    world.run(seconds=1.0)
+    assert world.asleep.tolist() == [False, True, False]
+    assert abs(_way(sleeper.position[0] - (7.8, 1.5))[0]) > 0.1
+
+
+# ---- what is refused --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: pv.Periodic((0, 0), (0, 4)), r"upper is \(0.0, 4.0\); allowed is a corner above and to the right of lower"),
+        (lambda: pv.Periodic((0, 0), (4, 4), axes="z"), r"axes is 'z'; allowed are 'xy', 'x' and 'y'"),
+        (
+            lambda: _world().add(position=(0, 3), radius=2.3),
+            r"radius\[0\] is 2.3 m; allowed is at most a quarter of the room's period, 2.25 m",
+        ),
+        (lambda: _linked(5.0), r"Rope: length\[0\] is 5 m; allowed is at most half a period of the room, 4.5 m"),
+        (
+            lambda: setattr(_linked(4.0), "length", 4.6),
+            r"Rope: length\[0\] is 4.6 m; allowed is at most half a period of the room",
+        ),
+    ],
+)
+def test_bad_input(make: Any, says: str) -> None:
+    with pytest.raises(pv.InputError, match=says):
+        make()
+
+
+def _linked(length: float) -> Any:
+    world = _world()
+    two = world.add(position=[(0, 3), (1, 3)], radius=0.1)
+    return world.links.append(pv.Rope(two, 0, 1, length=length))
+
+
+def test_a_room_that_is_too_small_for_what_is_there() -> None:
+    """Nothing changes then."""
+    world = pv.World(boundary=pv.Open(), gravity=(0, 0))
+    two = world.add(position=[(0, 3), (1, 3)], radius=0.1)
+    world.links.append(pv.Rope(two, 0, 1, length=5.0))
+    with pytest.raises(pv.InputError, match="at most half a period"):
+        world.boundary = _room()
+    assert isinstance(world.boundary, pv.Open)
+    world.step(1 / 60)
+
+
+def test_a_room_that_changes() -> None:
+    """What was near across the seam is not any more, and the other way round."""
+    world = _world(collisions=pv.Collisions(restitution=1.0))
+    two = world.add(position=[(7.0, 5.0), (-3.0, 5.0)], velocity=[(1.0, 0), (-1.0, 0)], radius=0.5)
+    world.run(seconds=0.2)
+    world.boundary = pv.Box(tuple(LOWER), tuple(LOWER + PERIOD), restitution=1.0)
+    world.run(seconds=0.5)
+    assert two.velocity[:, 0] == pytest.approx((-1.0, 1.0))  # off the walls
+    world.boundary = _room()
+    two.velocity[:, 0] = 1.0, -1.0
+    world.run(seconds=1.0)
+    assert two.velocity[:, 0] == pytest.approx((-1.0, 1.0))  # off each other
+
+
+# ---- obstacles ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("speed", [0.0, 2.0])
+def test_obstacles_across_the_seam(speed: float) -> None:
+    """A ball that meets a disc that moves, or not, and hangs over the seam: as in the middle of the room."""
+    found = []
+    for move in CORNERS:
+        world = _world(collisions=None, contacts=True)
+        disc = pv.Disc(tuple(MIDDLE + np.array((0.5, 0.2)) + move), 0.6, velocity=(-speed, 0.0), restitution=1.0)
+        world.obstacles.append(disc)
+        ball = world.add(position=MIDDLE - np.array((1.2, 0.0)) + move, velocity=(3.0, 0.0), radius=0.3)
+        for _ in range(60):
+            world.step(1 / 60)
+        found.append((ball.velocity.copy(), ball.position - move, np.array([disc.pivot]) - move))
+        assert not world.is_free(disc.pivot)[0]
+    (velocity, place, pivot), *others = found
+    assert velocity[0, 0] < 0.0
+    for other in others:
+        assert other[0] == pytest.approx(velocity, abs=1e-9)
+        assert _apart(other[1], place) < 1e-9
+        assert _apart(other[2], pivot) < 1e-9

@@ -1,0 +1,377 @@
+"""Sketches on the page, as their writer sees them: built anew when saved, wrong, endless; and what they draw and answer."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from .browser import comes_true, number, status, visit
+
+SKETCH = """
+import pyverlet as pv
+
+lift = pv.slider("lift", 0.0, 20.0, 9.81)
+
+def build(particles=COUNT):
+    world = pv.World(boundary=pv.Box((0, 0), (10, 10)))
+    start = pv.fill(world.boundary, radius=0.3, count=particles)
+    world.add(position=start.position, radius=start.radius)
+    world.watch("highest", lambda world: world.position[:, 1].max())
+    return world
+
+def update(world, dt):
+    world.gravity = (0, lift.value - 9.81)
+
+def draw(world, pen):
+    pen.circle((5, 5), 2)
+    pen.text((5, 5), "COUNT", colour="#ff0000")
+
+def keys(world, key):
+    if key == "x":
+        world.remove(0)
+
+def click(world, point, button):
+    world.add(position=point, radius=0.1 if button == "left" else 0.2, mass=7)
+"""
+
+
+class Sketching:
+    """A sketch in a file, on a page."""
+
+    def __init__(self, folder: Path, source: str, *options: str) -> None:
+        self.path = folder / "mine.py"
+        self.save(source)
+        command = [
+            sys.executable,
+            "-u",
+            "-W",
+            "error",
+            "-m",
+            "pyverlet",
+            "run",
+            str(self.path),
+            "--no-open",
+            "--port",
+            "0",
+            *options,
+        ]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        assert self.process.stdout is not None
+        found = re.search(r"http://\S+", self.process.stdout.readline())
+        assert found, self.process.stderr.read() if self.process.stderr else ""
+        self.address = found[0]
+
+    def save(self, source: str) -> None:
+        """As editors do: a new file in the place of the old."""
+        fresh = self.path.with_suffix(".new")
+        fresh.write_text(source, encoding="utf-8")
+        os.replace(fresh, self.path)  # noqa: PTH105
+
+    def end(self) -> str:
+        self.process.send_signal(signal.SIGINT)
+        _, err = self.process.communicate(timeout=20)
+        assert self.process.returncode in (0, 130), err
+        assert "Traceback" not in err
+        return err
+
+
+Start = Callable[..., Sketching]
+
+
+@pytest.fixture
+def sketching(tmp_path: Path) -> Iterator[Start]:
+    running: list[Sketching] = []
+
+    def start(source: str, *options: str) -> Sketching:
+        running.append(Sketching(tmp_path, source, *options))
+        return running[-1]
+
+    yield start
+    for each in running:
+        if each.process.poll() is None:
+            each.end()
+
+
+@pytest.fixture
+def page(browser: Browser, sketching: Start) -> Iterator[Page]:
+    page = browser.new_page(viewport={"width": 1280, "height": 800}, accept_downloads=True)
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    yield page
+    page.close()
+    assert errors == []
+
+
+def drops(count: int) -> str:
+    return SKETCH.replace("COUNT", str(count))
+
+
+def spot(page: Page) -> list[float]:
+    """Where circle 2 is: left, top on the page, x in the world. There is no frame for a moment when circles come or go."""
+    script = "() => { try { const { left, top, x } = window.pyverlet.where(2); return [left, top, x]; } catch { return null; } }"
+    found: list[float] = page.wait_for_function(script).json_value()
+    return found
+
+
+def has(page: Page, count: int) -> bool:
+    return comes_true(page, lambda: number(page, "particles") == count)
+
+
+def test_saved_it_is_built_anew_and_the_page_stays(page: Page, sketching: Start) -> None:
+    mine = sketching(drops(5), "--watch")
+    visit(page, mine.address)
+    assert has(page, 5)
+    page.get_by_test_id("theme").select_option("light")
+    page.locator("[name=tool][value=pin]").check(force=True)
+    for _ in range(3):
+        page.keyboard.press("+")
+    page.get_by_test_id("slider-lift").fill("4")
+    assert comes_true(page, lambda: abs(status(page)["gravity"][1] - (4 - 9.81)) < 1e-6)
+    before = page.evaluate("() => window.pyverlet.camera.own")
+    for count in (6, 7):
+        mine.save(drops(count))
+        assert has(page, count)
+    assert page.evaluate("() => window.pyverlet.camera.own") == before
+    expect(page.locator("#pyverlet")).to_have_attribute("data-theme", "light")
+    expect(page.locator("[name=tool][value=pin]")).to_be_checked()
+    assert status(page)["sliders"][0][4] == 4  # where it was left
+
+    # Something wrong: its line is told, and the last good world goes on.
+    mine.save(drops(8).replace("    return world", "    return wrold"))
+    notice = page.get_by_test_id("notice")
+    expect(notice).to_contain_text("mine.py, line 11: NameError: name 'wrold' is not defined")
+    now = number(page, "time")
+    assert number(page, "particles") == 7
+    assert comes_true(page, lambda: number(page, "time") > now)
+    mine.save(drops(8).replace("def update(", "def update(("))
+    expect(notice).to_contain_text("mine.py, line 13: ")
+    mine.save(drops(8).replace("def build(", "def bild("))
+    expect(notice).to_contain_text("mine.py has no build() (did you mean 'bild'?)")
+    mine.save(drops(8))
+    assert has(page, 8)
+    expect(notice).to_be_hidden()
+
+    # A function that fails is left out, and the rest goes on.
+    mine.save(drops(9).replace("    pen.circle((5, 5), 2)", "    pen.circle((5, 5), -2)"))
+    assert has(page, 9)
+    expect(notice).to_contain_text("mine.py, line 17: radius is -2")
+    mine.save(drops(10).replace("lift.value - 9.81)", "lift.valeu - 9.81)"))
+    assert has(page, 10)
+    expect(notice).to_contain_text("mine.py, line 14: AttributeError")
+    now = number(page, "time")
+    assert comes_true(page, lambda: number(page, "time") > now)
+    mine.end()
+
+
+def test_one_that_loops_for_ever_is_told_of(page: Page, sketching: Start) -> None:
+    mine = sketching(drops(5), "--watch", "--patience", "1")
+    visit(page, mine.address)
+    assert has(page, 5)
+    mine.save(drops(6).replace("    return world", "    while True:\n        pass"))
+    expect(page.get_by_test_id("notice")).to_contain_text(re.compile(r"mine.py, line 1[12] does not come back"), timeout=10_000)
+    now = number(page, "time")
+    assert comes_true(page, lambda: number(page, "time") > now)
+    mine.save(drops(7))
+    assert has(page, 7)
+    mine.save(drops(8).replace("    pen.circle((5, 5), 2)", "    while True:\n        pass"))
+    assert has(page, 8)
+    expect(page.get_by_test_id("notice")).to_contain_text("draw is not called any more", timeout=15_000)
+    now = number(page, "time")
+    assert comes_true(page, lambda: number(page, "time") > now)
+    mine.end()
+
+
+@pytest.mark.slow
+def test_modules_beside_it_are_watched_and_bring_no_change_of_their_own(page: Page, sketching: Start, tmp_path: Path) -> None:
+    beside = tmp_path / "many_beside.py"
+    beside.write_text("MANY = 4\n", encoding="utf-8")
+    mine = sketching(drops(5), "--watch")
+    visit(page, mine.address)
+    mine.save("import many_beside\n" + drops(5).replace("particles=5", "particles=many_beside.MANY"))
+    assert has(page, 4)
+    page.wait_for_timeout(700)  # some looks at the files: that there is one more is no reason to begin anew
+    assert comes_true(page, lambda: number(page, "time") > 0.4)
+    beside.write_text("MANY = 6  # more\n", encoding="utf-8")
+    assert has(page, 6)
+    mine.end()
+
+
+@pytest.mark.slow
+def test_one_that_is_wrong_from_the_start_comes_when_it_is_mended(page: Page, sketching: Start) -> None:
+    mine = sketching("import nothing_of_that_name\n", "--watch")
+    page.goto(mine.address)
+    expect(page.get_by_test_id("notice")).to_contain_text("mine.py, line 1: ModuleNotFoundError")
+    mine.save(drops(5))
+    assert has(page, 5)
+    mine.end()
+
+
+def test_it_draws_and_answers(page: Page, sketching: Start) -> None:
+    mine = sketching(drops(5).replace("lift.value - 9.81", "0"))
+    visit(page, mine.address)
+    assert has(page, 5)
+    assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.overlay.drawn") == 2)
+    left, top = page.evaluate("() => window.pyverlet.camera.toScreen(7, 5)")  # on the circle of 2 m about (5, 5)
+    script = """([x, y]) => {
+        const canvas = document.querySelector("#overlay"), ratio = canvas.width / canvas.clientWidth;
+        const { data } = canvas.getContext("2d").getImageData(x * ratio - 2, y * ratio - 2, 5, 5);
+        return data.filter((v, k) => k % 4 == 3 && v > 100).length;
+    }"""
+    assert page.evaluate(script, [left, top]) > 4
+    assert page.evaluate(script, [left - 30, top - 60]) == 0
+    page.keyboard.press("x")
+    assert has(page, 4)
+    page.keyboard.press("r")  # a key of the page's own otherwise: the sketch has them all
+    left, top = page.evaluate("() => window.pyverlet.camera.toScreen(8, 8)")
+    page.mouse.click(left, top)
+    assert has(page, 5)
+    page.mouse.click(left, top - 60, button="right")
+    assert has(page, 6)
+    assert page.evaluate("() => [4, 5].map((i) => [window.pyverlet.mass(i), +window.pyverlet.where(i).x.toFixed(2)])") == [
+        [7, 8],
+        [7, 8],
+    ]
+    assert comes_true(page, lambda: status(page)["watched"]["highest"] > 5)
+    expect(page.get_by_test_id("watched-highest")).to_be_visible()
+    mine.end()
+
+
+def test_a_still_picture_and_a_film_are_saved(page: Page, sketching: Start, tmp_path: Path) -> None:
+    import av
+    import numpy as np
+    from PIL import Image
+
+    page.set_viewport_size({"width": 800, "height": 480})
+    mine = sketching(drops(5).replace("(0, lift.value - 9.81)", "(0, -9.81)"))
+    visit(page, mine.address)
+    with page.expect_download() as saved:
+        page.get_by_test_id("still").click()
+    saved.value.save_as(tmp_path / "still.png")
+    assert saved.value.suggested_filename == "mine.png"
+    with Image.open(tmp_path / "still.png") as still:
+        pixels = np.asarray(still.convert("RGB"))
+    assert pixels.shape == (480, 800, 3)
+    assert len(np.unique(pixels.reshape(-1, 3), axis=0)) > 20  # the ground, the room, circles, a drawing
+    red = (pixels[..., 0] > 200) & (pixels[..., 1:] < 60).all(axis=-1)
+    assert red.any()  # the text that the sketch writes
+    film = page.get_by_test_id("film")
+    film.click()
+    expect(film).to_have_text("Stop")
+    page.wait_for_timeout(500)
+    page.get_by_test_id("theme").select_option("dark")
+    assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.capture.bytes") > 20_000)
+    with page.expect_download() as saved:
+        film.click()
+    saved.value.save_as(tmp_path / "film.webm")
+    with av.open(str(tmp_path / "film.webm")) as container:
+        frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+    assert len(frames) > 5
+    assert frames[0].shape == (480, 800, 3)
+    assert np.abs(frames[-1].astype(int) - frames[0]).max() > 100  # it was light, then dark
+    expect(film).to_have_text("Film")
+    mine.end()
+
+
+def test_what_a_hand_has_done_can_be_undone(page: Page, sketching: Start) -> None:
+    quiet = drops(5)[: drops(5).index("def keys")].replace("lift.value - 9.81", "0")
+    mine = sketching(quiet)
+    visit(page, mine.address)
+    undo, redo = page.get_by_test_id("undo"), page.get_by_test_id("redo")
+    expect(undo).to_be_disabled()
+    at = spot(page)[:2]
+
+    page.keyboard.press("5")
+    page.mouse.click(*at)
+    assert has(page, 4)
+    undo.click()
+    assert has(page, 5)
+    redo.click()
+    assert has(page, 4)
+    page.keyboard.press("Control+z")
+    assert has(page, 5)
+    page.keyboard.press("Control+Shift+z")
+    assert has(page, 4)
+    page.keyboard.press("Control+z")
+    expect(undo).to_be_disabled()
+
+    at = spot(page)[:2]
+    page.keyboard.press("3")
+    page.mouse.click(*at)
+    assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.mass(2)") == float("inf"))
+    page.keyboard.press("Control+z")
+    assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.mass(2)") == 1.0)
+
+    page.keyboard.press("4")
+    page.mouse.move(300, 200)
+    page.mouse.down()
+    page.mouse.move(600, 200, steps=10)
+    page.mouse.up()
+    assert comes_true(page, lambda: number(page, "particles") > 7)
+    page.keyboard.press("Control+z")  # one stroke is one thing
+    assert has(page, 5)
+
+    where = spot(page)
+    page.keyboard.press("1")
+    page.mouse.move(*at)
+    page.mouse.down()
+    page.mouse.move(at[0] + 150, at[1] - 100, steps=5)
+    assert comes_true(page, lambda: spot(page)[2] > where[2] + 0.5)
+    page.mouse.up()
+    page.keyboard.press("Control+z")
+    assert comes_true(page, lambda: abs(spot(page)[2] - where[2]) < 0.05)
+    mine.end()
+
+
+COLUMN = """
+import pyverlet as pv
+
+def build():
+    world = pv.World(boundary=pv.Box((0, 0), (1, 6)))
+    world.add(position=[(0.5, 0.5 + k) for k in range(4)], radius=0.5)
+    return world
+"""
+
+
+def test_forces_are_drawn_as_wide_as_they_are(page: Page, sketching: Start) -> None:
+    mine = sketching(COLUMN)
+    visit(page, mine.address)
+    page.get_by_test_id("theme").select_option("light")
+    page.get_by_test_id("forces").check()
+    assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.overlay.forces") == 4)  # three contacts, and the floor
+    script = """() => {
+        const canvas = document.querySelector("#overlay"), context = canvas.getContext("2d");
+        const ratio = canvas.width / canvas.clientWidth;
+        const wide = (y) => {
+            const [x0, top] = window.pyverlet.camera.toScreen(0, y), [x1] = window.pyverlet.camera.toScreen(1, y);
+            const { data } = context.getImageData(x0 * ratio, top * ratio, (x1 - x0) * ratio, 1);
+            return data.filter((v, k) => k % 4 == 3 && v > 128).length;
+        };
+        return [0.1, 1.0, 2.0, 3.0].map(wide);
+    }"""
+    # Below circle k hangs the weight of 4 - k: 4, 3, 2 and 1 of them.
+    assert comes_true(page, lambda: (found := page.evaluate(script))[0] > found[1] > found[2] > found[3] > 0)
+    page.get_by_test_id("forces").uncheck()
+    assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.overlay.forces") == 0)
+    page.get_by_test_id("colour").select_option("force")
+    assert comes_true(page, lambda: len({page.evaluate(f"() => window.pyverlet.ink({i})") for i in range(4)}) >= 3)
+    page.get_by_test_id("colour").select_option("group")
+    assert comes_true(page, lambda: len({page.evaluate(f"() => window.pyverlet.ink({i} >> 2)") for i in range(4)}) == 1)
+    mine.end()
+
+
+def test_two_on_one_port(sketching: Start, tmp_path: Path) -> None:
+    mine = sketching(drops(3), "--watch")
+    port = mine.address.rstrip("/").rpartition(":")[2]
+    command = [sys.executable, "-m", "pyverlet", "run", str(mine.path), "--watch", "--no-open", "--port", port]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert f"port is {port}, which another program is using" in done.stderr
