@@ -2,7 +2,8 @@
 
 `python -m benchmarks --particles 2000 20000` beside other engines, `python -m benchmarks physics` what their physics is worth,
 `python -m benchmarks own` what pyverlet promises about its own speed, `python -m benchmarks materials` what
-restitution, friction, masses and services cost, `python -m benchmarks page` how fast the live page is,
+restitution, friction, masses and services cost, `python -m benchmarks links` what
+hangs together costs and how far it is stretched, `python -m benchmarks page` how fast the live page is,
 `python -m benchmarks data` what it costs to keep worlds, to step many, and to sweep settings, `python -m benchmarks busy` what
 frames take beside other programs, and `python -m benchmarks soak` whether anything grows in a page that is served for long.
 """
@@ -21,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 import pyverlet as pv
-from benchmarks import busy, data, materials, own, page, physics, soak
+from benchmarks import busy, data, links, materials, own, page, physics, soak
 from benchmarks.engines import CAREFUL, DT, ENGINES, RADIUS, Array, Engine
 from pyverlet.scenes import report
 
@@ -124,7 +125,7 @@ def main() -> None:
     parser.add_argument(
         "table",
         nargs="?",
-        choices=("speed", "physics", "own", "page", "materials", "data", "busy", "soak"),
+        choices=("speed", "physics", "own", "page", "materials", "links", "data", "busy", "soak"),
         default="speed",
         help="what to compare",
     )
@@ -149,6 +150,9 @@ def main() -> None:
         return
     if arguments.table == "materials":
         materials.main((arguments.particles or [20_000])[0], arguments.csv)
+        return
+    if arguments.table == "links":
+        links.main(arguments.csv)
         return
     if arguments.table == "soak":
         if not soak.main(arguments.minutes):

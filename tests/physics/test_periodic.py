@@ -239,13 +239,13 @@ def _pair_of(kind: Any, **options: Any) -> Any:
 
 
 def _ring(world: pv.World, move: Any) -> pv.Group:
+    """It swings from wide to high, with its area: what it moves by is far above rounding, and nothing is taken back from it."""
     angle = 2 * np.pi * np.arange(10) / 10
-    ring = world.add(
-        position=MIDDLE + 1.5 * np.column_stack((np.cos(angle), np.sin(angle))) + move, velocity=(1.0, 0.5), radius=0.2
-    )
+    out = np.column_stack((np.cos(angle), np.sin(angle)))
+    ring = world.add(position=MIDDLE + 1.5 * out + move, velocity=(1.0, 0.5) + out * (0.5, -0.5), radius=0.2)
     turn = (np.arange(10) + 1) % 10
     world.links.append(pv.Spring(ring, np.arange(10), turn, stiffness=400.0))
-    world.links.append(pv.Area(ring, area=8.0))
+    world.links.append(pv.Area(ring))
     return ring
 
 

@@ -87,17 +87,20 @@ def spread(typing: Any, value: Any) -> Any:
     return lanes(value), generate
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def square_root(typing: Any, a: Any) -> Any:
-    """Square root, lane by lane."""
+def _function(name: str) -> Any:
+    @intrinsic  # type: ignore[untyped-decorator]
+    def function(typing: Any, a: Any) -> Any:
+        def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            kind, full = ir.FunctionType(args[0].type, [args[0].type]), f"llvm.{name}.v{LANES}f{a.real.bitwidth}"
+            return builder.call(cgutils.get_or_insert_function(builder.module, kind, full), args)
 
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        vector = context.get_value_type(a)
-        name = f"llvm.sqrt.v{LANES}f{a.real.bitwidth}"
-        function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(vector, [vector]), name)
-        return builder.call(function, args)
+        return a(a), generate
 
-    return a(a), generate
+    return function
+
+
+square_root, nearest_whole = _function("sqrt"), _function("rint")
+"""Lane by lane: the square root, and the nearest whole number, the even one of two."""
 
 
 def _chosen(comparison: str) -> Any:

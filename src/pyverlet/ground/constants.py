@@ -143,6 +143,9 @@ LINK_GIVE: Final = 1e-7
 LINK_RESOLVED: Final = 0.2
 """(natural frequency * h)^2 of a spring that is treated half as motion to follow, half as stiffness to settle."""
 
+LINK_BOWED: Final = 0.1
+"""From this share of settling on, the tension of a link resists its being turned: below, substeps follow the swing."""
+
 LINK_TAUT: Final = 0.01
 """Part of its length a rope may be short of taut and still be tried as taut, since others may stretch it in the same substep."""
 

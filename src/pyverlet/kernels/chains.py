@@ -1,56 +1,154 @@
-"""Chains of distances, each solved at once: a light rope carries a heavy ball in one go.
+"""Runs of distances, each solved at once, eight runs beside each other: a light rope carries a heavy ball in one go.
 
-A run is rows a to b whose neighbours share a particle: row r joins nodes r - a and r - a + 1. The moves dx of its nodes satisfy
+A run is links that follow each other: row r joins the nodes r and r + 1. With w = 1/m, the direction n of a link, and the one d
+its force acts along (kernels.links), the steps of lam satisfy
 
-    m dx = sum of the pulls of both links,   pull of a link on its far node = d lam - bow P (dx_far - dx_near)
+    (n_r . (w_r d_r + w_r+1 d_r) + give_r) lam_r - w_r n_r . d_r-1 lam_r-1 - w_r+1 n_r . d_r+1 lam_r+1 = right_r
 
-with lam = (right - n (dx_far - dx_near)) / give, the direction n of the link, the one d its force acts along (kernels.links), and
-P = 1 - n n^T. `bow` is the tension over the length: as a string under tension does, the link resists being turned. Without it a
-taut light rope would be thrown sideways by its own tension as soon as the substeps are too long for its fastest swing.
+for each row: tridiagonal, eliminated from its first row on. What the rows so far leave of the mobility of the present one's first
+node is a = w (near / pivot), a sum of what gives: in that form nothing large cancels.
 
-So each link is a 2 x 2 matrix B = d n^T / give + bow P, and the run is block tridiagonal: eliminated from its first node on. X is
-what the nodes so far put against a move of the present one; beyond the link that is X (X + B)^-1 B, as for springs in series: a
-form that loses no digits.
+A taut link also resists being turned, as a string does: by its tension over its length, `bow`. Without it a light rope would
+be thrown sideways by its own tension as soon as substeps are too long for its fastest swing. Where that matters (`bow` > 0) each
+link is a 2 x 2 matrix B = d n^T / give + bow (1 - n n^T), and the run is eliminated node by node: X is what the nodes so far put
+against a move of the present one; beyond the link that is X (X + B)^-1 B, as for springs in series.
+
+Eight runs of one colour are a pack: they share no particle. Number k of lane l in a pack is item 8 k + l of it. A run that is
+shorter than its pack repeats its last node, with rows that are broken; a pack that has fewer runs repeats its last one: both
+lanes write the same. The items of the rows of pack p are start[p] to start[p + 1]; those of its nodes begin at start[p] + 8 p.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.compile.jit import kernel, parallel_kernel, prange
-from pyverlet.ground.constants import LINK_COLOURS, LINK_ROUNDS, LINK_TAUT, LINK_TURN
-from pyverlet.kernels.seam import nearest
-from pyverlet.kernels.shapes import measure_distance
+from pyverlet.compile.jit import driver, kernel, parallel_kernel, prange
+from pyverlet.compile.lanes import (
+    LANES,
+    larger,
+    load,
+    pick,
+    put,
+    spread,
+    square_root,
+    store,
+    take,
+    where_above,
+    where_set,
+    where_zero,
+    which_above,
+)
+from pyverlet.ground.constants import LINK_ROUNDS, LINK_TAUT, LINK_TURN
+from pyverlet.kernels.chain_rows import AX, AY, BOW, GIVE, INTACT, LAM, OFFSET, REST, ROPE, ROPES, TURN, ahead
+from pyverlet.kernels.seam import nearest, nearest_lanes
 
 _SWEEPS = 4
 
+SCRATCH = 17
+"""Columns of room for one pack: of each row n, 1 / length, right, active, step, two of elimination; of each node its weight,
+move, and six of elimination more."""
+
+_NX, _NY, _BEND, _RIGHT, _ACTIVE, _STEP, _Z, _U, _W, _MX, _MY, _G0, _G1, _I = range(14)
+
+_HEAVY = 1e-40
+"""1/kg: the inverse mass that pinned nodes have where one is divided by."""
+
 
 @kernel
-def _eliminate(a, b, node, first, particle, weight, gradient, along, active, give, bow, right, inverse, carried, move, step):
-    """The moves of the nodes, and the steps of lam, of the run a to b; its nodes are `node` and following."""
-    x00 = x01 = x10 = x11 = 0.0
-    gx = gy = 0.0
-    for r in range(a, b):
-        e = first[r]
-        w = weight[particle[e]]
-        k = node + r - a
-        nx, ny, dx, dy = gradient[e + 1, 0], gradient[e + 1, 1], along[e + 1, 0], along[e + 1, 1]
-        stiff, across = (1.0 / give[r], bow[r]) if active[r] else (0.0, 0.0)
-        b00, b01 = stiff * dx * nx + across * (1.0 - nx * nx), stiff * dx * ny - across * nx * ny
-        b10, b11 = stiff * dy * nx - across * nx * ny, stiff * dy * ny + across * (1.0 - ny * ny)
-        carried[k, 0], carried[k, 1] = gx, gy
-        push = stiff * right[r]
-        if w == 0.0:
-            inverse[k, 0] = inverse[k, 1] = inverse[k, 2] = inverse[k, 3] = 0.0
-            x00, x01, x10, x11 = b00, b01, b10, b11
-            gx, gy = dx * push, dy * push
-            continue
-        x00 += 1.0 / w
-        x11 += 1.0 / w
+def _measure_pack(p, start, node, row, position, period_x, period_y, weight, room):
+    """How the rows of a pack stand now, in `room`, and who of them pulls; the direction of the force follows them."""
+    zero, one, half = spread(0.0), spread(1.0), spread(0.5)
+    begin, end, shift = start[p], start[p + 1], LANES * p
+    xi, yi = take(position, node, begin + shift)
+    wi = pick(weight, node, begin + shift)
+    store(room[_W], 0, wi)
+    for k in range(begin, end, LANES):
+        xj, yj = take(position, node, k + shift + LANES)
+        wj = pick(weight, node, k + shift + LANES)
+        dx, dy = nearest_lanes(xj - xi, period_x), nearest_lanes(yj - yi, period_y)
+        rest = load(row[REST], k)
+        length = square_root(dx * dx + dy * dy)
+        bend = one / larger(length, spread(1e-12))
+        nx, ny = where_zero(length, one, dx * bend), dy * bend
+        ax, ay, turn = load(row[AX], k), load(row[AY], k), load(row[TURN], k)
+        ax, ay = ax + turn * (nx - ax), ay + turn * (ny - ay)
+        old = nx * ax + ny * ay  # turned by 60 degrees in a substep: the old direction says nothing any more
+        ax, ay = where_above(half, old, nx, ax), where_above(half, old, ny, ay)
+        give, intact = load(row[GIVE], k), load(row[INTACT], k)
+        right = zero - (length - rest + load(row[OFFSET], k) + give * load(row[LAM], k))
+        taut = where_above(spread(LINK_TAUT) * rest, right, one, one - load(row[ROPE], k))
+        to = k - begin
+        store(row[AX], k, ax)
+        store(row[AY], k, ay)
+        store(room[_NX], to, nx)
+        store(room[_NY], to, ny)
+        store(room[_BEND], to, bend)
+        store(room[_RIGHT], to, right)
+        store(room[_ACTIVE], to, where_above(give, zero, intact * taut, zero))
+        store(room[_W], to + LANES, wj)
+        xi, yi, wi = xj, yj, wj
+
+
+@kernel
+def _eliminate_rows(begin, end, row, room):
+    """The steps of lam of a pack, and the moves of its nodes: row by row, where no link resists being turned."""
+    zero, one = spread(0.0), spread(1.0)
+    w = load(room[_W], 0)
+    active = a = give = nd = z = per = zero
+    nx = ny = ax = ay = zero
+    for k in range(begin, end, LANES):
+        to = k - begin
+        mx, my, bx, by = load(room[_NX], to), load(room[_NY], to), load(row[AX], k), load(row[AY], k)
+        here, g, wj = load(room[_ACTIVE], to), load(row[GIVE], k), load(room[_W], to + LANES)
+        md = mx * bx + my * by
+        c, cc = nx * bx + ny * by, mx * ax + my * ay
+        if k > begin:
+            store(room[_U], to - LANES, active * w * c * per)
+        near = md * (a + give) + w * (nd * md - c * cc)
+        a = where_zero(active, w * md, w * near * per)
+        per = one / where_zero(here, one, a + wj * md + g)
+        z = where_zero(here, zero - load(row[LAM], k), (load(room[_RIGHT], to) + w * cc * z) * per)
+        store(room[_Z], to, z)
+        nx, ny, ax, ay, nd, give, w, active = mx, my, bx, by, md, g, wj, here
+    step = zero
+    fx = fy = zero
+    for k in range(end - LANES, begin - LANES, -LANES):
+        to = k - begin
+        step = load(room[_Z], to) + (load(room[_U], to) * step if k < end - LANES else zero)
+        store(room[_STEP], to, step)
+        bx, by, wj = load(row[AX], k) * step, load(row[AY], k) * step, load(room[_W], to + LANES)
+        store(room[_MX], to + LANES, wj * (bx - fx))
+        store(room[_MY], to + LANES, wj * (by - fy))
+        fx, fy = bx, by
+    w = load(room[_W], 0)
+    store(room[_MX], 0, zero - w * fx)
+    store(room[_MY], 0, zero - w * fy)
+
+
+@kernel
+def _eliminate_nodes(begin, end, row, room):
+    """The same node by node, with what resists being turned."""
+    zero, one, heavy = spread(0.0), spread(1.0), spread(_HEAVY)
+    x00 = x01 = x10 = x11 = gx = gy = zero
+    for k in range(begin, end, LANES):
+        to = k - begin
+        nx, ny, dx, dy = load(room[_NX], to), load(room[_NY], to), load(row[AX], k), load(row[AY], k)
+        active, mass = load(room[_ACTIVE], to), one / larger(load(room[_W], to), heavy)
+        stiff, across = where_zero(active, zero, one / load(row[GIVE], k)), active * load(row[BOW], k)
+        b00, b01 = stiff * dx * nx + across * (one - nx * nx), stiff * dx * ny - across * nx * ny
+        b10, b11 = stiff * dy * nx - across * nx * ny, stiff * dy * ny + across * (one - ny * ny)
+        store(room[_G0], to, gx)
+        store(room[_G1], to, gy)
+        push = stiff * load(room[_RIGHT], to) + where_zero(active, zero - load(row[LAM], k), zero)
+        x00 = x00 + mass
+        x11 = x11 + mass
         d00, d01, d10, d11 = x00 + b00, x01 + b01, x10 + b10, x11 + b11
-        over = 1.0 / (d00 * d11 - d01 * d10)
-        i00, i01, i10, i11 = d11 * over, -d01 * over, -d10 * over, d00 * over
-        inverse[k, 0], inverse[k, 1], inverse[k, 2], inverse[k, 3] = i00, i01, i10, i11
+        over = one / (d00 * d11 - d01 * d10)
+        i00, i01, i10, i11 = d11 * over, zero - d01 * over, zero - d10 * over, d00 * over
+        store(room[_I], to, i00)
+        store(room[_I + 1], to, i01)
+        store(room[_I + 2], to, i10)
+        store(room[_I + 3], to, i11)
         # What is carried over the link: X D^-1 d right / give + B D^-1 g
         px, py = i00 * dx * push + i01 * dy * push, i10 * dx * push + i11 * dy * push
         qx, qy = i00 * gx + i01 * gy, i10 * gx + i11 * gy
@@ -59,65 +157,70 @@ def _eliminate(a, b, node, first, particle, weight, gradient, along, active, giv
         m00, m01 = i00 * b00 + i01 * b10, i00 * b01 + i01 * b11
         m10, m11 = i10 * b00 + i11 * b10, i10 * b01 + i11 * b11
         x00, x01, x10, x11 = x00 * m00 + x01 * m10, x00 * m01 + x01 * m11, x10 * m00 + x11 * m10, x10 * m01 + x11 * m11
-    last = node + b - a
-    w = weight[particle[first[b] - 1]]
-    move[last, 0] = move[last, 1] = 0.0
-    if w > 0.0:
-        x00 += 1.0 / w
-        x11 += 1.0 / w
-        over = 1.0 / (x00 * x11 - x01 * x10)
-        move[last, 0], move[last, 1] = (x11 * gx - x01 * gy) * over, (x00 * gy - x10 * gx) * over
-    for r in range(b - 1, a - 1, -1):
-        e = first[r]
-        k = node + r - a
-        nx, ny, dx, dy = gradient[e + 1, 0], gradient[e + 1, 1], along[e + 1, 0], along[e + 1, 1]
-        stiff, across = (1.0 / give[r], bow[r]) if active[r] else (0.0, 0.0)
-        mx, my = move[k + 1, 0], move[k + 1, 1]
+    mass = one / larger(load(room[_W], end - begin), heavy)
+    x00 = x00 + mass
+    x11 = x11 + mass
+    over = one / (x00 * x11 - x01 * x10)
+    mx, my = (x11 * gx - x01 * gy) * over, (x00 * gy - x10 * gx) * over
+    store(room[_MX], end - begin, mx)
+    store(room[_MY], end - begin, my)
+    for k in range(end - LANES, begin - LANES, -LANES):
+        to = k - begin
+        nx, ny, dx, dy = load(room[_NX], to), load(room[_NY], to), load(row[AX], k), load(row[AY], k)
+        active, right = load(room[_ACTIVE], to), load(room[_RIGHT], to)
+        stiff, across = where_zero(active, zero, one / load(row[GIVE], k)), active * load(row[BOW], k)
         out = nx * mx + ny * my
-        fx = carried[k, 0] + stiff * dx * (out - right[r]) + across * (mx - nx * out)
-        fy = carried[k, 1] + stiff * dy * (out - right[r]) + across * (my - ny * out)
-        move[k, 0] = inverse[k, 0] * fx + inverse[k, 1] * fy
-        move[k, 1] = inverse[k, 2] * fx + inverse[k, 3] * fy
-        step[r] = stiff * (right[r] - out + nx * move[k, 0] + ny * move[k, 1])
+        known = where_zero(active, zero - load(row[LAM], k), zero)
+        push = stiff * (right - out) + known
+        fx = load(room[_G0], to) - dx * push + across * (mx - nx * out)
+        fy = load(room[_G1], to) - dy * push + across * (my - ny * out)
+        mx = load(room[_I], to) * fx + load(room[_I + 1], to) * fy
+        my = load(room[_I + 2], to) * fx + load(room[_I + 3], to) * fy
+        store(room[_MX], to, mx)
+        store(room[_MY], to, my)
+        store(room[_STEP], to, push + stiff * (nx * mx + ny * my))
 
 
 @kernel
-def _slack_changes(a, b, node, first, gradient, upper, intact, active, right, move, step, lam):
+def _slack_changes(begin, end, row, room):
     """A rope pulls or does nothing: let go of rows that would push, take up those the others stretch; whether any changed."""
-    changed = False
-    for r in range(a, b):
-        if upper[r] == np.inf or not intact[r]:
-            continue
-        if active[r]:
-            if lam[r] + step[r] > upper[r]:
-                active[r] = 0
-                changed = True
-        else:
-            e, k = first[r], node + r - a
-            out = gradient[e + 1, 0] * (move[k + 1, 0] - move[k, 0]) + gradient[e + 1, 1] * (move[k + 1, 1] - move[k, 1])
-            if out > right[r]:
-                active[r] = 1
-                changed = True
-    return changed
+    zero, one = spread(0.0), spread(1.0)
+    changed = 0
+    for k in range(begin, end, LANES):
+        to = k - begin
+        active = load(room[_ACTIVE], to)
+        rope = load(row[ROPE], k) * load(row[INTACT], k)
+        dx = load(room[_MX], to + LANES) - load(room[_MX], to)
+        dy = load(room[_MY], to + LANES) - load(room[_MY], to)
+        out = load(room[_NX], to) * dx + load(room[_NY], to) * dy
+        ends = active * rope * where_above(load(row[LAM], k) + load(room[_STEP], to), zero, one, zero)
+        begins = (one - active) * rope * where_above(out, load(room[_RIGHT], to), one, zero)
+        begins = where_above(load(row[GIVE], k), zero, begins, zero)
+        changed |= which_above(ends + begins, zero)
+        store(room[_ACTIVE], to, active + begins - ends)
+    return changed != 0
 
 
 @kernel
-def _sweep(a, b, position, period_x, period_y, first, particle, weight, rest, upper, intact, offset, give, lam):
-    """One link after the other, back and forth: less exact, but safe when links turn too far to be solved as straight ones."""
+def _sweep(begin, end, lane, node, row, position, period_x, period_y, weight, shift):
+    """One link of a run after the other, back and forth: less exact, but safe where links turn too far."""
     for sweep in range(_SWEEPS):
-        for s in range(a, b):
-            r = s if sweep % 2 == 0 else a + b - 1 - s
-            if not intact[r]:
+        for s in range(begin + lane, end, LANES):
+            r = s if sweep % 2 == 0 else begin + end - LANES + 2 * lane - s
+            if row[INTACT, r] == 0.0:
                 continue
-            i, j = particle[first[r]], particle[first[r] + 1]
+            i, j = node[r + shift], node[r + shift + LANES]
             dx = nearest(position[j, 0] - position[i, 0], period_x)
             dy = nearest(position[j, 1] - position[i, 1], period_y)
             length = np.sqrt(dx * dx + dy * dy)
             ww = weight[i] + weight[j]
             if length == 0.0 or ww == 0.0:
                 continue
-            step = min(-(length - rest[r] + offset[r] + give[r] * lam[r]) / (ww + give[r]), upper[r] - lam[r])
-            lam[r] += step
+            give = row[GIVE, r]
+            step = -(length - row[REST, r] + row[OFFSET, r] + give * row[LAM, r]) / (ww + give)
+            if row[ROPE, r] != 0.0:
+                step = min(step, -row[LAM, r])
+            row[LAM, r] += step
             dx, dy = dx * (step / length), dy * (step / length)
             position[i, 0] -= weight[i] * dx
             position[i, 1] -= weight[i] * dy
@@ -126,90 +229,80 @@ def _sweep(a, b, position, period_x, period_y, first, particle, weight, rest, up
 
 
 @kernel
-def _solve_one(r, position, first, particle, weight, upper, along, gradient, give, active, right, lam):
-    """A run of a single link: one equation."""
-    if not active[r]:
-        return
-    e = first[r]
-    i, j = particle[e], particle[e + 1]
-    dx, dy = along[e + 1, 0], along[e + 1, 1]
-    ww = (weight[i] + weight[j]) * (gradient[e + 1, 0] * dx + gradient[e + 1, 1] * dy)
-    step = min(right[r] / (ww + give[r]), upper[r] - lam[r])
-    lam[r] += step
-    dx, dy = dx * step, dy * step
-    if weight[i] > 0.0:
-        position[i, 0] -= weight[i] * dx
-        position[i, 1] -= weight[i] * dy
-    if weight[j] > 0.0:
-        position[j, 0] += weight[j] * dx
-        position[j, 1] += weight[j] * dy
+def _move_pack(p, start, node, row, position, room):
+    """The nodes go where the solution puts them, but for lanes whose links it turns too far: returns which those are."""
+    begin, end, shift = start[p], start[p + 1], LANES * p
+    zero, limit = spread(0.0), spread(LINK_TURN if end - begin > LANES else np.inf)
+    most = zero
+    for k in range(begin, end, LANES):
+        to = k - begin
+        dx = load(room[_MX], to + LANES) - load(room[_MX], to)
+        dy = load(room[_MY], to + LANES) - load(room[_MY], to)
+        across = (load(room[_NX], to) * dy - load(room[_NY], to) * dx) * load(room[_BEND], to) * load(row[INTACT], k)
+        most = larger(most, larger(across, zero - across))
+    far = which_above(most, limit)
+    for k in range(begin, end + 1, LANES):
+        to = k - begin
+        if k < end:
+            lam = load(row[LAM], k)
+            store(row[LAM], k, where_set(far, lam, lam + load(room[_STEP], to)))
+        x, y = take(position, node, k + shift)
+        w = load(room[_W], to)
+        free = where_set(far, zero, where_zero(w, zero, spread(1.0)))
+        put(position, node, k + shift, x + free * load(room[_MX], to), y + free * load(room[_MY], to))
+    return far
 
 
 @kernel
-def _solve_run(
-    a, b, node, position, period_x, period_y, first, particle, weight, rest, upper, intact, value, gradient, along, turn, bend,
-    bow, give, offset, active, right, inverse, carried, move, step, lam,
-):  # fmt: skip
-    one_sided = False
-    for r in range(a, b):
-        measure_distance(r, first[r], position, period_x, period_y, particle, rest, value, gradient, bend)
-        e = first[r] + 1
-        nx, ny = gradient[e, 0], gradient[e, 1]
-        along[e, 0] += turn[r] * (nx - along[e, 0])
-        along[e, 1] += turn[r] * (ny - along[e, 1])
-        if nx * along[e, 0] + ny * along[e, 1] < 0.5:  # by 60 degrees in a substep: the old direction says nothing any more
-            along[e, 0], along[e, 1] = nx, ny
-        right[r] = -(value[r] + offset[r] + give[r] * lam[r])
-        active[r] = intact[r] and give[r] > 0.0
-        if upper[r] < np.inf:
-            one_sided = True
-            active[r] &= right[r] < LINK_TAUT * rest[r]
-    if b - a == 1:
-        _solve_one(a, position, first, particle, weight, upper, along, gradient, give, active, right, lam)
-        return
+def _solve_pack(p, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, room):
+    begin, end = start[p], start[p + 1]
+    _measure_pack(p, start, node, row, position, period_x, period_y, weight, room)
+    ropes = holds[p] & ROPES
     for _ in range(LINK_ROUNDS):
-        _eliminate(a, b, node, first, particle, weight, gradient, along, active, give, bow, right, inverse, carried, move, step)
-        if not one_sided or not _slack_changes(a, b, node, first, gradient, upper, intact, active, right, move, step, lam):
+        if bowed[p] and end - begin > LANES:
+            _eliminate_nodes(begin, end, row, room)
+        else:
+            _eliminate_rows(begin, end, row, room)
+        if not (ropes and _slack_changes(begin, end, row, room)):
             break
-    trusted = True
-    for r in range(a, b):
-        e, k = first[r], node + r - a
-        mx, my = move[k + 1, 0] - move[k, 0], move[k + 1, 1] - move[k, 1]
-        trusted &= abs(gradient[e + 1, 0] * my - gradient[e + 1, 1] * mx) * bend[r] < LINK_TURN
-    if not trusted:
-        _sweep(a, b, position, period_x, period_y, first, particle, weight, rest, upper, intact, offset, give, lam)
-        return
-    for r in range(a, b):
-        lam[r] += step[r]
-    for k in range(node, node + b - a + 1):
-        p = particle[first[a]] if k == node else particle[first[a + k - node] - 1]
-        if weight[p] > 0.0:
-            position[p, 0] += move[k, 0]
-            position[p, 1] += move[k, 1]
+    far = _move_pack(p, start, node, row, position, room)
+    if far != 0:
+        for lane in range(lanes[p]):
+            if (far >> lane) & 1:
+                _sweep(begin, end, lane, node, row, position, period_x, period_y, weight, LANES * p)
+        for lane in range(lanes[p], LANES):  # those that repeat the last run
+            for k in range(begin, end, LANES):
+                row[LAM, k + lane] = row[LAM, k + lanes[p] - 1]
 
 
 @parallel_kernel
-def sweep(
-    back, skip, colour, run, position, period_x, period_y, first, particle, weight, rest, upper, intact, value, gradient, along,
-    turn, bend, bow, give, offset, active, right, inverse, carried, move, step, lam,
-):  # fmt: skip
-    """Solve all runs, colour by colour or `back` from the last one, without the first colour on the way if `skip`.
+def _solve(first, stop, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms):
+    parts = rooms.shape[0]
+    for part in prange(parts):
+        for p in range(first + part, stop, parts):
+            _solve_pack(p, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms[part])
 
-    Run k is rows run[k] to run[k + 1], colour c runs colour[c] to colour[c + 1]; those of a colour share no particle, but for the
-    last one's. active to step: room for the solver, of a row or of a node; the nodes of run k begin at run[k] + k.
+
+@driver
+def sweep(back, skip, colour, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms):
+    """Solve all packs, colour by colour or `back` from the last one, without the first colour on the way if `skip`.
+
+    Colour c is packs colour[c] to colour[c + 1], which share no particle. rooms: (parts, SCRATCH, items of the longest pack's
+    nodes): as many packs are solved beside each other.
     """
     colours = colour.shape[0] - 1
     for n in range(1 if skip else 0, colours):
         c = colours - 1 - n if back else n
-        if c < LINK_COLOURS - 1:
-            for k in prange(colour[c], colour[c + 1]):
-                _solve_run(
-                    run[k], run[k + 1], run[k] + k, position, period_x, period_y, first, particle, weight, rest, upper, intact,
-                    value, gradient, along, turn, bend, bow, give, offset, active, right, inverse, carried, move, step, lam,
-                )  # fmt: skip
-        else:
-            for k in range(colour[c], colour[c + 1]):
-                _solve_run(
-                    run[k], run[k + 1], run[k] + k, position, period_x, period_y, first, particle, weight, rest, upper, intact,
-                    value, gradient, along, turn, bend, bow, give, offset, active, right, inverse, carried, move, step, lam,
-                )  # fmt: skip
+        _solve(colour[c], colour[c + 1], start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms)
+
+
+@driver
+def passes(times, gives, colour, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms):
+    """There and back so many times, from the lam that rows start from; once, one way, where there is a single colour."""
+    if gives:
+        ahead(colour, start, node, holds, row, position, weight)
+    several = colour.shape[0] > 2
+    for _ in range(times if several else 1):
+        sweep(False, False, colour, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms)
+        if several:
+            sweep(True, True, colour, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms)

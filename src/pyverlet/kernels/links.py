@@ -21,6 +21,7 @@ import numpy as np
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.ground.constants import LINK_GIVE, LINK_MEMORY_S, LINK_RESOLVED
+from pyverlet.kernels.seam import image_near
 
 
 @kernel
@@ -131,18 +132,35 @@ def snap(force, strength, intact):
             intact[r] = 0
 
 
-@kernel
-def look_back(out, position, before, velocity, calm, h):
-    """Where everybody was a substep ago: by the velocity, or `before`, by memory, where rest has put another velocity in.
+@parallel_kernel
+def look_back(slot, position, velocity, inverse_mass, period_x, period_y, before, calm, h, start, earlier, weight):
+    """Copy who is linked: where a substep starts; `earlier`, where everybody was a substep ago; the inverse mass.
 
-    Contacts at rest carry weight by small velocities that move nobody, and links would take them for motion. calm: (k,) m/s, by
-    how much the velocity may differ from the way gone and still be of that kind; beyond it there was an impact. NaN: unknown.
+    That is by the velocity, or `before`, by memory, where rest has put another velocity in. Contacts at rest carry weight by
+    small velocities that move nobody, and links would take them for motion. calm: (k,) m/s, by how much the velocity may differ
+    from the way gone and still be of that kind; beyond it there was an impact. NaN: unknown. In a periodic room `before` may be
+    another image of where they were.
     """
-    for k in range(position.shape[0]):
-        x, y = position[k, 0] - h * velocity[k, 0], position[k, 1] - h * velocity[k, 1]
-        if np.hypot(x - before[k, 0], y - before[k, 1]) <= h * calm[k]:
-            x, y = before[k, 0], before[k, 1]
-        out[k, 0], out[k, 1] = x, y
+    for k in prange(slot.shape[0]):
+        s = slot[k]
+        start[k, 0], start[k, 1] = position[s, 0], position[s, 1]
+        x, y = start[k, 0] - h * np.float64(velocity[s, 0]), start[k, 1] - h * np.float64(velocity[s, 1])
+        bx = image_near(before[k, 0], start[k, 0], period_x)
+        by = image_near(before[k, 1], start[k, 1], period_y)
+        dx, dy, most = x - bx, y - by, h * calm[k]
+        if dx * dx + dy * dy <= most * most:
+            x, y = bx, by
+        earlier[k, 0], earlier[k, 1] = x, y
+        weight[k] = inverse_mass[s]
+
+
+@parallel_kernel
+def take_twice(position, predicted, source, slot):
+    """Where the integrator has put who is linked, in two copies: one to solve on."""
+    for k in prange(slot.shape[0]):
+        s = slot[k]
+        for axis in range(2):
+            position[k, axis] = predicted[k, axis] = source[s, axis]
 
 
 @parallel_kernel
@@ -162,6 +180,7 @@ def add_pull(acceleration, slot, pull, calm, rest):
     """acceleration[slot[k]] += pull[k], (n, 2); no slot comes twice. calm[k] becomes what both are in `rest` seconds, m/s."""
     for k in prange(slot.shape[0]):
         s = slot[k]
-        calm[k] = rest * (np.hypot(acceleration[s, 0], acceleration[s, 1]) + np.hypot(pull[k, 0], pull[k, 1]))
+        ax, ay = np.float64(acceleration[s, 0]), np.float64(acceleration[s, 1])
+        calm[k] = rest * (np.sqrt(ax * ax + ay * ay) + np.sqrt(pull[k, 0] * pull[k, 0] + pull[k, 1] * pull[k, 1]))
         acceleration[s, 0] += pull[k, 0]
         acceleration[s, 1] += pull[k, 1]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
-from pyverlet.compile.lanes import LANES
+from pyverlet.compile.lanes import LANES, nearest_whole, spread
 from pyverlet.ground.constants import CLOSE
 from pyverlet.kernels.packs import aside
 
@@ -20,6 +20,21 @@ _CHUNK = 2048
 def nearest(difference, period):
     """The image of a difference that is nearest to 0; the difference itself where the period is 0."""
     return difference - period * np.rint(difference / period) if period > 0 else difference
+
+
+@kernel
+def nearest_lanes(difference, period):
+    """`nearest`, lane by lane; period: one number for all."""
+    if not period > 0:
+        return difference
+    wide = spread(period)
+    return difference - wide * nearest_whole(difference / wide)
+
+
+@kernel
+def image_near(x, reference, period):
+    """The image of x that is nearest to `reference`; x itself where the period is 0."""
+    return x + period * np.rint((reference - x) / period) if period > 0 else x
 
 
 @kernel
@@ -48,10 +63,8 @@ def follow(position, reference, period_x, period_y):
     """Positions become the images nearest to `reference` (n, 2)."""
     for c in prange((position.shape[0] + _CHUNK - 1) // _CHUNK):
         for i in range(c * _CHUNK, min((c + 1) * _CHUNK, position.shape[0])):
-            if period_x > 0:
-                position[i, 0] += period_x * np.rint((reference[i, 0] - position[i, 0]) / period_x)
-            if period_y > 0:
-                position[i, 1] += period_y * np.rint((reference[i, 1] - position[i, 1]) / period_y)
+            position[i, 0] = image_near(position[i, 0], reference[i, 0], period_x)
+            position[i, 1] = image_near(position[i, 1], reference[i, 1], period_y)
 
 
 @kernel

@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike
 
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import shapes
+from pyverlet.laws.links._chains import ChainPool
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import Floats, Link, several, stiffness_of
 from pyverlet.laws.links._pool import Pool
-from pyverlet.laws.links._rows import ChainPool
 from pyverlet.state.seam import NONE, Seam
 
 
@@ -75,7 +75,7 @@ class Distance(Link):
         return shapes.distance
 
     def _new_pool(self) -> Pool:
-        return ChainPool(shapes.distance, turn=0)
+        return ChainPool(turn=0)
 
     def _columns(self) -> dict[str, Any]:
         return {

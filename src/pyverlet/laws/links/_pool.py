@@ -84,6 +84,15 @@ class Pool(ABC):
     def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
         """Solve one colour after the other, or back from the last; without the first on the way if `skip`."""
 
+    def passes(self, work: Work, times: int) -> None:
+        """All of a substep for a pool that is alone: ahead, then there and back so many times."""
+        self.ahead(work)
+        several = self.colours > 1
+        for _ in range(times if several else 1):
+            self.sweep(work, back=False, skip=False)
+            if several:
+                self.sweep(work, back=True, skip=True)
+
     @abstractmethod
     def snap(self, work: Work, h: float) -> Array:
         """After the passes: what does each pull with? Break those beyond their strength; returns which rows did."""

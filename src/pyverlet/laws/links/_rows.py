@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from pyverlet.ground.constants import LINK_COLOURS
-from pyverlet.kernels import chains, links, runs
+from pyverlet.kernels import links, runs
 from pyverlet.laws.links._link import Array
 from pyverlet.laws.links._pool import MOVING, Pool
 from pyverlet.laws.links._work import Work
@@ -147,32 +147,6 @@ class RowPool(Pool):
         self.measure(position, *seam.period, first, particle, rows["rest"], 0, len(rows), value, gradient, bend)
         soft = np.isfinite(rows["stiffness"])
         return _stored(rows["stiffness"][soft], rows["upper"][soft], rows["intact"][soft], value[soft])
-
-
-class ChainPool(RowPool):
-    """Links of two particles' distance: those that follow each other are solved at once, as kernels.chains does."""
-
-    def _find_runs(self, first: Array, entry: Array, particles: int) -> Array:
-        run_of = np.empty(len(self.rows), np.int64)
-        runs.find_runs(first, entry, self.rows["intact"], particles, run_of)
-        return run_of
-
-    def pack(self, work: Work) -> None:
-        super().pack(work)
-        count = len(self.rows)
-        nodes = count + len(self._run)
-        self._active, self._inverse = np.zeros(count, np.uint8), np.zeros((nodes, 4))
-        self._carried, self._move = np.zeros((2, nodes, 2))
-        self._right, self._step = np.zeros((2, count))
-
-    def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
-        row = self._row
-        chains.sweep(
-            back, skip, self._colour[: self.colours + 1], self._run, work.position, *work.seam.period, self._first,
-            self._particle, work.weight, row["rest"], row["upper"], row["intact"], row["value"], self._gradient, self._along,
-            row["turn"], row["bend"], row["bow"], row["give"], row["offset"], self._active, self._right, self._inverse,
-            self._carried, self._move, self._step, row["lam"],
-        )  # fmt: skip
 
 
 def _stored(stiffness: Array, upper: Array, intact: Array, value: Array) -> float:

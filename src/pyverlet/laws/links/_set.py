@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any, TypeVar
 
 import numpy as np
@@ -181,16 +182,20 @@ class Links:
         if len(self._apart):
             runs.drop_pairs(pairs.first, pairs.count, pairs.pair_i, pairs.pair_j, particle, *self._partners)
 
+    def _threads(self) -> AbstractContextManager[None]:
+        """As many as pay: each colour is a meeting of theirs."""
+        return jit.one_thread() if self._few and jit.threads_in_use() > 1 else nullcontext()
+
     def before(self, state: Slots, h: float) -> None:
         """Before the integrator: remember where the substep starts."""
-        with jit.one_thread(self._few):
+        with self._threads():
             self._work.look(state, h)
             for pool in self._order:
                 pool.before(self._work, h)
 
     def solve(self, state: Slots, h: float) -> None:
         """Move the linked particles to where their links allow, and break those that pull too hard."""
-        with jit.one_thread(self._few):
+        with self._threads():
             self._solve(state, h)
 
     def _solve(self, state: Slots, h: float) -> None:
@@ -198,16 +203,12 @@ class Links:
         work.take(state)
         for pool in self._order:
             pool.tie(work, h)
-        for pool in self._order:
-            pool.ahead(work)
         # There and back: one way only, the links about a common particle throw it in a circle, faster and faster.
         pools = [pool for pool in self._order if pool.colours]
-        several = sum(pool.colours for pool in pools) > 1
-        for _ in range(self._iterations if several else 1):
-            for pool in pools:
-                pool.sweep(work, back=False, skip=False)
-            for pool in reversed(pools) if several else ():
-                pool.sweep(work, back=True, skip=pool is pools[-1])  # its last colour has just been solved
+        if len(pools) == 1:
+            pools[0].passes(work, self._iterations)
+        elif pools:
+            self._passes(pools)
         for pool in self._order:
             snapped = pool.snap(work, h)
             if len(snapped):
@@ -215,9 +216,20 @@ class Links:
                 self._broken = np.concatenate((self._broken, self._note(pool, snapped)))
         work.give(state, h)
 
+    def _passes(self, pools: list[Pool]) -> None:
+        """Of several pools: all of them there, and all of them back."""
+        work = self._work
+        for pool in pools:
+            pool.ahead(work)
+        for _ in range(self._iterations):
+            for pool in pools:
+                pool.sweep(work, back=False, skip=False)
+            for pool in reversed(pools):
+                pool.sweep(work, back=True, skip=pool is pools[-1])  # its last colour has just been solved
+
     def after(self, state: Slots) -> None:
         """After the contacts: what the links did is part of the acceleration, for integrators that remember it."""
-        with jit.one_thread(self._few):
+        with self._threads():
             self._work.after(state)
 
     def scatter(self) -> None:
@@ -252,7 +264,7 @@ class Links:
         """The same in the middle of a frame, J, where the particles are now, without those that have broken in it."""
         if not any(pool.gives for pool in self._order):
             return 0.0
-        with jit.one_thread(self._few):
+        with self._threads():
             position = self._work.where(state)
             return sum(pool.stored(position, state.seam) for pool in self._order if pool.gives)
 

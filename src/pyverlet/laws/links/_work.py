@@ -48,7 +48,7 @@ class Work:
         self.compact = np.zeros(count, np.int64)
         self.compact[particle] = np.arange(len(particle))
         self.start, self.earlier, self.position, self.predicted = np.zeros((4, len(particle), 2))
-        self._where, self._velocity, self.pull, self._spare = np.zeros((4, len(particle), 2))
+        self._where, self.pull, self._spare = np.zeros((3, len(particle), 2))
         self.weight = np.zeros(len(particle))
         self._slot = np.zeros(len(particle), np.int64)
         self._calm = np.full(len(particle), np.nan)
@@ -89,17 +89,14 @@ class Work:
         slot, self._h = self.slots(state), h
         before = self.start
         self.start, self._spare = self._spare, before
-        motion.take_rows(self.start, state.position, slot)
-        motion.take_rows(self._velocity, state.velocity, slot)
-        if self.seam:  # it may be remembered by another image
-            before = self.start + self.seam.nearest(before - self.start)
-        links.look_back(self.earlier, self.start, before, self._velocity, self._calm, h)
-        self.weight[:] = state.inverse_mass[slot]
+        links.look_back(
+            slot, state.position, state.velocity, state.inverse_mass, *self.seam.period, before, self._calm, h, self.start,
+            self.earlier, self.weight,
+        )  # fmt: skip
 
     def take(self, state: Slots) -> None:
         """After the integrator and the contacts."""
-        motion.take_rows(self.predicted, state.position, self.slots(state))
-        self.position[:] = self.predicted
+        links.take_twice(self.position, self.predicted, state.position, self.slots(state))
 
     def where(self, state: Slots) -> Array:
         """(m, 2) where they are now, m; good until asked again."""

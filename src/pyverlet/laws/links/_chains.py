@@ -1,0 +1,138 @@
+"""Links of two particles' distance: those that follow each other are runs, solved at once and eight beside each other."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pyverlet.compile import jit
+from pyverlet.compile.lanes import LANES
+from pyverlet.ground.constants import LINK_COLOURS, LINKS_ONE_THREAD_BELOW
+from pyverlet.kernels import chain_rows, chains, runs
+from pyverlet.laws.links._link import Array
+from pyverlet.laws.links._pool import MOVING, Pool
+from pyverlet.laws.links._work import Work
+from pyverlet.state.seam import Seam
+
+
+class ChainPool(Pool):
+    """Runs in packs of eight that share no particle, as `kernels.chains` wants them."""
+
+    def __init__(self, turn: int) -> None:
+        super().__init__(turn, rest=np.float64, upper=np.float64)
+
+    def pack(self, work: Work) -> None:
+        """By colour, and within a colour long runs first, so that runs of a pack are as long as each other."""
+        count, entry = len(self.rows), work.compact[self.entries["particle"]]
+        run_of = np.empty(count, np.int64)
+        number = runs.find_runs(self.first, entry, self.rows["intact"], len(work), run_of)
+        colour = np.zeros(number, np.int64)
+        runs.colour_runs(self.first, entry, run_of, len(work), LINK_COLOURS, colour)
+        length = np.bincount(run_of, minlength=number)
+        alone = colour == LINK_COLOURS - 1  # these may share particles: each is a pack, and a colour, of its own
+        order = np.lexsort((np.where(alone, 0, -length), colour))
+        rank = np.arange(number) - np.searchsorted(colour[order], colour[order])
+        lane = np.where(alone[order], 0, rank % LANES)
+        opens = np.flatnonzero(lane == 0)
+        run_at = _place(order, opens)
+        self._lanes = np.diff(np.append(opens, number))
+        longest = np.maximum.reduceat(length[order], opens) if number else np.zeros(0, np.int64)
+        self._start = LANES * np.concatenate((np.zeros(1, np.int64), np.cumsum(longest)))
+        new = (np.diff(colour[order][opens], prepend=-1) != 0) | alone[order][opens]
+        self._colour = np.append(np.flatnonzero(new), len(opens))
+        self.colours = len(self._colour) - 1
+        self._lay_out(entry, run_at, longest, length)
+        self._place = np.empty(count, np.int64)
+        self._place[self._source[self._source >= 0][::-1]] = np.flatnonzero(self._source >= 0)[::-1]
+        self._ends = entry.reshape(-1, 2)
+        self._row = np.zeros((len(chain_rows.COLUMNS), len(self._source)))
+        self._strength = np.full(len(self._source), np.inf)
+        self._bowed = np.zeros(len(opens), np.uint8)
+        parts = 1 if len(work) < LINKS_ONE_THREAD_BELOW else jit.max_threads()
+        self._rooms = np.zeros((parts, chains.SCRATCH, LANES * (int(longest.max(initial=0)) + 1)))
+        self.stale, self.changed = False, True
+
+    def _lay_out(self, entry: Array, run_at: Array, longest: Array, length: Array) -> None:
+        """Which row stands in each item, -1 for none, and which particle in each item of the nodes."""
+        begin = np.concatenate((np.zeros(1, np.int64), np.cumsum(length)))
+        pack, step = _within(longest)
+        run = run_at[pack]
+        source = np.where(step[:, None] < length[run], begin[run] + step[:, None], -1)
+        pack, step = _within(longest + 1)
+        run = run_at[pack]
+        step = np.minimum(step[:, None], length[run])
+        node = entry[2 * (begin[run] + np.minimum(step, length[run] - 1)) + (step == length[run])]
+        self._source, self._node = source.ravel(), node.astype(np.uint32).ravel()
+
+    def begin(self) -> None:
+        row, source, rows = self._row, self._source, self.rows
+        if self.changed:
+            self.changed, here = False, source >= 0
+            stiffness, rope = rows["stiffness"][source], here & np.isfinite(rows["upper"][source])
+            soft = here & np.isfinite(stiffness)
+            row[chain_rows.REST], row[chain_rows.DAMPING] = rows["rest"][source] * here, rows["damping"][source] * here
+            row[chain_rows.ROPE], row[chain_rows.SOFT], row[chain_rows.STIFFNESS] = rope, soft, np.where(soft, stiffness, 0.0)
+            self._strength[:] = rows["strength"][source]
+            self._brittle = bool(np.isfinite(self._strength).any())
+            kinds = (chain_rows.ROPES * rope + chain_rows.SOFTS * soft).astype(np.uint8)
+            self._holds = np.bitwise_or.reduceat(kinds, self._start[:-1]) if len(kinds) else kinds
+            self.gives = bool(soft.any())
+        chain_rows.take_up(source, row, *(rows[name] for name in MOVING))
+
+    def before(self, work: Work, h: float) -> None:
+        chain_rows.prepare(
+            self._start, self._node, self._holds, self._bowed, self._row, work.start, *work.seam.period, work.earlier,
+            work.weight, h,
+        )  # fmt: skip
+
+    def ahead(self, work: Work) -> None:
+        if self.gives:
+            chain_rows.ahead(self._colour, self._start, self._node, self._holds, self._row, work.position, work.weight)
+
+    def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
+        chains.sweep(
+            back, skip, self._colour, self._start, self._node, self._holds, self._lanes, self._bowed, self._row, work.position,
+            *work.seam.period, work.weight, self._rooms,
+        )  # fmt: skip
+
+    def passes(self, work: Work, times: int) -> None:
+        chains.passes(
+            times, self.gives, self._colour, self._start, self._node, self._holds, self._lanes, self._bowed, self._row,
+            work.position, *work.seam.period, work.weight, self._rooms,
+        )  # fmt: skip
+
+    def snap(self, work: Work, h: float) -> Array:
+        chain_rows.note_force(self._row, h)
+        if not self._brittle:
+            return np.empty(0, np.int64)
+        hard = np.flatnonzero((np.abs(self._row[chain_rows.FORCE]) > self._strength) & (self._row[chain_rows.INTACT] != 0.0))
+        self._row[chain_rows.INTACT, hard] = 0.0
+        return np.unique(self._source[hard])
+
+    def pulled(self) -> Array:
+        return np.asarray(self._row[chain_rows.FORCE][self._place])
+
+    def end(self) -> None:
+        chain_rows.hand_over(self._place, self._row, *(self.rows[name] for name in MOVING))
+
+    def stored(self, position: Array, seam: Seam) -> float:
+        return self._energy(position, seam, self._ends, chain_rows.intact(self._place, self._row))
+
+    def energy(self, position: Array, seam: Seam) -> float:
+        return self._energy(position, seam, self.entries["particle"].reshape(-1, 2), self.rows["intact"])
+
+    def _energy(self, position: Array, seam: Seam, ends: Array, intact: Array) -> float:
+        rows = self.rows
+        return float(chain_rows.energy(position, *seam.period, ends, rows["rest"], rows["upper"], rows["stiffness"], intact))
+
+
+def _place(order: Array, opens: Array) -> Array:
+    """(packs, LANES) the run in each lane; a pack that is not full repeats its last one."""
+    end = np.append(opens[1:], len(order))
+    where = np.minimum(opens[:, None] + np.arange(LANES), end[:, None] - 1)
+    return np.asarray(order[where])
+
+
+def _within(count: Array) -> tuple[Array, Array]:
+    """Of so many items each: which each belongs to, and its number within."""
+    owner = np.repeat(np.arange(len(count)), count)
+    return owner, np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
