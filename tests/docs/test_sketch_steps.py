@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -33,11 +34,12 @@ def changed(source: str, diff: str) -> str:
 class Watched:
     """`pyverlet run mysketch.py --watch`, and a browser on its page."""
 
-    def __init__(self, page: Page, command: list[str]) -> None:
+    def __init__(self, page: Page, command: list[str], left_over: ExitStack) -> None:
         self.process = subprocess.Popen(
             [sys.executable, "-u", "-m", "pyverlet", *command, "--no-open", "--port", "0"],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
+        left_over.callback(self.kill)
         assert self.process.stdout is not None
         address = re.search(r"http://\S+", self.process.stdout.readline())
         assert address
@@ -59,6 +61,11 @@ class Watched:
         _, err = self.process.communicate(timeout=20)
         assert "Traceback" not in err
 
+    def kill(self) -> None:
+        """Whatever has happened: nothing is left behind."""
+        with self.process:
+            self.process.kill()
+
 
 def test_changes_are_applied() -> None:
     assert changed("a\nb\nc\n", "-b\n+d\n+e\n") == "a\nd\ne\nc\n"
@@ -71,18 +78,19 @@ def test_every_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
         pytest.skip("no Chromium found")
     monkeypatch.chdir(tmp_path)
     sketch, watched, steps = tmp_path / "mysketch.py", None, iter([*STEPS, ("end", "")])
-    with sync_playwright() as playwright:
+    with sync_playwright() as playwright, ExitStack() as left_over:
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
         page = browser.new_page(viewport={"width": 900, "height": 700})
         errors: list[str] = []
         page.on("pageerror", lambda error: errors.append(str(error)))
+        page.set_default_timeout(120_000)  # kernels may have to be compiled first
         kind, text = next(steps)
         while kind != "end":
             after = next(steps)
             if kind == "sh":
                 for line in text.splitlines():
                     if line.endswith("--watch"):
-                        watched = Watched(page, shlex.split(line)[1:])
+                        watched = Watched(page, shlex.split(line)[1:], left_over)
                     else:
                         assert main(shlex.split(line)[1:]) == 0, capsys.readouterr().err
             if kind == "diff":

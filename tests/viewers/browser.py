@@ -103,7 +103,9 @@ def visit(page: Page, address: str) -> None:
 
 
 def where(page: Page, particle: int) -> dict[str, float]:
-    found: dict[str, float] = page.evaluate("(i) => window.pyverlet.where(i)", particle)
+    # Between a new shape and its first frame there is nobody to ask about.
+    asked = "(i) => { try { return window.pyverlet.where(i); } catch { return null; } }"
+    found: dict[str, float] = page.wait_for_function(asked, arg=particle).json_value()
     return found
 
 
