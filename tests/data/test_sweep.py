@@ -332,6 +332,8 @@ def command(*arguments: object) -> tuple[int, str, str]:
 
 def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.delitem(sys.modules, "mine", raising=False)  # another test's, and so may be what is found first on the path
+    monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "mine.py").write_text("def tops(world):\n    return {'top': float(world.position[:, 1].max())}\n")
     run = ("sweep", "run", "box", "--vary", "friction=0,0.5", "--vary", "seed=1:3", "--set", "particles=8", "--seconds", "0.05")
     code, text, _ = command(*run, "--measure", "mine:tops", "--out", "study", "--processes", "1")
