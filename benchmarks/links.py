@@ -7,10 +7,8 @@ The others take smaller steps too, for what they stretch depends on that.
 
 from __future__ import annotations
 
-import csv
-import json
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -19,6 +17,7 @@ import numpy as np
 import pyverlet as pv
 from benchmarks.engines import DT, GRAVITY, Array
 from benchmarks.own import times_in_turn
+from benchmarks.tables import write
 
 SETTLE_FRAMES = 300
 FRAMES = 20
@@ -272,9 +271,4 @@ def main(path: Path | None) -> None:
                 f"{row.stretch_mean:>14.4%}{row.stretch_max:>10.3%}"
             )
             rows.append(row)
-    if path:
-        with path.open("w", newline="") as file:
-            writer = csv.DictWriter(file, list(asdict(rows[0])))
-            writer.writeheader()
-            writer.writerows(asdict(row) for row in rows)
-        path.with_suffix(".json").write_text(json.dumps([asdict(row) for row in rows], indent=1))
+    write(rows, path)

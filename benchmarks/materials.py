@@ -6,10 +6,8 @@ moods hit them alike. A ratio is that of the quartiles of the faster frames. Ove
 
 from __future__ import annotations
 
-import csv
-import json
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +16,7 @@ import numpy as np
 import pyverlet as pv
 from benchmarks.engines import DT, RADIUS, Array, Box2D, Engine, Pymunk
 from benchmarks.own import times_in_turn
+from benchmarks.tables import write
 
 SETTLE_SECONDS = 10.0
 """Each material is given so long to come to terms with the heap in its own way."""
@@ -202,9 +201,4 @@ def main(particles: int, path: Path | None) -> None:
                 f"{row.world:<40}{row.ms_per_frame:>9.2f}{row.ratio:>8.1f}{row.asked:>8.1f}{row.overlap_mean:>10.3%}{row.overlap_max:>8.1%}"
             )
             rows.append(row)
-    if path:
-        with path.open("w", newline="") as file:
-            writer = csv.DictWriter(file, list(asdict(rows[0])))
-            writer.writeheader()
-            writer.writerows(asdict(row) for row in rows)
-        path.with_suffix(".json").write_text(json.dumps([asdict(row) for row in rows], indent=1))
+    write(rows, path)

@@ -108,10 +108,6 @@ class BroadPhase(ABC):
     def follow(self, state: Slots) -> None:
         """A frame begins in a periodic room: places are to be those images that the list is about."""
 
-    def lasts(self) -> tuple[Any, ...] | None:
-        """What `update` depends on, if as long as it does nothing it is but calls of kernels; None: there is more to it."""
-        return None
-
     def aged(self, substeps: int) -> None:
         """So many have gone by in which `update` would have done nothing."""
 
@@ -215,9 +211,6 @@ class _SortedCells(BroadPhase):
             if self.renewing:
                 self.renewing(state, self.list)
         self.rebuild(state)
-
-    def lasts(self) -> tuple[Any, ...] | None:
-        return (self, self.rebuilds, id(self._checked)) if self._allowed >= 0 else None
 
     def aged(self, substeps: int) -> None:
         self._age += substeps
