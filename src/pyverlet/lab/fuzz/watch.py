@@ -183,7 +183,7 @@ def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str]
     if about_energy in made and not (world.actors or touched) and undriven(world, h, world._h_last) and _uniform(world):
         looks.append(_energy(about_energy, world, frame))
     if "momentum" in made and not world.actors and _alone(world):
-        looks.append(_momentum(world, frame))
+        looks.append(_momentum(world, frame, dt))
     try:
         world.step(dt)
     except NonFiniteError as error:
@@ -241,7 +241,7 @@ def _alone(world: World) -> bool:
     return not (held or any(world.gravity) or world.forces or world.obstacles) and isinstance(world.boundary, Open)
 
 
-def _momentum(world: World, frame: int) -> Callable[[], None]:
+def _momentum(world: World, frame: int, dt: float) -> Callable[[], None]:
     before = world.momentum()
     eps = float(np.finfo(world.dtype).eps)
 
@@ -252,7 +252,8 @@ def _momentum(world: World, frame: int) -> Callable[[], None]:
 
     def look() -> None:
         change = float(np.hypot(*(world.momentum() - before)))
-        allowed = _MOMENTUM * eps * world.substeps * max(moved, size())
+        pulled = dt * sum(float(np.abs(link.force).sum(dtype=float)) for link in world.links)  # N s, which are rounded too
+        allowed = _MOMENTUM * eps * world.substeps * max(moved + pulled, size())
         if change > allowed:
             raise Broken("momentum", frame, f"changed by {change:.3g} N s, rounding explains {allowed:.3g}")
 

@@ -61,7 +61,8 @@ def undriven_scenes() -> dict[str, Callable[..., World]]:
     found: dict[str, Callable[..., World]] = {}
     for name, scene in scenes.SCENES.items():
         world = scene.world(particles=min(scene.defaults.particles, 20))
-        driven = any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
+        turns = isinstance(world.boundary, Circle) and world.boundary.angular_velocity != 0.0
+        driven = turns or any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
         honest = not isinstance(world.boundary, Naive) and world.integrator.symplectic
         if honest and not driven and all(isinstance(force, Conservative) for force in world.forces):
             found[name] = partial(scene.world, particles=min(scene.defaults.particles, 400))
