@@ -150,7 +150,12 @@ def test_no_clock_that_can_be_set_times_the_page() -> None:
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
 def test_a_closed_terminal_ends_a_run(name: str) -> None:
     command = [sys.executable, "-m", "pyverlet", "run", "cage", "--particles", "100", "--seconds", "100000"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    ignored = signal.signal(getattr(signal, name), signal.SIG_DFL)  # as under `nohup`, which children would inherit
+    try:
+        started = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    finally:
+        signal.signal(getattr(signal, name), ignored)
+    with started as process:
         assert process.stderr
         process.stderr.readline()  # it is running
         process.send_signal(getattr(signal, name))
