@@ -153,7 +153,7 @@ class Slots:
         start: (n, 2) positions before the integration of this substep, m; empty unless circles rub each other, or meet obstacles.
         turn, lift: empty unless circles rub each other: (n,) rad by which each turns in this substep, and (n,) s; times -a that
             is the velocity with which circles at rest against others end a substep, for others 0.
-        along: (n, 2) m/s^2, the acceleration left to circles that an obstacle holds, for others 0; empty without obstacles.
+        along: (n, 2) m/s^2, the acceleration left to circles that an obstacle or a smooth wall holds, for others 0; or empty.
         drop: a circle at rest falls drop * a h^2 in a substep of h seconds; depends on the integrator.
         fed: (n,) bits: CARRIES where a contact at rest fed the velocity in the last substep, AT_WALL where a wall was touched
             in it, CARRIED and WAS_AT_WALL the same in the one before. Kept only if circles bounce.
