@@ -44,8 +44,8 @@ _CLOSED = 1e-6
 _FALL_S = 1.0
 """s: without walls the scale of the energy is that of a fall of a second."""
 
-_MOMENTUM = 32.0
-"""Rounding errors of each velocity in a substep: two for each pair a circle is in, and it is in six, two sweeps and a few."""
+_MOMENTUM = 64.0
+"""Rounding errors of each velocity in a substep: two for each pair a circle is in, and it is in six, four sweeps and a few."""
 
 _EASED = 60
 """Frames until what overlapped more deeply in longer steps has come apart."""
@@ -194,7 +194,7 @@ def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str]
     driven = world.actors or touched or unsettled or pinned_move(world._state) or not undriven(world, h, world._h_last)
     if about_energy in made and not driven and _uniform(world):
         looks.append(_energy(about_energy, world, frame))
-    if "momentum" in made and not world.actors and _alone(world):
+    if "momentum" in made and not (world.actors or (touched and world.links)) and _alone(world):
         looks.append(_momentum(world, frame, dt))
     try:
         world.step(dt)
