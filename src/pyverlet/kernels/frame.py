@@ -7,7 +7,7 @@ stages in `world.profile`. A frame is compiled for a kind of room: `frames` has 
 
 from __future__ import annotations
 
-from pyverlet.compile.bundle import fields
+from pyverlet.compile.bundle import borrowed, fields
 from pyverlet.compile.clock import note
 from pyverlet.compile.jit import driver, parallel_kernel, prange, variant
 from pyverlet.compile.lanes import copy_row
@@ -80,12 +80,12 @@ def four_walls(room, circles, law, claims):
 
 def _project(circles, pairs, law, cut, looks, sets_out, claims):
     """The first sweep over the pairs, called from Python, which has plain tuples."""
-    push(Circles(*circles), Pairs(*pairs), Law(*law), cut, looks, sets_out, claims)
+    push(Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Law(*law), cut, looks, sets_out, claims)
 
 
 def _still(circles, pairs, law, cut, marks, claims):
     """The second one."""
-    relax(Circles(*circles), Pairs(*pairs), Law(*law), cut, marks, claims)
+    relax(Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Law(*law), cut, marks, claims)
 
 
 def _substeps(substep, stop, last, circles, pairs, law, room, cut, looks, sets_out, checked, far, claims, spent, clock):
@@ -96,7 +96,7 @@ def _substeps(substep, stop, last, circles, pairs, law, room, cut, looks, sets_o
 
     Returns the substep that is next, and whether it has been integrated and the list of pairs needs a look.
     """
-    circles, pairs, law = Circles(*circles), Pairs(*pairs), Law(*law)
+    circles, pairs, law = Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Law(*law)
     while True:
         push(circles, pairs, law, cut, looks, sets_out, claims)
         note(spent, CONTACTS, clock[0], clock[1])
