@@ -11,7 +11,8 @@ from pyverlet.compile.bundle import borrowed, fields
 from pyverlet.compile.clock import note
 from pyverlet.compile.jit import driver, parallel_kernel, prange, variant
 from pyverlet.compile.lanes import copy_row
-from pyverlet.kernels.bounds import box, circle
+from pyverlet.kernels.bounds import box
+from pyverlet.kernels.cage import confine as confine_in_cage
 from pyverlet.kernels.cage import hold
 from pyverlet.kernels.kinds import for_each_kind
 from pyverlet.kernels.motion import leap
@@ -58,7 +59,7 @@ def smooth_cage(room, circles, law, claims):
 @driver
 def cage(room, circles, law, claims):
     """(x, y, radius, e, mu) of a round room."""
-    circle(
+    confine_in_cage(
         room[0], room[1], room[2], circles.position, circles.velocity, circles.acceleration, circles.spin, circles.radius,
         circles.inverse_mass, circles.restitution, circles.friction, circles.fed, circles.resting, circles.hits, circles.spent,
         circles.start, circles.turn, circles.lift, law.h, law.lag, room[3], room[4], law.rest_speed,
