@@ -53,8 +53,8 @@ def _impact_time(dx, dy, vx, vy, ax, ay, reach, zero, half, h):
 
 @kernel
 def _wall(dx, dy, ux, uy, ax, ay, room, rest_speed, zero, half, h):
-    """Of circles at (dx, dy) from the centre, with the velocity (ux, uy): the wall's normal (2), their depth, and whether they hit
-    it faster than one that rests on it, not 0: then it is the tangent where they hit.
+    """Of circles at (dx, dy) from the centre, with the velocity (ux, uy): the wall's normal (2), their depth, and whether they
+    hit it faster than one that rests on it, not 0: then it is the tangent where they hit.
     """
     distance = square_root(dx * dx + dy * dy)
     nx, ny, depth = (zero - dx) / distance, (zero - dy) / distance, distance - room
