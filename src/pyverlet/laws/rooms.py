@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.constants import STANDS_OUT
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import bounds, frame, meetings
+from pyverlet.kernels import bounds, cage, frame, meetings
 from pyverlet.kernels.motion import ON_WALL
 from pyverlet.laws.turning import surface
 from pyverlet.state.moves import bodies
@@ -185,7 +185,7 @@ class Circle(_Walls):
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         speed = self.angular_velocity * self.radius
         with surface(state, speed, h) if self.moves else nullcontext():
-            self._confine(bounds.circle, (*self.center, self.radius), state, h, lag, rest_speed)
+            self._confine(cage.confine, (*self.center, self.radius), state, h, lag, rest_speed)
 
     def facing(self, position: Array) -> tuple[Array, Array]:
         way = self.center - position.astype(np.float64)
