@@ -162,6 +162,7 @@ def test_scripts_need_no_guard(tmp_path: Path) -> None:
     assert (run.returncode, run.stdout.strip(), run.stderr) == (0, "(4, 5, 2)", "")
 
 
+@pytest.mark.slow
 def test_the_vector_env_of_the_examples() -> None:
     pytest.importorskip("gymnasium")
     made = runpy.run_path(str(EXAMPLES / "gym_vector_env.py"))

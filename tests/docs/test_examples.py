@@ -26,7 +26,10 @@ def blocks(page: Path, language: str) -> list[tuple[int, str]]:
 
 
 # Commands that take long for what others show too.
-SLOW = ("pyverlet bench --particles 20000", "pyverlet record galton ", "pyverlet record image image.png ")
+SLOW = (
+    "pyverlet bench --particles 20000", "pyverlet record galton ", "pyverlet record image image.png ", "pyverlet check fuzz ",
+    "pyverlet order",
+)  # fmt: skip
 
 
 def commands() -> list[str]:
