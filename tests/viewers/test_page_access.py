@@ -12,8 +12,8 @@ from .browser import Serve, number, visit
 SIZES = [(1280, 800), (320, 640)]
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-@pytest.mark.parametrize("size", SIZES, ids=["wide", "phone"])
+@pytest.mark.parametrize("theme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("size", [SIZES[0], pytest.param(SIZES[1], marks=pytest.mark.slow)], ids=["wide", "phone"])
 def test_axe_finds_nothing(page: Page, program: Serve, size: tuple[int, int], theme: str) -> None:
     if importlib.util.find_spec("axe_playwright_python") is None:
         pytest.skip("axe-playwright-python is not installed")
@@ -26,6 +26,7 @@ def test_axe_finds_nothing(page: Page, program: Serve, size: tuple[int, int], th
     assert [(each["id"], each["impact"], [node["html"][:80] for node in each["nodes"]]) for each in found] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", SIZES, ids=["wide", "phone"])
 def test_all_of_it_is_within_reach(page: Page, program: Serve, size: tuple[int, int]) -> None:
     page.set_viewport_size({"width": size[0], "height": size[1]})
