@@ -155,7 +155,7 @@ FEATURES = (rubbing, told, sleeping, uneven, pouring, linked, crowded)
 def test_all_that_is_remembered_is_kept(tmp_path: Path) -> None:
     expected: dict[str, str] = {}
     for make in FEATURES:
-        expected |= follow(make.__name__, make(), tmp_path, frames=141, every=70)
+        expected |= follow(make.__name__, make(), tmp_path, frames=71, every=70)
     check(expected, 2)
 
 

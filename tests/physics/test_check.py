@@ -24,7 +24,7 @@ BROKEN: dict[str, str] = {}
 # Settings at which a check takes a fraction of the processor time, where it takes one to thirty seconds as it is.
 SMALLER: dict[str, dict[str, Any]] = {
     "repose": {"heaps": 2, "particles": 200, "frictions": (0.0, 0.5)},
-    "energy-scenes": {"seconds": 0.5},
+    "energy-scenes": {"seconds": 0.5, "counts": (1, 8)},
     "energy-gas": {"seconds": 1},
     "energy-overlapped": {"seconds": 0.5},
     "energy-coincident": {"seconds": 0.5},

@@ -178,6 +178,7 @@ def test_a_closed_terminal_ends_a_run(name: str) -> None:
 
 
 @posix
+@pytest.mark.slow
 def test_killed_while_recording_what_was_recorded_plays(tmp_path: Path) -> None:
     av = pytest.importorskip("av")
     command = [sys.executable, "-m", "pyverlet", "record", "cage", "a.mp4", "--particles", "100", "--seconds", "10000",

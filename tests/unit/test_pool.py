@@ -80,7 +80,8 @@ print(world(2500))
     assert told[0] == told[1]
 
 
-@pytest.mark.parametrize("method", ["fork", pytest.param("spawn", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["spawn", "fork"])
 def test_processes_of_multiprocessing(method: str, tmp_path: Path) -> None:
     if sys.platform == "win32" and method == "fork":
         pytest.skip("no fork here")
