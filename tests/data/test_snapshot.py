@@ -162,7 +162,7 @@ def test_all_that_is_remembered_is_kept(tmp_path: Path) -> None:
 @pytest.mark.parametrize("make", FEATURES)
 def test_what_a_world_says_of_itself_is_kept(make: Callable[[], pv.World], tmp_path: Path) -> None:
     world = make()
-    world.run(seconds=1.5)
+    world.run(seconds=0.7)
     pv.save(world, tmp_path / "a.pvsnap")
     again = pv.load(tmp_path / "a.pvsnap", exact=True)
     for each in (world, again):

@@ -33,6 +33,7 @@ SMALLER: dict[str, dict[str, Any]] = {
     "masses": {"particles": 150},
     "radii": {"particles": 150},
     "radii-masses": {"particles": 150},
+    "heavy-on-rough-bed": {"particles": 700, "seconds": 8},
     "heavy-on-smooth-bed": {"particles": 700, "seconds": 8},
     "ball-in-box": {"steps": 20_000},
 }

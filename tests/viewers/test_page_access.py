@@ -12,8 +12,9 @@ from .browser import Serve, number, visit
 SIZES = [(1280, 800), (320, 640)]
 
 
-@pytest.mark.parametrize("theme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("size", [SIZES[0], pytest.param(SIZES[1], marks=pytest.mark.slow)], ids=["wide", "phone"])
+@pytest.mark.slow
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("size", SIZES, ids=["wide", "phone"])
 def test_axe_finds_nothing(page: Page, program: Serve, size: tuple[int, int], theme: str) -> None:
     if importlib.util.find_spec("axe_playwright_python") is None:
         pytest.skip("axe-playwright-python is not installed")
