@@ -167,7 +167,7 @@ class Obstacles(list[Obstacle]):
 
     def extend(self, obstacles: Iterable[Obstacle]) -> None:
         """Add several; InputError as `append`."""
-        given = list(obstacles)
+        given: list[Any] = list(obstacles)
         for obstacle in given:
             if not isinstance(obstacle, Obstacle):
                 allowed = "allowed is an object such as pyverlet.Disc((0, 0), 1) or pyverlet.Segment((0, 0), (1, 0))"
