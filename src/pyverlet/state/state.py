@@ -148,7 +148,7 @@ class Slots:
         most_restitution, most_friction: the largest of their columns; negative if no circle has values of its own.
         given: how often what users set was taken up anew.
         size: (n,) grown * radius, m: what contacts between particles take as the radius.
-        inverse_mass: (n,) 1/kg; 0 for a pinned particle. total_mass: of all others, kg.
+        inverse_mass: (n,) 1/kg; 0 for a pinned particle: whether one `pins`. total_mass: of others, kg.
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
         start: (n, 2) positions before the integration of this substep, m; empty unless circles rub each other, or meet obstacles.
         turn, lift: empty unless circles rub each other: (n,) rad by which each turns in this substep, and (n,) s; times -a that
@@ -173,7 +173,7 @@ class Slots:
         self.real = lru_cache(64)(dtype.type)
         self.reals = lru_cache(64)(lambda *numbers: tuple(map(dtype.type, numbers)))
         self._kept: dict[str, Array] = {}
-        self.drop, self.lean, self.total_mass, self.taken, self.worked, self.given = 1.0, 0.0, 0.0, 0.0, 0.0, 0
+        self.drop, self.lean, self.total_mass, self.pins, self.taken, self.worked, self.given = 1.0, 0.0, 0.0, False, 0.0, 0.0, 0
         self.h = 0.0
         self.claims = Claims()
         self._resize(0)
@@ -277,7 +277,8 @@ class Slots:
         with np.errstate(divide="ignore"):  # a mass of 0 is refused by the world, with a sentence
             np.divide(1, self.mass, out=self.inverse_mass)
         self.inverse_mass[self.asleep] = 0
-        self.total_mass = float(self.mass.sum(dtype=float, where=np.isfinite(self.mass)))
+        self.total_mass = float(self.mass.sum(dtype=float, where=(free := np.isfinite(self.mass))))
+        self.pins = not free.all()
 
     def _keep(self, slots: Any) -> None:
         """Remember what outlives a change of size, of these slots."""
