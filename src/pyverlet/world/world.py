@@ -162,7 +162,7 @@ class World(Measures, Queries, Doors):
                 contacts.still(state, h)
             done("velocities")
             if links:
-                links.after(state)
+                links.after(state, h)
                 done("links")
             substep += 1
         self._finish(contacts, watch, h, marked=run.marked)
