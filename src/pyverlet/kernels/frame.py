@@ -11,12 +11,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyverlet.compile.bundle import fields
+from pyverlet.compile.bundle import borrowed, fields
 from pyverlet.compile.clock import note
 from pyverlet.compile.jit import driver, kernel, parallel_kernel, prange, variant
 from pyverlet.compile.lanes import copy_row
 from pyverlet.ground.constants import CARRIED_WEIGHT, REST_ACCELERATIONS
-from pyverlet.kernels.bounds import box, circle
+from pyverlet.kernels.bounds import box
+from pyverlet.kernels.cage import confine as confine_in_cage
 from pyverlet.kernels.cage import hold
 from pyverlet.kernels.drive import drive
 from pyverlet.kernels.kinds import for_each_kind
@@ -100,7 +101,7 @@ def smooth_cage(room, circles, law, claims):
 @driver
 def cage(room, circles, law, claims):
     """(x, y, radius, e, mu) of a round room."""
-    circle(
+    confine_in_cage(
         room[0], room[1], room[2], circles.position, circles.velocity, circles.acceleration, circles.spin, circles.radius,
         circles.inverse_mass, circles.restitution, circles.friction, circles.fed, circles.resting, circles.hits, circles.spent,
         circles.start, circles.turn, circles.lift, law.h, law.lag, room[3], room[4], law.rest_speed,
@@ -122,12 +123,12 @@ def four_walls(room, circles, law, claims):
 
 def _project(circles, pairs, law, cut, looks, sets_out, claims):
     """The first sweep over the pairs, called from Python, which has plain tuples."""
-    push(Circles(*circles), Pairs(*pairs), Law(*law), cut, looks, sets_out, claims)
+    push(Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Law(*law), cut, looks, sets_out, claims)
 
 
 def _still(circles, pairs, law, cut, marks, claims):
     """The second one."""
-    relax(Circles(*circles), Pairs(*pairs), Law(*law), cut, marks, claims)
+    relax(Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Law(*law), cut, marks, claims)
 
 
 def _substeps(
@@ -142,7 +143,7 @@ def _substeps(
     Returns the substep that is next, whether it has been integrated and the list of pairs needs a look, and if so under what
     largest acceleration, m/s^2.
     """
-    circles, pairs, law = Circles(*circles), Pairs(*pairs), Law(*law)
+    circles, pairs, law = Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Law(*law)
     strongest, begins = law.h - law.h, law.rubs != 0
     if SERVED:
         services = Services(*services)

@@ -132,12 +132,11 @@ class Watch:
         part = np.minimum(_ratio(left, add(lift)), 1)[cluster]
         strength = np.hypot(*pull.T)
         drop = part * np.minimum(_ratio(lift, strength), np.hypot(*moved.T))  # who is near where a spring pulls to feels little
-        lower = slots.position + (_ratio(drop, strength)[:, None] * pull).astype(slots.dtype)
-        stays = self._within_room(lower, slots.size)  # a strong pull may lead through a wall
-        slots.position[stays] = lower[stays]
+        lower = slots.position + _ratio(drop, strength)[:, None] * pull
         if slots.size is not slots.radius:
             slots.grown -= (part * (slots.grown - start.grown[order])).astype(slots.dtype)
             slots.resize()
+        slots.position[:] = self._within_room(slots.position.astype(float), lower, slots.size)
 
     def _pushed(self, slots: Slots, mass: Array, add: _Sums) -> Array:
         """(n,) bool, clusters whose momentum has changed in this frame by more than rounding does."""
@@ -160,11 +159,15 @@ class Watch:
         slots.position = now
         return pulls[0], pulls[1]
 
-    def _within_room(self, position: Array, radius: Array) -> Array:
-        """(n,) bool, who would not reach beyond a wall there."""
-        faced = self._room.facing(position)
-        outside = self._room.outside(position.astype(float)) if faced is None else (faced[0] < radius[:, None]).any(axis=1)
-        return np.asarray(~outside)
+    def _within_room(self, here: Array, lower: Array, radius: Array) -> Array:
+        """(n, 2) m, `lower` or as far that way as walls let circles go: a strong pull may lead through one."""
+        faced = self._room.facing(lower)
+        if faced is None:
+            return np.where(self._room.outside(lower)[:, None], here, lower)
+        was, _ = self._room.facing(here) or faced
+        for before, gap, normal in zip(was.T, faced[0].T, faced[1].swapaxes(0, 1), strict=True):
+            lower = lower + np.maximum(np.minimum(radius, before) - gap, 0)[:, None] * normal
+        return lower
 
     def _was_inside(self) -> Array:
         """(n,) bool, who was above the wall when the frame began, in the user's order."""
