@@ -21,6 +21,11 @@ H = 1 / 480
 CHANGED = ("position", "velocity", "resting", "hits")
 
 
+def note_turn(slots: Slots) -> None:
+    """Circles rub each other: `turn` is what their spin makes it, nobody's `lift` is known yet."""
+    slots.turn, slots.lift = slots.spin * slots.real(H), np.zeros_like(slots.spin)
+
+
 def crowd(seed: int, n: int, speed: float, dtype: Any) -> Slots:
     """Circles in and around a cage of radius 10 m about (1, 2), some of them pinned, some faster than a room width a substep."""
     rng = np.random.default_rng(seed)
@@ -96,7 +101,7 @@ def test_so_are_circles_of_any_material(
         slots.friction[:] = rng.choice([-1.0, 0.0, 0.7], n)
         slots.fed[:] = rng.integers(0, 16, n)
         if rubs:
-            slots.note_turn(H)
+            note_turn(slots)
             slots.note_start()
             slots.start += rng.normal(0, 0.01, (n, 2)).astype(dtype)
             slots.lift[:] = rng.choice([0.0, 1e-3], n)
@@ -128,7 +133,7 @@ def test_circles_that_bounce_or_rub_do_so(change: str) -> None:
     if change == "bouncy circle":
         slots.restitution[:] = slots.most_restitution = 0.5
     if change == "circles that rub":
-        slots.note_turn(H)
+        note_turn(slots)
         slots.lift[:] = 0.1
     smooth = crowd(0, 100, 3.0, np.float64)
     cage.confine(slots, H, 0.0, 0.08)

@@ -292,13 +292,6 @@ class Slots:
             self.start = np.empty_like(self.position)
         self.start[:] = self.position
 
-    def note_turn(self, h: float) -> None:
-        """Circles rub each other in a substep of h seconds: `turn` is what their spin makes it, nobody's `lift` is known yet."""
-        self.turn = self.spin * self.real(h)
-        if len(self.lift) != len(self):
-            self.lift = np.empty_like(self.spin)
-        self.lift.fill(0)
-
     def keep_account(self) -> None:
         """From now on walls are to note what they take."""
         self.spent = self.spent if len(self.spent) == len(self) else np.zeros((len(self), 2))
