@@ -66,8 +66,8 @@ def worlds(most: int) -> dict[str, pv.World]:
     return found
 
 
-def check(expected: dict[str, str]) -> None:
-    for threads in (1, 2):
+def check(expected: dict[str, str], *numbers: int) -> None:
+    for threads in numbers:
         assert in_another_process(list(expected), threads) == expected, f"{threads} threads"
 
 
@@ -76,7 +76,7 @@ def test_every_scene_goes_on_with_the_same_bits(tmp_path: Path) -> None:
     for name, world in worlds(60).items():
         expected |= follow(name, world, tmp_path, frames=31, every=30)
     assert len(expected) > 2 * len(pv.scenes.SCENES)
-    check(expected)
+    check(expected, 2)  # worlds this small have had one
 
 
 @pytest.mark.full
@@ -84,7 +84,7 @@ def test_every_scene_goes_on_with_the_same_bits_from_every_tenth_frame(tmp_path:
     expected: dict[str, str] = {}
     for name, world in worlds(3000).items():
         expected |= follow(name, world, tmp_path, frames=200, every=10)
-    check(expected)
+    check(expected, 1, 2)
 
 
 # ---- features ----------------------------------------------------------------------------------------------------------
@@ -155,14 +155,14 @@ FEATURES = (rubbing, told, sleeping, uneven, pouring, linked, crowded)
 def test_all_that_is_remembered_is_kept(tmp_path: Path) -> None:
     expected: dict[str, str] = {}
     for make in FEATURES:
-        expected |= follow(make.__name__, make(), tmp_path, frames=141, every=70)
-    check(expected)
+        expected |= follow(make.__name__, make(), tmp_path, frames=71, every=70)
+    check(expected, 2)
 
 
 @pytest.mark.parametrize("make", FEATURES)
 def test_what_a_world_says_of_itself_is_kept(make: Callable[[], pv.World], tmp_path: Path) -> None:
     world = make()
-    world.run(seconds=1.5)
+    world.run(seconds=0.7)
     pv.save(world, tmp_path / "a.pvsnap")
     again = pv.load(tmp_path / "a.pvsnap", exact=True)
     for each in (world, again):

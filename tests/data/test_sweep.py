@@ -151,6 +151,7 @@ test_sweep.small(test_sweep.Path(sys.argv[1]), {"friction": [0.0, 0.4], "seed": 
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 def test_killed_and_started_again_it_comes_to_the_same(tmp_path: Path) -> None:
     grid, whole, cut = {"friction": [0.0, 0.4], "seed": range(50)}, tmp_path / "whole", tmp_path / "cut"
@@ -187,6 +188,7 @@ def process(world: pv.World) -> int:
     return os.getpid()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 def test_processes_end_with_a_coordinator_that_is_killed(tmp_path: Path) -> None:
     script = tmp_path / "orphaned.py"
