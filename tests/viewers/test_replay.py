@@ -282,6 +282,6 @@ def test_a_sketch_answers_as_it_did(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     panels = scene.panels(integrators=(pv.RK4(), pv.Yoshida4()))
     with (
         Journal(tmp_path / "b.pvlog", dt=DT) as journal,
-        pytest.raises(pv.InputError, match="2 worlds of kicks.py side by side"),
+        pytest.raises(pv.InputError, match=r"2 worlds of kicks.py side by side"),
     ):
         journal.stage(Exhibit("kicks", panels, answers=scene.sketch))
