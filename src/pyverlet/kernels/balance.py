@@ -68,7 +68,8 @@ def note_walls(velocity, unpushed, inverse_mass, touched, root, sums, held):
     velocity: (n, 2) m/s, now. unpushed: the same before walls. held[i] becomes 1 if walls have pushed the cluster of i.
     """
     for i in range(root.shape[0]):
-        sums[i, _XX], sums[i, _XY], sums[i, _YY] = 0.0, 0.0, 0.0
+        if root[i] == i:
+            sums[i, _XX], sums[i, _XY], sums[i, _YY] = 0.0, 0.0, 0.0
     for i in range(root.shape[0]):
         dx, dy = velocity[i, 0] - unpushed[i, 0], velocity[i, 1] - unpushed[i, 1]
         if touched[i] and (dx != 0 or dy != 0 or touched[i] & PINNED) and inverse_mass[i] > 0:

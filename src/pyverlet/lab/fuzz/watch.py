@@ -44,8 +44,8 @@ _CLOSED = 1e-6
 _FALL_S = 1.0
 """s: without walls the scale of the energy is that of a fall of a second."""
 
-_MOMENTUM = 64.0
-"""Rounding errors of each velocity in a substep: two for each pair a circle is in, and it is in six, four sweeps and a few."""
+_MOMENTUM = 16.0
+"""Rounding errors of each velocity in a substep: one for each pair a circle is in, and it is in six, two sweeps and a few."""
 
 _EASED = 60
 """Frames until what overlapped more deeply in longer steps has come apart."""
@@ -184,17 +184,18 @@ def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str]
     holds more energy when steps become shorter, until it is gone.
     """
     before_deed = (world.version, world.substeps)
-    energy_then = world.energy().total
+    energy_then, linked = world.energy().total, bool(world.links)
     deed(world, frame)
     looks: list[Callable[[], None]] = []
     touched = before_deed != (world.version, world.substeps) or energy_then != world.energy().total
+    touched |= bool(linked and not world.links)
     touched |= frame == 0 and len(world.obstacles) > 0  # which lift whoever starts inside them
     h = dt / world.substeps
     about_energy = "links" if world.links else "energy"
     driven = world.actors or touched or unsettled or pinned_move(world._state) or not undriven(world, h, world._h_last)
     if about_energy in made and not driven and _uniform(world):
         looks.append(_energy(about_energy, world, frame))
-    if "momentum" in made and not (world.actors or (touched and world.links)) and _alone(world):
+    if "momentum" in made and not (world.actors or (touched and linked)) and _alone(world):
         looks.append(_momentum(world, frame, dt))
     try:
         world.step(dt)
@@ -281,8 +282,9 @@ def _momentum(world: World, frame: int, dt: float) -> Callable[[], None]:
         allowed = _MOMENTUM * eps * world.substeps * max(moved + pulled, pushed, size(world.velocity))
         far = float(np.abs(start).max(initial=0.0))
         allowed += float(np.finfo(float).eps) * far * mass.sum() / h  # sums are made in float64
-        if world.links:  # velocities follow from places, and those are rounded: of the heaviest by m eps |x|
-            allowed += eps * far * float(mass.max(initial=0.0)) / h
+        # Pushes and links look at places, and those are rounded: of the heaviest by m eps |x|.
+        allowed += eps * far * float(mass.max(initial=0.0)) / h
+        if world.links:
             # Of who touches another, half a substep of what links do is not shown, and of whom they hold to it, it is.
             allowed += h / dt * pulled if world.collisions else 0.0
         if change > allowed:
