@@ -157,6 +157,7 @@ print(many.position.shape)
 """
 
 
+@pytest.mark.slow
 def test_scripts_need_no_guard(tmp_path: Path) -> None:
     (tmp_path / "script.py").write_text(SCRIPT)
     run = subprocess.run([sys.executable, "script.py"], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)

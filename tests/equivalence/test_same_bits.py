@@ -64,7 +64,10 @@ def falling_heap(**options: Any) -> pv.World:
     return world
 
 
-@pytest.mark.parametrize(("restitution", "friction"), [(0.0, 0.0), (0.5, 0.0), (0.0, 0.3), (0.5, 0.3)])
+@pytest.mark.parametrize(
+    ("restitution", "friction"),
+    [(0.0, 0.0), (0.5, 0.3), *(pytest.param(*each, marks=pytest.mark.slow) for each in ((0.5, 0.0), (0.0, 0.3)))],
+)
 @pytest.mark.parametrize("name", pv.integrators.BY_NAME)
 def test_restore_continues_with_the_same_bits(name: str, restitution: float, friction: float) -> None:
     collisions = pv.Collisions(restitution=restitution, friction=friction)

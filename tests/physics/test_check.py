@@ -39,8 +39,12 @@ SMALLER: dict[str, dict[str, Any]] = {
 }
 
 
+# Dear ones of which another shows the same at one number of substeps.
+DEAR = ("rebound-substeps",)
+
+
 def parameters() -> list[Any]:
-    marks: dict[str, Any] = dict.fromkeys(SMALLER, pytest.mark.slow)
+    marks: dict[str, Any] = dict.fromkeys((*SMALLER, *DEAR), pytest.mark.slow)
     marks |= {name: pytest.mark.xfail(strict=True, reason=f"{name}: {reason}") for name, reason in BROKEN.items()}
     return [pytest.param(check, id=check.name, marks=marks.get(check.name, ())) for check in physics.CHECKS]
 

@@ -139,7 +139,7 @@ def beyond(world: pv.World) -> float:
     return float(((np.maximum(low, high).max(axis=1) + r) / r).max())
 
 
-@pytest.mark.parametrize("e", [0.0, 1.0])
+@pytest.mark.parametrize("e", [0.0, pytest.param(1.0, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("room", [pv.Box((-5, -5), (5, 5)), pv.Circle(radius=5)])
 def test_obstacles_that_move_push_nobody_through_the_wall(room: pv.Boundary, e: float) -> None:
     world = pv.World(boundary=room, collisions=pv.Collisions(restitution=e), threads=1)

@@ -48,6 +48,7 @@ def test_a_pyramid_stands_above_tan_15_degrees(name: str, substeps: int) -> None
 
 
 @pytest.mark.parametrize("method", [pv.Fast(skin=0.0), pv.BruteForce()])
+@pytest.mark.slow
 def test_a_pyramid_stands_while_the_list_is_made_anew(method: pv.Fast | pv.BruteForce) -> None:
     world, circles = pyramid(1.1 * LIMIT, method=method)
     start = circles.position.astype(float)

@@ -123,12 +123,14 @@ def test_first_starts_at_once(count: int, tmp_path: Path) -> None:
     assert {out.strip() for out, _ in told} == {SAID}
 
 
+@pytest.mark.slow
 def test_no_shared_memory_is_needed(tmp_path: Path) -> None:
     # As if /dev/shm was not there: whatever asks for it fails.
     code = "import multiprocessing.synchronize as s\ndef no(*a, **k): raise OSError(38, 'no')\ns.SemLock.__init__ = no\ncall()"
     assert said(code, tmp_path) == SAID
 
 
+@pytest.mark.slow
 def test_one_core(tmp_path: Path) -> None:
     code = "import pyverlet as pv; call(); world = pv.World(); world.add(position=np.zeros((20000, 2))); print(world.threads)"
     assert said(code, tmp_path, NUMBA_NUM_THREADS="1").split() == [*SAID.split(), "1"]

@@ -102,6 +102,7 @@ if __name__ == "__main__":
     assert done.stdout.strip() == "True", done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(jit.max_threads() < 2, reason="one core")
 def test_beside_threads_of_numpy_and_of_the_users_own_kernels() -> None:
     told = run("""

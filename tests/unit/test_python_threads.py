@@ -69,7 +69,8 @@ def test_each_thread_may_compile_the_first_kernels(layer: str, tmp_path: Path) -
     assert run.returncode == 0, run.stderr
 
 
-@pytest.mark.parametrize("layer", ["default", pytest.param("workqueue", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("layer", ["default", "workqueue"])
 def test_each_thread_may_step_its_first_world(layer: str) -> None:
     env = {**os.environ, "NUMBA_THREADING_LAYER": layer, "NUMBA_NUM_THREADS": "2"}
     run = subprocess.run([sys.executable, "-c", FIRST_WORLDS], env=env, capture_output=True, text=True)

@@ -238,6 +238,7 @@ def test_circles_are_added_one_by_one_and_poured(page: Page, program: Serve) -> 
     assert reads(page, "particles", 100)
 
 
+@pytest.mark.slow
 def test_circles_are_erased_and_come_back(page: Page, program: Serve) -> None:
     visit(page, program("cage", 100).address)
     pause(page)
@@ -450,6 +451,7 @@ def test_curves_and_stages(page: Page, program: Serve) -> None:
     assert page.evaluate(drawn, "energy-chart") > 3
 
 
+@pytest.mark.slow
 def test_a_phone_has_a_drawer_and_fingers(playwright: Playwright, program: Serve) -> None:
     browser = playwright.chromium.launch(executable_path=chromium(), args=FLAGS)
     context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True, device_scale_factor=2)

@@ -125,6 +125,7 @@ def has(page: Page, count: int) -> bool:
     return comes_true(page, lambda: number(page, "particles") == count)
 
 
+@pytest.mark.slow
 def test_saved_it_is_built_anew_and_the_page_stays(page: Page, sketching: Start) -> None:
     mine = sketching(drops(5), "--watch")
     visit(page, mine.address)

@@ -12,8 +12,9 @@ between a wall and a heavy one have their own small inertia against it, and cont
 
 from __future__ import annotations
 
+from pyverlet.compile.bits import lowest_bit
 from pyverlet.compile.jit import kernel
-from pyverlet.compile.lanes import LANES, load, lowest_bit, spread, which_above
+from pyverlet.compile.lanes import LANES, load, spread, which_above
 from pyverlet.kernels.clusters import join, settle
 from pyverlet.kernels.loans import PINNED
 from pyverlet.kernels.motion import IN_PILE
