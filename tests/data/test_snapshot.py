@@ -432,3 +432,9 @@ def test_warnings_are_of_a_kind_of_their_own() -> None:
     assert issubclass(snapshot.OtherBits, UserWarning)
     with warnings.catch_warnings():
         warnings.simplefilter("error", snapshot.OtherBits)
+
+
+def test_objects_are_several(tmp_path: Path) -> None:
+    pv.save(pv.World(), tmp_path / "a.pvsnap")
+    with pytest.raises(pv.InputError, match=r"objects is 3; allowed is a list"):
+        pv.load(tmp_path / "a.pvsnap", objects=3)  # type: ignore[arg-type]

@@ -348,7 +348,7 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         code, text, _ = command("sweep", "verify", "study", "--rows", "2", *measure)
         assert (code, text.count("all as they were")) == (0, 1)
     shown: list[pv.World] = []
-    monkeypatch.setattr(viewers, "view", lambda world, **options: shown.append(world))
+    monkeypatch.setattr(viewers, "serve", lambda build, **options: shown.extend(build().panels.worlds))
     assert command("sweep", "show", "study", 3)[0] == 0
     assert shown[0].state_hash() == pv.scenes.get("box").world(friction=0.5, seed=2, particles=8).state_hash()
     row = json.loads((tmp_path / "study" / "rows.jsonl").read_text().splitlines()[0])

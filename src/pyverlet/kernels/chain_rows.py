@@ -7,6 +7,7 @@ import numpy as np
 from pyverlet.compile.jit import driver, kernel, parallel_kernel, prange
 from pyverlet.compile.lanes import (
     LANES,
+    lanes_like,
     larger,
     load,
     pick,
@@ -18,73 +19,84 @@ from pyverlet.compile.lanes import (
     where_above,
     where_zero,
     which_above,
+    widen,
 )
 from pyverlet.ground.constants import LINK_BOWED, LINK_GIVE, LINK_MEMORY_S, LINK_RESOLVED
 from pyverlet.kernels.seam import nearest, nearest_lanes
 
 COLUMNS = (
     "rest", "rope", "stiffness", "soft", "damping", "intact", "force", "last", "lam", "give", "offset", "turn", "bow", "along_x",
-    "along_y",
+    "along_y", "held",
 )  # fmt: skip
-"""What is kept of a row, all float64: rope, soft and intact are 1 or 0, the stiffness of what is not soft is 0."""
+"""What is kept of a row, in the dtype of the world: rope, soft, intact and held are 1 or 0, the stiffness of what is not soft is
+0. held: a rope that pulled when it was solved last."""
 
-REST, ROPE, STIFFNESS, SOFT, DAMPING, INTACT, FORCE, LAST, LAM, GIVE, OFFSET, TURN, BOW, AX, AY = range(len(COLUMNS))
+REST, ROPE, STIFFNESS, SOFT, DAMPING, INTACT, FORCE, LAST, LAM, GIVE, OFFSET, TURN, BOW, AX, AY, HELD = range(len(COLUMNS))
 
 ROPES, SOFTS = 1, 2
 """Bits of what is in a pack."""
 
+_LEAST = 1e-25
+"""N/m: springs softer than that pull with as much; where one divides by them, in float32 too."""
+
 
 @kernel
-def _settled(s):
-    """`kernels.links.share_settled`, lane by lane."""
-    return s * s / (s * s + spread(LINK_RESOLVED * LINK_RESOLVED))
+def _settled(s, resolved):
+    """`kernels.links.share_settled`, lane by lane; resolved: the square of LINK_RESOLVED."""
+    return s * s / (s * s + resolved)
 
 
 @kernel
 def _prepare_pack(p, start, node, holds, row, position, period_x, period_y, earlier, weight, h):
     """From where a substep starts, and a substep `earlier`: what the rows of a pack are to satisfy. See kernels.links."""
-    zero, one, tiny = spread(0.0), spread(1.0), spread(1e-12)
-    hh, soft = spread(h * h), holds[p] & SOFTS
+    real = row.dtype.type
+    zero, one, tiny, resolved = spread(real(0)), spread(real(1)), spread(real(1e-12)), spread(real(LINK_RESOLVED * LINK_RESOLVED))
+    quarter, half, two, three = spread(real(0.25)), spread(real(0.5)), spread(real(2)), spread(real(3))
+    straight, steeper = spread(real(LINK_BOWED)), spread(real(1.0 / (1.0 - LINK_BOWED)))
+    one_h, hh, per_h, rigid = spread(real(h)), spread(real(h * h)), spread(real(1.0 / h)), spread(real(LINK_GIVE))
+    per_hh, least = spread(real(1.0 / (h * h))), spread(real(_LEAST))
+    soft = holds[p] & SOFTS
     begin, end = start[p], start[p + 1]
     shift = LANES * p
     bowed = 0
     xi, yi = take(position, node, begin + shift)
-    wi = pick(weight, node, begin + shift)
+    wi = lanes_like(pick(weight, node, begin + shift), row)
     ui, vi = take(earlier, node, begin + shift)
     for k in range(begin, end, LANES):
         xj, yj = take(position, node, k + shift + LANES)
-        wj = pick(weight, node, k + shift + LANES)
-        dx, dy = nearest_lanes(xj - xi, period_x), nearest_lanes(yj - yi, period_y)
+        wj = lanes_like(pick(weight, node, k + shift + LANES), row)
+        dx, dy = lanes_like(nearest_lanes(xj - xi, period_x), row), lanes_like(nearest_lanes(yj - yi, period_y), row)
         length = square_root(dx * dx + dy * dy)
         bend = one / larger(length, tiny)
         store(row[AX], k, where_zero(length, one, dx * bend))
         store(row[AY], k, dy * bend)
         ww, force, rest = wi + wj, load(row[FORCE], k), load(row[REST], k)
         swing = hh * larger(force, zero - force) * bend * ww  # (frequency of swinging sideways * h)^2
-        turn = _settled(swing)
-        bow = larger(turn - spread(LINK_BOWED), zero) * spread(1.0 / (1.0 - LINK_BOWED)) * hh * larger(force, zero) * bend
+        turn = _settled(swing, resolved)
+        bow = larger(turn - straight, zero) * steeper * hh * larger(force, zero) * bend
         bowed |= which_above(bow, zero)
         store(row[TURN], k, turn)
         store(row[BOW], k, bow)
-        give, offset, lam = spread(LINK_GIVE) * ww, zero, zero
+        store(row[HELD], k, where_above(load(row[LAST], k), zero, one, zero))
+        give, offset, lam = rigid * ww, zero, zero
         if soft:
             uj, vj = take(earlier, node, k + shift + LANES)
-            ex, ey = nearest_lanes(uj - ui, period_x), nearest_lanes(vj - vi, period_y)
+            ex, ey = lanes_like(nearest_lanes(uj - ui, period_x), row), lanes_like(nearest_lanes(vj - vi, period_y), row)
             ui, vi = uj, vj
             here, slack = load(row[SOFT], k), load(row[ROPE], k)
             stiffness, damping = load(row[STIFFNESS], k), load(row[DAMPING], k)
             c0, cm = length - rest, square_root(ex * ex + ey * ey) - rest
             c0 = where_above(slack, zero, larger(c0, zero), c0)  # a slack rope has no stretch to remember
             cm = where_above(slack, zero, larger(cm, zero), cm)
-            q = _settled(hh * stiffness * ww)
-            s = spread(h) * damping * ww
-            part = spread(0.5) + spread(0.5) * s / (one + s)
-            rate = damping * spread(1.0 / h)
-            kp = stiffness * (one + spread(3.0) * q) * spread(0.25) + rate * part
-            k0 = stiffness * (one - q) * spread(0.5) + rate * (one - spread(2.0) * part)
-            km = stiffness * (one - q) * spread(0.25) - rate * (one - part)
-            per = one / larger(kp, spread(1e-200))
-            give = give + here * (per / hh)
+            q = _settled(hh * stiffness * ww, resolved)
+            s = one_h * damping * ww
+            part = half + half * s / (one + s)
+            rate = damping * per_h
+            kp = stiffness * (one + three * q) * quarter + rate * part
+            k0 = stiffness * (one - q) * half + rate * (one - two * part)
+            km = stiffness * (one - q) * quarter - rate * (one - part)
+            per = one / larger(kp, least)
+            give = give + here * (per * per_hh)
             offset = here * ((k0 * c0 + km * cm) * per)
             lam = zero - here * (one - slack) * load(row[INTACT], k) * (one - q) * load(row[LAST], k) * hh
         store(row[GIVE], k, give)
@@ -109,8 +121,8 @@ def _ahead_pack(p, start, node, row, position, weight):
     for k in range(begin, end + 1, LANES):
         gx = gy = spread(0.0)
         if k < end:
-            lam = load(row[LAM], k)
-            gx, gy = load(row[AX], k) * lam, load(row[AY], k) * lam
+            lam = widen(load(row[LAM], k))
+            gx, gy = widen(load(row[AX], k)) * lam, widen(load(row[AY], k)) * lam
         x, y = take(position, node, k + shift)
         w = pick(weight, node, k + shift)
         put(position, node, k + shift, x + w * (fx - gx), y + w * (fy - gy))
@@ -133,12 +145,21 @@ def ahead(colour, start, node, holds, row, position, weight):
 
 @kernel
 def note_force(row, h):
-    """The pull in N, which for rigid links is noisy; let the force shown follow it."""
-    part, rate = spread(h / (h + LINK_MEMORY_S)), spread(-1.0 / (h * h))
+    """The pull in N, which for rigid links is noisy; let the force shown follow it. That of the broken stays what it was."""
+    real = row.dtype.type
+    part, rate = spread(real(h / (h + LINK_MEMORY_S))), spread(real(-1.0 / (h * h)))
     for k in range(0, row.shape[1], LANES):
         last, force = load(row[LAM], k) * rate, load(row[FORCE], k)
         store(row[LAST], k, last)
-        store(row[FORCE], k, force + part * (last - force))
+        store(row[FORCE], k, force + part * load(row[INTACT], k) * (last - force))
+
+
+@kernel
+def snap(row, strength):
+    """Break every row that pulls or pushes harder than its strength, N."""
+    for k in range(row.shape[1]):
+        if abs(row[FORCE, k]) > strength[k]:
+            row[INTACT, k] = 0
 
 
 # ---- between the tables of the user's links and the packs ---------------------------------------------------------------------
@@ -149,7 +170,7 @@ def take_up(source, row, intact, force, last):
     """A frame begins: what of the rows changes. source: which row stands in each item, -1 for none."""
     for k in range(source.shape[0]):
         r = source[k]
-        row[INTACT, k] = row[FORCE, k] = row[LAST, k] = 0.0
+        row[INTACT, k] = row[FORCE, k] = row[LAST, k] = 0
         if r >= 0:
             row[INTACT, k], row[FORCE, k], row[LAST, k] = intact[r], force[r], last[r]
 

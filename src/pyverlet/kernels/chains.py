@@ -25,6 +25,7 @@ import numpy as np
 from pyverlet.compile.jit import driver, kernel, parallel_kernel, prange
 from pyverlet.compile.lanes import (
     LANES,
+    lanes_like,
     larger,
     load,
     pick,
@@ -37,18 +38,20 @@ from pyverlet.compile.lanes import (
     where_set,
     where_zero,
     which_above,
+    widen,
 )
 from pyverlet.ground.constants import LINK_ROUNDS, LINK_TAUT, LINK_TURN
-from pyverlet.kernels.chain_rows import AX, AY, BOW, GIVE, INTACT, LAM, OFFSET, REST, ROPE, ROPES, TURN, ahead
+from pyverlet.kernels.chain_rows import AX, AY, BOW, GIVE, HELD, INTACT, LAM, OFFSET, REST, ROPE, ROPES, TURN, ahead
 from pyverlet.kernels.seam import nearest, nearest_lanes
 
 _SWEEPS = 4
 
-SCRATCH = 17
-"""Columns of room for one pack: of each row n, 1 / length, right, active, step, two of elimination; of each node its weight,
-move, and six of elimination more."""
+SCRATCH, WIDE = 11, 6
+"""Columns of room for one pack, in the dtype of the rows and in float64: of each row n, 1 / length, right, active, step, two of
+elimination; of each node its weight and move; and what nodes are eliminated with."""
 
-_NX, _NY, _BEND, _RIGHT, _ACTIVE, _STEP, _Z, _U, _W, _MX, _MY, _G0, _G1, _I = range(14)
+_NX, _NY, _BEND, _RIGHT, _ACTIVE, _STEP, _Z, _U, _W, _MX, _MY = range(SCRATCH)
+_G0, _G1, _I = range(3)
 
 _HEAVY = 1e-40
 """1/kg: the inverse mass that pinned nodes have where one is divided by."""
@@ -57,18 +60,18 @@ _HEAVY = 1e-40
 @kernel
 def _measure_pack(p, start, node, row, position, period_x, period_y, weight, room):
     """How the rows of a pack stand now, in `room`, and who of them pulls; the direction of the force follows them."""
-    zero, one, half = spread(0.0), spread(1.0), spread(0.5)
+    real = row.dtype.type
+    zero, one, half = spread(real(0)), spread(real(1)), spread(real(0.5))
+    shortest, nearly = spread(real(1e-12)), spread(real(LINK_TAUT))
     begin, end, shift = start[p], start[p + 1], LANES * p
     xi, yi = take(position, node, begin + shift)
-    wi = pick(weight, node, begin + shift)
-    store(room[_W], 0, wi)
+    store(room[_W], 0, lanes_like(pick(weight, node, begin + shift), row))
     for k in range(begin, end, LANES):
         xj, yj = take(position, node, k + shift + LANES)
-        wj = pick(weight, node, k + shift + LANES)
-        dx, dy = nearest_lanes(xj - xi, period_x), nearest_lanes(yj - yi, period_y)
+        dx, dy = lanes_like(nearest_lanes(xj - xi, period_x), row), lanes_like(nearest_lanes(yj - yi, period_y), row)
         rest = load(row[REST], k)
         length = square_root(dx * dx + dy * dy)
-        bend = one / larger(length, spread(1e-12))
+        bend = one / larger(length, shortest)
         nx, ny = where_zero(length, one, dx * bend), dy * bend
         ax, ay, turn = load(row[AX], k), load(row[AY], k), load(row[TURN], k)
         ax, ay = ax + turn * (nx - ax), ay + turn * (ny - ay)
@@ -76,7 +79,7 @@ def _measure_pack(p, start, node, row, position, period_x, period_y, weight, roo
         ax, ay = where_above(half, old, nx, ax), where_above(half, old, ny, ay)
         give, intact = load(row[GIVE], k), load(row[INTACT], k)
         right = zero - (length - rest + load(row[OFFSET], k) + give * load(row[LAM], k))
-        taut = where_above(spread(LINK_TAUT) * rest, right, one, one - load(row[ROPE], k))
+        taut = where_above(nearly * rest * load(row[HELD], k), right, one, one - load(row[ROPE], k))
         to = k - begin
         store(row[AX], k, ax)
         store(row[AY], k, ay)
@@ -85,14 +88,15 @@ def _measure_pack(p, start, node, row, position, period_x, period_y, weight, roo
         store(room[_BEND], to, bend)
         store(room[_RIGHT], to, right)
         store(room[_ACTIVE], to, where_above(give, zero, intact * taut, zero))
-        store(room[_W], to + LANES, wj)
-        xi, yi, wi = xj, yj, wj
+        store(room[_W], to + LANES, lanes_like(pick(weight, node, k + shift + LANES), row))
+        xi, yi = xj, yj
 
 
 @kernel
 def _eliminate_rows(begin, end, row, room):
     """The steps of lam of a pack, and the moves of its nodes: row by row, where no link resists being turned."""
-    zero, one = spread(0.0), spread(1.0)
+    real = row.dtype.type
+    zero, one = spread(real(0)), spread(real(1))
     w = load(room[_W], 0)
     active = a = give = nd = z = per = zero
     nx = ny = ax = ay = zero
@@ -105,7 +109,7 @@ def _eliminate_rows(begin, end, row, room):
         if k > begin:
             store(room[_U], to - LANES, active * w * c * per)
         near = md * (a + give) + w * (nd * md - c * cc)
-        a = where_zero(active, w * md, w * near * per)
+        a = where_zero(active, w * md, w * (near * per))
         per = one / where_zero(here, one, a + wj * md + g)
         z = where_zero(here, zero - load(row[LAM], k), (load(room[_RIGHT], to) + w * cc * z) * per)
         store(room[_Z], to, z)
@@ -126,29 +130,29 @@ def _eliminate_rows(begin, end, row, room):
 
 
 @kernel
-def _eliminate_nodes(begin, end, row, room):
-    """The same node by node, with what resists being turned."""
+def _eliminate_nodes(begin, end, row, room, wide):
+    """The same node by node, with what resists being turned: in float64, for masses of the pinned have no bounds."""
     zero, one, heavy = spread(0.0), spread(1.0), spread(_HEAVY)
     x00 = x01 = x10 = x11 = gx = gy = zero
     for k in range(begin, end, LANES):
         to = k - begin
-        nx, ny, dx, dy = load(room[_NX], to), load(room[_NY], to), load(row[AX], k), load(row[AY], k)
-        active, mass = load(room[_ACTIVE], to), one / larger(load(room[_W], to), heavy)
-        stiff, across = where_zero(active, zero, one / load(row[GIVE], k)), active * load(row[BOW], k)
+        nx, ny, dx, dy = widen(load(room[_NX], to)), widen(load(room[_NY], to)), widen(load(row[AX], k)), widen(load(row[AY], k))
+        active, mass = widen(load(room[_ACTIVE], to)), one / larger(widen(load(room[_W], to)), heavy)
+        stiff, across = where_zero(active, zero, one / widen(load(row[GIVE], k))), active * widen(load(row[BOW], k))
         b00, b01 = stiff * dx * nx + across * (one - nx * nx), stiff * dx * ny - across * nx * ny
         b10, b11 = stiff * dy * nx - across * nx * ny, stiff * dy * ny + across * (one - ny * ny)
-        store(room[_G0], to, gx)
-        store(room[_G1], to, gy)
-        push = stiff * load(room[_RIGHT], to) + where_zero(active, zero - load(row[LAM], k), zero)
+        store(wide[_G0], to, gx)
+        store(wide[_G1], to, gy)
+        push = stiff * widen(load(room[_RIGHT], to)) + where_zero(active, zero - widen(load(row[LAM], k)), zero)
         x00 = x00 + mass
         x11 = x11 + mass
         d00, d01, d10, d11 = x00 + b00, x01 + b01, x10 + b10, x11 + b11
         over = one / (d00 * d11 - d01 * d10)
         i00, i01, i10, i11 = d11 * over, zero - d01 * over, zero - d10 * over, d00 * over
-        store(room[_I], to, i00)
-        store(room[_I + 1], to, i01)
-        store(room[_I + 2], to, i10)
-        store(room[_I + 3], to, i11)
+        store(wide[_I], to, i00)
+        store(wide[_I + 1], to, i01)
+        store(wide[_I + 2], to, i10)
+        store(wide[_I + 3], to, i11)
         # What is carried over the link: X D^-1 d right / give + B D^-1 g
         px, py = i00 * dx * push + i01 * dy * push, i10 * dx * push + i11 * dy * push
         qx, qy = i00 * gx + i01 * gy, i10 * gx + i11 * gy
@@ -157,34 +161,35 @@ def _eliminate_nodes(begin, end, row, room):
         m00, m01 = i00 * b00 + i01 * b10, i00 * b01 + i01 * b11
         m10, m11 = i10 * b00 + i11 * b10, i10 * b01 + i11 * b11
         x00, x01, x10, x11 = x00 * m00 + x01 * m10, x00 * m01 + x01 * m11, x10 * m00 + x11 * m10, x10 * m01 + x11 * m11
-    mass = one / larger(load(room[_W], end - begin), heavy)
+    mass = one / larger(widen(load(room[_W], end - begin)), heavy)
     x00 = x00 + mass
     x11 = x11 + mass
     over = one / (x00 * x11 - x01 * x10)
     mx, my = (x11 * gx - x01 * gy) * over, (x00 * gy - x10 * gx) * over
-    store(room[_MX], end - begin, mx)
-    store(room[_MY], end - begin, my)
+    store(room[_MX], end - begin, lanes_like(mx, row))
+    store(room[_MY], end - begin, lanes_like(my, row))
     for k in range(end - LANES, begin - LANES, -LANES):
         to = k - begin
-        nx, ny, dx, dy = load(room[_NX], to), load(room[_NY], to), load(row[AX], k), load(row[AY], k)
-        active, right = load(room[_ACTIVE], to), load(room[_RIGHT], to)
-        stiff, across = where_zero(active, zero, one / load(row[GIVE], k)), active * load(row[BOW], k)
+        nx, ny, dx, dy = widen(load(room[_NX], to)), widen(load(room[_NY], to)), widen(load(row[AX], k)), widen(load(row[AY], k))
+        active, right = widen(load(room[_ACTIVE], to)), widen(load(room[_RIGHT], to))
+        stiff, across = where_zero(active, zero, one / widen(load(row[GIVE], k))), active * widen(load(row[BOW], k))
         out = nx * mx + ny * my
-        known = where_zero(active, zero - load(row[LAM], k), zero)
+        known = where_zero(active, zero - widen(load(row[LAM], k)), zero)
         push = stiff * (right - out) + known
-        fx = load(room[_G0], to) - dx * push + across * (mx - nx * out)
-        fy = load(room[_G1], to) - dy * push + across * (my - ny * out)
-        mx = load(room[_I], to) * fx + load(room[_I + 1], to) * fy
-        my = load(room[_I + 2], to) * fx + load(room[_I + 3], to) * fy
-        store(room[_MX], to, mx)
-        store(room[_MY], to, my)
-        store(room[_STEP], to, push + stiff * (nx * mx + ny * my))
+        fx = load(wide[_G0], to) - dx * push + across * (mx - nx * out)
+        fy = load(wide[_G1], to) - dy * push + across * (my - ny * out)
+        mx = load(wide[_I], to) * fx + load(wide[_I + 1], to) * fy
+        my = load(wide[_I + 2], to) * fx + load(wide[_I + 3], to) * fy
+        store(room[_MX], to, lanes_like(mx, row))
+        store(room[_MY], to, lanes_like(my, row))
+        store(room[_STEP], to, lanes_like(push + stiff * (nx * mx + ny * my), row))
 
 
 @kernel
 def _slack_changes(begin, end, row, room):
     """A rope pulls or does nothing: let go of rows that would push, take up those the others stretch; whether any changed."""
-    zero, one = spread(0.0), spread(1.0)
+    real = row.dtype.type
+    zero, one = spread(real(0)), spread(real(1))
     changed = 0
     for k in range(begin, end, LANES):
         to = k - begin
@@ -198,6 +203,7 @@ def _slack_changes(begin, end, row, room):
         begins = where_above(load(row[GIVE], k), zero, begins, zero)
         changed |= which_above(ends + begins, zero)
         store(room[_ACTIVE], to, active + begins - ends)
+        store(row[HELD], k, active + begins - ends)
     return changed != 0
 
 
@@ -221,6 +227,7 @@ def _sweep(begin, end, lane, node, row, position, period_x, period_y, weight, sh
             if row[ROPE, r] != 0.0:
                 step = min(step, -row[LAM, r])
             row[LAM, r] += step
+            row[HELD, r] = 1 if row[LAM, r] != 0.0 else 0
             dx, dy = dx * (step / length), dy * (step / length)
             position[i, 0] -= weight[i] * dx
             position[i, 1] -= weight[i] * dy
@@ -232,7 +239,8 @@ def _sweep(begin, end, lane, node, row, position, period_x, period_y, weight, sh
 def _move_pack(p, start, node, row, position, room):
     """The nodes go where the solution puts them, but for lanes whose links it turns too far: returns which those are."""
     begin, end, shift = start[p], start[p + 1], LANES * p
-    zero, limit = spread(0.0), spread(LINK_TURN if end - begin > LANES else np.inf)
+    real = row.dtype.type
+    zero, one, limit = spread(real(0)), spread(real(1)), spread(real(LINK_TURN if end - begin > LANES else np.inf))
     most = zero
     for k in range(begin, end, LANES):
         to = k - begin
@@ -248,19 +256,20 @@ def _move_pack(p, start, node, row, position, room):
             store(row[LAM], k, where_set(far, lam, lam + load(room[_STEP], to)))
         x, y = take(position, node, k + shift)
         w = load(room[_W], to)
-        free = where_set(far, zero, where_zero(w, zero, spread(1.0)))
-        put(position, node, k + shift, x + free * load(room[_MX], to), y + free * load(room[_MY], to))
+        free = where_set(far, zero, where_zero(w, zero, one))
+        mx, my = widen(free * load(room[_MX], to)), widen(free * load(room[_MY], to))
+        put(position, node, k + shift, x + mx, y + my)
     return far
 
 
 @kernel
-def _solve_pack(p, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, room):
+def _solve_pack(p, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, room, wide):
     begin, end = start[p], start[p + 1]
     _measure_pack(p, start, node, row, position, period_x, period_y, weight, room)
     ropes = holds[p] & ROPES
     for _ in range(LINK_ROUNDS):
         if bowed[p] and end - begin > LANES:
-            _eliminate_nodes(begin, end, row, room)
+            _eliminate_nodes(begin, end, row, room, wide)
         else:
             _eliminate_rows(begin, end, row, room)
         if not (ropes and _slack_changes(begin, end, row, room)):
@@ -276,33 +285,33 @@ def _solve_pack(p, start, node, holds, lanes, bowed, row, position, period_x, pe
 
 
 @parallel_kernel
-def _solve(first, stop, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms):
+def _solve(first, stop, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms, wide):
     parts = rooms.shape[0]
     for part in prange(parts):
         for p in range(first + part, stop, parts):
-            _solve_pack(p, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms[part])
+            _solve_pack(p, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms[part], wide[part])
 
 
 @driver
-def sweep(back, skip, colour, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms):
+def sweep(back, skip, colour, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms, wide):
     """Solve all packs, colour by colour or `back` from the last one, without the first colour on the way if `skip`.
 
-    Colour c is packs colour[c] to colour[c + 1], which share no particle. rooms: (parts, SCRATCH, items of the longest pack's
-    nodes): as many packs are solved beside each other.
+    Colour c is packs colour[c] to colour[c + 1], which share no particle. rooms, wide: (parts, SCRATCH or WIDE, items of
+    the longest pack's nodes): as many packs are solved beside each other.
     """
     colours = colour.shape[0] - 1
     for n in range(1 if skip else 0, colours):
         c = colours - 1 - n if back else n
-        _solve(colour[c], colour[c + 1], start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms)
+        _solve(colour[c], colour[c + 1], start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms, wide)
 
 
 @driver
-def passes(times, gives, colour, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms):
+def passes(times, gives, colour, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms, wide):
     """There and back so many times, from the lam that rows start from; once, one way, where there is a single colour."""
     if gives:
         ahead(colour, start, node, holds, row, position, weight)
     several = colour.shape[0] > 2
     for _ in range(times if several else 1):
-        sweep(False, False, colour, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms)
+        sweep(False, False, colour, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms, wide)
         if several:
-            sweep(True, True, colour, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms)
+            sweep(True, True, colour, start, node, holds, lanes, bowed, row, position, period_x, period_y, weight, rooms, wide)

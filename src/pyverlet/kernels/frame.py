@@ -7,11 +7,12 @@ stages in `world.profile`. A frame is compiled for a kind of room: `frames` has 
 
 from __future__ import annotations
 
-from pyverlet.compile.bundle import fields
+from pyverlet.compile.bundle import borrowed, fields
 from pyverlet.compile.clock import note
 from pyverlet.compile.jit import driver, parallel_kernel, prange, variant
 from pyverlet.compile.lanes import copy_row
-from pyverlet.kernels.bounds import box, circle
+from pyverlet.kernels.bounds import box
+from pyverlet.kernels.cage import confine as confine_in_cage
 from pyverlet.kernels.cage import hold
 from pyverlet.kernels.kinds import for_each_kind
 from pyverlet.kernels.motion import leap
@@ -58,7 +59,7 @@ def smooth_cage(room, circles, law, claims):
 @driver
 def cage(room, circles, law, claims):
     """(x, y, radius, e, mu) of a round room."""
-    circle(
+    confine_in_cage(
         room[0], room[1], room[2], circles.position, circles.velocity, circles.acceleration, circles.spin, circles.radius,
         circles.inverse_mass, circles.restitution, circles.friction, circles.fed, circles.resting, circles.hits, circles.spent,
         circles.start, circles.turn, circles.lift, law.h, law.lag, room[3], room[4], law.rest_speed,
@@ -80,12 +81,12 @@ def four_walls(room, circles, law, claims):
 
 def _project(circles, pairs, law, cut, looks, sets_out, claims):
     """The first sweep over the pairs, called from Python, which has plain tuples."""
-    push(Circles(*circles), Pairs(*pairs), Law(*law), cut, looks, sets_out, claims)
+    push(Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Law(*law), cut, looks, sets_out, claims)
 
 
 def _still(circles, pairs, law, cut, marks, claims):
     """The second one."""
-    relax(Circles(*circles), Pairs(*pairs), Law(*law), cut, marks, claims)
+    relax(Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Law(*law), cut, marks, claims)
 
 
 def _substeps(substep, stop, last, circles, pairs, law, room, cut, looks, sets_out, checked, far, claims, spent, clock):
@@ -96,7 +97,7 @@ def _substeps(substep, stop, last, circles, pairs, law, room, cut, looks, sets_o
 
     Returns the substep that is next, and whether it has been integrated and the list of pairs needs a look.
     """
-    circles, pairs, law = Circles(*circles), Pairs(*pairs), Law(*law)
+    circles, pairs, law = Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Law(*law)
     while True:
         push(circles, pairs, law, cut, looks, sets_out, claims)
         note(spent, CONTACTS, clock[0], clock[1])

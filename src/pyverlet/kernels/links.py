@@ -116,12 +116,13 @@ def solve_rows(begin, end, position, first, particle, weight, upper, intact, val
 
 
 @kernel
-def note_force(force, last, lam, h):
-    """last = -lam / h^2, the pull in N, which for rigid links is noisy; let `force` follow it."""
+def note_force(force, last, lam, intact, h):
+    """last = -lam / h^2, the pull in N, which for rigid links is noisy; let `force` follow it, but for the broken."""
     part = h / (h + LINK_MEMORY_S)
     for r in range(force.shape[0]):
         last[r] = -lam[r] / (h * h)
-        force[r] += part * (last[r] - force[r])
+        if intact[r]:
+            force[r] += part * (last[r] - force[r])
 
 
 @kernel
@@ -133,20 +134,21 @@ def snap(force, strength, intact):
 
 
 @parallel_kernel
-def look_back(slot, position, velocity, inverse_mass, period_x, period_y, before, calm, h, start, earlier, weight):
+def look_back(slot, position, velocity, inverse_mass, period_x, period_y, calm, h, start, earlier, weight):
     """Copy who is linked: where a substep starts; `earlier`, where everybody was a substep ago; the inverse mass.
 
-    That is by the velocity, or `before`, by memory, where rest has put another velocity in. Contacts at rest carry weight by
+    That is by the velocity, or, by memory of `start`, where rest has put another velocity in. Contacts at rest carry weight by
     small velocities that move nobody, and links would take them for motion. calm: (k,) m/s, by how much the velocity may differ
-    from the way gone and still be of that kind; beyond it there was an impact. NaN: unknown. In a periodic room `before` may be
-    another image of where they were.
+    from the way gone and still be of that kind; beyond it there was an impact. NaN: unknown. In a periodic room what is
+    remembered may be another image of where they were.
     """
     for k in prange(slot.shape[0]):
         s = slot[k]
+        before_x, before_y = start[k, 0], start[k, 1]
         start[k, 0], start[k, 1] = position[s, 0], position[s, 1]
         x, y = start[k, 0] - h * np.float64(velocity[s, 0]), start[k, 1] - h * np.float64(velocity[s, 1])
-        bx = image_near(before[k, 0], start[k, 0], period_x)
-        by = image_near(before[k, 1], start[k, 1], period_y)
+        bx = image_near(before_x, start[k, 0], period_x)
+        by = image_near(before_y, start[k, 1], period_y)
         dx, dy, most = x - bx, y - by, h * calm[k]
         if dx * dx + dy * dy <= most * most:
             x, y = bx, by

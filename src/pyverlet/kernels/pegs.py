@@ -72,6 +72,8 @@ def hold(position, velocity, resting, size, circle, first, second, side):
         distance, ux, uy = _frame(position, a, b)
         if side[k] == 0.0 or not abs(one - other) < distance < one + other:
             continue
+        if velocity[a, 0] != 0.0 or velocity[a, 1] != 0.0 or velocity[b, 0] != 0.0 or velocity[b, 1] != 0.0:
+            continue  # pegs that are on their way would push it through a wall
         x, y = np.float64(position[i, 0]) - position[a, 0], np.float64(position[i, 1]) - position[a, 1]
         s, t = ux * x + uy * y, side[k] * (ux * y - uy * x)
         along, across = _corner(distance, one, other)

@@ -132,10 +132,11 @@ class Watch:
         part = np.minimum(_ratio(left, add(lift)), 1)[cluster]
         strength = np.hypot(*pull.T)
         drop = part * np.minimum(_ratio(lift, strength), np.hypot(*moved.T))  # who is near where a spring pulls to feels little
-        slots.position += (_ratio(drop, strength)[:, None] * pull).astype(slots.dtype)
+        lower = slots.position + _ratio(drop, strength)[:, None] * pull
         if slots.size is not slots.radius:
             slots.grown -= (part * (slots.grown - start.grown[order])).astype(slots.dtype)
             slots.resize()
+        slots.position[:] = self._within_room(slots.position.astype(float), lower, slots.size)
 
     def _pushed(self, slots: Slots, mass: Array, add: _Sums) -> Array:
         """(n,) bool, clusters whose momentum has changed in this frame by more than rounding does."""
@@ -158,6 +159,16 @@ class Watch:
             pulls.append(weight + np.where(mass > 0, 1.0, 0.0)[:, None] * slots.force)
         slots.position = now
         return pulls[0], pulls[1]
+
+    def _within_room(self, here: Array, lower: Array, radius: Array) -> Array:
+        """(n, 2) m, `lower` or as far that way as walls let circles go: a strong pull may lead through one."""
+        faced = self._room.facing(lower)
+        if faced is None:
+            return np.where(self._room.outside(lower)[:, None], here, lower)
+        was, _ = self._room.facing(here) or faced
+        for before, gap, normal in zip(was.T, faced[0].T, faced[1].swapaxes(0, 1), strict=True):
+            lower = lower + np.maximum(np.minimum(radius, before) - gap, 0)[:, None] * normal
+        return lower
 
     def _was_inside(self) -> Array:
         """(n,) bool, who was above the wall when the frame began, in the user's order."""
@@ -205,16 +216,23 @@ def _rounding(slots: Slots) -> float:
 def undriven(world: Any, h: float, h_last: float | None) -> bool:
     """Whether nothing but contacts and links could raise the energy of a world.
 
-    Forces have a potential or are drag, no obstacle or wall moves, gravity does not point along a period, and the integrator does
-    not raise it either: of order 2 or more, and with a constant step, which `PositionVerlet` needs.
+    Forces have a potential or are drag, no obstacle, wall or pinned circle moves, gravity does not point along a period, and the
+    integrator does not raise it either: of order 2 or more, and with a constant step, which `PositionVerlet` needs.
     """
     if world.integrator.order < 2 or h_last not in (None, h) or world.boundary.moves:
+        return False
+    if world._slots.pins and pinned_move(world._slots):
         return False
     if any(g != 0 and period > 0 for g, period in zip(world.gravity, world.boundary.seam.period, strict=True)):
         return False  # who falls for ever gains for ever
     if world.forces and not all(isinstance(force, Conservative | Drag) for force in world.forces):
         return False
     return not world.obstacles or not any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
+
+
+def pinned_move(state: State | Slots) -> bool:
+    """Whether somebody pinned pushes others about: with infinite mass one goes on at its velocity, and nothing stops it."""
+    return bool((np.isinf(state.mass) & (state.velocity.any(axis=1) | (state.spin != 0))).any())
 
 
 def _ratio(a: Array, b: Array) -> Array:

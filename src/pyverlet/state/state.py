@@ -113,11 +113,11 @@ class State:
         self.version += 1
         return now
 
-    def restore(self, arrays: dict[str, Array]) -> None:
-        """Take up what `arrays` gave once, however many particles that were."""
+    def restore(self, arrays: dict[str, Array], *, own: bool = False) -> None:
+        """Take up what `arrays` gave once, however many particles that were; `own`: in these arrays themselves, from now on."""
         count = len(arrays["number"])
-        if count > len(self._store["number"]):
-            self._store = {name: np.empty((count, *old.shape[1:]), old.dtype) for name, old in self._store.items()}
+        if own or count > len(self._store["number"]):
+            self._store = {name: arrays[name] if own else np.empty_like(arrays[name]) for name in self._store}
         self._show(count)
         for name in self._store:
             getattr(self, name)[:] = arrays[name]
@@ -148,12 +148,12 @@ class Slots:
         most_restitution, most_friction: the largest of their columns; negative if no circle has values of its own.
         given: how often what users set was taken up anew.
         size: (n,) grown * radius, m: what contacts between particles take as the radius.
-        inverse_mass: (n,) 1/kg; 0 for a pinned particle. total_mass: of all others, kg.
+        inverse_mass: (n,) 1/kg; 0 for a pinned particle: whether one `pins`. total_mass: of others, kg.
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
         start: (n, 2) positions before the integration of this substep, m; empty unless circles rub each other, or meet obstacles.
         turn, lift: empty unless circles rub each other: (n,) rad by which each turns in this substep, and (n,) s; times -a that
             is the velocity with which circles at rest against others end a substep, for others 0.
-        along: (n, 2) m/s^2, the acceleration left to circles that an obstacle holds, for others 0; empty without obstacles.
+        along: (n, 2) m/s^2, the acceleration left to circles that an obstacle or a smooth wall holds, for others 0; or empty.
         drop: a circle at rest falls drop * a h^2 in a substep of h seconds; depends on the integrator.
         fed: (n,) bits: CARRIES where a contact at rest fed the velocity in the last substep, AT_WALL where a wall was touched
             in it, CARRIED and WAS_AT_WALL the same in the one before. Kept only if circles bounce.
@@ -173,7 +173,7 @@ class Slots:
         self.real = lru_cache(64)(dtype.type)
         self.reals = lru_cache(64)(lambda *numbers: tuple(map(dtype.type, numbers)))
         self._kept: dict[str, Array] = {}
-        self.drop, self.lean, self.total_mass, self.taken, self.worked, self.given = 1.0, 0.0, 0.0, 0.0, 0.0, 0
+        self.drop, self.lean, self.total_mass, self.pins, self.taken, self.worked, self.given = 1.0, 0.0, 0.0, False, 0.0, 0.0, 0
         self.h = 0.0
         self.claims = Claims()
         self._resize(0)
@@ -262,7 +262,8 @@ class Slots:
             changed |= name in _LISTED and motion.differs(given, now)
             self._given[name] = (now[:1] if (now == now[:1]).all() else now).copy()
         for name in (*_SET, "grown"):
-            np.take(getattr(state, name), self.particle, out=getattr(self, name))
+            now = self._given.get(name, state.grown)  # one number, if it is that of all
+            np.take(now, self.particle, out=getattr(self, name), mode="clip")  # else it would make another array first
         self.weigh()
         self.most_restitution, self.most_friction = (float(a.max(initial=-1.0)) for a in (self.restitution, self.friction))
         filters = (state.category != 1).any() or (state.mask != EVERYONE).any()
@@ -277,7 +278,8 @@ class Slots:
         with np.errstate(divide="ignore"):  # a mass of 0 is refused by the world, with a sentence
             np.divide(1, self.mass, out=self.inverse_mass)
         self.inverse_mass[self.asleep] = 0
-        self.total_mass = float(self.mass.sum(dtype=float, where=np.isfinite(self.mass)))
+        self.total_mass = float(self.mass.sum(dtype=float, where=(free := np.isfinite(self.mass))))
+        self.pins = not free.all()
 
     def _keep(self, slots: Any) -> None:
         """Remember what outlives a change of size, of these slots."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from pyverlet.compile import jit
@@ -15,10 +17,11 @@ from pyverlet.state.seam import Seam
 
 
 class ChainPool(Pool):
-    """Runs in packs of eight that share no particle, as `kernels.chains` wants them."""
+    """Runs in packs of eight that share no particle, as `kernels.chains` wants them, whose rows have the world's dtype."""
 
-    def __init__(self, turn: int) -> None:
-        super().__init__(turn, rest=np.float64, upper=np.float64)
+    def __init__(self, dtype: np.dtype[Any]) -> None:
+        super().__init__(0, rest=np.float64, upper=np.float64)
+        self.dtype = dtype
 
     def pack(self, work: Work) -> None:
         """By colour, and within a colour long runs first, so that runs of a pack are as long as each other."""
@@ -44,11 +47,12 @@ class ChainPool(Pool):
         self._place = np.empty(count, np.int64)
         self._place[self._source[self._source >= 0][::-1]] = np.flatnonzero(self._source >= 0)[::-1]
         self._ends = entry.reshape(-1, 2)
-        self._row = np.zeros((len(chain_rows.COLUMNS), len(self._source)))
+        self._row = np.zeros((len(chain_rows.COLUMNS), len(self._source)), self.dtype)
         self._strength = np.full(len(self._source), np.inf)
         self._bowed = np.zeros(len(opens), np.uint8)
         parts = 1 if len(work) < LINKS_ONE_THREAD_BELOW else jit.max_threads()
-        self._rooms = np.zeros((parts, chains.SCRATCH, LANES * (int(longest.max(initial=0)) + 1)))
+        items = LANES * (int(longest.max(initial=0)) + 1)
+        self._rooms, self._wide = np.zeros((parts, chains.SCRATCH, items), self.dtype), np.zeros((parts, chains.WIDE, items))
         self.stale, self.changed = False, True
 
     def _lay_out(self, entry: Array, run_at: Array, longest: Array, length: Array) -> None:
@@ -72,7 +76,7 @@ class ChainPool(Pool):
             row[chain_rows.REST], row[chain_rows.DAMPING] = rows["rest"][source] * here, rows["damping"][source] * here
             row[chain_rows.ROPE], row[chain_rows.SOFT], row[chain_rows.STIFFNESS] = rope, soft, np.where(soft, stiffness, 0.0)
             self._strength[:] = rows["strength"][source]
-            self._brittle = bool(np.isfinite(self._strength).any())
+            self.brittle = bool(np.isfinite(self._strength).any())
             kinds = (chain_rows.ROPES * rope + chain_rows.SOFTS * soft).astype(np.uint8)
             self._holds = np.bitwise_or.reduceat(kinds, self._start[:-1]) if len(kinds) else kinds
             self.gives = bool(soft.any())
@@ -88,25 +92,28 @@ class ChainPool(Pool):
         if self.gives:
             chain_rows.ahead(self._colour, self._start, self._node, self._holds, self._row, work.position, work.weight)
 
+    def arrays(self) -> tuple[Array, ...]:
+        """As `kernels.linked.Linked` has them."""
+        return (
+            self._colour, self._start, self._node, self._holds, self._lanes, self._bowed, self._row, self._rooms, self._wide,
+            self._strength,
+        )  # fmt: skip
+
     def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
         chains.sweep(
             back, skip, self._colour, self._start, self._node, self._holds, self._lanes, self._bowed, self._row, work.position,
-            *work.seam.period, work.weight, self._rooms,
+            *work.seam.period, work.weight, self._rooms, self._wide,
         )  # fmt: skip
 
-    def passes(self, work: Work, times: int) -> None:
-        chains.passes(
-            times, self.gives, self._colour, self._start, self._node, self._holds, self._lanes, self._bowed, self._row,
-            work.position, *work.seam.period, work.weight, self._rooms,
-        )  # fmt: skip
-
-    def snap(self, work: Work, h: float) -> Array:
+    def note(self, work: Work, h: float) -> None:
         chain_rows.note_force(self._row, h)
-        if not self._brittle:
+        if self.brittle:
+            chain_rows.snap(self._row, self._strength)
+
+    def broken(self) -> Array:
+        if not self.brittle:
             return np.empty(0, np.int64)
-        hard = np.flatnonzero((np.abs(self._row[chain_rows.FORCE]) > self._strength) & (self._row[chain_rows.INTACT] != 0.0))
-        self._row[chain_rows.INTACT, hard] = 0.0
-        return np.unique(self._source[hard])
+        return np.flatnonzero(chain_rows.intact(self._place, self._row) != self.rows["intact"])
 
     def pulled(self) -> Array:
         return np.asarray(self._row[chain_rows.FORCE][self._place])

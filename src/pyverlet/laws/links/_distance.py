@@ -75,7 +75,7 @@ class Distance(Link):
         return shapes.distance
 
     def _new_pool(self) -> Pool:
-        return ChainPool(turn=0)
+        return ChainPool(self._state.dtype)
 
     def _columns(self) -> dict[str, Any]:
         return {

@@ -26,13 +26,12 @@ class Pool(ABC):
         drawn: whether its rows are lines between their particles.
         stale: rows have come or gone since `pack`.
         changed: numbers of rows have changed since `begin`.
-        snapped: rows have broken in this frame.
         gives: whether any row stores energy, once a frame has begun.
         colours: how many parts are solved one after the other, once packed.
     """
 
     drawn = True
-    snapped = gives = False
+    gives = False
 
     def __init__(self, turn: int, **columns: Any) -> None:
         self.turn = turn
@@ -84,22 +83,17 @@ class Pool(ABC):
     def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
         """Solve one colour after the other, or back from the last; without the first on the way if `skip`."""
 
-    def passes(self, work: Work, times: int) -> None:
-        """All of a substep for a pool that is alone: ahead, then there and back so many times."""
-        self.ahead(work)
-        several = self.colours > 1
-        for _ in range(times if several else 1):
-            self.sweep(work, back=False, skip=False)
-            if several:
-                self.sweep(work, back=True, skip=True)
+    @abstractmethod
+    def note(self, work: Work, h: float) -> None:
+        """After the passes: what does each pull with? Break those beyond their strength."""
 
     @abstractmethod
-    def snap(self, work: Work, h: float) -> Array:
-        """After the passes: what does each pull with? Break those beyond their strength; returns which rows did."""
+    def broken(self) -> Array:
+        """The rows that have broken in this frame, until its `end`."""
 
     @abstractmethod
     def pulled(self) -> Array:
-        """(k,) what each row pulled with in this substep, N."""
+        """(k,) what each row pulls with now, N; of those that have broken, what they broke with."""
 
     def lines(self) -> tuple[Array, Array]:
         """(m, 2) the particles that follow each other in rows that are intact, and (m,) which row that is."""

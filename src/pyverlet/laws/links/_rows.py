@@ -118,14 +118,16 @@ class RowPool(Pool):
                 self._gradient, self._along, row["turn"], row["give"], row["offset"], row["lam"],
             )  # fmt: skip
 
-    def snap(self, work: Work, h: float) -> Array:
+    def note(self, work: Work, h: float) -> None:
         row = self._row
-        links.note_force(row["force"], row["last"], row["lam"], h)
+        links.note_force(row["force"], row["last"], row["lam"], row["intact"], h)
+        if self._brittle:
+            links.snap(row["force"], row["strength"], row["intact"])
+
+    def broken(self) -> Array:
         if not self._brittle:
             return np.empty(0, np.int64)
-        before = row["intact"].copy()
-        links.snap(row["force"], row["strength"], row["intact"])
-        return np.sort(self._order[before != row["intact"]])
+        return np.sort(self._order[self._row["intact"] != self.rows["intact"][self._order]])
 
     def pulled(self) -> Array:
         result = np.empty_like(self._row["force"])

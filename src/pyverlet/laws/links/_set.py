@@ -11,13 +11,15 @@ from numpy.typing import NDArray
 
 from pyverlet.compile import jit
 from pyverlet.ground import checks
-from pyverlet.ground.constants import LINKS_ONE_THREAD_BELOW
+from pyverlet.ground.constants import LINKS_ONE_THREAD_BELOW, REST_ACCELERATIONS
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import runs
+from pyverlet.kernels import linked, runs
 from pyverlet.laws.contacts.broadphase import PairList
+from pyverlet.laws.links._chains import ChainPool
 from pyverlet.laws.links._link import Array, Link
 from pyverlet.laws.links._pool import Pool
 from pyverlet.laws.links._work import Past, Work
+from pyverlet.laws.links.pin import PinPool
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import Slots, State
 
@@ -47,7 +49,10 @@ class Links:
         self._apart, self._apart_stale = np.empty((0, 2), np.int64), False
         self._partners = np.zeros(1, np.int64), np.empty(0, np.int64)
         self._apart_changed = False
-        self._broken = self.broken = np.empty(0, BROKEN)
+        self.broken = np.empty(0, BROKEN)
+        self._chains: ChainPool | None = None
+        self._pins = PinPool()
+        self._linked: tuple[Any, ...] | None = None
 
     # ---- a list --------------------------------------------------------------------------------------------------------
 
@@ -146,20 +151,50 @@ class Links:
         if not self._order:
             return False
         if any(pool.stale for pool in self._order) or len(self._work.compact) != len(self._state):
-            linked = np.zeros(len(self._state), bool)
+            among = np.zeros(len(self._state), bool)
             for pool in self._order:
-                linked[pool.entries["particle"]] = True
-            self._work = Work(np.flatnonzero(linked), len(self._state))
+                among[pool.entries["particle"]] = True
+            self._work = Work(np.flatnonzero(among), len(self._state))
             for pool in self._order:
                 pool.pack(self._work)
             self._few = len(self._work) < LINKS_ONE_THREAD_BELOW
+            self._join()
         self._work.begin(self._state, self._past)
         for pool in self._order:
             pool.begin()
-        self._broken = np.empty(0, BROKEN)
+        self._linked = None
         self._know_apart()
         changed, self._apart_changed = self._apart_changed, False
         return changed
+
+    def _join(self) -> None:
+        """Note what compiled code is handed, if chains and pins are all there is."""
+        chains: Any = next((pool for pool in self._order if isinstance(pool, ChainPool)), None)
+        pins: Any = next((pool for pool in self._order if isinstance(pool, PinPool)), None)
+        self._chains = None
+        if len(self._order) > (chains is not None) + (pins is not None):
+            return
+        chains, pins = chains or ChainPool(self._state.dtype), pins or PinPool()
+        for pool in (chains, pins):
+            if not len(pool.rows):
+                pool.pack(self._work)
+                pool.begin()
+        self._chains, self._pins = chains, pins
+
+    def compiled(self, state: Slots, h: float) -> tuple[Any, Any] | None:
+        """What `kernels.linked` is handed in the substeps of a frame, as plain tuples; None if Python is to call the stages.
+
+        Good as long as the order of the slots is.
+        """
+        if self._chains is None:
+            return None
+        chains = self._chains
+        self._work.slots(state)
+        if self._linked is None:
+            self._linked = (*self._work.arrays(), *chains.arrays(), *self._pins.arrays())
+        rest = REST_ACCELERATIONS * h
+        numbers = (h, *self._work.seam.period, self._iterations, int(chains.gives), int(chains.brittle), rest)
+        return self._linked, numbers
 
     def _know_apart(self) -> None:
         """Bring the pairs that are no contacts up to date, and note if they are others than before."""
@@ -189,6 +224,9 @@ class Links:
     def before(self, state: Slots, h: float) -> None:
         """Before the integrator: remember where the substep starts."""
         with self._threads():
+            if (given := self.compiled(state, h)) is not None:
+                linked.call_look(*given, state.position, state.velocity, state.inverse_mass)
+                return
             self._work.look(state, h)
             for pool in self._order:
                 pool.before(self._work, h)
@@ -196,52 +234,55 @@ class Links:
     def solve(self, state: Slots, h: float) -> None:
         """Move the linked particles to where their links allow, and break those that pull too hard."""
         with self._threads():
-            self._solve(state, h)
+            if (given := self.compiled(state, h)) is not None:
+                linked.call_solve(*given, state.position, state.velocity)
+            else:
+                self._solve(state, h)
 
     def _solve(self, state: Slots, h: float) -> None:
+        """`kernels.linked.solve`, with pools of other kinds."""
         work = self._work
         work.take(state)
         for pool in self._order:
             pool.tie(work, h)
         # There and back: one way only, the links about a common particle throw it in a circle, faster and faster.
-        pools = [pool for pool in self._order if pool.colours]
-        if len(pools) == 1:
-            pools[0].passes(work, self._iterations)
-        elif pools:
+        if pools := [pool for pool in self._order if pool.colours]:
             self._passes(pools)
         for pool in self._order:
-            snapped = pool.snap(work, h)
-            if len(snapped):
-                pool.snapped = True
-                self._broken = np.concatenate((self._broken, self._note(pool, snapped)))
+            pool.note(work, h)
         work.give(state, h)
 
     def _passes(self, pools: list[Pool]) -> None:
-        """Of several pools: all of them there, and all of them back."""
+        """All of them there, and all of them back."""
         work = self._work
         for pool in pools:
             pool.ahead(work)
-        for _ in range(self._iterations):
+        several = sum(pool.colours for pool in pools) > 1
+        for _ in range(self._iterations if several else 1):
             for pool in pools:
                 pool.sweep(work, back=False, skip=False)
-            for pool in reversed(pools):
+            for pool in reversed(pools) if several else ():
                 pool.sweep(work, back=True, skip=pool is pools[-1])  # its last colour has just been solved
 
-    def after(self, state: Slots) -> None:
+    def after(self, state: Slots, h: float) -> None:
         """After the contacts: what the links did is part of the acceleration, for integrators that remember it."""
         with self._threads():
-            self._work.after(state)
+            if (given := self.compiled(state, h)) is not None:
+                linked.call_note(*given, state.acceleration)
+            else:
+                self._work.after(state, h)
 
     def scatter(self) -> None:
         """The frame is good: what it did to the links holds."""
         self._past = self._work.end(self._state) if self._order else None
+        self.broken = np.empty(0, BROKEN)
         for pool in self._order:
+            snapped = pool.broken()
+            if len(snapped):
+                self.broken = np.concatenate((self.broken, self._note(pool, snapped)))
+                # What is left is packed anew, as by `restore`: chains are cut where links have broken.
+                pool.stale = self._apart_stale = True
             pool.end()
-            # What is left is packed anew, as by `restore`: chains are cut where links have broken.
-            pool.stale |= pool.snapped
-            pool.snapped = False
-        self.broken = self._broken
-        self._apart_stale |= bool(len(self.broken))
 
     def _note(self, pool: Pool, snapped: Array) -> Array:
         """The BROKEN entries of these rows of a pool."""

@@ -48,11 +48,10 @@ class Work:
         self.compact = np.zeros(count, np.int64)
         self.compact[particle] = np.arange(len(particle))
         self.start, self.earlier, self.position, self.predicted = np.zeros((4, len(particle), 2))
-        self._where, self.pull, self._spare = np.zeros((3, len(particle), 2))
+        self._where, self.pull = np.zeros((2, len(particle), 2))
         self.weight = np.zeros(len(particle))
         self._slot = np.zeros(len(particle), np.int64)
         self._calm = np.full(len(particle), np.nan)
-        self._h = 0.0
         self.seam = NONE
         self._order: Array | None = None
 
@@ -65,7 +64,7 @@ class Work:
             self._order = state.particle
             slot_of = np.empty(len(state.particle), np.int64)
             slot_of[state.particle] = np.arange(len(slot_of))
-            self._slot = slot_of[self.particle]
+            self._slot[:] = slot_of[self.particle]
         return self._slot
 
     def begin(self, state: State, past: Past | None) -> None:
@@ -84,14 +83,18 @@ class Work:
         number, left = state.number[self.particle], state.position[self.particle]
         return Past(number, self.start.copy(), left, self._calm.copy())
 
+    def arrays(self) -> tuple[Array, ...]:
+        """As `kernels.linked.Linked` has them; the slots are right once `slots` has been asked."""
+        return (
+            self._slot, self.start, self.earlier, self.position, self.predicted, self.weight, self.pull, self._calm,
+        )  # fmt: skip
+
     def look(self, state: Slots, h: float) -> None:
         """Before the integrator: where they are, and where they were."""
-        slot, self._h = self.slots(state), h
-        before = self.start
-        self.start, self._spare = self._spare, before
+        slot = self.slots(state)
         links.look_back(
-            slot, state.position, state.velocity, state.inverse_mass, *self.seam.period, before, self._calm, h, self.start,
-            self.earlier, self.weight,
+            slot, state.position, state.velocity, state.inverse_mass, *self.seam.period, self._calm, h, self.start, self.earlier,
+            self.weight,
         )  # fmt: skip
 
     def take(self, state: Slots) -> None:
@@ -107,6 +110,6 @@ class Work:
         """Hand the result back."""
         links.hand_back(state.position, state.velocity, self.slots(state), self.position, self.predicted, 1 / h, self.pull)
 
-    def after(self, state: Slots) -> None:
+    def after(self, state: Slots, h: float) -> None:
         """After the contacts: what the links did is part of the acceleration, for integrators that remember it."""
-        links.add_pull(state.acceleration, self.slots(state), self.pull, self._calm, REST_ACCELERATIONS * self._h)
+        links.add_pull(state.acceleration, self.slots(state), self.pull, self._calm, REST_ACCELERATIONS * h)

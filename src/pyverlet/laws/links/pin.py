@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pyverlet.ground import checks
-from pyverlet.kernels import links, ties
+from pyverlet.kernels import ties
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import Array, Floats, Link, several, stiffness_of
 from pyverlet.laws.links._pool import Pool
@@ -67,7 +67,7 @@ class Pin(Link):
         return Pin
 
     def _new_pool(self) -> Pool:
-        return _PinPool()
+        return PinPool()
 
     def _columns(self) -> dict[str, Any]:
         return {
@@ -76,7 +76,7 @@ class Pin(Link):
         }  # fmt: skip
 
 
-class _PinPool(Pool):
+class PinPool(Pool):
     """Pins act on their particles alone, before the rows, which then feel a particle as heavy as its pin is stiff."""
 
     drawn = False
@@ -87,36 +87,43 @@ class _PinPool(Pool):
     def pack(self, work: Work) -> None:
         self.stale, self.changed = False, True
         self._particle = work.compact[self.entries["particle"]]
-        self._give, self._lam, self._last = np.zeros((3, len(self.rows)))
+        self._give, self._lam, self._last, self._force = np.zeros((4, len(self.rows)))
         self._offset = np.zeros((len(self.rows), 2))
+        self._intact = np.zeros(len(self.rows), np.uint8)
 
     def begin(self) -> None:
         if self.changed:
             self.gives, self.changed = bool(np.isfinite(self.rows["stiffness"]).any()), False
-        self._intact = self.rows["intact"].copy()
-        self._force = self.rows["force"].copy()
+        self._intact[:] = self.rows["intact"]
+        self._force[:] = self.rows["force"]
+
+    def arrays(self) -> tuple[Array, ...]:
+        """As `kernels.linked.Linked` has them."""
+        rows = self.rows
+        return (
+            self._particle, rows["point"], rows["stiffness"], rows["damping"], rows["strength"], self._intact, self._give,
+            self._offset, self._lam, self._last, self._force,
+        )  # fmt: skip
 
     def before(self, work: Work, h: float) -> None:
         pass
 
     def tie(self, work: Work, h: float) -> None:
-        rows, here = self.rows, work.start[self._particle]
-        self._point = here + work.seam.nearest(rows["point"] - here)
+        rows, about = self.rows, (self._particle, self.rows["point"], *work.seam.period)
         ties.tie(
-            work.position, work.weight, work.start, work.earlier, self._particle, self._point, rows["stiffness"], rows["damping"],
-            self._intact, h, self._give, self._offset,
+            work.position, work.weight, work.start, work.earlier, *about, rows["stiffness"], rows["damping"], self._intact, h,
+            self._give, self._offset,
         )  # fmt: skip
 
     def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
         pass
 
-    def snap(self, work: Work, h: float) -> Array:
-        before = self._intact.copy()
-        pulled = (self._intact, self._give, self._offset, self._lam)
-        ties.pull_of_ties(work.position, self._particle, self._point, *pulled)
-        links.note_force(self._force, self._last, self._lam, h)
-        links.snap(self._force, self.rows["strength"], self._intact)
-        return np.flatnonzero(before != self._intact)
+    def note(self, work: Work, h: float) -> None:
+        about = (self._particle, self.rows["point"], *work.seam.period, self.rows["strength"], self._intact)
+        ties.note_ties(work.position, work.start, *about, h, self._give, self._offset, self._lam, self._last, self._force)
+
+    def broken(self) -> Array:
+        return np.flatnonzero(self._intact != self.rows["intact"])
 
     def pulled(self) -> Array:
         return self._force

@@ -1,0 +1,128 @@
+"""What links do in a substep, each part of it one call: `look` before the integrator moves, `solve` after the contacts, `note`
+when velocities are done.
+
+For links of two particles' distance, and pins; rows of other kinds have Python call the same stages one by one.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from pyverlet.compile.bundle import bundle
+from pyverlet.compile.jit import driver
+from pyverlet.kernels.chain_rows import note_force, prepare, snap
+from pyverlet.kernels.chains import passes
+from pyverlet.kernels.links import add_pull, hand_back, look_back, take_twice
+from pyverlet.kernels.ties import note_ties, tie
+
+
+@bundle
+class Linked:
+    """The linked particles (`laws.links._work`), their chains (`_chains`) and pins (`pin`)."""
+
+    slot: Any
+    start: Any
+    earlier: Any
+    position: Any
+    predicted: Any
+    weight: Any
+    pull: Any
+    calm: Any
+    colour: Any
+    begin: Any
+    node: Any
+    holds: Any
+    lanes: Any
+    bowed: Any
+    row: Any
+    rooms: Any
+    wide: Any
+    strength: Any
+    tied: Any
+    point: Any
+    tie_stiffness: Any
+    tie_damping: Any
+    tie_strength: Any
+    tie_intact: Any
+    tie_give: Any
+    tie_offset: Any
+    tie_lam: Any
+    tie_last: Any
+    tie_force: Any
+
+
+class Linking(NamedTuple):
+    """Numbers of a substep. times: passes, there and back. gives, brittle: whether any chain has springs, or may break; rest: s,
+    see `kernels.links.add_pull`.
+    """
+
+    h: Any
+    period_x: Any
+    period_y: Any
+    times: Any
+    gives: Any
+    brittle: Any
+    rest: Any
+
+
+@driver
+def look(linked, linking, position, velocity, inverse_mass):
+    """Before the integrator: where everybody starts, and what each row is to satisfy. Arrays are by slot."""
+    look_back(
+        linked.slot, position, velocity, inverse_mass, linking.period_x, linking.period_y, linked.calm, linking.h, linked.start,
+        linked.earlier, linked.weight,
+    )  # fmt: skip
+    prepare(
+        linked.begin, linked.node, linked.holds, linked.bowed, linked.row, linked.start, linking.period_x, linking.period_y,
+        linked.earlier, linked.weight, linking.h,
+    )  # fmt: skip
+
+
+@driver
+def solve(linked, linking, position, velocity):
+    """Move the linked particles to where their links allow, and break those that pull too hard."""
+    take_twice(linked.position, linked.predicted, position, linked.slot)
+    tie(
+        linked.position, linked.weight, linked.start, linked.earlier, linked.tied, linked.point, linking.period_x,
+        linking.period_y, linked.tie_stiffness, linked.tie_damping, linked.tie_intact, linking.h, linked.tie_give,
+        linked.tie_offset,
+    )  # fmt: skip
+    passes(
+        linking.times, linking.gives, linked.colour, linked.begin, linked.node, linked.holds, linked.lanes, linked.bowed,
+        linked.row, linked.position, linking.period_x, linking.period_y, linked.weight, linked.rooms, linked.wide,
+    )  # fmt: skip
+    note_force(linked.row, linking.h)
+    if linking.brittle:
+        snap(linked.row, linked.strength)
+    note_ties(
+        linked.position, linked.start, linked.tied, linked.point, linking.period_x, linking.period_y, linked.tie_strength,
+        linked.tie_intact, linking.h, linked.tie_give, linked.tie_offset, linked.tie_lam, linked.tie_last, linked.tie_force,
+    )  # fmt: skip
+    hand_back(position, velocity, linked.slot, linked.position, linked.predicted, 1.0 / linking.h, linked.pull)
+
+
+@driver
+def note(linked, linking, acceleration):
+    """When velocities are done: what links did is part of the acceleration."""
+    add_pull(acceleration, linked.slot, linked.pull, linked.calm, linking.rest)
+
+
+# ---- called from Python, which has plain tuples ------------------------------------------------------------------------------
+
+
+@driver
+def call_look(linked, linking, position, velocity, inverse_mass):
+    """`look`."""
+    look(Linked(*linked), Linking(*linking), position, velocity, inverse_mass)
+
+
+@driver
+def call_solve(linked, linking, position, velocity):
+    """`solve`."""
+    solve(Linked(*linked), Linking(*linking), position, velocity)
+
+
+@driver
+def call_note(linked, linking, acceleration):
+    """`note`."""
+    note(Linked(*linked), Linking(*linking), acceleration)
