@@ -235,7 +235,6 @@ def test_what_is_wrong_is_one_sentence_with_its_line(run: Any, folder: Path, sou
         (["run", "cage", "--watch"], "watch is asked for with 'cage'; allowed is a sketch"),
         (["run", "balls.py", "--watch", "--seconds", "1"], "allowed is the page alone"),
         (["run", "balls.py", "--patience", "3", "--frames", "1"], "allowed is none without --watch"),
-        (["run", "balls.py", "--journal", "a.pvlog", "--integrators", "rk4,yoshida4"], "2 worlds of balls.py side by side"),
         (["new", "mine.txt"], "allowed is a name such as mysketch.py"),
         (["new", "nowhere/mine.py"], "cannot be written"),
         (["new", "mine.py", "--kind", "heap"], "'heap'"),

@@ -279,3 +279,9 @@ def test_a_sketch_answers_as_it_did(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     (tmp_path / "a.pvlog").write_text((tmp_path / "a.pvlog").read_text().replace(start, "0" * 16))
     with pytest.raises(DivergedError, match="draws by chance without a seed"):
         Script(tmp_path / "a.pvlog").run()
+    panels = scene.panels(integrators=(pv.RK4(), pv.Yoshida4()))
+    with (
+        Journal(tmp_path / "b.pvlog", dt=DT) as journal,
+        pytest.raises(pv.InputError, match=r"2 worlds of kicks\.py side by side"),
+    ):
+        journal.stage(Exhibit("kicks", panels, answers=scene.sketch))

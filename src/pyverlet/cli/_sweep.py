@@ -109,7 +109,7 @@ def show_world(
     folder: Folder,
     number: Annotated[int, typer.Argument(parser=options.whole, metavar="RUN", help="Its number in the table.")],
     port: Annotated[int, typer.Option(help="Of the page.", metavar="N")] = DEFAULT_PORT,
-    no_browser: Annotated[bool, typer.Option("--no-browser", help="Print the address only.")] = False,
+    no_browser: Annotated[bool, typer.Option("--no-open", "--no-browser", help="Do not open a browser tab.")] = False,
 ) -> None:
     """Show the world of a run on the live page, from its start."""
     from pyverlet.viewers import serve

@@ -49,7 +49,8 @@ class Watch:
     def __init__(self, start: State, forces: ForceSum, links: Links, room: Boundary) -> None:
         self._start, self._forces, self._links, self._room = start, forces, links, room
         self._gravity = forces.gravity
-        self._plain = len(start) < ONE_THREAD_BELOW and not (forces.forces or links)
+        self._kept: list[Any] = [force for force in forces.forces if isinstance(force, Conservative)]
+        self._plain = len(start) < ONE_THREAD_BELOW and not (self._kept or links)
         # What links hold is not known any more when the frame is over.
         self._held = 0.0 if self._plain else self._holds(start)
         self._energy = 0.0 if self._plain else self._held + self._mechanical(start, self._gravity)
@@ -60,11 +61,10 @@ class Watch:
 
     def _holds(self, now: State | Slots) -> float:
         """Energy that forces and links hold, J."""
-        if not (self._forces.forces or self._links):
+        if not (self._kept or self._links):
             return 0.0
         state = now.in_users_order() if isinstance(now, Slots) else now
-        kept = (force for force in self._forces.forces if isinstance(force, Conservative))
-        return float(sum(force.potential(state) for force in kept) + self._links.energy(state))
+        return float(sum(force.potential(state) for force in self._kept) + self._links.energy(state))
 
     def _gained(self, now: Slots) -> float:
         """What the energy of all is now above that at the start, J."""
@@ -147,14 +147,13 @@ class Watch:
     def _pulls(self, slots: Slots, mass: Array) -> tuple[Array, Array]:
         """(n, 2) N, what gravity and forces with a potential do to each, at the start of the frame and now."""
         weight = mass[:, None] * self._forces.gravity
-        kept: list[Any] = [force for force in self._forces.forces if isinstance(force, Conservative)]
-        if not kept:
+        if not self._kept:
             return weight, weight
         now, pulls = slots.position, []
         for where in (self._start.position[slots.particle], now):
             slots.position = where
             slots.force.fill(0)
-            for force in kept:
+            for force in self._kept:
                 force.apply(slots, self._forces.t)
             pulls.append(weight + np.where(mass > 0, 1.0, 0.0)[:, None] * slots.force)
         slots.position = now
@@ -225,7 +224,7 @@ def undriven(world: Any, h: float, h_last: float | None) -> bool:
         return False
     if any(g != 0 and period > 0 for g, period in zip(world.gravity, world.boundary.seam.period, strict=True)):
         return False  # who falls for ever gains for ever
-    if world.forces and not all(isinstance(force, Conservative | Drag) for force in world.forces):
+    if world.forces and not all(isinstance(force, Drag | Conservative) for force in world.forces):
         return False
     return not world.obstacles or not any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
 

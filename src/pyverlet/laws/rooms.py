@@ -178,7 +178,7 @@ class Circle(_Walls):
     def compiled(self, state: Slots) -> tuple[Any, tuple[float, ...]] | None:
         if type(self) is not Circle or self.moves:
             return None
-        if self.restitution == 0.0 == self.friction and state.smooth:
+        if self.restitution == 0.0 == self.friction and state.smooth and not len(state.spent):
             return frame.smooth_cage, (*self.center, self.radius)
         return frame.cage, (*self.center, self.radius, self.restitution, self.friction)
 

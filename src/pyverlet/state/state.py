@@ -262,8 +262,7 @@ class Slots:
             changed |= name in _LISTED and motion.differs(given, now)
             self._given[name] = (now[:1] if (now == now[:1]).all() else now).copy()
         for name in (*_SET, "grown"):
-            now = self._given.get(name, state.grown)  # one number, if it is that of all
-            np.take(now, self.particle, out=getattr(self, name), mode="clip")  # else it would make another array first
+            memory.take(self._given.get(name, state.grown), self.particle, getattr(self, name))  # one number, if that of all
         self.weigh()
         self.most_restitution, self.most_friction = (float(a.max(initial=-1.0)) for a in (self.restitution, self.friction))
         filters = (state.category != 1).any() or (state.mask != EVERYONE).any()

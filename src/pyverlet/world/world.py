@@ -131,7 +131,7 @@ class World(Measures, Queries, Doors):
         contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course or None
         lag, state.drop, state.h, run = integrator.velocity_lag * h, integrator.drop, h, self._run.begin(contacts)
         parts: list[Any] = [part for part in (contacts, links, course) if part]
-        compiled = contacts and not (links or course) and done == self.profile.mark
+        compiled = contacts and not links and run.tells(done, self.profile.mark)
         if not self._open(h, done):
             return
         watch, substep = self._watch(h) if contacts or course else None, 0
