@@ -66,17 +66,17 @@ def worlds(most: int) -> dict[str, pv.World]:
     return found
 
 
-def check(expected: dict[str, str]) -> None:
-    for threads in (1, 2):
-        assert in_another_process(list(expected), threads) == expected, f"{threads} threads"
+# Worlds this small have had one thread.
+THREADS = pytest.mark.parametrize("threads", [2, pytest.param(1, marks=pytest.mark.slow)])
 
 
-def test_every_scene_goes_on_with_the_same_bits(tmp_path: Path) -> None:
+@THREADS
+def test_every_scene_goes_on_with_the_same_bits(threads: int, tmp_path: Path) -> None:
     expected: dict[str, str] = {}
     for name, world in worlds(60).items():
         expected |= follow(name, world, tmp_path, frames=31, every=30)
     assert len(expected) > 2 * len(pv.scenes.SCENES)
-    check(expected)
+    assert in_another_process(list(expected), threads) == expected
 
 
 @pytest.mark.full
@@ -84,7 +84,8 @@ def test_every_scene_goes_on_with_the_same_bits_from_every_tenth_frame(tmp_path:
     expected: dict[str, str] = {}
     for name, world in worlds(3000).items():
         expected |= follow(name, world, tmp_path, frames=200, every=10)
-    check(expected)
+    for threads in (1, 2):
+        assert in_another_process(list(expected), threads) == expected, f"{threads} threads"
 
 
 # ---- features ----------------------------------------------------------------------------------------------------------
@@ -152,17 +153,19 @@ def crowded() -> pv.World:
 FEATURES = (rubbing, told, sleeping, uneven, pouring, linked, crowded)
 
 
-def test_all_that_is_remembered_is_kept(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("frames", "threads"), [(71, 2), *(pytest.param(141, n, marks=pytest.mark.slow) for n in (1, 2))])
+def test_all_that_is_remembered_is_kept(frames: int, threads: int, tmp_path: Path) -> None:
     expected: dict[str, str] = {}
     for make in FEATURES:
-        expected |= follow(make.__name__, make(), tmp_path, frames=141, every=70)
-    check(expected)
+        expected |= follow(make.__name__, make(), tmp_path, frames=frames, every=70)
+    assert in_another_process(list(expected), threads) == expected
 
 
+@pytest.mark.parametrize("seconds", [0.7, pytest.param(1.5, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("make", FEATURES)
-def test_what_a_world_says_of_itself_is_kept(make: Callable[[], pv.World], tmp_path: Path) -> None:
+def test_what_a_world_says_of_itself_is_kept(make: Callable[[], pv.World], seconds: float, tmp_path: Path) -> None:
     world = make()
-    world.run(seconds=1.5)
+    world.run(seconds=seconds)
     pv.save(world, tmp_path / "a.pvsnap")
     again = pv.load(tmp_path / "a.pvsnap", exact=True)
     for each in (world, again):
@@ -429,3 +432,9 @@ def test_warnings_are_of_a_kind_of_their_own() -> None:
     assert issubclass(snapshot.OtherBits, UserWarning)
     with warnings.catch_warnings():
         warnings.simplefilter("error", snapshot.OtherBits)
+
+
+def test_objects_are_several(tmp_path: Path) -> None:
+    pv.save(pv.World(), tmp_path / "a.pvsnap")
+    with pytest.raises(pv.InputError, match=r"objects is 3; allowed is a list"):
+        pv.load(tmp_path / "a.pvsnap", objects=3)  # type: ignore[arg-type]

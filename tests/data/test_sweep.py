@@ -151,6 +151,7 @@ test_sweep.small(test_sweep.Path(sys.argv[1]), {"friction": [0.0, 0.4], "seed": 
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 def test_killed_and_started_again_it_comes_to_the_same(tmp_path: Path) -> None:
     grid, whole, cut = {"friction": [0.0, 0.4], "seed": range(50)}, tmp_path / "whole", tmp_path / "cut"
@@ -187,6 +188,7 @@ def process(world: pv.World) -> int:
     return os.getpid()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 def test_processes_end_with_a_coordinator_that_is_killed(tmp_path: Path) -> None:
     script = tmp_path / "orphaned.py"
@@ -346,7 +348,7 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         code, text, _ = command("sweep", "verify", "study", "--rows", "2", *measure)
         assert (code, text.count("all as they were")) == (0, 1)
     shown: list[pv.World] = []
-    monkeypatch.setattr(viewers, "view", lambda world, **options: shown.append(world))
+    monkeypatch.setattr(viewers, "serve", lambda build, **options: shown.extend(build().panels.worlds))
     assert command("sweep", "show", "study", 3)[0] == 0
     assert shown[0].state_hash() == pv.scenes.get("box").world(friction=0.5, seed=2, particles=8).state_hash()
     row = json.loads((tmp_path / "study" / "rows.jsonl").read_text().splitlines()[0])

@@ -140,6 +140,7 @@ def test_worlds_whose_particles_come_and_go() -> None:
     assert (many[2].velocity == 3.0).all()
 
 
+@pytest.mark.slow
 def test_a_process_that_is_killed_is_said_to_be() -> None:
     many = pv.Worlds("box", 2, processes=2, particles=5)
     assert many._crew is not None
@@ -156,12 +157,14 @@ print(many.position.shape)
 """
 
 
+@pytest.mark.slow
 def test_scripts_need_no_guard(tmp_path: Path) -> None:
     (tmp_path / "script.py").write_text(SCRIPT)
     run = subprocess.run([sys.executable, "script.py"], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
     assert (run.returncode, run.stdout.strip(), run.stderr) == (0, "(4, 5, 2)", "")
 
 
+@pytest.mark.slow
 def test_the_vector_env_of_the_examples() -> None:
     pytest.importorskip("gymnasium")
     made = runpy.run_path(str(EXAMPLES / "gym_vector_env.py"))

@@ -26,7 +26,12 @@ def blocks(page: Path, language: str) -> list[tuple[int, str]]:
 
 
 # Commands that take long for what others show too.
-SLOW = ("pyverlet bench --particles 20000", "pyverlet record galton ", "pyverlet record image image.png ")
+SLOW = (
+    "pyverlet bench --particles 20000", "pyverlet check fuzz ", "pyverlet check physics --only sliding-disc --only gas-energy",
+    "pyverlet order", "pyverlet sweep run box --vary friction=0,0.4", "pyverlet truth", "pyverlet record conveyor ",
+    "pyverlet record drum ", "pyverlet record galton ", "pyverlet record hourglass ",
+    "pyverlet record image boat.png ", "pyverlet record image image.png ", "pyverlet record soft-bodies ",
+)  # fmt: skip
 
 
 def commands() -> list[str]:

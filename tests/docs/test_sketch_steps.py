@@ -72,6 +72,7 @@ def test_changes_are_applied() -> None:
     assert changed("a\nb\nc\n", " b\n+d\n") == "a\nb\nd\nc\n"
 
 
+@pytest.mark.slow
 def test_every_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     chromium = shutil.which("chromium") or shutil.which("google-chrome") or shutil.which("chromium-browser")
     if chromium is None:

@@ -105,12 +105,13 @@ def seen_through(code: str, *arguments: str, library: str = "") -> str:
     return done.stdout
 
 
-@pytest.mark.parametrize("dtype", ["float32", "float64"])
+@pytest.mark.parametrize("dtype", ["float32", pytest.param("float64", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("library", "code"), [("pyglet", PYGLET), ("arcade", ARCADE)])
 def test_the_card_draws_the_circles(library: str, code: str, dtype: str) -> None:
     assert "seen" in seen_through(WORLD + code, dtype, library=library)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("library", "update"), [("pyglet", "update"), ("arcade", "on_update")])
 def test_the_example_runs(library: str, update: str) -> None:
     code = (

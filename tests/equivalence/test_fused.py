@@ -69,6 +69,15 @@ def heap(particles: int = 6000, seconds: float = SECONDS, **options: Any) -> pv.
     return world
 
 
+def fallen(seconds: float, **options: Any) -> pv.World:
+    """A block of 1,000 that falls into a cage."""
+    world = pv.World(boundary=pv.Circle(radius=26), **options)
+    world.add(position=np.stack(np.meshgrid(np.arange(40.0) - 20, np.arange(25.0) - 16), axis=-1).reshape(-1, 2), radius=0.45)
+    world.velocity[:] = np.random.default_rng(3).normal(0, 2, world.velocity.shape)
+    world.run(seconds=seconds)
+    return world
+
+
 def same(one: pv.World, other: pv.World) -> bool:
     return one.state_hash() == other.state_hash() and np.array_equal(one._slots.resting, other._slots.resting)
 
@@ -190,14 +199,85 @@ def test_whatever_more_there_is_goes_the_long_way(change: Any, fusing: Fusing) -
     assert same(world, changed(change, fusing))
 
 
-def test_a_force_is_asked_in_every_substep(fusing: Fusing) -> None:
-    def drag(world: pv.World) -> None:
-        world.forces.append(pv.Drag(linear=0.1))
+class Thrust:
+    """A force of one's own."""
 
-    world = changed(drag, fusing)
+    velocity_dependent = False
+
+    def apply(self, state: Any, t: float) -> None:
+        state.force[:, 0] += 0.1 * t * state.mass
+
+
+def test_a_force_of_ones_own_is_asked_in_every_substep(fusing: Fusing) -> None:
+    def thrust(world: pv.World) -> None:
+        world.forces += [pv.Drag(linear=0.1), Thrust()]
+
+    world = changed(thrust, fusing)
     assert (fusing.substeps, fusing.leaps) == (6 * world.substeps, 0)
     fusing.undo()
-    assert same(world, changed(drag, fusing))
+    assert same(world, changed(thrust, fusing))
+
+
+def below(world: pv.World) -> float:
+    """Where its lowest circles are."""
+    return float(world.position[:, 1].min())
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda world: world.forces.append(pv.Drag(linear=0.1)),
+        lambda world: world.forces.append(pv.Wind((3, 1), linear=0.1, quadratic=0.2)),
+        lambda world: world.forces.extend([pv.PointSpring(stiffness=3), pv.ConstantForce((1, 2)), pv.Attractor(strength=5)]),
+        lambda world: world.obstacles.append(pv.Segment((-9, below(world)), (9, below(world) + 1), restitution=0.3)),
+        lambda world: (world.obstacles.append(pv.Disc((0, below(world)), 1)), world.forces.append(pv.Drag(quadratic=0.1))),
+    ],
+    ids=["drag", "wind", "three forces", "segment", "disc and drag"],
+)
+@pytest.mark.parametrize("mu", [0.0, 0.5])
+def test_forces_of_few_numbers_and_obstacles_that_stand_still_go_along(change: Any, mu: float, fusing: Fusing) -> None:
+    def rough(world: pv.World) -> None:
+        world.collisions = pv.Collisions(friction=mu)
+        change(world)
+
+    world = changed(rough, fusing)
+    assert fusing.leaps == 6 * (world.substeps - 1)
+    assert world._slots.along.any() == bool(world.obstacles)  # somebody is held
+    fusing.undo()
+    assert same(world, changed(rough, fusing))
+    assert world._force_sum.t == changed(rough, fusing)._force_sum.t
+
+
+def test_forces_that_are_asked_leave_obstacles_to_compiled_code(fusing: Fusing) -> None:
+    def both(world: pv.World) -> None:
+        world.forces.append(Thrust())
+        world.obstacles.append(pv.Segment((-9, below(world)), (9, below(world) + 1), friction=0.3))
+
+    world = changed(both, fusing)
+    assert (fusing.substeps, fusing.leaps) == (6 * world.substeps, 0)
+    fusing.undo()
+    assert same(world, changed(both, fusing))
+
+
+@pytest.mark.parametrize("materials", [{}, {"restitution": 0.3, "friction": 0.5}], ids=["smooth", "both"])
+def test_a_ledger_has_the_same_accounts(materials: dict[str, float], fusing: Fusing) -> None:
+    def kept() -> pv.World:
+        return fallen(0.5, ledger=True, collisions=pv.Collisions(**materials))  # type: ignore[arg-type]
+
+    world = kept()
+    assert fusing.leaps > 0.9 * world.frames * (world.substeps - 1)
+    assert "ledger" in world.profile.stages
+    fusing.undo()
+    expected = kept()
+    assert same(world, expected)
+    assert world.ledger.as_dict() == expected.ledger.as_dict()
+
+
+def test_as_long_as_nobody_sleeps(fusing: Fusing) -> None:
+    world = fallen(0.2, sleep=True)
+    assert fusing.leaps > 0
+    fusing.undo()
+    assert same(world, fallen(0.2, sleep=True))
 
 
 @pytest.mark.parametrize(

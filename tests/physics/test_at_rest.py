@@ -19,7 +19,7 @@ def slot(count: int, **options: object) -> tuple[pv.World, pv.Group]:
 
 @pytest.mark.parametrize("integrator", [pv.PositionVerlet(), pv.integrators.TimeCorrectedVerlet()])
 @pytest.mark.parametrize("settings", [{}, {"friction": 0.5}, {"restitution": 0.5}, {"restitution": 0.5, "friction": 0.5}])
-@pytest.mark.parametrize("count", [1, 2, 5])
+@pytest.mark.parametrize("count", [1, 5, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_column_at_rest_reports_no_velocity(count: int, settings: dict[str, float], integrator: pv.Integrator) -> None:
     # Inside, a substep ends with (1 - PUSHED / FED) g h upwards, 0.6 or 0.7 g h, which the next one's gravity takes. A floor
     # without friction leaves the lowest circle with 0, so that the one above has up to 0.17 g h less.

@@ -18,10 +18,11 @@ def undamped(**options: object) -> pv.World:
     return pv.World(ledger=True, dtype=np.float64, **options)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("most", [100, pytest.param(300, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("name", scenes.SCENES)
-def test_the_accounts_add_up_to_the_energy_in_every_scene(name: str, dtype: type[np.float32]) -> None:
-    settings: dict[str, Any] = {"particles": min(scenes.get(name).defaults.particles, 300), "dtype": dtype, "ledger": True}
+def test_the_accounts_add_up_to_the_energy_in_every_scene(name: str, dtype: type[np.float32], most: int) -> None:
+    settings: dict[str, Any] = {"particles": min(scenes.get(name).defaults.particles, most), "dtype": dtype, "ledger": True}
     for panel in scenes.get(name).panels(**settings):
         world = panel.world
         scale = world.energy().kinetic + float(world.mass.sum() * G * np.ptp(world.position[:, 1]) + world.mass.sum() * G)

@@ -300,3 +300,23 @@ def test_nets_of_masses_one_to_a_thousand_bring_no_energy(seed: int) -> None:
         before, size = world.energy().total, scale(world, 1.0)
         world.step(1 / 60)
         assert world.energy().total - before <= 1e-4 * size
+
+
+def test_who_is_lowered_stays_in_the_room() -> None:
+    # Gravitation of points without a size: circles that pass each other are thrown with hundreds of m/s, that is taken back.
+    rng, n = np.random.default_rng(2146), 138
+    world = pv.World(boundary=pv.Box((-10, -10), (10, 10), friction=0.728), threads=1)
+    world.add(position=rng.uniform(-6.98, 6.98, (n, 2)), radius=0.0319, mass=1000 ** rng.random(n))
+    world.forces.append(pv.Gravitation(strength=0.5))
+    for _ in range(3):
+        world.step(1 / 15)
+        assert not world.boundary.outside(world.position).any()
+
+
+def test_nothing_is_taken_from_who_a_moving_pinned_circle_has_pushed() -> None:
+    # Infinite mass at 2 m/s strikes one at rest: v' = (1 + e) 2 m/s, from nothing that the world has.
+    world = pv.World(gravity=(0, 0), collisions=pv.Collisions(restitution=1.0), ledger=True, dtype=np.float64, threads=1)
+    world.add(position=[(0, 0), (1.5, 0)], velocity=[(2.0, 0), (0, 0)], radius=0.5, mass=[np.inf, 1.0])
+    world.run(seconds=1.0)
+    assert world.velocity[1] == pytest.approx([4.0, 0.0], rel=1e-12)
+    assert world.ledger.limiter == 0.0

@@ -31,7 +31,7 @@ def downward_crossings(t: Array, x: Array) -> Array:
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("amplitude", [0.05, 1.0, 2.0, 3.0])
+@pytest.mark.parametrize("amplitude", [0.05, 3.0, *(pytest.param(each, marks=pytest.mark.slow) for each in (1.0, 2.0))])
 def test_pendulum_keeps_the_period_of_the_elliptic_integral(amplitude: float, dtype: Any) -> None:
     # T = 4 sqrt(L / g) K(sin^2(amplitude / 2)). The method's own error is (w h)^2 / 24 = 2e-6; crossings between frames add 1e-5,
     # and near the top, at 3 rad, rounding in float32 moves the start by 1e-7 of an unstable position.
@@ -327,7 +327,7 @@ def loaded_pin(damping: float, **options: Any) -> tuple[pv.World, pv.Group, pv.P
     return world, column, world.links.append(pv.Pin(column, 0, point=(0, 0), compliance=1e-5, damping=damping))
 
 
-@pytest.mark.parametrize("substeps", [2, 8])
+@pytest.mark.parametrize("substeps", [2, pytest.param(8, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("damping", [0.0, 200.0, 2000.0])
 def test_a_soft_pin_under_a_pile_gives_what_its_compliance_says(damping: float, substeps: int) -> None:
     # At rest nothing moves: deflection = load * compliance, whatever the damping. Contacts carry the load by velocities that

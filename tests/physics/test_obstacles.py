@@ -260,6 +260,7 @@ json.dump(hashes, sys.stdout)
 """
 
 
+@pytest.mark.slow  # it compiles what many threads need
 def test_threads_do_not_change_a_bit() -> None:
     run = subprocess.run(
         [sys.executable, "-c", RUN_WITH_THREADS, os.path.dirname(os.path.dirname(pv.__file__))],  # noqa: PTH120
@@ -352,3 +353,11 @@ def test_bad_input_gets_one_sentence(case: str) -> None:
     with pytest.raises(pv.InputError, match=says) as caught:
         act()
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("add", [lambda obstacles, it: obstacles.append(it), lambda obstacles, it: obstacles.__iadd__([it])])
+def test_what_is_no_obstacle_is_refused(add: Any) -> None:
+    world = pv.World()
+    with pytest.raises(pv.InputError, match=r"obstacle is a Circle; allowed is an object such as pyverlet.Disc"):
+        add(world.obstacles, pv.Circle(radius=3))
+    assert world.obstacles == []

@@ -73,3 +73,13 @@ def test_what_was_saved_goes_on_with_the_same_bits() -> None:
     world.restore(saved)
     world.run(seconds=0.2)
     assert world.state_hash() == there
+
+
+def test_pegs_that_move_push_nobody_through_a_wall() -> None:
+    # Two of infinite mass on their way down, nearer to each other than what lies under them is wide: the room wins.
+    world = pv.World(boundary=pv.Box((-3, 0), (3, 6)), dtype=np.float64, threads=1)
+    world.add(position=[(-0.5, 1.6), (0.5, 1.6)], velocity=(0, -1.0), radius=0.3, mass=np.inf)
+    disc = world.add(position=[(0, 0.5)], radius=0.5)
+    for _ in range(90):
+        world.step(1 / 60)
+        assert disc.position[0, 1] > 0.5 * (1 - 1e-3)

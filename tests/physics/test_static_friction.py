@@ -34,7 +34,7 @@ def test_a_pyramid_falls_apart_below_tan_15_degrees() -> None:
     assert np.ptp(circles.position[:, 1]) < 0.1 * RADIUS
 
 
-@pytest.mark.parametrize("substeps", [4, 8, 16])
+@pytest.mark.parametrize("substeps", [8, *(pytest.param(each, marks=pytest.mark.slow) for each in (4, 16))])
 @pytest.mark.parametrize("name", pv.integrators.BY_NAME)
 def test_a_pyramid_stands_above_tan_15_degrees(name: str, substeps: int) -> None:
     world, circles = pyramid(1.1 * LIMIT)
@@ -48,6 +48,7 @@ def test_a_pyramid_stands_above_tan_15_degrees(name: str, substeps: int) -> None
 
 
 @pytest.mark.parametrize("method", [pv.Fast(skin=0.0), pv.BruteForce()])
+@pytest.mark.slow
 def test_a_pyramid_stands_while_the_list_is_made_anew(method: pv.Fast | pv.BruteForce) -> None:
     world, circles = pyramid(1.1 * LIMIT, method=method)
     start = circles.position.astype(float)

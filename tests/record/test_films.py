@@ -180,7 +180,7 @@ def test_ctrl_c_keeps_what_was_recorded(tmp_path: Path, suffix: str) -> None:
         assert durations_ms(path) == [20] * 20
 
 
-@pytest.mark.parametrize("suffix", [".mp4", ".gif", ".webp"])
+@pytest.mark.parametrize("suffix", [".mp4", *(pytest.param(each, marks=pytest.mark.slow) for each in (".gif", ".webp"))])
 @pytest.mark.skipif(os.name == "nt", reason="no limit on the size of files to set")
 def test_a_full_disk_keeps_what_was_recorded(tmp_path: Path, suffix: str) -> None:
     # A limit on the size of files stands for the full disk: writing fails at the same place, with an OSError as well.

@@ -19,7 +19,8 @@ def assert_binomial(counts: NDArray[np.float64], least: float) -> None:
     assert stats.chisquare(observed, wanted).pvalue > least
 
 
-@pytest.mark.parametrize("options", [{"particles": 100}, pytest.param({}, marks=pytest.mark.slow)], ids=["few", "all"])
+@pytest.mark.slow  # the test of the pegs alone has more of them
+@pytest.mark.parametrize("options", [{"particles": 100}, {}], ids=["few", "all"])
 def test_the_bins_of_a_galton_board_follow_the_binomial_law(options: dict[str, int]) -> None:
     scene = scenes.get("galton")
     settings = scene.settings(threads=1, **options)
@@ -95,6 +96,7 @@ def test_the_bodies_of_a_disc_keep_keplers_third_law() -> None:
     assert np.polyfit(np.log(axis), np.log(turned / world.time), 1)[0] == pytest.approx(-1.5, abs=0.02)
 
 
+@pytest.mark.slow
 def test_the_belts_carry_all_grains_into_the_pit() -> None:
     world = scenes.get("conveyor").world(particles=60, threads=1)
     world.run(seconds=60, dt=1 / 60)

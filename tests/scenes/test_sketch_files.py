@@ -13,6 +13,7 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.cli import main
+from pyverlet.data.sweep_open import open_study
 from pyverlet.ground.patience import Patience, TooLong
 from pyverlet.picture import LIGHT, Pen
 from pyverlet.picture.pen import Lettering, Stroke
@@ -109,8 +110,29 @@ def test_it_goes_wherever_a_scene_goes(run: Any, folder: Path) -> None:
     code, _, err = run(*study)
     assert code == 0, err
     assert "2 of 2 runs" in run("sweep", "status", "study")[1]
+    code, out, err = run("sweep", "verify", "study", "--rows", "2")
+    assert (code, out) == (0, "made again: runs 0, 1; all as they were\n"), err
     written(folder, BALLS.replace("-9.81", "-5"))  # another sketch now: not the same study
     assert run(*study)[0] == 2
+    assert "has changed since then" in run("sweep", "verify", "study")[2]
+    assert "2 of 2 runs" in run("sweep", "status", "study")[1]  # which needs no world
+
+
+def test_a_study_knows_its_sketch_and_its_defaults_wherever_that_is_now(folder: Path) -> None:
+    (folder / "there").mkdir()
+    path = written(folder / "there", BALLS.replace("particles=12", "seed=0, particles=4"))
+    study = pv.sweep(pv.scenes.read(path), {"seed": [1, 2], "dtype": ["float64"]}, seconds=0.1, out=folder / "study")
+    study.run(processes=1)
+    again = open_study(folder / "study")
+    assert again.verify(2).differ == []
+    world = again.world(1)
+    assert len(world) == 4
+    assert world.dtype.name == "float64"
+    path.rename(folder / "balls.py")
+    assert len(open_study("study").world(0)) == 4  # in this folder now
+    (folder / "balls.py").unlink()
+    with pytest.raises(pv.InputError, match=r"the sketch '.*balls.py' is not there any more"):
+        open_study("study").world(0)
 
 
 def test_every_build_starts_anew(folder: Path) -> None:
@@ -213,7 +235,6 @@ def test_what_is_wrong_is_one_sentence_with_its_line(run: Any, folder: Path, sou
         (["run", "cage", "--watch"], "watch is asked for with 'cage'; allowed is a sketch"),
         (["run", "balls.py", "--watch", "--seconds", "1"], "allowed is the page alone"),
         (["run", "balls.py", "--patience", "3", "--frames", "1"], "allowed is none without --watch"),
-        (["run", "balls.py", "--journal", "a.pvlog"], "which has functions or sliders"),
         (["new", "mine.txt"], "allowed is a name such as mysketch.py"),
         (["new", "nowhere/mine.py"], "cannot be written"),
         (["new", "mine.py", "--kind", "heap"], "'heap'"),

@@ -60,6 +60,18 @@ def test_a_frame_that_was_broken_off_is_not_counted() -> None:
     assert profile.total_ms["b"] == profile.stages["b"] < 10
 
 
+def test_compiled_code_notes_its_own_stages_whoever_was_first() -> None:
+    # Circles that grow have Python call the stages of the first frames, and name them.
+    world = pv.World(boundary=pv.Circle(radius=40))
+    world.add(position=[(0, 0), (0.5, 0), (3, 0), (4, 0)], radius=0.5, allow_overlap=True)
+    world.run(seconds=3)
+    assert (world._state.grown == 1).all()
+    world.step(1 / 60)
+    assert set(world.profile.stages) == {
+        "gather", "integrate", "broad phase", "contacts", "bounds", "velocities", "finish", "scatter",
+    }  # fmt: skip
+
+
 def test_a_frame_is_timed_by_stage() -> None:
     world = pv.World(boundary=pv.Circle(radius=40))
     side = np.arange(30) - 14.5

@@ -49,11 +49,21 @@ def said(code: str, cache: Path, **environment: str) -> str:
 @pytest.mark.parametrize(
     "when",
     [
-        "with jit.watch_compiling(lambda: os.kill(os.getpid(), signal.SIGKILL)): call()",
-        "os.replace = lambda *a: os.kill(os.getpid(), signal.SIGKILL); call()",
-        "real = os.replace\nos.replace = lambda a, b: (real(a, b), os.kill(os.getpid(), signal.SIGKILL)); call()",
+        pytest.param(
+            "with jit.watch_compiling(lambda: os.kill(os.getpid(), signal.SIGKILL)): call()",
+            id="compiling",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            "os.replace = lambda *a: os.kill(os.getpid(), signal.SIGKILL); call()",
+            id="before a file is there",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            "real = os.replace\nos.replace = lambda a, b: (real(a, b), os.kill(os.getpid(), signal.SIGKILL)); call()",
+            id="after the first file",
+        ),
     ],
-    ids=["compiling", "before a file is there", "after the first file"],
 )
 def test_killed_while_compiling_the_next_start_compiles(when: str, tmp_path: Path) -> None:
     with start(when, tmp_path) as process:
@@ -62,7 +72,7 @@ def test_killed_while_compiling_the_next_start_compiles(when: str, tmp_path: Pat
     assert said("call()", tmp_path) == SAID
 
 
-@pytest.mark.parametrize("harm", ["cut", "empty", "flipped"])
+@pytest.mark.parametrize("harm", ["cut", *(pytest.param(each, marks=pytest.mark.slow) for each in ("empty", "flipped"))])
 def test_half_a_file_is_compiled_anew(harm: str, tmp_path: Path) -> None:
     assert said("call()", tmp_path) == SAID
     kept = [path for path in tmp_path.rglob("*") if path.suffix in (".nbi", ".nbc")]
@@ -84,6 +94,7 @@ def test_a_full_disk_keeps_nothing_and_runs(tmp_path: Path) -> None:
 
 
 @posix
+@pytest.mark.slow
 def test_a_folder_that_may_only_be_read_runs(tmp_path: Path) -> None:
     assert said("call()", tmp_path) == SAID
     folders = [path for path in tmp_path.rglob("*") if path.is_dir()] + [tmp_path]
@@ -96,13 +107,15 @@ def test_a_folder_that_may_only_be_read_runs(tmp_path: Path) -> None:
             folder.chmod(0o755)
 
 
+@pytest.mark.slow
 def test_two_versions_share_a_folder(tmp_path: Path) -> None:
     other = "real = jit.sources_hash\njit.sources_hash = lambda root=None: 'f' * 16\njit.cache_dir.cache_clear()\n"
     assert said("call()", tmp_path) == said(other + "call()", tmp_path) == said("call()", tmp_path) == SAID
     assert len([path for path in tmp_path.iterdir() if path.is_dir()]) == 2
 
 
-@pytest.mark.parametrize("count", [2, pytest.param(8, marks=pytest.mark.slow)])
+@pytest.mark.slow  # test_two_processes_share_the_work has two
+@pytest.mark.parametrize("count", [2, 8])
 def test_first_starts_at_once(count: int, tmp_path: Path) -> None:
     processes = [start("call()", tmp_path) for _ in range(count)]
     told = [process.communicate(timeout=300) for process in processes]
@@ -110,12 +123,14 @@ def test_first_starts_at_once(count: int, tmp_path: Path) -> None:
     assert {out.strip() for out, _ in told} == {SAID}
 
 
+@pytest.mark.slow
 def test_no_shared_memory_is_needed(tmp_path: Path) -> None:
     # As if /dev/shm was not there: whatever asks for it fails.
     code = "import multiprocessing.synchronize as s\ndef no(*a, **k): raise OSError(38, 'no')\ns.SemLock.__init__ = no\ncall()"
     assert said(code, tmp_path) == SAID
 
 
+@pytest.mark.slow
 def test_one_core(tmp_path: Path) -> None:
     code = "import pyverlet as pv; call(); world = pv.World(); world.add(position=np.zeros((20000, 2))); print(world.threads)"
     assert said(code, tmp_path, NUMBA_NUM_THREADS="1").split() == [*SAID.split(), "1"]
@@ -147,7 +162,7 @@ def test_no_clock_that_can_be_set_times_the_page() -> None:
 
 
 @posix
-@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+@pytest.mark.parametrize("name", ["SIGTERM", pytest.param("SIGHUP", marks=pytest.mark.slow)])
 def test_a_closed_terminal_ends_a_run(name: str) -> None:
     command = [sys.executable, "-m", "pyverlet", "run", "cage", "--particles", "100", "--seconds", "100000"]
     ignored = signal.signal(getattr(signal, name), signal.SIG_DFL)  # as under `nohup`, which children would inherit
@@ -165,6 +180,7 @@ def test_a_closed_terminal_ends_a_run(name: str) -> None:
 
 
 @posix
+@pytest.mark.slow
 def test_killed_while_recording_what_was_recorded_plays(tmp_path: Path) -> None:
     av = pytest.importorskip("av")
     command = [sys.executable, "-m", "pyverlet", "record", "cage", "a.mp4", "--particles", "100", "--seconds", "10000",

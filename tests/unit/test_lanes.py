@@ -8,16 +8,15 @@ import numba
 import numpy as np
 import pytest
 
+from pyverlet.compile.bits import count_bits, lowest_bit, write_all, write_chosen
 from pyverlet.compile.jit import kernel
 from pyverlet.compile.lanes import (
     LANES,
     add_lanes,
     copy_row,
-    count_bits,
     larger,
     load,
     load_rows,
-    lowest_bit,
     pick,
     place,
     put,
@@ -30,8 +29,6 @@ from pyverlet.compile.lanes import (
     where_zero,
     which_above,
     widen,
-    write_all,
-    write_chosen,
 )
 
 DTYPES = [np.float32, np.float64]

@@ -33,7 +33,8 @@ def sheet(columns: int, rows: int, **options: Any) -> tuple[pv.World, pv.Group, 
     return world, group, n
 
 
-@pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
+@pytest.mark.slow  # it compiles what many threads need
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_any_number_of_threads_gives_the_same_bits(dtype: Any) -> None:
     hashes = []
     for threads in (1, 2):

@@ -38,8 +38,7 @@ except ValueError: print("none")
     assert told == "none"
 
 
-def test_who_waits_soon_sleeps_unless_the_user_has_said_otherwise() -> None:
-    code = """
+SPINS = """
 seen = []
 from pyverlet.compile import pool
 start = numba.get_num_threads
@@ -47,14 +46,21 @@ numba.get_num_threads = lambda: (seen.append(os.environ.get("GOMP_SPINCOUNT")), 
 world(2500)
 print(seen[0], os.environ.get("GOMP_SPINCOUNT"))
 """
-    assert run(code) == "5000 None"
-    assert run(code, GOMP_SPINCOUNT="7") == "7 7"
-    assert run(code, OMP_WAIT_POLICY="active") == "None None"
+
+
+def test_who_waits_soon_sleeps() -> None:
+    assert run(SPINS) == "5000 None"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "value", "said"), [("GOMP_SPINCOUNT", "7", "7 7"), ("OMP_WAIT_POLICY", "active", "None None")])
+def test_unless_the_user_has_said_otherwise(name: str, value: str, said: str) -> None:
+    assert run(SPINS, **{name: value}) == said
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
-@pytest.mark.parametrize("layer", ["default", "workqueue"])
-@pytest.mark.parametrize("before", ["world(2500)", "None"])
+@pytest.mark.parametrize("layer", ["default", pytest.param("workqueue", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("before", ["world(2500)", pytest.param("None", marks=pytest.mark.slow)])
 def test_a_fork_goes_on(layer: str, before: str) -> None:
     # GNU's OpenMP ends a fork that uses its threads when its parent has; a lock held by a thread that is not there never opens.
     told = run(
@@ -74,6 +80,7 @@ print(world(2500))
     assert told[0] == told[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["spawn", "fork"])
 def test_processes_of_multiprocessing(method: str, tmp_path: Path) -> None:
     if sys.platform == "win32" and method == "fork":
@@ -95,6 +102,7 @@ if __name__ == "__main__":
     assert done.stdout.strip() == "True", done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(jit.max_threads() < 2, reason="one core")
 def test_beside_threads_of_numpy_and_of_the_users_own_kernels() -> None:
     told = run("""

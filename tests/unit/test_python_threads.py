@@ -62,13 +62,14 @@ with ThreadPoolExecutor(4) as pool:
 """
 
 
-@pytest.mark.parametrize("layer", ["default", "workqueue"])
+@pytest.mark.parametrize("layer", ["default", pytest.param("workqueue", marks=pytest.mark.slow)])
 def test_each_thread_may_compile_the_first_kernels(layer: str, tmp_path: Path) -> None:
     env = {**os.environ, "NUMBA_THREADING_LAYER": layer, "NUMBA_NUM_THREADS": "2", "PYVERLET_CACHE_DIR": str(tmp_path)}
     run = subprocess.run([sys.executable, "-c", FIRST_KERNELS], env=env, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layer", ["default", "workqueue"])
 def test_each_thread_may_step_its_first_world(layer: str) -> None:
     env = {**os.environ, "NUMBA_THREADING_LAYER": layer, "NUMBA_NUM_THREADS": "2"}

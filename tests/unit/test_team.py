@@ -42,7 +42,7 @@ def run(team: Team, cores: int, machine: Machine, frames: int, seed: int) -> tup
 
 
 @pytest.mark.parametrize(("cores", "most"), [(2, 1.05), (4, 1.1), (16, 1.1)])
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(each, marks=pytest.mark.slow) for each in range(2, 5))])
 def test_a_quiet_machine_is_used(cores: int, most: float, seed: int) -> None:
     _, times = run(Team(), cores, quiet, 4000, seed)
     rng = np.random.default_rng(seed)
@@ -52,7 +52,7 @@ def test_a_quiet_machine_is_used(cores: int, most: float, seed: int) -> None:
 
 
 @pytest.mark.parametrize(("cores", "gain"), [(2, 1), (4, 3), (16, 15), (16, 4)])
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(each, marks=pytest.mark.slow) for each in range(2, 5))])
 def test_beside_other_programs_late_threads_are_left_out(cores: int, gain: int, seed: int) -> None:
     machine = busy(cores, gain)
     team = Team()

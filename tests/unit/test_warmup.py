@@ -84,19 +84,24 @@ print(len(ours), len(list(jit.cache_dir().rglob("compiled-float32/*"))) if jit.c
 """
 
 
+ACCIDENTS = {
+    "not started": "def fails(*a, **k): raise OSError('no more processes')\nsubprocess.Popen = fails",
+    "starts and fails": "os.environ['PYTHONHOME'] = '/nowhere'",
+    "killed": (
+        "start = warmup._Helper.__init__\ndef killed(self, *a): start(self, *a); self._process.kill()\n"
+        "warmup._Helper.__init__ = killed"
+    ),
+    "frozen": "warmup._Helper = None; sys.frozen = True",
+    "no Python": "warmup._Helper = None; sys.executable = ''",
+    "one core": "warmup._Helper = None; jit.max_threads = lambda: 1",
+    "nothing can be kept": "warmup._Helper = None; jit.cache_dir = lambda: None",
+}
+ALWAYS = "starts and fails"
+
+
 @pytest.mark.parametrize(
     "accident",
-    [
-        "def fails(*a, **k): raise OSError('no more processes')\nsubprocess.Popen = fails",
-        "os.environ['PYTHONHOME'] = '/nowhere'",
-        "start = warmup._Helper.__init__\ndef killed(self, *a): start(self, *a); self._process.kill()\n"
-        "warmup._Helper.__init__ = killed",
-        "warmup._Helper = None; sys.frozen = True",
-        "warmup._Helper = None; sys.executable = ''",
-        "warmup._Helper = None; jit.max_threads = lambda: 1",
-        "warmup._Helper = None; jit.cache_dir = lambda: None",
-    ],
-    ids=["not started", "starts and fails", "killed", "frozen", "no Python", "one core", "nothing can be kept"],
+    [pytest.param(code, id=name, marks=() if name == ALWAYS else pytest.mark.slow) for name, code in ACCIDENTS.items()],
 )
 def test_without_a_helper_everything_is_compiled_all_the_same(accident: str, tmp_path: Path) -> None:
     began, parts = run(f"{TINY}{accident}\n{COUNTED}", tmp_path, NUMBA_NUM_THREADS="2").split()

@@ -101,6 +101,7 @@ def status_view(page: Page) -> list[float]:
     return view
 
 
+@pytest.mark.slow
 def test_velocities_colours_zoom_and_time(page: Page, tmp_path: Path) -> None:
     world = pv.scenes.get("cage").world(particles=300)
     record.to_video(world, tmp_path / "heap.html", seconds=1, colour=BySpeed(), theme=LIGHT)
@@ -130,6 +131,7 @@ def test_velocities_colours_zoom_and_time(page: Page, tmp_path: Path) -> None:
     expect(page.get_by_test_id("sheet")).not_to_contain_text("gravity")
 
 
+@pytest.mark.slow
 def test_a_film_that_was_cut_off_plays_what_there_is(page: Page, tmp_path: Path) -> None:
     record.to_video(pv.scenes.get("box").world(particles=20), tmp_path / "a.html", seconds=3, fps=FPS)
     whole = (tmp_path / "a.html").read_bytes()
@@ -140,6 +142,7 @@ def test_a_film_that_was_cut_off_plays_what_there_is(page: Page, tmp_path: Path)
     seek(page, 119)
 
 
+@pytest.mark.slow
 def test_a_full_disk_leaves_the_seconds_before(page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     class Full(Disk):
         def write(self, data: bytes) -> int:
@@ -157,6 +160,7 @@ def test_a_full_disk_leaves_the_seconds_before(page: Page, tmp_path: Path, monke
     assert page.evaluate("() => pyverlet.player.reel.length") == kept
 
 
+@pytest.mark.slow
 def test_colours_of_ones_own_come_along(page: Page, tmp_path: Path) -> None:
     world = pv.scenes.get("box").world(particles=3)
     record.to_video(world, tmp_path / "a.html", seconds=0.1, colour=Fixed([(255, 0, 0), (0, 255, 0), (0, 0, 255)]))

@@ -79,7 +79,7 @@ def test_sigterm_ends_the_program_as_usual() -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="a browser that is a shell script")
-@pytest.mark.parametrize(("screen", "opens"), [({"DISPLAY": ":7"}, True), ({}, False)])
+@pytest.mark.parametrize(("screen", "opens"), [({"DISPLAY": ":7"}, True), pytest.param({}, False, marks=pytest.mark.slow)])
 def test_the_browser_opens_by_itself_where_there_is_a_screen(tmp_path: Path, screen: dict[str, str], opens: bool) -> None:
     browser, visited = tmp_path / "browser", tmp_path / "visited"
     browser.write_text(f'#!/bin/sh\necho "$1" > {visited}\n')

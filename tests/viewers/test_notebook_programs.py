@@ -110,6 +110,7 @@ def use(page: Page) -> None:
     page.wait_for_function("window.found.status().time < 1")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(missing("marimo"), reason="marimo is not installed")
 def test_marimo(tmp_path: Path, start: Start, tab: Page) -> None:
     (tmp_path / "cage.py").write_text(MARIMO)
@@ -119,6 +120,7 @@ def test_marimo(tmp_path: Path, start: Start, tab: Page) -> None:
     use(tab)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(missing("jupyterlab"), reason="JupyterLab is not installed")
 def test_jupyterlab(tmp_path: Path, start: Start, tab: Page) -> None:
     (tmp_path / "cage.ipynb").write_text(json.dumps(NOTEBOOK))

@@ -16,6 +16,7 @@ from playwright.sync_api import Browser, Page, Playwright, expect
 from .browser import FLAGS, NOTHING, Serve, chromium, comes_true, everywhere, number, pause, visit, where
 
 
+@pytest.mark.slow
 def test_fifty_frames_a_second_at_5000_circles(page: Page, program: Serve) -> None:
     visit(page, program("cage", 5000).address)
     assert page.evaluate("document.querySelector('#pyverlet').dataset.renderer") == "canvas"  # imitated hardware does not count
@@ -47,6 +48,7 @@ QUEUE = """async (quick) => {
 }"""
 
 
+@pytest.mark.slow
 def test_a_page_as_quick_as_its_screen_draws_all_but_what_always_waits(page: Page, program: Serve) -> None:
     visit(page, program("cage", 10).address)
     quick = page.evaluate(QUEUE, True)  # three wait, of which one is skipped every ten seconds
@@ -85,6 +87,7 @@ def test_pause_step_and_reset(page: Page, program: Serve) -> None:
     assert comes_true(page, lambda: number(page, "time") < 0.4)
 
 
+@pytest.mark.slow
 def test_sliders_of_gravity_and_substeps(page: Page, program: Serve) -> None:
     visit(page, program("cage", 500).address)
     expect(page.get_by_test_id("gravity")).to_have_value("9.81")
@@ -103,6 +106,7 @@ def test_sliders_of_gravity_and_substeps(page: Page, program: Serve) -> None:
     expect(page.locator("#substeps-value")).to_have_text("3")
 
 
+@pytest.mark.slow
 def test_two_tabs_and_a_reload(page: Page, browser: Browser, program: Serve) -> None:
     address = program("cage", 500).address
     visit(page, address)
@@ -132,6 +136,7 @@ def test_a_circle_follows_the_mouse_and_falls_when_let_go(page: Page, program: S
     assert comes_true(page, lambda: where(page, top)["top"] > start["top"] - 40)
 
 
+@pytest.mark.slow
 def test_shift_drag_pokes_a_hole(page: Page, program: Serve) -> None:
     visit(page, program("cage", 500).address)
     assert comes_true(page, lambda: number(page, "time") > 2)
@@ -163,6 +168,7 @@ def test_every_circle_is_drawn_where_it_is(page: Page, program: Serve, scheme: s
     assert circles_missing(page) == 0
 
 
+@pytest.mark.slow
 def test_without_bounds_the_view_follows_the_fall(page: Page, program: Serve) -> None:
     visit(page, program("fall", 1).address)
     assert comes_true(page, lambda: number(page, "time") > 1.5)
@@ -195,6 +201,7 @@ def test_worlds_side_by_side_have_names_energies_and_curves(page: Page, program:
     assert page.evaluate(drawn) == [True, True]
 
 
+@pytest.mark.slow
 def test_the_end_of_the_server_is_told(page: Page, program: Serve) -> None:
     server = program("cage", 100)
     visit(page, server.address)
@@ -217,6 +224,7 @@ def circles_missing(page: Page) -> int:
     return missing
 
 
+@pytest.mark.slow
 def test_webgl_points_draw_the_same_circles(playwright: Playwright, program: Serve) -> None:
     """On imitated hardware, which the page would not choose by itself: the shaders work."""
     browser = playwright.chromium.launch(executable_path=chromium(), args=[*FLAGS, "--enable-unsafe-swiftshader"])

@@ -12,6 +12,7 @@ from .browser import Serve, number, visit
 SIZES = [(1280, 800), (320, 640)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize("size", SIZES, ids=["wide", "phone"])
 def test_axe_finds_nothing(page: Page, program: Serve, size: tuple[int, int], theme: str) -> None:
@@ -26,6 +27,7 @@ def test_axe_finds_nothing(page: Page, program: Serve, size: tuple[int, int], th
     assert [(each["id"], each["impact"], [node["html"][:80] for node in each["nodes"]]) for each in found] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", SIZES, ids=["wide", "phone"])
 def test_all_of_it_is_within_reach(page: Page, program: Serve, size: tuple[int, int]) -> None:
     page.set_viewport_size({"width": size[0], "height": size[1]})

@@ -49,6 +49,7 @@ def test_gravity_has_a_strength_and_a_direction(page: Page, program: Serve) -> N
     assert comes_true(page, lambda: status(page)["gravity"][0] == pytest.approx(0, abs=1e-6))
 
 
+@pytest.mark.slow
 def test_substeps_restitution_friction_and_integrator(page: Page, program: Serve) -> None:
     visit(page, program("box", 60).address)
     expect(page.get_by_test_id("restitution")).to_have_value("0.5")
@@ -69,6 +70,7 @@ def test_substeps_restitution_friction_and_integrator(page: Page, program: Serve
     expect(page.get_by_test_id("integrator")).to_have_value("rk4")
 
 
+@pytest.mark.slow
 def test_the_ledger_says_where_the_energy_has_gone(page: Page, program: Serve) -> None:
     visit(page, program("box", 60, 150_000, 1).address)
     assert comes_true(page, lambda: number(page, "time") > 2)
@@ -93,12 +95,14 @@ def test_the_ledger_says_where_the_energy_has_gone(page: Page, program: Serve) -
     assert comes_true(page, lambda: status(page)["particles"] == 5000 and status(page)["ledger"] is not None)
 
 
+@pytest.mark.slow
 def test_a_world_without_a_ledger_shows_none(page: Page, program: Serve) -> None:
     visit(page, program("cage", 50).address)
     assert status(page)["ledger"] is None
     expect(page.get_by_test_id("ledger")).to_be_hidden()
 
 
+@pytest.mark.slow
 def test_what_a_world_lacks_is_not_offered(page: Page, program: Serve) -> None:
     visit(page, program("bounce-order", 1).address)
     expect(page.locator("#friction-field")).to_be_hidden()
@@ -106,6 +110,7 @@ def test_what_a_world_lacks_is_not_offered(page: Page, program: Serve) -> None:
     expect(page.locator("#restitution-field")).to_be_visible()
 
 
+@pytest.mark.slow
 def test_another_number_of_circles_and_another_scene(page: Page, program: Serve) -> None:
     visit(page, program("cage", 100).address)
     page.get_by_test_id("gravity").fill("5")
@@ -124,6 +129,7 @@ def test_another_number_of_circles_and_another_scene(page: Page, program: Serve)
     assert reads(page, "particles", 2000)
 
 
+@pytest.mark.slow
 def test_the_scene_image_shows_its_colours(page: Page, program: Serve) -> None:
     visit(page, program("image", 40).address)
     expect(page.get_by_test_id("colour")).to_have_value("picture")
@@ -140,7 +146,8 @@ def test_the_scene_image_shows_its_colours(page: Page, program: Serve) -> None:
     assert page.evaluate("() => window.pyverlet.ink(0)") != inks[0]
 
 
-@pytest.mark.parametrize("colouring", ["mass", *(pytest.param(each, marks=pytest.mark.slow) for each in ("speed", "energy"))])
+@pytest.mark.slow
+@pytest.mark.parametrize("colouring", ["mass", "speed", "energy"])
 def test_colours_say_what_they_say(page: Page, program: Serve, colouring: str) -> None:
     """Brighter and yellower for more: the palette's lightness grows along it."""
     page.emulate_media(color_scheme="dark")
@@ -201,6 +208,7 @@ def test_slow_motion(page: Page, program: Serve) -> None:
     expect(page.get_by_test_id("pace")).to_have_text(NOTHING)
 
 
+@pytest.mark.slow
 def test_pin_and_let_go(page: Page, program: Serve) -> None:
     visit(page, program("cage", 100).address)
     pause(page)
@@ -215,6 +223,7 @@ def test_pin_and_let_go(page: Page, program: Serve) -> None:
     assert comes_true(page, lambda: where(page, 99)["y"] < place["y"] - 1)
 
 
+@pytest.mark.slow
 def test_circles_are_added_one_by_one_and_poured(page: Page, program: Serve) -> None:
     visit(page, program("cage", 100).address)
     page.keyboard.press("4")
@@ -229,6 +238,7 @@ def test_circles_are_added_one_by_one_and_poured(page: Page, program: Serve) -> 
     assert reads(page, "particles", 100)
 
 
+@pytest.mark.slow
 def test_circles_are_erased_and_come_back(page: Page, program: Serve) -> None:
     visit(page, program("cage", 100).address)
     pause(page)
@@ -249,6 +259,7 @@ def test_circles_are_erased_and_come_back(page: Page, program: Serve) -> None:
     assert reads(page, "particles", 100)
 
 
+@pytest.mark.slow
 def test_zoom_move_and_fit(page: Page, program: Serve) -> None:
     visit(page, program("cage", 400).address)
     pause(page)
@@ -290,6 +301,7 @@ def test_zoom_move_and_fit(page: Page, program: Serve) -> None:
     assert where(page, 200)["left"] == pytest.approx(place["left"], abs=1)
 
 
+@pytest.mark.slow
 def test_velocities_and_contacts_are_drawn(page: Page, program: Serve) -> None:
     visit(page, program("box", 200).address)
     assert comes_true(page, lambda: number(page, "time") > 0.5)
@@ -345,6 +357,7 @@ def test_the_page_says_why_an_overlay_is_off(page: Page, program: Serve) -> None
         expect(page.locator(f"label:has(#{name})")).to_have_attribute("title", "")
 
 
+@pytest.mark.slow
 def test_dark_and_light(page: Page, program: Serve) -> None:
     visit(page, program("cage", 50).address)
 
@@ -358,6 +371,7 @@ def test_dark_and_light(page: Page, program: Serve) -> None:
     assert corner() > 0.8
 
 
+@pytest.mark.slow
 def test_the_sheet_lists_the_keys(page: Page, program: Serve) -> None:
     visit(page, program("cage", 50).address)
     page.keyboard.press("?")
@@ -411,7 +425,8 @@ def test_a_link_carries_scene_and_settings(page: Page, browser: Browser, program
 NONSENSE = ("scene=nowhere&particles=-5", "particles=1e99&gravity=a,b&substeps=x", "%%%", "integrator=<b>&colour=pink")
 
 
-@pytest.mark.parametrize("settings", [NONSENSE[0], *(pytest.param(each, marks=pytest.mark.slow) for each in NONSENSE[1:])])
+@pytest.mark.slow
+@pytest.mark.parametrize("settings", NONSENSE)
 def test_a_link_of_nonsense_does_no_harm(page: Page, program: Serve, settings: str) -> None:
     visit(page, program("cage", 50).address + "#" + settings)
     assert comes_true(page, lambda: number(page, "time") > 0.3)
@@ -419,6 +434,7 @@ def test_a_link_of_nonsense_does_no_harm(page: Page, program: Serve, settings: s
     assert status(page)["error"] is None
 
 
+@pytest.mark.slow
 def test_curves_and_stages(page: Page, program: Serve) -> None:
     visit(page, program("cage", 5000).address)
     assert comes_true(page, lambda: number(page, "time") > 1)
@@ -435,6 +451,7 @@ def test_curves_and_stages(page: Page, program: Serve) -> None:
     assert page.evaluate(drawn, "energy-chart") > 3
 
 
+@pytest.mark.slow
 def test_a_phone_has_a_drawer_and_fingers(playwright: Playwright, program: Serve) -> None:
     browser = playwright.chromium.launch(executable_path=chromium(), args=FLAGS)
     context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True, device_scale_factor=2)
@@ -474,6 +491,7 @@ def test_a_phone_has_a_drawer_and_fingers(playwright: Playwright, program: Serve
     browser.close()
 
 
+@pytest.mark.slow
 def test_large_worlds_are_drawn_by_the_server(page: Page, program: Serve) -> None:
     """Chosen by itself and shown; zoom, theme and colours reach the picture, and the mouse its circles."""
     page.emulate_media(color_scheme="dark")
@@ -507,6 +525,7 @@ def test_large_worlds_are_drawn_by_the_server(page: Page, program: Serve) -> Non
     expect(page.get_by_test_id("drawing")).to_have_text("Canvas2D")  # few enough again
 
 
+@pytest.mark.slow
 def test_circles_that_roll_have_marks(page: Page, program: Serve) -> None:
     visit(page, program("conveyor", 60).address)
     drawn = "() => window.pyverlet.overlay.marks"

@@ -21,7 +21,8 @@ def place(page: Page, x: float, y: float) -> list[float]:
     return found
 
 
-@pytest.mark.parametrize("size", [(1280, 800), pytest.param((390, 844), marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [(1280, 800), (390, 844)])
 def test_no_wall_runs_through_the_title(page: Page, program: Serve, size: tuple[int, int]) -> None:
     page.set_viewport_size({"width": size[0], "height": size[1]})
     visit(page, program("rope-bridge", 40).address)
@@ -37,17 +38,20 @@ def test_no_wall_runs_through_the_title(page: Page, program: Serve, size: tuple[
     assert page.evaluate("() => window.pyverlet.camera.part")[3] == pytest.approx(top)
 
 
+@pytest.mark.slow
 def test_where_only_a_part_of_a_room_is_on_show_it_has_all_the_height(page: Page, program: Serve) -> None:
     visit(page, program("image", 40).address)
     assert page.evaluate("() => window.pyverlet.camera.free.top") == 0
 
 
+@pytest.mark.slow
 def test_a_round_room_leaves_the_corner_to_the_title_and_has_all_the_height(page: Page, program: Serve) -> None:
     visit(page, program("cage", 40).address)
     free: dict[str, Any] = page.evaluate("() => window.pyverlet.camera.free")
     assert (free["top"], free["height"]) == (0, 800)
 
 
+@pytest.mark.slow
 def test_panels_have_their_names_on_a_phone(page: Page, program: Serve) -> None:
     page.set_viewport_size({"width": 390, "height": 844})
     visit(page, program("energy-10-substeps", 1).address)
@@ -58,6 +62,7 @@ def test_panels_have_their_names_on_a_phone(page: Page, program: Serve) -> None:
         assert energy["bottom"] <= strip["bottom"] + 0.5  # where its room begins
 
 
+@pytest.mark.slow
 def test_words_have_room_in_their_buttons(page: Page, program: Serve) -> None:
     visit(page, program("cage", 40).address)
     for name in ("fit", "copy", "help"):

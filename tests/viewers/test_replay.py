@@ -15,7 +15,23 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.cli import main
-from pyverlet.viewers.commands import Build, Delete, Drag, Pause, Pin, Poke, Release, Reset, SetFriction, SetGravity, Spawn, Step
+from pyverlet.viewers.commands import (
+    Build,
+    Click,
+    Delete,
+    Drag,
+    Key,
+    Pause,
+    Pin,
+    Poke,
+    Release,
+    Reset,
+    SetFriction,
+    SetGravity,
+    SetSlider,
+    Spawn,
+    Step,
+)
 from pyverlet.viewers.exhibit import Exhibit, Repertoire
 from pyverlet.viewers.journal import Journal
 from pyverlet.viewers.replay import DivergedError, EndError, ReplayStage, Script
@@ -202,3 +218,70 @@ def test_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert done["whole"]
     assert done["frames"] >= 60
     assert done["checked"] >= 2
+
+
+SKETCH = """
+import pyverlet as pv
+
+push = pv.slider("push", -5, 5, 1)
+breeze = pv.Wind((0, 0))
+kicks = []
+
+def build(particles=12, seed=0):
+    world = pv.World(boundary=pv.Box((0, 0), (10, 10)))
+    world.forces.append(breeze)
+    start = pv.fill(world.boundary, radius=0.3, count=particles, pattern="random", seed=seed)
+    world.add(position=start.position, radius=0.3)
+    return world
+
+def update(world, dt):
+    breeze.velocity = (push.value, len(kicks))
+    if len(kicks) > 2:
+        raise RuntimeError("three is too many")
+
+def keys(world, key):
+    kicks.append(key)
+    world.velocity[:, 1] += len(kicks)
+
+def click(world, point, button):
+    world.add(position=point, radius=0.5)
+
+def draw(world, pen):
+    pen.text((1, 1), str(len(world)))
+"""
+
+
+def test_a_sketch_answers_as_it_did(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "kicks.py").write_text(SKETCH)
+    scene = pv.scenes.read("kicks.py")
+    repertoire = Repertoire(scene, dt=DT, overrides={"particles": 9, "seed": 5, "substeps": 3})
+    monkeypatch.setitem(pv.scenes.SCENES, scene.name, scene)  # as `pyverlet run` does it
+    commands = [
+        Step(30), SetSlider("push", 4.0), Step(20), Key("a"), Step(10), Click(0, 5.0, 8.0, "left"), Step(30), Build("box", 20),
+        Step(5), Build("kicks", 7), Step(5), SetSlider("push", -2.0), Step(30), Key("b"), Step(60), Reset(), Step(5), Key("c"),
+        Step(3), Key("d"), Step(70),
+    ]  # fmt: skip
+    end = session_of(tmp_path / "a.pvlog", commands, repertoire.open(), repertoire=repertoire)
+    script = Script(tmp_path / "a.pvlog")
+    for _ in range(2):  # and nothing of the first time is left
+        done = script.run()
+        assert done["state_hash"] == end
+        assert done["checked"] == script.checks >= 4
+        assert "three is too many (update is not called any more)" in done["stopped"]
+    assert main(["replay", "a.pvlog", "--headless"]) == 0
+    source = (tmp_path / "kicks.py").read_text()
+    (tmp_path / "kicks.py").write_text(source + "# changed\n")
+    with pytest.raises(pv.InputError, match="has changed since then"):
+        script.run()
+    (tmp_path / "kicks.py").write_text(source)
+    start = json.loads((tmp_path / "a.pvlog").read_text().splitlines()[1])["worlds"][0]["hash"]
+    (tmp_path / "a.pvlog").write_text((tmp_path / "a.pvlog").read_text().replace(start, "0" * 16))
+    with pytest.raises(DivergedError, match="draws by chance without a seed"):
+        Script(tmp_path / "a.pvlog").run()
+    panels = scene.panels(integrators=(pv.RK4(), pv.Yoshida4()))
+    with (
+        Journal(tmp_path / "b.pvlog", dt=DT) as journal,
+        pytest.raises(pv.InputError, match=r"2 worlds of kicks\.py side by side"),
+    ):
+        journal.stage(Exhibit("kicks", panels, answers=scene.sketch))

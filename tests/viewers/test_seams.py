@@ -80,6 +80,7 @@ def test_pictures_have_both_halves() -> None:
     assert red.sum() == pytest.approx(discs, rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [1, 300])
 def test_the_gas_on_the_page(page: Page, program: Serve, size: int) -> None:
     """Its graph is there, and says what theory does; its circles are drawn, those at the seam twice."""
@@ -97,6 +98,7 @@ def test_the_gas_on_the_page(page: Page, program: Serve, size: int) -> None:
         expect(page.get_by_test_id("graph")).to_be_hidden()
 
 
+@pytest.mark.slow
 def test_a_film_of_one_file(page: Page, tmp_path: Path) -> None:
     """As the page, from positions alone: the disc at the left end is at the right end, too."""
     path = tmp_path / "a.html"

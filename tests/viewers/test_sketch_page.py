@@ -125,6 +125,7 @@ def has(page: Page, count: int) -> bool:
     return comes_true(page, lambda: number(page, "particles") == count)
 
 
+@pytest.mark.slow
 def test_saved_it_is_built_anew_and_the_page_stays(page: Page, sketching: Start) -> None:
     mine = sketching(drops(5), "--watch")
     visit(page, mine.address)
@@ -171,6 +172,7 @@ def test_saved_it_is_built_anew_and_the_page_stays(page: Page, sketching: Start)
     mine.end()
 
 
+@pytest.mark.slow
 def test_one_that_loops_for_ever_is_told_of(page: Page, sketching: Start) -> None:
     mine = sketching(drops(5), "--watch", "--patience", "1")
     visit(page, mine.address)
@@ -214,6 +216,7 @@ def test_one_that_is_wrong_from_the_start_comes_when_it_is_mended(page: Page, sk
     mine.end()
 
 
+@pytest.mark.slow
 def test_it_draws_and_answers(page: Page, sketching: Start) -> None:
     mine = sketching(drops(5).replace("lift.value - 9.81", "0"))
     visit(page, mine.address)
@@ -244,6 +247,7 @@ def test_it_draws_and_answers(page: Page, sketching: Start) -> None:
     mine.end()
 
 
+@pytest.mark.slow
 def test_a_still_picture_and_a_film_are_saved(page: Page, sketching: Start, tmp_path: Path) -> None:
     import av
     import numpy as np
@@ -280,6 +284,7 @@ def test_a_still_picture_and_a_film_are_saved(page: Page, sketching: Start, tmp_
     mine.end()
 
 
+@pytest.mark.slow
 def test_what_a_hand_has_done_can_be_undone(page: Page, sketching: Start) -> None:
     quiet = drops(5)[: drops(5).index("def keys")].replace("lift.value - 9.81", "0")
     mine = sketching(quiet)
@@ -340,6 +345,7 @@ def build():
 """
 
 
+@pytest.mark.slow
 def test_forces_are_drawn_as_wide_as_they_are(page: Page, sketching: Start) -> None:
     mine = sketching(COLUMN)
     visit(page, mine.address)
@@ -367,6 +373,7 @@ def test_forces_are_drawn_as_wide_as_they_are(page: Page, sketching: Start) -> N
     mine.end()
 
 
+@pytest.mark.slow
 def test_two_on_one_port(sketching: Start, tmp_path: Path) -> None:
     mine = sketching(drops(3), "--watch")
     port = mine.address.rstrip("/").rpartition(":")[2]

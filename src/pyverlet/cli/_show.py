@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pyverlet.cli import _print as out
-from pyverlet.ground.errors import InputError
 from pyverlet.ground.patience import Patience
 from pyverlet.ground.progress import Progress
 from pyverlet.laws.integrators import Integrator
@@ -32,10 +31,6 @@ def page(
     journal: Path | None,
 ) -> None:
     """Show the scene on the live page until Ctrl-C, and keep what happens there in a journal if one is asked for."""
-    if journal is not None and scene.sketch is not None and scene.sketch.answers:
-        raise InputError(
-            f"journal is '{journal}' for {scene.sketch.name}, which has functions or sliders; allowed is a scene without"
-        )
     if scene.sketch is not None:
         scene.sketch.patience = Patience()  # a screen waits for what is called with each picture
     from pyverlet.viewers import serve

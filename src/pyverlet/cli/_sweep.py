@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import itertools
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -18,6 +19,7 @@ from pyverlet.data.sweep import Measure, Status, Study
 from pyverlet.data.sweep import sweep as make
 from pyverlet.data.sweep_open import open_study
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.patience import Patience
 from pyverlet.viewers import DEFAULT_PORT
 
 FAILED = 1
@@ -107,12 +109,20 @@ def show_world(
     folder: Folder,
     number: Annotated[int, typer.Argument(parser=options.whole, metavar="RUN", help="Its number in the table.")],
     port: Annotated[int, typer.Option(help="Of the page.", metavar="N")] = DEFAULT_PORT,
-    no_browser: Annotated[bool, typer.Option("--no-browser", help="Print the address only.")] = False,
+    no_browser: Annotated[bool, typer.Option("--no-open", "--no-browser", help="Do not open a browser tab.")] = False,
 ) -> None:
     """Show the world of a run on the live page, from its start."""
-    from pyverlet.viewers import view
+    from pyverlet.viewers import serve
+    from pyverlet.viewers.exhibit import Exhibit
 
-    view(open_study(folder).world(number), port=port, open_browser=not no_browser)
+    study = open_study(folder)
+
+    def build() -> Exhibit:
+        return replace(Exhibit.of(study.world(number), f"{study.scene.name}, run {number}"), answers=study.scene.sketch)
+
+    if study.scene.sketch is not None:
+        study.scene.sketch.patience = Patience()  # a screen waits for what is called with each picture
+    serve(build, scene_name=study.scene.name, port=port, open_browser=not no_browser)
 
 
 def _tell(study: Study, as_json: bool, *, rows: bool = True) -> None:

@@ -150,11 +150,16 @@ _compiling = threading.RLock()
 _launching = threading.Lock()
 """Held by who launches threads where only one may: Numba's own pool, `workqueue`, ends the process when two do."""
 
+_chosen = threading.local()
+"""`wanted`: what `use_threads` was told by this thread."""
+
 
 def _free_locks() -> None:
     """A fork begins: whoever held them is not here."""
     global _compiling, _launching
     _compiling, _launching = threading.RLock(), threading.Lock()
+    if pool.usable(2) == 1:
+        _chosen.wanted = 1, False
 
 
 if hasattr(os, "register_at_fork"):
@@ -322,9 +327,6 @@ def max_threads() -> int:
     return int(numba.config.NUMBA_NUM_THREADS)
 
 
-_chosen = threading.local()
-
-
 def use_threads(count: int, most: int | None = None) -> None:
     """Let the parallel kernels called from this thread use `count` threads, in a fork of a process that had several one.
 
@@ -338,9 +340,9 @@ def use_threads(count: int, most: int | None = None) -> None:
 def _in_use() -> tuple[int, bool]:
     """How many threads the parallel kernels called from this thread use, and whether they run the code for several."""
     chosen: tuple[int, bool] | None = getattr(_chosen, "wanted", None)
-    if pool.usable(2) == 1:
-        return 1, False
     if chosen is None:
+        if pool.usable(2) == 1:
+            return 1, False
         pool.layer()
         chosen = int(numba.get_num_threads()), int(numba.get_num_threads()) > 1
     return chosen

@@ -68,7 +68,7 @@ for _symbol, _instruction in (
     _operator(_symbol, _instruction)
 
 
-def _order(lanes: Any) -> Any:
+def order(lanes: Any) -> Any:
     """Which lanes a shuffle picks."""
     lanes = list(lanes)
     return ir.Constant(ir.VectorType(_INT32, len(lanes)), lanes)
@@ -82,7 +82,7 @@ def spread(typing: Any, value: Any) -> Any:
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         empty = ir.Constant(context.get_value_type(lanes), ir.Undefined)
         first = builder.insert_element(empty, args[0], ir.Constant(_INT32, 0))
-        return builder.shuffle_vector(first, empty, _order([0] * LANES))
+        return builder.shuffle_vector(first, empty, order([0] * LANES))
 
     return lanes(value), generate
 
@@ -202,7 +202,7 @@ def which_above(typing: Any, a: Any, b: Any) -> Any:
     return types.int64(a, b), generate
 
 
-def _pointer(context: Any, builder: Any, array: Any, value: Any, index: Any, item: Any) -> Any:
+def pointer(context: Any, builder: Any, array: Any, value: Any, index: Any, item: Any) -> Any:
     """To array[index], as if the array were of `item`s."""
     data = context.make_array(array)(context, builder, value).data
     return builder.bitcast(builder.gep(data, [index]), item.as_pointer())
@@ -214,7 +214,7 @@ def load(typing: Any, array: Any, k: Any) -> Any:
     lanes = LanesType(array.dtype)
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        value = builder.load(_pointer(context, builder, array, args[0], args[1], context.get_value_type(lanes)))
+        value = builder.load(pointer(context, builder, array, args[0], args[1], context.get_value_type(lanes)))
         value.align = array.dtype.bitwidth // 8
         return value
 
@@ -226,7 +226,7 @@ def store(typing: Any, array: Any, k: Any, value: Any) -> Any:
     """array[k : k + LANES] = value, on an (n,) array."""
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        written = builder.store(args[2], _pointer(context, builder, array, args[0], args[1], context.get_value_type(value)))
+        written = builder.store(args[2], pointer(context, builder, array, args[0], args[1], context.get_value_type(value)))
         written.align = array.dtype.bitwidth // 8
         return context.get_dummy_value()
 
@@ -242,7 +242,7 @@ def load_rows(typing: Any, array: Any, k: Any) -> Any:
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         real = context.get_value_type(array.dtype)
         first = builder.shl(args[1], ir.Constant(args[1].type, 1))
-        rows = builder.load(_pointer(context, builder, array, args[0], first, ir.VectorType(real, 2 * LANES)))
+        rows = builder.load(pointer(context, builder, array, args[0], first, ir.VectorType(real, 2 * LANES)))
         rows.align = array.dtype.bitwidth // 8
         return context.make_tuple(builder, both, _columns(builder, rows))
 
@@ -252,14 +252,14 @@ def load_rows(typing: Any, array: Any, k: Any) -> Any:
 def _columns(builder: Any, rows: Any) -> list[Any]:
     """The eight x and the eight y of eight rows that follow each other."""
     empty = ir.Constant(rows.type, ir.Undefined)
-    return [builder.shuffle_vector(rows, empty, _order(range(axis, 2 * LANES, 2))) for axis in range(2)]
+    return [builder.shuffle_vector(rows, empty, order(range(axis, 2 * LANES, 2))) for axis in range(2)]
 
 
-def _picked(context: Any, builder: Any, array: Any, index: Any, args: Any) -> list[Any]:
-    """Pointers to the rows, or numbers, index[k], index[k + 1], ... of an (n, 2), or (n,), array."""
+def pointers(context: Any, builder: Any, array: Any, index: Any, args: Any, width: int = 2) -> list[Any]:
+    """Pointers to the rows, or numbers, index[k], index[k + 1], ... of an (n, width), or (n,), array."""
     zero, real = ir.Constant(_INT64, 0), context.get_value_type(array.dtype)
-    start = _pointer(context, builder, array, args[0], zero, ir.VectorType(real, 2) if array.ndim == 2 else real)
-    first = _pointer(context, builder, index, args[1], args[2], context.get_value_type(index.dtype))
+    start = pointer(context, builder, array, args[0], zero, ir.VectorType(real, width) if array.ndim == 2 else real)
+    first = pointer(context, builder, index, args[1], args[2], context.get_value_type(index.dtype))
     numbers = [builder.load(builder.gep(first, [ir.Constant(_INT64, lane)])) for lane in range(LANES)]
     return [builder.gep(start, [builder.zext(number, _INT64)]) for number in numbers]
 
@@ -272,11 +272,11 @@ def take(typing: Any, array: Any, index: Any, k: Any) -> Any:
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         parts = []
-        for row in _picked(context, builder, array, index, args):
+        for row in pointers(context, builder, array, index, args):
             parts.append(builder.load(row))
             parts[-1].align = array.dtype.bitwidth // 8
         while len(parts) > 1:
-            double = _order(range(2 * parts[0].type.count))
+            double = order(range(2 * parts[0].type.count))
             parts = [builder.shuffle_vector(a, b, double) for a, b in zip(parts[::2], parts[1::2], strict=True)]
         return context.make_tuple(builder, both, _columns(builder, parts[0]))
 
@@ -288,8 +288,8 @@ def put(typing: Any, array: Any, index: Any, k: Any, x: Any, y: Any) -> Any:
     """Rows index[k : k + LANES] of an (n, 2) array = (x, y). Lanes of one row must hold the same value."""
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        for lane, row in enumerate(_picked(context, builder, array, index, args)):
-            written = builder.store(builder.shuffle_vector(args[3], args[4], _order([lane, lane + LANES])), row)
+        for lane, row in enumerate(pointers(context, builder, array, index, args)):
+            written = builder.store(builder.shuffle_vector(args[3], args[4], order([lane, lane + LANES])), row)
             written.align = array.dtype.bitwidth // 8
         return context.get_dummy_value()
 
@@ -304,7 +304,7 @@ def copy_row(typing: Any, array: Any, k: Any, source: Any, i: Any) -> Any:
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         row = ir.VectorType(context.get_value_type(array.dtype), 2)
-        to, start = (_pointer(context, builder, a, args[n], ir.Constant(_INT64, 0), row) for n, a in ((0, array), (2, source)))
+        to, start = (pointer(context, builder, a, args[n], ir.Constant(_INT64, 0), row) for n, a in ((0, array), (2, source)))
         value = builder.load(builder.gep(start, [args[3]]))
         written = builder.store(value, builder.gep(to, [args[1]]))
         value.align = written.align = array.dtype.bitwidth // 8
@@ -320,7 +320,7 @@ def pick(typing: Any, array: Any, index: Any, k: Any) -> Any:
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         value = ir.Constant(context.get_value_type(lanes), ir.Undefined)
-        for lane, item in enumerate(_picked(context, builder, array, index, args)):
+        for lane, item in enumerate(pointers(context, builder, array, index, args)):
             value = builder.insert_element(value, builder.load(item), ir.Constant(_INT32, lane))
         return value
 
@@ -332,69 +332,8 @@ def place(typing: Any, array: Any, index: Any, k: Any, value: Any) -> Any:
     """array[index[k : k + LANES]] = value, on an (n,) array. Lanes of one item must hold the same value."""
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        for lane, item in enumerate(_picked(context, builder, array, index, args)):
+        for lane, item in enumerate(pointers(context, builder, array, index, args)):
             builder.store(builder.extract_element(args[3], ir.Constant(_INT32, lane)), item)
         return context.get_dummy_value()
 
     return types.void(array, index, k, value), generate
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def count_bits(typing: Any, bits: Any) -> Any:
-    """How many bits of a number are set."""
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.ctpop(args[0])
-
-    return bits(bits), generate
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def lowest_bit(typing: Any, bits: Any) -> Any:
-    """The number of the lowest bit of a number that is set; how many bits it has if none is."""
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.cttz(args[0], ir.Constant(ir.IntType(1), 0))
-
-    return bits(bits), generate
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def write_chosen(typing: Any, array: Any, where: Any, bits: Any, first: Any) -> Any:
-    """array[where], array[where + 1], ... = first + the number of each lane that is set in `bits`, on an (n,) array of 32 bits.
-
-    LANES items are written, whatever they are behind the chosen ones: cheaper than to ask of each lane whether it counts.
-    """
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        vector, rows = ir.VectorType(_INT32, LANES), 1 << LANES
-        picked = [[lane for lane in range(LANES) if row >> lane & 1] for row in range(rows)]
-        table = ir.Constant(ir.ArrayType(vector, rows), [ir.Constant(vector, (p + [0] * LANES)[:LANES]) for p in picked])
-        place = cgutils.global_constant(builder, "lanes chosen by bits", table)
-        chosen = builder.load(builder.gep(place, [ir.Constant(_INT64, 0), args[2]]))
-        written = builder.store(
-            builder.add(chosen, _spread_int(builder, args[3])), _pointer(context, builder, array, args[0], args[1], vector)
-        )
-        written.align = 4
-        return context.get_dummy_value()
-
-    return types.void(array, where, bits, first), generate
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def write_all(typing: Any, array: Any, where: Any, value: Any) -> Any:
-    """array[where : where + LANES] = value, on an (n,) array of 32 bits."""
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        vector = ir.VectorType(_INT32, LANES)
-        written = builder.store(_spread_int(builder, args[2]), _pointer(context, builder, array, args[0], args[1], vector))
-        written.align = 4
-        return context.get_dummy_value()
-
-    return types.void(array, where, value), generate
-
-
-def _spread_int(builder: Any, value: Any) -> Any:
-    empty = ir.Constant(ir.VectorType(_INT32, LANES), ir.Undefined)
-    first = builder.insert_element(empty, builder.trunc(value, _INT32), ir.Constant(_INT32, 0))
-    return builder.shuffle_vector(first, empty, _order([0] * LANES))

@@ -43,7 +43,8 @@ _ROWS = ".rows"
 """After the name of an array: its different rows."""
 
 _DTYPES = {"|b1", "|u1", "<u4", "<i4", "<i8", "<f4", "<f8"}
-_CHUNK = 1 << 22
+_CHUNK = 1 << 18
+"""Bytes at a time: in the cache of a core they are summed and copied sooner."""
 _BROKEN = (
     zipfile.BadZipFile, zlib.error, KeyError, TypeError, ValueError, EOFError, OSError, NotImplementedError, RuntimeError,
     RecursionError, OverflowError, AttributeError, IndexError, SyntaxError,

@@ -151,6 +151,10 @@ def load(path: str | Path, exact: bool = False, objects: Iterable[Any] = ()) -> 
         InputError: there is no such file, it is damaged or of a newer format, `exact` is not to be had, or an object is missing.
     """
     path = Path(path)
+    try:
+        objects = list(objects)
+    except TypeError:
+        raise InputError(f"objects is {objects!r}; allowed is a list of objects of your own") from None
     header, arrays = archive.read(path)
     try:
         return from_table(header, arrays, exact=exact, objects=objects)

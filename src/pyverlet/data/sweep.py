@@ -201,6 +201,11 @@ class Study:
         """The rows there are as a structured array: run, settings, what was measured, hashes, error, and who made it."""
         return sweep_rows.as_array(self._plan, self._table_rows(self._read()))
 
+    @property
+    def scene(self) -> Scene:
+        """Of all its worlds."""
+        return self._plan.scene
+
     def world(self, k: int) -> World:
         """The world of run k as it starts, to look at live: `pv.view(study.world(17))`."""
         return self._plan.world(self._run(k))
@@ -221,6 +226,8 @@ class Study:
         chosen = np.random.default_rng(seed).permutation(len(ready))[:most]
         picked = sorted((ready[k] for k in chosen), key=lambda run: run.number)
         differ = []
+        if self.scene.sketch is not None:
+            _ = self.scene.sketch.module  # one that is lost or has changed is told of, not a difference
         with Progress("verifying, run") as progress:
             for done, run in enumerate(picked):
                 row, told = sweep_run.one(self._plan, run), known.get(run.key)

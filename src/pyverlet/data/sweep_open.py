@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pyverlet.data.describe import TYPE, Builder
+from pyverlet.data.known_sketch import KnownSketch, value_of
 from pyverlet.data.sweep import Measure, Study, basics
-from pyverlet.data.sweep_plan import SCENE_FILE, Plan
+from pyverlet.data.sweep_plan import SCENE_FILE, SKETCH, Plan
 from pyverlet.ground.errors import InputError
-from pyverlet.scenes import Scene, Settings, get
-from pyverlet.scenes.sketch import Given, Sketch, SketchScene
+from pyverlet.scenes import Scene, get
 from pyverlet.world.world import World
 
 
@@ -22,7 +21,7 @@ def open_study(folder: str | Path, measure: Measure | None = None) -> Study:
     Args:
         folder: of the study.
         measure: the one it was made with. Nothing is imported because a file says so: without it the study can be looked at, and
-            verified but for what was measured.
+            verified but for what was measured. A sketch is run when a world is asked for, if it is what it was.
 
     Raises:
         InputError: there is none, or it is of a scene that only the program that made it knows.
@@ -31,12 +30,12 @@ def open_study(folder: str | Path, measure: Measure | None = None) -> Study:
     try:
         about = json.loads(path.read_text(encoding="utf-8"))
         told, settings, grid = about["measure"], about["settings"], about["grid"]
-        scene = _scene(about["scene"], folder)
+        scene = _scene(about["scene"], folder, about.get(SKETCH))
         known = measure or (basics if told == basics.__qualname__ else Unknown(told))
         plan = Plan(
             scene,
-            {name: [_value(name, value) for value in values] for name, values in grid.items()},
-            {name: _value(name, value) for name, value in settings.items()},
+            {name: [value_of(name, value) for value in values] for name, values in grid.items()},
+            {name: value_of(name, value) for name, value in settings.items()},
             known, about["frames"], about["dt"],
         )  # fmt: skip
         return Study(plan, Path(folder))
@@ -60,34 +59,13 @@ class Unknown:
         return {}
 
 
-class _Absent(Sketch):
-    """A sketch of which only the name is known, and what was in it; nothing is run because a file says so."""
-
-    def __init__(self, name: str, digest: str) -> None:
-        super().__init__(Path(name), b"")
-        self._digest = digest
-
-    @property
-    def digest(self) -> str:
-        return self._digest
-
-    def build(self, settings: Settings) -> World:
-        raise InputError(f"the study is of the sketch {self.name}; allowed is `pyverlet sweep run {self.name}` with its folder")
-
-
-def _scene(told: Any, folder: str | Path) -> Scene:
+def _scene(told: Any, folder: str | Path, place: str | None) -> Scene:
     if isinstance(told, str):
         return get(told)
     if "format" in told:  # a document: `Study` has written it there
         return get(str(Path(folder) / SCENE_FILE))
     if "sketch" in told:
-        absent = _Absent(told["sketch"], told["source"])
-        return SketchScene(told["name"], "", absent.build, Given(), sketch=absent)
+        name = told["sketch"]
+        sketch = KnownSketch(name, told["source"], Path(place or name), Path(), Path(folder).parent)
+        return replace(sketch.scene(), name=told["name"])
     raise InputError(f"'{folder}' is a study of a scene of its program's own; allowed is pyverlet.sweep with that scene")
-
-
-def _value(name: str, value: Any) -> Any:
-    """A setting as the scene takes it."""
-    if isinstance(value, Mapping) and TYPE in value:
-        return Builder().build(name, value, object)
-    return tuple(value) if isinstance(value, list) else value

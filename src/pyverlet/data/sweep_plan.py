@@ -25,6 +25,10 @@ SCENE_FILE = "scene.json"
 """In the folder of a study of a scene that was read from a file: a copy of that."""
 
 
+SKETCH = "sketch"
+"""Key of `plan.json`: where the study's sketch was. Studies that differ in this alone are one."""
+
+
 class Run(NamedTuple):
     """One run: its number in the grid, its key and its settings, as the scene takes them."""
 
@@ -64,6 +68,10 @@ class Plan:
             "frames": self.frames,
             "dt": self.dt,
         }
+
+    def beside(self) -> dict[str, Any]:
+        """What is kept with it, and makes it no other study."""
+        return {} if self.scene.sketch is None else {SKETCH: str(self.scene.sketch.path.resolve())}
 
     def described_grid(self) -> dict[str, Any]:
         """The grid as JSON has it."""

@@ -67,7 +67,7 @@ def open_folder(folder: Path, plan: Plan) -> None:
                 there, here = _briefly(theirs), _briefly(value)
                 other = f"is {there}, not {here}" if there != here else f"is another {there}"
                 raise InputError(f"'{folder}' has a study whose {name} {other}; allowed is a new folder")
-    wanted = json.dumps({**about, "grid": plan.described_grid()}, indent=1).encode() + b"\n"
+    wanted = json.dumps({**about, **plan.beside(), "grid": plan.described_grid()}, indent=1).encode() + b"\n"
     if known is None or path.read_bytes() != wanted:
         if known is None and getattr(plan.scene, "document", None) is not None:
             plan.scene.write(folder / SCENE_FILE)

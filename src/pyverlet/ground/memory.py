@@ -63,8 +63,12 @@ def room(worn: Array, count: int) -> Array:
 
 def taken(array: Array, index: Array) -> Array:
     """As array[index], of rows."""
-    result = empty((len(index), *array.shape[1:]), array.dtype)
-    return np.take(array, index, axis=0, out=result, mode="clip")  # by default it would make another array first
+    return take(array, index, empty((len(index), *array.shape[1:]), array.dtype))
+
+
+def take(array: Array, index: Array, out: Array) -> Array:
+    """array[index], of rows, in `out`; an index beyond the last row is the last: of one row, that is all there is."""
+    return np.take(array, index, axis=0, out=out, mode="clip")  # by default it would make another array first
 
 
 def mapped() -> int:

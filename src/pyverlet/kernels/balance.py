@@ -12,8 +12,9 @@ between a wall and a heavy one have their own small inertia against it, and cont
 
 from __future__ import annotations
 
+from pyverlet.compile.bits import lowest_bit
 from pyverlet.compile.jit import kernel
-from pyverlet.compile.lanes import LANES, load, lowest_bit, spread, which_above
+from pyverlet.compile.lanes import LANES, load, spread, which_above
 from pyverlet.kernels.clusters import join, settle
 from pyverlet.kernels.loans import PINNED
 from pyverlet.kernels.motion import IN_PILE
@@ -68,7 +69,8 @@ def note_walls(velocity, unpushed, inverse_mass, touched, root, sums, held):
     velocity: (n, 2) m/s, now. unpushed: the same before walls. held[i] becomes 1 if walls have pushed the cluster of i.
     """
     for i in range(root.shape[0]):
-        sums[i, _XX], sums[i, _XY], sums[i, _YY] = 0.0, 0.0, 0.0
+        if root[i] == i:
+            sums[i, _XX], sums[i, _XY], sums[i, _YY] = 0.0, 0.0, 0.0
     for i in range(root.shape[0]):
         dx, dy = velocity[i, 0] - unpushed[i, 0], velocity[i, 1] - unpushed[i, 1]
         if touched[i] and (dx != 0 or dy != 0 or touched[i] & PINNED) and inverse_mass[i] > 0:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from pyverlet.compile.bits import lowest_bit
 from pyverlet.compile.jit import kernel
-from pyverlet.compile.lanes import LANES, load, load_rows, lowest_bit, spread, which_above
+from pyverlet.compile.lanes import LANES, load, load_rows, spread, which_above
 
 
 @kernel

@@ -15,7 +15,7 @@ import numpy as np
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.compile.rounding import rounded
 from pyverlet.ground.constants import FED, PUSHED
-from pyverlet.kernels.beyond import beyond_box, beyond_circle
+from pyverlet.kernels.beyond import beyond_box
 
 _CHUNK = 1024
 """Circles one thread takes at a time."""
@@ -26,7 +26,7 @@ REFLECTIONS = 8
 # What is noted of a circle in `fed`: a contact at rest has fed its velocity, a wall has touched it; in this substep, or the last.
 CARRIES, AT_WALL, CARRIED, WAS_AT_WALL = 1, 2, 4, 8
 
-_LOADED = CARRIES | CARRIED | WAS_AT_WALL
+LOADED = CARRIES | CARRIED | WAS_AT_WALL
 
 
 class Body(NamedTuple):
@@ -160,7 +160,7 @@ def meet(b, nx, ny, depth, h, lag, e, mu, rest_speed):
     after = zero
     shift = depth
     # The wall of a pile carries it: the speed that the weight of others has fed is no arrival.
-    loaded = b.fed & _LOADED == _LOADED
+    loaded = b.fed & LOADED == LOADED
     if e * hit > rest_speed and vn < zero and not loaded:
         time = min(two * depth / (hit - vn), h)
         leaving = e * hit
@@ -240,7 +240,7 @@ def _bounced(b, px, py, back_x, back_y, h, lag, e, mu, rest_speed):
 
 
 @kernel
-def _at_cage(b, x0, y0, size, h, lag, e, mu, rest_speed):
+def at_cage(b, x0, y0, size, h, lag, e, mu, rest_speed):
     """The circle b is beyond the wall of the cage: what becomes of it."""
     zero = h - h
     half = h / (h + h)
@@ -301,39 +301,6 @@ def _at_box(b, x0, y0, x1, y1, h, lag, e, mu, rest_speed):
     # As in the cage: who is still beyond waits at the wall.
     x, y = min(max(b.x, x0 + r), x1 - r), min(max(b.y, y0 + r), y1 - r)
     return moved(b, x, y, b.vx, b.vy, b.from_x, b.from_y)
-
-
-@kernel
-def _circle_some(
-    x0, y0, size, first, stop, position, velocity, acceleration, spin, radius, inverse_mass, restitution,
-    friction, fed, resting, hits, spent, start, turn, lift, h, lag, e, mu, rest_speed,
-):  # fmt: skip
-    """What `circle` does, for the circles from `first` up to `stop`."""
-    resting[first:stop] = 0
-    found = np.empty(_CHUNK, np.uint32)
-    for k in range(beyond_circle(x0, y0, size, position, radius, inverse_mass, first, stop, found)):
-        i = found[k]
-        # Made here, and only for circles at a wall: a tuple is slow to hand over.
-        body = look(
-            i, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
-            start, turn, lift,
-        )  # fmt: skip
-        body = _at_cage(body, x0, y0, size, h, lag, e, mu, rest_speed)
-        put(i, body, position, velocity, spin, fed, resting, hits, spent, turn)
-
-
-@parallel_kernel
-def circle(
-    x0, y0, size, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits,
-    spent, start, turn, lift, h, lag, e, mu, rest_speed,
-):  # fmt: skip
-    """A cage: all circles stay inside that of radius `size` about (x0, y0). position to lift: what `look` takes."""
-    for chunk in prange((radius.shape[0] + _CHUNK - 1) // _CHUNK):
-        _circle_some(
-            x0, y0, size, chunk * _CHUNK, min((chunk + 1) * _CHUNK, radius.shape[0]), position, velocity, acceleration,
-            spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent, start, turn, lift, h, lag, e, mu,
-            rest_speed,
-        )  # fmt: skip
 
 
 @kernel

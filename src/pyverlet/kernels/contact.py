@@ -24,7 +24,6 @@ from pyverlet.compile.lanes import (
     larger,
     load,
     pick,
-    place,
     put,
     smaller,
     spread,
@@ -36,58 +35,70 @@ from pyverlet.compile.lanes import (
     where_zero,
     which_above,
 )
+from pyverlet.compile.rows import put_four, take_four
 from pyverlet.ground.constants import DEEP_PART, DEEP_SWEEPS, FED, GRIP, LARGEST_PUSH, PUSHED
 from pyverlet.kernels.bounce import treat
 from pyverlet.kernels.kinds import BOUNCES, RUBS, for_each_kind
 from pyverlet.kernels.motion import IN_PILE
 from pyverlet.kernels.tables import MASS, MU, NEW, R_I, R_J, TURN_I, TURN_J, E
 
+ANSWER = -GRIP * PUSHED / (3.0 * FED)
+"""Of what a contact has slipped: the push along the tangent that answers it."""
+
 
 def _push_strip(s, to, circles, pairs, law, looks):
     """The first sweep over strip s; normals go to `to` and up. If it `looks`, it notes in `deep` what overlaps deeply."""
-    moved, lane_i, lane_j = circles.moved, pairs.lane_i, pairs.lane_j
+    # Named here: in a loop each reading would count who holds the array.
+    moved, velocity, rows, carries = circles.moved, circles.velocity, circles.rows, circles.carries
+    lane_i, lane_j, gap, reach, share = pairs.lane_i, pairs.lane_j, pairs.gap, pairs.reach, pairs.share
+    made_of, normal, depths, slips, heard = pairs.made_of, pairs.normal, pairs.depth, pairs.slip, pairs.closing
     real = moved.dtype.type
     zero, one, limit = spread(real(0)), spread(real(1)), spread(law.deep)
     pushed, most, rest = spread(real(PUSHED)), spread(law.most), spread(law.rest_speed)
-    answer = spread(real(-GRIP * PUSHED / (3.0 * FED)))
+    answer = spread(real(ANSWER))
     begin, end, count = pairs.begin[s], pairs.begin[s] + pairs.lanes[s], 0
     close, to = begin + pairs.apart[s], to - begin
     spent = pairs.spent[s] if law.accounts != 0 else pairs.spent[0, :0]
     for k in range(begin, end, LANES):
         xi, yi = take(moved, lane_i, k)
         xj, yj = take(moved, lane_j, k)
-        dx, dy = load(pairs.gap[0], k) + (xj - xi), load(pairs.gap[1], k) + (yj - yi)
-        r, part = load(pairs.reach, k * law.varied), load(pairs.share, k * law.varied)
+        dx, dy = load(gap[0], k) + (xj - xi), load(gap[1], k) + (yj - yi)
+        r, part = load(reach, k * law.varied), load(share, k * law.varied)
         distance = square_root(dx * dx + dy * dy)
-        if (k < close or BOUNCES) and which_above(r, distance) == 0:
-            store(pairs.normal[0], to + k, zero)
-            store(pairs.normal[1], to + k, zero)
+        touching = which_above(r, distance)
+        if (k < close or BOUNCES) and touching == 0:
+            store(normal[0], to + k, zero)
+            store(normal[1], to + k, zero)
             if BOUNCES:
-                store(pairs.depth, k, zero)
+                store(depths, k, zero)
             continue
         done, at = 0, k * law.mixed
         mu = zero
         if BOUNCES:
-            e, mu = load(pairs.made_of[E], at), load(pairs.made_of[MU], at)
-            live = which_above(e + spread(law.grazes) * mu, zero)
+            e, mu = load(made_of[E], at), load(made_of[MU], at)
+            if RUBS:
+                sxi, syi, turned_i, carries_i = take_four(rows, lane_i, k)
+                sxj, syj, turned_j, carries_j = take_four(rows, lane_j, k)
+            else:
+                carries_i, carries_j = pick(carries, lane_i, k), pick(carries, lane_j, k)
+            free = one - carries_i * carries_j
+            # Where nothing accelerates, nothing that bounces rests: not even who moves alike is pushed, and fed.
+            restless = which_above(e, zero) if law.weight == 0 else 0
+            live = touching & which_above(e + spread(law.grazes) * mu, zero) & (which_above(free, zero) | restless)
             if live != 0 or law.listens != 0:
-                vxi, vyi = take(circles.velocity, lane_i, k)
-                vxj, vyj = take(circles.velocity, lane_j, k)
+                vxi, vyi = take(velocity, lane_i, k)
+                vxj, vyj = take(velocity, lane_j, k)
                 closing = zero - (dx * (vxj - vxi) + dy * (vyj - vyi))
-                touching = which_above(r, distance)
                 if law.listens != 0:
                     speed = larger(closing / where_zero(distance, r, distance), zero)
-                    heard = load(pairs.closing, k)
-                    store(pairs.closing, k, where_set(touching, larger(heard, speed), heard))
-                free = one - pick(circles.carries, lane_i, k) * pick(circles.carries, lane_j, k)
-                fast = which_above(free * larger(closing, zero - closing), rest * distance)
-                # Where nothing accelerates, nothing that bounces rests: not even who moves alike is pushed, and fed.
-                done = live & touching & (fast if law.weight != 0 else fast | which_above(e, zero))
+                    before = load(heard, k)
+                    store(heard, k, where_set(touching, larger(before, speed), before))
+                done = live & (which_above(free * larger(closing, zero - closing), rest * distance) | restless)
                 if done != 0:
                     done = treat(done, k, at, circles, pairs, law, spent)
                     xi, yi = take(moved, lane_i, k)
                     xj, yj = take(moved, lane_j, k)
-                    dx, dy = load(pairs.gap[0], k) + (xj - xi), load(pairs.gap[1], k) + (yj - yi)
+                    dx, dy = load(gap[0], k) + (xj - xi), load(gap[1], k) + (yj - yi)
                     distance = square_root(dx * dx + dy * dy)
         depth = where_set(done, zero, smaller(larger(r - distance, zero), most * r))
         dx = where_zero(distance, r, dx)
@@ -97,26 +108,24 @@ def _push_strip(s, to, circles, pairs, law, looks):
         push = pushed * depth
         cx, cy = nx * push, ny * push
         if BOUNCES:
-            store(pairs.depth, k, depth)
+            store(depths, k, depth)
             if RUBS and which_above(mu, zero) != 0:
                 # What the contact has slipped is answered as an overlap is, within the cone of friction.
-                slipped = load(pairs.slip, k)
+                slipped = load(slips, k)
                 cone = mu * push
                 rub = larger(smaller(answer * where_above(spread(real(NEW)), slipped, slipped, zero), cone), zero - cone)
-                store(pairs.held, k, rub)
                 # Beside the pushes, which it must not change: with it in `moved` single circles of rough piles spun for ever.
-                ui, wi = take(circles.slid, lane_i, k)
-                uj, wj = take(circles.slid, lane_j, k)
                 sx, sy = rub * ny, zero - rub * nx
-                put(circles.slid, lane_i, k, ui - sx * part, wi - sy * part)
-                put(circles.slid, lane_j, k, uj + sx * (one - part), wj + sy * (one - part))
-                turned_i, turned_j = pick(circles.turned, lane_i, k), pick(circles.turned, lane_j, k)
-                place(circles.turned, lane_i, k, turned_i + rub * load(pairs.made_of[TURN_I], at))
-                place(circles.turned, lane_j, k, turned_j + rub * load(pairs.made_of[TURN_J], at))
+                turned_i, turned_j = (
+                    turned_i + rub * load(made_of[TURN_I], at),
+                    turned_j + rub * load(made_of[TURN_J], at),
+                )
+                put_four(rows, lane_i, k, sxi - sx * part, syi - sy * part, turned_i, carries_i)
+                put_four(rows, lane_j, k, sxj + sx * (one - part), syj + sy * (one - part), turned_j, carries_j)
         put(moved, lane_i, k, xi - cx * part, yi - cy * part)
         put(moved, lane_j, k, xj + cx * (one - part), yj + cy * (one - part))
-        store(pairs.normal[0], to + k, where_zero(depth, zero, nx))
-        store(pairs.normal[1], to + k, where_zero(depth, zero, ny))
+        store(normal[0], to + k, where_zero(depth, zero, nx))
+        store(normal[1], to + k, where_zero(depth, zero, ny))
         if looks != 0 and which_above(depth, limit * r) != 0:
             pairs.deep[begin // LANES + count] = k
             count += 1
@@ -158,80 +167,78 @@ def refine_strip(s, circles, pairs, law):
     pairs.deeps[s] = count
 
 
-@kernel
-def _struck(bits, k, circles, pairs):
-    """Which of these pairs, that rested at their turn and now approach fast, do not both carry weight: one was struck since."""
-    struck = 0
-    for lane in range(LANES):
-        if (bits >> lane) & 1:
-            i, j = pairs.lane_i[k + lane], pairs.lane_j[k + lane]
-            if not circles.carries[i] * circles.carries[j] > 0:
-                struck |= 1 << lane
-    return struck
-
-
 def _relax_strip(s, to, circles, pairs, law):
     """The second sweep over strip s: no approach, and no slip but what friction cannot hold, between circles that touch."""
-    velocity, lane_i, lane_j = circles.velocity, pairs.lane_i, pairs.lane_j
+    # Named here: in a loop each reading would count who holds the array.
+    velocity, rows, moved, carries = circles.velocity, circles.rows, circles.moved, circles.carries
+    lane_i, lane_j, reach, share, made_of = pairs.lane_i, pairs.lane_j, pairs.reach, pairs.share, pairs.made_of
+    normal, depths, slips = pairs.normal, pairs.depth, pairs.slip
     real = velocity.dtype.type
     zero, one, third, half3 = spread(real(0)), spread(real(1)), spread(real(1) / real(3)), spread(real(1.5))
     new, feed, fed = spread(real(NEW)), spread(law.feed), spread(law.feed * real(PUSHED))
+    pushed, answer = spread(real(PUSHED)), spread(real(ANSWER))
     memory, rest = spread(real(3) * law.h / real(GRIP)), spread(law.rest_speed)
     begin, end = pairs.begin[s], pairs.begin[s] + pairs.lanes[s]
     close, to = begin + pairs.apart[s], to - begin
     taken = lever = 0.0
     for k in range(begin, end, LANES):
-        nx, ny = load(pairs.normal[0], to + k), load(pairs.normal[1], to + k)
-        part = load(pairs.share, k * law.varied)
+        nx, ny = load(normal[0], to + k), load(normal[1], to + k)
+        part = load(share, k * law.varied)
         if (k < close or RUBS) and which_above(nx * nx + ny * ny, zero) == 0:
             if RUBS:
-                store(pairs.slip, k, new)
+                store(slips, k, new)
             continue
-        xi, yi = take(velocity, lane_i, k)
-        xj, yj = take(velocity, lane_j, k)
+        if RUBS:
+            xi, yi, si, turn_i = take_four(rows, lane_i, k)
+            xj, yj, sj, turn_j = take_four(rows, lane_j, k)
+        else:
+            xi, yi = take(velocity, lane_i, k)
+            xj, yj = take(velocity, lane_j, k)
         vx, vy = xj - xi, yj - yi
         speed, at = vx * nx + vy * ny, k * law.mixed
         struck = 0
         if BOUNCES:
-            fast = which_above(zero - speed, rest) & which_above(load(pairs.made_of[E], at), zero)
-            if fast != 0:
-                struck = _struck(fast, k, circles, pairs)
+            fast = which_above(zero - speed, rest) & which_above(load(made_of[E], at), zero)
+            if fast != 0:  # has been struck since its turn in the first sweep, unless both carry weight
+                struck = fast & which_above(one - pick(carries, lane_i, k) * pick(carries, lane_j, k), zero)
                 speed = where_set(struck, zero, speed)
             if law.accounts != 0:  # what was fed, too, has pushed them apart
-                given = where_set(struck, zero, fed * load(pairs.depth, k)) - speed
-                squeezed = load(pairs.made_of[MASS], at) * load(pairs.reach, k * law.varied) * given
+                given = where_set(struck, zero, fed * load(depths, k)) - speed
+                squeezed = load(made_of[MASS], at) * load(reach, k * law.varied) * given
                 lever += add_lanes(squeezed, _distinct(lane_i, lane_j, k))
         cx, cy = speed * nx, speed * ny
         if RUBS:
-            mu = load(pairs.made_of[MU], at)
+            mu = load(made_of[MU], at)
             if which_above(mu, zero) != 0:
-                ri, rj = load(pairs.made_of[R_I], at), load(pairs.made_of[R_J], at)
-                depth, before, given = (
-                    where_set(struck, zero, load(pairs.depth, k)),
-                    load(pairs.slip, k),
-                    load(pairs.held, k) * feed,
-                )
-                si, sj = pick(circles.spin, lane_i, k), pick(circles.spin, lane_j, k)
+                ri, rj = load(made_of[R_I], at), load(made_of[R_J], at)
+                depth, before = load(depths, k), load(slips, k)
+                cone = mu * (pushed * depth)
+                given = feed * larger(smaller(answer * where_above(new, before, before, zero), cone), zero - cone)
+                depth = where_set(struck, zero, depth)
                 slides = vx * ny - vy * nx + si * ri + sj * rj
                 # As changes of the relative velocity: impulses times W. Together with what the push has given.
                 cone = mu * larger(depth * fed - larger(speed, zero), zero)
                 rub = larger(smaller(given - third * slides, cone), zero - cone) - given
                 if law.accounts != 0:
-                    mass = load(pairs.made_of[MASS], at)
+                    mass = load(made_of[MASS], at)
                     taken += add_lanes(mass * rub * (slides + half3 * rub), _distinct(lane_i, lane_j, k))
                 cx, cy = cx - rub * ny, cy + rub * nx
-                place(circles.spin, lane_i, k, si + rub * load(pairs.made_of[TURN_I], at))
-                place(circles.spin, lane_j, k, sj + rub * load(pairs.made_of[TURN_J], at))
+                turned_i, turned_j = rub * load(made_of[TURN_I], at), rub * load(made_of[TURN_J], at)
+                si, sj = si + turned_i, sj + turned_j
                 # Measured from where the substep started; the velocity would count feeds that have moved nobody yet.
-                ui, wi = take(circles.moved, lane_i, k)
-                uj, wj = take(circles.moved, lane_j, k)
-                rolled = pick(circles.turn, lane_i, k) * ri + pick(circles.turn, lane_j, k) * rj
+                ui, wi = take(moved, lane_i, k)
+                uj, wj = take(moved, lane_j, k)
+                rolled = turn_i * ri + turn_j * rj
                 slipped = before + (uj - ui) * ny - (wj - wi) * nx + rolled
                 most = cone * memory
                 slipped = where_above(new, before, larger(smaller(slipped, most), zero - most), zero)
-                store(pairs.slip, k, where_above(depth, zero, slipped, new))
-        put(velocity, lane_i, k, xi + cx * part, yi + cy * part)
-        put(velocity, lane_j, k, xj - cx * (one - part), yj - cy * (one - part))
+                store(slips, k, where_above(depth, zero, slipped, new))
+        if RUBS:
+            put_four(rows, lane_i, k, xi + cx * part, yi + cy * part, si, turn_i)
+            put_four(rows, lane_j, k, xj - cx * (one - part), yj - cy * (one - part), sj, turn_j)
+        else:
+            put(velocity, lane_i, k, xi + cx * part, yi + cy * part)
+            put(velocity, lane_j, k, xj - cx * (one - part), yj - cy * (one - part))
     if BOUNCES and law.accounts != 0:
         pairs.spent[s, 1] += taken
         pairs.spent[s, 2] += lever

@@ -7,25 +7,68 @@ stages in `world.profile`. A frame is compiled for a kind of room: `frames` has 
 
 from __future__ import annotations
 
-from pyverlet.compile.bundle import fields
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pyverlet.compile.bundle import borrowed, fields
 from pyverlet.compile.clock import note
-from pyverlet.compile.jit import driver, parallel_kernel, prange, variant
+from pyverlet.compile.jit import driver, kernel, parallel_kernel, prange, variant
 from pyverlet.compile.lanes import copy_row
-from pyverlet.kernels.bounds import box, circle
+from pyverlet.ground.constants import CARRIED_WEIGHT, REST_ACCELERATIONS
+from pyverlet.kernels.bounds import box
+from pyverlet.kernels.cage import confine as confine_in_cage
 from pyverlet.kernels.cage import hold
+from pyverlet.kernels.drive import drive
 from pyverlet.kernels.kinds import for_each_kind
+from pyverlet.kernels.measure import mechanical
+from pyverlet.kernels.meetings import collide
 from pyverlet.kernels.motion import leap
 from pyverlet.kernels.sweeps import push, relax
 from pyverlet.kernels.tables import Circles, Law, Pairs
 
-CONTACTS, BOUNDS, VELOCITIES, INTEGRATE = 1, 2, 3, 4
-STAGES = ("contacts", "bounds", "velocities", "integrate")
+CONTACTS, BOUNDS, VELOCITIES, INTEGRATE, OBSTACLES, LEDGER = range(1, 7)
+STAGES = ("contacts", "bounds", "velocities", "integrate", "obstacles", "ledger")
 """Names of the numbers above, less one, by which their time is noted."""
 
 NORMAL = fields(Pairs).index("normal")
 """Where in the tuple of `Pairs` the normals are."""
 
+SERVED = False
+"""Whether there may be more in a world than circles, a room and gravity: `Services`."""
+
 _CHUNK = 4096
+
+
+class Services(NamedTuple):
+    """What a world has beside circles, a room and gravity; empty arrays for what it has not.
+
+    h, lag: s, in float64. gravity: (x, y), m/s^2; down: the same in float64. forces: what `drive` takes, (kind, vector, number,
+    force, period_x, period_y), and ahead. course: what `meetings.collide` takes, (segments, bodies, cells, walls, along, rest,
+    drop). mass: (n,) kg. energies: (2 substeps,) J, becomes what `measure.mechanical` says after the integration of each substep,
+    but of the first and of the one that is handed back, and at its end.
+    """
+
+    h: Any
+    lag: Any
+    gravity: Any
+    down: Any
+    forces: Any
+    ahead: Any
+    course: Any
+    mass: Any
+    energies: Any
+
+
+@kernel
+def _felt(law, strongest, h, position):
+    """The law of a substep in which nobody feels more than `strongest`, m/s^2; h: in float64."""
+    g, real = np.float64(strongest), position.dtype.type
+    carried = CARRIED_WEIGHT * g * h if g > 0 else np.inf
+    return Law(
+        law.varied, law.mixed, law.asks, law.rubs, law.listens, law.accounts, law.arrives, law.h, law.lag, law.feed, law.most,
+        law.deep, real(REST_ACCELERATIONS * g * h), law.grazes, 1 if g > 0 else 0, real(carried),
+    )  # fmt: skip
 
 
 @parallel_kernel
@@ -58,7 +101,7 @@ def smooth_cage(room, circles, law, claims):
 @driver
 def cage(room, circles, law, claims):
     """(x, y, radius, e, mu) of a round room."""
-    circle(
+    confine_in_cage(
         room[0], room[1], room[2], circles.position, circles.velocity, circles.acceleration, circles.spin, circles.radius,
         circles.inverse_mass, circles.restitution, circles.friction, circles.fed, circles.resting, circles.hits, circles.spent,
         circles.start, circles.turn, circles.lift, law.h, law.lag, room[3], room[4], law.rest_speed,
@@ -80,48 +123,91 @@ def four_walls(room, circles, law, claims):
 
 def _project(circles, pairs, law, cut, looks, sets_out, claims):
     """The first sweep over the pairs, called from Python, which has plain tuples."""
-    push(Circles(*circles), Pairs(*pairs), Law(*law), cut, looks, sets_out, claims)
+    push(Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Law(*law), cut, looks, sets_out, claims)
 
 
 def _still(circles, pairs, law, cut, marks, claims):
     """The second one."""
-    relax(Circles(*circles), Pairs(*pairs), Law(*law), cut, marks, claims)
+    relax(Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Law(*law), cut, marks, claims)
 
 
-def _substeps(substep, stop, last, circles, pairs, law, room, cut, looks, sets_out, checked, far, claims, spent, clock):
+def _substeps(
+    substep, stop, last, circles, pairs, law, room, services, cut, looks, sets_out, checked, far, claims, spent, clock
+):  # fmt: skip
     """From after the integration of `substep`, whose list of pairs is good, up to the end of substep `stop` - 1.
 
-    last: the substep whose end is that of the frame. circles, pairs, law: `kernels.tables`. looks, sets_out: as for `push`, in
-    the first substep. checked, far: as for `leap`. spent, clock: as for `note`, (address, tick).
+    last: the substep whose end is that of the frame. circles, pairs, law: `kernels.tables`. services: `Services`, or nothing.
+    looks, sets_out: as for `push`, in the first substep. checked, far: as for `leap`. spent, clock: as for `note`, (address,
+    tick).
 
-    Returns the substep that is next, and whether it has been integrated and the list of pairs needs a look.
+    Returns the substep that is next, whether it has been integrated and the list of pairs needs a look, and if so under what
+    largest acceleration, m/s^2.
     """
-    circles, pairs, law = Circles(*circles), Pairs(*pairs), Law(*law)
+    circles, pairs, law = Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Law(*law)
+    strongest, begins = law.h - law.h, law.rubs != 0
+    if SERVED:
+        services = Services(*services)
+        kind, vector, number, force, period_x, period_y = services.forces
+        segments, bodies, cells, walls, along, rest, drop = services.course
+        gx, gy = services.gravity
+        begins = begins or segments.shape[0] > 0
     while True:
         push(circles, pairs, law, cut, looks, sets_out, claims)
         note(spent, CONTACTS, clock[0], clock[1])
         confine(room, circles, law, claims)  # noqa: F821  (`frames` says what that is)
         note(spent, BOUNDS, clock[0], clock[1])
+        if SERVED and segments.shape[0] > 0:
+            until = substep * services.h + services.h
+            collide(
+                segments, bodies, until, *cells, walls, along, rest, circles.position, circles.velocity, circles.acceleration,
+                circles.spin, circles.radius, circles.inverse_mass, circles.restitution, circles.friction,
+                circles.fed, circles.resting, circles.hits, circles.spent, circles.start, circles.turn, circles.lift, law.h,
+                law.lag, law.rest_speed, drop,
+            )  # fmt: skip
+            note(spent, OBSTACLES, clock[0], clock[1])
         relax(circles, pairs, law, cut, 1 if substep == last else 0, claims)
         note(spent, VELOCITIES, clock[0], clock[1])
+        if SERVED and services.energies.shape[0] > 0:
+            services.energies[2 * substep + 1] = mechanical(
+                circles.position, circles.velocity, circles.acceleration, services.lag, circles.spin, circles.radius,
+                services.mass, services.down[0], services.down[1],
+            )  # fmt: skip
+            note(spent, LEDGER, clock[0], clock[1])
         substep += 1
         if substep == stop:
-            return substep, False
-        if law.rubs != 0:
+            return substep, False, strongest
+        if begins:
             remember(circles.start, circles.position)
-        strayed = leap(
-            circles.position, circles.velocity, circles.acceleration, law.h, checked, far, circles.origin, circles.moved, claims
-        )
+        if SERVED and kind.shape[0] > 0:
+            strongest, strayed = drive(
+                circles.position, circles.velocity, circles.acceleration, circles.inverse_mass, kind, vector, number, force,
+                period_x, period_y, gx, gy, law.h, services.ahead, checked, far, circles.origin, circles.moved,
+            )  # fmt: skip
+            law = _felt(law, strongest, services.h, circles.position)
+        else:
+            strayed = leap(
+                circles.position, circles.velocity, circles.acceleration, law.h, checked, far, circles.origin, circles.moved,
+                claims,
+            )  # fmt: skip
         note(spent, INTEGRATE, clock[0], clock[1])
         looks, sets_out = 0, 0
         if strayed:
-            return substep, True
+            return substep, True, strongest
+        if SERVED and services.energies.shape[0] > 0:
+            services.energies[2 * substep] = mechanical(
+                circles.position, circles.velocity, circles.acceleration, services.lag, circles.spin, circles.radius,
+                services.mass, services.down[0], services.down[1],
+            )  # fmt: skip
+            note(spent, LEDGER, clock[0], clock[1])
 
 
 project = for_each_kind(driver, _project, push=push)
 still = for_each_kind(driver, _still, relax=relax)
 frames = {
-    room: for_each_kind(driver, variant(_substeps, room.function.__name__, confine=room), push=push, relax=relax)
-    for room in (open_space, smooth_cage, cage, four_walls)
-}
-"""Substeps in each kind of room, of each kind of world."""
+    (room, served): for_each_kind(
+        driver, variant(_substeps, f"{room.function.__name__}{'_served' * served}", confine=room, SERVED=served),
+        push=push, relax=relax,
+    )
+    for room in (open_space, smooth_cage, cage, four_walls) for served in (False, True)
+}  # fmt: skip
+"""Substeps in each kind of room, without and with services, of each kind of world."""

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from pyverlet.compile.bundle import borrowed
 from pyverlet.compile.jit import driver, kernel, parallel_kernel, prange
 from pyverlet.kernels.cage import hold_some
 from pyverlet.kernels.contact import mark_strip, push_strip, refine_strip, relax_strip
@@ -145,4 +146,4 @@ def _substep(cut, circles, pairs, law, room, strips):
 @driver
 def substep(cut, circles, pairs, law, room, strips):
     """What `_substep` does, called from Python, which has plain tuples."""
-    return _substep(cut, Circles(*circles), Pairs(*pairs), Law(*law), room, Strips(*strips))
+    return _substep(cut, Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Law(*law), room, Strips(*strips))

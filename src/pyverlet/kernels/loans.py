@@ -19,11 +19,18 @@ that momentum is.
 from __future__ import annotations
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
-from pyverlet.compile.lanes import LANES, larger, load, pick, place, smaller, spread, where_set, which_above
+from pyverlet.compile.lanes import LANES, larger, load, smaller, spread, where_above, where_set, which_above
+from pyverlet.compile.rows import put_four, take_four
 from pyverlet.ground.constants import LENT
 
 # What a circle touches: another that has not bounced off; a pinned one.
 TOUCHED, PINNED = 1, 2
+
+# Whether a circle lends: yes; not for now; never, and who touches it is told so.
+_LENDS, _WAITS, _PINNED = 0, 1, 2
+
+# Circles one thread takes at a time.
+_CHUNK = 1024
 
 # Of the own mass: less than this is no loan but the rounding of one.
 _NOTHING = 1e-7
@@ -75,45 +82,60 @@ def settle(position, velocity, acceleration, inverse_mass, lighter, held, touche
 
 
 @kernel
-def _share_strip(begin, end, lane_i, lane_j, normal, mass, inverse_mass, lent, busy, touched):
+def _gather(mass, inverse_mass, lent, busy, rows, a, b):
+    """rows: what each of the circles from a up to b has lent, kg, its mass, whether it lends; and that it touches nobody."""
+    none = lent.dtype.type(0)
+    for i in range(a, b):
+        waits = _PINNED if inverse_mass[i] == none else _WAITS if busy[i] > none else _LENDS
+        rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3] = lent[i], mass[i], waits, none
+
+
+@kernel
+def _scatter(rows, lent, touched, a, b):
+    """And what each has lent then, and whom it touches."""
+    for i in range(a, b):
+        lent[i], touched[i] = rows[i, 0], rows[i, 3]
+
+
+@kernel
+def _share_strip(begin, end, lane_i, lane_j, normal, rows):
     """The pairs that touch and have not bounced, in the lanes from `begin` up to `end`."""
-    real = mass.dtype.type
+    real = rows.dtype.type
     zero, half, least = spread(real(0)), spread(real(0.5)), spread(real(1 - LENT))
+    waiting, pinned = spread(real(_WAITS)), spread(real(_PINNED))
+    one, both = spread(real(TOUCHED)), spread(real(TOUCHED | PINNED))
     for k in range(begin, end, LANES):
         nx, ny = load(normal[0], k), load(normal[1], k)
         touches = which_above(nx * nx + ny * ny, zero)
         if touches == 0:
             continue
-        free = which_above(smaller(pick(inverse_mass, lane_i, k), pick(inverse_mass, lane_j, k)), zero)
-        for lane in range(LANES):
-            if (touches >> lane) & 1:
-                mark = TOUCHED | (0 if (free >> lane) & 1 else PINNED)
-                touched[lane_i[k + lane]] |= mark
-                touched[lane_j[k + lane]] |= mark
-        waits = which_above(larger(pick(busy, lane_i, k), pick(busy, lane_j, k)), zero)
-        lends = touches & free & ~waits
-        if lends != 0:
-            mi, mj = pick(mass, lane_i, k), pick(mass, lane_j, k)
-            li, lj = pick(lent, lane_i, k), pick(lent, lane_j, k)
-            flow = larger(smaller(half * ((mi + li) - (mj + lj)), (mi + li) - least * mi), least * mj - (mj + lj))
-            flow = where_set(lends, flow, zero)
-            place(lent, lane_i, k, li - flow)
-            place(lent, lane_j, k, lj + flow)
+        li, mi, waits_i, touched_i = take_four(rows, lane_i, k)
+        lj, mj, waits_j, touched_j = take_four(rows, lane_j, k)
+        waits = larger(waits_i, waits_j)
+        flow = larger(smaller(half * ((mi + li) - (mj + lj)), (mi + li) - least * mi), least * mj - (mj + lj))
+        flow = where_set(touches & which_above(waiting, waits), flow, zero)
+        mark = where_set(touches, where_above(pinned, waits, one, both), zero)
+        put_four(rows, lane_i, k, li - flow, mi, waits_i, larger(touched_i, mark))
+        put_four(rows, lane_j, k, lj + flow, mj, waits_j, larger(touched_j, mark))
 
 
 @parallel_kernel
-def share(begin, lanes, lane_i, lane_j, normal, cut, mass, inverse_mass, lent, busy, touched):
+def share(begin, lanes, lane_i, lane_j, normal, cut, mass, inverse_mass, lent, busy, touched, rows):
     """Even out the inertia of each touching pair that has not bounced; nobody lends more than the part LENT of the own mass.
 
-    touched[i], 0 before, gains TOUCHED for who is in such a pair, and PINNED if one of them is pinned. cut: as for
-    `kernels.sweeps.push`.
+    touched[i] becomes TOUCHED for who is in such a pair, with PINNED if one of them is pinned, else 0. cut: as for
+    `kernels.sweeps.push`. rows: (n, 4) scratch.
     """
+    count = mass.shape[0]
+    for c in prange((count + _CHUNK - 1) // _CHUNK):
+        _gather(mass, inverse_mass, lent, busy, rows, c * _CHUNK, min((c + 1) * _CHUNK, count))
     for parity in range(2):
         for part in prange(cut.shape[1] - 1):
             for half in range(cut[parity, part], cut[parity, part + 1]):
                 a = begin[2 * half + parity]
-                b = a + lanes[2 * half + parity]
-                _share_strip(a, b, lane_i, lane_j, normal, mass, inverse_mass, lent, busy, touched)
+                _share_strip(a, a + lanes[2 * half + parity], lane_i, lane_j, normal, rows)
+    for c in prange((count + _CHUNK - 1) // _CHUNK):
+        _scatter(rows, lent, touched, c * _CHUNK, min((c + 1) * _CHUNK, count))
 
 
 @kernel

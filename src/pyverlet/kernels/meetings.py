@@ -39,6 +39,9 @@ PARALLEL = 1e-4
 """Sine of the angle below which two surfaces that face each other count as parallel; and part of the speed that is no
 approach."""
 
+_BLOCK = 128
+"""Circles of which is asked first whether there is anything near one of them."""
+
 ROOM, NOBODY = -2, -1
 """Numbers that are no segment's."""
 
@@ -281,19 +284,43 @@ def _alone(px, py, qx, qy, x0, y0, cell, columns, rows, start):
     return start[c] == start[c + 1]
 
 
-@parallel_kernel
-def collide(
-    segments, bodies, until, x0, y0, cell, columns, rows, start, entries, room, along, rest,
+@kernel
+def _nobody(position, before, x0, y0, x1, y1, cell):
+    """Whether nothing can be near the ways of these circles: all are short, with their middles off the cells. Errs towards no."""
+    q, p = position.reshape(-1), before.reshape(-1)
+    near = False
+    for k in range(position.shape[0]):
+        i = np.uint64(2 * k)
+        j = i + np.uint64(1)
+        x, y = 0.5 * (p[i] + q[i]), 0.5 * (p[j] + q[j])
+        near |= not (abs(q[i] - p[i]) + abs(q[j] - p[j]) < cell)
+        near |= (x >= x0) & (x <= x1) & (y >= y0) & (y <= y1)
+    return not near
+
+
+@kernel
+def _forget(along, rest):
+    """Nobody of these has been met."""
+    one, other = along.reshape(-1), rest.reshape(-1)
+    for k in range(one.shape[0]):
+        one[k] = 0
+    for k in range(other.shape[0]):
+        other[k] = 0
+
+
+@kernel
+def _collide(
+    first, stop, segments, bodies, until, x0, y0, cell, columns, rows, start, entries, room, along, rest,
     position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
     before, turn, lift, h, lag, rest_speed, drop,
 ):  # fmt: skip
-    """All circles, from their places `before` the substep (n, 2) to `position`; `until`: seconds into the frame at its end.
-
-    room: its wall, which wins: (7,), see OPEN. along: (n, 2), becomes the acceleration left to those who are held, m/s^2, or 0.
-    rest: (n, 2), what rounding has taken from places in the substep before, and takes in this, m. drop: of the integrator.
-    """
+    """`collide`, of the circles from `first` up to `stop`."""
+    high_x, high_y = x0 + (columns + 1) * cell, y0 + (rows + 1) * cell  # one more, for rounding
+    if _nobody(position[first:stop], before[first:stop], x0, y0, high_x, high_y, cell):
+        _forget(along[first:stop], rest[first:stop])
+        return
     step = 0.5 * np.finfo(position.dtype).eps
-    for i in prange(position.shape[0]):
+    for i in range(first, stop):
         along[i, 0] = along[i, 1] = 0.0
         met = False
         if inverse_mass[i] > 0 and not _alone(
@@ -321,3 +348,22 @@ def collide(
                     rest[i, 0], rest[i, 1] = b.x - position[i, 0], b.y - position[i, 1]
         if not met:
             rest[i, 0] = rest[i, 1] = 0.0
+
+
+@parallel_kernel
+def collide(
+    segments, bodies, until, x0, y0, cell, columns, rows, start, entries, room, along, rest,
+    position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
+    before, turn, lift, h, lag, rest_speed, drop,
+):  # fmt: skip
+    """All circles, from their places `before` the substep (n, 2) to `position`; `until`: seconds into the frame at its end.
+
+    room: its wall, which wins: (7,), see OPEN. along: (n, 2), becomes the acceleration left to those who are held, m/s^2, or 0.
+    rest: (n, 2), what rounding has taken from places in the substep before, and takes in this, m. drop: of the integrator.
+    """
+    for block in prange((position.shape[0] + _BLOCK - 1) // _BLOCK):
+        _collide(
+            block * _BLOCK, min((block + 1) * _BLOCK, position.shape[0]), segments, bodies, until, x0, y0, cell, columns, rows,
+            start, entries, room, along, rest, position, velocity, acceleration, spin, radius, inverse_mass, restitution,
+            friction, fed, resting, hits, spent, before, turn, lift, h, lag, rest_speed, drop,
+        )  # fmt: skip

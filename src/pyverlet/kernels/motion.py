@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.compile.jit import driver, kernel, parallel_kernel, prange
 from pyverlet.compile.lanes import copy_row, larger_finite
 from pyverlet.compile.stealing import claim_evenly, none_claimed
 
@@ -48,7 +48,7 @@ def kick_drift(position, velocity, acceleration, h):
 
 
 @kernel
-def _newton(acceleration, force, inverse_mass, gx, gy):
+def newton_block(acceleration, force, inverse_mass, gx, gy):
     """`newton`; returns the square of the largest acceleration."""
     a, f = acceleration.reshape(-1), force.reshape(-1)
     zero = gx - gx
@@ -81,7 +81,7 @@ def newton(acceleration, force, inverse_mass, gx, gy):
     largest = gx - gx
     for block in prange((inverse_mass.shape[0] + _BLOCK - 1) // _BLOCK):
         a, b = block * _BLOCK, min((block + 1) * _BLOCK, inverse_mass.shape[0])
-        largest = max(largest, _newton(acceleration[a:b], force[a:b], inverse_mass[a:b], gx, gy))
+        largest = max(largest, newton_block(acceleration[a:b], force[a:b], inverse_mass[a:b], gx, gy))
     return np.sqrt(largest)
 
 
@@ -93,7 +93,7 @@ def newton_kick_drift(position, velocity, acceleration, force, inverse_mass, gx,
         a, b = block * _BLOCK, min((block + 1) * _BLOCK, inverse_mass.shape[0])
         if ahead != 0:
             add_scaled(velocity[a:b], acceleration[a:b], -ahead)
-        largest = max(largest, _newton(acceleration[a:b], force[a:b], inverse_mass[a:b], gx, gy))
+        largest = max(largest, newton_block(acceleration[a:b], force[a:b], inverse_mass[a:b], gx, gy))
         kick_drift(position[a:b], velocity[a:b], acceleration[a:b], h)
     return np.sqrt(largest)
 
@@ -305,3 +305,29 @@ def first_non_finite(vectors):
             if not (np.isfinite(vectors[i, 0]) and np.isfinite(vectors[i, 1])):
                 return i
     return -1
+
+
+# ---- what a frame opens and closes with, a call each: to be called takes longer than to be done, in a small world ------------
+
+
+@driver
+def take_up(velocity, acceleration, inverse_mass, h):
+    """`clear_pinned` of accelerations, and v += h a. False, and nothing is done, if there is a NaN among the accelerations."""
+    if any_nan(acceleration):
+        return False
+    clear_pinned(acceleration, inverse_mass)
+    add_scaled(velocity, acceleration, h)
+    return True
+
+
+@driver
+def leave(acceleration, velocity, resting, left, lean, h, half):
+    """`remember_rest`, and v += half a."""
+    remember_rest(acceleration, velocity, resting, left, lean, h)
+    add_scaled(velocity, acceleration, half)
+
+
+@driver
+def all_finite(position, velocity):
+    """Whether no row is NaN or infinite."""
+    return first_non_finite(position) < 0 and first_non_finite(velocity) < 0

@@ -14,8 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from pyverlet.compile.bits import count_bits, lowest_bit, write_all, write_chosen
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
-from pyverlet.compile.lanes import LANES, count_bits, load, lowest_bit, spread, which_above, write_all, write_chosen
+from pyverlet.compile.lanes import LANES, load, spread, which_above
 from pyverlet.ground.constants import CLOSE, COLOURS, COLUMNS, ROUNDING
 from pyverlet.kernels.grid import before_row, cell_number
 from pyverlet.kernels.seam import nearest

@@ -22,7 +22,11 @@ kg."""
 
 @bundle
 class Circles:
-    """Circles by slot; what each is: `Slots`, of contacts `Wide`, and the last four `Loans`: empty where nobody lends."""
+    """Circles by slot; what each is: `Slots`, of contacts `Wide`, and the last four `Loans`: empty where nobody lends.
+
+    rows: (n, 4), where circles rub, what a pair reads and writes of each, side by side. In the first sweep: what friction moves
+    it by (2), m, what that turns it by, rad, whether it carries weight. In the second: velocity (2), spin, `turn`.
+    """
 
     position: Any
     velocity: Any
@@ -34,8 +38,7 @@ class Circles:
     spin: Any
     carries: Any
     fed: Any
-    slid: Any
-    turned: Any
+    rows: Any
     turn: Any
     lift: Any
     leans: Any
@@ -67,7 +70,6 @@ class Pairs:
     normal: Any
     depth: Any
     slip: Any
-    held: Any
     closing: Any
     deep: Any
     deeps: Any

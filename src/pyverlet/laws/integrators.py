@@ -17,7 +17,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from pyverlet.kernels import motion
-from pyverlet.state.moves import advance, remember_rest
+from pyverlet.state.moves import advance, leave
 from pyverlet.state.state import Slots
 
 
@@ -151,18 +151,20 @@ class _Stormer(Integrator):
         return self.name() + (", naive start" if self.naive_start else "")
 
     def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
-        if motion.any_nan(state.acceleration):
-            fresh = np.isnan(state.acceleration[:, 0])
-            # x_prev = x - v h + a h^2 / 2 makes u = v - a h / 2: order 2. The naive x_prev = x - v h makes u = v: order 1.
-            known = state.acceleration.copy()
-            if self.naive_start:
-                state.acceleration[fresh] = 0
-            else:
-                forces(state, t)
-            state.acceleration[~fresh] = known[~fresh]
+        back = -0.5 * (h if h_last is None else h_last)
         # Pinned since the frame before: what is left of its fall would move it for ever.
+        if motion.take_up(state.velocity, state.acceleration, state.inverse_mass, state.real(back)):
+            return
+        fresh = np.isnan(state.acceleration[:, 0])
+        # x_prev = x - v h + a h^2 / 2 makes u = v - a h / 2: order 2. The naive x_prev = x - v h makes u = v: order 1.
+        known = state.acceleration.copy()
+        if self.naive_start:
+            state.acceleration[fresh] = 0
+        else:
+            forces(state, t)
+        state.acceleration[~fresh] = known[~fresh]
         motion.clear_pinned(state.acceleration, state.inverse_mass)
-        advance(state.velocity, state.velocity, state.acceleration, -0.5 * (h if h_last is None else h_last))
+        advance(state.velocity, state.velocity, state.acceleration, back)
 
     def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
         # Forces that look at the velocity get the one at time t, not the one half a substep behind.
@@ -172,8 +174,7 @@ class _Stormer(Integrator):
         forces.kick_drift(state, t, h, ahead)
 
     def end(self, state: Slots, h: float) -> None:
-        remember_rest(state, h)
-        _kick(state, 0.5 * h)
+        leave(state, h)
 
 
 class PositionVerlet(_Stormer):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -86,12 +86,14 @@ class Bookkeeper:
 
     def frame(
         self, state: Slots, forces: ForceSum, links: Links, t: float, h: float, lag: float, done: Callable[[str], None]
-    ) -> _Frame:
+    ) -> Page:
         """The books of one frame, to be told of each stage; it passes on what it is told to `done`."""
-        return _Frame(self, state, forces, links, t, h, lag, done)
+        return Page(self, state, forces, links, t, h, lag, done)
 
 
-class _Frame:
+class Page:
+    """The books of one frame."""
+
     def __init__(
         self, books: Bookkeeper, state: Slots, forces: ForceSum, links: Links, t: float, h: float, lag: float,
         done: Callable[[str], None],
@@ -108,6 +110,25 @@ class _Frame:
 
     def __call__(self, stage: str) -> None:
         self._done(stage)
+        self._book(stage, None)
+
+    @property
+    def plain(self) -> bool:
+        """Whether energies are all there is to know after each stage."""
+        return not (self._working or self._holding or self._links)
+
+    def read(self, energies: Any, substep: int, reached: int) -> None:
+        """Stages have gone by since the integration of `substep`, up to the end of the one before `reached`.
+
+        energies: (2 substeps,) J after the integration of each, and at its end.
+        """
+        for k in range(substep, reached):
+            if k > substep:
+                self._book("integrate", float(energies[2 * k]))
+            self._book("velocities", float(energies[2 * k + 1]))
+
+    def _book(self, stage: str, energy: float | None) -> None:
+        """`energy`: of now, J, if it is known already."""
         if stage == "gather":
             self._state.keep_account()
             self._now = self._look(0.0)
@@ -117,7 +138,7 @@ class _Frame:
         elif stage == "integrate":
             self._t += self._h
             self._settled = False
-            before, self._now = self._now, self._look(self._lag)
+            before, self._now = self._now, self._look(self._lag) if energy is None else _Instant(energy, 0.0, {})
             gained = self._now.energy - before.energy
             for account, power in self._now.power.items():
                 work = 0.5 * self._h * (before.power[account] + power)
@@ -133,7 +154,8 @@ class _Frame:
             self._open.links += self._now.energy - before.energy
         elif stage == "velocities" or (stage == "contacts" and self._links):
             self._settled = stage == "velocities"
-            before, self._now = self._now, self._look(self._lag, works=self._settled and not self._links)
+            known = None if energy is None else _Instant(energy, 0.0, {})
+            before, self._now = self._now, known or self._look(self._lag, works=self._settled and not self._links)
             self._contacts += self._now.energy - before.energy
         elif stage == "finish":
             # Velocities as users see them: those of circles at rest without what carries their weight.
@@ -143,7 +165,8 @@ class _Frame:
             self._risen = self._beyond_seam()
         else:
             return
-        self._done("ledger")
+        if energy is None:
+            self._done("ledger")
 
     def close(self, spent: tuple[float, float, float, float]) -> None:
         """The frame has gone well; `spent` is what impacts, friction, the energy limiter and the room say they have given, J."""

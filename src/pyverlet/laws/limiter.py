@@ -49,7 +49,8 @@ class Watch:
     def __init__(self, start: State, forces: ForceSum, links: Links, room: Boundary) -> None:
         self._start, self._forces, self._links, self._room = start, forces, links, room
         self._gravity = forces.gravity
-        self._plain = len(start) < ONE_THREAD_BELOW and not (forces.forces or links)
+        self._kept: list[Any] = [force for force in forces.forces if isinstance(force, Conservative)]
+        self._plain = len(start) < ONE_THREAD_BELOW and not (self._kept or links)
         # What links hold is not known any more when the frame is over.
         by_forces, by_links = (0.0, 0.0) if self._plain else self._holds(start)
         # A potential is known but for a constant, so that under gravity, which has a scale, it is none.
@@ -62,11 +63,10 @@ class Watch:
 
     def _holds(self, now: State | Slots) -> tuple[float, float]:
         """Energy that forces hold, and links, J."""
-        if not (self._forces.forces or self._links):
+        if not (self._kept or self._links):
             return 0.0, 0.0
         state = now.in_users_order() if isinstance(now, Slots) else now
-        kept = (force for force in self._forces.forces if isinstance(force, Conservative))
-        return float(sum(force.potential(state) for force in kept)), float(self._links.energy(state))
+        return float(sum(force.potential(state) for force in self._kept)), float(self._links.energy(state))
 
     def _gained(self, now: Slots) -> float:
         """What the energy of all is now above that at the start, J."""
@@ -137,12 +137,11 @@ class Watch:
         part = np.minimum(_ratio(left, add(lift)), 1)[cluster]
         strength = np.hypot(*pull.T)
         drop = part * np.minimum(_ratio(lift, strength), np.hypot(*moved.T))  # who is near where a spring pulls to feels little
-        lower = slots.position + (_ratio(drop, strength)[:, None] * pull).astype(slots.dtype)
-        stays = self._within_room(lower, slots.size)  # a strong pull may lead through a wall
-        slots.position[stays] = lower[stays]
+        lower = slots.position + _ratio(drop, strength)[:, None] * pull
         if slots.size is not slots.radius:
             slots.grown -= (part * (slots.grown - start.grown[order])).astype(slots.dtype)
             slots.resize()
+        slots.position[:] = self._within_room(slots.position.astype(float), lower, slots.size)
 
     def _pushed(self, slots: Slots, mass: Array, add: _Sums) -> Array:
         """(n,) bool, clusters whose momentum has changed in this frame by more than rounding does."""
@@ -153,24 +152,27 @@ class Watch:
     def _pulls(self, slots: Slots, mass: Array) -> tuple[Array, Array]:
         """(n, 2) N, what gravity and forces with a potential do to each, at the start of the frame and now."""
         weight = mass[:, None] * self._forces.gravity
-        kept: list[Any] = [force for force in self._forces.forces if isinstance(force, Conservative)]
-        if not kept:
+        if not self._kept:
             return weight, weight
         now, pulls = slots.position, []
         for where in (self._start.position[slots.particle], now):
             slots.position = where
             slots.force.fill(0)
-            for force in kept:
+            for force in self._kept:
                 force.apply(slots, self._forces.t)
             pulls.append(weight + np.where(mass > 0, 1.0, 0.0)[:, None] * slots.force)
         slots.position = now
         return pulls[0], pulls[1]
 
-    def _within_room(self, position: Array, radius: Array) -> Array:
-        """(n,) bool, who would not reach beyond a wall there."""
-        faced = self._room.facing(position)
-        outside = self._room.outside(position.astype(float)) if faced is None else (faced[0] < radius[:, None]).any(axis=1)
-        return np.asarray(~outside)
+    def _within_room(self, here: Array, lower: Array, radius: Array) -> Array:
+        """(n, 2) m, `lower` or as far that way as walls let circles go: a strong pull may lead through one."""
+        faced = self._room.facing(lower)
+        if faced is None:
+            return np.where(self._room.outside(lower)[:, None], here, lower)
+        was, _ = self._room.facing(here) or faced
+        for before, gap, normal in zip(was.T, faced[0].T, faced[1].swapaxes(0, 1), strict=True):
+            lower = lower + np.maximum(np.minimum(radius, before) - gap, 0)[:, None] * normal
+        return lower
 
     def _was_inside(self) -> Array:
         """(n,) bool, who was above the wall when the frame began, in the user's order."""
@@ -227,7 +229,7 @@ def undriven(world: Any, h: float, h_last: float | None) -> bool:
         return False
     if any(g != 0 and period > 0 for g, period in zip(world.gravity, world.boundary.seam.period, strict=True)):
         return False  # who falls for ever gains for ever
-    if world.forces and not all(isinstance(force, Conservative | Drag) for force in world.forces):
+    if world.forces and not all(isinstance(force, Drag | Conservative) for force in world.forces):
         return False
     return not world.obstacles or not any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
 

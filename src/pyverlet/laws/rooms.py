@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.constants import STANDS_OUT
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import bounds, frame, meetings
+from pyverlet.kernels import bounds, cage, frame, meetings
+from pyverlet.kernels.motion import ON_WALL
 from pyverlet.laws.turning import surface
 from pyverlet.state.moves import bodies
 from pyverlet.state.seam import NONE, Seam
@@ -52,6 +53,9 @@ class Boundary(ABC):
     def walls(self) -> Sequence[float]:
         """Its shape as seven numbers (`kernels.meetings`), so that obstacles push nobody through it; none, if it cannot say."""
         return (meetings.OPEN, 0, 0, 0, 0, 0, 0)
+
+    def leave(self, state: Slots) -> None:
+        """At the end of a frame: note in `state.along` the acceleration that is left to those whom a wall holds."""
 
     def facing(self, position: Array) -> tuple[Array, Array] | None:
         """(k, w) distance of centres (k, 2) from each of its walls, m, and (k, w, 2) the unit normal of each into the room."""
@@ -114,6 +118,22 @@ class _Walls(Boundary):
         shape, laws = self._rounded(shape, state, h, lag, rest_speed)
         kernel(*shape, *bodies(state), *laws)
 
+    def leave(self, state: Slots) -> None:
+        held = np.flatnonzero(state.resting == ON_WALL)
+        if not len(held) or len(state.along):  # where there are obstacles it may be one of them that holds
+            return
+        own = state.friction[held]
+        held = held[np.where(own < 0, self.friction, self.friction * own) == 0]  # whom a wall rubs is not left what drives it
+        faced = self.facing(state.position[held])
+        if faced is None:
+            return
+        left = state.acceleration[held].astype(float)
+        for gap, normal in zip(faced[0].T, faced[1].swapaxes(0, 1), strict=True):
+            into = np.minimum((left * normal).sum(axis=1), 0)
+            left -= np.where(gap < (1 + STANDS_OUT) * state.radius[held], into, 0)[:, None] * normal
+        state.along = np.zeros_like(state.position)
+        state.along[held] = left
+
     def _rounded(self, shape: Sequence[float], state: Slots, h: float, lag: float, rest_speed: float) -> tuple[Any, Any]:
         """The numbers of `shape`, and h, lag, e, mu and rest_speed, in the dtype of the state."""
         given = (state.real, shape, h, lag, self.restitution, self.friction, rest_speed)
@@ -158,14 +178,14 @@ class Circle(_Walls):
     def compiled(self, state: Slots) -> tuple[Any, tuple[float, ...]] | None:
         if type(self) is not Circle or self.moves:
             return None
-        if self.restitution == 0.0 == self.friction and state.smooth:
+        if self.restitution == 0.0 == self.friction and state.smooth and not len(state.spent):
             return frame.smooth_cage, (*self.center, self.radius)
         return frame.cage, (*self.center, self.radius, self.restitution, self.friction)
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         speed = self.angular_velocity * self.radius
         with surface(state, speed, h) if self.moves else nullcontext():
-            self._confine(bounds.circle, (*self.center, self.radius), state, h, lag, rest_speed)
+            self._confine(cage.confine, (*self.center, self.radius), state, h, lag, rest_speed)
 
     def facing(self, position: Array) -> tuple[Array, Array]:
         way = self.center - position.astype(np.float64)

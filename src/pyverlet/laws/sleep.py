@@ -61,9 +61,14 @@ class Sleep:
                 return False
         return self._wake(slots, np.isin(slots.island, slots.island[(edited == 1) & (slots.island >= 0)]))
 
+    @property
+    def anyone(self) -> bool:
+        """Whether somebody sleeps."""
+        return len(self._members) > 0
+
     def all_asleep(self, slots: Slots) -> bool:
         """Whether nothing can move."""
-        return len(self._members) > 0 and not slots.inverse_mass.any()
+        return self.anyone and not slots.inverse_mass.any()
 
     def touched(self, slots: Slots, pairs: PairList) -> bool:
         """Wake islands that somebody awake overlaps. Whether there were any: then the list lacks pairs."""

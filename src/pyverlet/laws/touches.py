@@ -110,7 +110,8 @@ class Touches:
         return told
 
     def _note(self, whose: int, state: Slots, before: Array) -> None:
-        moved = np.flatnonzero((state.velocity != before).any(axis=1) & (state.inverse_mass > 0))
+        now = state.velocity
+        moved = np.flatnonzero(((now[:, 0] != before[:, 0]) | (now[:, 1] != before[:, 1])) & (state.inverse_mass > 0))
         change = state.velocity[moved].astype(float) - before[moved]
         self._given[whose, state.particle[moved]] += state.mass[moved, None] * change
 
@@ -311,8 +312,11 @@ def _shared(push: Floats, near: Array, into: Floats) -> Floats:
 def _rows(first: Array, count: Array, pair_i: Array, pair_j: Array, order: Array) -> Array:
     """(k, 2) the user's a < b of each listed pair, once."""
     which = np.concatenate([np.zeros(0, np.int64), *(np.arange(f, f + c) for f, c in zip(first, count, strict=True))])
-    pairs = np.sort(np.column_stack((order[pair_i[which]], order[pair_j[which]])).astype(np.int64), axis=1)
-    return np.unique(pairs, axis=0)
+    i, j = order[pair_i[which]].astype(np.int64), order[pair_j[which]].astype(np.int64)
+    keys = np.sort(np.minimum(i, j) * len(order) + np.maximum(i, j))
+    once = np.ones(len(keys), bool)
+    np.not_equal(keys[1:], keys[:-1], out=once[1:])
+    return np.column_stack(np.divmod(keys[once], max(len(order), 1)))
 
 
 def _least(pairs: Array, normal: Floats, got: Floats, free: Array) -> Floats:

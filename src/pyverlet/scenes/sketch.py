@@ -59,12 +59,14 @@ class Sketch:
     Attributes:
         name: of the file, without its folder.
         files: of the sketch and of the modules beside it that it has imported.
+        settings: with which it was last built.
     """
 
     def __init__(self, path: Path, source: bytes, before: Sketch | None = None) -> None:
         self.path, self.source, self.name = Path(path), source, Path(path).name
         self.sliders: Board = {}
         self.patience: Patience | None = None
+        self.settings = Settings()
         self._left: Board = dict(before.sliders) if before else {}
         self._brought: dict[str, Path] = dict(before._brought) if before else {}
         self._module: ModuleType | None = None
@@ -146,7 +148,7 @@ class Sketch:
         if self._built:  # what stands at the top of the file starts anew as well, so that every build is the same
             self._left, self._module = self.sliders, None
         scene = getattr(self.module, "SCENE", None)
-        self._built = True
+        self._built, self.settings = True, settings
         with self.at_work():
             world = scene.build(settings) if isinstance(scene, Scene) else self._made(settings)
         if self.has("update"):

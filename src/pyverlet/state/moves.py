@@ -52,14 +52,19 @@ def pick_falling(state: Slots, before: Array, lag: float, dt: float) -> None:
     motion.pick_falling(state.resting, *moving, *state.reals(lag, dt))
 
 
-def remember_rest(state: Slots, h: float) -> None:
-    """Scale the accelerations of those that are held, so that h / 2 of it makes of what they carry weight with no velocity."""
+def leave(state: Slots, h: float) -> None:
+    """Make of what circles carry weight with no velocity; of others' velocity, half a substep old, that of now.
+
+    Scales the accelerations of those that are held, so that h / 2 of it does that, and kicks all by it.
+    """
     held = state.acceleration, state.velocity, state.resting, state.along
-    motion.remember_rest(*held, *state.reals(state.lean, h))
+    motion.leave(*held, *state.reals(state.lean, h, 0.5 * h))
 
 
 def first_non_finite(state: Slots) -> int:
     """The user's index of a particle whose position or velocity is NaN or infinite; -1 if all are finite."""
+    if motion.all_finite(state.position, state.velocity):
+        return -1
     for array in (state.position, state.velocity):
         slot = int(motion.first_non_finite(array))
         if slot >= 0:

@@ -113,11 +113,11 @@ class State:
         self.version += 1
         return now
 
-    def restore(self, arrays: dict[str, Array]) -> None:
-        """Take up what `arrays` gave once, however many particles that were."""
+    def restore(self, arrays: dict[str, Array], *, own: bool = False) -> None:
+        """Take up what `arrays` gave once, however many particles that were; `own`: in these arrays themselves, from now on."""
         count = len(arrays["number"])
-        if count > len(self._store["number"]):
-            self._store = {name: np.empty((count, *old.shape[1:]), old.dtype) for name, old in self._store.items()}
+        if own or count > len(self._store["number"]):
+            self._store = {name: arrays[name] if own else np.empty_like(arrays[name]) for name in self._store}
         self._show(count)
         for name in self._store:
             getattr(self, name)[:] = arrays[name]
@@ -153,7 +153,7 @@ class Slots:
         start: (n, 2) positions before the integration of this substep, m; empty unless circles rub each other, or meet obstacles.
         turn, lift: empty unless circles rub each other: (n,) rad by which each turns in this substep, and (n,) s; times -a that
             is the velocity with which circles at rest against others end a substep, for others 0.
-        along: (n, 2) m/s^2, the acceleration left to circles that an obstacle holds, for others 0; empty without obstacles.
+        along: (n, 2) m/s^2, the acceleration left to circles that an obstacle or a smooth wall holds, for others 0; or empty.
         drop: a circle at rest falls drop * a h^2 in a substep of h seconds; depends on the integrator.
         fed: (n,) bits: CARRIES where a contact at rest fed the velocity in the last substep, AT_WALL where a wall was touched
             in it, CARRIED and WAS_AT_WALL the same in the one before. Kept only if circles bounce.
@@ -262,7 +262,7 @@ class Slots:
             changed |= name in _LISTED and motion.differs(given, now)
             self._given[name] = (now[:1] if (now == now[:1]).all() else now).copy()
         for name in (*_SET, "grown"):
-            np.take(getattr(state, name), self.particle, out=getattr(self, name))
+            memory.take(self._given.get(name, state.grown), self.particle, getattr(self, name))  # one number, if that of all
         self.weigh()
         self.most_restitution, self.most_friction = (float(a.max(initial=-1.0)) for a in (self.restitution, self.friction))
         filters = (state.category != 1).any() or (state.mask != EVERYONE).any()

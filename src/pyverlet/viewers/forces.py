@@ -23,8 +23,8 @@ AGAIN_S = 0.1
 SHARE = 6.0
 """From one look to the next, in terms of the frame that was noted: it takes many times as long as others."""
 
-MOST = 5_000
-"""Circles: of more, noting a frame would stop the picture."""
+MOST = 20_000
+"""Circles: of more, the picture would stop while a frame is noted, which takes several times as long as others."""
 
 
 class Contacts(NamedTuple):

@@ -17,13 +17,16 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from pyverlet.data.known_sketch import told
 from pyverlet.data.snapshot import save
 from pyverlet.ground.errors import InputError
+from pyverlet.scenes.sketch import Sketch
 from pyverlet.viewers.commands import Command
 from pyverlet.viewers.exhibit import Exhibit
 from pyverlet.viewers.stage import Stage
 from pyverlet.world.moments import Moment
 from pyverlet.world.panels import every_frame
+from pyverlet.world.world import World
 
 _log = logging.getLogger(__name__)
 
@@ -108,7 +111,7 @@ class _RecordedStage(Stage):
         super().__init__(exhibit)
         self._journal, self._substep = journal, 0
         journal.note(
-            worlds=[{"name": panel.name, "snapshot": _snapshot(panel.world)} for panel in exhibit.panels],
+            worlds=[{"name": panel.name, **_told(exhibit, panel.world)} for panel in exhibit.panels],
             title=exhibit.title,
             part=exhibit.part,
             line=exhibit.panels.line,
@@ -140,7 +143,27 @@ class _RecordedStage(Stage):
         self._journal.passed(self.panels.state_hash)
 
 
-def _snapshot(world: Any) -> str:
+def _told(exhibit: Exhibit, world: World) -> dict[str, Any]:
+    """How to have this world again."""
+    sketch = exhibit.answers
+    if not isinstance(sketch, Sketch) or (len(exhibit.panels) > 1 and not sketch.answers):
+        return {"snapshot": _snapshot(world)}
+    if len(exhibit.panels) > 1:
+        side_by_side = f"{len(exhibit.panels)} worlds of {sketch.name} side by side"
+        raise InputError(f"journal is asked for with {side_by_side}; allowed is one world of a sketch with functions or sliders")
+    return {
+        "sketch": {
+            "name": sketch.name,
+            "path": str(sketch.path.resolve()),
+            "source": sketch.digest,
+            "settings": told(sketch.settings),
+            "sliders": {name: slider.value for name, slider in sketch.sliders.items()},
+        },
+        "hash": world.state_hash(),
+    }
+
+
+def _snapshot(world: World) -> str:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "world.pvsnap"
         save(world, path)

@@ -12,9 +12,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from pyverlet.data.known_sketch import asked, find
 from pyverlet.data.snapshot import load
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, PyverletError
+from pyverlet.ground.patience import Patience
+from pyverlet.scenes.sketch import Sketch, SketchError
 from pyverlet.viewers import commands
 from pyverlet.viewers.commands import Command, Reset
 from pyverlet.viewers.exhibit import Exhibit
@@ -54,6 +57,8 @@ class Event:
 
 class Script:
     """A journal that was read.
+
+    Worlds of a sketch are built by it again; it is run if it is what it was.
 
     Attributes:
         dt: simulated seconds a frame.
@@ -99,11 +104,15 @@ class Script:
         """The worlds of an event that has some."""
         what = event.what
         try:
-            panels = [Panel(str(each["name"]), self._world(each["snapshot"])) for each in what["worlds"]]
+            sketch = self._sketch(what["worlds"][0]) if "sketch" in what["worlds"][0] else None
+            if sketch is None:
+                panels = [Panel(str(each["name"]), self._world(each["snapshot"])) for each in what["worlds"]]
+            else:
+                panels = [Panel(str(what["worlds"][0]["name"]), self._built(sketch, what["worlds"][0]))]
             part = what.get("part") and tuple(checks.number("part", value) for value in what["part"])
             line = what.get("line") if what.get("line") is None else checks.number("line", what["line"])
-            return Exhibit(str(what["title"]), Panels(panels, line=line), part=part)
-        except (KeyError, TypeError, binascii.Error) as error:
+            return Exhibit(str(what["title"]), Panels(panels, line=line), part=part, answers=sketch)
+        except (KeyError, TypeError, IndexError, AttributeError, binascii.Error) as error:
             raise InputError(f"'{self.path}' is no journal of pyverlet's: its worlds lack something ({error})") from None
 
     def _world(self, snapshot: str) -> World:
@@ -111,6 +120,25 @@ class Script:
             path = Path(folder) / "world.pvsnap"
             path.write_bytes(base64.b64decode(snapshot, validate=True))
             return load(path)
+
+    def _sketch(self, told: dict[str, Any]) -> Sketch:
+        """The sketch of then, with its sliders where they were; in the folder it was in, in this one or beside the journal."""
+        about = told["sketch"]
+        sketch = find(str(about["name"]), about["source"], Path(about["path"]), Path(), self.path.parent)
+        _ = sketch.module
+        for name, value in about["sliders"].items():
+            sketch.sliders[name].value = value
+        sketch.patience = Patience()  # a function that looped for ever does so again
+        return sketch
+
+    def _built(self, sketch: Sketch, told: dict[str, Any]) -> World:
+        world = sketch.scene().world(**asked(told["sketch"]["settings"]))
+        if world.state_hash() != told["hash"]:
+            raise DivergedError(
+                f"{sketch.name} builds a world with the hash {world.state_hash()}, and built {told['hash']} in the session: "
+                "it draws by chance without a seed, or what it imports or reads has changed"
+            )
+        return world
 
     def open(self) -> Exhibit:
         """The first worlds, for a viewer."""
@@ -142,7 +170,7 @@ class Script:
             "commands": sum(event.command is not None for event in self.events),
             "checked": stage.checked,
             "state_hash": stage.panels.state_hash(),
-            "stopped": stopped,
+            "stopped": stopped or stage.complaint,
             "whole": self.whole,
         }
 
@@ -196,6 +224,8 @@ class ReplayStage(Stage):
             if stop is None or not stops:
                 raise
             self._at = stop + 1
+            if isinstance(error, SketchError) and self.mend(error):  # as the session did
+                return
             raise StoppedError(str(error)) from error
         if stop is not None and stops:
             said = events[stop].what["stopped"]

@@ -20,7 +20,7 @@ from pyverlet.world.panels import Panel, Panels
 from pyverlet.world.warmup import warm_up
 from pyverlet.world.world import World
 
-LOOK_S = 0.1
+LOOK_S = 0.05
 """How often the files are looked at."""
 
 SAY_S = 1.0
@@ -125,7 +125,7 @@ class Watcher:
             yield
         finally:
             self._ended.set()
-            thread.join(10 * LOOK_S)
+            thread.join(20 * LOOK_S)
 
     def _look(self) -> None:
         known, began = self._workshop.stamps(), 0.0

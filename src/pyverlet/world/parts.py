@@ -156,7 +156,7 @@ def check(parts: Parts, real: np.dtype[Any]) -> None:
 
 
 def fill(world: World, parts: Parts) -> None:
-    """Give an empty world the particles, with their numbers and groups; `put_together` needs them there.
+    """Give an empty world the particles, with their numbers and groups; `put_together` needs them there. It keeps the arrays.
 
     Raises:
         InputError: the arrays are not what they must be.
@@ -167,7 +167,7 @@ def fill(world: World, parts: Parts) -> None:
         begun = parts.arrays["particles.begun"]
     except KeyError as error:
         raise InputError(f"the array {error} is missing; allowed are files that have all") from None
-    world._state.restore(arrays)
+    world._state.restore(arrays, own=True)
     most = int(arrays["number"][-1]) + 1 if len(world) else 0
     world._state.numbers = checks.whole("numbers", parts.facts.get("numbers"), least=most, most=2**31)
     world._state.begun = begun.tolist()

@@ -6,6 +6,8 @@ from time import perf_counter
 
 import numpy as np
 
+from pyverlet.kernels import frame
+
 _ROOM = 64
 """Stages that have a place at most, and one more."""
 
@@ -23,7 +25,8 @@ class Profile:
         self.rebuilds = 0
         self._start = 0.0
         self._broken_off = False
-        self._places: dict[str, int] = {}
+        # Compiled code notes its stages (`compile.clock.note`) in the first places.
+        self._places = {stage: place for place, stage in enumerate(frame.STAGES, 1)}
         self._spent = np.zeros(_ROOM)  # s, of the frame that is under way, by place; the first is when the last stage ended
         self._complete = np.zeros(_ROOM)  # of the last complete frame
         self._total = np.zeros(_ROOM)  # of all of them
@@ -41,10 +44,9 @@ class Profile:
         spent[self._places.get(stage) or self._places.setdefault(stage, len(self._places) + 1)] += now - spent[0]
         spent[0] = now
 
-    def spent(self, stages: tuple[str, ...]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-        """Where compiled code notes the time of these stages, which have the first places: `compile.clock.note`."""
-        if stages[0] not in self._places:
-            self._places = {stage: place for place, stage in enumerate(stages, 1)}
+    @property
+    def spent(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        """Where compiled code notes the time of its stages: `kernels.frame.STAGES`."""
         return self._spent
 
     def end(self) -> None:

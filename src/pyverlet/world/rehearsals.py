@@ -15,7 +15,7 @@ from pyverlet.compile import jit
 from pyverlet.ground.constants import FUSED_FROM, KNOWN_FROM, ONE_THREAD_BELOW, UNEVEN
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.collisions import Collisions
-from pyverlet.laws.forces import Conservative, Drag
+from pyverlet.laws.forces import Conservative, Drag, Force
 from pyverlet.laws.limiter import Watch
 from pyverlet.laws.links import Angle, Area, Pin, Spring, Stick
 from pyverlet.laws.obstacles import Segment
@@ -45,6 +45,8 @@ def rehearse(world: World) -> None:
     if world.obstacles:
         small.obstacles.append(Segment((0, 0), (1, 0)))
         small.is_free((0, 0))
+    known = Slots(world.dtype)
+    small.forces.extend(force for force in _ours(world) if (row := getattr(force, "compiled", None)) and row(known))
     _use(small)
     if len(world) >= FUSED_FROM:
         _fuse(world)
@@ -67,14 +69,18 @@ def _fuse(world: World) -> None:
 
 
 def _forces(world: World) -> None:
-    """Evaluate our own kinds of force once, on a copy of the particles; others may count how often they are asked."""
+    """Evaluate our own kinds of force once, on a copy of the particles."""
     slots = Slots(world.dtype)
     slots.gather(world._state)
-    for force in world.forces:
-        if type(force).__module__.startswith("pyverlet."):
-            force.apply(slots, world.time)
-            if isinstance(force, Conservative):
-                force.potential(world._state)
+    for force in _ours(world):
+        force.apply(slots, world.time)
+        if isinstance(force, Conservative):
+            force.potential(world._state)
+
+
+def _ours(world: World) -> list[Force]:
+    """Its forces of our own kinds: others may count how often they are asked."""
+    return [force for force in world.forces if type(force).__module__.startswith("pyverlet.")]
 
 
 def _sleep(dtype: np.dtype[Any]) -> None:

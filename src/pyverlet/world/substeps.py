@@ -1,12 +1,13 @@
 """Substeps that need nothing of Python: gone through in one call (`kernels.frame`), until somebody wants to look.
 
-Under gravity alone accelerations are known after the first substep, and a call goes on until the list of pairs may be stale or
-the frame is over. Where forces, or who looks on, are asked in every substep, it is contacts, room and velocities of one. Smooth
-worlds too large for the processor's caches go strip by strip (`kernels.fused`).
+Under gravity, and forces that a few numbers describe, a call goes on until the list of pairs may be stale or the frame is over.
+Where other forces, or who looks on, are asked in every substep, it is what comes after the integration of one. Smooth worlds too
+large for the processor's caches go strip by strip (`kernels.fused`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,10 +15,11 @@ from numpy.typing import NDArray
 
 from pyverlet.compile import clock, jit
 from pyverlet.ground.constants import FUSED_FROM
-from pyverlet.kernels import frame, fused
+from pyverlet.kernels import drive, frame, fused
 from pyverlet.laws.contacts.broadphase import Strips
 from pyverlet.laws.contacts.collisions import ContactSolver
 from pyverlet.laws.contacts.wide import Wide
+from pyverlet.laws.ledger import Page
 
 Array = NDArray[Any]
 
@@ -42,6 +44,9 @@ class Substeps:
         self._held: Array | None = None
         self._cut = self._place = np.zeros(0, np.int64)
         self._normal = np.empty((2, 0))
+        self._books: Page | None = None
+        self._rows: Any = None  # forces, as numbers, and the dtype of the table made of them
+        self._table: tuple[Array, ...] = ()
 
     def begin(self, contacts: ContactSolver | None) -> Substeps:
         """A frame begins. That before may have been broken off, and the user may have changed everything since."""
@@ -50,30 +55,45 @@ class Substeps:
             contacts.broad_phase.strayed = None
         return self
 
+    def tells(self, done: Callable[[str], None], mark: Callable[[str], None]) -> bool:
+        """Whether who is told of the stages of a frame can be told later: it is but the clock, `mark`, or sums of energies."""
+        self._books = done if isinstance(done, Page) and done.plain else None
+        return self._books is not None or done == mark
+
     def go(self, world: Any, contacts: ContactSolver, substep: int, h: float, lag: float) -> int:
         """From after the integration of `substep`, whose list is good, as far as it goes: the substep that is next.
 
         `substep` itself: nothing has been done, for there is more to it than kernels.
         """
-        out, self._out, self.leapt, state = self._out, None, False, world._slots
+        out, self._out, self.leapt, state, forces = self._out, None, False, world._slots, world._force_sum
+        books = self._books
         strips = contacts.steady(state)
-        if strips is None or world.boundary.compiled(state) is None:
+        if strips is None or world.boundary.compiled(state) is None or not (course := world._course).still:
             return substep
-        wide = contacts.set_up(state, h, lag, world._force_sum.strongest)
+        if course:
+            course.set_up(state, substep * h, h)
+        wide = contacts.set_up(state, h, lag, forces.strongest)
         confine, shape = world.boundary.compiled(state)  # that circles rub is known by now
         smooth = confine is frame.smooth_cage
         if smooth:
             wide.leave_arriving()
-        last = world.substeps - 1
-        leaps = world.integrator.leaps and not (world.forces or world.onlooker)  # who looks on may turn gravity
-        if smooth and not wide.asks and len(state) >= FUSED_FROM and strips.in_order:
+        last, rows = world.substeps - 1, forces.compiled(state)
+        # Who looks on may turn gravity, and see what a ledger sees.
+        leaps = world.integrator.leaps and rows is not None and not world.onlooker
+        served = bool(course or books or (leaps and rows))
+        if smooth and not (served or wide.asks) and len(state) >= FUSED_FROM and strips.in_order:
             return self._strip_by_strip(world, contacts, wide, strips, shape, substep, leaps=leaps)
+        services: Any = self._services(world, books, rows if leaps else (), h, lag) if served else ()
         stop, looks = world.substeps if leaps else substep + 1, wide.takes_looks()
-        reached, self.leapt = frame.frames[confine][wide.kind](
-            substep, stop, last, wide.circles, wide.arrays, wide.law, tuple(map(state.real, shape)), wide.cut(), looks,
+        reached, self.leapt, strongest = frame.frames[confine, served][wide.kind](
+            substep, stop, last, wide.circles, wide.arrays, wide.law, tuple(map(state.real, shape)), services, wide.cut(), looks,
             int(out is not wide.moved), strips.checked, state.real(strips.allowed * strips.allowed), state.claims(),
-            world.profile.spent(frame.STAGES), (clock.address(), clock.tick()),
+            world.profile.spent, (clock.address(), clock.tick()),
         )  # fmt: skip
+        if leaps and rows and (self.leapt or reached > substep + 1):
+            forces.strongest, forces.t = float(strongest), world.time + (reached - (not self.leapt)) * h
+        if books:
+            books.read(services.energies, substep, reached)
         self.marked = reached > last
         if self.marked:
             wide.has_marked()
@@ -81,6 +101,23 @@ class Substeps:
             contacts.broad_phase.strayed, self._out = True, wide.moved
         contacts.broad_phase.aged(reached - substep - 1)
         return int(reached)
+
+    def _services(self, world: Any, books: Any, rows: Any, h: float, lag: float) -> frame.Services:
+        """What the world has beside circles, a room and gravity: `rows` of forces, obstacles, `books`."""
+        state, gravity = world._slots, world._force_sum.gravity
+        if self._rows != (rows, state.dtype):
+            self._rows = rows, state.dtype
+            kind, vector, number = zip(*rows, strict=True) if rows else ((), (), ())
+            self._table = (
+                np.array(kind, np.int64), np.array(vector, state.dtype).reshape(-1, 2),
+                np.array(number, state.dtype).reshape(-1, drive.NUMBERS),
+            )  # fmt: skip
+        ahead = world.integrator.velocity_lag * h if world._force_sum.velocity_dependent else 0.0
+        return frame.Services(
+            h, lag, state.reals(*gravity), gravity, (*self._table, state.force, *state.reals(*state.seam.period)),
+            state.real(ahead), world._course.compiled(state, world.boundary), state.mass,
+            np.empty(2 * world.substeps if books else 0),
+        )  # fmt: skip
 
     def _strip_by_strip(
         self, world: Any, contacts: ContactSolver, wide: Wide, strips: Strips, room: Any, substep: int, *, leaps: bool

@@ -93,14 +93,13 @@ class World(Measures, Queries, Doors):
         self._slots = Slots(self._state.dtype, sleeps=sleep)
         self.links, self.forces, self.obstacles = Links(self._state), ForceList(), Obstacles()
         self._events, self._touches = Events() if events else None, Touches() if contacts else None
-        self._sleep = Sleep() if sleep else None
+        self._sleep, self._books = Sleep() if sleep else None, Bookkeeper() if ledger else None
         self._force_sum, self.actors = ForceSum(checks.vector("gravity", gravity), self.forces), list[Actor]()
         self._course = Course(self.obstacles)
         self.integrator = PositionVerlet() if integrator is None else integrator
         self.boundary = Open() if boundary is None else boundary
         self.collisions, self.substeps, self.threads = collisions, substeps, threads
-        self.time, self.frames = 0.0, 0
-        self.profile, self._books = Profile(), Bookkeeper() if ledger else None
+        self.time, self.frames, self.profile = 0.0, 0, Profile()
         self._run, self._coarse, self._team = Substeps(), Coarse(), Team()
         self.onlooker: Callable[[Moment], None] | None = None
         """Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins."""
@@ -132,7 +131,7 @@ class World(Measures, Queries, Doors):
         contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course or None
         lag, state.drop, state.h, run = integrator.velocity_lag * h, integrator.drop, h, self._run.begin(contacts)
         parts: list[Any] = [part for part in (contacts, links, course) if part]
-        compiled = contacts and not (links or course) and done == self.profile.mark
+        compiled = contacts and not links and run.tells(done, self.profile.mark)
         if not self._open(h, done):
             return
         watch, substep = self._watch(h) if contacts or course else None, 0
@@ -219,6 +218,7 @@ class World(Measures, Queries, Doors):
         if contacts:
             lag = self.integrator.velocity_lag * h
             contacts.end(self._slots, self._state, lag, self.substeps * h, self.gravity, marked=marked)
+        self.boundary.leave(self._slots)
         self.integrator.end(self._slots, h)
         if watch:
             watch.close(self._slots, contacts)

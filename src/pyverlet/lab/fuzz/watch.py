@@ -47,6 +47,9 @@ _FALL_S = 1.0
 _MOMENTUM = 16.0
 """Rounding errors of each velocity in a substep: one for each pair a circle is in, and it is in six, two sweeps and a few."""
 
+_EASED = 60
+"""Frames until what overlapped more deeply in longer steps has come apart."""
+
 _EDGE = 1e-5
 """Of the contact distance: pairs nearer than this to just touching may count or not, in float32."""
 
@@ -87,14 +90,14 @@ def check(build: Build, deed: Deed, *, frames: int, dt: float, only: str | None 
 def _check(build: Build, deed: Deed, frames: int, dt: float, made: frozenset[str]) -> None:
     world = build(1)
     half = frames // 2
-    touched = False
+    unsettled = 0
     for frame in range(half):
-        touched = _frame(world, deed, frame, dt, made, touched_before=touched)
+        unsettled = _frame(world, deed, frame, dt, made, unsettled=unsettled)
     saved, file = world.save(), None
     if "file" in made and not world.actors and _is_plain(world):
         file = _through_a_file(world)
     for frame in range(half, frames):
-        touched = _frame(world, deed, frame, dt, made, touched_before=touched)
+        unsettled = _frame(world, deed, frame, dt, made, unsettled=unsettled)
     end = world.state_hash()
     if "contacts" in made:
         _compare_contacts(world, frames)
@@ -174,20 +177,25 @@ def _told(name: str, frame: int) -> Iterator[None]:
         raise Broken(name, frame, f"{type(error).__name__}: {error}") from error
 
 
-def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str], *, touched_before: bool) -> bool:
-    """One frame. Whether the deed has touched the world: velocities are of half a step before, so the next frame knows it too."""
+def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str], *, unsettled: int) -> int:
+    """One frame, `unsettled` if so many are to come in which the world may gain by what was done to it; then how many there are.
+
+    Velocities are of half a step before, so the frame after a deed knows of it too; and overlap that a coarse step has left
+    holds more energy when steps become shorter, until it is gone.
+    """
     before_deed = (world.version, world.substeps)
-    energy_then = world.energy().total
+    energy_then, linked = world.energy().total, bool(world.links)
     deed(world, frame)
     looks: list[Callable[[], None]] = []
     touched = before_deed != (world.version, world.substeps) or energy_then != world.energy().total
+    touched |= bool(linked and not world.links)
     touched |= frame == 0 and len(world.obstacles) > 0  # which lift whoever starts inside them
     h = dt / world.substeps
     about_energy = "links" if world.links else "energy"
-    driven = world.actors or touched or touched_before or pinned_move(world._state) or not undriven(world, h, world._h_last)
+    driven = world.actors or touched or unsettled or pinned_move(world._state) or not undriven(world, h, world._h_last)
     if about_energy in made and not driven and _uniform(world):
         looks.append(_energy(about_energy, world, frame))
-    if "momentum" in made and not world.actors and _alone(world):
+    if "momentum" in made and not (world.actors or (touched and linked)) and _alone(world):
         looks.append(_momentum(world, frame, dt))
     try:
         world.step(dt)
@@ -209,7 +217,7 @@ def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str]
         slowest = float(np.finfo(world.dtype).eps * np.abs(world.position).max(initial=0.0)) / dt  # m/s, of places rounded
         if abs(world.ledger.total - now) > _CLOSED * size + 0.5 * _free_mass(world) * slowest**2:
             raise Broken("ledger", frame, f"accounts add up to {world.ledger.total:.9g} J, energy is {now:.9g} J")
-    return bool(touched)
+    return max(unsettled - 1, _EASED if before_deed[1] != world.substeps else int(touched))
 
 
 def _free_mass(world: World) -> float:
@@ -253,6 +261,11 @@ def _alone(world: World) -> bool:
     return not (held or any(world.gravity) or world.forces or world.obstacles) and isinstance(world.boundary, Open)
 
 
+def _tension(world: World) -> float:
+    """N, of all links, averaged over a few substeps."""
+    return sum(float(np.abs(link.force).sum(dtype=float)) for link in world.links)
+
+
 def _momentum(world: World, frame: int, dt: float) -> Callable[[], None]:
     before, start, mass = world.momentum(), world.position.astype(float), world.mass.astype(float)
     eps, h = float(np.finfo(world.dtype).eps), dt / world.substeps
@@ -260,17 +273,20 @@ def _momentum(world: World, frame: int, dt: float) -> Callable[[], None]:
     def size(rows: NDArray[Any]) -> float:
         return float((mass * np.hypot(*rows.astype(float).T)).sum())
 
-    moved = size(world.velocity)
+    moved, tension = size(world.velocity), _tension(world)
 
     def look() -> None:
         change = float(np.hypot(*(world.momentum() - before)))
-        pulled = dt * sum(float(np.abs(link.force).sum(dtype=float)) for link in world.links)  # N s, which are rounded too
+        pulled = dt * max(tension, _tension(world))  # N s, which are rounded too
         pushed = size(world.position - start) / dt  # out of each other, at no velocity
         allowed = _MOMENTUM * eps * world.substeps * max(moved + pulled, pushed, size(world.velocity))
         far = float(np.abs(start).max(initial=0.0))
         allowed += float(np.finfo(float).eps) * far * mass.sum() / h  # sums are made in float64
-        if world.links:  # velocities follow from places, and those are rounded: of the heaviest by m eps |x|
-            allowed += eps * far * float(mass.max(initial=0.0)) / h
+        # Pushes and links look at places, and those are rounded: of the heaviest by m eps |x|.
+        allowed += eps * far * float(mass.max(initial=0.0)) / h
+        if world.links:
+            # Of who touches another, half a substep of what links do is not shown, and of whom they hold to it, it is.
+            allowed += h / dt * pulled if world.collisions else 0.0
         if change > allowed:
             raise Broken("momentum", frame, f"changed by {change:.3g} N s, rounding explains {allowed:.3g}")
 

@@ -139,7 +139,7 @@ class ContactSolver:
 
     def steady(self, state: Slots) -> Strips | None:
         """Where strips stand, if a substep's contacts are but the two sweeps; None: there is more to them."""
-        alone = not (self._uneven or self._sleep is not None or self._pegs) and state.size is state.radius
+        alone = not (self._uneven or (self._sleep and self._sleep.anyone) or self._pegs) and state.size is state.radius
         return self.broad_phase.strips() if alone else None
 
     def set_up(self, state: Slots, h: float, lag: float, strongest: float, lent: Inertia | None = None) -> Wide:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.compile.rows import WIDTH
 from pyverlet.ground.constants import FED, LOAN_S, PUSHED
 from pyverlet.kernels import balance, loans
 from pyverlet.laws.contacts.wide import Wide
@@ -40,7 +41,7 @@ class Loans:
         """Room for what lasts a substep."""
         self._lighter, self._touched = np.empty(count, self._dtype), np.empty(count, np.uint8)
         self._before, self._spin_before = np.empty((count, 2), self._dtype), np.empty(count, self._dtype)
-        self._unpushed = np.empty((count, 2), self._dtype)
+        self._unpushed, self._rows = np.empty((count, 2), self._dtype), np.empty((count, WIDTH), self._dtype)
         self._root, self._sums, self._open_to = np.empty(count, np.int64), np.empty((count, 10)), np.empty(count, np.uint8)
 
     def begin(self, state: Slots, h: float) -> Array:
@@ -48,7 +49,6 @@ class Loans:
         if self._kept.particle is not state.particle:
             self._follow(state)
         loans.weigh(state.mass, state.inverse_mass, self._kept.lent, self._lighter)
-        # At rest a substep ends with the velocity -(1 - PUSHED / FED) a h: the same for all that way.
         # At rest a substep ends with the velocity -(1 - PUSHED / FED) a h: the same for all that way.
         self._kick, self._fall = state.real(h), state.real((state.drop - 1 + PUSHED / FED) * h * h)
         held = self._kept.held
@@ -74,8 +74,7 @@ class Loans:
     def settle(self, state: Slots, wide: Wide, h: float) -> None:
         """Those that touch lend each other; those that do not have fallen by themselves."""
         _, lent, busy, held = self._kept
-        self._touched.fill(0)
-        loans.share(*wide.touching(), wide.cut(), state.mass, state.inverse_mass, lent, busy, self._touched)
+        loans.share(*wide.touching(), wide.cut(), state.mass, state.inverse_mass, lent, busy, self._touched, self._rows)
         bodies = (state.position, state.velocity, state.acceleration, state.inverse_mass, self._lighter, held)
         loans.settle(*bodies, self._touched, self._kick, self._fall)
         loans.give_back(state.mass, state.real(min(h / LOAN_S, 1.0)), state.real(h), lent, busy)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from pyverlet.compile import jit
 from pyverlet.compile.lanes import LANES
+from pyverlet.compile.rows import WIDTH
 from pyverlet.ground import memory
 from pyverlet.ground.constants import CARRIED_WEIGHT, COLOURS, DEEP, DEEP_LENT, FED, LARGEST_PUSH, PUSHED
 from pyverlet.kernels import frame, packs, sweeps, tables
@@ -46,7 +47,7 @@ class Wide:
         reach, share: m, and what part of a push moves i; one for each lane, or (LANES,) if they are the same for all.
         made_of: (7, room) or (7, LANES) what each pair is made of: rows of `kernels.tables`.
         normal: (2, room) of pairs that touch, for others 0. depth: (room,) their overlap, m.
-        slip: (room,) what contacts have slipped, m. held: (room,) m by which friction has answered it in this substep.
+        slip: (room,) what contacts have slipped, m.
         closing: (room,) largest speed of approach since the last `collect`, m/s; negative: has not touched.
         spent: (strips, 3) J that impacts, and friction, have taken in this frame, negative; and the virial of contacts: sum of
             what pushes each pair apart times their distance, N s m.
@@ -83,12 +84,12 @@ class Wide:
         self.lane_i, self.lane_j = (memory.empty(lanes, np.uint32) for _ in range(2))
         self.gap, self.normal = memory.empty((2, lanes), self._dtype), np.empty((2, 0), self._dtype)
         self._deep = np.empty(lanes // LANES, np.int64)
-        self.depth = self.slip = self.held = self.closing = np.empty(0, self._dtype)
+        self.depth = self.slip = self.closing = np.empty(0, self._dtype)
 
     def _hold_circles(self, count: int) -> None:
         """Room for what contacts that may bounce or rub note of circles."""
-        self._carries, self._lift, self._leans, self._turned, self._turn = (np.zeros(count, self._dtype) for _ in range(5))
-        self._slid = np.zeros((count, 2), self._dtype)
+        self._carries, self._lift, self._leans, self._turn = (np.zeros(count, self._dtype) for _ in range(4))
+        self._rows = np.zeros((count, WIDTH), self._dtype)
 
     def take(self, pairs: PairList, origin: Array, radius: Array, seam: Seam = NONE) -> None:
         """Pack a new list; origin: (n, 2) positions it was made from; radius: (n,) m."""
@@ -143,11 +144,11 @@ class Wide:
     def hold_slips(self) -> None:
         """Room for what friction notes; the values are anything."""
         if len(self.slip) != len(self.lane_i):
-            self.slip, self.held = (np.empty(len(self.lane_i), self._dtype) for _ in range(2))
+            self.slip = np.empty(len(self.lane_i), self._dtype)
 
     def drop_slips(self) -> None:
         """Nobody rubs any more."""
-        self.slip = self.held = self.slip[:0]
+        self.slip = self.slip[:0]
 
     def weigh(self, asked: bool) -> None:
         """Whether somebody asks for the virial."""
@@ -213,7 +214,7 @@ class Wide:
             state.turn, state.lift = turn, self._lift
         self.circles = (
             state.position, state.velocity, state.acceleration, state.inverse_mass, self.origin, self.moved, state.resting,
-            state.spin, self._carries, state.fed, self._slid, self._turned, turn, self._lift, self._leans, state.start,
+            state.spin, self._carries, state.fed, self._rows, turn, self._lift, self._leans, state.start,
             state.radius, state.restitution, state.friction, state.hits, state.spent, *(lent.noted if lent else self._nobody),
         )  # fmt: skip
         carried = CARRIED_WEIGHT * strongest * h if strongest > 0 else np.inf
@@ -225,7 +226,7 @@ class Wide:
         )  # fmt: skip
         self.arrays = (
             self.begin, self.lanes, self.apart, self.lane_i, self.lane_j, self.gap, self.reach, self.share, self.made_of,
-            self.normal, self.depth, self.slip, self.held, self.closing, self._deep, self._deeps, self.spent,
+            self.normal, self.depth, self.slip, self.closing, self._deep, self._deeps, self.spent,
         )  # fmt: skip
 
     def leave_arriving(self) -> None:

@@ -27,6 +27,10 @@ class Conservative(Protocol):
         """Potential energy of all particles, J."""
 
 
+Row = tuple[int, tuple[float, float], tuple[float, float]]
+"""A force by the numbers of `kernels.drive`: kind, vector, numbers."""
+
+
 @runtime_checkable
 class Numbered(Protocol):
     """Something that holds particles by their index."""
@@ -81,6 +85,16 @@ class ForceSum:
     def kick_drift(self, state: Slots, t: float, h: float, ahead: float = 0.0) -> None:
         """Evaluate, take back a kick of `ahead` seconds, then velocity += h * acceleration, then position += h * velocity."""
         self.strongest = newton_kick_drift(state, self._summed(state, t), self.gravity, h, ahead)
+
+    def compiled(self, state: Slots) -> tuple[Row, ...] | None:
+        """All forces as rows that compiled code adds up by itself; None: one of them has to be asked."""
+        rows = []
+        for force in self.forces:
+            row = getattr(force, "compiled", None)
+            if row is None or (known := row(state)) is None:
+                return None
+            rows.append(known)
+        return tuple(rows)
 
     def _summed(self, state: Slots, t: float) -> NDArray[Any]:
         """The sum of all forces but gravity (n, 2), N; (0, 2) if there are none."""

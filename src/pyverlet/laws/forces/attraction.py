@@ -8,6 +8,8 @@ import numpy as np
 
 from pyverlet.ground import checks
 from pyverlet.kernels import forces
+from pyverlet.kernels.drive import ATTRACTION
+from pyverlet.laws.forces._base import Row
 from pyverlet.state.group import Group
 from pyverlet.state.state import Slots, State
 
@@ -33,6 +35,10 @@ class Attractor:
     def apply(self, state: Slots, t: float) -> None:
         law = map(state.real, (*self.center, self.strength, self.softening, *state.seam.period))
         forces.attract(state.force, state.position, state.inverse_mass, *law)
+
+    def compiled(self, state: Slots) -> Row | None:
+        """What `kernels.drive` needs to know of it; None: it has to be asked."""
+        return (ATTRACTION, self.center, (self.strength, self.softening)) if type(self) is Attractor else None
 
     def potential(self, state: State) -> float:
         distance = np.hypot(*state.seam.nearest(state.position.astype(np.float64) - self.center).T)

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from pyverlet.ground import checks
+from pyverlet.kernels.drive import UNIFORM
+from pyverlet.laws.forces._base import Row
 from pyverlet.state.group import Group
 from pyverlet.state.state import Slots, State
 
@@ -28,6 +30,10 @@ class ConstantForce:
     def apply(self, state: Slots, t: float) -> None:
         where = slice(None) if self.group is None else state.slots_of(self.group.index)
         state.force[where] += np.asarray(self.newtons, state.dtype)
+
+    def compiled(self, state: Slots) -> Row | None:
+        """What `kernels.drive` needs to know of it; None: it has to be asked."""
+        return (UNIFORM, self.newtons, (0.0, 0.0)) if type(self) is ConstantForce and self.group is None else None
 
     def potential(self, state: State) -> float:
         where = slice(None) if self.group is None else self.group.index

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import forces
+from pyverlet.kernels.drive import DRAG
+from pyverlet.laws.forces._base import Row
 from pyverlet.state.state import Slots
 
 Field = Callable[[NDArray[Any], NDArray[Any], float], Any]
@@ -37,6 +39,10 @@ class Drag:
         wind = self._wind(state, t)
         forces.drag(state.force, state.velocity, wind, state.inverse_mass, *state.reals(self.linear, self.quadratic, state.h))
 
+    def compiled(self, state: Slots) -> Row | None:
+        """What `kernels.drive` needs to know of it; None: it has to be asked."""
+        return (DRAG, (0.0, 0.0), (self.linear, self.quadratic)) if type(self) is Drag else None
+
     def _wind(self, state: Slots, t: float) -> NDArray[Any]:
         return np.zeros((1, 2), state.dtype)
 
@@ -54,6 +60,11 @@ class Wind(Drag):
     def __init__(self, velocity: Sequence[float] | Field, *, linear: float = 0.0, quadratic: float = 0.0) -> None:
         super().__init__(linear=linear, quadratic=quadratic)
         self.velocity: Field | tuple[float, float] = velocity if callable(velocity) else checks.vector("velocity", velocity)
+
+    def compiled(self, state: Slots) -> Row | None:
+        if type(self) is not Wind or callable(self.velocity):
+            return None
+        return DRAG, self.velocity, (self.linear, self.quadratic)
 
     def _wind(self, state: Slots, t: float) -> NDArray[Any]:
         if not callable(self.velocity):

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
 
 Value = TypeVar("Value")
 Points = NDArray[np.float64]
@@ -156,9 +157,26 @@ class Obstacles(list[Obstacle]):
         self._outlines: list[Outline] = []
 
     def append(self, obstacle: AnyObstacle) -> AnyObstacle:  # type: ignore[override]
-        """Add an obstacle; returns it."""
-        super().append(obstacle)
+        """Add an obstacle; returns it.
+
+        Raises:
+            InputError: it is none, but a room, say.
+        """
+        self.extend((obstacle,))
         return obstacle
+
+    def extend(self, obstacles: Iterable[Obstacle]) -> None:
+        """Add several; InputError as `append`."""
+        given: list[Any] = list(obstacles)
+        for obstacle in given:
+            if not isinstance(obstacle, Obstacle):
+                allowed = "allowed is an object such as pyverlet.Disc((0, 0), 1) or pyverlet.Segment((0, 0), (1, 0))"
+                raise InputError(f"obstacle is a {type(obstacle).__name__}; {allowed}")
+        super().extend(given)
+
+    def __iadd__(self, obstacles: Iterable[Obstacle]) -> Obstacles:  # type: ignore[override,misc]
+        self.extend(obstacles)
+        return self
 
     def outlines(self) -> list[Outline]:
         """Lines that draw all of them where they are now, metres; the same list as long as nothing has moved."""

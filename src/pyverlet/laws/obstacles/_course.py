@@ -18,6 +18,9 @@ from pyverlet.state.state import Slots
 
 Array = NDArray[Any]
 
+_NO_CELLS = (0.0, 0.0, 1.0, 0, 0, np.zeros(1, np.int64), np.zeros(0, np.int32))
+_NO_WALLS = np.zeros(7)
+
 
 class Course:
     """Tables of all segments and of where their obstacles are; the obstacles themselves are the truth between frames.
@@ -98,19 +101,34 @@ class Course:
 
         time: seconds from the beginning of the frame to that of the substep.
         """
+        self.set_up(state, time, h)
+        collide: Any = meetings.collide
+        segments, placed, cells, *taken, drop = self.compiled(state, room)
+        numbers = map(state.real, (h, lag, rest_speed))
+        collide(segments, placed, time + h, *cells, *taken, *bodies(state), *numbers, drop)
+
+    @property
+    def still(self) -> bool:
+        """Whether obstacles stay where they are, so that a substep is like the one before."""
+        return not self._moving
+
+    def set_up(self, state: Slots, time: float, h: float) -> None:
+        """Place the obstacles, and make room for what is noted of those they hold; arguments: as for `collide`."""
         largest = float(state.radius.max(initial=0.0))
         if self._moving or self._binned_for != largest:
             kernels.place(self._segments, self._bodies, time, h)
             self._bin(largest)
-        numbers = map(state.real, (h, lag, rest_speed))
-        collide: Any = meetings.collide
         if len(state.along) != len(state):
             state.along = np.empty_like(state.position)
-        walls = np.array(room.walls(), float)
         if time == 0.0 or self._order is not state.particle:  # every new order is a new array
             self._order, self._rest = state.particle, np.zeros_like(state.position)
-        taken = (walls, state.along, self._rest)
-        collide(self._segments, self._bodies, time + h, *self._cells, *taken, *bodies(state), *numbers, state.drop)
+
+    def compiled(self, state: Slots, room: Boundary) -> tuple[Any, ...]:
+        """What `kernels.meetings.collide` takes: segments, bodies, cells, walls, along, rest, drop; empty without obstacles."""
+        if not self:
+            return self._segments, self._bodies, _NO_CELLS, _NO_WALLS, state.along, self._rest, state.drop
+        walls = np.array(room.walls(), float)
+        return self._segments, self._bodies, self._cells, walls, state.along, self._rest, state.drop
 
     def end(self, dt: float) -> None:
         """At the end of a frame that went well: the obstacles are where they moved to."""

@@ -8,7 +8,7 @@ import { GRID_MAX } from "./draw.js";
 import { drawMarksOf } from "./drawing.js";
 
 export const MOST_CONTACTS = 20000; // circles whose contacts are searched for: beyond, it would cost frames
-export const MOST_FORCES = 5000; // circles, see forces.py
+export const MOST_FORCES = 20000; // circles, see forces.py
 const LINK_PX = 1.6;
 const LOADS = 12; // shades that links are drawn in: a stroke for each
 const MARKED_PX = 4; // radius from which on a circle has a mark that shows how it has turned, as in pictures and films

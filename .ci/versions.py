@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The suite on other versions: `python3 .ci/versions [--python 3.12] [--only oldest|newest|generic] [pytest arguments]`.
+"""The suite on other versions: `python3 .ci/versions.py [--python 3.12] [--only oldest|newest|generic] [pytest arguments]`.
 
 On every Python from 3.11 on that is found, with the oldest and the newest NumPy and Numba that pyproject.toml allows, and once
 compiled for a generic processor: without browsers, and the bits are the same. Not part of `.ci/run`: each takes as long as the
@@ -25,6 +25,8 @@ TESTED = ["unit", "equivalence", "physics", "data", "cli", "scenes", "picture", 
 
 NEEDED = ["pytest>=8.3", "hypothesis>=6.100", "scipy>=1.13", "pytest-xdist>=3.6", "httpx>=0.27"]
 
+GENERIC = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
+
 HASHES = """
 import numpy as np, pyverlet as pv
 for name in ("cage", "box", "cloth", "soft-bodies"):
@@ -33,7 +35,6 @@ for name in ("cage", "box", "cloth", "soft-bodies"):
         world.run(seconds=1.0)
         print(name, dtype, world.state_hash(), flush=True)
 """
-
 
 
 def bounds(name: str) -> tuple[str, str]:
@@ -59,7 +60,15 @@ def environment(folder: Path, python: str, requirements: list[str]) -> Path | No
     """An interpreter with these, and this project; None if there are no such releases for it."""
     subprocess.run([python, "-m", "venv", folder], check=True)
     inside = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
-    pip = [inside, "-m", "pip", "--disable-pip-version-check", "-q", "install", "--only-binary=numpy,numba,llvmlite"]
+    pip: list[str | Path] = [
+        inside,
+        "-m",
+        "pip",
+        "--disable-pip-version-check",
+        "-q",
+        "install",
+        "--only-binary=numpy,numba,llvmlite",
+    ]
     extras = f"{ROOT}[record,data,page]"
     done = subprocess.run([*pip, *requirements, *NEEDED, extras], capture_output=True, text=True)
     if done.returncode:
@@ -107,7 +116,7 @@ def main() -> None:
                 cache = str(Path(folder, "cache"))
                 told[f"{version} {age}"] = hashes(inside, cache, {})
                 if age == "newest":
-                    told[f"{version} generic"] = hashes(inside, str(Path(folder, "generic")), {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""})
+                    told[f"{version} generic"] = hashes(inside, str(Path(folder, "generic")), GENERIC)
                 if options.only != "generic":
                     passed, last = suite(inside, cache, arguments)
                     good &= passed

@@ -1,0 +1,98 @@
+"""The integration of a substep under forces that are known by a few numbers each: none of them is asked, block by block.
+
+Integrators of Stormer's kind keep a velocity half a substep old: it is kicked for the forces to see, and that is taken back.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.kernels.forces import attract, drag
+from pyverlet.kernels.motion import add_scaled, any_strayed, kick_drift, newton_block, set_out
+
+DRAG, UNIFORM, SPRING, ATTRACTION = range(4)
+"""Kinds of forces. Vector and numbers of each: velocity of the medium, (linear, quadratic); newtons; centre, (stiffness,);
+centre, (strength, softening)."""
+
+NUMBERS = 2
+"""Each has, of which some need fewer."""
+
+_BLOCK = 2048
+"""Particles that one thread takes at a time."""
+
+
+@kernel
+def _push(force, x, y):
+    for i in range(force.shape[0]):
+        force[i, 0] += x
+        force[i, 1] += y
+
+
+@kernel
+def _pull(force, position, x, y, stiffness):
+    for i in range(force.shape[0]):
+        force[i, 0] -= stiffness * (position[i, 0] - x)
+        force[i, 1] -= stiffness * (position[i, 1] - y)
+
+
+@kernel
+def _add_up(force, position, velocity, inverse_mass, h, kind, vector, number, period_x, period_y):
+    """force = the sum of all, in their order."""
+    f, zero = force.reshape(-1), h - h
+    for k in range(f.shape[0]):
+        f[k] = zero
+    for row in range(kind.shape[0]):
+        x, y, first, second = vector[row, 0], vector[row, 1], number[row, 0], number[row, 1]
+        if kind[row] == DRAG:
+            drag(force, velocity, vector[row : row + 1], inverse_mass, first, second, h)
+        elif kind[row] == UNIFORM:
+            _push(force, x, y)
+        elif kind[row] == SPRING:
+            _pull(force, position, x, y, first)
+        else:
+            attract(force, position, inverse_mass, x, y, first, second, period_x, period_y)
+
+
+@kernel
+def _some(
+    position, velocity, acceleration, inverse_mass, kind, vector, number, force, period_x, period_y, gx, gy, h, ahead, a, b
+):  # fmt: skip
+    """Of the particles from a up to b; the square of the largest acceleration."""
+    x, v, felt, pushed, light = position[a:b], velocity[a:b], acceleration[a:b], force[a:b], inverse_mass[a:b]
+    if ahead != 0:
+        add_scaled(v, felt, ahead)
+    _add_up(pushed, x, v, light, h, kind, vector, number, period_x, period_y)
+    if ahead != 0:
+        add_scaled(v, felt, -ahead)
+    largest = newton_block(felt, pushed, light, gx, gy)
+    kick_drift(x, v, felt, h)
+    return largest
+
+
+@parallel_kernel
+def drive(
+    position, velocity, acceleration, inverse_mass, kind, vector, number, force, period_x, period_y, gx, gy, h, ahead, reference,
+    square, origin, moved,
+):  # fmt: skip
+    """What `motion.leap` does after all forces have been asked: v += h a, x += h v, moved = x - origin.
+
+    kind: (k,) of the constants above; vector: (k, 2), number: (k, NUMBERS), in the dtype of the world. force: (n, 2) N, becomes
+    their sum. ahead: s, by which velocities are kicked for forces to see. reference, square: as for `motion.leap`.
+
+    Returns the largest acceleration, m/s^2, and whether anyone has strayed.
+    """
+    where, start = position.reshape(-1), reference.reshape(-1)
+    largest, found = gx - gx, 0
+    for block in prange((inverse_mass.shape[0] + _BLOCK - 1) // _BLOCK):
+        a, b = block * _BLOCK, min((block + 1) * _BLOCK, inverse_mass.shape[0])
+        largest = max(
+            largest,
+            _some(
+                position, velocity, acceleration, inverse_mass, kind, vector, number, force, period_x, period_y, gx, gy, h, ahead,
+                a, b,
+            ),
+        )  # fmt: skip
+        found += int(any_strayed(where, start, a, b, square))
+        set_out(position[a:b], origin[a:b], moved[a:b])
+    return np.sqrt(largest), found > 0
