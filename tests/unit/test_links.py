@@ -10,6 +10,7 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.kernels import runs
+from pyverlet.laws.links import Links
 from pyverlet.viewers.hands import Hands
 
 DT = 1 / 60
@@ -43,6 +44,28 @@ def test_any_number_of_threads_gives_the_same_bits(dtype: Any) -> None:
         world.run(seconds=0.1)
         hashes.append((world.state_hash(), world.links[1].force.tobytes()))
     assert hashes[0] == hashes[1]
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_one_call_a_substep_does_what_its_stages_do(dtype: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def hanging() -> tuple[str, bytes, int]:
+        world = pv.World(boundary=pv.Box((-1, -8), (9, 2)), dtype=dtype)
+        x, y = np.meshgrid(np.arange(9) * 0.5, -np.arange(6) * 0.5)
+        group, n = world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.2, mass=0.1), np.arange(54).reshape(6, 9)
+        world.links.append(pv.Stick(group, n[:, :-1].ravel(), n[:, 1:].ravel(), collide=False))
+        world.links.append(pv.Rope(group, n[:-1].T.ravel(), n[1:].T.ravel(), breaking_force=8.0, collide=False))
+        world.links.append(pv.Spring(group, n[:-1, :-1].ravel(), n[1:, 1:].ravel(), stiffness=50.0, damping=0.1))
+        world.links.append(pv.Pin(group, n[0, [0, 4, -1]], compliance=1e-4, breaking_force=1.0))
+        broken = 0
+        for _ in range(30):
+            world.step(DT)
+            broken += len(world.links.broken)
+        return world.state_hash(), world.links[1].force.tobytes(), broken
+
+    together = hanging()
+    monkeypatch.setattr(Links, "compiled", lambda self, state, h: None)
+    assert hanging() == together
+    assert together[2] > 0
 
 
 def test_saving_continues_with_the_same_bits() -> None:

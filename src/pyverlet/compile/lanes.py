@@ -176,20 +176,6 @@ def widen(typing: Any, a: Any) -> Any:
 
 
 @intrinsic  # type: ignore[untyped-decorator]
-def lanes_like(typing: Any, a: Any, array: Any) -> Any:
-    """The same numbers in the dtype of an array, rounded where that holds fewer digits."""
-    like = LanesType(array.dtype)
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        if a == like:
-            return args[0]
-        change = builder.fpext if a.real.bitwidth < like.real.bitwidth else builder.fptrunc
-        return change(args[0], context.get_value_type(like))
-
-    return like(a, array), generate
-
-
-@intrinsic  # type: ignore[untyped-decorator]
 def add_lanes(typing: Any, a: Any, lanes: Any) -> Any:
     """The sum, in float64, of the first so many lanes, one after the other."""
 

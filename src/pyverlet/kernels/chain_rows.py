@@ -7,7 +7,6 @@ import numpy as np
 from pyverlet.compile.jit import driver, kernel, parallel_kernel, prange
 from pyverlet.compile.lanes import (
     LANES,
-    lanes_like,
     larger,
     load,
     pick,
@@ -21,6 +20,7 @@ from pyverlet.compile.lanes import (
     which_above,
     widen,
 )
+from pyverlet.compile.rounding import lanes_like
 from pyverlet.ground.constants import LINK_BOWED, LINK_GIVE, LINK_MEMORY_S, LINK_RESOLVED
 from pyverlet.kernels.seam import nearest, nearest_lanes
 

@@ -25,7 +25,6 @@ import numpy as np
 from pyverlet.compile.jit import driver, kernel, parallel_kernel, prange
 from pyverlet.compile.lanes import (
     LANES,
-    lanes_like,
     larger,
     load,
     pick,
@@ -40,6 +39,7 @@ from pyverlet.compile.lanes import (
     which_above,
     widen,
 )
+from pyverlet.compile.rounding import lanes_like
 from pyverlet.ground.constants import LINK_ROUNDS, LINK_TAUT, LINK_TURN
 from pyverlet.kernels.chain_rows import AX, AY, BOW, GIVE, HELD, INTACT, LAM, OFFSET, REST, ROPE, ROPES, TURN, ahead
 from pyverlet.kernels.seam import nearest, nearest_lanes

@@ -3,8 +3,8 @@
 Pushing circles apart lifts them and throws them: in a crash that a substep sees as deep overlap, and where circles grow that were
 added on top of each other. So the energy at the end of a frame is compared with that at its start. What it has gained beyond
 SURPLUS of the world's scale is taken back, cluster by cluster, in proportion to what each has gained, never more than that. A
-cluster is what hangs together by contacts in this frame, and by links. What it has gained is its kinetic energy less the work of
-gravity and of the forces with a potential, by the trapezoidal rule: exact for springs. In this order:
+cluster is what hangs together by contacts in this frame, and by links. What it has gained is its kinetic energy and that of its
+links, less the work of gravity and of the forces with a potential, by the trapezoidal rule: exact for springs. In this order:
 
 1. The velocities within the cluster, beside those with which it moves and turns as a whole: that keeps its momentum and its
    angular momentum. Kinetic energy goes with the square, so all are multiplied by sqrt(1 - taken / energy).
@@ -52,24 +52,26 @@ class Watch:
         self._kept: list[Any] = [force for force in forces.forces if isinstance(force, Conservative)]
         self._plain = len(start) < ONE_THREAD_BELOW and not (self._kept or links)
         # What links hold is not known any more when the frame is over.
-        self._held = 0.0 if self._plain else self._holds(start)
-        self._energy = 0.0 if self._plain else self._held + self._mechanical(start, self._gravity)
+        by_forces, by_links = (0.0, 0.0) if self._plain else self._holds(start)
+        # A potential is known but for a constant, so that under gravity, which has a scale, it is none.
+        self._held = by_links if any(self._gravity) else by_forces + by_links
+        self._energy = 0.0 if self._plain else by_forces + by_links + self._mechanical(start, self._gravity)
 
     def _mechanical(self, now: State | Slots, gravity: tuple[float, float]) -> float:
         moving, body = (now.position, now.velocity, now.velocity, 0.0), (now.spin, now.radius, now.mass)
         return float(measure.mechanical(*moving, *body, *gravity))
 
-    def _holds(self, now: State | Slots) -> float:
-        """Energy that forces and links hold, J."""
+    def _holds(self, now: State | Slots) -> tuple[float, float]:
+        """Energy that forces hold, and links, J."""
         if not (self._kept or self._links):
-            return 0.0
+            return 0.0, 0.0
         state = now.in_users_order() if isinstance(now, Slots) else now
-        return float(sum(force.potential(state) for force in self._kept) + self._links.energy(state))
+        return float(sum(force.potential(state) for force in self._kept)), float(self._links.energy(state))
 
     def _gained(self, now: Slots) -> float:
         """What the energy of all is now above that at the start, J."""
         if not self._plain:
-            return self._mechanical(now, self._gravity) + self._holds(now) - self._energy
+            return self._mechanical(now, self._gravity) + sum(self._holds(now)) - self._energy
         then, motion = self._start, (now.position, now.velocity, now.spin, now.radius, now.mass)
         start = (then.position, then.velocity, then.spin, then.radius, then.mass)
         return float(measure.gained(*start, *motion, *self._gravity))
@@ -109,7 +111,10 @@ class Watch:
         cluster = self._clusters(slots, listed, moved)
         x = x[cluster] + slots.seam.nearest(x - x[cluster])  # across the seam they hang together, too
         add = _Sums(cluster)
-        gain = np.maximum(add(_kinetic(mass, v, slots.radius, slots.spin) - self._kinetic()[order] + lift), 0)
+        gain = add(_kinetic(mass, v, slots.radius, slots.spin) - self._kinetic()[order] + lift)
+        if self._links:
+            gain += add((self._links.shares(slots.in_users_order()) - self._links.shares(start))[order])
+        gain = np.maximum(gain, 0)
         if self._forces.forces:  # what has touched nobody has its gain from the integrator
             gain *= (add(np.ones(len(slots))) > 1) | (add(slots.hits >= 0) > 0)
         # Energy that forces and links hold may be more than they ever give: it is not answered alone.

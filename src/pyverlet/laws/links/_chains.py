@@ -11,7 +11,7 @@ from pyverlet.compile.lanes import LANES
 from pyverlet.ground.constants import LINK_COLOURS, LINKS_ONE_THREAD_BELOW
 from pyverlet.kernels import chain_rows, chains, runs
 from pyverlet.laws.links._link import Array
-from pyverlet.laws.links._pool import MOVING, Pool
+from pyverlet.laws.links._pool import MOVING, Pool, held
 from pyverlet.laws.links._work import Work
 from pyverlet.state.seam import Seam
 
@@ -126,6 +126,11 @@ class ChainPool(Pool):
 
     def energy(self, position: Array, seam: Seam) -> float:
         return self._energy(position, seam, self.entries["particle"].reshape(-1, 2), self.rows["intact"])
+
+    def energies(self, position: Array, seam: Seam) -> Array:
+        rows, ends = self.rows, self.entries["particle"].reshape(-1, 2)
+        away = np.hypot(*seam.nearest(position[ends[:, 1]] - position[ends[:, 0]]).T) - rows["rest"]
+        return held(rows["stiffness"], rows["upper"], rows["intact"], away)
 
     def _energy(self, position: Array, seam: Seam, ends: Array, intact: Array) -> float:
         rows = self.rows

@@ -113,5 +113,15 @@ class Pool(ABC):
         """Energy stored in soft links at (n, 2) positions in the user's order, J."""
 
     @abstractmethod
+    def energies(self, position: Array, seam: Seam) -> Array:
+        """(k,) the same, row by row."""
+
+    @abstractmethod
     def stored(self, position: Array, seam: Seam) -> float:
         """The same in the middle of a frame, of the rows that are intact then, at (m, 2) positions in the order of `Work`."""
+
+
+def held(stiffness: Array, upper: Array | float, intact: Array, value: Array) -> Array:
+    """(k,) energy of rows, J: none of the rigid, of the broken, nor of slack ropes."""
+    pulled = np.isfinite(stiffness) & (intact != 0) & ~((upper <= 0.0) & (value < 0.0))
+    return 0.5 * np.where(pulled, stiffness, 0.0) * value * value

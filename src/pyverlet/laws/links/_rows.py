@@ -9,7 +9,7 @@ import numpy as np
 from pyverlet.ground.constants import LINK_COLOURS
 from pyverlet.kernels import links, runs
 from pyverlet.laws.links._link import Array
-from pyverlet.laws.links._pool import MOVING, Pool
+from pyverlet.laws.links._pool import MOVING, Pool, held
 from pyverlet.laws.links._work import Work
 from pyverlet.state.seam import Seam
 
@@ -141,17 +141,13 @@ class RowPool(Pool):
     def stored(self, position: Array, seam: Seam) -> float:
         row, soft, value = self._row, self._soft, self._soft_value
         self.measure(position, *seam.period, *self._soft_rows, value, self._soft_gradient, self._soft_bend)
-        return _stored(row["stiffness"][soft], row["upper"][soft], row["intact"][soft], value)
+        return float(held(row["stiffness"][soft], row["upper"][soft], row["intact"][soft], value).sum())
 
     def energy(self, position: Array, seam: Seam) -> float:
+        return float(self.energies(position, seam).sum())
+
+    def energies(self, position: Array, seam: Seam) -> Array:
         rows, first, particle = self.rows, self.first, self.entries["particle"]
         value, bend, gradient = np.empty(len(rows)), np.empty(len(rows)), np.empty((len(particle), 2))
         self.measure(position, *seam.period, first, particle, rows["rest"], 0, len(rows), value, gradient, bend)
-        soft = np.isfinite(rows["stiffness"])
-        return _stored(rows["stiffness"][soft], rows["upper"][soft], rows["intact"][soft], value[soft])
-
-
-def _stored(stiffness: Array, upper: Array, intact: Array, value: Array) -> float:
-    """Energy of rows of finite stiffness, J: none of the broken, nor of slack ropes."""
-    pulled = (intact != 0) & ~((upper <= 0.0) & (value < 0.0))
-    return 0.5 * float(np.sum(np.where(pulled, stiffness * value * value, 0.0)))
+        return held(rows["stiffness"], rows["upper"], rows["intact"], value)

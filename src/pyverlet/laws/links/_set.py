@@ -301,6 +301,17 @@ class Links:
         position = (self._state if state is None else state).position.astype(np.float64)
         return sum(pool.energy(position, self._state.seam) for pool in self._order)
 
+    def shares(self, state: State) -> Array:
+        """(n,) the same in the user's order: what each link holds, at the first of its particles that is free to move."""
+        position, share = state.position.astype(np.float64), np.zeros(len(state))
+        for pool in self._order:
+            particle, entry = pool.entries["particle"], np.arange(len(pool.entries))
+            if len(particle):
+                entry += np.where(np.isfinite(state.mass[particle]), 0, len(entry))
+                whose = particle[np.minimum.reduceat(entry, pool.first[:-1]) % len(entry)]
+                share += np.bincount(whose, pool.energies(position, self._state.seam), len(state))
+        return share
+
     def stored(self, state: Slots) -> float:
         """The same in the middle of a frame, J, where the particles are now, without those that have broken in it."""
         if not any(pool.gives for pool in self._order):

@@ -11,7 +11,7 @@ from pyverlet.ground import checks
 from pyverlet.kernels import ties
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import Array, Floats, Link, several, stiffness_of
-from pyverlet.laws.links._pool import Pool
+from pyverlet.laws.links._pool import Pool, held
 from pyverlet.laws.links._work import Work
 from pyverlet.state.seam import Seam
 
@@ -133,13 +133,14 @@ class PinPool(Pool):
         self.rows["force"][:] = np.where(self._intact, self._force, 0.0)
 
     def stored(self, position: Array, seam: Seam) -> float:
-        return self._energy(position, self._particle, self._intact, seam)
+        return float(self._energies(position, self._particle, self._intact, seam).sum())
 
     def energy(self, position: Array, seam: Seam) -> float:
-        return self._energy(position, self.entries["particle"], self.rows["intact"], seam)
+        return float(self.energies(position, seam).sum())
 
-    def _energy(self, position: Array, particle: Array, intact: Array, seam: Seam) -> float:
-        rows = self.rows
-        soft = np.isfinite(rows["stiffness"]) & (intact != 0)
-        away = seam.nearest(position[particle[soft]] - rows["point"][soft])
-        return 0.5 * float(np.sum(rows["stiffness"][soft] * np.sum(away * away, axis=1)))
+    def energies(self, position: Array, seam: Seam) -> Array:
+        return self._energies(position, self.entries["particle"], self.rows["intact"], seam)
+
+    def _energies(self, position: Array, particle: Array, intact: Array, seam: Seam) -> Array:
+        away = np.hypot(*seam.nearest(position[particle] - self.rows["point"]).T)
+        return held(self.rows["stiffness"], np.inf, intact, away)
