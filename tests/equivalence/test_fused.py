@@ -262,7 +262,7 @@ def test_forces_that_are_asked_leave_obstacles_to_compiled_code(fusing: Fusing) 
 @pytest.mark.parametrize("materials", [{}, {"restitution": 0.3, "friction": 0.5}], ids=["smooth", "both"])
 def test_a_ledger_has_the_same_accounts(materials: dict[str, Any], fusing: Fusing) -> None:
     def kept() -> pv.World:
-        return fallen(0.5, ledger=True, collisions=pv.Collisions(**materials))  # type: ignore[arg-type]
+        return fallen(0.5, ledger=True, collisions=pv.Collisions(**materials))
 
     world = kept()
     assert fusing.leaps > 0.9 * world.frames * (world.substeps - 1)

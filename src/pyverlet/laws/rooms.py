@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.constants import STANDS_OUT
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import bounds, cage, frame, meetings
-from pyverlet.kernels.motion import ON_WALL
+from pyverlet.kernels import bounds, cage, frame, leaving, meetings
 from pyverlet.laws.turning import surface
 from pyverlet.state.moves import bodies
 from pyverlet.state.seam import NONE, Seam
@@ -119,20 +118,13 @@ class _Walls(Boundary):
         kernel(*shape, *bodies(state), *laws)
 
     def leave(self, state: Slots) -> None:
-        held = np.flatnonzero(state.resting == ON_WALL)
-        if not len(held) or len(state.along):  # where there are obstacles it may be one of them that holds
+        # Where there are obstacles it may be one of them that holds. Whom a wall rubs is not left all that drives it.
+        if len(state.along) or not leaving.anybody_slides(state.resting, state.friction, self.friction):
             return
-        own = state.friction[held]
-        held = held[np.where(own < 0, self.friction, self.friction * own) == 0]  # whom a wall rubs is not left what drives it
-        faced = self.facing(state.position[held])
-        if faced is None:
-            return
-        left = state.acceleration[held].astype(float)
-        for gap, normal in zip(faced[0].T, faced[1].swapaxes(0, 1), strict=True):
-            into = np.minimum((left * normal).sum(axis=1), 0)
-            left -= np.where(gap < (1 + STANDS_OUT) * state.radius[held], into, 0)[:, None] * normal
-        state.along = np.zeros_like(state.position)
-        state.along[held] = left
+        what, x0, y0, x1, y1 = map(float, self.walls()[:5])
+        state.along = np.empty_like(state.position)
+        about = (state.position, state.radius, state.friction, state.resting, state.acceleration)
+        leaving.note_along(what, x0, y0, x1, y1, self.friction, *about, state.along)
 
     def _rounded(self, shape: Sequence[float], state: Slots, h: float, lag: float, rest_speed: float) -> tuple[Any, Any]:
         """The numbers of `shape`, and h, lag, e, mu and rest_speed, in the dtype of the state."""

@@ -59,6 +59,7 @@ def leave(state: Slots, h: float) -> None:
     """
     held = state.acceleration, state.velocity, state.resting, state.along
     motion.leave(*held, *state.reals(state.lean, h, 0.5 * h))
+    state.along = state.along[:0].copy()  # of use no more, and as large as a column
 
 
 def first_non_finite(state: Slots) -> int:
