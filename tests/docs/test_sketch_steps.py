@@ -96,7 +96,8 @@ def test_every_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
                         assert main(shlex.split(line)[1:]) == 0, capsys.readouterr().err
             if kind == "diff":
                 assert watched is not None
-                page.wait_for_function("() => (window.before = window.pyverlet.status().time) > 0.3")
+                # That it begins anew shows in its time, for as long as it is before this one.
+                page.wait_for_function("() => (window.before = window.pyverlet.status().time) > 2")
                 sketch.write_text(changed(sketch.read_text(encoding="utf-8"), text), encoding="utf-8")
                 watched.saved(after[1].strip() if after[0] == "text" else None)
             kind, text = after

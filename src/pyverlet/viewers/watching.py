@@ -111,7 +111,7 @@ class Watcher:
         self._workshop, self._session = workshop, session
         self._ended = threading.Event()
         self._builder: threading.Thread | None = None
-        self._lock, self._interruptible = threading.Lock(), False
+        self._lock, self._interruptible, self._building = threading.Lock(), False, False
         self._turn = 0
 
     @contextmanager
@@ -135,16 +135,20 @@ class Watcher:
                 began = time.monotonic()
                 self._build()
             known |= now  # files that a build has brought along are news, but no change
-            building = self._builder is not None and self._builder.is_alive()
-            if building and began and time.monotonic() - began > SAY_S:
-                self._session.tell(complaint=self._workshop.fault, busy=f"building {self._workshop.path.name}")
+            if began and time.monotonic() - began > SAY_S:
+                self._say_busy()
                 began = 0.0
+
+    def _say_busy(self) -> None:
+        with self._lock:  # said after the end of the building, it would be said for ever
+            if self._building:
+                self._session.tell(complaint=self._workshop.fault, busy=f"building {self._workshop.path.name}")
 
     def _build(self) -> None:
         with self._lock:
             if self._interruptible and self._builder is not None:
                 interrupt(self._builder)  # what it builds is old
-        self._turn += 1
+            self._turn, self._building = self._turn + 1, True
         self._builder = threading.Thread(target=self._put_on, args=(self._turn,), name="pyverlet-build", daemon=True)
         self._builder.start()
 
@@ -163,9 +167,11 @@ class Watcher:
                         warm_up(world)  # so that the world before goes on meanwhile
                 except PyverletError as error:  # such as a force that does not compile
                     built, fault = None, str(error)
-            if turn != self._turn:
-                return
-            if built:
-                self._session.put_on(built)
-            else:
-                self._session.tell(complaint=fault)
+            with self._lock:
+                if turn != self._turn:
+                    return
+                self._building = False
+                if built:
+                    self._session.put_on(built)
+                else:
+                    self._session.tell(complaint=fault)

@@ -13,11 +13,12 @@ import numpy as np
 
 from pyverlet.compile import jit
 from pyverlet.ground.constants import FUSED_FROM, KNOWN_FROM, ONE_THREAD_BELOW, UNEVEN
+from pyverlet.kernels.motion import ON_WALL
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.collisions import Collisions
 from pyverlet.laws.forces import Conservative, Drag, Force
 from pyverlet.laws.limiter import Watch
-from pyverlet.laws.links import Angle, Area, Pin, Spring, Stick
+from pyverlet.laws.links import Angle, Area, Link, Pin, Rope, Spring, Stick
 from pyverlet.laws.obstacles import Segment
 from pyverlet.laws.rooms import Boundary, Box, Circle, Open
 from pyverlet.state.group import Group
@@ -41,7 +42,7 @@ def rehearse(world: World) -> None:
     )
     small.integrator, small.substeps = world.integrator, 2  # the second leans on the first
     if world.links:
-        _link(small)
+        _link(small, {type(link) for link in world.links})
     if world.obstacles:
         small.obstacles.append(Segment((0, 0), (1, 0)))
         small.is_free((0, 0))
@@ -98,14 +99,16 @@ def _enough(threads: int) -> int:
     return 9 if threads == 1 else ONE_THREAD_BELOW
 
 
-def _link(world: World) -> None:
-    """One link of every kind."""
+def _link(world: World, kinds: set[type[Link]]) -> None:
+    """One link of every kind that a chain is made of, for a frame; then of every kind, if there are others."""
     group = Group(world._state, slice(0, 4), world.remove)
     world.links.append(Stick(group, [0, 1], [1, 2], collide=False, breaking_force=1e9))
     world.links.append(Spring(group, 0, 2, stiffness=1.0))
-    world.links.append(Angle(group, 0, 1, 2, compliance=1.0))
-    world.links.append(Area(group, [0, 1, 2], area=1.0, compliance=1.0))
     world.links.append(Pin(group, 3))
+    if not kinds <= {Stick, Spring, Rope, Pin}:
+        world.step(1e-3)
+        world.links.append(Angle(group, 0, 1, 2, compliance=1.0))
+        world.links.append(Area(group, [0, 1, 2], area=1.0, compliance=1.0))
 
 
 def _use(world: World) -> None:
@@ -113,9 +116,16 @@ def _use(world: World) -> None:
     world.step(1e-3)  # by now somebody has moved far enough for a closer look at the list of pairs
     if world._contacts:
         Watch(world._state, world._force_sum, world.links, world.boundary).take_back(world._slots, world._contacts.listed(), 0.0)
+    _lean(world)
     world.energy()
     world.momentum()
     world.overlap()
+
+
+def _lean(world: World) -> None:
+    """At the end of a frame somebody has come to rest on a smooth wall."""
+    world._slots.resting[:1], world._slots.along = ON_WALL, world._slots.along[:0]
+    world.boundary.leave(world._slots)
 
 
 def _lattice(

@@ -20,8 +20,8 @@ from pyverlet.world.rehearsals import PARTS, rehearse
 from pyverlet.world.world import World
 
 OF_CIRCLES = (
-    "bounce", "bounds", "cage", "clusters", "contact", "contacts", "frame", "friction", "grid", "impacts", "loans", "measure",
-    "motion", "packs", "pairs", "refine", "sweeps",
+    "bounce", "bounds", "cage", "clusters", "contact", "contacts", "frame", "friction", "grid", "impacts", "leaving", "loans",
+    "measure", "motion", "packs", "pairs", "refine", "sweeps",
 )  # fmt: skip
 """Modules of the kernels that every world of circles may need: how many there are is what progress is measured by."""
 
