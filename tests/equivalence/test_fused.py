@@ -187,9 +187,11 @@ def changed(change: Any, fusing: Fusing) -> pv.World:
     "change",
     [
         lambda world: setattr(world, "collisions", pv.Collisions(method=pv.BruteForce())),
-        lambda world: world.links.append(pv.Stick(world.add(position=[(0, 99), (1, 99)], radius=0.1, allow_overlap=True), 0, 1)),
+        lambda world: world.links.append(
+            pv.Angle(world.add(position=[(0, 99), (1, 99), (2, 99)], radius=0.1, allow_overlap=True), 0, 1, 2, compliance=0.1)
+        ),
     ],
-    ids=["brute force", "link"],
+    ids=["brute force", "angle"],
 )
 def test_whatever_more_there_is_goes_the_long_way(change: Any, fusing: Fusing) -> None:
     world = changed(change, fusing)
@@ -248,6 +250,50 @@ def test_forces_of_few_numbers_and_obstacles_that_stand_still_go_along(change: A
     assert world._force_sum.t == changed(rough, fusing)._force_sum.t
 
 
+def hang(world: pv.World) -> None:
+    """A chain from a pin, which breaks, and springs and ropes across it, in the midst of the heap."""
+    top = world.groups[0]
+    world.links.append(pv.Stick(top, range(11), range(1, 12), breaking_force=50.0))
+    world.links.append(pv.Pin(top, 0))
+    world.links.append(pv.Spring(top, np.arange(10), np.arange(2, 12), stiffness=20.0, damping=0.1))
+    world.links.append(pv.Rope(top, np.arange(0, 7, 3), np.arange(5, 12, 3)))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda world: None,
+        lambda world: setattr(world, "collisions", pv.Collisions(friction=0.5, restitution=0.3)),
+        lambda world: world.forces.append(pv.Wind((3, 1), linear=0.1)),
+        lambda world: world.obstacles.append(pv.Segment((-9, below(world)), (9, below(world) + 1), friction=0.3)),
+        lambda world: setattr(world, "boundary", pv.Box((-99, -99), (99, 99), friction=0.2)),
+    ],
+    ids=["smooth", "rough", "wind", "segment", "box"],
+)
+def test_chains_and_pins_go_along(change: Any, fusing: Fusing) -> None:
+    def linked(world: pv.World) -> None:
+        change(world)
+        hang(world)
+
+    world = changed(linked, fusing)
+    assert fusing.leaps == 6 * (world.substeps - 1)
+    fusing.undo()
+    assert same(world, changed(linked, fusing))
+
+
+@pytest.mark.parametrize("name", ["rope-bridge", "cloth", "newton-cradle"])
+def test_scenes_of_chains_go_along(name: str, fusing: Fusing) -> None:
+    def swung() -> pv.World:
+        world = pv.scenes.get(name).world()
+        world.run(seconds=0.5)
+        return world
+
+    world = swung()
+    assert fusing.leaps > 0.9 * world.frames * (world.substeps - 1)
+    fusing.undo()
+    assert same(world, swung())
+
+
 def test_forces_that_are_asked_leave_obstacles_to_compiled_code(fusing: Fusing) -> None:
     def both(world: pv.World) -> None:
         world.forces.append(Thrust())
@@ -271,6 +317,25 @@ def test_a_ledger_has_the_same_accounts(materials: dict[str, Any], fusing: Fusin
     expected = kept()
     assert same(world, expected)
     assert world.ledger.as_dict() == expected.ledger.as_dict()
+
+
+@pytest.mark.parametrize("stiffness", [None, 50.0])
+def test_a_ledger_of_links_has_the_same_accounts(stiffness: float | None, fusing: Fusing) -> None:
+    def kept() -> pv.World:
+        world = fallen(0.0, ledger=True, collisions=pv.Collisions(friction=0.3))
+        world.links.append(pv.Stick(world.groups[0], range(39), range(1, 40)))
+        if stiffness:
+            world.links.append(pv.Spring(world.groups[0], 50, 52, stiffness=stiffness))
+        world.run(seconds=0.5)
+        return world
+
+    world = kept()
+    assert (fusing.substeps > 0) == (stiffness is None)  # what springs hold Python asks them
+    fusing.undo()
+    expected = kept()
+    assert same(world, expected)
+    assert world.ledger.as_dict() == expected.ledger.as_dict()
+    assert world.ledger.links
 
 
 def test_as_long_as_nobody_sleeps(fusing: Fusing) -> None:

@@ -21,21 +21,34 @@ from pyverlet.kernels.cage import confine as confine_in_cage
 from pyverlet.kernels.cage import hold
 from pyverlet.kernels.drive import drive
 from pyverlet.kernels.kinds import for_each_kind
+from pyverlet.kernels.linked import Linked, Linking, look, look_alone, note_pull, note_pull_alone, solve, solve_alone
 from pyverlet.kernels.measure import mechanical
 from pyverlet.kernels.meetings import collide
 from pyverlet.kernels.motion import leap
 from pyverlet.kernels.sweeps import push, relax
 from pyverlet.kernels.tables import Circles, Law, Pairs
 
-CONTACTS, BOUNDS, VELOCITIES, INTEGRATE, OBSTACLES, LEDGER = range(1, 7)
-STAGES = ("contacts", "bounds", "velocities", "integrate", "obstacles", "ledger")
+CONTACTS, BOUNDS, VELOCITIES, INTEGRATE, OBSTACLES, LEDGER, LINKS = range(1, 8)
+STAGES = ("contacts", "bounds", "velocities", "integrate", "obstacles", "ledger", "links")
 """Names of the numbers above, less one, by which their time is noted."""
+
+INTEGRATED, TOUCHED, JOINED, STILLED, PULLED = range(5)
+LOOKS = 5
+"""At the energy in a substep: where a ledger looks."""
+
+SERVED = LINKED = False
+"""Whether there may be more in a world than circles, a room and gravity: `Services`; and links."""
+
+BESIDE: dict[str, dict[str, Any]] = {
+    "": {},
+    "served": {"SERVED": True},
+    "linked": {"SERVED": True, "LINKED": True},
+    "few_linked": {"SERVED": True, "LINKED": True, "look": look_alone, "solve": solve_alone, "note_pull": note_pull_alone},
+}
+"""Frames are compiled for each of these. Links so few that it does not pay stay on one thread where circles use several."""
 
 NORMAL = fields(Pairs).index("normal")
 """Where in the tuple of `Pairs` the normals are."""
-
-SERVED = False
-"""Whether there may be more in a world than circles, a room and gravity: `Services`."""
 
 _CHUNK = 4096
 
@@ -45,8 +58,10 @@ class Services(NamedTuple):
 
     h, lag: s, in float64. gravity: (x, y), m/s^2; down: the same in float64. forces: what `drive` takes, (kind, vector, number,
     force, period_x, period_y), and ahead. course: what `meetings.collide` takes, (segments, bodies, cells, walls, along, rest,
-    drop). mass: (n,) kg. energies: (2 substeps,) J, becomes what `measure.mechanical` says after the integration of each substep,
-    but of the first and of the one that is handed back, and at its end.
+    drop). mass: (n,) kg. energies: (substeps, LOOKS) J, becomes what `measure.mechanical` says after the integration of each
+    substep, but of the first and of the one that is handed back, and after its contacts, links and so on; without links at its end
+    only. links: what `kernels.linked` takes, its arrays and
+    numbers, where there are any.
     """
 
     h: Any
@@ -58,6 +73,7 @@ class Services(NamedTuple):
     course: Any
     mass: Any
     energies: Any
+    links: Any
 
 
 @kernel
@@ -121,6 +137,17 @@ def four_walls(room, circles, law, claims):
 # ---- substeps --------------------------------------------------------------------------------------------------------------
 
 
+@driver
+def _look_at_energy(circles, services, substep, when, spent, clock):
+    """Note what there is, if anybody wants to know."""
+    if services.energies.shape[0] > 0:
+        services.energies[substep, when] = mechanical(
+            circles.position, circles.velocity, circles.acceleration, services.lag, circles.spin, circles.radius, services.mass,
+            services.down[0], services.down[1],
+        )  # fmt: skip
+        note(spent, LEDGER, clock[0], clock[1])
+
+
 def _project(circles, pairs, law, cut, looks, sets_out, claims):
     """The first sweep over the pairs, called from Python, which has plain tuples."""
     push(Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Law(*law), cut, looks, sets_out, claims)
@@ -151,9 +178,16 @@ def _substeps(
         segments, bodies, cells, walls, along, rest, drop = services.course
         gx, gy = services.gravity
         begins = begins or segments.shape[0] > 0
+    if LINKED:
+        linked, linking = Linked(*borrowed(services.links[0])), Linking(*services.links[1])
     while True:
         push(circles, pairs, law, cut, looks, sets_out, claims)
         note(spent, CONTACTS, clock[0], clock[1])
+        if LINKED:
+            _look_at_energy(circles, services, substep, TOUCHED, spent, clock)
+            solve(linked, linking, circles.position, circles.velocity)
+            note(spent, LINKS, clock[0], clock[1])
+            _look_at_energy(circles, services, substep, JOINED, spent, clock)
         confine(room, circles, law, claims)  # noqa: F821  (`frames` says what that is)
         note(spent, BOUNDS, clock[0], clock[1])
         if SERVED and segments.shape[0] > 0:
@@ -167,18 +201,21 @@ def _substeps(
             note(spent, OBSTACLES, clock[0], clock[1])
         relax(circles, pairs, law, cut, 1 if substep == last else 0, claims)
         note(spent, VELOCITIES, clock[0], clock[1])
-        if SERVED and services.energies.shape[0] > 0:
-            services.energies[2 * substep + 1] = mechanical(
-                circles.position, circles.velocity, circles.acceleration, services.lag, circles.spin, circles.radius,
-                services.mass, services.down[0], services.down[1],
-            )  # fmt: skip
-            note(spent, LEDGER, clock[0], clock[1])
+        if SERVED:
+            _look_at_energy(circles, services, substep, STILLED, spent, clock)
+        if LINKED:
+            note_pull(linked, linking, circles.acceleration)
+            note(spent, LINKS, clock[0], clock[1])
+            _look_at_energy(circles, services, substep, PULLED, spent, clock)
         substep += 1
         if substep == stop:
             return substep, False, strongest
         if begins:
             remember(circles.start, circles.position)
-        if SERVED and kind.shape[0] > 0:
+        if LINKED:
+            look(linked, linking, circles.position, circles.velocity, circles.inverse_mass)
+            note(spent, LINKS, clock[0], clock[1])
+        if LINKED or (SERVED and kind.shape[0] > 0):  # what links have pulled is not felt again
             strongest, strayed = drive(
                 circles.position, circles.velocity, circles.acceleration, circles.inverse_mass, kind, vector, number, force,
                 period_x, period_y, gx, gy, law.h, services.ahead, checked, far, circles.origin, circles.moved,
@@ -193,21 +230,17 @@ def _substeps(
         looks, sets_out = 0, 0
         if strayed:
             return substep, True, strongest
-        if SERVED and services.energies.shape[0] > 0:
-            services.energies[2 * substep] = mechanical(
-                circles.position, circles.velocity, circles.acceleration, services.lag, circles.spin, circles.radius,
-                services.mass, services.down[0], services.down[1],
-            )  # fmt: skip
-            note(spent, LEDGER, clock[0], clock[1])
+        if SERVED:
+            _look_at_energy(circles, services, substep, INTEGRATED, spent, clock)
 
 
 project = for_each_kind(driver, _project, push=push)
 still = for_each_kind(driver, _still, relax=relax)
 frames = {
-    (room, served): for_each_kind(
-        driver, variant(_substeps, f"{room.function.__name__}{'_served' * served}", confine=room, SERVED=served),
+    (room, beside): for_each_kind(
+        driver, variant(_substeps, f"{room.function.__name__}{'_' * bool(beside)}{beside}", confine=room, **constants),
         push=push, relax=relax,
     )
-    for room in (open_space, smooth_cage, cage, four_walls) for served in (False, True)
+    for room in (open_space, smooth_cage, cage, four_walls) for beside, constants in BESIDE.items()
 }  # fmt: skip
-"""Substeps in each kind of room, without and with services, of each kind of world."""
+"""Substeps in each kind of room, by what there may be `BESIDE` circles, of each kind of world."""

@@ -1,5 +1,5 @@
-"""What links do in a substep, each part of it one call: `look` before the integrator moves, `solve` after the contacts, `note`
-when velocities are done.
+"""What links do in a substep, each part of it one call: `look` before the integrator moves, `solve` after the contacts, and
+`note_pull` when velocities are done.
 
 For links of two particles' distance, and pins; rows of other kinds have Python call the same stages one by one.
 """
@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from pyverlet.compile.bundle import bundle
-from pyverlet.compile.jit import driver
+from pyverlet.compile.jit import driver, kernel, variant
 from pyverlet.kernels.chain_rows import note_force, prepare, snap
 from pyverlet.kernels.chains import passes
 from pyverlet.kernels.links import add_pull, hand_back, look_back, take_twice
@@ -102,10 +102,13 @@ def solve(linked, linking, position, velocity):
 
 
 @driver
-def note(linked, linking, acceleration):
+def note_pull(linked, linking, acceleration):
     """When velocities are done: what links did is part of the acceleration."""
     add_pull(acceleration, linked.slot, linked.pull, linked.calm, linking.rest)
 
+
+look_alone, solve_alone, note_pull_alone = (kernel(variant(each.function, "alone")) for each in (look, solve, note_pull))
+"""The same, which stay on one thread also where circles use several."""
 
 # ---- called from Python, which has plain tuples ------------------------------------------------------------------------------
 
@@ -123,6 +126,6 @@ def call_solve(linked, linking, position, velocity):
 
 
 @driver
-def call_note(linked, linking, acceleration):
-    """`note`."""
-    note(Linked(*linked), Linking(*linking), acceleration)
+def call_note_pull(linked, linking, acceleration):
+    """`note_pull`."""
+    note_pull(Linked(*linked), Linking(*linking), acceleration)

@@ -115,17 +115,23 @@ class Page:
     @property
     def plain(self) -> bool:
         """Whether energies are all there is to know after each stage."""
-        return not (self._working or self._holding or self._links)
+        return not (self._working or self._holding or (self._links and self._links.give))
 
     def read(self, energies: Any, substep: int, reached: int) -> None:
         """Stages have gone by since the integration of `substep`, up to the end of the one before `reached`.
 
-        energies: (2 substeps,) J after the integration of each, and at its end.
+        energies: (substeps, LOOKS) J, as in `kernels.frame.Services`.
         """
         for k in range(substep, reached):
+            integrated, touched, joined, stilled, pulled = map(float, energies[k])
             if k > substep:
-                self._book("integrate", float(energies[2 * k]))
-            self._book("velocities", float(energies[2 * k + 1]))
+                self._book("integrate", integrated)
+            if self._links:
+                self._book("contacts", touched)
+                self._book("links", joined)
+            self._book("velocities", stilled)
+            if self._links:
+                self._book("links", pulled)
 
     def _book(self, stage: str, energy: float | None) -> None:
         """`energy`: of now, J, if it is known already."""
@@ -150,7 +156,8 @@ class Page:
             self._resting = 0.0
         elif stage == "links":
             # Before the contacts they move what they join; after them they are but part of the acceleration.
-            before, self._now = self._now, self._look(self._lag, moved=not self._settled, works=self._settled)
+            known = None if energy is None else _Instant(energy, 0.0, {})
+            before, self._now = self._now, known or self._look(self._lag, moved=not self._settled, works=self._settled)
             self._open.links += self._now.energy - before.energy
         elif stage == "velocities" or (stage == "contacts" and self._links):
             self._settled = stage == "velocities"

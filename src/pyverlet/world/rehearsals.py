@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pyverlet.compile import jit
-from pyverlet.ground.constants import FUSED_FROM, KNOWN_FROM, ONE_THREAD_BELOW, UNEVEN
+from pyverlet.ground.constants import FUSED_FROM, KNOWN_FROM, LINKS_ONE_THREAD_BELOW, ONE_THREAD_BELOW, UNEVEN
 from pyverlet.kernels.motion import ON_WALL
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.collisions import Collisions
@@ -31,7 +31,10 @@ _ROOMS = (Open, Circle, Box)
 def rehearse(world: World) -> None:
     """What this world needs: frames of a small one of the same kind, its forces, and sleep."""
     small = _lattice(
-        max(_enough(world.threads), *(least for least in (0, ONE_THREAD_BELOW, KNOWN_FROM) if len(world) >= least)),
+        max(
+            _enough(world.threads),
+            *(least for least in (0, ONE_THREAD_BELOW, LINKS_ONE_THREAD_BELOW, KNOWN_FROM) if len(world) >= least),
+        ),
         world.dtype,
         type(world.boundary),
         getattr(world.boundary, "restitution", 0.0),
@@ -100,11 +103,14 @@ def _enough(threads: int) -> int:
 
 
 def _link(world: World, kinds: set[type[Link]]) -> None:
-    """One link of every kind that a chain is made of, for a frame; then of every kind, if there are others."""
-    group = Group(world._state, slice(0, 4), world.remove)
+    """One link of every kind that a chain is made of; for several threads, many; then one of every kind, if there are others."""
+    group = Group(world._state, slice(0, len(world)), world.remove)
     world.links.append(Stick(group, [0, 1], [1, 2], collide=False, breaking_force=1e9))
     world.links.append(Spring(group, 0, 2, stiffness=1.0))
     world.links.append(Pin(group, 3))
+    if world.threads > 1 and len(world) >= LINKS_ONE_THREAD_BELOW:
+        world.step(1e-3)
+        world.links.append(Stick(group, np.arange(len(world) - 1), np.arange(1, len(world))))
     if not kinds <= {Stick, Spring, Rope, Pin}:
         world.step(1e-3)
         world.links.append(Angle(group, 0, 1, 2, compliance=1.0))

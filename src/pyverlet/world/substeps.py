@@ -70,22 +70,27 @@ class Substeps:
         strips = contacts.steady(state)
         if strips is None or world.boundary.compiled(state) is None or not (course := world._course).still:
             return substep
+        links: Any = world.links.compiled(state, h) if world.links else ()
+        if links is None:
+            return substep
         if course:
             course.set_up(state, substep * h, h)
         wide = contacts.set_up(state, h, lag, forces.strongest)
         confine, shape = world.boundary.compiled(state)  # that circles rub is known by now
-        smooth = confine is frame.smooth_cage
-        if smooth:
+        if smooth := confine is frame.smooth_cage and not links:
             wide.leave_arriving()
-        last, rows = world.substeps - 1, forces.compiled(state)
+        # Who rests is a question of all that pulls: links do so after the circles.
+        last, rows = -1 if links else world.substeps - 1, forces.compiled(state)
         # Who looks on may turn gravity, and see what a ledger sees.
         leaps = world.integrator.leaps and rows is not None and not world.onlooker
-        served = bool(course or books or (leaps and rows))
-        if smooth and not (served or wide.asks) and len(state) >= FUSED_FROM and strips.in_order:
+        beside = "served" * bool(course or books or (leaps and rows))
+        if links:
+            beside = "few_linked" if world.links.stand_back else "linked"
+        if smooth and not (beside or wide.asks) and len(state) >= FUSED_FROM and strips.in_order:
             return self._strip_by_strip(world, contacts, wide, strips, shape, substep, leaps=leaps)
-        services: Any = self._services(world, books, rows if leaps else (), h, lag) if served else ()
+        services: Any = self._services(world, books, rows if leaps else (), links, h, lag) if beside else ()
         stop, looks = world.substeps if leaps else substep + 1, wide.takes_looks()
-        reached, self.leapt, strongest = frame.frames[confine, served][wide.kind](
+        reached, self.leapt, strongest = frame.frames[confine, beside][wide.kind](
             substep, stop, last, wide.circles, wide.arrays, wide.law, tuple(map(state.real, shape)), services, wide.cut(), looks,
             int(out is not wide.moved), strips.checked, state.real(strips.allowed * strips.allowed), state.claims(),
             world.profile.spent, (clock.address(), clock.tick()),
@@ -94,7 +99,7 @@ class Substeps:
             forces.strongest, forces.t = float(strongest), world.time + (reached - (not self.leapt)) * h
         if books:
             books.read(services.energies, substep, reached)
-        self.marked = reached > last
+        self.marked = not links and reached > last
         if self.marked:
             wide.has_marked()
         if self.leapt:
@@ -102,8 +107,8 @@ class Substeps:
         contacts.broad_phase.aged(reached - substep - 1)
         return int(reached)
 
-    def _services(self, world: Any, books: Any, rows: Any, h: float, lag: float) -> frame.Services:
-        """What the world has beside circles, a room and gravity: `rows` of forces, obstacles, `books`."""
+    def _services(self, world: Any, books: Any, rows: Any, links: Any, h: float, lag: float) -> frame.Services:
+        """What the world has beside circles, a room and gravity: `rows` of forces, obstacles, `books`, links."""
         state, gravity = world._slots, world._force_sum.gravity
         if self._rows != (rows, state.dtype):
             self._rows = rows, state.dtype
@@ -116,7 +121,7 @@ class Substeps:
         return frame.Services(
             h, lag, state.reals(*gravity), gravity, (*self._table, state.force, *state.reals(*state.seam.period)),
             state.real(ahead), world._course.compiled(state, world.boundary), state.mass,
-            np.empty(2 * world.substeps if books else 0),
+            np.empty((world.substeps if books else 0, frame.LOOKS)), links,
         )  # fmt: skip
 
     def _strip_by_strip(

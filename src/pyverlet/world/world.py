@@ -131,9 +131,9 @@ class World(Measures, Queries, Doors):
         contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course or None
         lag, state.drop, state.h, run = integrator.velocity_lag * h, integrator.drop, h, self._run.begin(contacts)
         parts: list[Any] = [part for part in (contacts, links, course) if part]
-        compiled = contacts and not links and run.tells(done, self.profile.mark)
         if not self._open(h, done):
             return
+        compiled = contacts and run.tells(done, self.profile.mark)
         watch, substep = self._watch(h) if contacts or course else None, 0
         while substep < self.substeps:
             self._show(substep, h, lag)

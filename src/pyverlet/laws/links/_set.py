@@ -217,9 +217,13 @@ class Links:
         if len(self._apart):
             runs.drop_pairs(pairs.first, pairs.count, pairs.pair_i, pairs.pair_j, particle, *self._partners)
 
+    @property
+    def stand_back(self) -> bool:
+        """Whether they had better be solved on one thread while others use several: each colour is a meeting of theirs."""
+        return self._few and jit.threads_in_use() > 1
+
     def _threads(self) -> AbstractContextManager[None]:
-        """As many as pay: each colour is a meeting of theirs."""
-        return jit.one_thread() if self._few and jit.threads_in_use() > 1 else nullcontext()
+        return jit.one_thread() if self.stand_back else nullcontext()
 
     def before(self, state: Slots, h: float) -> None:
         """Before the integrator: remember where the substep starts."""
@@ -268,7 +272,7 @@ class Links:
         """After the contacts: what the links did is part of the acceleration, for integrators that remember it."""
         with self._threads():
             if (given := self.compiled(state, h)) is not None:
-                linked.call_note(*given, state.acceleration)
+                linked.call_note_pull(*given, state.acceleration)
             else:
                 self._work.after(state, h)
 
@@ -312,9 +316,14 @@ class Links:
                 share += np.bincount(whose, pool.energies(position, self._state.seam), len(state))
         return share
 
+    @property
+    def give(self) -> bool:
+        """Whether any may hold energy."""
+        return any(pool.gives for pool in self._order)
+
     def stored(self, state: Slots) -> float:
         """The same in the middle of a frame, J, where the particles are now, without those that have broken in it."""
-        if not any(pool.gives for pool in self._order):
+        if not self.give:
             return 0.0
         with self._threads():
             position = self._work.where(state)
