@@ -59,9 +59,8 @@ class Services(NamedTuple):
     h, lag: s, in float64. gravity: (x, y), m/s^2; down: the same in float64. forces: what `drive` takes, (kind, vector, number,
     force, period_x, period_y), and ahead. course: what `meetings.collide` takes, (segments, bodies, cells, walls, along, rest,
     drop). mass: (n,) kg. energies: (substeps, LOOKS) J, becomes what `measure.mechanical` says after the integration of each
-    substep, but of the first and of the one that is handed back, and after its contacts, links and so on; without links at its end
-    only. links: what `kernels.linked` takes, its arrays and
-    numbers, where there are any.
+    substep, but of the first and of the one that is handed back, and after its contacts, links and so on; without links at its
+    end only. links: what `kernels.linked` takes, its arrays and numbers, where there are any.
     """
 
     h: Any
