@@ -338,6 +338,47 @@ def test_a_ledger_of_links_has_the_same_accounts(stiffness: float | None, fusing
     assert world.ledger.links
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda world: None,
+        lambda world: setattr(world, "collisions", pv.Collisions(friction=0.5, restitution=0.3)),
+        lambda world: world.forces.append(pv.Wind((3, 1), linear=0.1)),
+        lambda world: world.obstacles.append(pv.Segment((-9, below(world)), (9, below(world) + 1), friction=0.3)),
+        lambda world: setattr(world, "boundary", pv.Circle(radius=world.boundary.radius, friction=0.5)),
+        hang,
+    ],
+    ids=["smooth", "rough", "wind", "segment", "rough cage", "links"],
+)
+def test_circles_that_lend_each_other_inertia_go_along(change: Any, fusing: Fusing) -> None:
+    def uneven(world: pv.World) -> None:
+        world.mass[::3] *= 100.0
+        change(world)
+
+    world = changed(uneven, fusing)
+    assert fusing.leaps == 6 * (world.substeps - 1)
+    assert world._contacts is not None
+    assert world._contacts.lending
+    fusing.undo()
+    assert same(world, changed(uneven, fusing))
+
+
+def test_a_ledger_of_circles_that_lend(fusing: Fusing) -> None:
+    def kept() -> pv.World:
+        world = fallen(0.0, ledger=True, collisions=pv.Collisions(friction=0.3))
+        world.mass[::3] *= 100.0
+        world.links.append(pv.Stick(world.groups[0], range(39), range(1, 40)))
+        world.run(seconds=0.5)
+        return world
+
+    world = kept()
+    assert fusing.leaps > 0.9 * world.frames * (world.substeps - 1)
+    fusing.undo()
+    expected = kept()
+    assert same(world, expected)
+    assert world.ledger.as_dict() == expected.ledger.as_dict()
+
+
 def test_as_long_as_nobody_sleeps(fusing: Fusing) -> None:
     world = fallen(0.2, sleep=True)
     assert fusing.leaps > 0

@@ -21,6 +21,7 @@ from pyverlet.kernels.cage import confine as confine_in_cage
 from pyverlet.kernels.cage import hold
 from pyverlet.kernels.drive import drive
 from pyverlet.kernels.kinds import for_each_kind
+from pyverlet.kernels.lending import Lending, Terms, even_up, join, leave_out, lend, set_aside, settle
 from pyverlet.kernels.linked import Linked, Linking, look, look_alone, note_pull, note_pull_alone, solve, solve_alone
 from pyverlet.kernels.measure import mechanical
 from pyverlet.kernels.meetings import collide
@@ -36,15 +37,16 @@ INTEGRATED, TOUCHED, JOINED, STILLED, PULLED = range(5)
 LOOKS = 5
 """At the energy in a substep: where a ledger looks."""
 
-SERVED = LINKED = False
-"""Whether there may be more in a world than circles, a room and gravity: `Services`; and links."""
+SERVED = LINKED = LENT = False
+"""Whether there may be more in a world than circles, a room and gravity: `Services`; links; lent inertia."""
 
-BESIDE: dict[str, dict[str, Any]] = {
+_BESIDE: dict[str, dict[str, Any]] = {
     "": {},
     "served": {"SERVED": True},
     "linked": {"SERVED": True, "LINKED": True},
     "few_linked": {"SERVED": True, "LINKED": True, "look": look_alone, "solve": solve_alone, "note_pull": note_pull_alone},
 }
+BESIDE = _BESIDE | {f"{name}_lent": {**constants, "SERVED": True, "LENT": True} for name, constants in _BESIDE.items()}
 """Frames are compiled for each of these. Links so few that it does not pay stay on one thread where circles use several."""
 
 NORMAL = fields(Pairs).index("normal")
@@ -60,7 +62,8 @@ class Services(NamedTuple):
     force, period_x, period_y), and ahead. course: what `meetings.collide` takes, (segments, bodies, cells, walls, along, rest,
     drop). mass: (n,) kg. energies: (substeps, LOOKS) J, becomes what `measure.mechanical` says after the integration of each
     substep, but of the first and of the one that is handed back, and after its contacts, links and so on; without links at its
-    end only. links: what `kernels.linked` takes, its arrays and numbers, where there are any.
+    end only. links: what `kernels.linked` takes, its arrays and numbers, where there are any; loans: what
+    `kernels.lending` takes, likewise.
     """
 
     h: Any
@@ -73,6 +76,7 @@ class Services(NamedTuple):
     mass: Any
     energies: Any
     links: Any
+    loans: Any
 
 
 @kernel
@@ -179,12 +183,20 @@ def _substeps(
         begins = begins or segments.shape[0] > 0
     if LINKED:
         linked, linking = Linked(*borrowed(services.links[0])), Linking(*services.links[1])
+    if LENT:
+        loans, terms = Lending(*borrowed(services.loans[0])), Terms(*services.loans[1])
     while True:
         push(circles, pairs, law, cut, looks, sets_out, claims)
+        if LENT:
+            settle(circles, pairs, loans, terms, cut)
         note(spent, CONTACTS, clock[0], clock[1])
         if LINKED:
             _look_at_energy(circles, services, substep, TOUCHED, spent, clock)
+            if LENT:
+                set_aside(circles, loans)
             solve(linked, linking, circles.position, circles.velocity)
+            if LENT:
+                leave_out(circles, loans)
             note(spent, LINKS, clock[0], clock[1])
             _look_at_energy(circles, services, substep, JOINED, spent, clock)
         confine(room, circles, law, claims)  # noqa: F821  (`frames` says what that is)
@@ -198,7 +210,11 @@ def _substeps(
                 law.lag, law.rest_speed, drop,
             )  # fmt: skip
             note(spent, OBSTACLES, clock[0], clock[1])
+        if LENT:
+            join(circles, pairs, loans)
         relax(circles, pairs, law, cut, 1 if substep == last else 0, claims)
+        if LENT:
+            even_up(circles, loans, law.rubs)
         note(spent, VELOCITIES, clock[0], clock[1])
         if SERVED:
             _look_at_energy(circles, services, substep, STILLED, spent, clock)
@@ -226,11 +242,13 @@ def _substeps(
                 claims,
             )  # fmt: skip
         note(spent, INTEGRATE, clock[0], clock[1])
-        looks, sets_out = 0, 0
+        looks = sets_out = 1 if LENT else 0  # with the inertia of the moment others overlap deeply, and stand elsewhere
         if strayed:
             return substep, True, strongest
         if SERVED:
             _look_at_energy(circles, services, substep, INTEGRATED, spent, clock)
+        if LENT:
+            lend(circles, pairs, loans, terms, cut)
 
 
 project = for_each_kind(driver, _project, push=push)

@@ -64,7 +64,7 @@ def pull(position, acceleration, inverse_mass, lighter, held, fall):
 
 
 @kernel
-def settle(position, velocity, acceleration, inverse_mass, lighter, held, touched, kick, fall):
+def take_up(position, velocity, acceleration, inverse_mass, lighter, held, touched, kick, fall):
     """After `pull`, and contacts: do the same to velocities, kick (s), of who has touched another; take it back for the others.
 
     Not before contacts: to those it is no motion, and would be an impact.

@@ -51,6 +51,8 @@ def rehearse(world: World) -> None:
         small.is_free((0, 0))
     known = Slots(world.dtype)
     small.forces.extend(force for force in _ours(world) if (row := getattr(force, "compiled", None)) and row(known))
+    if (masses := world.mass[np.isfinite(world.mass)]).size and masses.max() > UNEVEN * masses.min():
+        small.mass[0] *= 2 * UNEVEN
     _use(small)
     if len(world) >= FUSED_FROM:
         _fuse(world)

@@ -77,7 +77,8 @@ class Substeps:
             course.set_up(state, substep * h, h)
         wide = contacts.set_up(state, h, lag, forces.strongest)
         confine, shape = world.boundary.compiled(state)  # that circles rub is known by now
-        if smooth := confine is frame.smooth_cage and not links:
+        loans = contacts.lending or ()
+        if smooth := confine is frame.smooth_cage and not (links or loans):
             wide.leave_arriving()
         # Who rests is a question of all that pulls: links do so after the circles.
         last, rows = -1 if links else world.substeps - 1, forces.compiled(state)
@@ -86,13 +87,15 @@ class Substeps:
         beside = "served" * bool(course or books or (leaps and rows))
         if links:
             beside = "few_linked" if world.links.stand_back else "linked"
+        if loans:
+            beside += "_lent"
         if smooth and not (beside or wide.asks) and len(state) >= FUSED_FROM and strips.in_order:
             return self._strip_by_strip(world, contacts, wide, strips, shape, substep, leaps=leaps)
-        services: Any = self._services(world, books, rows if leaps else (), links, h, lag) if beside else ()
+        services: Any = self._services(world, books, rows if leaps else (), links, loans, h, lag) if beside else ()
         stop, looks = world.substeps if leaps else substep + 1, wide.takes_looks()
         reached, self.leapt, strongest = frame.frames[confine, beside][wide.kind](
             substep, stop, last, wide.circles, wide.arrays, wide.law, tuple(map(state.real, shape)), services, wide.cut(), looks,
-            int(out is not wide.moved), strips.checked, state.real(strips.allowed * strips.allowed), state.claims(),
+            int(bool(loans) or out is not wide.moved), strips.checked, state.real(strips.allowed * strips.allowed), state.claims(),
             world.profile.spent, (clock.address(), clock.tick()),
         )  # fmt: skip
         if leaps and rows and (self.leapt or reached > substep + 1):
@@ -107,8 +110,8 @@ class Substeps:
         contacts.broad_phase.aged(reached - substep - 1)
         return int(reached)
 
-    def _services(self, world: Any, books: Any, rows: Any, links: Any, h: float, lag: float) -> frame.Services:
-        """What the world has beside circles, a room and gravity: `rows` of forces, obstacles, `books`, links."""
+    def _services(self, world: Any, books: Any, rows: Any, links: Any, loans: Any, h: float, lag: float) -> frame.Services:
+        """What the world has beside circles, a room and gravity: `rows` of forces, obstacles, `books`, links, loans."""
         state, gravity = world._slots, world._force_sum.gravity
         if self._rows != (rows, state.dtype):
             self._rows = rows, state.dtype
@@ -121,7 +124,7 @@ class Substeps:
         return frame.Services(
             h, lag, state.reals(*gravity), gravity, (*self._table, state.force, *state.reals(*state.seam.period)),
             state.real(ahead), world._course.compiled(state, world.boundary), state.mass,
-            np.empty((world.substeps if books else 0, frame.LOOKS)), links,
+            np.empty((world.substeps if books else 0, frame.LOOKS)), links, loans,
         )  # fmt: skip
 
     def _strip_by_strip(

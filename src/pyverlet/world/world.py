@@ -210,7 +210,7 @@ class World(Measures, Queries, Doors):
                 self._contacts.fit(self._slots)
 
     def _solve(self, links: Links, contacts: ContactSolver | None, h: float) -> None:
-        with contacts.aside(self._slots) if contacts else nullcontext():
+        with contacts.aside() if contacts else nullcontext():
             links.solve(self._slots, h)
 
     def _finish(self, contacts: ContactSolver | None, watch: Watch | None, h: float, *, marked: bool) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -18,7 +18,7 @@ from pyverlet.laws.contacts.growth import Growth
 from pyverlet.laws.contacts.loans import Lent, Loans
 from pyverlet.laws.contacts.pegs import Pegs
 from pyverlet.laws.contacts.slips import Kept, Slips
-from pyverlet.laws.contacts.wide import Inertia, Wide
+from pyverlet.laws.contacts.wide import Wide
 from pyverlet.laws.events import Events
 from pyverlet.laws.sleep import Sleep
 from pyverlet.state.moves import pick_falling
@@ -139,36 +139,41 @@ class ContactSolver:
 
     def steady(self, state: Slots) -> Strips | None:
         """Where strips stand, if a substep's contacts are but the two sweeps; None: there is more to them."""
-        alone = not (self._uneven or (self._sleep and self._sleep.anyone) or self._pegs) and state.size is state.radius
+        alone = not ((self._sleep and self._sleep.anyone) or self._pegs) and state.size is state.radius
         return self.broad_phase.strips() if alone else None
 
-    def set_up(self, state: Slots, h: float, lag: float, strongest: float, lent: Inertia | None = None) -> Wide:
+    def set_up(self, state: Slots, h: float, lag: float, strongest: float) -> Wide:
         """The pairs of now, with all that their sweeps need in this substep."""
         wide = self._pack(state)
         if self._rubs(state):
             self._slips.start(wide, state.particle)
-        rest_speed = REST_ACCELERATIONS * strongest * h
-        wide.set_up(state, h, lag, strongest, rest_speed, len(state.spent) > 0, lent)
+        self._lends = self._uneven and strongest > 0
+        noted = self._loans.begin(state, h) if self._lends else None
+        wide.set_up(state, h, lag, strongest, REST_ACCELERATIONS * strongest * h, len(state.spent) > 0, noted)
+        if self._lends:
+            self._loans.lend(wide)
         return wide
+
+    @property
+    def lending(self) -> tuple[Any, Any] | None:
+        """What `kernels.lending` takes, if circles lend each other inertia since `set_up`."""
+        return self._loans.compiled if self._lends else None
 
     def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
         """Let impacts bounce, move other overlapping circles apart, note who touches, and let those grip each other."""
         self._pegs.before(state, h)
-        self._lends = self._uneven and strongest > 0
-        lent = Inertia(self._loans.begin(state, h), self._loans.noted()) if self._lends else None
-        wide = self.set_up(state, h, lag, strongest, lent)
+        wide = self.set_up(state, h, lag, strongest)
         wide.push(state)
         if self._lends:
-            self._loans.settle(state, wide, h)
-            self._loans.free_of_walls(state)
+            self._loans.settle(wide)
 
     def still(self, state: Slots, h: float) -> None:
         """Take from touching circles the velocity that projection has put in, rub them, and hold who is too large for a gap."""
         if self._lends:
-            self._loans.join(state, self._wide)
+            self._loans.join(self._wide)
         self._wide.relax(state)
         if self._lends:
-            self._loans.balance(state, rubs=self._wide.rubs)
+            self._loans.even_up(self._wide)
         self._pegs.hold(state)
 
     def spent(self) -> Any:
@@ -187,13 +192,9 @@ class ContactSolver:
         """A frame begins."""
         self._wide.spent.fill(0)
 
-    @contextmanager
-    def aside(self, state: Slots) -> Iterator[None]:
+    def aside(self) -> AbstractContextManager[None]:
         """While others, who keep momentum by themselves, change velocities between `project` and `still`."""
-        before = state.velocity.copy() if self._lends else None
-        yield
-        if before is not None:
-            self._loans.leave_out(state.velocity - before)
+        return self._loans.aside(self._wide) if self._lends else nullcontext()
 
     def listed(self) -> tuple[Any, Any, Any, Any]:
         """first, count, pair_i, pair_j of the pairs of now."""

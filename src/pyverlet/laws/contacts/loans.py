@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,7 +11,7 @@ from numpy.typing import NDArray
 
 from pyverlet.compile.rows import WIDTH
 from pyverlet.ground.constants import FED, LOAN_S, PUSHED
-from pyverlet.kernels import balance, loans
+from pyverlet.kernels import balance, lending
 from pyverlet.laws.contacts.wide import Wide
 from pyverlet.state.state import Slots
 
@@ -26,7 +28,13 @@ class Lent(NamedTuple):
 
 
 class Loans:
-    """Who has lent how much to the others, and what that changes for the contacts of a substep. Costs nothing until `begin`."""
+    """Who has lent how much to the others, and what that changes for the contacts of a substep. Costs nothing until `begin`.
+
+    Attributes:
+        compiled: since `begin`, what `kernels.lending` takes, (arrays, terms).
+    """
+
+    compiled: tuple[Any, Any] = ((), ())
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self._dtype = dtype
@@ -41,24 +49,25 @@ class Loans:
         """Room for what lasts a substep."""
         self._lighter, self._touched = np.empty(count, self._dtype), np.empty(count, np.uint8)
         self._before, self._spin_before = np.empty((count, 2), self._dtype), np.empty(count, self._dtype)
-        self._unpushed, self._rows = np.empty((count, 2), self._dtype), np.empty((count, WIDTH), self._dtype)
+        self._unpushed, self._aside = np.empty((2, count, 2), self._dtype)
+        self._rows = np.empty((count, WIDTH), self._dtype)
         self._root, self._sums, self._open_to = np.empty(count, np.int64), np.empty((count, 10)), np.empty(count, np.uint8)
 
-    def begin(self, state: Slots, h: float) -> Array:
-        """(n,) inverse masses with which this substep's contacts are solved; each is pulled at by its own weight all the same."""
+    def begin(self, state: Slots, h: float) -> tuple[Array, Array, Array, Array]:
+        """Contacts will be solved with lent inertia. Where an impact notes what it does by masses of their own: before,
+        spin_before, lent, busy.
+        """
         if self._kept.particle is not state.particle:
             self._follow(state)
-        loans.weigh(state.mass, state.inverse_mass, self._kept.lent, self._lighter)
+        _, lent, busy, held = self._kept
         # At rest a substep ends with the velocity -(1 - PUSHED / FED) a h: the same for all that way.
-        self._kick, self._fall = state.real(h), state.real((state.drop - 1 + PUSHED / FED) * h * h)
-        held = self._kept.held
-        balance.set_out(state.velocity, state.acceleration, state.spin, held, self._kick, self._before, self._spin_before)
-        loans.pull(state.position, state.acceleration, state.inverse_mass, self._lighter, held, self._fall)
-        return self._lighter
-
-    def noted(self) -> tuple[Array, Array, Array, Array]:
-        """Where an impact notes what it does by masses of their own: before, spin_before, lent, busy."""
-        return self._before, self._spin_before, self._kept.lent, self._kept.busy
+        terms = state.reals(h, (state.drop - 1 + PUSHED / FED) * h * h, min(h / LOAN_S, 1.0), h)
+        arrays = (
+            state.mass, lent, busy, held, self._lighter, self._touched, self._before, self._spin_before, self._unpushed,
+            self._aside, self._rows, self._root, self._sums, self._open_to,
+        )  # fmt: skip
+        self.compiled = arrays, terms
+        return self._before, self._spin_before, lent, busy
 
     def _follow(self, state: Slots) -> None:
         """Slots were reordered, or particles have come or gone."""
@@ -71,34 +80,32 @@ class Loans:
         self._kept = Lent(state.particle, *columns)
         self._fit(len(state))
 
-    def settle(self, state: Slots, wide: Wide, h: float) -> None:
+    # ---- the stages of a substep, as `kernels.lending` has them --------------------------------------------------------------
+
+    def lend(self, wide: Wide) -> None:
+        """The inertia with which this substep's contacts are solved; each is pulled at by its own weight all the same."""
+        lending.call_lend(wide.circles, wide.arrays, *self.compiled, wide.cut())
+
+    def settle(self, wide: Wide) -> None:
         """Those that touch lend each other; those that do not have fallen by themselves."""
-        _, lent, busy, held = self._kept
-        loans.share(*wide.touching(), wide.cut(), state.mass, state.inverse_mass, lent, busy, self._touched, self._rows)
-        bodies = (state.position, state.velocity, state.acceleration, state.inverse_mass, self._lighter, held)
-        loans.settle(*bodies, self._touched, self._kick, self._fall)
-        loans.give_back(state.mass, state.real(min(h / LOAN_S, 1.0)), state.real(h), lent, busy)
+        lending.call_settle(wide.circles, wide.arrays, *self.compiled, wide.cut())
 
-    def free_of_walls(self, state: Slots) -> None:
-        """Contacts have been solved; what changes velocities from now on is walls."""
-        self._unpushed[:] = state.velocity
+    @contextmanager
+    def aside(self, wide: Wide) -> Iterator[None]:
+        """Meanwhile links, which keep momentum by themselves, change velocities."""
+        lending.call_set_aside(wide.circles, self.compiled[0])
+        yield
+        lending.call_leave_out(wide.circles, self.compiled[0])
 
-    def leave_out(self, change: Array) -> None:
-        """But not this `change` (n, 2), m/s, which keeps momentum by itself."""
-        self._before += change
-        self._unpushed += change
-
-    def join(self, state: Slots, wide: Wide) -> None:
+    def join(self, wide: Wide) -> None:
         """Walls have pushed: who hangs together, and is held by them."""
-        balance.cluster(*wide.touching(), state.inverse_mass, self._root)
-        who = (state.inverse_mass, self._touched, self._root)
-        balance.note_walls(state.velocity, self._unpushed, *who, self._sums, self._kept.held)
+        lending.call_join(wide.circles, wide.arrays, self.compiled[0])
 
-    def balance(self, state: Slots, *, rubs: bool) -> None:
+    def even_up(self, wide: Wide) -> None:
         """The substep is done: give those who have met with borrowed inertia what their momentum lacks."""
-        bodies = (state.position, state.velocity, state.spin, state.radius, state.mass, state.inverse_mass, self._lighter)
-        before = (self._touched, self._before, self._spin_before)
-        balance.balance(*bodies, *before, self._root, rubs, self._sums, self._open_to)
+        lending.call_even_up(wide.circles, self.compiled[0], int(wide.rubs))
+
+    # ---- beyond substeps -----------------------------------------------------------------------------------------------------
 
     def let_fall(self, state: Slots) -> None:
         """The frame is done: those on whom only others of their cluster have pushed do not rest."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,13 +24,6 @@ Array = NDArray[Any]
 
 _ROWS = tables.MASS + 1
 _ARRIVES = tables.Law._fields.index("arrives")
-
-
-class Inertia(NamedTuple):
-    """What `Loans` changes for the contacts of a substep: (n,) inverse masses, 1/kg, and where impacts note what they do."""
-
-    inverse_mass: Array
-    noted: tuple[Array, Array, Array, Array]
 
 
 class Wide:
@@ -196,16 +189,16 @@ class Wide:
     # ---- a substep ---------------------------------------------------------------------------------------------------------
 
     def set_up(
-        self, state: Slots, h: float, lag: float, strongest: float, rest_speed: float, accounts: bool, lent: Inertia | None
-    ) -> None:
-        """Everything that the sweeps of this substep, and of those that follow it alike, need: `circles`, `arrays` and `law`."""
-        if not self.fits(state) or (self._lent and lent is None):
+        self, state: Slots, h: float, lag: float, strongest: float, rest_speed: float, accounts: bool,
+        noted: tuple[Array, Array, Array, Array] | None,
+    ) -> None:  # fmt: skip
+        """Everything that the sweeps of this substep, and of those that follow it alike, need: `circles`, `arrays` and `law`.
+
+        noted: where circles lend inertia, where impacts note what they do: `Loans.begin`.
+        """
+        if not self.fits(state) or (self._lent and noted is None):
             self.fit(state)
-        self._lent = lent is not None
-        if lent is not None:
-            packs.share_anew(
-                *self._lanes(), self.cut(), state.radius, lent.inverse_mass, self.share, self.made_of,
-            )  # fmt: skip
+        self._lent = noted is not None
         if self.asks:
             np.bitwise_and(state.fed, CARRIES, out=self._carries, casting="unsafe")
         turn = self._turn if self.rubs else self._turn[:0]
@@ -215,10 +208,10 @@ class Wide:
         self.circles = (
             state.position, state.velocity, state.acceleration, state.inverse_mass, self.origin, self.moved, state.resting,
             state.spin, self._carries, state.fed, self._rows, turn, self._lift, self._leans, state.start,
-            state.radius, state.restitution, state.friction, state.hits, state.spent, *(lent.noted if lent else self._nobody),
+            state.radius, state.restitution, state.friction, state.hits, state.spent, *(noted or self._nobody),
         )  # fmt: skip
         carried = CARRIED_WEIGHT * strongest * h if strongest > 0 else np.inf
-        deep, grazes = (DEEP_LENT, 0.0) if lent else (DEEP, 1.0)
+        deep, grazes = (DEEP_LENT, 0.0) if noted else (DEEP, 1.0)
         self.law = (
             self._varied, self._mixed, int(self.asks), int(self.rubs), int(self._listens), int(accounts or self.weighs),
             1, *state.reals(h, lag, FED / PUSHED / h, LARGEST_PUSH, deep, rest_speed, grazes), int(strongest > 0),
