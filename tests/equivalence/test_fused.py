@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,9 @@ from pyverlet.laws.contacts.collisions import ContactSolver
 from pyverlet.world import substeps
 
 SECONDS = 1.5
+
+slow = functools.partial(pytest.param, marks=pytest.mark.slow)
+"""Each compiles a frame of its own."""
 
 
 @pytest.fixture(autouse=True)
@@ -59,6 +63,12 @@ def fusing(request: pytest.FixtureRequest, slots_in_order: None, monkeypatch: py
 @pytest.fixture
 def by_strips(slots_in_order: None, monkeypatch: pytest.MonkeyPatch) -> Fusing:
     return Fusing(monkeypatch, by_strips=True)
+
+
+@pytest.fixture
+def by_stages(slots_in_order: None, monkeypatch: pytest.MonkeyPatch) -> Fusing:
+    """Where links are, or loans, no world goes by strips."""
+    return Fusing(monkeypatch, by_strips=False)
 
 
 def heap(particles: int = 6000, seconds: float = SECONDS, **options: Any) -> pv.World:
@@ -262,35 +272,39 @@ def hang(world: pv.World) -> None:
 @pytest.mark.parametrize(
     "change",
     [
-        lambda world: None,
-        lambda world: setattr(world, "collisions", pv.Collisions(friction=0.5, restitution=0.3)),
-        lambda world: world.forces.append(pv.Wind((3, 1), linear=0.1)),
-        lambda world: world.obstacles.append(pv.Segment((-9, below(world)), (9, below(world) + 1), friction=0.3)),
-        lambda world: setattr(world, "boundary", pv.Box((-99, -99), (99, 99), friction=0.2)),
+        slow(lambda world: None, id="smooth"),
+        pytest.param(lambda world: setattr(world, "collisions", pv.Collisions(friction=0.5, restitution=0.3)), id="rough"),
+        slow(lambda world: world.forces.append(pv.Wind((3, 1), linear=0.1)), id="wind"),
+        slow(
+            lambda world: world.obstacles.append(pv.Segment((-9, below(world)), (9, below(world) + 1), friction=0.3)),
+            id="segment",
+        ),
+        slow(lambda world: setattr(world, "boundary", pv.Box((-99, -99), (99, 99), friction=0.2)), id="box"),
     ],
-    ids=["smooth", "rough", "wind", "segment", "box"],
 )
-def test_chains_and_pins_go_along(change: Any, fusing: Fusing) -> None:
+def test_chains_and_pins_go_along(change: Any, by_stages: Fusing) -> None:
     def linked(world: pv.World) -> None:
         change(world)
         hang(world)
 
-    world = changed(linked, fusing)
-    assert fusing.leaps == 6 * (world.substeps - 1)
-    fusing.undo()
-    assert same(world, changed(linked, fusing))
+    world = changed(linked, by_stages)
+    assert by_stages.leaps == 6 * (world.substeps - 1)
+    by_stages.undo()
+    assert same(world, changed(linked, by_stages))
 
 
-@pytest.mark.parametrize("name", ["rope-bridge", "cloth", "newton-cradle"])
-def test_scenes_of_chains_go_along(name: str, fusing: Fusing) -> None:
+@pytest.mark.parametrize(
+    "name", ["newton-cradle", *(pytest.param(each, marks=pytest.mark.slow) for each in ("rope-bridge", "cloth"))]
+)
+def test_scenes_of_chains_go_along(name: str, by_stages: Fusing) -> None:
     def swung() -> pv.World:
         world = pv.scenes.get(name).world()
         world.run(seconds=0.5)
         return world
 
     world = swung()
-    assert fusing.leaps > 0.9 * world.frames * (world.substeps - 1)
-    fusing.undo()
+    assert by_stages.leaps > 0.9 * world.frames * (world.substeps - 1)
+    by_stages.undo()
     assert same(world, swung())
 
 
@@ -320,7 +334,7 @@ def test_a_ledger_has_the_same_accounts(materials: dict[str, Any], fusing: Fusin
 
 
 @pytest.mark.parametrize("stiffness", [None, 50.0])
-def test_a_ledger_of_links_has_the_same_accounts(stiffness: float | None, fusing: Fusing) -> None:
+def test_a_ledger_of_links_has_the_same_accounts(stiffness: float | None, by_stages: Fusing) -> None:
     def kept() -> pv.World:
         world = fallen(0.0, ledger=True, collisions=pv.Collisions(friction=0.3))
         world.links.append(pv.Stick(world.groups[0], range(39), range(1, 40)))
@@ -330,8 +344,8 @@ def test_a_ledger_of_links_has_the_same_accounts(stiffness: float | None, fusing
         return world
 
     world = kept()
-    assert (fusing.substeps > 0) == (stiffness is None)  # what springs hold Python asks them
-    fusing.undo()
+    assert (by_stages.substeps > 0) == (stiffness is None)  # what springs hold Python asks them
+    by_stages.undo()
     expected = kept()
     assert same(world, expected)
     assert world.ledger.as_dict() == expected.ledger.as_dict()
@@ -341,29 +355,32 @@ def test_a_ledger_of_links_has_the_same_accounts(stiffness: float | None, fusing
 @pytest.mark.parametrize(
     "change",
     [
-        lambda world: None,
-        lambda world: setattr(world, "collisions", pv.Collisions(friction=0.5, restitution=0.3)),
-        lambda world: world.forces.append(pv.Wind((3, 1), linear=0.1)),
-        lambda world: world.obstacles.append(pv.Segment((-9, below(world)), (9, below(world) + 1), friction=0.3)),
-        lambda world: setattr(world, "boundary", pv.Circle(radius=world.boundary.radius, friction=0.5)),
-        hang,
+        slow(lambda world: None, id="smooth"),
+        pytest.param(lambda world: setattr(world, "collisions", pv.Collisions(friction=0.5, restitution=0.3)), id="rough"),
+        slow(lambda world: world.forces.append(pv.Wind((3, 1), linear=0.1)), id="wind"),
+        slow(
+            lambda world: world.obstacles.append(pv.Segment((-9, below(world)), (9, below(world) + 1), friction=0.3)),
+            id="segment",
+        ),
+        slow(lambda world: setattr(world, "boundary", pv.Circle(radius=world.boundary.radius, friction=0.5)), id="rough cage"),
+        slow(hang, id="links"),
     ],
-    ids=["smooth", "rough", "wind", "segment", "rough cage", "links"],
 )
-def test_circles_that_lend_each_other_inertia_go_along(change: Any, fusing: Fusing) -> None:
+def test_circles_that_lend_each_other_inertia_go_along(change: Any, by_stages: Fusing) -> None:
     def uneven(world: pv.World) -> None:
         world.mass[::3] *= 100.0
         change(world)
 
-    world = changed(uneven, fusing)
-    assert fusing.leaps == 6 * (world.substeps - 1)
+    world = changed(uneven, by_stages)
+    assert by_stages.leaps == 6 * (world.substeps - 1)
     assert world._contacts is not None
     assert world._contacts.lending
-    fusing.undo()
-    assert same(world, changed(uneven, fusing))
+    by_stages.undo()
+    assert same(world, changed(uneven, by_stages))
 
 
-def test_a_ledger_of_circles_that_lend(fusing: Fusing) -> None:
+@pytest.mark.slow
+def test_a_ledger_of_circles_that_lend(by_stages: Fusing) -> None:
     def kept() -> pv.World:
         world = fallen(0.0, ledger=True, collisions=pv.Collisions(friction=0.3))
         world.mass[::3] *= 100.0
@@ -372,8 +389,8 @@ def test_a_ledger_of_circles_that_lend(fusing: Fusing) -> None:
         return world
 
     world = kept()
-    assert fusing.leaps > 0.9 * world.frames * (world.substeps - 1)
-    fusing.undo()
+    assert by_stages.leaps > 0.9 * world.frames * (world.substeps - 1)
+    by_stages.undo()
     expected = kept()
     assert same(world, expected)
     assert world.ledger.as_dict() == expected.ledger.as_dict()
