@@ -2,7 +2,7 @@
 of it.
 
 A substep is left for Python when the list of pairs may no longer be good, and when it is the last. The names are those of the
-stages in `world.profile`. A frame is compiled for a kind of room: `frames` has one for each.
+stages in `world.profile`.
 """
 
 from __future__ import annotations
@@ -33,6 +33,9 @@ CONTACTS, BOUNDS, VELOCITIES, INTEGRATE, OBSTACLES, LEDGER, LINKS = range(1, 8)
 STAGES = ("contacts", "bounds", "velocities", "integrate", "obstacles", "ledger", "links")
 """Names of the numbers above, less one, by which their time is noted."""
 
+OPEN, SMOOTH_CAGE, CAGE, FOUR_WALLS = range(4)
+"""Rooms: without walls; round, without restitution and friction, around circles that have none either; round; a box."""
+
 INTEGRATED, TOUCHED, JOINED, STILLED, PULLED = range(5)
 LOOKS = 5
 """At the energy in a substep: where a ledger looks."""
@@ -53,6 +56,18 @@ NORMAL = fields(Pairs).index("normal")
 """Where in the tuple of `Pairs` the normals are."""
 
 _CHUNK = 4096
+
+
+class Room(NamedTuple):
+    """what: of the rooms above. Of a round one x0, y0 is the centre and x1 the radius, m; e and mu are those of the walls."""
+
+    what: Any
+    x0: Any
+    y0: Any
+    x1: Any
+    y1: Any
+    e: Any
+    mu: Any
 
 
 class Services(NamedTuple):
@@ -98,56 +113,45 @@ def remember(start, position):
             copy_row(start, i, position, i)
 
 
-# ---- rooms: from here on `law` and `circles` are named tuples -------------------------------------------------------------
+# ---- from here on `room`, `law` and `circles` are named tuples -----------------------------------------------------------
 
 
 @driver
-def open_space(room, circles, law, claims):
-    """No walls."""
-    circles.resting[:] = 0
-
-
-@driver
-def smooth_cage(room, circles, law, claims):
-    """(x, y, radius) of a round room without restitution and friction, around circles that have none either."""
-    hold(
-        room[0], room[1], room[2], circles.position, circles.velocity, circles.acceleration, circles.radius, circles.inverse_mass,
-        circles.resting, circles.hits, law.h, law.lag, law.rest_speed, 1 - law.arrives, circles.origin, circles.moved, law.feed,
-        claims,
-    )  # fmt: skip
-
-
-@driver
-def cage(room, circles, law, claims):
-    """(x, y, radius, e, mu) of a round room."""
-    confine_in_cage(
-        room[0], room[1], room[2], circles.position, circles.velocity, circles.acceleration, circles.spin, circles.radius,
-        circles.inverse_mass, circles.restitution, circles.friction, circles.fed, circles.resting, circles.hits, circles.spent,
-        circles.start, circles.turn, circles.lift, law.h, law.lag, room[3], room[4], law.rest_speed,
-    )  # fmt: skip
-
-
-@driver
-def four_walls(room, circles, law, claims):
-    """(x0, y0, x1, y1, e, mu) of a box."""
-    box(
-        room[0], room[1], room[2], room[3], circles.position, circles.velocity, circles.acceleration, circles.spin,
-        circles.radius, circles.inverse_mass, circles.restitution, circles.friction, circles.fed, circles.resting, circles.hits,
-        circles.spent, circles.start, circles.turn, circles.lift, law.h, law.lag, room[4], room[5], law.rest_speed,
-    )  # fmt: skip
+def confine(room, circles, law, claims):
+    """What the walls do."""
+    if room.what == OPEN:
+        circles.resting[:] = 0
+    elif room.what == SMOOTH_CAGE:
+        hold(
+            room.x0, room.y0, room.x1, circles.position, circles.velocity, circles.acceleration, circles.radius,
+            circles.inverse_mass, circles.resting, circles.hits, law.h, law.lag, law.rest_speed, 1 - law.arrives, circles.origin,
+            circles.moved, law.feed, claims,
+        )  # fmt: skip
+    elif room.what == CAGE:
+        confine_in_cage(
+            room.x0, room.y0, room.x1, circles.position, circles.velocity, circles.acceleration, circles.spin, circles.radius,
+            circles.inverse_mass, circles.restitution, circles.friction, circles.fed, circles.resting, circles.hits,
+            circles.spent, circles.start, circles.turn, circles.lift, law.h, law.lag, room.e, room.mu, law.rest_speed,
+        )  # fmt: skip
+    else:
+        box(
+            room.x0, room.y0, room.x1, room.y1, circles.position, circles.velocity, circles.acceleration, circles.spin,
+            circles.radius, circles.inverse_mass, circles.restitution, circles.friction, circles.fed, circles.resting,
+            circles.hits, circles.spent, circles.start, circles.turn, circles.lift, law.h, law.lag, room.e, room.mu,
+            law.rest_speed,
+        )  # fmt: skip
 
 
 # ---- substeps --------------------------------------------------------------------------------------------------------------
 
 
 @driver
-def _look_at_energy(circles, services, substep, when, spent, clock):
+def _look_at_energy(energies, substep, when, circles, mass, lag, down, spent, clock):
     """Note what there is, if anybody wants to know."""
-    if services.energies.shape[0] > 0:
-        services.energies[substep, when] = mechanical(
-            circles.position, circles.velocity, circles.acceleration, services.lag, circles.spin, circles.radius, services.mass,
-            services.down[0], services.down[1],
-        )  # fmt: skip
+    if energies.shape[0] > 0:
+        energies[substep, when] = mechanical(
+            circles.position, circles.velocity, circles.acceleration, lag, circles.spin, circles.radius, mass, down[0], down[1]
+        )
         note(spent, LEDGER, clock[0], clock[1])
 
 
@@ -174,12 +178,13 @@ def _substeps(
     largest acceleration, m/s^2.
     """
     circles, pairs, law = Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Law(*law)
-    strongest, begins = law.h - law.h, law.rubs != 0
+    room, strongest, begins = Room(*room), law.h - law.h, law.rubs != 0
     if SERVED:
         services = Services(*services)
         kind, vector, number, force, period_x, period_y = services.forces
         segments, bodies, cells, walls, along, rest, drop = services.course
         gx, gy = services.gravity
+        energies, mass, lag, down = services.energies, services.mass, services.lag, services.down
         begins = begins or segments.shape[0] > 0
     if LINKED:
         linked, linking = Linked(*borrowed(services.links[0])), Linking(*services.links[1])
@@ -191,15 +196,15 @@ def _substeps(
             settle(circles, pairs, loans, terms, cut)
         note(spent, CONTACTS, clock[0], clock[1])
         if LINKED:
-            _look_at_energy(circles, services, substep, TOUCHED, spent, clock)
+            _look_at_energy(energies, substep, TOUCHED, circles, mass, lag, down, spent, clock)
             if LENT:
                 set_aside(circles, loans)
             solve(linked, linking, circles.position, circles.velocity)
             if LENT:
                 leave_out(circles, loans)
             note(spent, LINKS, clock[0], clock[1])
-            _look_at_energy(circles, services, substep, JOINED, spent, clock)
-        confine(room, circles, law, claims)  # noqa: F821  (`frames` says what that is)
+            _look_at_energy(energies, substep, JOINED, circles, mass, lag, down, spent, clock)
+        confine(room, circles, law, claims)
         note(spent, BOUNDS, clock[0], clock[1])
         if SERVED and segments.shape[0] > 0:
             until = substep * services.h + services.h
@@ -217,11 +222,11 @@ def _substeps(
             even_up(circles, loans, law.rubs)
         note(spent, VELOCITIES, clock[0], clock[1])
         if SERVED:
-            _look_at_energy(circles, services, substep, STILLED, spent, clock)
+            _look_at_energy(energies, substep, STILLED, circles, mass, lag, down, spent, clock)
         if LINKED:
             note_pull(linked, linking, circles.acceleration)
             note(spent, LINKS, clock[0], clock[1])
-            _look_at_energy(circles, services, substep, PULLED, spent, clock)
+            _look_at_energy(energies, substep, PULLED, circles, mass, lag, down, spent, clock)
         substep += 1
         if substep == stop:
             return substep, False, strongest
@@ -246,7 +251,7 @@ def _substeps(
         if strayed:
             return substep, True, strongest
         if SERVED:
-            _look_at_energy(circles, services, substep, INTEGRATED, spent, clock)
+            _look_at_energy(energies, substep, INTEGRATED, circles, mass, lag, down, spent, clock)
         if LENT:
             lend(circles, pairs, loans, terms, cut)
 
@@ -254,10 +259,7 @@ def _substeps(
 project = for_each_kind(driver, _project, push=push)
 still = for_each_kind(driver, _still, relax=relax)
 frames = {
-    (room, beside): for_each_kind(
-        driver, variant(_substeps, f"{room.function.__name__}{'_' * bool(beside)}{beside}", confine=room, **constants),
-        push=push, relax=relax,
-    )
-    for room in (open_space, smooth_cage, cage, four_walls) for beside, constants in BESIDE.items()
-}  # fmt: skip
-"""Substeps in each kind of room, by what there may be `BESIDE` circles, of each kind of world."""
+    beside: for_each_kind(driver, variant(_substeps, beside, **constants), push=push, relax=relax)
+    for beside, constants in BESIDE.items()
+}
+"""Substeps, by what there may be `BESIDE` circles, of each kind of world."""

@@ -27,6 +27,10 @@ Array = NDArray[Any]
 Extent = tuple[float, float, float, float]
 
 
+NOWHERE = (0.0,) * 6
+"""The numbers of no walls."""
+
+
 class Boundary(ABC):
     """What the world asks of its bounds.
 
@@ -45,8 +49,8 @@ class Boundary(ABC):
         """Whether its walls may do work."""
         return False
 
-    def compiled(self, state: Slots) -> tuple[Any, tuple[float, ...]] | None:
-        """What `confine` does as a driver of `kernels.frame`, and the numbers it takes; None: Python has to call it."""
+    def compiled(self, state: Slots) -> tuple[int, tuple[float, ...]] | None:
+        """What `confine` does: of the rooms of `kernels.frame`, and the six numbers of one; None: Python has to call it."""
         return None
 
     def walls(self) -> Sequence[float]:
@@ -84,8 +88,8 @@ class Boundary(ABC):
 class Open(Boundary):
     """No walls."""
 
-    def compiled(self, state: Slots) -> tuple[Any, tuple[float, ...]] | None:
-        return (frame.open_space, ()) if type(self) is Open else None
+    def compiled(self, state: Slots) -> tuple[int, tuple[float, ...]] | None:
+        return (frame.OPEN, NOWHERE) if type(self) is Open else None
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         state.resting[:] = 0
@@ -167,12 +171,12 @@ class Circle(_Walls):
         # Whom an obstacle pushes to a wall that turns is held there, and rubbed where the wall itself is met.
         return (meetings.ROUND, *self.center, self.radius, 0.0, self.restitution, 0.0 if self.moves else self.friction)
 
-    def compiled(self, state: Slots) -> tuple[Any, tuple[float, ...]] | None:
+    def compiled(self, state: Slots) -> tuple[int, tuple[float, ...]] | None:
         if type(self) is not Circle or self.moves:
             return None
         if self.restitution == 0.0 == self.friction and state.smooth and not len(state.spent):
-            return frame.smooth_cage, (*self.center, self.radius)
-        return frame.cage, (*self.center, self.radius, self.restitution, self.friction)
+            return frame.SMOOTH_CAGE, (*self.center, self.radius, 0.0, 0.0, 0.0)
+        return frame.CAGE, (*self.center, self.radius, 0.0, self.restitution, self.friction)
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         speed = self.angular_velocity * self.radius
@@ -233,9 +237,9 @@ class Box(_Walls):
     def walls(self) -> Sequence[float]:
         return (meetings.RECTANGLE, *self.lower, *self.upper, self.restitution, self.friction)
 
-    def compiled(self, state: Slots) -> tuple[Any, tuple[float, ...]] | None:
+    def compiled(self, state: Slots) -> tuple[int, tuple[float, ...]] | None:
         shape = (*self.lower, *self.upper, self.restitution, self.friction)
-        return (frame.four_walls, shape) if type(self) is Box else None
+        return (frame.FOUR_WALLS, shape) if type(self) is Box else None
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         self._confine(bounds.box, (*self.lower, *self.upper), state, h, lag, rest_speed)
@@ -316,12 +320,12 @@ class Periodic(_Walls):
     def walls(self) -> Sequence[float]:
         return (meetings.RECTANGLE, *self._box, self.restitution, self.friction)
 
-    def compiled(self, state: Slots) -> tuple[Any, tuple[float, ...]] | None:
+    def compiled(self, state: Slots) -> tuple[int, tuple[float, ...]] | None:
         if type(self) is not Periodic:
             return None
         if self.axes == "xy":
-            return frame.open_space, ()
-        return frame.four_walls, (*self._box, self.restitution, self.friction)
+            return frame.OPEN, NOWHERE
+        return frame.FOUR_WALLS, (*self._box, self.restitution, self.friction)
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         if self.axes == "xy":

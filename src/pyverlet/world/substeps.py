@@ -76,9 +76,9 @@ class Substeps:
         if course:
             course.set_up(state, substep * h, h)
         wide = contacts.set_up(state, h, lag, forces.strongest)
-        confine, shape = world.boundary.compiled(state)  # that circles rub is known by now
+        walls, shape = world.boundary.compiled(state)  # that circles rub is known by now
         loans = contacts.lending or ()
-        if smooth := confine is frame.smooth_cage and not (links or loans):
+        if smooth := walls == frame.SMOOTH_CAGE and not (links or loans):
             wide.leave_arriving()
         # Who rests is a question of all that pulls: links do so after the circles.
         last, rows = -1 if links else world.substeps - 1, forces.compiled(state)
@@ -92,10 +92,10 @@ class Substeps:
         if smooth and not (beside or wide.asks) and len(state) >= FUSED_FROM and strips.in_order:
             return self._strip_by_strip(world, contacts, wide, strips, shape, substep, leaps=leaps)
         services: Any = self._services(world, books, rows if leaps else (), links, loans, h, lag) if beside else ()
-        stop, looks = world.substeps if leaps else substep + 1, wide.takes_looks()
-        reached, self.leapt, strongest = frame.frames[confine, beside][wide.kind](
-            substep, stop, last, wide.circles, wide.arrays, wide.law, tuple(map(state.real, shape)), services, wide.cut(), looks,
-            int(bool(loans) or out is not wide.moved), strips.checked, state.real(strips.allowed * strips.allowed), state.claims(),
+        stop, looks, sets_out = world.substeps if leaps else substep + 1, wide.takes_looks(), bool(loans) or out is not wide.moved
+        reached, self.leapt, strongest = frame.frames[beside][wide.kind](
+            substep, stop, last, wide.circles, wide.arrays, wide.law, (walls, *map(state.real, shape)), services, wide.cut(),
+            looks, int(sets_out), strips.checked, state.real(strips.allowed * strips.allowed), state.claims(),
             world.profile.spent, (clock.address(), clock.tick()),
         )  # fmt: skip
         if leaps and rows and (self.leapt or reached > substep + 1):
@@ -137,7 +137,7 @@ class Substeps:
         looks, far = wide.takes_looks(), state.real(strips.allowed * strips.allowed)
         about = (strips.held, self._place, looks, int(self.leapt), int(self.marked), strips.checked, far)
         arrays = (*wide.arrays[: frame.NORMAL], self._normal, *wide.arrays[frame.NORMAL + 1 :])
-        strayed = fused.substep(self._cut, wide.circles, arrays, wide.law, tuple(map(state.real, room)), about)
+        strayed = fused.substep(self._cut, wide.circles, arrays, wide.law, tuple(map(state.real, room[:3])), about)
         contacts.broad_phase.strayed = bool(strayed) if self.leapt else None
         if self.marked:
             wide.has_marked()
