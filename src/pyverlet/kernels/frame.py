@@ -40,16 +40,15 @@ INTEGRATED, TOUCHED, JOINED, STILLED, PULLED = range(5)
 LOOKS = 5
 """At the energy in a substep: where a ledger looks."""
 
-SERVED = LINKED = LENT = False
-"""Whether there may be more in a world than circles, a room and gravity: `Services`; links; lent inertia."""
+SERVED = LINKED = False
+"""Whether there may be more in a world than circles, a room and gravity: `Services`; links."""
 
-_BESIDE: dict[str, dict[str, Any]] = {
+BESIDE: dict[str, dict[str, Any]] = {
     "": {},
     "served": {"SERVED": True},
     "linked": {"SERVED": True, "LINKED": True},
     "few_linked": {"SERVED": True, "LINKED": True, "look": look_alone, "solve": solve_alone, "note_pull": note_pull_alone},
 }
-BESIDE = _BESIDE | {f"{name}_lent": {**constants, "SERVED": True, "LENT": True} for name, constants in _BESIDE.items()}
 """Frames are compiled for each of these. Links so few that it does not pay stay on one thread where circles use several."""
 
 NORMAL = fields(Pairs).index("normal")
@@ -78,7 +77,7 @@ class Services(NamedTuple):
     drop). mass: (n,) kg. energies: (substeps, LOOKS) J, becomes what `measure.mechanical` says after the integration of each
     substep, but of the first and of the one that is handed back, and after its contacts, links and so on; without links at its
     end only. links: what `kernels.linked` takes, its arrays and numbers, where there are any; loans: what
-    `kernels.lending` takes, likewise.
+    `kernels.lending` takes; empty where nobody lends.
     """
 
     h: Any
@@ -185,22 +184,22 @@ def _substeps(
         segments, bodies, cells, walls, along, rest, drop = services.course
         gx, gy = services.gravity
         energies, mass, lag, down = services.energies, services.mass, services.lag, services.down
+        loans, terms = Lending(*borrowed(services.loans[0])), Terms(*services.loans[1])
+        lends = services.loans[0][0].shape[0] > 0
         begins = begins or segments.shape[0] > 0
     if LINKED:
         linked, linking = Linked(*borrowed(services.links[0])), Linking(*services.links[1])
-    if LENT:
-        loans, terms = Lending(*borrowed(services.loans[0])), Terms(*services.loans[1])
     while True:
         push(circles, pairs, law, cut, looks, sets_out, claims)
-        if LENT:
+        if SERVED and lends:
             settle(circles, pairs, loans, terms, cut)
         note(spent, CONTACTS, clock[0], clock[1])
         if LINKED:
             _look_at_energy(energies, substep, TOUCHED, circles, mass, lag, down, spent, clock)
-            if LENT:
+            if lends:
                 set_aside(circles, loans)
             solve(linked, linking, circles.position, circles.velocity)
-            if LENT:
+            if lends:
                 leave_out(circles, loans)
             note(spent, LINKS, clock[0], clock[1])
             _look_at_energy(energies, substep, JOINED, circles, mass, lag, down, spent, clock)
@@ -215,10 +214,10 @@ def _substeps(
                 law.lag, law.rest_speed, drop,
             )  # fmt: skip
             note(spent, OBSTACLES, clock[0], clock[1])
-        if LENT:
+        if SERVED and lends:
             join(circles, pairs, loans)
         relax(circles, pairs, law, cut, 1 if substep == last else 0, claims)
-        if LENT:
+        if SERVED and lends:
             even_up(circles, loans, law.rubs)
         note(spent, VELOCITIES, clock[0], clock[1])
         if SERVED:
@@ -247,13 +246,14 @@ def _substeps(
                 claims,
             )  # fmt: skip
         note(spent, INTEGRATE, clock[0], clock[1])
-        looks = sets_out = 1 if LENT else 0  # with the inertia of the moment others overlap deeply, and stand elsewhere
+        looks = sets_out = 0
         if strayed:
             return substep, True, strongest
         if SERVED:
             _look_at_energy(energies, substep, INTEGRATED, circles, mass, lag, down, spent, clock)
-        if LENT:
+        if SERVED and lends:
             lend(circles, pairs, loans, terms, cut)
+            looks = sets_out = 1  # with the inertia of the moment others overlap deeply, and circles stand elsewhere
 
 
 project = for_each_kind(driver, _project, push=push)

@@ -77,22 +77,20 @@ class Substeps:
             course.set_up(state, substep * h, h)
         wide = contacts.set_up(state, h, lag, forces.strongest)
         walls, shape = world.boundary.compiled(state)  # that circles rub is known by now
-        loans = contacts.lending or ()
-        if smooth := walls == frame.SMOOTH_CAGE and not (links or loans):
+        lends, loans = contacts.lending
+        if smooth := walls == frame.SMOOTH_CAGE and not (links or lends):
             wide.leave_arriving()
         # Who rests is a question of all that pulls: links do so after the circles.
         last, rows = -1 if links else world.substeps - 1, forces.compiled(state)
         # Who looks on may turn gravity, and see what a ledger sees.
         leaps = world.integrator.leaps and rows is not None and not world.onlooker
-        beside = "served" * bool(course or books or (leaps and rows))
+        beside = "served" * bool(course or books or lends or (leaps and rows))
         if links:
             beside = "few_linked" if world.links.stand_back else "linked"
-        if loans:
-            beside += "_lent"
         if smooth and not (beside or wide.asks) and len(state) >= FUSED_FROM and strips.in_order:
             return self._strip_by_strip(world, contacts, wide, strips, shape, substep, leaps=leaps)
         services: Any = self._services(world, books, rows if leaps else (), links, loans, h, lag) if beside else ()
-        stop, looks, sets_out = world.substeps if leaps else substep + 1, wide.takes_looks(), bool(loans) or out is not wide.moved
+        stop, looks, sets_out = world.substeps if leaps else substep + 1, wide.takes_looks(), lends or out is not wide.moved
         reached, self.leapt, strongest = frame.frames[beside][wide.kind](
             substep, stop, last, wide.circles, wide.arrays, wide.law, (walls, *map(state.real, shape)), services, wide.cut(),
             looks, int(sets_out), strips.checked, state.real(strips.allowed * strips.allowed), state.claims(),

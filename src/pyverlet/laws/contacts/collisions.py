@@ -155,9 +155,9 @@ class ContactSolver:
         return wide
 
     @property
-    def lending(self) -> tuple[Any, Any] | None:
-        """What `kernels.lending` takes, if circles lend each other inertia since `set_up`."""
-        return self._loans.compiled if self._lends else None
+    def lending(self) -> tuple[bool, tuple[Any, Any]]:
+        """Whether circles lend each other inertia since `set_up`, and what `kernels.lending` takes."""
+        return self._lends, self._loans.compiled if self._lends else self._loans.nobody
 
     def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
         """Let impacts bounce, move other overlapping circles apart, note who touches, and let those grip each other."""

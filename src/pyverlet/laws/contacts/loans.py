@@ -31,14 +31,14 @@ class Loans:
     """Who has lent how much to the others, and what that changes for the contacts of a substep. Costs nothing until `begin`.
 
     Attributes:
-        compiled: since `begin`, what `kernels.lending` takes, (arrays, terms).
+        compiled: what `kernels.lending` takes since `begin`, (arrays, terms).
+        nobody: the same, empty, of worlds where nobody lends.
     """
-
-    compiled: tuple[Any, Any] = ((), ())
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self._dtype = dtype
         self.forget()
+        self.compiled = self.nobody = self._arrays(np.empty(0, dtype)), (dtype.type(0),) * 4
 
     def forget(self) -> None:
         """Nobody has lent anything."""
@@ -59,15 +59,17 @@ class Loans:
         """
         if self._kept.particle is not state.particle:
             self._follow(state)
-        _, lent, busy, held = self._kept
         # At rest a substep ends with the velocity -(1 - PUSHED / FED) a h: the same for all that way.
         terms = state.reals(h, (state.drop - 1 + PUSHED / FED) * h * h, min(h / LOAN_S, 1.0), h)
-        arrays = (
-            state.mass, lent, busy, held, self._lighter, self._touched, self._before, self._spin_before, self._unpushed,
-            self._aside, self._rows, self._root, self._sums, self._open_to,
+        self.compiled = self._arrays(state.mass), terms
+        return self._before, self._spin_before, self._kept.lent, self._kept.busy
+
+    def _arrays(self, mass: Array) -> tuple[Array, ...]:
+        _, lent, busy, held = self._kept
+        return (
+            mass, lent, busy, held, self._lighter, self._touched, self._before, self._spin_before, self._unpushed, self._aside,
+            self._rows, self._root, self._sums, self._open_to,
         )  # fmt: skip
-        self.compiled = arrays, terms
-        return self._before, self._spin_before, lent, busy
 
     def _follow(self, state: Slots) -> None:
         """Slots were reordered, or particles have come or gone."""
