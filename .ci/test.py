@@ -5,8 +5,8 @@ is tested is what a user gets: a data file missing from the wheel shows.
 
 What runs is meant to take five minutes on two cores and looks at everything: every module, every scene, equal bits on any number
 of threads, the physics at small sizes, the live page in a browser if there is one. `--all` adds the tests marked `slow`: larger
-worlds, every combination, compiling from nothing. `--setup` stops before the tests. Two processes share them; with `-n0` one
-does all.
+worlds, every combination, compiling from nothing. `--setup` stops before the tests. Three processes share them, two with `--all`;
+with `-n0` one does all.
 """
 
 from __future__ import annotations
@@ -73,8 +73,10 @@ def main(arguments: list[str]) -> None:
     if WITH_ARCADE.exists():
         os.environ["PYVERLET_TEST_ARCADE"] = str(WITH_ARCADE)
     everything = ["-m", "not full"] if "--all" in arguments else []
-    # Two processes, one of which soon has all tests of the page; whoever is through takes over what the other has left.
-    run(PYTHON, "-m", "pytest", "-n2", "--dist=worksteal", *everything, *(each for each in arguments if each != "--all"))
+    # With two, half a core was idle while the page, or a compiler, was waited for. For all tests three would need 6 GB.
+    processes = "-n2" if everything else "-n3"
+    # One soon has all tests of the page; whoever is through takes over what the others have left.
+    run(PYTHON, "-m", "pytest", processes, "--dist=worksteal", *everything, *(each for each in arguments if each != "--all"))
 
 
 if __name__ == "__main__":

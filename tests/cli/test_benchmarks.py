@@ -12,6 +12,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 
+@pytest.mark.slow  # it compiles for several threads, and with and without a room
 def test_the_comparison_runs_and_writes_its_rows(tmp_path: Path) -> None:
     table = tmp_path / "rows.csv"
     command = [sys.executable, "-m", "benchmarks", "--particles", "60", "--frames", "3", "--csv", str(table)]
@@ -38,6 +39,7 @@ def test_the_physics_of_every_engine_is_measured() -> None:
     assert " 1.000 " in ours
 
 
+@pytest.mark.slow
 def test_the_cost_of_a_force_of_ones_own_is_measured() -> None:
     command = [sys.executable, "-m", "benchmarks.forces", "--particles", "60", "--frames", "3"]
     run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=True)

@@ -61,6 +61,7 @@ print(compile_kernels(World()))
 """
 
 
+@pytest.mark.slow
 def test_compiling_is_announced(tmp_path: Path) -> None:
     for announced in (True, False):
         done = subprocess.run(

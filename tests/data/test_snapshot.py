@@ -417,6 +417,7 @@ print(lines, seen.count(old), seen.count(new))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="forks")
 def test_killed_in_any_step_of_saving_leaves_a_whole_file(tmp_path: Path) -> None:
     path = tmp_path / "a.pvsnap"

@@ -133,6 +133,7 @@ def test_a_run_that_raises_is_a_row_that_says_so(tmp_path: Path) -> None:
     assert len((tmp_path / "rows.jsonl").read_bytes()) > len(before)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 def test_a_run_that_ends_its_process_costs_no_other(tmp_path: Path) -> None:
     study = pv.sweep("box", {"particles": range(1, 13)}, measure=ends_at_seven, seconds=0.0, out=tmp_path)

@@ -132,6 +132,7 @@ def test_the_example_runs(library: str, update: str) -> None:
     assert seen_through(code, library=library).split()[-4:] == ["3", "2001", "4.5", "3.0"]
 
 
+@pytest.mark.slow
 def test_the_moderngl_example_writes_a_picture(tmp_path: Path) -> None:
     if importlib.util.find_spec("moderngl") is None:
         pytest.skip("moderngl is not installed")

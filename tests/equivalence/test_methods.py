@@ -61,7 +61,7 @@ def listed(state: State, skin: float) -> Any:
     return phase, slots
 
 
-@pytest.mark.parametrize("most", [800, pytest.param(2000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("most", [400, pytest.param(2000, marks=pytest.mark.slow)])
 @settings(max_examples=60, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),

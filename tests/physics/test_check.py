@@ -43,6 +43,10 @@ SMALLER: dict[str, dict[str, Any]] = {
 DEAR = ("rebound-substeps",)
 
 
+# Dear ones even so: at any size with `--all` only.
+DEARER = ("repose", "energy-scenes", "radii-masses")
+
+
 def parameters() -> list[Any]:
     marks: dict[str, Any] = dict.fromkeys((*SMALLER, *DEAR), pytest.mark.slow)
     marks |= {name: pytest.mark.xfail(strict=True, reason=f"{name}: {reason}") for name, reason in BROKEN.items()}
@@ -55,7 +59,7 @@ def test_promise(check: physics.Check) -> None:
     assert row.passed, f"asked: {row.asked}; measured: {row.measured}"
 
 
-@pytest.mark.parametrize("name", SMALLER)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) if name in DEARER else name for name in SMALLER])
 def test_promise_at_a_smaller_size(name: str) -> None:
     check = physics.named(name)
     row = dataclasses.replace(check, settings={**check.settings, **SMALLER[name]}).run()

@@ -30,7 +30,7 @@ def test_some_random_worlds(seed: int) -> None:
 
 
 # Light circles beside drag stiffer than a substep; pinned circles that move; circles lowered through a wall, pegs that push out.
-@pytest.mark.parametrize("seed", [41, 168, 1522, 2146, 2167])
+@pytest.mark.parametrize("seed", [41, 168, 1522, pytest.param(2146, marks=pytest.mark.slow), 2167])
 def test_seeds_that_once_failed(seed: int) -> None:
     (finding,) = fuzz.fuzz(1, seed, small=False, without=OPEN)
     assert finding.check is None, finding.check

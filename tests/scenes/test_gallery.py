@@ -32,7 +32,7 @@ def test_the_bins_of_a_galton_board_follow_the_binomial_law(options: dict[str, i
     assert_binomial(counts, 0.01)
 
 
-@pytest.mark.parametrize("count", [1_000, pytest.param(4_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [pytest.param(count, marks=pytest.mark.slow) for count in (1_000, 4_000)])
 def test_pegs_alone_send_a_ball_left_or_right_whatever_it_did_before(count: int) -> None:
     """Many balls that do not meet, dropped below the hopper's lips: no force but gravity, nothing random but where they start."""
     world = scenes.get("galton").world(particles=1, collisions=False, threads=1)

@@ -65,6 +65,7 @@ print(*(workers for _, workers in bits), len(compiled))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(jit.max_threads() < 2, reason="needs two threads")
 def test_both_variants_are_kept_give_the_same_bits_and_use_their_threads(tmp_path: Path) -> None:
     program = tmp_path / "program.py"

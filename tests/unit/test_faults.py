@@ -46,6 +46,7 @@ def said(code: str, cache: Path, **environment: str) -> str:
 
 
 @posix
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "when",
     [
@@ -72,6 +73,7 @@ def test_killed_while_compiling_the_next_start_compiles(when: str, tmp_path: Pat
     assert said("call()", tmp_path) == SAID
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("harm", ["cut", *(pytest.param(each, marks=pytest.mark.slow) for each in ("empty", "flipped"))])
 def test_half_a_file_is_compiled_anew(harm: str, tmp_path: Path) -> None:
     assert said("call()", tmp_path) == SAID

@@ -116,7 +116,7 @@ def test_many_particles_give_the_same_bits_on_all_threads(dtype: Any) -> None:
     assert worlds[0].velocity[:, 0] == pytest.approx(-0.5 / 60 * position[:, 1] / mass, abs=2e-3)
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
 def test_the_largest_acceleration_of_all_is_known(dtype: Any) -> None:
     # Walls and impacts ask for it: an approach slower than a few times |a| h is rest.
     rng = np.random.default_rng(0)

@@ -49,6 +49,7 @@ print(out[0, 0], sum(motion.advance.alone.stats.cache_hits.values()))
 """
 
 
+@pytest.mark.slow
 def test_an_edited_helper_is_not_served_from_the_cache(tmp_path: Path) -> None:
     # Numba alone would miss this: the file of the kernel that is called does not change, that of an inlined one does.
     copy = tmp_path / "site" / "pyverlet"

@@ -48,6 +48,7 @@ print(seen[0], os.environ.get("GOMP_SPINCOUNT"))
 """
 
 
+@pytest.mark.slow
 def test_who_waits_soon_sleeps() -> None:
     assert run(SPINS) == "5000 None"
 
@@ -58,9 +59,10 @@ def test_unless_the_user_has_said_otherwise(name: str, value: str, said: str) ->
     assert run(SPINS, **{name: value}) == said
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
 @pytest.mark.parametrize("layer", ["default", pytest.param("workqueue", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("before", ["world(2500)", pytest.param("None", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("before", [pytest.param("world(2500)", marks=pytest.mark.slow), "None"])
 def test_a_fork_goes_on(layer: str, before: str) -> None:
     # GNU's OpenMP ends a fork that uses its threads when its parent has; a lock held by a thread that is not there never opens.
     told = run(

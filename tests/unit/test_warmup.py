@@ -49,6 +49,7 @@ warmup.rehearse = lambda world: None
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("some", ["tiny", pytest.param("short", marks=pytest.mark.slow)])
 def test_two_processes_share_the_work(some: str, tmp_path: Path) -> None:
     # Without the pipes of `_Helper`, to see both: whatever begins to compile is written to disk, under a name of its
@@ -115,6 +116,7 @@ def test_one_core_has_no_helper(monkeypatch: pytest.MonkeyPatch) -> None:
         assert helpers == []
 
 
+@pytest.mark.slow
 def test_a_helper_ends_with_its_parent() -> None:
     parent = (
         "import os, numpy as np; from pyverlet.world import warmup\n"

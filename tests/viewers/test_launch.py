@@ -66,6 +66,7 @@ def test_a_script_views_its_world_until_ctrl_c_and_goes_on() -> None:
     assert int(frames[1]) > 10
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="signals as a terminal sends them")
 def test_sigterm_ends_the_program_as_usual() -> None:
     with start({}) as script:

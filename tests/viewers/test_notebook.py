@@ -215,6 +215,7 @@ def cell(comm: Comm, request: pytest.FixtureRequest) -> Iterator[Page]:
     assert errors == []
 
 
+@pytest.mark.slow
 def test_a_cell_shows_steers_and_leaves(cell: Page, comm: Comm, world: pv.World) -> None:
     time_shown = cell.get_by_test_id("time")
     cell.wait_for_function("window.host?.pyverlet.status()?.time > 0.3")

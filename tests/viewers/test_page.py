@@ -61,6 +61,7 @@ def test_a_page_as_quick_as_its_screen_draws_all_but_what_always_waits(page: Pag
     assert quick["kept"] == slow["kept"] == 3
 
 
+@pytest.mark.slow
 def test_pause_step_and_reset(page: Page, program: Serve) -> None:
     visit(page, program("cage", 500).address)
     assert comes_true(page, lambda: number(page, "time") > 0.5)
@@ -180,6 +181,7 @@ def test_without_bounds_the_view_follows_the_fall(page: Page, program: Serve) ->
     assert circles_missing(page) == 0
 
 
+@pytest.mark.slow
 def test_worlds_side_by_side_have_names_energies_and_curves(page: Page, program: Serve) -> None:
     visit(page, program("bounce-order", 1).address)
     assert page.locator("#panels h2").all_inner_texts() == ["position first", "velocity first"]

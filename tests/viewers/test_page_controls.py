@@ -29,6 +29,7 @@ def picture(page: Page) -> NDArray[np.float32]:
     return np.asarray(image.imread(BytesIO(page.screenshot()))[:, :, :3])
 
 
+@pytest.mark.slow
 def test_gravity_has_a_strength_and_a_direction(page: Page, program: Serve) -> None:
     visit(page, program("cage", 100).address)
     pause(page)
@@ -535,6 +536,7 @@ def test_circles_that_roll_have_marks(page: Page, program: Serve) -> None:
     assert page.evaluate(drawn) == 0  # nobody turns there
 
 
+@pytest.mark.slow
 def test_links_are_drawn_and_a_cloth_is_torn(page: Page, program: Serve) -> None:
     visit(page, program("cloth", 500).address)
     drawn = "() => window.pyverlet.overlay.links"

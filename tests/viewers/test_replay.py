@@ -201,6 +201,7 @@ def test_bad_use_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[s
         Session(pv.scenes.get("frame-rate").panels(), stage=journal.stage)
 
 
+@pytest.mark.slow
 def test_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "a.pvlog"
     command = [sys.executable, "-m", "pyverlet", "run", "cage", "--particles", "50", "--port", "0", "--no-open"]

@@ -290,6 +290,7 @@ class Treacle:
         time.sleep(0.02)
 
 
+@pytest.mark.slow
 def test_a_slow_world_makes_pictures_between_substeps_for_tabs_that_draw_them_only(
     server: Server, tab: Tab, world: pv.World, wait_until: WaitUntil
 ) -> None:
@@ -323,6 +324,7 @@ def test_an_acknowledgement_of_a_frame_never_sent_is_refused(tab: Tab) -> None:
         assert "seq" in tab.refusal()
 
 
+@pytest.mark.slow
 def test_a_stalled_tab_does_not_slow_the_others(server: Server, tab: Tab) -> None:
     with dial(server) as stalled:
         stalled.recv(5.0)

@@ -251,6 +251,7 @@ class Diary(Treacle):
         self.seen.append((self.world.frames, self.world.gravity[1]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("commands", "ledger", "at_once"),
     [
@@ -337,6 +338,7 @@ def test_the_pace_is_that_of_the_wall(wait_until: WaitUntil) -> None:
         assert session.latest.status.pace is None
 
 
+@pytest.mark.slow
 def test_drag_takes_the_nearest_circle_moves_it_and_lets_go(session: Session, world: pv.World, wait_until: WaitUntil) -> None:
     session.submit(Drag(hand=1, x=2.3, y=0.9, reach=0.3))  # particle 5 stands at (2, 0.5)
     session.submit(Drag(hand=1, x=2.0, y=8.0))
