@@ -15,7 +15,7 @@ from pyverlet.laws.forces import Push
 from pyverlet.state.state import Slots
 from pyverlet.viewers.commands import Command, Drag, Pause, Poke, Release, Reset, SetGravity, SetSubsteps, Step
 from pyverlet.viewers.hands import LEASH
-from pyverlet.viewers.session import MAX_CATCH_UP, Session
+from pyverlet.viewers.session import Session
 
 WaitUntil = Callable[[Callable[[], bool]], None]
 
@@ -31,10 +31,12 @@ def test_pause_holds_time_and_resume_does_not_catch_up(paused: Session, wait_unt
     held = paused.latest.status
     time.sleep(0.3)
     assert paused.latest.status.time == held.time
+    began = time.perf_counter()
     paused.submit(Pause(False))
     wait_until(lambda: paused.latest.status.frames > held.frames)
-    assert paused.latest.status.frames <= held.frames + MAX_CATCH_UP
-    assert paused.latest.status.dropped == held.dropped
+    # On a busy machine somebody may look late: no more frames are due, made or dropped, than time has passed since.
+    due = paused.latest.status.frames + paused.latest.status.dropped - held.frames - held.dropped
+    assert due <= 60 * (time.perf_counter() - began) + 1
 
 
 def test_step_pauses_and_advances_by_exactly_the_frames_asked(session: Session, wait_until: WaitUntil) -> None:
