@@ -6,6 +6,7 @@ Prints what became of them as JSON. A mutant is refused with InputError, or load
 from __future__ import annotations
 
 import collections
+import copy
 import io
 import json
 import sys
@@ -68,7 +69,7 @@ def mutate_table(rng: np.random.Generator, table: Any) -> None:
     elif kind == 1:
         del table[key]
     else:
-        table[key] = ODD[rng.integers(len(ODD))]
+        table[key] = copy.deepcopy(ODD[rng.integers(len(ODD))])  # it may be mutated, too
 
 
 def mutate_arrays(rng: np.random.Generator, arrays: dict[str, Any]) -> None:

@@ -335,6 +335,12 @@ def test_bad_paths_and_values_lose_nothing(saved: Path, tmp_path: Path) -> None:
         pv.save(world, tmp_path / "nowhere" / "a.pvsnap")
     with pytest.raises(pv.InputError, match="is not there"):
         pv.load(tmp_path / "nowhere.pvsnap")
+    path = tmp_path / "kept.pvsnap"
+    table, arrays = archive.read(saved)
+    with path.open("wb") as file:  # an array where a table is to be
+        archive.write(file, lambda: {**table, "world": {"$array": next(iter(arrays))}}, arrays)
+    with pytest.raises(pv.InputError, match="lacks something"):
+        pv.load(path)
     with pytest.raises(pv.InputError, match=r"world is 3"):
         pv.save(3, tmp_path / "a.pvsnap")  # type: ignore[arg-type]
     path = tmp_path / "kept.pvsnap"

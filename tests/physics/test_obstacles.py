@@ -361,3 +361,12 @@ def test_what_is_no_obstacle_is_refused(add: Any) -> None:
     with pytest.raises(pv.InputError, match=r"obstacle is a Circle; allowed is an object such as pyverlet.Disc"):
         add(world.obstacles, pv.Circle(radius=3))
     assert world.obstacles == []
+
+
+def test_an_obstacle_that_flies_off_the_end_of_all_numbers_is_named() -> None:
+    world = pv.World()
+    world.add(position=(0, 0))
+    world.obstacles += [pv.Segment((-5, -5), (5, -5)), pv.Disc((3, 3), 1, velocity=(1e300, 0))]
+    with pytest.raises(pv.InputError, match=r"obstacles\[1\] is farther away than numbers reach"):
+        world.step(1e9)
+    assert world.frames == 0

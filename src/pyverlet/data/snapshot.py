@@ -160,7 +160,7 @@ def load(path: str | Path, exact: bool = False, objects: Iterable[Any] = ()) -> 
         return from_table(header, arrays, exact=exact, objects=objects)
     except InputError as error:
         raise InputError(f"'{path}': {error}") from error.__cause__
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
         raise InputError(f"'{path}' lacks something ({error!r}); allowed is a file as pyverlet wrote it") from error
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.constants import OBSTACLE_CELLS
+from pyverlet.ground.errors import InputError
 from pyverlet.kernels import meetings
 from pyverlet.kernels import obstacles as kernels
 from pyverlet.laws.obstacles._base import Obstacle, Obstacles
@@ -183,6 +184,7 @@ class Course:
         self._segments["body"] += count * number
         self._segments["first"] += sides * number
 
+    @np.errstate(over="ignore", invalid="ignore")
     def _bin(self, largest: float) -> None:
         """Fill cells with the segments near them, so that nobody looks at the others."""
         s = self._segments
@@ -194,6 +196,13 @@ class Course:
         # As wide as the largest particle, for coarser cells hold segments out of reach; wider where those would be too many.
         cell = max(2 * largest, float(sides.max()) / OBSTACLE_CELLS, float(np.sqrt(np.prod(sides) / OBSTACLE_CELLS)))
         low, high = low - around - 0.5 * cell, high + around + 0.5 * cell
+        if not np.isfinite((high - low) / cell).all():
+            reach = np.abs(np.column_stack((ends, s["rounding"], s["inner"], s["sweep"])))
+            farthest = np.nan_to_num(reach, nan=np.inf, posinf=np.inf).max(axis=1).argmax()
+            number = int(s["body"][farthest]) % len(self._seen)
+            raise InputError(
+                f"obstacles[{number}] is farther away than numbers reach; allowed are speeds that keep it at a place"
+            )
         columns, rows = (int(n) + 1 for n in (high - low) / cell)
         start = np.empty(columns * rows + 1, np.int64)
         entries = np.empty(4 * columns * rows, np.int32)
