@@ -161,6 +161,7 @@ def test_settings_reach_the_world() -> None:
         ({"restitution": 1.5}, "restitution is 1.5"),
         ({"friction": -0.1}, "friction is -0.1"),
         ({"substeps": 0}, "substeps is 0"),
+        ({"substeps": 2**31}, "substeps is 2147483648; allowed is a whole number from 1 to 100000"),
         ({"colour": "red"}, "colour"),
     ],
 )

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, Union
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from pyverlet.data.describe import KINDS, SURFACE
-from pyverlet.ground.constants import STANDARD_GRAVITY
+from pyverlet.ground.constants import MOST_SUBSTEPS, STANDARD_GRAVITY
 from pyverlet.laws import naive, rooms
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.forces import Force
@@ -232,7 +232,7 @@ class World(Part):
 
     gravity: Vector = STANDARD_GRAVITY
     integrator: Integrators | None = None
-    substeps: Annotated[int, Field(ge=1)] = 8
+    substeps: Annotated[int, Field(ge=1, le=MOST_SUBSTEPS)] = 8
     dtype: Literal["float32", "float64"] = "float32"
     ledger: bool = False
     events: bool = False
@@ -256,7 +256,7 @@ class SceneSettings(Part):
     """Settings of a scene with a name; see `pyverlet.scenes.Settings`."""
 
     particles: Annotated[int, Field(ge=1)] | None = None
-    substeps: Annotated[int, Field(ge=1)] | None = None
+    substeps: Annotated[int, Field(ge=1, le=MOST_SUBSTEPS)] | None = None
     integrator: Integrators | None = None
     restitution: Annotated[float, Field(ge=0, le=1)] | None = None
     friction: Annotated[float, Field(ge=0)] | None = None

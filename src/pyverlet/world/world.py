@@ -11,7 +11,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from pyverlet.compile import jit
 from pyverlet.ground import checks
-from pyverlet.ground.constants import ALL_THREADS_FROM, ONE_THREAD_BELOW, REST_ACCELERATIONS, STANDARD_GRAVITY
+from pyverlet.ground.constants import ALL_THREADS_FROM, MOST_SUBSTEPS, ONE_THREAD_BELOW, REST_ACCELERATIONS, STANDARD_GRAVITY
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.laws.coarse import Coarse
 from pyverlet.laws.contacts.collisions import Collisions, ContactSolver
@@ -292,7 +292,7 @@ class World(Measures, Queries, Doors):
 
     @substeps.setter
     def substeps(self, value: int) -> None:
-        self._substeps = checks.whole("substeps", value)
+        self._substeps = checks.whole("substeps", value, most=MOST_SUBSTEPS, most_is=" (finer steps take a smaller dt)")
         self._h_last = None
 
     @property
