@@ -483,6 +483,7 @@ def test_a_phone_has_a_drawer_and_fingers(playwright: Playwright, program: Serve
     assert page.evaluate("() => window.pyverlet.camera.scale") > 3 * before
     page.keyboard.press("f")
     page.get_by_test_id("pause").tap()
+    assert comes_true(page, lambda: number(page, "time") > 3)  # at rest: it is still there when the finger comes
     place = where(page, 100)
     touch("touchStart", (place["left"], place["top"]))  # one pulls
     for k in range(1, 7):

@@ -39,6 +39,19 @@ def test_pause_holds_time_and_resume_does_not_catch_up(paused: Session, wait_unt
     assert due <= 60 * (time.perf_counter() - began) + 1
 
 
+def test_time_until_it_goes_on_is_not_caught_up_with() -> None:
+    """Paused for 0.2 s since the last turn: nothing of that is due, whenever the next turn looks."""
+    session = Session(pv.scenes.get("fall").world(collisions=False))
+    session.submit(Pause(True))
+    session.turn()
+    time.sleep(0.2)
+    session.submit(Pause(False))
+    began = time.perf_counter()
+    session.turn()
+    status = session.latest.status
+    assert status.frames + status.dropped <= 60 * (time.perf_counter() - began) + 1
+
+
 def test_step_pauses_and_advances_by_exactly_the_frames_asked(session: Session, wait_until: WaitUntil) -> None:
     session.submit(Pause(True))
     session.submit(Step(3))

@@ -124,7 +124,7 @@ class Session(Door):
         now = time.perf_counter()
         elapsed, self._last = now - self._last, now
         if self._held():
-            return IDLE_S  # time spent paused is not time to catch up with
+            return IDLE_S
         if longest is not None:
             elapsed = min(elapsed, longest)
         due = self._clock.advance(elapsed * self._speed)
@@ -183,6 +183,7 @@ class Session(Door):
         return any_at_all
 
     def _obey(self, command: Command | None) -> None:
+        held = self._held()
         try:
             self._do(command)
         except PyverletError as error:  # the world did not take it
@@ -190,6 +191,8 @@ class Session(Door):
         except Exception as error:  # nothing a viewer says may end the physics thread
             _log.exception("a viewer asked for %r", command)
             self._error = f"{type(error).__name__}: {error}"
+        if held and not self._held():
+            self._last = time.perf_counter()  # time spent paused is not time to catch up with
 
     def _do(self, command: Command | None) -> None:
         match command:
