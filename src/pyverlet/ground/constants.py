@@ -86,8 +86,8 @@ substep; on a busy machine (a browser drawing the world, say) each wait may last
 1.7 ms a frame when nothing else runs, and lost a hundredfold when three other processes did."""
 
 MOST_SUBSTEPS: Final = 100_000
-"""In a frame: one of many more would not end while anybody waits, and nothing could stop it but the process's end. Finer steps take
-a smaller dt."""
+"""In a frame: one of many more would not end while anybody waits, and nothing could stop it but the process's end. Who wants
+finer steps takes a smaller dt."""
 
 REST_ACCELERATIONS: Final = 4.0
 """An approach slower than this many |a| h is contact at rest, not an impact: 0.08 m/s under gravity at 480 substeps a second. One
