@@ -191,7 +191,7 @@ BAD: dict[str, tuple[Callable[[], Any], tuple[str, ...]]] = {
         ("radius[0]", "0.6 m", "box", "0.5 m"),
     ),
     "cage smaller than the circles": (lambda: setattr(two_balls(), "boundary", pv.Circle(radius=0.1)), ("radius[0]", "cage")),
-    "substeps 0": (lambda: pv.World(substeps=0), ("substeps", "0", "at least 1")),
+    "substeps 0": (lambda: pv.World(substeps=0), ("substeps", "0", "from 1 to 100000")),
     "substeps 1.5": (lambda: pv.World(substeps=1.5), ("substeps", "1.5", "whole")),  # type: ignore[arg-type]
     "dt 0": (lambda: two_balls().step(0), ("dt", "0", "greater than 0")),
     "dt negative": (lambda: two_balls().step(-0.1), ("dt", "-0.1", "greater than 0")),
