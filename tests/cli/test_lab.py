@@ -158,6 +158,7 @@ def test_order_in_numbers(run: Any) -> None:
                 assert found["order"] == pytest.approx(each["expected"], abs=0.1)
 
 
+@pytest.mark.slow
 def test_order_as_table_and_figure(run: Any, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     picture = tmp_path / "order.png"

@@ -54,7 +54,7 @@ def kept(path: Path, dtype: Any = np.float32) -> list[dict[str, Any]]:
     return had
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_every_bit_comes_back(tmp_path: Path, suffix: str, dtype: Any) -> None:
     had = kept(tmp_path / f"a{suffix}", dtype)

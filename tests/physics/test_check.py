@@ -39,8 +39,8 @@ SMALLER: dict[str, dict[str, Any]] = {
 }
 
 
-# Dear ones of which another shows the same at one number of substeps.
-DEAR = ("rebound-substeps",)
+# Dear ones of which another shows the same at one number of substeps, or for one law.
+DEAR = ("rebound-substeps", "gas-pressure")
 
 
 # Dear ones even so: at any size with `--all` only.

@@ -18,9 +18,19 @@ def undamped(**options: object) -> pv.World:
     return pv.World(ledger=True, dtype=np.float64, **options)  # type: ignore[arg-type]
 
 
+def scenes_in_both() -> list[Any]:
+    """Names and dtypes; another than the scene's own, which compiles much anew, with `--all` only."""
+    return [
+        pytest.param(
+            name, dtype, marks=[] if dtype == scene.defaults.dtype else [pytest.mark.slow], id=f"{name}-{dtype.__name__}"
+        )
+        for name, scene in scenes.SCENES.items()
+        for dtype in (np.float32, np.float64)
+    ]
+
+
 @pytest.mark.parametrize("most", [100, pytest.param(300, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("name", scenes.SCENES)
+@pytest.mark.parametrize(("name", "dtype"), scenes_in_both())
 def test_the_accounts_add_up_to_the_energy_in_every_scene(name: str, dtype: type[np.float32], most: int) -> None:
     settings: dict[str, Any] = {"particles": min(scenes.get(name).defaults.particles, most), "dtype": dtype, "ledger": True}
     for panel in scenes.get(name).panels(**settings):

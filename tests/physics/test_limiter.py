@@ -106,6 +106,7 @@ def test_nothing_is_taken_from_those_who_touch_nobody(taken: list[float]) -> Non
     assert taken
 
 
+@pytest.mark.slow
 def test_a_crowd_grows_as_fast_as_its_energy_may(taken: list[float]) -> None:
     # 200 circles must be raised before they are as large as they are: by m g dy, at 60 SURPLUS m g H a second at most.
     world = crowd()

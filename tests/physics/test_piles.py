@@ -78,6 +78,7 @@ def test_a_bouncy_pile_of_mixed_circles_comes_to_rest(options: dict[str, float])
     assert np.percentile(np.hypot(*world.velocity.T), 99) < 0.5
 
 
+@pytest.mark.slow
 def test_coincident_circles_separate_and_stay_inside() -> None:
     world = pv.World(boundary=pv.Circle(radius=10))
     balls = world.add(position=np.zeros((50, 2)), radius=RADIUS)
@@ -107,6 +108,7 @@ def test_circles_added_on_top_of_each_other_part_slowly(substeps: int, dtype: ty
     assert world.momentum() == pytest.approx([0, 0], abs=10 * rounding)
 
 
+@pytest.mark.slow
 def test_a_crowd_in_one_point_does_not_explode() -> None:
     # Pushed apart at once, 300 of them left with 7e4 J each.
     world = pv.World(boundary=pv.Circle(radius=20), gravity=(0, 0))

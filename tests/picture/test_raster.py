@@ -323,6 +323,7 @@ def test_discs_of_a_crowd_are_as_large_as_others_and_nearly_where_they_are(radiu
     assert abs(area - np.pi * radius**2) < 4 * deviation / np.sqrt(stamps.FINE**2 / 8) + 2e-6 * (8 * radius + 8)
 
 
+@pytest.mark.slow
 def test_discs_of_a_crowd_of_many_sizes_are_nearly_as_large_as_others() -> None:
     # One stamp serves radii within a factor exp(1 / 128), more stamps than there is room for: areas are within two of these.
     rng = np.random.default_rng(6)

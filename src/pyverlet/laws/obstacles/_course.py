@@ -127,7 +127,7 @@ class Course:
     def compiled(self, state: Slots, room: Boundary) -> tuple[Any, ...]:
         """What `kernels.meetings.collide` takes: segments, bodies, cells, walls, along, rest, drop; empty without obstacles."""
         if not self:
-            return self._segments, self._bodies, _NO_CELLS, _NO_WALLS, state.along, self._rest, state.drop
+            return self._segments, self._bodies, _NO_CELLS, _NO_WALLS, state.along, state.position[:0], state.drop
         walls = np.array(room.walls(), float)
         return self._segments, self._bodies, self._cells, walls, state.along, self._rest, state.drop
 
