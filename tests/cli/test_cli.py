@@ -310,6 +310,7 @@ def test_a_report_keeps_a_ledger_if_asked(run: Any) -> None:
     assert without["energy"] == with_it["energy"]
 
 
+@pytest.mark.slow
 def test_the_tables_of_the_physics_page(run: Any) -> None:
     small = ("check", "limiter", "--scene", "newton-cradle", "--particles", "10", "--seconds", "0.1")
     rows = json.loads(run(*small, "--json")[1])

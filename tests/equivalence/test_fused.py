@@ -193,6 +193,7 @@ def changed(change: Any, fusing: Fusing) -> pv.World:
     return world
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "change",
     [

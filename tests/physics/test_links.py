@@ -54,6 +54,7 @@ def test_pendulum_keeps_the_period_of_the_elliptic_integral(amplitude: float, dt
     assert np.mean(energy[-10:]) == pytest.approx(np.mean(energy[:10]), abs=1e-3 * 0.7 * G * length)
 
 
+@pytest.mark.slow
 def test_double_pendulum_keeps_its_energy() -> None:
     # Chaotic, so energy is all there is to compare: within a hundredth of its range for a minute, with no trend.
     world = pv.World(collisions=None, dtype=np.float64)

@@ -79,6 +79,7 @@ def test_everything_moved_alike(laws: dict[str, Any]) -> None:
             assert world.velocity == pytest.approx(first.velocity, abs=1e-7)
 
 
+@pytest.mark.slow
 def test_a_stream_keeps_its_digits() -> None:
     """At 300 m/s around a room of 12 m for 600 rounds: everyone stays inside, the stream as fast, contacts as they are."""
     world = _world(dtype=np.float32, collisions=pv.Collisions(restitution=1.0))

@@ -55,6 +55,7 @@ def test_the_second_run_forms_the_picture(quarters: Path) -> None:
     assert (extent[2] - extent[0]) / top == pytest.approx(1.5, rel=0.1)
 
 
+@pytest.mark.slow
 def test_recorded_it_shows_the_picture(quarters: Path, tmp_path: Path) -> None:
     out = tmp_path / "out.png"
     command = ["record", "image", str(out), "--picture", str(quarters), "--particles", "300", "--size", "300x200"]

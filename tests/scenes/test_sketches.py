@@ -98,6 +98,7 @@ def test_verlet_and_semi_implicit_euler_reach_the_same_heights(name: str) -> Non
     assert difference == pytest.approx((v**2 - (v - G * h / 2) ** 2) / 2, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_more_substeps_make_a_firmer_heap() -> None:
     # Overlap at rest goes with h^2: 6 substeps leave a 36th of 1, give or take what still moves. The largest of 400 is luck.
     overlaps = [world.overlap().mean for _, _, world in heights("cage-brute-force", 10)]

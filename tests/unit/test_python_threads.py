@@ -86,6 +86,7 @@ def small(seed: int) -> pv.World:
     return world
 
 
+@pytest.mark.slow
 def test_a_pool_of_threads_steps_a_hundred_worlds() -> None:
     def run(seed: int) -> str:
         world = small(seed)
