@@ -161,6 +161,8 @@ class Course:
             self._own_segments[name] = np.repeat(column, count)
         self._revision, self._imaged = -1, self.seam
         self._moving = []
+        if not self._seen:
+            self._imagine()  # no revision tells of those that are gone
 
     def _refresh(self, k: int) -> None:
         obstacle = self._seen[k]
