@@ -145,3 +145,10 @@ def test_float32_stays_float32() -> None:
 
     advance(out, np.ones((1, 2), np.float32), np.ones((1, 2), np.float32), 2.0**-25)
     assert out[0, 0] == 1.0
+
+
+def test_parts_of_kernels_are_not_called_from_python() -> None:
+    """They are compiled without what that takes: called nevertheless, they would end the process."""
+    part = next(kernel for kernel in jit.KERNELS.values() if kernel.inner)
+    with pytest.raises(TypeError, match="is called by kernels, not from Python"):
+        part(1.0)

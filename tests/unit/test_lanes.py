@@ -35,7 +35,7 @@ DTYPES = [np.float32, np.float64]
 
 
 @kernel
-def _compute(a: Any, b: Any, out: Any) -> None:
+def compute_lanes(a: Any, b: Any, out: Any) -> None:
     for k in range(0, a.shape[0], LANES):
         x, y = load(a, k), load(b, k)
         store(out[0], k, x + y)
@@ -55,14 +55,14 @@ def test_arithmetic_is_that_of_single_numbers(dtype: Any) -> None:
     a, b = rng.normal(0, 3, (2, 10 * LANES)).astype(dtype)
     a[3] = 0
     out = np.empty((9, len(a)), dtype)
-    _compute(a, b, out)
+    compute_lanes(a, b, out)
     expected = (a + b, a - b, a * b, a / b, np.sqrt(a * a), np.maximum(a, b), np.minimum(a, b), np.where(a == 0, b, a), a * b[0])
     for row, right in zip(out, expected, strict=True):
         assert row.tobytes() == right.tobytes()
 
 
 @kernel
-def _turn(points: Any, index: Any) -> None:
+def turn_lanes(points: Any, index: Any) -> None:
     for k in range(0, index.shape[0], LANES):
         x, y = take(points, index, k)
         put(points, index, k, y, x + y)
@@ -75,12 +75,12 @@ def test_rows_are_taken_and_put_by_their_index(dtype: Any) -> None:
     index = rng.permutation(50)[: 4 * LANES].astype(np.uint32)
     expected = points.copy()
     expected[index] = np.column_stack((points[index, 1], points[index, 0] + points[index, 1]))
-    _turn(points, index)
+    turn_lanes(points, index)
     assert points.tobytes() == expected.tobytes()
 
 
 @kernel
-def _copy(to: Any, source: Any, index: Any) -> None:
+def copy_lanes(to: Any, source: Any, index: Any) -> None:
     for k in range(index.shape[0]):
         copy_row(to, k, source, np.int64(index[k]))
 
@@ -90,14 +90,14 @@ def test_rows_are_copied_whole(dtype: Any) -> None:
     rng = np.random.default_rng(4)
     source, index = rng.normal(0, 1, (20, 2)).astype(dtype), rng.permutation(20).astype(np.int32)
     to = np.empty_like(source)
-    _copy(to, source, index)
+    copy_lanes(to, source, index)
     assert to.tobytes() == source[index].tobytes()
     with pytest.raises(numba.TypingError):  # bits of one dtype are nothing in another
-        _copy(to.astype(np.float32 if dtype is np.float64 else np.float64), source, index)
+        copy_lanes(to.astype(np.float32 if dtype is np.float64 else np.float64), source, index)
 
 
 @kernel
-def _move(points: Any, numbers: Any, index: Any, limit: Any, above: Any) -> None:
+def move_lanes(points: Any, numbers: Any, index: Any, limit: Any, above: Any) -> None:
     for k in range(0, points.shape[0], LANES):
         x, y = load_rows(points, k)
         above[k // LANES] = which_above(x, spread(limit))
@@ -111,14 +111,14 @@ def test_rows_and_numbers_come_lane_by_lane(dtype: Any) -> None:
     index = rng.permutation(50)[: 3 * LANES].astype(np.uint32)
     expected, above = numbers.copy(), np.zeros(3, np.int64)
     expected[index] += points[:, 1]
-    _move(points, numbers, index, dtype(0.3), above)
+    move_lanes(points, numbers, index, dtype(0.3), above)
     assert numbers.tobytes() == expected.tobytes()
     bits = (points[:, 0] > dtype(0.3)).reshape(3, LANES)
     assert above.tolist() == [sum(1 << lane for lane in np.flatnonzero(row)) for row in bits]
 
 
 @kernel
-def _sift(numbers: Any, limit: Any, found: Any, of: Any, lowest: Any) -> int:
+def sift_lanes(numbers: Any, limit: Any, found: Any, of: Any, lowest: Any) -> int:
     count = 0
     for k in range(0, numbers.shape[0], LANES):
         above = which_above(load(numbers, k), spread(limit))
@@ -135,7 +135,7 @@ def test_lanes_are_chosen_by_bits() -> None:
     found, of = (np.zeros(len(numbers) + LANES, np.uint32) for _ in range(2))
     expected = np.flatnonzero(numbers > 0)
     lowest = np.zeros(4096, np.int64)
-    assert _sift(numbers, 0.0, found, of, lowest) == len(expected)
+    assert sift_lanes(numbers, 0.0, found, of, lowest) == len(expected)
     rows = (numbers > 0).reshape(-1, LANES)
     assert lowest[rows.any(axis=1)].tolist() == rows[rows.any(axis=1)].argmax(axis=1).tolist()
     assert found[: len(expected)].tolist() == expected.tolist()
@@ -143,7 +143,7 @@ def test_lanes_are_chosen_by_bits() -> None:
 
 
 @kernel
-def _sum(numbers: Any, count: Any) -> Any:
+def sum_lanes(numbers: Any, count: Any) -> Any:
     return add_lanes(load(numbers, 0), count) + add_lanes(widen(load(numbers, 0)), LANES)
 
 
@@ -152,11 +152,11 @@ def test_lanes_are_added_in_float64(dtype: Any) -> None:
     numbers = (np.arange(1, LANES + 1) / 3).astype(dtype)
     for count in range(LANES + 1):
         expected = sum(map(float, numbers[:count])) + sum(map(float, numbers))
-        assert _sum(numbers, count) == pytest.approx(expected, rel=1e-15)
+        assert sum_lanes(numbers, count) == pytest.approx(expected, rel=1e-15)
 
 
 @kernel
-def _where(a: Any, b: Any, out: Any) -> None:
+def where_lanes(a: Any, b: Any, out: Any) -> None:
     store(out, 0, where_above(load(a, 0), load(b, 0), load(a, 0) + load(a, 0), load(b, 0)))
 
 
@@ -165,5 +165,5 @@ def test_where_above(dtype: Any) -> None:
     a, b = np.random.default_rng(5).normal(0, 1, (2, LANES)).astype(dtype)
     a[0], a[1], b[2] = np.nan, np.inf, np.inf  # NaN is above nothing
     out = np.empty(LANES, dtype)
-    _where(a, b, out)
+    where_lanes(a, b, out)
     assert out.tobytes() == np.where(a > b, a + a, b).tobytes()

@@ -170,18 +170,21 @@ class Kernel:
     """A compiled function: compiled when it is first called with arguments of some types, or found on disk.
 
     From Python it runs on as many threads as are in use. Other kernels call one thread's code; those that are drivers, that of
-    their own variant.
+    their own variant. One whose name begins with an underscore is part of another: only kernels call it, and what would take
+    Python's objects apart for it, a tenth of its compiling, is left out.
 
     Attributes:
         function: as it is written.
         parallel: whether it has a variant for several threads.
+        inner: whether only kernels can call it.
     """
 
     def __init__(self, function: Callable[..., Any], *, loops: bool = False, drives: bool = False) -> None:
         functools.update_wrapper(self, function)
         self.function, self.parallel = function, loops or drives
         self._loops = loops
-        self._alone = functools.partial(self._first, "alone")
+        self.inner = not self.parallel and function.__name__.startswith("_")
+        self._alone = self._refuse if self.inner else functools.partial(self._first, "alone")
         self._together = functools.partial(self._first, "together")
 
     def __reduce__(self) -> str:
@@ -228,9 +231,12 @@ class Kernel:
                 # a raise. No kernel is handed to another as an argument, which is what cfunc wrappers are for.
                 made = numba.njit(
                     nogil=True, error_model="numpy", cache=kept, parallel=self._loops and variant == "together",
-                    no_cfunc_wrapper=True,
+                    no_cfunc_wrapper=True, no_cpython_wrapper=self.inner,
                 )(function)  # fmt: skip
             return vars(self).setdefault(variant, made)
+
+    def _refuse(self, *_: Any) -> Any:
+        raise TypeError(f"{self.function.__module__}.{self.function.__qualname__} is called by kernels, not from Python")
 
     def _first(self, variant: str, *arguments: Any) -> Any:
         """The first call: no two processes compile a kernel at a time, and whoever comes second finds it on disk."""

@@ -206,7 +206,7 @@ def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str]
     if driven:
         lately.clear()
     elif about_energy in made:
-        looks.append(_energy(about_energy, world, frame, lately))
+        looks.append(_energy(about_energy, world, frame, dt, lately))
     if "momentum" in made and not (world.actors or (touched and linked)) and _alone(world):
         looks.append(_momentum(world, frame, dt))
     try:
@@ -226,10 +226,15 @@ def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str]
     if "ledger" in made and world.keeps_ledger:
         now = world.energy().total
         size = scale(world, _FALL_S) + abs(now)
-        slowest = float(np.finfo(world.dtype).eps * np.abs(world.position).max(initial=0.0)) / dt  # m/s, of places rounded
-        if abs(world.ledger.total - now) > _CLOSED * size + 0.5 * _free_mass(world) * slowest**2:
+        if abs(world.ledger.total - now) > _CLOSED * size + _of_rounding(world, dt):
             raise Broken("ledger", frame, f"accounts add up to {world.ledger.total:.9g} J, energy is {now:.9g} J")
     return max(unsettled - 1, _EASED if before_deed[1] != world.substeps else int(touched))
+
+
+def _of_rounding(world: World, dt: float) -> float:
+    """J, the energy of who moves by a rounding error of its place in a frame."""
+    slowest = float(np.finfo(world.dtype).eps * np.abs(world.position).max(initial=0.0)) / dt  # m/s
+    return 0.5 * _free_mass(world) * slowest**2
 
 
 def _free_mass(world: World) -> float:
@@ -255,7 +260,7 @@ def _uniform(world: World) -> bool:
     return all(isinstance(force, ConstantForce | Drag) and not isinstance(force, Wind) for force in world.forces)
 
 
-def _energy(name: str, world: World, frame: int, lately: deque[float]) -> Callable[[], None]:
+def _energy(name: str, world: World, frame: int, dt: float, lately: deque[float]) -> Callable[[], None]:
     before = world.energy()
     size = scale(world, _FALL_S) + abs(before.links)
     lately.append(before.total)
@@ -263,7 +268,7 @@ def _energy(name: str, world: World, frame: int, lately: deque[float]) -> Callab
 
     def look() -> None:
         rise = world.energy().total - most
-        if rise > MOST * size:
+        if rise > MOST * size + _of_rounding(world, dt):
             raise Broken(name, frame, f"up by {rise / size:.2e} of the scale, {rise:.4g} J")
 
     return look
