@@ -125,7 +125,7 @@ def test_worlds_that_differ_between_runs_are_seen() -> None:
         check(build, lambda world, frame: None, frames=2, dt=0.01)
 
 
-@pytest.mark.parametrize("seed", [43, 48, 98])  # a net of springs that one pass does not solve, beside a force with a potential
+@pytest.mark.parametrize("seed", [43, 48, 98, 100356])  # nets of springs that one pass does not solve; stiff angles
 def test_soft_links_bring_no_energy(seed: int) -> None:
     (finding,) = fuzz.fuzz(1, seed, small=False)
     assert finding.check is None, finding.check

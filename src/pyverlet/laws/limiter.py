@@ -187,8 +187,8 @@ class Watch:
         bodies = (slots.position, moved.astype(slots.dtype), slots.size, period_x, period_y, slots.inverse_mass)
         clusters.join_met(*bodies, *listed, slots.real(SLEEP_NEAR), root)
         if self._links:
-            rows, _ = self._links.pulls()
-            clusters.join_rows(slots.slots_of(rows.ravel()).reshape(-1, 2).astype(np.int64), slots.inverse_mass, root)
+            rows = slots.slots_of(self._links.joined().ravel()).reshape(-1, 2)
+            clusters.join_rows(rows.astype(np.int64), slots.inverse_mass, root)
         clusters.settle(root)
         return root
 

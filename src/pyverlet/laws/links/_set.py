@@ -349,9 +349,13 @@ class Links:
                 force.append(pool.rows["force"][row])
         return np.concatenate(pairs), np.concatenate(force)
 
+    def joined(self) -> Array:
+        """(m, 2) indices of particles that hang together by links of any kind, drawn or not."""
+        return np.concatenate([np.empty((0, 2), np.int64), *(pool.lines()[0] for pool in self._order)])
+
     def hold(self, particle: int) -> bool:
         """Whether a link that is whole joins the particle of this index to anything."""
-        return bool((self.pulls()[0] == particle).any())
+        return bool((self.joined() == particle).any())
 
     def apart(self) -> Array:
         """(k, 2) sorted pairs i < j of particles that do not collide with each other, since a link says so."""
