@@ -37,8 +37,8 @@ json.dump(hashes, sys.stdout)
 
 
 # Restitution, friction, how much smaller and how much heavier the others are. Each kind's kernels are compiled for many threads.
-SMOOTH_AND_ROUGH = [(0, 0, 1, 1), (0.5, 0.3, 30, 1000)]
-EVERY_KIND = [*SMOOTH_AND_ROUGH, (0.5, 0.3, 1, 1), (0, 0, 30, 1), (0, 0, 1, 1000), (0.5, 0.3, 1, 1000)]
+SMOOTH_AND_ROUGH = [(0, 0, 1, 1), (0.5, 0.3, 1, 1)]
+EVERY_KIND = [*SMOOTH_AND_ROUGH, (0, 0, 30, 1), (0, 0, 1, 1000), (0.5, 0.3, 1, 1000), (0.5, 0.3, 30, 1000)]
 
 
 @pytest.mark.parametrize(

@@ -55,6 +55,7 @@ def test_inelastic_impacts_are_booked_as_restitution() -> None:
     assert world.ledger.restitution == pytest.approx(-2 * G * 2, rel=1e-3)  # it ends within 1e-3 of the drop
 
 
+@pytest.mark.slow  # it compiles what only it needs
 def test_impacts_between_circles_are_booked_as_restitution() -> None:
     # Equal masses, relative speed u: (1 - e^2) m u^2 / 4.
     world = undamped(gravity=(0, 0), collisions=pv.Collisions(restitution=0.8))
