@@ -1,6 +1,7 @@
 """`pyverlet` that answers questions about what it serves: `python -m benchmarks.served run cage`.
 
-For each line it is given it prints one of JSON: how far the world is, what its frames took, and what its threads are called.
+For each line it is given it prints one of JSON: how far the world is, what its frames took, the slowest of them since the line
+before by the clock and by its thread's processor time, and what its threads are called.
 The line "reset" has the world start anew before.
 """
 
@@ -9,6 +10,7 @@ from __future__ import annotations
 import json
 import sys
 import threading
+import time
 from typing import Any
 
 from pyverlet.cli import main
@@ -16,7 +18,7 @@ from pyverlet.viewers import launch
 from pyverlet.viewers.commands import Reset
 from pyverlet.viewers.session import Session
 
-sessions: list[Session] = []
+sessions: list[Known] = []
 
 
 class Known(Session):
@@ -24,7 +26,13 @@ class Known(Session):
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
+        self.slowest = 0.0, 0.0
         sessions.append(self)
+
+    def _advance(self) -> None:
+        began, worked = time.perf_counter(), time.thread_time()
+        super()._advance()
+        self.slowest = max(self.slowest, (1e3 * (time.perf_counter() - began), 1e3 * (time.thread_time() - worked)))
 
 
 def answer() -> None:
@@ -37,7 +45,8 @@ def answer() -> None:
             status = session.latest.status
             said = {name: getattr(status, name) for name in ("time", "frames", "physics_median_ms")}
             threads = {thread.native_id: thread.name for thread in threading.enumerate()}
-            print(json.dumps({**said, "threads": threads}), flush=True)
+            slowest, session.slowest = session.slowest, (0.0, 0.0)
+            print(json.dumps({**said, "threads": threads, "slowest_ms": slowest}), flush=True)
 
 
 if __name__ == "__main__":

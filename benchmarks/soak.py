@@ -1,7 +1,8 @@
 """A served page for long, and whether anything grows: `python -m benchmarks soak --minutes 60`. Linux, whose /proc is read.
 
 Tabs come, draw, stall, vanish in the middle of a frame, send nonsense and floods; scenes change, and films are recorded.
-Each minute has a line: memory, open files and threads of the server, and its frames.
+Each minute has a line: memory, open files and threads of the server, and its frames; the slowest by the clock and by processor
+time, and beside it the longest that a process that only sleeps was kept waiting in that minute: a stall of the machine.
 """
 
 from __future__ import annotations
@@ -31,6 +32,10 @@ GROWTH = 0.03
 """Part of its memory after SETTLED_MINUTES that the server may have more at the end."""
 
 
+SLOWEST_MS = 250.0
+"""What no frame may take beyond what the machine stood still."""
+
+
 @dataclass(frozen=True)
 class Minute:
     """The server, at the end of a minute."""
@@ -41,6 +46,45 @@ class Minute:
     threads: int
     median_ms: float
     frames: int
+    slowest_ms: float
+    worked_ms: float
+    stalled_ms: float
+
+
+class Idle:
+    """A process that sleeps for 5 ms at a time and notes how late it wakes."""
+
+    LOOP = """
+import sys, threading, time
+late = [0.0]
+def answer():
+    for _ in sys.stdin:
+        print(1e3 * late[0], flush=True)
+        late[0] = 0.0
+threading.Thread(target=answer, daemon=True).start()
+while True:
+    began = time.perf_counter()
+    time.sleep(0.005)
+    late[0] = max(late[0], time.perf_counter() - began - 0.005)
+"""
+
+    def __init__(self) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", self.LOOP], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+
+    def latest_ms(self) -> float:
+        """The longest it was kept waiting since it was last asked."""
+        assert self._process.stdin
+        assert self._process.stdout
+        self._process.stdin.write("\n")
+        self._process.stdin.flush()
+        return float(self._process.stdout.readline())
+
+    def end(self) -> None:
+        """It would go on for ever."""
+        self._process.kill()
+        self._process.wait()
 
 
 class Watched:
@@ -146,13 +190,14 @@ def record(folder: Path) -> None:
 
 def main(minutes: float) -> bool:
     """Print a line a minute; whether nothing has grown."""
-    served, stop, rng = Watched(), threading.Event(), random.Random(0)
+    served, idle, stop, rng = Watched(), Idle(), threading.Event(), random.Random(0)
     tabs = [Tab(served.port, seed, stop) for seed in range(TABS)]
     for tab in tabs:
         tab.start()
     rows: list[Minute] = []
     print(
-        f"{'minute':>6}{'memory, MB':>12}{'files':>7}{'threads':>9}{'median, ms':>12}{'frames':>8}{'longest gap, ms':>17}",
+        f"{'minute':>6}{'memory, MB':>12}{'files':>7}{'threads':>9}{'median, ms':>12}{'frames':>8}{'slowest, ms':>13}"
+        f"{'of that work':>14}{'machine stood still':>21}{'longest gap, ms':>17}",
         flush=True,
     )
     try:
@@ -163,11 +208,12 @@ def main(minutes: float) -> bool:
                     change_scene(served.port, rng)
                 if minute % 4 == 1:
                     record(Path(folder))
-                medians = [served.ask()["physics_median_ms"]]
+                asked = [served.ask()]
                 while time.monotonic() < begin + 60 * minute:
                     time.sleep(2)
-                    medians.append(served.ask()["physics_median_ms"])
-                said = served.ask()
+                    asked.append(served.ask())
+                said = asked[-1]
+                slowest, worked = max(each["slowest_ms"] for each in asked)
                 gap, frames = max(1e3 * tab.largest_gap for tab in tabs), said["frames"]
                 for tab in tabs:
                     tab.largest_gap = 0.0
@@ -176,31 +222,41 @@ def main(minutes: float) -> bool:
                     served.memory_mb(),
                     served.files(),
                     len(said["threads"]),
-                    statistics.median(medians),
+                    statistics.median(each["physics_median_ms"] for each in asked),
                     frames - before if frames >= before else frames,  # a scene begins at 0
+                    slowest,
+                    worked,
+                    idle.latest_ms(),
                 )
                 before = frames
                 rows.append(row)
                 print(
                     f"{row.minute:>6}{row.memory_mb:>12.1f}{row.files:>7}{row.threads:>9}{row.median_ms:>12.2f}"
-                    f"{row.frames:>8}{gap:>17.0f}", flush=True,
+                    f"{row.frames:>8}{row.slowest_ms:>13.0f}{row.worked_ms:>14.0f}{row.stalled_ms:>21.0f}{gap:>17.0f}",
+                    flush=True,
                 )  # fmt: skip
     finally:
         stop.set()
         for tab in tabs:
             tab.join(20)
         served.end()
+        idle.end()
     return verdict(rows)
 
 
 def verdict(rows: list[Minute]) -> bool:
-    """Whether the server ends as small as it was after SETTLED_MINUTES, both as the median of some minutes."""
+    """Whether the server ends as small as it was after SETTLED_MINUTES, by medians of some minutes, and no frame was slow."""
     if len(rows) < 2 * SETTLED_MINUTES:
         print(f"too short to tell: at least {2 * SETTLED_MINUTES} minutes")
         return True
-    early, late = rows[SETTLED_MINUTES - 2 : SETTLED_MINUTES + 1], rows[-3:]
-    memory = [statistics.median(row.memory_mb for row in part) for part in (early, late)]
-    files = [max(row.files for row in part) for part in (early, late)]
+    early, end = rows[SETTLED_MINUTES - 2 : SETTLED_MINUTES + 1], rows[-3:]
+    memory = [statistics.median(row.memory_mb for row in part) for part in (early, end)]
+    files = [max(row.files for row in part) for part in (early, end)]
     growth = memory[1] / memory[0] - 1
-    print(f"memory {growth:+.1%} since minute {SETTLED_MINUTES}, files {files[0]} and {files[1]}")
-    return growth <= GROWTH and files[1] <= files[0] + 2 * TABS
+    late = [row for row in rows if row.slowest_ms - row.stalled_ms > SLOWEST_MS]
+    print(
+        f"memory {growth:+.1%} since minute {SETTLED_MINUTES}, files {files[0]} and {files[1]}; "
+        f"slowest frame {max(row.slowest_ms for row in rows):.0f} ms; minutes with one over {SLOWEST_MS} ms that no stall of the "
+        f"machine explains: {[row.minute for row in late]}"
+    )
+    return growth <= GROWTH and files[1] <= files[0] + 2 * TABS and not late
