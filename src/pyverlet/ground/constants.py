@@ -132,6 +132,11 @@ LOAN_S: Final = 0.1
 """s within which loans of inertia go back, and for which who has bounced has none. At 0.02 they come and go with contacts that
 tremble; at 0.02 and at 0.2 unequal circles with e = 0.5 still trembled after 40 s."""
 
+SUNK: Final = 1.6
+"""Of |a| LOAN_S: who lends, or has just bounced and may not, meets others slower than this as at rest. So fast a heavy circle
+falls into light ones while nobody lends; with restitution that made it bounce, and not lend, again: heaps of 1:100 with e = 0.3
+boiled for ever."""
+
 DEEP: Final = 0.025
 DEEP_PART: Final = 0.25
 DEEP_SWEEPS: Final = 8

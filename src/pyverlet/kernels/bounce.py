@@ -42,6 +42,14 @@ def _own(circles, i, x, y, turn):
 
 
 @kernel
+def _slow(circles, i, j, law):
+    """Slower than this i and j meet, or part, as contacts at rest do, m/s."""
+    if circles.calm.shape[0] > 0:
+        return max(law.rest_speed, max(circles.calm[i], circles.calm[j]))
+    return law.rest_speed
+
+
+@kernel
 def _bounce(i, j, dx, dy, reach, e, mu, ri, rj, circles, law, spent):
     """An overlapping pair that meets faster than a contact at rest: back to when and where it met, and on from there.
 
@@ -68,7 +76,7 @@ def _bounce(i, j, dx, dy, reach, e, mu, ri, rj, circles, law, spent):
     ux = np.float64(v[j, 0]) - v[i, 0] + (np.float64(law.lag) - time) * ax
     uy = np.float64(v[j, 1]) - v[i, 1] + (np.float64(law.lag) - time) * ay
     hit = -(ux * nx + uy * ny)
-    if not hit > law.rest_speed:
+    if not hit > _slow(circles, i, j, law):
         return False
     kick = (hit + e * hit) / (np.float64(wi) + wj)
     px, py, turn_i, turn_j = kick * nx, kick * ny, 0.0, 0.0
@@ -146,7 +154,7 @@ def treat(bits, k, at, circles, pairs, law, spent):
                 if not _bounce(i, j, dx, dy, reach, m[E, one], m[MU, one], m[R_I, one], m[R_J, one], circles, law, spent):
                     continue
                 dx, dy = _apart(i, j, k + lane, circles, pairs)
-            elif not along > law.rest_speed * np.sqrt(dx * dx + dy * dy) and not (law.weight == 0 and m[E, one] > 0):
+            elif not along > _slow(circles, i, j, law) * np.sqrt(dx * dx + dy * dy) and not (law.weight == 0 and m[E, one] > 0):
                 continue
             _make_room(i, j, dx, dy, reach, circles, law)
             done |= 1 << lane

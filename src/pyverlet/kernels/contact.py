@@ -52,6 +52,7 @@ def _push_strip(s, to, circles, pairs, law, looks):
     moved, velocity, rows, carries = circles.moved, circles.velocity, circles.rows, circles.carries
     lane_i, lane_j, gap, reach, share = pairs.lane_i, pairs.lane_j, pairs.gap, pairs.reach, pairs.share
     made_of, normal, depths, slips, heard = pairs.made_of, pairs.normal, pairs.depth, pairs.slip, pairs.closing
+    calm, lends = circles.calm, circles.calm.shape[0] > 0
     real = moved.dtype.type
     zero, one, limit = spread(real(0)), spread(real(1)), spread(law.deep)
     pushed, most, rest = spread(real(PUSHED)), spread(law.most), spread(law.rest_speed)
@@ -93,7 +94,8 @@ def _push_strip(s, to, circles, pairs, law, looks):
                     speed = larger(closing / where_zero(distance, r, distance), zero)
                     before = load(heard, k)
                     store(heard, k, where_set(touching, larger(before, speed), before))
-                done = live & (which_above(free * larger(closing, zero - closing), rest * distance) | restless)
+                slow = larger(rest, larger(pick(calm, lane_i, k), pick(calm, lane_j, k))) if lends else rest
+                done = live & (which_above(free * larger(closing, zero - closing), slow * distance) | restless)
                 if done != 0:
                     done = treat(done, k, at, circles, pairs, law, spent)
                     xi, yi = take(moved, lane_i, k)
@@ -173,6 +175,7 @@ def _relax_strip(s, to, circles, pairs, law):
     velocity, rows, moved, carries = circles.velocity, circles.rows, circles.moved, circles.carries
     lane_i, lane_j, reach, share, made_of = pairs.lane_i, pairs.lane_j, pairs.reach, pairs.share, pairs.made_of
     normal, depths, slips = pairs.normal, pairs.depth, pairs.slip
+    calm, lends = circles.calm, circles.calm.shape[0] > 0
     real = velocity.dtype.type
     zero, one, third, half3 = spread(real(0)), spread(real(1)), spread(real(1) / real(3)), spread(real(1.5))
     new, feed, fed = spread(real(NEW)), spread(law.feed), spread(law.feed * real(PUSHED))
@@ -198,7 +201,8 @@ def _relax_strip(s, to, circles, pairs, law):
         speed, at = vx * nx + vy * ny, k * law.mixed
         struck = 0
         if BOUNCES:
-            fast = which_above(zero - speed, rest) & which_above(load(made_of[E], at), zero)
+            slow = larger(rest, larger(pick(calm, lane_i, k), pick(calm, lane_j, k))) if lends else rest
+            fast = which_above(zero - speed, slow) & which_above(load(made_of[E], at), zero)
             if fast != 0:  # has been struck since its turn in the first sweep, unless both carry weight
                 struck = fast & which_above(one - pick(carries, lane_i, k) * pick(carries, lane_j, k), zero)
                 speed = where_set(struck, zero, speed)

@@ -18,13 +18,14 @@ from pyverlet.kernels.tables import Circles, Pairs
 class Lending:
     """Who has lent how much, by slot (`laws.contacts.loans`), and scratch of a substep.
 
-    mass, lent: (n,) kg; busy: (n,) s; held, touched, open_to: (n,); lighter: (n,) 1/kg; before, unpushed, aside: (n, 2) m/s;
-    spin_before: (n,) rad/s; rows: (n, 4); root: (n,); sums: (n, 10).
+    mass, lent: (n,) kg; busy: (n,) s; calm: (n,) m/s; held, touched, open_to: (n,); lighter: (n,) 1/kg; before, unpushed, aside:
+    (n, 2) m/s; spin_before: (n,) rad/s; rows: (n, 4); root: (n,); sums: (n, 10).
     """
 
     mass: Any
     lent: Any
     busy: Any
+    calm: Any
     held: Any
     lighter: Any
     touched: Any
@@ -39,18 +40,23 @@ class Lending:
 
 
 class Terms(NamedTuple):
-    """kick, s, and fall, s^2: see `kernels.loans.take_up`; part: of a loan given back in a substep of h seconds."""
+    """kick, s, and fall, s^2: see `kernels.loans.take_up`; part: of a loan given back in a substep of h seconds; sunk, m/s: see
+    `kernels.loans.weigh`.
+    """
 
     kick: Any
     fall: Any
     part: Any
+    sunk: Any
     h: Any
 
 
 @driver
 def lend(circles, pairs, lending, terms, cut):
     """The inertia with which this substep's contacts are solved; each is pulled at by its own weight all the same."""
-    weigh(lending.mass, circles.inverse_mass, lending.lent, lending.lighter)
+    weigh(
+        lending.mass, circles.inverse_mass, lending.lent, lending.busy, terms.sunk, lending.lighter, lending.calm,
+    )  # fmt: skip
     set_out(circles.velocity, circles.acceleration, circles.spin, lending.held, terms.kick, lending.before, lending.spin_before)
     pull(circles.position, circles.acceleration, circles.inverse_mass, lending.lighter, lending.held, terms.fall)
     share_anew(

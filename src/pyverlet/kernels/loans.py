@@ -43,11 +43,12 @@ def _inertia(mass, lent, i):
 
 
 @kernel
-def weigh(mass, inverse_mass, lent, lighter):
-    """lighter: 1 / m' of each circle, 1/kg."""
+def weigh(mass, inverse_mass, lent, busy, sunk, lighter, calm):
+    """lighter: 1 / m' of each circle, 1/kg. calm: `sunk`, m/s, for who lends, or may not yet, else 0."""
     for i in range(mass.shape[0]):
         w = inverse_mass[i]
         lighter[i] = w if w == w - w or lent[i] == w - w else w / w / _inertia(mass, lent, i)
+        calm[i] = w - w if lent[i] == w - w and busy[i] == w - w else sunk
 
 
 @kernel

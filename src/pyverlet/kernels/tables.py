@@ -22,7 +22,7 @@ kg."""
 
 @bundle
 class Circles:
-    """Circles by slot; what each is: `Slots`, of contacts `Wide`, and the last four `Loans`: empty where nobody lends.
+    """Circles by slot; what each is: `Slots`, of contacts `Wide`, and the last five `Loans`: empty where nobody lends.
 
     rows: (n, 4), where circles rub, what a pair reads and writes of each, side by side. In the first sweep: what friction moves
     it by (2), m, what that turns it by, rad, whether it carries weight. In the second: velocity (2), spin, `turn`.
@@ -52,6 +52,7 @@ class Circles:
     spin_before: Any
     lent: Any
     busy: Any
+    calm: Any
 
 
 @bundle

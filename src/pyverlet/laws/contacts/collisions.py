@@ -148,7 +148,7 @@ class ContactSolver:
         if self._rubs(state):
             self._slips.start(wide, state.particle)
         self._lends = self._uneven and strongest > 0
-        noted = self._loans.begin(state, h) if self._lends else None
+        noted = self._loans.begin(state, h, strongest) if self._lends else None
         wide.set_up(state, h, lag, strongest, REST_ACCELERATIONS * strongest * h, len(state.spent) > 0, noted)
         if self._lends:
             self._loans.lend(wide)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.compile.rows import WIDTH
-from pyverlet.ground.constants import FED, LOAN_S, PUSHED
+from pyverlet.ground.constants import FED, LOAN_S, PUSHED, SUNK
 from pyverlet.kernels import balance, lending
 from pyverlet.laws.contacts.wide import Wide
 from pyverlet.state.state import Slots
@@ -38,7 +38,7 @@ class Loans:
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self._dtype = dtype
         self.forget()
-        self.compiled = self.nobody = self._arrays(np.empty(0, dtype)), (dtype.type(0),) * 4
+        self.compiled = self.nobody = self._arrays(np.empty(0, dtype)), (dtype.type(0),) * 5
 
     def forget(self) -> None:
         """Nobody has lent anything."""
@@ -50,25 +50,25 @@ class Loans:
         self._lighter, self._touched = np.empty(count, self._dtype), np.empty(count, np.uint8)
         self._before, self._spin_before = np.empty((count, 2), self._dtype), np.empty(count, self._dtype)
         self._unpushed, self._aside = np.empty((2, count, 2), self._dtype)
-        self._rows = np.empty((count, WIDTH), self._dtype)
+        self._rows, self._calm = np.empty((count, WIDTH), self._dtype), np.zeros(count, self._dtype)
         self._root, self._sums, self._open_to = np.empty(count, np.int64), np.empty((count, 10)), np.empty(count, np.uint8)
 
-    def begin(self, state: Slots, h: float) -> tuple[Array, Array, Array, Array]:
+    def begin(self, state: Slots, h: float, strongest: float) -> tuple[Array, ...]:
         """Contacts will be solved with lent inertia. Where an impact notes what it does by masses of their own: before,
-        spin_before, lent, busy.
+        spin_before, lent, busy; and calm. strongest: m/s^2, that anybody feels.
         """
         if self._kept.particle is not state.particle:
             self._follow(state)
         # At rest a substep ends with the velocity -(1 - PUSHED / FED) a h: the same for all that way.
-        terms = state.reals(h, (state.drop - 1 + PUSHED / FED) * h * h, min(h / LOAN_S, 1.0), h)
+        terms = state.reals(h, (state.drop - 1 + PUSHED / FED) * h * h, min(h / LOAN_S, 1.0), SUNK * strongest * LOAN_S, h)
         self.compiled = self._arrays(state.mass), terms
-        return self._before, self._spin_before, self._kept.lent, self._kept.busy
+        return self._before, self._spin_before, self._kept.lent, self._kept.busy, self._calm
 
     def _arrays(self, mass: Array) -> tuple[Array, ...]:
         _, lent, busy, held = self._kept
         return (
-            mass, lent, busy, held, self._lighter, self._touched, self._before, self._spin_before, self._unpushed, self._aside,
-            self._rows, self._root, self._sums, self._open_to,
+            mass, lent, busy, self._calm, held, self._lighter, self._touched, self._before, self._spin_before, self._unpushed,
+            self._aside, self._rows, self._root, self._sums, self._open_to,
         )  # fmt: skip
 
     def _follow(self, state: Slots) -> None:

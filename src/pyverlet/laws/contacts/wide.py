@@ -65,7 +65,7 @@ class Wide:
         self._looks = True  # whether they are to be noted, once a frame
         self.spent = np.zeros((1, 3))
         none = np.empty(0, dtype)
-        self._lent, self._nobody = False, (np.empty((0, 2), dtype), none, none, none)
+        self._lent, self._nobody = False, (np.empty((0, 2), dtype), none, none, none, none)
         self._hold_circles(0)
 
     @property
@@ -190,7 +190,7 @@ class Wide:
 
     def set_up(
         self, state: Slots, h: float, lag: float, strongest: float, rest_speed: float, accounts: bool,
-        noted: tuple[Array, Array, Array, Array] | None,
+        noted: tuple[Array, ...] | None,
     ) -> None:  # fmt: skip
         """Everything that the sweeps of this substep, and of those that follow it alike, need: `circles`, `arrays` and `law`.
 
