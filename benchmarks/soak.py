@@ -175,10 +175,10 @@ class Tab(threading.Thread):
             connection.send(json.dumps({"type": "gravity", "x": 0.0, "y": self._rng.uniform(-12, -8)}))
 
 
-def change_scene(port: int, rng: random.Random) -> None:
+def change_scene(port: int, scene: str) -> None:
     """Another scene of another size, for all."""
     with contextlib.suppress(ConnectionClosed, OSError, TimeoutError), connect(f"ws://127.0.0.1:{port}/socket") as connection:
-        connection.send(json.dumps({"type": "build", "scene": rng.choice(SCENES)}))
+        connection.send(json.dumps({"type": "build", "scene": scene}))
         connection.recv(10.0)
 
 
@@ -204,12 +204,14 @@ def main(minutes: float) -> bool:
         with tempfile.TemporaryDirectory() as folder:
             begin, before = time.monotonic(), served.ask()["frames"]
             for minute in range(1, max(round(minutes), 1) + 1):
-                if minute % 3 == 0:
-                    change_scene(served.port, rng)
+                # All of them at first: the kernels of a scene stay in memory, and are read when it is first built.
+                scenes = list(SCENES[2 * minute - 2 : 2 * minute]) or [rng.choice(SCENES)] * (minute % 3 == 0)
                 if minute % 4 == 1:
                     record(Path(folder))
                 asked = [served.ask()]
                 while time.monotonic() < begin + 60 * minute:
+                    if scenes and time.monotonic() > begin + 60 * minute - 30 * len(scenes):
+                        change_scene(served.port, scenes.pop(0))
                     time.sleep(2)
                     asked.append(served.ask())
                 said = asked[-1]
