@@ -204,6 +204,53 @@ def test_rehearsals_of_larger_worlds_do_what_these_do(monkeypatch: pytest.Monkey
         assert done == expected, count
 
 
+def _one_bounces(world: pv.World) -> None:
+    world.restitution[0] = 0.5
+
+
+def _one_rubs(world: pv.World) -> None:
+    world.friction[0] = 0.5
+
+
+def _pegs(world: pv.World) -> None:
+    world.collisions = pv.Collisions(restitution=0.5)
+    world.mass[0] = np.inf
+
+
+def _moving_obstacle(world: pv.World) -> None:
+    world.obstacles.append(pv.Segment((-3, -5), (3, -5), velocity=(0.0, 0.1)))
+
+
+def _heavy_and_elastic(world: pv.World) -> None:
+    world.mass[0], world.restitution[1] = 100.0, 0.5
+
+
+def _across_a_seam(world: pv.World) -> None:
+    world.boundary = pv.Periodic((-6, -6), (6, 6))
+    world.velocity[:] = 20.0
+
+
+@pytest.mark.parametrize("change", [_one_bounces, _one_rubs, _pegs, _moving_obstacle, _heavy_and_elastic, _across_a_seam])
+def test_a_rehearsal_calls_all_that_the_world_will(change: Callable[[pv.World], None], monkeypatch: pytest.MonkeyPatch) -> None:
+    called: set[str] = set()
+    call = jit.Kernel.__call__
+
+    def noted(kernel: jit.Kernel, *arguments: Any) -> Any:
+        called.add(kernel.function.__qualname__)
+        return call(kernel, *arguments)
+
+    monkeypatch.setattr(jit.Kernel, "__call__", noted)
+    world = pv.World(boundary=pv.Circle(radius=12), threads=1)
+    world.add(position=np.random.default_rng(0).uniform(-5, 5, (60, 2)), radius=0.3, allow_overlap=True)
+    change(world)
+    for part in rehearsals.PARTS.values():
+        part(np.dtype(np.float32), 1)
+    rehearsals.rehearse(world)
+    before = set(called)
+    world.run(seconds=0.5)
+    assert called - before == set()
+
+
 # ---- turns -------------------------------------------------------------------------------------------------------------
 
 KEEP = """

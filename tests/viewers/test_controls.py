@@ -266,6 +266,25 @@ def test_the_way_to_a_scene_is_told(wait_until: WaitUntil) -> None:
     assert any(text.endswith("%") for text in told)
 
 
+def test_all_is_compiled_before_a_scene_is_shown(wait_until: WaitUntil, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Links, say, are compiled when a world has them first: half a minute, in which the page said nothing and stood still.
+    plan = repertoire()
+    seen: list[str | None] = []
+    ready: list[tuple[pv.World, int]] = []
+
+    def warm_up(world: pv.World, progress: Callable[[int, int], None]) -> None:
+        progress(1, 2)  # as of a kernel that begins to compile
+        ready.append((world, world.frames))
+
+    monkeypatch.setattr("pyverlet.viewers.session.warm_up", warm_up)
+    with Session(plan.open(), repertoire=plan) as session:
+        session.subscribe(lambda: seen.append(session.latest.status.busy))
+        session.submit(Build("box", 20))
+        wait_until(lambda: session.latest.shape.scene == "box" and session.latest.status.frames > 0)
+    assert [(len(world), frames) for world, frames in ready] == [(20, 0)]
+    assert "compiling what box needs, once" in seen
+
+
 def test_a_session_that_stops_does_not_wait_for_a_scene(wait_until: WaitUntil) -> None:
     plan = repertoire()
     session = Session(plan.open(), repertoire=plan)

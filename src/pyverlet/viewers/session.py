@@ -31,6 +31,7 @@ from pyverlet.viewers.rhythm import PICTURE_S, Rhythm
 from pyverlet.viewers.stage import Stage
 from pyverlet.world.clock import Clock, FrameBudget
 from pyverlet.world.moments import Moment
+from pyverlet.world.warmup import warm_up
 
 if TYPE_CHECKING:
     from pyverlet.world.panels import Panels
@@ -252,7 +253,10 @@ class Session(Door):
         old.hands.release_all()
         self._say_busy(f"building {name}")
         try:
-            self._enter(self._repertoire.build(name, particles, self._on_the_way(name)))
+            exhibit = self._repertoire.build(name, particles, self._on_the_way(name))
+            for world in exhibit.panels.worlds:  # what is left to compile would stop a frame later, unsaid
+                warm_up(world, lambda *_: self._say_busy(f"compiling what {name} needs, once"))
+            self._enter(exhibit)
         except _Stopped:
             return
         finally:

@@ -20,12 +20,12 @@ from pyverlet.laws.forces import Conservative, Drag, Force
 from pyverlet.laws.limiter import Watch
 from pyverlet.laws.links import Angle, Area, Link, Pin, Rope, Spring, Stick
 from pyverlet.laws.obstacles import Segment
-from pyverlet.laws.rooms import Boundary, Box, Circle, Open
+from pyverlet.laws.rooms import Boundary, Box, Circle, Open, Periodic
 from pyverlet.state.group import Group
 from pyverlet.state.state import Slots
 from pyverlet.world.world import World
 
-_ROOMS = (Open, Circle, Box)
+_ROOMS = (Open, Circle, Box, Periodic)
 
 
 def rehearse(world: World) -> None:
@@ -51,9 +51,14 @@ def rehearse(world: World) -> None:
         small.is_free((0, 0))
     known = Slots(world.dtype)
     small.forces.extend(force for force in _ours(world) if (row := getattr(force, "compiled", None)) and row(known))
-    if (masses := world.mass[np.isfinite(world.mass)]).size and masses.max() > UNEVEN * masses.min():
-        small.mass[0] *= 2 * UNEVEN
+    _make_alike(small, world)
     _use(small)
+    if world.collisions:  # stage by stage, as beside pegs or moving obstacles
+        law = {"restitution": world.collisions.restitution, "friction": world.collisions.friction}
+        staged = _small(world.dtype, world.threads, Open, **law)
+        _make_alike(staged, world)
+        staged.obstacles.extend(small.obstacles)
+        staged.step(1e-3)
     if len(world) >= FUSED_FROM:
         _fuse(world)
     if len(world) and type(world.boundary) not in _ROOMS:  # one circle in the world's own room, which has kernels of its own
@@ -63,6 +68,14 @@ def rehearse(world: World) -> None:
     _forces(world)
     if world._sleep:
         _sleep(world.dtype)
+
+
+def _make_alike(small: World, world: World) -> None:
+    """Of circles as different in mass, and some as elastic and rough, as any."""
+    if (masses := world.mass[np.isfinite(world.mass)]).size and masses.max() > UNEVEN * masses.min():
+        small.mass[0] *= 2 * UNEVEN
+    if len(world):
+        small.restitution[0], small.friction[0] = world.restitution.max(), world.friction.max()
 
 
 def _fuse(world: World) -> None:
@@ -146,6 +159,8 @@ def _lattice(
         room = Circle(radius=2.0 * side, restitution=restitution)
     elif boundary is Box:
         room = Box((-side, -side), (side, side), restitution=restitution)
+    elif boundary is Periodic:
+        room = Periodic((-side, -side), (side, side))
     world = World(boundary=room, collisions=collisions, substeps=1, dtype=dtype, threads=threads, ledger=ledger, events=events)
     row, column = np.divmod(np.arange(count), side)
     # Small ones for a second grid, and one fast enough to pass through the skin in a step.
