@@ -118,18 +118,18 @@ def _enough(threads: int) -> int:
 
 
 def _link(world: World, kinds: set[type[Link]]) -> None:
-    """One link of every kind that a chain is made of; for several threads, many; then one of every kind, if there are others."""
+    """One link of every kind that a chain is made of; one of every kind, if there are others; then, for several threads, many."""
     group = Group(world._state, slice(0, len(world)), world.remove)
     world.links.append(Stick(group, [0, 1], [1, 2], collide=False, breaking_force=1e9))
     world.links.append(Spring(group, 0, 2, stiffness=1.0))
     world.links.append(Pin(group, 3))
-    if world.threads > 1 and len(world) >= LINKS_ONE_THREAD_BELOW:
-        world.step(1e-3)
-        world.links.append(Stick(group, np.arange(len(world) - 1), np.arange(1, len(world))))
     if not kinds <= {Stick, Spring, Rope, Pin}:
         world.step(1e-3)
         world.links.append(Angle(group, 0, 1, 2, compliance=1.0))
         world.links.append(Area(group, [0, 1, 2], area=1.0, compliance=1.0))
+    if world.threads > 1 and len(world) >= LINKS_ONE_THREAD_BELOW:
+        world.step(1e-3)
+        world.links.append(Stick(group, np.arange(len(world) - 1), np.arange(1, len(world))))
 
 
 def _use(world: World) -> None:
