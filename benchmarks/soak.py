@@ -30,8 +30,6 @@ SCENES = ("cage", "box", "cloth", "rope-bridge", "galton", "soft-bodies", "newto
 SETTLED_MINUTES = 5
 GROWTH = 0.03
 """Part of its memory after SETTLED_MINUTES that the server may have more at the end."""
-
-
 SLOWEST_MS = 250.0
 """What no frame may take beyond what the machine stood still."""
 
@@ -205,7 +203,9 @@ def main(minutes: float) -> bool:
             begin, before = time.monotonic(), served.ask()["frames"]
             for minute in range(1, max(round(minutes), 1) + 1):
                 # All of them at first: the kernels of a scene stay in memory, and are read when it is first built.
-                scenes = list(SCENES[2 * minute - 2 : 2 * minute]) or [rng.choice(SCENES)] * (minute % 3 == 0)
+                scenes = list(SCENES[2 * minute - 2 : 2 * minute])
+                if not scenes and minute % 3 == 0:
+                    scenes = [rng.choice(SCENES)]
                 if minute % 4 == 1:
                     record(Path(folder))
                 asked = [served.ask()]
