@@ -161,6 +161,10 @@ LINK_TAUT: Final = 0.01
 LINK_MEMORY_S: Final = 1 / 120
 """s over which the pull of a link is averaged. In float32 a rigid link's own is noise: 1e-7 of a coordinate, times m / h^2."""
 
+LINK_LEAST_N: Final = 1e-25
+"""N: what pulls with less has stopped. The averages of links gone slack would for ever be numbers that processors are slow with,
+too near 0 to have all their digits: 100 times as slow."""
+
 LINK_TURN: Final = 0.25
 """rad: a chain whose solution turns a link by more is solved link by link instead; a straight step cannot be trusted so far."""
 

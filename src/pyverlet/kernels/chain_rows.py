@@ -21,7 +21,7 @@ from pyverlet.compile.lanes import (
     widen,
 )
 from pyverlet.compile.rounding import lanes_like
-from pyverlet.ground.constants import LINK_BOWED, LINK_GIVE, LINK_MEMORY_S, LINK_RESOLVED
+from pyverlet.ground.constants import LINK_BOWED, LINK_GIVE, LINK_LEAST_N, LINK_MEMORY_S, LINK_RESOLVED
 from pyverlet.kernels.seam import nearest, nearest_lanes
 
 COLUMNS = (
@@ -148,10 +148,12 @@ def note_force(row, h):
     """The pull in N, which for rigid links is noisy; let the force shown follow it. That of the broken stays what it was."""
     real = row.dtype.type
     part, rate = spread(real(h / (h + LINK_MEMORY_S))), spread(real(-1.0 / (h * h)))
+    zero, least = spread(real(0)), spread(real(LINK_LEAST_N))
     for k in range(0, row.shape[1], LANES):
         last, force = load(row[LAM], k) * rate, load(row[FORCE], k)
         store(row[LAST], k, last)
-        store(row[FORCE], k, force + part * load(row[INTACT], k) * (last - force))
+        force = force + part * load(row[INTACT], k) * (last - force)
+        store(row[FORCE], k, where_above(larger(force, zero - force), least, force, zero))
 
 
 @kernel

@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
-from pyverlet.ground.constants import LINK_GIVE, LINK_MEMORY_S, LINK_RESOLVED
+from pyverlet.ground.constants import LINK_GIVE, LINK_LEAST_N, LINK_MEMORY_S, LINK_RESOLVED
 from pyverlet.kernels.seam import image_near
 
 
@@ -123,6 +123,8 @@ def note_force(force, last, lam, intact, h):
         last[r] = -lam[r] / (h * h)
         if intact[r]:
             force[r] += part * (last[r] - force[r])
+            if abs(force[r]) < LINK_LEAST_N:
+                force[r] = 0.0
 
 
 @kernel
@@ -131,6 +133,23 @@ def snap(force, strength, intact):
     for r in range(force.shape[0]):
         if abs(force[r]) > strength[r]:
             intact[r] = 0
+
+
+@kernel
+def recall(past_number, past_start, past_left, past_calm, number, position, particle, start, calm):
+    """A frame begins: what is remembered of each `particle`, in `start` and `calm`, if it is where it was left; NaN if not.
+
+    number, position: of all, in the user's order; `particle` and both numbers are ascending.
+    """
+    r = 0
+    for k in range(particle.shape[0]):
+        p = particle[k]
+        calm[k] = np.nan
+        while r < past_number.shape[0] and past_number[r] < number[p]:
+            r += 1
+        if r < past_number.shape[0] and past_number[r] == number[p]:
+            if past_left[r, 0] == position[p, 0] and past_left[r, 1] == position[p, 1]:
+                start[k, 0], start[k, 1], calm[k] = past_start[r, 0], past_start[r, 1], past_calm[r]
 
 
 @parallel_kernel

@@ -95,3 +95,12 @@ def momenta(position, velocity, spin, radius, mass):
             turning += np.float64(position[i, 0]) * vy - np.float64(position[i, 1]) * vx
             turning += 0.5 * m * r * r * np.float64(spin[i])
     return px, py, turning
+
+
+@kernel
+def pinned_move(mass, velocity, spin):
+    """Whether somebody pinned pushes others about: with infinite mass one goes on at its velocity, and nothing stops it."""
+    for i in range(mass.shape[0]):
+        if mass[i] == np.inf and (velocity[i, 0] != 0 or velocity[i, 1] != 0 or spin[i] != 0):
+            return True
+    return False

@@ -7,39 +7,90 @@ import numpy as np
 from pyverlet.compile.jit import kernel
 
 
-@kernel
-def find_runs(first, particle, intact, particles, run_of):
-    """Number the runs: run_of[r]. Rows of two particles continue the row before if they begin where it ended.
+_FREE = -1
+_GRID = 16
+"""A particle with more links than that is no node of a grid: a hub."""
 
-    Rows given the other way round are turned. A run never comes back to a particle it has met.
+
+@kernel
+def _match(a, b, p, pair, on):
+    """Rows a and b, who share particle p, follow each other there, if neither is followed yet; whether they do."""
+    end_a, end_b = 2 * a + (pair[a, 1] == p), 2 * b + (pair[b, 1] == p)
+    if a == b or on[end_a] != _FREE or on[end_b] != _FREE:
+        return False
+    on[end_a], on[end_b] = end_b, end_a
+    return True
+
+
+@kernel
+def _follow(pair, intact, particles):
+    """(2 rows,) which end of which row, 2 r + (0 or 1), follows each end of each row; _FREE if none."""
+    rows = pair.shape[0]
+    begin = np.zeros(particles + 1, np.int64)
+    for r in range(rows):
+        if intact[r]:
+            for side in range(2):
+                begin[pair[r, side] + 1] += 1
+    begin = np.cumsum(begin)
+    at, among = begin[:-1].copy(), np.empty(begin[-1], np.int64)
+    for r in range(rows):
+        if intact[r]:
+            for side in range(2):
+                p = pair[r, side]
+                among[at[p]] = r
+                at[p] += 1
+    on = np.full(2 * rows, _FREE, np.int64)
+    for p in range(particles):
+        here = among[begin[p] : begin[p + 1]]
+        if len(here) == 2:
+            _match(here[0], here[1], p, pair, on)
+        elif len(here) <= _GRID:
+            for k in range(len(here)):
+                for n in range(k + 1, len(here)):
+                    if pair[here[k], 0] + pair[here[k], 1] + pair[here[n], 0] + pair[here[n], 1] == 4 * p:
+                        _match(here[k], here[n], p, pair, on)
+    for r in range(rows - 1):
+        if intact[r] and intact[r + 1]:
+            for side in range(2):
+                if pair[r, 1 - side] == pair[r + 1, 0] or pair[r, 1 - side] == pair[r + 1, 1]:
+                    if _match(r, r + 1, pair[r, 1 - side], pair, on):
+                        break
+    return on
+
+
+@kernel
+def find_runs(pair, intact, particles, order, placed, run_of):
+    """Sort rows of two particles into runs of links that follow each other; the number of runs.
+
+    Two rows follow each other at a particle that has no others, or whose number lies in the middle between those of their other
+    ends, as in the rows, columns and diagonals of a grid, in whatever order they are given; or if one is given right after the
+    other. A run never comes back to a particle it has met. pair: (rows, 2); order: becomes the rows, run after run, placed:
+    (rows, 2) their particles, the way the run goes, and run_of the run of each.
     """
-    seen = np.full(particles, -1, np.int64)
-    runs = 0
-    tail = np.int64(-1)
-    length = 0
-    for r in range(run_of.shape[0]):
-        e = first[r]
-        if first[r + 1] - e != 2 or not intact[r]:
-            run_of[r], tail = runs, -1
-            runs += 1
+    rows = pair.shape[0]
+    on, seen = _follow(pair, intact, particles), np.full(particles, -1, np.int64)
+    done = np.zeros(rows, np.bool_)
+    runs = k = 0
+    for row in range(rows):
+        if done[row]:
             continue
-        i, j = particle[e], particle[e + 1]
-        if length == 1 and tail >= 0 and tail != i and tail != j:
-            head = particle[e - 2]
-            if head in (i, j):  # the row before was given backwards
-                particle[e - 2], particle[e - 1] = particle[e - 1], particle[e - 2]
-                tail = head
-        follows = tail >= 0 and ((tail == i and seen[j] != runs - 1) or (tail == j and seen[i] != runs - 1))
-        if follows:
-            if tail == j:
-                particle[e], particle[e + 1] = j, i
-            length += 1
-        else:
-            runs += 1
-            length = 1
-        run_of[r] = runs - 1
-        seen[i] = seen[j] = runs - 1
-        tail = particle[e + 1]
+        end = 2 * row  # back to where this run begins, or once around a ring
+        while on[end] != _FREE:
+            end = on[end] ^ 1
+            if end // 2 == row:
+                break
+        runs += 1
+        while True:
+            r, i, j = end // 2, pair[end // 2, end % 2], pair[end // 2, 1 - end % 2]
+            if seen[j] == runs - 1:
+                runs += 1
+            order[k], run_of[k], done[r] = r, runs - 1, True
+            placed[k, 0], placed[k, 1] = i, j
+            seen[i] = seen[j] = runs - 1
+            k += 1
+            end = on[end ^ 1]
+            if end == _FREE or done[end // 2]:
+                break
     return runs
 
 

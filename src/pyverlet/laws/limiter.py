@@ -50,7 +50,7 @@ class Watch:
         self._start, self._forces, self._links, self._room = start, forces, links, room
         self._gravity = forces.gravity
         self._kept: list[Any] = [force for force in forces.forces if isinstance(force, Conservative)]
-        self._plain = len(start) < ONE_THREAD_BELOW and not (self._kept or links)
+        self._plain = len(start) < ONE_THREAD_BELOW and not (self._kept or links.give)
         # What links hold is not known any more when the frame is over.
         by_forces, by_links = (0.0, 0.0) if self._plain else self._holds(start)
         # A potential is known but for a constant, so that under gravity, which has a scale, it is none.
@@ -63,10 +63,13 @@ class Watch:
 
     def _holds(self, now: State | Slots) -> tuple[float, float]:
         """Energy that forces hold, and links, J."""
-        if not (self._kept or self._links):
-            return 0.0, 0.0
-        state = now.in_users_order() if isinstance(now, Slots) else now
-        return float(sum(force.potential(state) for force in self._kept)), float(self._links.energy(state))
+        by_forces = by_links = 0.0
+        if self._kept:
+            state = now.in_users_order() if isinstance(now, Slots) else now
+            by_forces = float(sum(force.potential(state) for force in self._kept))
+        if self._links.give:
+            by_links = self._links.energy(now.where() if isinstance(now, Slots) else now.position)
+        return by_forces, by_links
 
     def _gained(self, now: Slots) -> float:
         """What the energy of all is now above that at the start, J."""
@@ -113,7 +116,7 @@ class Watch:
         add = _Sums(cluster)
         gain = add(_kinetic(mass, v, slots.radius, slots.spin) - self._kinetic()[order] + lift)
         if self._links:
-            gain += add((self._links.shares(slots.in_users_order()) - self._links.shares(start))[order])
+            gain += add((self._links.shares(slots.where()) - self._links.shares(start.position))[order])
         gain = np.maximum(gain, 0)
         if self._forces.forces:  # what has touched nobody has its gain from the integrator
             gain *= (add(np.ones(len(slots))) > 1) | (add(slots.hits >= 0) > 0)
@@ -225,18 +228,14 @@ def undriven(world: Any, h: float, h_last: float | None) -> bool:
     """
     if world.integrator.order < 2 or h_last not in (None, h) or world.boundary.moves:
         return False
-    if world._slots.pins and pinned_move(world._slots):
+    slots = world._slots
+    if slots.pins and measure.pinned_move(slots.mass, slots.velocity, slots.spin):
         return False
     if any(g != 0 and period > 0 for g, period in zip(world.gravity, world.boundary.seam.period, strict=True)):
         return False  # who falls for ever gains for ever
     if world.forces and not all(isinstance(force, Drag | Conservative) for force in world.forces):
         return False
     return not world.obstacles or not any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
-
-
-def pinned_move(state: State | Slots) -> bool:
-    """Whether somebody pinned pushes others about: with infinite mass one goes on at its velocity, and nothing stops it."""
-    return bool((np.isinf(state.mass) & (state.velocity.any(axis=1) | (state.spin != 0))).any())
 
 
 def _ratio(a: Array, b: Array) -> Array:

@@ -330,6 +330,12 @@ class Slots:
         if self._grows:
             state.grown[self.particle] = self.grown
 
+    def where(self) -> Array:
+        """(n, 2) the positions of now in the user's order, m."""
+        position = np.empty_like(self.position)
+        position[self.particle] = self.position
+        return position
+
     def in_users_order(self) -> State:
         """A state with the positions, velocities, spins, radii and masses of now."""
         state, names = State(self.dtype), (*_ROWS, "spin", "radius", "mass")

@@ -25,11 +25,11 @@ class ChainPool(Pool):
 
     def pack(self, work: Work) -> None:
         """By colour, and within a colour long runs first, so that runs of a pack are as long as each other."""
-        count, entry = len(self.rows), work.compact[self.entries["particle"]]
-        run_of = np.empty(count, np.int64)
-        number = runs.find_runs(self.first, entry, self.rows["intact"], len(work), run_of)
+        count, self._ends = len(self.rows), work.compact[self.entries["particle"]].reshape(-1, 2)
+        given, ends, run_of = np.empty(count, np.int64), np.empty_like(self._ends), np.empty(count, np.int64)
+        number = runs.find_runs(self._ends, self.rows["intact"], len(work), given, ends, run_of)
         colour = np.zeros(number, np.int64)
-        runs.colour_runs(self.first, entry, run_of, len(work), LINK_COLOURS, colour)
+        runs.colour_runs(self.first, ends.ravel(), run_of, len(work), LINK_COLOURS, colour)
         length = np.bincount(run_of, minlength=number)
         alone = colour == LINK_COLOURS - 1  # these may share particles: each is a pack, and a colour, of its own
         order = np.lexsort((np.where(alone, 0, -length), colour))
@@ -43,10 +43,9 @@ class ChainPool(Pool):
         new = (np.diff(colour[order][opens], prepend=-1) != 0) | alone[order][opens]
         self._colour = np.append(np.flatnonzero(new), len(opens))
         self.colours = len(self._colour) - 1
-        self._lay_out(entry, run_at, longest, length)
+        self._lay_out(given, ends, run_at, longest, length)
         self._place = np.empty(count, np.int64)
         self._place[self._source[self._source >= 0][::-1]] = np.flatnonzero(self._source >= 0)[::-1]
-        self._ends = entry.reshape(-1, 2)
         self._row = np.zeros((len(chain_rows.COLUMNS), len(self._source)), self.dtype)
         self._strength = np.full(len(self._source), np.inf)
         self._bowed = np.zeros(len(opens), np.uint8)
@@ -55,16 +54,19 @@ class ChainPool(Pool):
         self._rooms, self._wide = np.zeros((parts, chains.SCRATCH, items), self.dtype), np.zeros((parts, chains.WIDE, items))
         self.stale, self.changed = False, True
 
-    def _lay_out(self, entry: Array, run_at: Array, longest: Array, length: Array) -> None:
-        """Which row stands in each item, -1 for none, and which particle in each item of the nodes."""
+    def _lay_out(self, given: Array, ends: Array, run_at: Array, longest: Array, length: Array) -> None:
+        """Which row stands in each item, -1 for none, and which particle in each item of the nodes.
+
+        given: rows, run after run; ends: (rows, 2) their particles.
+        """
         begin = np.concatenate((np.zeros(1, np.int64), np.cumsum(length)))
         pack, step = _within(longest)
         run = run_at[pack]
-        source = np.where(step[:, None] < length[run], begin[run] + step[:, None], -1)
+        source = np.where(step[:, None] < length[run], given[np.minimum(begin[run] + step[:, None], len(given) - 1)], -1)
         pack, step = _within(longest + 1)
         run = run_at[pack]
         step = np.minimum(step[:, None], length[run])
-        node = entry[2 * (begin[run] + np.minimum(step, length[run] - 1)) + (step == length[run])]
+        node = ends[begin[run] + np.minimum(step, length[run] - 1), (step == length[run]).astype(int)]
         self._source, self._node = source.ravel(), node.astype(np.uint32).ravel()
 
     def begin(self) -> None:

@@ -300,20 +300,20 @@ class Links:
 
     # ---- to look at ----------------------------------------------------------------------------------------------------
 
-    def energy(self, state: State | None = None) -> float:
-        """Energy stored in links that give, J, of the world's state or of another of the same particles."""
-        position = (self._state if state is None else state).position.astype(np.float64)
+    def energy(self, where: Array | None = None) -> float:
+        """Energy stored in links that give, J, with the particles where they are, or at (n, 2) other places, m."""
+        position = (self._state.position if where is None else where).astype(np.float64)
         return sum(pool.energy(position, self._state.seam) for pool in self._order)
 
-    def shares(self, state: State) -> Array:
+    def shares(self, where: Array) -> Array:
         """(n,) the same in the user's order: what each link holds, at the first of its particles that is free to move."""
-        position, share = state.position.astype(np.float64), np.zeros(len(state))
+        position, share = where.astype(np.float64), np.zeros(len(where))
         for pool in self._order:
             particle, entry = pool.entries["particle"], np.arange(len(pool.entries))
             if len(particle):
-                entry += np.where(np.isfinite(state.mass[particle]), 0, len(entry))
+                entry += np.where(np.isfinite(self._state.mass[particle]), 0, len(entry))
                 whose = particle[np.minimum.reduceat(entry, pool.first[:-1]) % len(entry)]
-                share += np.bincount(whose, pool.energies(position, self._state.seam), len(state))
+                share += np.bincount(whose, pool.energies(position, self._state.seam), len(where))
         return share
 
     @property

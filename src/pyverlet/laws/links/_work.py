@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.ground import memory
 from pyverlet.ground.constants import REST_ACCELERATIONS
 from pyverlet.kernels import links, motion
 from pyverlet.state.seam import NONE
@@ -26,6 +27,11 @@ class Past(NamedTuple):
     """(m, 2) and where at its end."""
     calm: Array
     """(m,) m/s, see `kernels.links.look_back`."""
+
+
+def nobody(dtype: np.dtype[Any]) -> Past:
+    """Nothing is remembered."""
+    return Past(np.empty(0, np.int64), np.empty((0, 2)), np.empty((0, 2), dtype), np.empty(0))
 
 
 class Work:
@@ -69,18 +75,12 @@ class Work:
 
     def begin(self, state: State, past: Past | None) -> None:
         """A frame begins: take up what is remembered of those who are where they were left."""
-        self._calm.fill(np.nan)
         self.seam = state.seam
-        if past is None or not len(past.number):
-            return
-        number, where = state.number[self.particle], state.position[self.particle]
-        row = np.searchsorted(past.number, number).clip(max=len(past.number) - 1)
-        same = (past.number[row] == number) & (past.left[row] == where).all(axis=1)
-        self.start[same], self._calm[same] = past.start[row[same]], past.calm[row[same]]
+        links.recall(*(past or nobody(state.dtype)), state.number, state.position, self.particle, self.start, self._calm)
 
     def end(self, state: State) -> Past:
         """The frame is good: what is to be remembered."""
-        number, left = state.number[self.particle], state.position[self.particle]
+        number, left = (memory.taken(array, self.particle) for array in (state.number, state.position))
         return Past(number, self.start.copy(), left, self._calm.copy())
 
     def arrays(self) -> tuple[Array, ...]:
