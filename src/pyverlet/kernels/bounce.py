@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet.compile.jit import kernel
-from pyverlet.compile.lanes import LANES
+from pyverlet.compile.lanes import LANES, larger, pick
 from pyverlet.ground.constants import LOAN_S
 from pyverlet.kernels.bounds import impact_time
 from pyverlet.kernels.tables import MU, R_I, R_J, E
@@ -47,6 +47,14 @@ def _slow(circles, i, j, law):
     if circles.calm.shape[0] > 0:
         return max(law.rest_speed, max(circles.calm[i], circles.calm[j]))
     return law.rest_speed
+
+
+@kernel
+def slow_lanes(calm, lane_i, lane_j, k, rest):
+    """`_slow` of the eight pairs from k on; rest: `law.rest_speed` in every lane."""
+    if calm.shape[0] > 0:
+        return larger(rest, larger(pick(calm, lane_i, k), pick(calm, lane_j, k)))
+    return rest
 
 
 @kernel

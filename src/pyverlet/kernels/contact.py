@@ -37,7 +37,7 @@ from pyverlet.compile.lanes import (
 )
 from pyverlet.compile.rows import put_four, take_four
 from pyverlet.ground.constants import DEEP_PART, DEEP_SWEEPS, FED, GRIP, LARGEST_PUSH, PUSHED
-from pyverlet.kernels.bounce import treat
+from pyverlet.kernels.bounce import slow_lanes, treat
 from pyverlet.kernels.kinds import BOUNCES, RUBS, for_each_kind
 from pyverlet.kernels.motion import IN_PILE
 from pyverlet.kernels.tables import MASS, MU, NEW, R_I, R_J, TURN_I, TURN_J, E
@@ -52,7 +52,7 @@ def _push_strip(s, to, circles, pairs, law, looks):
     moved, velocity, rows, carries = circles.moved, circles.velocity, circles.rows, circles.carries
     lane_i, lane_j, gap, reach, share = pairs.lane_i, pairs.lane_j, pairs.gap, pairs.reach, pairs.share
     made_of, normal, depths, slips, heard = pairs.made_of, pairs.normal, pairs.depth, pairs.slip, pairs.closing
-    calm, lends = circles.calm, circles.calm.shape[0] > 0
+    calm = circles.calm
     real = moved.dtype.type
     zero, one, limit = spread(real(0)), spread(real(1)), spread(law.deep)
     pushed, most, rest = spread(real(PUSHED)), spread(law.most), spread(law.rest_speed)
@@ -94,7 +94,7 @@ def _push_strip(s, to, circles, pairs, law, looks):
                     speed = larger(closing / where_zero(distance, r, distance), zero)
                     before = load(heard, k)
                     store(heard, k, where_set(touching, larger(before, speed), before))
-                slow = larger(rest, larger(pick(calm, lane_i, k), pick(calm, lane_j, k))) if lends else rest
+                slow = slow_lanes(calm, lane_i, lane_j, k, rest)
                 done = live & (which_above(free * larger(closing, zero - closing), slow * distance) | restless)
                 if done != 0:
                     done = treat(done, k, at, circles, pairs, law, spent)
@@ -175,7 +175,7 @@ def _relax_strip(s, to, circles, pairs, law):
     velocity, rows, moved, carries = circles.velocity, circles.rows, circles.moved, circles.carries
     lane_i, lane_j, reach, share, made_of = pairs.lane_i, pairs.lane_j, pairs.reach, pairs.share, pairs.made_of
     normal, depths, slips = pairs.normal, pairs.depth, pairs.slip
-    calm, lends = circles.calm, circles.calm.shape[0] > 0
+    calm = circles.calm
     real = velocity.dtype.type
     zero, one, third, half3 = spread(real(0)), spread(real(1)), spread(real(1) / real(3)), spread(real(1.5))
     new, feed, fed = spread(real(NEW)), spread(law.feed), spread(law.feed * real(PUSHED))
@@ -201,7 +201,7 @@ def _relax_strip(s, to, circles, pairs, law):
         speed, at = vx * nx + vy * ny, k * law.mixed
         struck = 0
         if BOUNCES:
-            slow = larger(rest, larger(pick(calm, lane_i, k), pick(calm, lane_j, k))) if lends else rest
+            slow = slow_lanes(calm, lane_i, lane_j, k, rest)
             fast = which_above(zero - speed, slow) & which_above(load(made_of[E], at), zero)
             if fast != 0:  # has been struck since its turn in the first sweep, unless both carry weight
                 struck = fast & which_above(one - pick(carries, lane_i, k) * pick(carries, lane_j, k), zero)

@@ -60,11 +60,14 @@ def _some(
 ):  # fmt: skip
     """Of the particles from a up to b; the square of the largest acceleration."""
     x, v, felt, pushed, light = position[a:b], velocity[a:b], acceleration[a:b], force[a:b], inverse_mass[a:b]
-    if ahead != 0:
-        add_scaled(v, felt, ahead)
-    _add_up(pushed, x, v, light, h, kind, vector, number, period_x, period_y)
-    if ahead != 0:
-        add_scaled(v, felt, -ahead)
+    if kind.shape[0] == 0:  # gravity alone: links have pulled, and that is not felt again
+        pushed = force[:0]
+    else:
+        if ahead != 0:
+            add_scaled(v, felt, ahead)
+        _add_up(pushed, x, v, light, h, kind, vector, number, period_x, period_y)
+        if ahead != 0:
+            add_scaled(v, felt, -ahead)
     largest = newton_block(felt, pushed, light, gx, gy)
     kick_drift(x, v, felt, h)
     return largest

@@ -147,9 +147,10 @@ def recall(past_number, past_start, past_left, past_calm, number, position, part
         calm[k] = np.nan
         while r < past_number.shape[0] and past_number[r] < number[p]:
             r += 1
-        if r < past_number.shape[0] and past_number[r] == number[p]:
-            if past_left[r, 0] == position[p, 0] and past_left[r, 1] == position[p, 1]:
-                start[k, 0], start[k, 1], calm[k] = past_start[r, 0], past_start[r, 1], past_calm[r]
+        if r == past_number.shape[0]:
+            continue
+        if past_number[r] == number[p] and past_left[r, 0] == position[p, 0] and past_left[r, 1] == position[p, 1]:
+            start[k, 0], start[k, 1], calm[k] = past_start[r, 0], past_start[r, 1], past_calm[r]
 
 
 @parallel_kernel

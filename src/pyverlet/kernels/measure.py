@@ -99,8 +99,8 @@ def momenta(position, velocity, spin, radius, mass):
 
 @kernel
 def pinned_move(mass, velocity, spin):
-    """Whether somebody pinned pushes others about: with infinite mass one goes on at its velocity, and nothing stops it."""
+    """Whether anybody of infinite mass moves or turns."""
+    found = False
     for i in range(mass.shape[0]):
-        if mass[i] == np.inf and (velocity[i, 0] != 0 or velocity[i, 1] != 0 or spin[i] != 0):
-            return True
-    return False
+        found |= mass[i] == np.inf and (velocity[i, 0] != 0 or velocity[i, 1] != 0 or spin[i] != 0)
+    return found

@@ -167,6 +167,13 @@ def take_rows(out, source, index):
 
 
 @parallel_kernel
+def put_rows(out, source, index):
+    """out[index[k]] = source[k] for (n, 2) arrays of one dtype; index is a permutation."""
+    for k in prange(index.shape[0]):
+        copy_row(out, np.int64(index[k]), source, k)
+
+
+@parallel_kernel
 def take_motion(position, velocity, acceleration, spin, from_position, from_velocity, from_acceleration, from_spin, index):
     """Row k of the first four arrays is row index[k] of the others: one pass, for what changes in every frame."""
     for k in prange(index.shape[0]):

@@ -6,7 +6,6 @@ import numpy as np
 
 from pyverlet.compile.jit import kernel
 
-
 _FREE = -1
 _GRID = 16
 """A particle with more links than that is no node of a grid: a hub."""
@@ -52,9 +51,9 @@ def _follow(pair, intact, particles):
     for r in range(rows - 1):
         if intact[r] and intact[r + 1]:
             for side in range(2):
-                if pair[r, 1 - side] == pair[r + 1, 0] or pair[r, 1 - side] == pair[r + 1, 1]:
-                    if _match(r, r + 1, pair[r, 1 - side], pair, on):
-                        break
+                p = pair[r, 1 - side]
+                if (p == pair[r + 1, 0] or p == pair[r + 1, 1]) and _match(r, r + 1, p, pair, on):
+                    break
     return on
 
 

@@ -228,14 +228,18 @@ def undriven(world: Any, h: float, h_last: float | None) -> bool:
     """
     if world.integrator.order < 2 or h_last not in (None, h) or world.boundary.moves:
         return False
-    slots = world._slots
-    if slots.pins and measure.pinned_move(slots.mass, slots.velocity, slots.spin):
+    if world._slots.pins and pinned_move(world._slots):
         return False
     if any(g != 0 and period > 0 for g, period in zip(world.gravity, world.boundary.seam.period, strict=True)):
         return False  # who falls for ever gains for ever
     if world.forces and not all(isinstance(force, Drag | Conservative) for force in world.forces):
         return False
     return not world.obstacles or not any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
+
+
+def pinned_move(state: State | Slots) -> bool:
+    """Whether somebody pinned pushes others about: with infinite mass one goes on at its velocity, and nothing stops it."""
+    return bool(measure.pinned_move(state.mass, state.velocity, state.spin))
 
 
 def _ratio(a: Array, b: Array) -> Array:

@@ -333,7 +333,7 @@ class Slots:
     def where(self) -> Array:
         """(n, 2) the positions of now in the user's order, m."""
         position = np.empty_like(self.position)
-        position[self.particle] = self.position
+        motion.put_rows(position, self.position, self.particle)
         return position
 
     def in_users_order(self) -> State:
