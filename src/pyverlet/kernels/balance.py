@@ -84,9 +84,12 @@ def note_walls(velocity, unpushed, inverse_mass, touched, root, sums, held):
 
 
 @kernel
-def _begin(inverse_mass, touched, root, sums, open_to):
-    """Clear the other sums; open_to[i]: in how many directions walls do not hold the cluster of i. Whether there is any."""
-    found = False
+def _begin(inverse_mass, touched, root, sums, open_to, among):
+    """Clear the other sums; open_to[i]: in how many directions walls do not hold the cluster of i.
+
+    Notes in `among` who has touched another in a cluster that is open, and returns how many: in a heap hardly anybody.
+    """
+    none, count = inverse_mass.dtype.type(0), 0
     for i in range(root.shape[0]):
         open_to[i] = 0
         if root[i] == i:
@@ -97,52 +100,51 @@ def _begin(inverse_mass, touched, root, sums, open_to):
                     sums[i, k] = 0.0
         else:  # roots come before what they are the roots of
             open_to[i] = open_to[root[i]]
-        found |= open_to[i] > 0 and touched[i] != 0
-    return found
+        among[count] = i
+        count += open_to[i] > 0 and touched[i] != 0 and inverse_mass[i] > none
+    return count
 
 
 @kernel
 def balance(
-    position, velocity, spin, radius, mass, inverse_mass, lighter, touched, before, spin_before, root, rubs, sums, open_to
+    position, velocity, spin, radius, mass, inverse_mass, lighter, touched, before, spin_before, root, rubs, sums, open_to, among
 ):  # fmt: skip
     """Give to each cluster what its momentum and its angular momentum lack.
 
     rubs: whether spins take part. sums: (n, 10) float64, for each root m, m x (2), what momentum lacks (2), I, what angular
-    momentum about the centre lacks, and the three numbers of `note_walls`. open_to: (n,) scratch.
+    momentum about the centre lacks, and the three numbers of `note_walls`. open_to, among: (n,) scratch.
     """
-    if not _begin(inverse_mass, touched, root, sums, open_to):
-        return
-    for i in range(root.shape[0]):
-        if open_to[i] and touched[i] and inverse_mass[i] > 0:
-            own, lent = float(mass[i]), _lent(mass, inverse_mass, lighter, i)
-            to = sums[root[i]]
-            to[0] += own
-            to[1] += own * position[i, 0]
-            to[2] += own * position[i, 1]
-            to[3] += lent * (velocity[i, 0] - before[i, 0])
-            to[4] += lent * (velocity[i, 1] - before[i, 1])
-    for i in range(root.shape[0]):
-        if open_to[i] == 2 and touched[i] and inverse_mass[i] > 0:
-            own, lent = float(mass[i]), _lent(mass, inverse_mass, lighter, i)
-            to = sums[root[i]]
-            x, y = position[i, 0] - to[1] / to[0], position[i, 1] - to[2] / to[0]
+    count = _begin(inverse_mass, touched, root, sums, open_to, among)
+    for k in range(count):
+        i = among[k]
+        r, own, lent = root[i], float(mass[i]), _lent(mass, inverse_mass, lighter, i)
+        sums[r, 0] += own
+        sums[r, 1] += own * position[i, 0]
+        sums[r, 2] += own * position[i, 1]
+        sums[r, 3] += lent * (velocity[i, 0] - before[i, 0])
+        sums[r, 4] += lent * (velocity[i, 1] - before[i, 1])
+    for k in range(count):
+        i = among[k]
+        if open_to[i] == 2:
+            r, own, lent = root[i], float(mass[i]), _lent(mass, inverse_mass, lighter, i)
+            x, y = position[i, 0] - sums[r, 1] / sums[r, 0], position[i, 1] - sums[r, 2] / sums[r, 0]
             half = 0.5 * radius[i] * radius[i] if rubs else 0.0
-            to[5] += own * (x * x + y * y + half)
-            to[6] += lent * (x * (velocity[i, 1] - before[i, 1]) - y * (velocity[i, 0] - before[i, 0]))
-            to[6] += lent * half * (spin[i] - spin_before[i])
-    for i in range(root.shape[0]):
-        if open_to[i] and touched[i] and inverse_mass[i] > 0:
-            to = sums[root[i]]
-            vx, vy = to[3] / to[0], to[4] / to[0]
-            pushed = to[_XX] + to[_YY]
-            if pushed > 0:  # only what is along the wall
-                vx, vy = (vx * to[_YY] - vy * to[_XY]) / pushed, (vy * to[_XX] - vx * to[_XY]) / pushed
-            turn = to[6] / to[5] if to[5] > 0 else 0.0
-            x, y = position[i, 0] - to[1] / to[0], position[i, 1] - to[2] / to[0]
-            velocity[i, 0] += vx - turn * y
-            velocity[i, 1] += vy + turn * x
-            if rubs:
-                spin[i] += turn
+            sums[r, 5] += own * (x * x + y * y + half)
+            sums[r, 6] += lent * (x * (velocity[i, 1] - before[i, 1]) - y * (velocity[i, 0] - before[i, 0]))
+            sums[r, 6] += lent * half * (spin[i] - spin_before[i])
+    for k in range(count):
+        i = among[k]
+        to = sums[root[i]]
+        vx, vy = to[3] / to[0], to[4] / to[0]
+        pushed = to[_XX] + to[_YY]
+        if pushed > 0:  # only what is along the wall
+            vx, vy = (vx * to[_YY] - vy * to[_XY]) / pushed, (vy * to[_XX] - vx * to[_XY]) / pushed
+        turn = to[6] / to[5] if to[5] > 0 else 0.0
+        x, y = position[i, 0] - to[1] / to[0], position[i, 1] - to[2] / to[0]
+        velocity[i, 0] += vx - turn * y
+        velocity[i, 1] += vy + turn * x
+        if rubs:
+            spin[i] += turn
 
 
 @kernel

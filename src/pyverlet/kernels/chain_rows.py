@@ -11,6 +11,7 @@ from pyverlet.compile.lanes import (
     load,
     pick,
     put,
+    smaller,
     spread,
     square_root,
     store,
@@ -39,10 +40,15 @@ ROPES, SOFTS = 1, 2
 _LEAST = 1e-25
 """N/m: springs softer than that pull with as much; where one divides by them, in float32 too."""
 
+_MOST = 1e15
+"""(frequency * h)^2: beyond that it is all settled, and its square no number in float32. Links that are crushed between a wall and
+what moves on have come to that."""
+
 
 @kernel
-def _settled(s, resolved):
-    """`kernels.links.share_settled`, lane by lane; resolved: the square of LINK_RESOLVED."""
+def _settled(s, resolved, most):
+    """`kernels.links.share_settled`, lane by lane; resolved: the square of LINK_RESOLVED; most: see _MOST."""
+    s = smaller(s, most)
     return s * s / (s * s + resolved)
 
 
@@ -54,7 +60,7 @@ def _prepare_pack(p, start, node, holds, row, position, period_x, period_y, earl
     quarter, half, two, three = spread(real(0.25)), spread(real(0.5)), spread(real(2)), spread(real(3))
     straight, steeper = spread(real(LINK_BOWED)), spread(real(1.0 / (1.0 - LINK_BOWED)))
     one_h, hh, per_h, rigid = spread(real(h)), spread(real(h * h)), spread(real(1.0 / h)), spread(real(LINK_GIVE))
-    per_hh, least = spread(real(1.0 / (h * h))), spread(real(_LEAST))
+    per_hh, least, most = spread(real(1.0 / (h * h))), spread(real(_LEAST)), spread(real(_MOST))
     soft = holds[p] & SOFTS
     begin, end = start[p], start[p + 1]
     shift = LANES * p
@@ -72,7 +78,7 @@ def _prepare_pack(p, start, node, holds, row, position, period_x, period_y, earl
         store(row[AY], k, dy * bend)
         ww, force, rest = wi + wj, load(row[FORCE], k), load(row[REST], k)
         swing = hh * larger(force, zero - force) * bend * ww  # (frequency of swinging sideways * h)^2
-        turn = _settled(swing, resolved)
+        turn = _settled(swing, resolved, most)
         bow = larger(turn - straight, zero) * steeper * hh * larger(force, zero) * bend
         bowed |= which_above(bow, zero)
         store(row[TURN], k, turn)
@@ -88,7 +94,7 @@ def _prepare_pack(p, start, node, holds, row, position, period_x, period_y, earl
             c0, cm = length - rest, square_root(ex * ex + ey * ey) - rest
             c0 = where_above(slack, zero, larger(c0, zero), c0)  # a slack rope has no stretch to remember
             cm = where_above(slack, zero, larger(cm, zero), cm)
-            q = _settled(hh * stiffness * ww, resolved)
+            q = _settled(hh * stiffness * ww, resolved, most)
             s = one_h * damping * ww
             part = half + half * s / (one + s)
             rate = damping * per_h

@@ -20,6 +20,8 @@ def find_root(root, i):
 @kernel
 def join(root, i, j):
     """The sets of i and j become one."""
+    if root[i] == root[j]:  # so it is for most, when most are joined
+        return
     a, b = find_root(root, np.int64(i)), find_root(root, np.int64(j))
     root[max(a, b)] = min(a, b)
 

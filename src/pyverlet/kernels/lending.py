@@ -18,8 +18,8 @@ from pyverlet.kernels.tables import Circles, Pairs
 class Lending:
     """Who has lent how much, by slot (`laws.contacts.loans`), and scratch of a substep.
 
-    mass, lent: (n,) kg; busy: (n,) s; calm: (n,) m/s; held, touched, open_to: (n,); lighter: (n,) 1/kg; before, unpushed, aside:
-    (n, 2) m/s; spin_before: (n,) rad/s; rows: (n, 4); root: (n,); sums: (n, 10).
+    mass, lent: (n,) kg; busy: (n,) s; calm: (n,) m/s; held, touched, open_to, among: (n,); lighter: (n,) 1/kg; before, unpushed,
+    aside: (n, 2) m/s; spin_before: (n,) rad/s; rows: (n, 4); root: (n,); sums: (n, 10).
     """
 
     mass: Any
@@ -37,6 +37,7 @@ class Lending:
     root: Any
     sums: Any
     open_to: Any
+    among: Any
 
 
 class Terms(NamedTuple):
@@ -117,6 +118,7 @@ def even_up(circles, lending, rubs):
     balance(
         circles.position, circles.velocity, circles.spin, circles.radius, lending.mass, circles.inverse_mass, lending.lighter,
         lending.touched, lending.before, lending.spin_before, lending.root, rubs != 0, lending.sums, lending.open_to,
+        lending.among,
     )  # fmt: skip
 
 

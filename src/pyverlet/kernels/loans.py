@@ -45,10 +45,11 @@ def _inertia(mass, lent, i):
 @kernel
 def weigh(mass, inverse_mass, lent, busy, sunk, lighter, calm):
     """lighter: 1 / m' of each circle, 1/kg. calm: `sunk`, m/s, for who lends, or may not yet, else 0."""
+    none, one = mass.dtype.type(0), mass.dtype.type(1)
     for i in range(mass.shape[0]):
         w = inverse_mass[i]
-        lighter[i] = w if w == w - w or lent[i] == w - w else w / w / _inertia(mass, lent, i)
-        calm[i] = w - w if lent[i] == w - w and busy[i] == w - w else sunk
+        lighter[i] = w if w == none or lent[i] == none else one / _inertia(mass, lent, i)
+        calm[i] = none if lent[i] == none and busy[i] == none else sunk
 
 
 @kernel
@@ -56,10 +57,11 @@ def pull(position, acceleration, inverse_mass, lighter, held, fall):
     """Move each circle that walls hold, through others, by what a (m / m' - 1) does to its position: so its weight
     is that of its own mass. fall: s^2.
     """
+    one = lighter.dtype.type(1)
     for i in range(position.shape[0]):
         w = inverse_mass[i]
         if held[i] and lighter[i] != w:
-            more = (lighter[i] / w - w / w) * fall
+            more = (lighter[i] / w - one) * fall
             position[i, 0] += more * acceleration[i, 0]
             position[i, 1] += more * acceleration[i, 1]
 
@@ -70,10 +72,11 @@ def take_up(position, velocity, acceleration, inverse_mass, lighter, held, touch
 
     Not before contacts: to those it is no motion, and would be an impact.
     """
+    one = lighter.dtype.type(1)
     for i in range(position.shape[0]):
         w = inverse_mass[i]
         if held[i] and lighter[i] != w:
-            more = lighter[i] / w - w / w
+            more = lighter[i] / w - one
             if touched[i]:
                 velocity[i, 0] += more * kick * acceleration[i, 0]
                 velocity[i, 1] += more * kick * acceleration[i, 1]

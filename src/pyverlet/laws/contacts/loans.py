@@ -51,7 +51,8 @@ class Loans:
         self._before, self._spin_before = np.empty((count, 2), self._dtype), np.empty(count, self._dtype)
         self._unpushed, self._aside = np.empty((2, count, 2), self._dtype)
         self._rows, self._calm = np.empty((count, WIDTH), self._dtype), np.zeros(count, self._dtype)
-        self._root, self._sums, self._open_to = np.empty(count, np.int64), np.empty((count, 10)), np.empty(count, np.uint8)
+        self._root, self._among = np.empty((2, count), np.int64)
+        self._sums, self._open_to = np.empty((count, 10)), np.empty(count, np.uint8)
 
     def begin(self, state: Slots, h: float, strongest: float) -> tuple[Array, ...]:
         """Contacts will be solved with lent inertia. Where an impact notes what it does by masses of their own: before,
@@ -68,7 +69,7 @@ class Loans:
         _, lent, busy, held = self._kept
         return (
             mass, lent, busy, self._calm, held, self._lighter, self._touched, self._before, self._spin_before, self._unpushed,
-            self._aside, self._rows, self._root, self._sums, self._open_to,
+            self._aside, self._rows, self._root, self._sums, self._open_to, self._among,
         )  # fmt: skip
 
     def _follow(self, state: Slots) -> None:
