@@ -41,8 +41,8 @@ _LEAST = 1e-25
 """N/m: springs softer than that pull with as much; where one divides by them, in float32 too."""
 
 _MOST = 1e15
-"""(frequency * h)^2: beyond that it is all settled, and its square no number in float32. Links that are crushed between a wall and
-what moves on have come to that."""
+"""(frequency * h)^2: beyond that it is all settled, and its square no number in float32. Links crushed between a wall and what
+moves on have come to that."""
 
 
 @kernel

@@ -303,6 +303,17 @@ def _rounded(world: World, held: float, stiff: float) -> float:
     return float(np.sqrt(2.0 * held * stiff)) * d + 0.5 * stiff * d * d
 
 
+def _rolled(world: World, h: float) -> float:
+    """J a frame, of who rolls along a wall: a step of order 2 moves it freely, and friction then mends its velocity alone.
+
+    By a third of a h^2 / 2 too far for a disc that rolls, along a: measured is 0.21 m (a h)^2 a substep with what friction takes.
+    """
+    if world.integrator.velocity_lag:
+        return 0.0
+    gx, gy = world.gravity
+    return 0.25 * _free_mass(world) * (gx * gx + gy * gy) * h * h * world.substeps
+
+
 def _energy(name: str, world: World, frame: int, dt: float, lately: deque[float]) -> Callable[[], None]:
     h = dt / world.substeps
 
@@ -317,7 +328,7 @@ def _energy(name: str, world: World, frame: int, dt: float, lately: deque[float]
 
     def look() -> None:
         now, held, stiff = total()
-        if now - most > MOST * size + _of_rounding(world, dt) + _rounded(world, held, stiff):
+        if now - most > MOST * size + _of_rounding(world, dt) + _rounded(world, held, stiff) + _rolled(world, h):
             share = f"{(now - most) / size:.2e} of the scale, " if size else ""
             raise Broken(name, frame, f"up by {share}{now - most:.4g} J")
 
