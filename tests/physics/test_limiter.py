@@ -325,8 +325,8 @@ def test_nothing_is_taken_from_who_a_moving_pinned_circle_has_pushed() -> None:
 
 
 def test_a_crowd_without_room_throws_nobody_about() -> None:
-    # Seven discs of 0.36 times the radius of a cage fill 0.91 of it and have no room (seven of 1/3 have). What pushes raise is
-    # lowered again, into others: without a bound on that they hit the wall at 3,200 m/s, 100 times the speed of a fall through it.
+    # Seven discs of 0.36 times the radius of a cage have no room in it (seven of 1/3 have). What pushes raise is lowered again,
+    # into others: without a bound on that they hit the wall at 1,700 m/s, 50 times the speed of a fall through it.
     gravity, falls = (1.87, 26.4), 10
     rng = np.random.default_rng(3)
     world = pv.World(boundary=pv.Circle(radius=10), gravity=gravity, substeps=32, events=True)
