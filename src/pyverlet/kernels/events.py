@@ -20,3 +20,27 @@ def heard(first, count, pair_i, pair_j, closing, particle, keys, speeds):
                 closing[k] = -1
                 found += 1
     return found
+
+
+@kernel
+def absent(keys, others):
+    """Which of the keys are not among the others; both ascend."""
+    out, at = np.ones(keys.shape[0], np.bool_), 0
+    for k in range(keys.shape[0]):
+        while at < others.shape[0] and others[at] < keys[k]:
+            at += 1
+        out[k] = at == others.shape[0] or others[at] != keys[k]
+    return out
+
+
+@kernel
+def largest(keys, told, speeds):
+    """The largest of the speeds that were told of each of the keys, which ascend; -1 if there is none."""
+    out = np.full(keys.shape[0], -1.0)
+    if keys.shape[0] == 0:
+        return out
+    for k in range(told.shape[0]):
+        at = np.searchsorted(keys, told[k])
+        if at < keys.shape[0] and keys[at] == told[k]:
+            out[at] = max(out[at], speeds[k])
+    return out

@@ -95,17 +95,13 @@ class Events:
         at_wall = slots.hits >= 0
         self._keys.append(slots.particle[at_wall].astype(np.int64) << 32)
         self._speeds.append(slots.hits[at_wall].astype(np.float64))
-        keys, speeds = _numbered(np.concatenate(self._keys), state), np.concatenate(self._speeds)
-        asleep = self._sleeping(slots, state)  # their pairs are not listed, but go on
-        keys, speeds = np.concatenate((keys, asleep)), np.concatenate((speeds, np.full(len(asleep), -1.0)))
-        order = np.argsort(keys)
-        keys, speeds = keys[order], speeds[order]
-        first = np.flatnonzero(np.diff(keys, prepend=-1))
-        keys, speeds = keys[first], np.maximum.reduceat(speeds, first) if len(first) else speeds
-        new = ~_among(keys, self._touching)
-        gone = self._touching[~_among(self._touching, keys)]
+        told, speeds = _numbered(np.concatenate(self._keys), state), np.concatenate(self._speeds)
+        # Those who sleep are not listed, but go on. To sort keys alone takes a third of what it takes to know their order.
+        keys = np.sort(np.concatenate((told, self._sleeping(slots, state))))
+        keys = keys[np.diff(keys, prepend=-1) > 0]
+        new, gone = keys[kernels.absent(keys, self._touching)], self._touching[kernels.absent(self._touching, keys)]
         self.end = _contacts(gone, state)
-        met, speeds = _contacts(keys[new], state), speeds[new]
+        met, speeds = _contacts(new, state), kernels.largest(new, told, speeds)
         self.begin = place.hits(met, speeds, state)
         self.hit = self.begin[speeds >= self._hit_speed]
         self._touching = keys
