@@ -360,7 +360,7 @@ def _momentum(world: World, frame: int, dt: float) -> Callable[[], None]:
     moved, tension, asleep = size(world.velocity), _tension(world), world.asleep
 
     def look() -> None:
-        if (world.asleep & ~asleep).any():  # who falls asleep keeps nothing of what it hardly moved with
+        if (world.asleep != asleep).any():  # who falls asleep keeps nothing of what it hardly moved with, and was in the way
             return
         change = float(np.hypot(*(world.momentum() - before)))
         pulled = dt * max(tension, _tension(world))  # N s, which are rounded too
