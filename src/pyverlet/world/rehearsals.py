@@ -71,9 +71,11 @@ def rehearse(world: World) -> None:
 
 
 def _make_alike(small: World, world: World) -> None:
-    """Of circles as different in mass, and some as elastic and rough, as any."""
+    """Of circles as different in mass, some pinned if any are, and some as elastic and rough, as any."""
     if (masses := world.mass[np.isfinite(world.mass)]).size and masses.max() > UNEVEN * masses.min():
         small.mass[0] *= 2 * UNEVEN
+    if np.isinf(world.mass).any():
+        small.mass[-1] = np.inf
     if len(world):
         small.restitution[0], small.friction[0] = world.restitution.max(), world.friction.max()
 
