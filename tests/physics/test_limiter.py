@@ -322,17 +322,3 @@ def test_nothing_is_taken_from_who_a_moving_pinned_circle_has_pushed() -> None:
     world.run(seconds=1.0)
     assert world.velocity[1] == pytest.approx([4.0, 0.0], rel=1e-6)
     assert world.ledger.limiter == 0.0
-
-
-def test_a_crowd_without_room_throws_nobody_about() -> None:
-    # Seven discs of 0.36 times the radius of a cage have no room in it (seven of 1/3 have). What pushes raise is lowered again,
-    # into others: without a bound on that they hit the wall at 1,700 m/s, 50 times the speed of a fall through it.
-    gravity, falls = (1.87, 26.4), 10
-    rng = np.random.default_rng(3)
-    world = pv.World(boundary=pv.Circle(radius=10), gravity=gravity, substeps=32, events=True)
-    world.add(position=rng.uniform(-4.67, 4.67, (7, 2)), radius=3.6)
-    fastest = 0.0
-    for _ in range(120):
-        world.step(1 / 60)
-        fastest = max(fastest, float(world.events.hit["speed"].max(initial=0.0)))
-    assert fastest < falls * np.sqrt(2 * np.hypot(*gravity) * 20)

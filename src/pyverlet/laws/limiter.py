@@ -11,7 +11,7 @@ links, less the work of gravity and of the forces with a potential, by the trape
 2. The velocities and spins of all in it: its turning, which pushes have changed, and if its momentum is not what it was, what it
    moves with as a whole: then it was not alone, for nothing thrusts itself off nothing.
 3. What circles have been raised against these forces in this frame: they are lowered by a part of that, and have grown by that
-   part less. Not those that a wall has raised because they were beyond it: it would do so again; and none by much in a frame.
+   part less. Not those that a wall has raised because they were beyond it: it would do so again.
 """
 
 from __future__ import annotations
@@ -38,10 +38,6 @@ _NOBODY: Listed = (np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.
 
 _ROUNDED = 1e-5
 """Of what momenta come to without their signs: less is rounding, in float32 by eight substeps of a thousand circles or so."""
-
-_LOWERED = 0.05
-"""Of its radius: a circle is lowered by no more in a frame. In a crowd without room it is lowered into others, and they throw it
-back up; unbounded, that threw circles about at thousands of metres a second."""
 
 _INSIDE = 0.99
 """Of its radius: a circle was inside the room if the point so far below its centre was, the way gravity points."""
@@ -144,7 +140,6 @@ class Watch:
         part = np.minimum(_ratio(left, add(lift)), 1)[cluster]
         strength = np.hypot(*pull.T)
         drop = part * np.minimum(_ratio(lift, strength), np.hypot(*moved.T))  # who is near where a spring pulls to feels little
-        drop = np.minimum(drop, _LOWERED * slots.radius)
         lower = slots.position + _ratio(drop, strength)[:, None] * pull
         if slots.size is not slots.radius:
             slots.grown -= (part * (slots.grown - start.grown[order])).astype(slots.dtype)
