@@ -12,6 +12,8 @@ links, less the work of gravity and of the forces with a potential, by the trape
    moves with as a whole: then it was not alone, for nothing thrusts itself off nothing.
 3. What circles have been raised against these forces in this frame: they are lowered by a part of that, and have grown by that
    part less. Not those that a wall has raised because they were beyond it: it would do so again.
+4. Their way. Where lowering pushes circles into walls, or forces hold them elsewhere, it may not do: those that could not give
+   enough of their motion have come only a part of the way that they have come in this frame.
 """
 
 from __future__ import annotations
@@ -38,6 +40,9 @@ _NOBODY: Listed = (np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.
 
 _ROUNDED = 1e-5
 """Of what momenta come to without their signs: less is rounding, in float32 by eight substeps of a thousand circles or so."""
+
+_NEARLY = 1.01
+"""Times what may be gained: more is too much, which lowering could not take back."""
 
 _INSIDE = 0.99
 """Of its radius: a circle was inside the room if the point so far below its centre was, the way gravity points."""
@@ -92,8 +97,9 @@ class Watch:
                 there = self._mechanical(self._start, (0.0, 0.0)) + abs(self._held)
                 surplus = gained - max(room, SURPLUS * there)
                 if surplus > 0.0 and gained > _rounding(slots):
-                    self.take_back(slots, contacts.listed() if contacts else _NOBODY, surplus)
-                    slots.taken = gained - self._gained(slots)
+                    raised = self.take_back(slots, contacts.listed() if contacts else _NOBODY, surplus)
+                    left = self._put_back(slots, raised, gained - surplus)
+                    slots.taken = gained - left
         if contacts:
             contacts.growth.heed(risen)
 
@@ -103,8 +109,8 @@ class Watch:
         mass = np.where(np.isfinite(then.mass), then.mass, 0).astype(float)
         return _kinetic(mass, then.velocity.astype(float), then.radius, then.spin)
 
-    def take_back(self, slots: Slots, listed: Listed, surplus: float) -> None:
-        """Take so many J from those who have gained in this frame."""
+    def take_back(self, slots: Slots, listed: Listed, surplus: float) -> Array:
+        """Take so many J from those who have gained in this frame. (n,) bool: who had more than could be taken of motion."""
         start, order = self._start, slots.particle
         mass = np.where(slots.inverse_mass > 0, slots.mass, 0).astype(float)
         x, v = slots.position.astype(float), slots.velocity.astype(float)
@@ -145,6 +151,30 @@ class Watch:
             slots.grown -= (part * (slots.grown - start.grown[order])).astype(slots.dtype)
             slots.resize()
         slots.position[:] = self._within_room(slots.position.astype(float), lower, slots.size)
+        return np.asarray((left > 0)[cluster] & taken_from & (strength > 0))
+
+    def _put_back(self, slots: Slots, raised: Array, allowed: float) -> float:
+        """Let `raised` have come only so much of their way in this frame that no more than `allowed` J are gained; return that.
+
+        Ways are straight and rooms convex, so nobody leaves one. Of gravity's work each part of the way has the same part.
+        """
+        left = self._gained(slots)
+        if left <= allowed * _NEARLY or not raised.any():
+            return left
+        start, order = self._start, slots.particle[raised]
+        begin, small = start.position[order].astype(float), start.grown[order]
+        way, growth = slots.seam.nearest(slots.position[raised].astype(float) - begin), slots.grown[raised] - small
+
+        def come(part: float) -> float:
+            slots.position[raised] = begin + part * way
+            slots.grown[raised] = small + slots.real(part) * growth
+            slots.resize()
+            return self._gained(slots)
+
+        none = come(0.0)
+        if none < allowed:
+            left = come((allowed - none) / (left - none))
+        return left if none < allowed and left <= allowed * _NEARLY else come(0.0)
 
     def _pushed(self, slots: Slots, mass: Array, add: _Sums) -> Array:
         """(n,) bool, clusters whose momentum has changed in this frame by more than rounding does."""
