@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parent.parent
 TESTED = ["unit", "equivalence", "physics", "data", "cli", "scenes", "picture", "record"]
 """Folders of tests that need no browser."""
 
-NEEDED = ["pytest>=8.3", "hypothesis>=6.100", "scipy>=1.13", "pytest-xdist>=3.6", "httpx>=0.27"]
+NEEDED = ["pytest>=8.3", "hypothesis>=6.100", "scipy>=1.13", "pytest-xdist>=3.6", "httpx>=0.27", "ase>=3.23"]
 
 GENERIC = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
 
@@ -69,7 +69,7 @@ def environment(folder: Path, python: str, requirements: list[str]) -> Path | No
         "install",
         "--only-binary=numpy,numba,llvmlite",
     ]
-    extras = f"{ROOT}[record,data,page]"
+    extras = f"{ROOT}[record,data,page,plot]"
     done = subprocess.run([*pip, *requirements, *NEEDED, extras], capture_output=True, text=True)
     if done.returncode:
         print("   ", done.stderr.strip().splitlines()[-1])

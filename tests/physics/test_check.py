@@ -33,7 +33,7 @@ SMALLER: dict[str, dict[str, Any]] = {
     "masses": {"particles": 150},
     "radii": {"particles": 150},
     "radii-masses": {"particles": 150},
-    "heavy-on-rough-bed": {"particles": 700, "seconds": 8},
+    "heavy-on-rough-bed": {"seconds": 8},  # fewer are not deep enough: with 700 it sinks to a third of the bed
     "heavy-on-smooth-bed": {"particles": 700, "seconds": 8},
     "ball-in-box": {"steps": 20_000},
 }

@@ -177,3 +177,32 @@ def test_a_hit_says_where_how_and_on_what() -> None:
     assert np.array([hit[5] for hit in hits]) == pytest.approx(points, abs=6 / 60)  # as of the end of the frame
     assert np.array([hit[6] for hit in hits]) == pytest.approx(np.array([(1, 0), (1, 0), (0, -1), (-1, 0)]), abs=1e-6)
     assert [hit[7] for hit in hits] == pytest.approx([1.5 * 18, 1.75 * 6 * 0.75, 2 * 12, 1.8 * 6])
+
+
+@pytest.mark.parametrize("options", [{}, {"sleep": True}, {"dtype": "float64", "boundary": pv.Periodic((-6, -6), (6, 6))}])
+def test_marked_in_the_list_or_by_key_the_same_events(options: dict[str, Any]) -> None:
+    # Where the list of pairs stays, only what has changed in it is sorted; without the marks all that touch is, in every frame.
+    def world() -> pv.World:
+        rng, now = np.random.default_rng(5), pv.World(events=True, **{"boundary": pv.Box((-6, -6), (6, 6)), **options})
+        now.add(position=rng.uniform(-5, 5, (150, 2)), radius=rng.uniform(0.1, 0.4, 150), velocity=rng.normal(0, 3, (150, 2)))
+        return now
+
+    marked, by_key = world(), world()
+    begun, by_marks = 0, 0
+    for frame in range(240):
+        assert by_key._events
+        assert marked._events
+        by_key._events._known = None
+        known = marked._events._known
+        for each in (marked, by_key):
+            if frame == 80:
+                each.add(position=(0, 5.0), radius=0.2)
+            if frame == 120:
+                each.remove(np.arange(len(each)) % 17 == 3)
+            each.step(1 / 60)
+        by_marks += known is not None and marked._events._known is known
+        for name in ("begin", "end", "hit"):
+            np.testing.assert_array_equal(getattr(marked.events, name), getattr(by_key.events, name))
+        begun += len(marked.events.begin)
+    assert begun > 500
+    assert by_marks > 60 or "sleep" in options

@@ -30,6 +30,10 @@ WORTH_LOOKING: Final = 0.3
 REBUILD_PAIRS: Final = 20.0
 """Candidate pairs that contacts solve in a substep in the time in which the list is built anew; all for each particle."""
 
+WORTH_THINNING: Final = 0.3
+"""Pairs for each particle that a step of the skin must spare for a list that is still good to be made anew: heaps at rest notice
+the other order of their pairs, by 1e-6 m g R of 20,000, and would stir for ever for the sake of fewer."""
+
 SAMPLE: Final = 64
 """Every so many pairs of a new list are looked at to tell how many the skin has brought."""
 

@@ -8,18 +8,79 @@ from pyverlet.compile.jit import kernel
 
 
 @kernel
-def heard(first, count, pair_i, pair_j, closing, particle, keys, speeds):
-    """Key (smaller index << 32, larger index + 1) and speed of pairs that have touched; closing becomes -1. Returns how many."""
+def _key(i, j, particle):
+    a, b = np.int64(particle[i]), np.int64(particle[j])
+    return (min(a, b) << 32) + max(a, b) + 1
+
+
+@kernel
+def heard(first, count, pair_i, pair_j, closing, touched, particle, keys, speeds):
+    """Key (smaller index << 32, larger index + 1) and speed of pairs that have touched; closing becomes -1. Returns how many.
+
+    touched: (room,) bool, becomes whether each has.
+    """
     found = 0
     for s in range(first.shape[0]):
         for k in range(first[s], first[s] + count[s]):
-            if closing[k] >= 0:
-                a, b = np.int64(particle[pair_i[k]]), np.int64(particle[pair_j[k]])
-                keys[found] = (min(a, b) << 32) + max(a, b) + 1
+            touched[k] = closing[k] >= 0
+            if touched[k]:
+                keys[found] = _key(pair_i[k], pair_j[k], particle)
                 speeds[found] = closing[k]
                 closing[k] = -1
                 found += 1
     return found
+
+
+@kernel
+def recall(first, count, pair_i, pair_j, touched, particle, keys):
+    """Pairs of these keys, which ascend, have touched, too."""
+    for s in range(first.shape[0]):
+        for k in range(first[s], first[s] + count[s]):
+            if not touched[k]:
+                key = _key(pair_i[k], pair_j[k], particle)
+                at = np.searchsorted(keys, key)
+                touched[k] = at < keys.shape[0] and keys[at] == key
+
+
+@kernel
+def changed(first, count, pair_i, pair_j, closing, touched, particle, new, speeds, gone):
+    """Keys and speeds of pairs that have touched and had not, keys of those that had and have not; closing becomes -1.
+
+    touched: (room,) bool, whether each had, becomes whether it has. Returns how many are new, and gone.
+    """
+    begun = ended = 0
+    for s in range(first.shape[0]):
+        for k in range(first[s], first[s] + count[s]):
+            now = closing[k] >= 0
+            if now != touched[k]:
+                key = _key(pair_i[k], pair_j[k], particle)
+                if now:
+                    new[begun], speeds[begun] = key, closing[k]
+                    begun += 1
+                else:
+                    gone[ended] = key
+                    ended += 1
+                touched[k] = now
+            closing[k] = -1
+    return begun, ended
+
+
+@kernel
+def replaced(keys, gone, new):
+    """The keys without those that are gone, and with the new ones; all ascend. gone: some of them, new: none."""
+    out, at, left = np.empty(keys.shape[0] - gone.shape[0] + new.shape[0], np.int64), 0, 0
+    to = 0
+    for k in range(keys.shape[0]):
+        if left < gone.shape[0] and gone[left] == keys[k]:
+            left += 1
+            continue
+        while at < new.shape[0] and new[at] < keys[k]:
+            out[to] = new[at]
+            at, to = at + 1, to + 1
+        out[to] = keys[k]
+        to += 1
+    out[to:] = new[at:]
+    return out
 
 
 @kernel

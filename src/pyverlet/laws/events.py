@@ -15,6 +15,8 @@ from pyverlet.laws.rooms import Boundary
 from pyverlet.state.state import Slots, State
 
 Array = NDArray[Any]
+Told = tuple[Array, Array, Array]
+"""Keys, sorted, of those who have parted in a frame, who have met, and who touch."""
 
 WALL = -1
 """In the place of b: a wall of the bounds, or an obstacle."""
@@ -52,6 +54,8 @@ class Events:
         self.begin = self.hit = np.empty(0, HIT)
         self.end = np.empty(0, CONTACT)
         self._touching = np.empty(0, np.int64)  # keys, sorted
+        self._at_wall = self._touching  # those of them that are about walls; known where the next is
+        self._known: Array | None = None  # `touched` of the list in which those of the frame before are marked
         self._keys: list[Array] = []
         self._speeds: list[Array] = []
 
@@ -72,17 +76,16 @@ class Events:
 
     def take(self, other: Events) -> None:
         """Remember what the other does."""
-        self._hit_speed, self._touching = other._hit_speed, other._touching
+        self._hit_speed, self._touching, self._known = other._hit_speed, other._touching, None
         self.begin, self.end, self.hit = other.begin, other.end, other.hit
 
     # ---- what the engine tells ---------------------------------------------------------------------------------------
 
     def collect(self, state: Slots, pairs: Wide) -> None:
         """The list of pairs is about to change, or the frame ends: keep what was heard."""
-        room = int(pairs.listed()[1].sum())
+        room, which = len(pairs.closing), pairs.listed()
         keys, speeds = np.empty(room, np.int64), np.empty(room)
-        which = pairs.listed()
-        found = kernels.heard(*which, pairs.closing, state.particle, keys, speeds)
+        found = kernels.heard(*which, pairs.closing, pairs.touched, state.particle, keys, speeds)
         self._keys.append(keys[:found])
         self._speeds.append(speeds[:found])
 
@@ -90,22 +93,51 @@ class Events:
         """A frame begins, or begins again."""
         self._keys, self._speeds = [], []
 
-    def close(self, slots: Slots, state: State, place: Place) -> None:
-        """The frame has gone well: what was heard is what happened; `place`: who and what they met."""
+    def close(self, slots: Slots, state: State, pairs: Wide | None, place: Place) -> None:
+        """The frame has gone well: what was heard is what happened; `pairs`: the list of now; `place`: who and what they met."""
         at_wall = slots.hits >= 0
-        self._keys.append(slots.particle[at_wall].astype(np.int64) << 32)
-        self._speeds.append(slots.hits[at_wall].astype(np.float64))
-        told, speeds = _numbered(np.concatenate(self._keys), state), np.concatenate(self._speeds)
-        # Those who sleep are not listed, but go on. To sort keys alone takes a third of what it takes to know their order.
-        keys = np.sort(np.concatenate((told, self._sleeping(slots, state))))
-        keys = keys[np.diff(keys, prepend=-1) > 0]
-        new, gone = keys[kernels.absent(keys, self._touching)], self._touching[kernels.absent(self._touching, keys)]
-        self.end = _contacts(gone, state)
-        met, speeds = _contacts(new, state), kernels.largest(new, told, speeds)
+        walls, wall_speeds = slots.particle[at_wall].astype(np.int64) << 32, slots.hits[at_wall].astype(float)
+        if pairs and pairs.touched is self._known and not (self._keys or len(slots.asleep)):
+            told, speeds = self._compare_pairs(slots, state, pairs, walls, wall_speeds)
+        else:
+            told, speeds = self._compare_keys(slots, state, pairs, walls, wall_speeds)
+        gone, new, self._touching = told
+        self.end, met = _contacts(gone, state), _contacts(new, state)
         self.begin = place.hits(met, speeds, state)
         self.hit = self.begin[speeds >= self._hit_speed]
-        self._touching = keys
         self.forget()
+
+    def _compare_pairs(self, slots: Slots, state: State, pairs: Wide, walls: Array, wall_speeds: Array) -> tuple[Told, Array]:
+        """The list is that of the frame before, where those who touched are marked: few have changed, and are sorted."""
+        room = len(pairs.closing)
+        new, speeds, gone = np.empty(room, np.int64), np.empty(room), np.empty(room, np.int64)
+        which = pairs.listed()
+        begun, ended = kernels.changed(*which, pairs.closing, pairs.touched, slots.particle, new, speeds, gone)
+        told = _numbered(np.concatenate((new[:begun], walls)), state)
+        walls, before = np.sort(told[begun:]), self._at_wall
+        self._at_wall = walls
+        left = np.unique(np.concatenate((_numbered(gone[:ended], state), before[kernels.absent(before, walls)])))
+        come = np.unique(np.concatenate((told[:begun], walls[kernels.absent(walls, before)])))
+        now = kernels.replaced(self._touching, left, come) if len(left) or len(come) else self._touching
+        return (left, come, now), kernels.largest(come, told, np.concatenate((speeds[:begun], wall_speeds)))
+
+    def _compare_keys(
+        self, slots: Slots, state: State, pairs: Wide | None, walls: Array, wall_speeds: Array
+    ) -> tuple[Told, Array]:
+        """The list is another, or circles sleep, who are not in it: all that touch are sorted and compared with those before."""
+        earlier = np.sort(np.concatenate(self._keys)) if self._keys else self._touching[:0]
+        if pairs:
+            self.collect(slots, pairs)
+            if len(earlier):
+                kernels.recall(*pairs.listed(), pairs.touched, slots.particle, earlier)
+        self._known = pairs.touched if pairs else None
+        told = _numbered(np.concatenate((*self._keys, walls)), state)
+        # Those who sleep are not listed, but go on. To sort keys alone takes a third of what it takes to know their order.
+        now = np.sort(np.concatenate((told, self._sleeping(slots, state))))
+        now = now[np.diff(now, prepend=-1) > 0]
+        self._at_wall = now[(now & _LOWER) == 0]
+        gone, new = self._touching[kernels.absent(self._touching, now)], now[kernels.absent(now, self._touching)]
+        return (gone, new, now), kernels.largest(new, told, np.concatenate((*self._speeds, wall_speeds)))
 
     def _sleeping(self, slots: Slots, state: State) -> Array:
         """Those of the contacts of the frame before whose circles sleep."""
@@ -129,23 +161,26 @@ class Place(NamedTuple):
             found[name] = column
         at_wall = met["b"] == WALL
         pair, single = np.flatnonzero(~at_wall), np.flatnonzero(at_wall)
-        x, r = state.position.astype(float), state.radius.astype(float)
-        with np.errstate(divide="ignore"):
-            inverse = 1 / state.mass.astype(float)
-        e = state.restitution.astype(float)
+
+        def of(values: Array, who: Array) -> Array:
+            return values[who].astype(float)
+
         if len(pair):
             a, b = met["a"][pair], met["b"][pair]
-            way = self.room.seam.nearest(x[b] - x[a])
+            x, y, r, s = of(state.position, a), of(state.position, b), of(state.radius, a), of(state.radius, b)
+            way = self.room.seam.nearest(y - x)
             far = np.hypot(*way.T)
             normal = way / np.maximum(far, 1e-300)[:, None]
-            both = np.maximum(*(np.where(e[k] >= 0, e[k], self.restitution) for k in (a, b)))
-            weight = inverse[a] + inverse[b]
-            self._write(found, pair, x[a] + (r[a] + 0.5 * (far - r[a] - r[b]))[:, None] * normal, normal, both, weight)
+            e, other = of(state.restitution, a), of(state.restitution, b)
+            both = np.maximum(np.where(e >= 0, e, self.restitution), np.where(other >= 0, other, self.restitution))
+            weight = 1 / of(state.mass, a) + 1 / of(state.mass, b)
+            self._write(found, pair, x + (r + 0.5 * (far - r - s))[:, None] * normal, normal, both, weight)
         if len(single):
             a = met["a"][single]
-            gap, into, surface = self._nearest(x[a], found, single)
-            both = np.maximum(surface, np.where(e[a] >= 0, e[a], 0.0))
-            self._write(found, single, x[a] - gap[:, None] * into, -into, both, inverse[a])
+            x, e = of(state.position, a), of(state.restitution, a)
+            gap, into, surface = self._nearest(x, found, single)
+            both = np.maximum(surface, np.where(e >= 0, e, 0.0))
+            self._write(found, single, x - gap[:, None] * into, -into, both, 1 / of(state.mass, a))
         return found
 
     def _write(self, found: Array, rows: Array, point: Array, normal: Array, e: Array, weight: Array) -> None:

@@ -231,9 +231,8 @@ class World(Measures, Queries, Doors):
         self._course.end(dt)
         self.links.scatter()
         if self._events:
-            if self._contacts:
-                self._contacts.collect(self._slots)
-            self._events.close(self._slots, self._state, self._place())
+            pairs = self._contacts.heard() if self._contacts else None
+            self._events.close(self._slots, self._state, pairs, self._place())
         self.profile.mark("scatter")
         self.time, self.frames, self._h_last = self.time + dt, self.frames + 1, h
         self._coarse.look(self, h)

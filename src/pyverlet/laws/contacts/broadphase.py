@@ -23,6 +23,7 @@ from pyverlet.ground.constants import (
     SKIN_STEP,
     UNSORTED,
     WORTH_LOOKING,
+    WORTH_THINNING,
 )
 from pyverlet.kernels import pairs as kernels
 from pyverlet.laws.contacts.crowd import Crowd, free_skin
@@ -193,6 +194,7 @@ class _SortedCells(BroadPhase):
         self._age = 0  # substeps the list has lasted
         self._excess = 0.0  # pairs for each particle that a skin smaller by SKIN_STEP would not list
         self._hold = 0  # rebuilds before the skin may grow again
+        self._outlived = False  # whether pairs listed for nothing have cost what a list costs: all have come to rest, say
         self._allowed = -1.0  # distance anyone may move from `_checked` before we look closer, m; negative: rebuild now
         self._mean_radius = 0.0  # m; 0: not known. Its last bit depends on the order of the slots, so it is saved, too
         self.built = self._checked = np.empty((0, 2), dtype)
@@ -204,7 +206,7 @@ class _SortedCells(BroadPhase):
         self._age += 1
         known, self.strayed = self.strayed, None
         if self._allowed >= 0:
-            if self._still_good(state, known):
+            if not self._outlived and self._still_good(state, known):
                 return
             if self._adapts:
                 self._adapt()
@@ -222,6 +224,8 @@ class _SortedCells(BroadPhase):
         return Strips(self._held, self._checked, self._allowed, in_order)
 
     def follow(self, state: Slots) -> None:
+        # Looked at between frames only: within one they are gone through in different ways, which must give the same bits.
+        self._outlived = self._adapts and self._excess > WORTH_THINNING and self._excess * self._age > REBUILD_PAIRS
         if not state.seam or self._allowed < 0:
             return
         state.seam.follow(state.position, self._checked)
@@ -278,7 +282,7 @@ class _SortedCells(BroadPhase):
         if self.replacing:
             self.replacing()
         self.rebuilds += 1
-        self._age, self._allowed = 0, -1.0  # until it is done: somebody may break it off
+        self._age, self._outlived, self._allowed = 0, False, -1.0  # until it is done: somebody may break it off
         if not self._mean_radius:
             self._mean_radius = float(state.radius.mean(dtype=np.float64))
         crowd = self._sort(state)

@@ -79,14 +79,13 @@ class ContactSolver:
         self._packed = False
         self._uneven = False  # whether masses differ so much that contacts need loans of inertia
         self._lends = False  # in this substep
-        self._events = events
         self._sleep = sleep
         self._slips = Slips(dtype)
         self._loans = Loans(dtype)
         self.growth, self._pegs = Growth(), Pegs()
         self.broad_phase.replacing = self._slips.stop
         if events is not None:
-            self.broad_phase.renewing = lambda state, pairs: self.collect(state)
+            self.broad_phase.renewing = lambda state, pairs: self._collect(state, events)
 
     def fit(self, state: Slots) -> None:
         """Let particles that were added on top of others start smaller."""
@@ -112,10 +111,14 @@ class ContactSolver:
             self.broad_phase.renew(state)
             self._list(state)
 
-    def collect(self, state: Slots) -> None:
+    def _collect(self, state: Slots, events: Events) -> None:
         """Tell the events who has met, and how fast."""
-        if self._events is not None and self._packed:
-            self._events.collect(state, self._wide)
+        if self._packed:
+            events.collect(state, self._wide)
+
+    def heard(self) -> Wide | None:
+        """The list in which is noted who has met since it was made, if there is one."""
+        return self._wide if self._packed else None
 
     def _list(self, state: Slots) -> None:
         self.broad_phase.update(state)

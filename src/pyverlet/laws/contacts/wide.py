@@ -42,6 +42,7 @@ class Wide:
         normal: (2, room) of pairs that touch, for others 0. depth: (room,) their overlap, m.
         slip: (room,) what contacts have slipped, m.
         closing: (room,) largest speed of approach since the last `collect`, m/s; negative: has not touched.
+        touched: (room,) bool, whether pairs have in the frame before, as events mark it.
         spent: (strips, 3) J that impacts, and friction, have taken in this frame, negative; and the virial of contacts: sum of
             what pushes each pair apart times their distance, N s m.
         weighs: whether that is asked for.
@@ -78,6 +79,7 @@ class Wide:
         self.gap, self.normal = memory.empty((2, lanes), self._dtype), np.empty((2, 0), self._dtype)
         self._deep = np.empty(lanes // LANES, np.int64)
         self.depth = self.slip = self.closing = np.empty(0, self._dtype)
+        self.touched = np.zeros(0, bool)
 
     def _hold_circles(self, count: int) -> None:
         """Room for what contacts that may bounce or rub note of circles."""
@@ -110,7 +112,7 @@ class Wide:
         spent, self.spent = self.spent.sum(axis=0), np.zeros((max(len(self.lanes), 1), 3))
         self.spent[0] = spent
         if self._listens:
-            self.closing = np.full(len(self.lane_i), -1, self._dtype)
+            self.closing, self.touched = np.full(len(self.lane_i), -1, self._dtype), np.zeros(len(self.lane_i), bool)
 
     def cut(self) -> Array:
         """(2, threads + 1): even and odd strips, each cut into as many parts of as nearly the same number of lanes as can be.
