@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from typing import Any
 
 import numpy as np
@@ -231,6 +232,16 @@ def test_a_force_of_ones_own_is_asked_in_every_substep(fusing: Fusing) -> None:
     assert same(world, changed(thrust, fusing))
 
 
+@pv.force
+def gust(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tuple[float, float]:
+    return 5.0 * mass * math.sin(9.0 * t + 0.1 * y), 0.0
+
+
+@pv.force
+def whirl(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tuple[float, float]:
+    return -0.5 * y - 0.1 * vx, 0.5 * x - 0.1 * vy
+
+
 def below(world: pv.World) -> float:
     """Where its lowest circles are."""
     return float(world.position[:, 1].min())
@@ -244,8 +255,10 @@ def below(world: pv.World) -> float:
         lambda world: world.forces.extend([pv.PointSpring(stiffness=3), pv.ConstantForce((1, 2)), pv.Attractor(strength=5)]),
         lambda world: world.obstacles.append(pv.Segment((-9, below(world)), (9, below(world) + 1), restitution=0.3)),
         lambda world: (world.obstacles.append(pv.Disc((0, below(world)), 1)), world.forces.append(pv.Drag(quadratic=0.1))),
+        lambda world: world.forces.append(gust),
+        lambda world: world.forces.extend([whirl, pv.Drag(linear=0.1), gust]),
     ],
-    ids=["drag", "wind", "three forces", "segment", "disc and drag"],
+    ids=["drag", "wind", "three forces", "segment", "disc and drag", "function", "functions and drag"],
 )
 @pytest.mark.parametrize("mu", [0.0, 0.5])
 def test_forces_of_few_numbers_and_obstacles_that_stand_still_go_along(change: Any, mu: float, fusing: Fusing) -> None:

@@ -205,6 +205,30 @@ def test_a_wrong_function_is_named_with_its_file_and_line(function: Callable[...
     world.step(1 / 60)
 
 
+def late(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
+    if t > 0.05 and x > 1:
+        raise ValueError("too late")
+    return 0.0, math.sqrt(0.06 - t) if x < -1 else 0.0
+
+
+def test_a_function_that_fails_in_the_midst_of_a_frame_loses_nothing() -> None:
+    # Compiled code has called it for substeps on end: the frame is gone through again, one by one, to say where and when.
+    world = pv.World(boundary=pv.Circle(radius=5))
+    world.forces += [pv.Drag(linear=0.1), pv.force(late)]
+    world.add(position=[(-2, 0), (0, 0), (2, 0)], radius=0.5)
+    for _ in range(3):
+        world.step(1 / 60)
+    before = world.state_hash()
+    with pytest.raises(
+        pv.NonFiniteError, match=r"force 'late' \(.*\) raised ValueError \(too late\) for particle 2 .*t = 0\.052"
+    ):
+        world.step(1 / 60)
+    assert world.state_hash() == before
+    world.forces.clear()
+    world.step(1 / 60)
+    assert np.isfinite(world.position).all()
+
+
 def test_other_arguments_are_refused_at_once() -> None:
     with pytest.raises(
         pv.InputError, match=r"force '<lambda>' \(.*, line \d+\) takes \(x, y\); allowed are the arguments \(x, y, vx"

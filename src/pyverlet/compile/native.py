@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numba
@@ -72,9 +72,7 @@ class Native:
                     wrong += int(free and not fine and (ax - ax) + (ay - ay) + (vx - vx) + (vy - vy) == 0.0)
                 return wrong
 
-            rows, column = types.Array(numba.from_dtype(dtype), 2, "C"), types.Array(numba.from_dtype(dtype), 1, "C")
-            kind = types.int64(rows, rows, rows, column, _REAL)
-            self._forces[dtype] = numba.cfunc(kind, error_model="numpy")(loop)
+            self._forces[dtype] = numba.cfunc(_of(dtype), error_model="numpy")(loop)
         return self._forces[dtype]
 
     @cached_property
@@ -87,6 +85,22 @@ class Native:
             return value if fine else np.nan
 
         return numba.cfunc(_REAL(_REAL, _REAL, _REAL), error_model="numpy")(one)
+
+
+def _of(dtype: np.dtype[Any]) -> Any:
+    """The type of a loop over particles: force, position, velocity, mass, t."""
+    rows, column = types.Array(numba.from_dtype(dtype), 2, "C"), types.Array(numba.from_dtype(dtype), 1, "C")
+    return types.int64(rows, rows, rows, column, _REAL)
+
+
+@lru_cache(maxsize=64)
+def both(first: Any, second: Any, dtype: np.dtype[Any]) -> Any:
+    """One loop of two, both of which `Native.force` or this have made: the first, then the second."""
+
+    def loop(force, position, velocity, mass, t):  # type: ignore[no-untyped-def]
+        return first(force, position, velocity, mass, t) + second(force, position, velocity, mass, t)
+
+    return numba.cfunc(_of(dtype), error_model="numpy")(loop)
 
 
 def _attempt(compiled: Any, parts: list[Any]) -> Any:

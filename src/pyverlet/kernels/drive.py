@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.compile.jit import kernel, parallel_kernel, prange, variant
 from pyverlet.kernels.forces import attract, drag
 from pyverlet.kernels.motion import add_scaled, any_strayed, kick_drift, newton_block, set_out
 
@@ -17,6 +17,9 @@ centre, (strength, softening)."""
 
 NUMBERS = 2
 """Each has, of which some need fewer."""
+
+CALLS = False
+"""Whether there are functions of the user's own."""
 
 _BLOCK = 2048
 """Particles that one thread takes at a time."""
@@ -54,34 +57,42 @@ def _add_up(force, position, velocity, inverse_mass, h, kind, vector, number, pe
             attract(force, position, inverse_mass, x, y, first, second, period_x, period_y)
 
 
-@kernel
 def _some(
-    position, velocity, acceleration, inverse_mass, kind, vector, number, force, period_x, period_y, gx, gy, h, ahead, a, b
+    position, velocity, acceleration, inverse_mass, mass, kind, vector, number, force, period_x, period_y, gx, gy, h, ahead,
+    function, t, a, b,
 ):  # fmt: skip
-    """Of the particles from a up to b; the square of the largest acceleration."""
+    """Of the particles from a up to b; the square of the largest acceleration.
+
+    Where the user's function fails the first of them is nowhere: the frame is then gone through again by who can say why.
+    """
     x, v, felt, pushed, light = position[a:b], velocity[a:b], acceleration[a:b], force[a:b], inverse_mass[a:b]
-    if kind.shape[0] == 0:  # gravity alone: links have pulled, and that is not felt again
+    wrong = 0
+    if kind.shape[0] == 0 and not CALLS:  # gravity alone: links have pulled, and that is not felt again
         pushed = force[:0]
     else:
         if ahead != 0:
             add_scaled(v, felt, ahead)
         _add_up(pushed, x, v, light, h, kind, vector, number, period_x, period_y)
+        if CALLS:
+            wrong = function(pushed, x, v, mass[a:b], t)
         if ahead != 0:
             add_scaled(v, felt, -ahead)
     largest = newton_block(felt, pushed, light, gx, gy)
     kick_drift(x, v, felt, h)
+    if wrong > 0:
+        x[0, 0] = np.nan
     return largest
 
 
-@parallel_kernel
-def drive(
-    position, velocity, acceleration, inverse_mass, kind, vector, number, force, period_x, period_y, gx, gy, h, ahead, reference,
-    square, origin, moved,
+def _drive(
+    position, velocity, acceleration, inverse_mass, mass, kind, vector, number, force, period_x, period_y, gx, gy, h, ahead,
+    reference, square, origin, moved, function, t,
 ):  # fmt: skip
     """What `motion.leap` does after all forces have been asked: v += h a, x += h v, moved = x - origin.
 
     kind: (k,) of the constants above; vector: (k, 2), number: (k, NUMBERS), in the dtype of the world. force: (n, 2) N, becomes
-    their sum. ahead: s, by which velocities are kicked for forces to see. reference, square: as for `motion.leap`.
+    their sum. ahead: s, by which velocities are kicked for forces to see. reference, square: as for `motion.leap`. mass: kg.
+    function: what `compile.native` makes of the user's functions, for the time t, s; nothing if there are none.
 
     Returns the largest acceleration, m/s^2, and whether anyone has strayed.
     """
@@ -91,11 +102,17 @@ def drive(
         a, b = block * _BLOCK, min((block + 1) * _BLOCK, inverse_mass.shape[0])
         largest = max(
             largest,
-            _some(
-                position, velocity, acceleration, inverse_mass, kind, vector, number, force, period_x, period_y, gx, gy, h, ahead,
-                a, b,
+            some(
+                position, velocity, acceleration, inverse_mass, mass, kind, vector, number, force, period_x, period_y, gx, gy, h,
+                ahead, function, t, a, b,
             ),
         )  # fmt: skip
         found += int(any_strayed(where, start, a, b, square))
         set_out(position[a:b], origin[a:b], moved[a:b])
     return np.sqrt(largest), found > 0
+
+
+some = kernel(variant(_some, "some"))
+drive = parallel_kernel(variant(_drive, "drive", some=some))
+some_called = kernel(variant(_some, "some_called", CALLS=True))
+drive_called = parallel_kernel(variant(_drive, "drive_called", some=some_called))

@@ -19,7 +19,7 @@ from pyverlet.ground.constants import CARRIED_WEIGHT, REST_ACCELERATIONS
 from pyverlet.kernels.bounds import box
 from pyverlet.kernels.cage import confine as confine_in_cage
 from pyverlet.kernels.cage import hold
-from pyverlet.kernels.drive import drive
+from pyverlet.kernels.drive import drive, drive_called
 from pyverlet.kernels.kinds import for_each_kind
 from pyverlet.kernels.lending import Lending, Terms, even_up, join, leave_out, lend, set_aside, settle
 from pyverlet.kernels.linked import Linked, Linking, look, look_alone, note_pull, note_pull_alone, solve, solve_alone
@@ -40,8 +40,8 @@ INTEGRATED, TOUCHED, JOINED, STILLED, PULLED = range(5)
 LOOKS = 5
 """At the energy in a substep: where a ledger looks."""
 
-SERVED = LINKED = False
-"""Whether there may be more in a world than circles, a room and gravity: `Services`; links."""
+SERVED = LINKED = CALLS = False
+"""Whether there may be more in a world than circles, a room and gravity: `Services`; links; functions of the user's own."""
 
 BESIDE: dict[str, dict[str, Any]] = {
     "": {},
@@ -49,6 +49,7 @@ BESIDE: dict[str, dict[str, Any]] = {
     "linked": {"SERVED": True, "LINKED": True},
     "few_linked": {"SERVED": True, "LINKED": True, "look": look_alone, "solve": solve_alone, "note_pull": note_pull_alone},
 }
+BESIDE |= {f"{name}_called": {**what, "CALLS": True, "drive": drive_called} for name, what in BESIDE.items() if name}
 """Frames are compiled for each of these. Links so few that it does not pay stay on one thread where circles use several."""
 
 NORMAL = fields(Pairs).index("normal")
@@ -77,7 +78,7 @@ class Services(NamedTuple):
     drop). mass: (n,) kg. energies: (substeps, LOOKS) J, becomes what `measure.mechanical` says after the integration of each
     substep, but of the first and of the one that is handed back, and after its contacts, links and so on; without links at its
     end only. links: what `kernels.linked` takes, its arrays and numbers, where there are any; loans: what
-    `kernels.lending` takes; empty where nobody lends.
+    `kernels.lending` takes; empty where nobody lends. began: when the frame did, s.
     """
 
     h: Any
@@ -91,6 +92,7 @@ class Services(NamedTuple):
     energies: Any
     links: Any
     loans: Any
+    began: Any
 
 
 @kernel
@@ -165,11 +167,12 @@ def _still(circles, pairs, law, cut, marks, claims):
 
 
 def _substeps(
-    substep, stop, last, circles, pairs, law, room, services, cut, looks, sets_out, checked, far, claims, spent, clock
+    substep, stop, last, circles, pairs, law, room, services, function, cut, looks, sets_out, checked, far, claims, spent, clock
 ):  # fmt: skip
     """From after the integration of `substep`, whose list of pairs is good, up to the end of substep `stop` - 1.
 
     last: the substep whose end is that of the frame. circles, pairs, law: `kernels.tables`. services: `Services`, or nothing.
+    function: what the user's functions of forces have become, by itself, for Numba is slow to tell the type of what holds one.
     looks, sets_out: as for `push`, in the first substep. checked, far: as for `leap`. spent, clock: as for `note`, (address,
     tick).
 
@@ -234,10 +237,11 @@ def _substeps(
         if LINKED:
             look(linked, linking, circles.position, circles.velocity, circles.inverse_mass)
             note(spent, LINKS, clock[0], clock[1])
-        if LINKED or (SERVED and kind.shape[0] > 0):  # what links have pulled is not felt again
+        if LINKED or CALLS or (SERVED and kind.shape[0] > 0):  # what links have pulled is not felt again
             strongest, strayed = drive(
-                circles.position, circles.velocity, circles.acceleration, circles.inverse_mass, kind, vector, number, force,
-                period_x, period_y, gx, gy, law.h, services.ahead, checked, far, circles.origin, circles.moved,
+                circles.position, circles.velocity, circles.acceleration, circles.inverse_mass, mass, kind, vector, number, force,
+                period_x, period_y, gx, gy, law.h, services.ahead, checked, far, circles.origin, circles.moved, function,
+                services.began + substep * services.h,
             )  # fmt: skip
             law = _felt(law, strongest, services.h, circles.position)
         else:

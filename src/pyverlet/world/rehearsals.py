@@ -50,7 +50,9 @@ def rehearse(world: World) -> None:
         small.obstacles.append(Segment((0, 0), (1, 0)))
         small.is_free((0, 0))
     known = Slots(world.dtype)
-    small.forces.extend(force for force in _ours(world) if (row := getattr(force, "compiled", None)) and row(known))
+    for force in _ours(world):
+        if (row := getattr(force, "compiled", None) or getattr(force, "native", None)) and row(known):
+            small.forces.append(force)
     _make_alike(small, world)
     _use(small)
     if world.collisions:  # stage by stage, as beside pegs or moving obstacles

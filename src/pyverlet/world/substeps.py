@@ -81,22 +81,25 @@ class Substeps:
         if smooth := walls == frame.SMOOTH_CAGE and not (links or lends):
             wide.leave_arriving()
         # Who rests is a question of all that pulls: links do so after the circles.
-        last, rows = -1 if links else world.substeps - 1, forces.compiled(state)
+        last, known = -1 if links else world.substeps - 1, forces.compiled(state)
         # Who looks on may turn gravity, and see what a ledger sees.
-        leaps = world.integrator.leaps and rows is not None and not world.onlooker
-        beside = "served" * bool(course or books or lends or (leaps and rows))
+        leaps = world.integrator.leaps and known is not None and not world.onlooker
+        rows, native = known if leaps and known else ((), None)
+        beside = "served" * bool(course or books or lends or rows or native)
         if links:
             beside = "few_linked" if world.links.stand_back else "linked"
+        if native:
+            beside += "_called"
         if smooth and not (beside or wide.asks) and len(state) >= FUSED_FROM and strips.in_order:
             return self._strip_by_strip(world, contacts, wide, strips, shape, substep, leaps=leaps)
-        services: Any = self._services(world, books, rows if leaps else (), links, loans, h, lag) if beside else ()
+        services: Any = self._services(world, books, rows, links, loans, h, lag) if beside else ()
         stop, looks, sets_out = world.substeps if leaps else substep + 1, wide.takes_looks(), lends or out is not wide.moved
         reached, self.leapt, strongest = frame.frames[beside][wide.kind](
-            substep, stop, last, wide.circles, wide.arrays, wide.law, (walls, *map(state.real, shape)), services, wide.cut(),
-            looks, int(sets_out), strips.checked, state.real(strips.allowed * strips.allowed), state.claims(),
+            substep, stop, last, wide.circles, wide.arrays, wide.law, (walls, *map(state.real, shape)), tuple(services), native or (),
+            wide.cut(), looks, int(sets_out), strips.checked, state.real(strips.allowed * strips.allowed), state.claims(),
             world.profile.spent, (clock.address(), clock.tick()),
         )  # fmt: skip
-        if leaps and rows and (self.leapt or reached > substep + 1):
+        if (rows or native) and (self.leapt or reached > substep + 1):
             forces.strongest, forces.t = float(strongest), world.time + (reached - (not self.leapt)) * h
         if books:
             books.read(services.energies, substep, reached)
@@ -122,7 +125,7 @@ class Substeps:
         return frame.Services(
             h, lag, state.reals(*gravity), gravity, (*self._table, state.force, *state.reals(*state.seam.period)),
             state.real(ahead), world._course.compiled(state, world.boundary), state.mass,
-            np.empty((world.substeps if books else 0, frame.LOOKS)), links, loans,
+            np.empty((world.substeps if books else 0, frame.LOOKS)), links, loans, world.time,
         )  # fmt: skip
 
     def _strip_by_strip(

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from functools import reduce
+from typing import Any, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 from numpy.typing import NDArray
 
+from pyverlet.compile.native import both
 from pyverlet.ground.errors import InputError
 from pyverlet.state.moves import newton, newton_kick_drift
 from pyverlet.state.state import Slots, State
@@ -29,6 +31,13 @@ class Conservative(Protocol):
 
 Row = tuple[int, tuple[float, float], tuple[float, float]]
 """A force by the numbers of `kernels.drive`: kind, vector, numbers."""
+
+
+class Known(NamedTuple):
+    """Forces as compiled code needs to know them: those of a few numbers, and a loop of the user's functions, if any."""
+
+    rows: tuple[Row, ...]
+    native: Any
 
 
 @runtime_checkable
@@ -86,15 +95,19 @@ class ForceSum:
         """Evaluate, take back a kick of `ahead` seconds, then velocity += h * acceleration, then position += h * velocity."""
         self.strongest = newton_kick_drift(state, self._summed(state, t), self.gravity, h, ahead)
 
-    def compiled(self, state: Slots) -> tuple[Row, ...] | None:
-        """All forces as rows that compiled code adds up by itself; None: one of them has to be asked."""
-        rows = []
+    def compiled(self, state: Slots) -> Known | None:
+        """All forces as compiled code adds them up by itself; None: one of them has to be asked."""
+        rows, natives = [], []
         for force in self.forces:
-            row = getattr(force, "compiled", None)
-            if row is None or (known := row(state)) is None:
+            if native := getattr(force, "native", None):
+                natives.append(native(state))
+            elif row := getattr(force, "compiled", None):
+                rows.append(row(state))
+            else:
                 return None
-            rows.append(known)
-        return tuple(rows)
+        if None in rows or None in natives:
+            return None
+        return Known(tuple(rows), reduce(lambda a, b: both(a, b, state.dtype), natives) if natives else None)
 
     def _summed(self, state: Slots, t: float) -> NDArray[Any]:
         """The sum of all forces but gravity (n, 2), N; (0, 2) if there are none."""
@@ -102,6 +115,11 @@ class ForceSum:
             return state.acceleration[:0]
         self.t = t
         state.force.fill(0)
-        for force in self.forces:
+        for force in sorted(self.forces, key=_is_function) if len(self.forces) > 1 else self.forces:
             force.apply(state, t)
         return state.force
+
+
+def _is_function(force: Any) -> bool:
+    """Functions of the user's own come after those that are known by numbers: compiled code, too, adds them up in this order."""
+    return hasattr(force, "native")

@@ -44,6 +44,10 @@ class FunctionForce:
         if forces.call(native, state.force, where, state.velocity, state.mass, float(t)):
             self._blame(state, t)
 
+    def native(self, state: Slots) -> Any:
+        """What `kernels.drive` calls, block by block; None: it has to be asked, for it sees one image of each place only."""
+        return None if state.seam else self._code.native().force(state.dtype)
+
     def _blame(self, state: Slots, t: float) -> None:
         """Find the first particle it fails for, and say what it did there."""
         for particle in range(len(state)):
