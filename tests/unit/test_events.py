@@ -179,6 +179,19 @@ def test_a_hit_says_where_how_and_on_what() -> None:
     assert [hit[7] for hit in hits] == pytest.approx([1.5 * 18, 1.75 * 6 * 0.75, 2 * 12, 1.8 * 6])
 
 
+@pytest.mark.parametrize("room", [pv.Box((-6, -6), (6, 6)), pv.Circle(radius=7, restitution=0.5)])
+@pytest.mark.parametrize("collisions", [pv.Collisions(), pv.Collisions(restitution=0.5, friction=0.5)])
+def test_to_listen_changes_no_bit(room: pv.Boundary, collisions: pv.Collisions) -> None:
+    hashes = set()
+    for listens in (False, True):
+        rng = np.random.default_rng(1)
+        world = pv.World(boundary=room, collisions=collisions, events=listens)
+        world.add(position=rng.uniform(-4, 4, (150, 2)), radius=rng.uniform(0.1, 0.4, 150), velocity=rng.normal(0, 3, (150, 2)))
+        world.run(seconds=3)
+        hashes.add(world.state_hash())
+    assert len(hashes) == 1
+
+
 @pytest.mark.parametrize("options", [{}, {"sleep": True}, {"dtype": "float64", "boundary": pv.Periodic((-6, -6), (6, 6))}])
 def test_marked_in_the_list_or_by_key_the_same_events(options: dict[str, Any]) -> None:
     # Where the list of pairs stays, only what has changed in it is sorted; without the marks all that touch is, in every frame.

@@ -38,12 +38,19 @@ from pyverlet.compile.lanes import (
 from pyverlet.compile.rows import put_four, take_four
 from pyverlet.ground.constants import DEEP_PART, DEEP_SWEEPS, FED, GRIP, LARGEST_PUSH, PUSHED
 from pyverlet.kernels.bounce import slow_lanes, treat
-from pyverlet.kernels.kinds import BOUNCES, RUBS, for_each_kind
+from pyverlet.kernels.kinds import BOUNCES, LISTENS, RUBS, for_each_kind
 from pyverlet.kernels.motion import IN_PILE
 from pyverlet.kernels.tables import MASS, MU, NEW, R_I, R_J, TURN_I, TURN_J, E
 
 ANSWER = -GRIP * PUSHED / (3.0 * FED)
 """Of what a contact has slipped: the push along the tangent that answers it."""
+
+
+@kernel
+def _hear(heard, k, touching, closing, distance):
+    """Note how fast those meet that touch, of the eight pairs from k on, if it is faster than before."""
+    before, none = load(heard, k), closing - closing
+    store(heard, k, where_set(touching, larger(before, larger(closing / distance, none)), before))
 
 
 def _push_strip(s, to, circles, pairs, law, looks):
@@ -75,6 +82,10 @@ def _push_strip(s, to, circles, pairs, law, looks):
             continue
         done, at = 0, k * law.mixed
         mu = zero
+        if LISTENS and not BOUNCES and touching != 0:
+            vxi, vyi = take(velocity, lane_i, k)
+            vxj, vyj = take(velocity, lane_j, k)
+            _hear(heard, k, touching, zero - (dx * (vxj - vxi) + dy * (vyj - vyi)), where_zero(distance, r, distance))
         if BOUNCES:
             e, mu = load(made_of[E], at), load(made_of[MU], at)
             if RUBS:
@@ -91,9 +102,7 @@ def _push_strip(s, to, circles, pairs, law, looks):
                 vxj, vyj = take(velocity, lane_j, k)
                 closing = zero - (dx * (vxj - vxi) + dy * (vyj - vyi))
                 if law.listens != 0:
-                    speed = larger(closing / where_zero(distance, r, distance), zero)
-                    before = load(heard, k)
-                    store(heard, k, where_set(touching, larger(before, speed), before))
+                    _hear(heard, k, touching, closing, where_zero(distance, r, distance))
                 slow = slow_lanes(calm, lane_i, lane_j, k, rest)
                 done = live & (which_above(free * larger(closing, zero - closing), slow * distance) | restless)
                 if done != 0:

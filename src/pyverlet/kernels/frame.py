@@ -101,7 +101,7 @@ def _felt(law, strongest, h, position):
     g, real = np.float64(strongest), position.dtype.type
     carried = CARRIED_WEIGHT * g * h if g > 0 else np.inf
     return Law(
-        law.varied, law.mixed, law.asks, law.rubs, law.listens, law.accounts, law.arrives, law.h, law.lag, law.feed, law.most,
+        law.varied, law.mixed, law.rubs, law.listens, law.accounts, law.arrives, law.h, law.lag, law.feed, law.most,
         law.deep, real(REST_ACCELERATIONS * g * h), law.grazes, 1 if g > 0 else 0, real(carried),
     )  # fmt: skip
 

@@ -11,17 +11,21 @@ from typing import Any
 from pyverlet.compile.jit import Kernel, variant
 
 BOUNCES = True
-"""Whether some pair may bounce or rub, or somebody listens to who meets how fast."""
+"""Whether some pair may bounce or rub, or the virial is asked for."""
 
 RUBS = True
 """Whether some pair may rub."""
 
-SMOOTH, BOUNCING, ROUGH = "smooth", "bouncing", "rough"
+LISTENS = True
+"""Whether somebody may listen to who meets how fast."""
+
+SMOOTH, HEARD, BOUNCING, ROUGH = "smooth", "heard", "bouncing", "rough"
 
 KINDS = {
-    SMOOTH: {"BOUNCES": False, "RUBS": False},
-    BOUNCING: {"BOUNCES": True, "RUBS": False},
-    ROUGH: {"BOUNCES": True, "RUBS": True},
+    SMOOTH: {"BOUNCES": False, "RUBS": False, "LISTENS": False},
+    HEARD: {"BOUNCES": False, "RUBS": False, "LISTENS": True},
+    BOUNCING: {"BOUNCES": True, "RUBS": False, "LISTENS": True},
+    ROUGH: {"BOUNCES": True, "RUBS": True, "LISTENS": True},
 }
 
 

@@ -168,7 +168,7 @@ class Measures(Particles):
 
     def _spent(self) -> tuple[float, float, float, float]:
         """What impacts, friction, the energy limiter and the room have given in this frame, J, as they have noted."""
-        spent = self._slots.spent.sum(axis=0)
+        spent = np.array([column.sum() for column in self._slots.spent.T])  # along the rows it takes NumPy ten times as long
         if self._contacts:
             spent += self._contacts.spent()
         return float(spent[0]), float(spent[1]), -self._slots.taken, self._slots.worked

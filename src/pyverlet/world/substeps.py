@@ -1,8 +1,8 @@
 """Substeps that need nothing of Python: gone through in one call (`kernels.frame`), until somebody wants to look.
 
-Under gravity, and forces that a few numbers describe, a call goes on until the list of pairs may be stale or the frame is over.
-Where other forces, or who looks on, are asked in every substep, it is what comes after the integration of one. Smooth worlds too
-large for the processor's caches go strip by strip (`kernels.fused`).
+Under gravity, forces that a few numbers describe, and functions that are compiled, a call goes on until the list of pairs may be
+stale or the frame is over. Where other forces, or who looks on, are asked in every substep, it is what comes after the
+integration of one. Smooth worlds too large for the processor's caches go strip by strip (`kernels.fused`).
 """
 
 from __future__ import annotations
@@ -95,9 +95,9 @@ class Substeps:
         services: Any = self._services(world, books, rows, links, loans, h, lag) if beside else ()
         stop, looks, sets_out = world.substeps if leaps else substep + 1, wide.takes_looks(), lends or out is not wide.moved
         reached, self.leapt, strongest = frame.frames[beside][wide.kind](
-            substep, stop, last, wide.circles, wide.arrays, wide.law, (walls, *map(state.real, shape)), tuple(services), native or (),
-            wide.cut(), looks, int(sets_out), strips.checked, state.real(strips.allowed * strips.allowed), state.claims(),
-            world.profile.spent, (clock.address(), clock.tick()),
+            substep, stop, last, wide.circles, wide.arrays, wide.law, (walls, *map(state.real, shape)), tuple(services),
+            native or (), wide.cut(), looks, int(sets_out), strips.checked, state.real(strips.allowed * strips.allowed),
+            state.claims(), world.profile.spent, (clock.address(), clock.tick()),
         )  # fmt: skip
         if (rows or native) and (self.leapt or reached > substep + 1):
             forces.strongest, forces.t = float(strongest), world.time + (reached - (not self.leapt)) * h

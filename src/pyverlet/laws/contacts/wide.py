@@ -14,7 +14,7 @@ from pyverlet.ground import memory
 from pyverlet.ground.constants import CARRIED_WEIGHT, COLOURS, DEEP, DEEP_LENT, FED, LARGEST_PUSH, PUSHED
 from pyverlet.kernels import frame, packs, sweeps, tables
 from pyverlet.kernels.bounds import CARRIES
-from pyverlet.kernels.kinds import BOUNCING, ROUGH, SMOOTH
+from pyverlet.kernels.kinds import BOUNCING, HEARD, ROUGH, SMOOTH
 from pyverlet.kernels.seam import close_gaps
 from pyverlet.laws.contacts.broadphase import PairList, rows_of
 from pyverlet.state.seam import NONE, Seam
@@ -46,7 +46,7 @@ class Wide:
         spent: (strips, 3) J that impacts, and friction, have taken in this frame, negative; and the virial of contacts: sum of
             what pushes each pair apart times their distance, N s m.
         weighs: whether that is asked for.
-        asks: whether any pair may bounce or rub, or somebody listens. rubs: whether any may rub.
+        asks: whether any pair may bounce or rub, or the virial is asked for. rubs: whether any may rub.
     """
 
     def __init__(self, dtype: np.dtype[Any], restitution: float = 0.0, friction: float = 0.0, *, listens: bool = False) -> None:
@@ -72,7 +72,7 @@ class Wide:
     @property
     def kind(self) -> str:
         """Which kernels it takes: of `kernels.kinds`."""
-        return ROUGH if self.rubs else BOUNCING if self.asks else SMOOTH
+        return ROUGH if self.rubs else BOUNCING if self.asks else HEARD if self._listens else SMOOTH
 
     def _make_room(self, lanes: int) -> None:
         self.lane_i, self.lane_j = (memory.empty(lanes, np.uint32) for _ in range(2))
@@ -163,7 +163,7 @@ class Wide:
         self._varied = int(any(_differ(values) for values in (size, state.radius, inverse_mass)))
         self._mixed = int(self._varied or _differ(state.restitution) or _differ(state.friction))
         self.rubs = max(mu, state.most_friction) > 0.0
-        self.asks = self._listens or self.weighs or self.rubs or max(e, state.most_restitution) > 0.0
+        self.asks = self.weighs or self.rubs or max(e, state.most_restitution) > 0.0
         if self._varied:
             self.reach, self.share = (memory.empty(len(self.lane_i), self._dtype) for _ in range(2))
             packs.share_out(self.begin, self.lanes, self.lane_i, self.lane_j, size, inverse_mass, self.reach, self.share)
@@ -215,7 +215,7 @@ class Wide:
         carried = CARRIED_WEIGHT * strongest * h if strongest > 0 else np.inf
         deep, grazes = (DEEP_LENT, 0.0) if noted else (DEEP, 1.0)
         self.law = (
-            self._varied, self._mixed, int(self.asks), int(self.rubs), int(self._listens), int(accounts or self.weighs),
+            self._varied, self._mixed, int(self.rubs), int(self._listens), int(accounts or self.weighs),
             1, *state.reals(h, lag, FED / PUSHED / h, LARGEST_PUSH, deep, rest_speed, grazes), int(strongest > 0),
             state.real(carried),
         )  # fmt: skip
