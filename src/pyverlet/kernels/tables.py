@@ -83,10 +83,10 @@ class Law(NamedTuple):
     varied: 1, or 0 if reach and share are the same for all and have one pack only; mixed: the same of `made_of`. rubs: whether
     any pair may rub; listens: whether somebody listens to who meets how fast; accounts: whether somebody asks what impacts take.
     arrives: 1 if what becomes of `moved` is to be added to positions and velocities when all pairs have been gone through, 0 if
-    the room does that; always 1 where pairs may bounce. feed: FED / PUSHED / h, 1/s. most: the largest part of the contact distance
-    that a push may see. deep: likewise, from which on an overlap is treated again. grazes: 1 if a pair without restitution may be
-    an impact, for friction's sake, 0 where inertia is lent. weight: whether an acceleration could stop a pair that parts.
-    carried: m/s, by which a substep feeds the velocity of one that carries weight.
+    the room does that; always 1 where pairs may bounce. feed: FED / PUSHED / h, 1/s. most: the largest part of the contact
+    distance that a push may see. deep: likewise, from which on an overlap is treated again. grazes: 1 if a pair without
+    restitution may be an impact, for friction's sake, 0 where inertia is lent. weight: whether an acceleration could stop a pair
+    that parts. carried: m/s, by which a substep feeds the velocity of one that carries weight.
     """
 
     varied: Any
