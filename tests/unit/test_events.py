@@ -179,6 +179,20 @@ def test_a_hit_says_where_how_and_on_what() -> None:
     assert [hit[7] for hit in hits] == pytest.approx([1.5 * 18, 1.75 * 6 * 0.75, 2 * 12, 1.8 * 6])
 
 
+@pytest.mark.parametrize("left", [0, 1])
+def test_who_is_left_alone_has_parted_from_nobody(left: int) -> None:
+    # A world of one looks at no pairs, and those of the frame before are about circles that are no more.
+    world = pv.World(boundary=pv.Circle(radius=3), events=True)
+    world.add(position=[(0, 0), (0.9, 0), (1.8, 0)], radius=0.5)
+    world.step(1 / 60)
+    assert len(world.events.begin) == 2
+    world.remove(np.arange(3) >= left)
+    for _ in range(60):
+        world.step(1 / 60)
+        assert len(world.events.end) == 0
+    assert len(world.events._touching) == left  # the wall
+
+
 @pytest.mark.parametrize("room", [pv.Box((-6, -6), (6, 6)), pv.Circle(radius=7, restitution=0.5)])
 @pytest.mark.parametrize("collisions", [pv.Collisions(), pv.Collisions(restitution=0.5, friction=0.5)])
 def test_to_listen_changes_no_bit(room: pv.Boundary, collisions: pv.Collisions) -> None:

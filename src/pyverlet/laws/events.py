@@ -130,7 +130,7 @@ class Events:
             self.collect(slots, pairs)
             if len(earlier):
                 kernels.recall(*pairs.listed(), pairs.touched, slots.particle, earlier)
-        self._known = pairs.touched if pairs else None
+        self._known = pairs.touched if pairs and not len(slots.asleep) else None
         told = _numbered(np.concatenate((*self._keys, walls)), state)
         # Those who sleep are not listed, but go on. To sort keys alone takes a third of what it takes to know their order.
         now = np.sort(np.concatenate((told, self._sleeping(slots, state))))

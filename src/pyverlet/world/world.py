@@ -231,7 +231,7 @@ class World(Measures, Queries, Doors):
         self._course.end(dt)
         self.links.scatter()
         if self._events:
-            pairs = self._contacts.heard() if self._contacts else None
+            pairs = self._contacts.heard(self._slots) if self._contacts and len(self) > 1 else None
             self._events.close(self._slots, self._state, pairs, self._place())
         self.profile.mark("scatter")
         self.time, self.frames, self._h_last = self.time + dt, self.frames + 1, h

@@ -116,9 +116,9 @@ class ContactSolver:
         if self._packed:
             events.collect(state, self._wide)
 
-    def heard(self) -> Wide | None:
-        """The list in which is noted who has met since it was made, if there is one."""
-        return self._wide if self._packed else None
+    def heard(self, state: Slots) -> Wide | None:
+        """The list in which is noted who has met since it was made, if there is one about the circles of now."""
+        return self._wide if self._packed and len(self._wide.origin) == len(state) else None
 
     def _list(self, state: Slots) -> None:
         self.broad_phase.update(state)
