@@ -11,7 +11,7 @@ from typing import Any
 from pyverlet.compile.jit import Kernel, variant
 
 BOUNCES = True
-"""Whether some pair may bounce or rub, or the virial is asked for."""
+"""Whether some pair may bounce or rub, or the virial is asked for, or walls that bounce ask who carries weight."""
 
 RUBS = True
 """Whether some pair may rub."""

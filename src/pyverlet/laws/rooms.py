@@ -49,6 +49,11 @@ class Boundary(ABC):
         """Whether its walls may do work."""
         return False
 
+    @property
+    def bounces(self) -> bool:
+        """Whether its walls throw circles back: it has to be known who arrives, and who rests with the weight of others."""
+        return bool(getattr(self, "restitution", 0.0) > 0.0)
+
     def compiled(self, state: Slots) -> tuple[int, tuple[float, ...]] | None:
         """What `confine` does: of the rooms of `kernels.frame`, and the six numbers of one; None: Python has to call it."""
         return None

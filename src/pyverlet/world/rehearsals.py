@@ -47,7 +47,7 @@ def rehearse(world: World) -> None:
     if world.links:
         _link(small, {type(link) for link in world.links})
     if world.obstacles:
-        small.obstacles.append(Segment((0, 0), (1, 0)))
+        small.obstacles.append(Segment((0, 0), (1, 0), restitution=max(each.restitution for each in world.obstacles)))
         small.is_free((0, 0))
     known = Slots(world.dtype)
     for force in _ours(world):

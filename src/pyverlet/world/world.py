@@ -252,7 +252,7 @@ class World(Measures, Queries, Doors):
         if self._events:
             self._events.forget()
         if self._contacts:
-            self._contacts.clear_notes()
+            self._contacts.clear_notes(self.boundary.bounces or self._course.bounces)
 
     def _refuse_non_finite(self, h: float) -> None:
         """Run a bad frame again from the last good state, looking after every stage: normal frames pay nothing for it."""

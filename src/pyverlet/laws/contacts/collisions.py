@@ -191,9 +191,10 @@ class ContactSolver:
         """Sum over all contacts of this frame of what pushes them apart times their distance, N s m."""
         return float(self._wide.spent[:, 2].sum())
 
-    def clear_notes(self) -> None:
-        """A frame begins."""
+    def clear_notes(self, walls_bounce: bool) -> None:
+        """A frame begins; `walls_bounce`: whether walls or obstacles throw circles back, and ask who carries weight."""
         self._wide.spent.fill(0)
+        self._wide.bear(walls_bounce)
 
     def aside(self) -> AbstractContextManager[None]:
         """While others, who keep momentum by themselves, change velocities between `project` and `still`."""

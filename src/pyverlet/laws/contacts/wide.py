@@ -46,13 +46,13 @@ class Wide:
         spent: (strips, 3) J that impacts, and friction, have taken in this frame, negative; and the virial of contacts: sum of
             what pushes each pair apart times their distance, N s m.
         weighs: whether that is asked for.
-        asks: whether any pair may bounce or rub, or the virial is asked for. rubs: whether any may rub.
+        asks: whether any pair may bounce or rub, or the virial is asked for, or who carries weight. rubs: whether any may rub.
     """
 
     def __init__(self, dtype: np.dtype[Any], restitution: float = 0.0, friction: float = 0.0, *, listens: bool = False) -> None:
         self._dtype = dtype
         self._settings = restitution, friction
-        self._listens = listens
+        self._listens, self._bears = listens, False
         self.asks = self.rubs = self.weighs = False
         self.begin = np.zeros(1, np.int64)
         self.lanes = self.apart = np.zeros(0, np.int64)
@@ -150,6 +150,11 @@ class Wide:
         if asked != self.weighs:
             self.weighs, self._known = asked, None
 
+    def bear(self, asked: bool) -> None:
+        """Whether somebody asks who carries weight, of circles that neither bounce nor rub."""
+        if asked != self._bears:
+            self._bears, self._known = asked, None
+
     # ---- what circles are made of ----------------------------------------------------------------------------------------
 
     def fits(self, state: Slots) -> bool:
@@ -163,7 +168,7 @@ class Wide:
         self._varied = int(any(_differ(values) for values in (size, state.radius, inverse_mass)))
         self._mixed = int(self._varied or _differ(state.restitution) or _differ(state.friction))
         self.rubs = max(mu, state.most_friction) > 0.0
-        self.asks = self.weighs or self.rubs or max(e, state.most_restitution) > 0.0
+        self.asks = self.weighs or self._bears or self.rubs or max(e, state.most_restitution) > 0.0
         if self._varied:
             self.reach, self.share = (memory.empty(len(self.lane_i), self._dtype) for _ in range(2))
             packs.share_out(self.begin, self.lanes, self.lane_i, self.lane_j, size, inverse_mass, self.reach, self.share)

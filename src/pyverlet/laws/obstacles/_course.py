@@ -113,6 +113,11 @@ class Course:
         """Whether obstacles stay where they are, so that a substep is like the one before."""
         return not self._moving
 
+    @property
+    def bounces(self) -> bool:
+        """Whether any throws circles back."""
+        return any(obstacle.restitution > 0.0 for obstacle in self._seen)
+
     def set_up(self, state: Slots, time: float, h: float) -> None:
         """Place the obstacles, and make room for what is noted of those they hold; arguments: as for `collide`."""
         largest = float(state.radius.max(initial=0.0))
