@@ -150,7 +150,7 @@ class Watch:
         if slots.size is not slots.radius:
             slots.grown -= (part * (slots.grown - start.grown[order])).astype(slots.dtype)
             slots.resize()
-        slots.position[:] = self._within_room(slots.position.astype(float), lower, slots.size)
+        slots.position[:] = self._within_room(slots.position.astype(float), lower, slots.radius)
         return np.asarray((left > 0)[cluster] & taken_from & (strength > 0))
 
     def _put_back(self, slots: Slots, raised: Array, allowed: float) -> float:
