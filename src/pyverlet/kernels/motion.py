@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet.compile.jit import driver, kernel, parallel_kernel, prange
-from pyverlet.compile.lanes import copy_row, larger_finite
+from pyverlet.compile.lanes import LANES, copy_row, larger_finite, load, load_rows, spread, where_zero
+from pyverlet.compile.rows import store_rows
 from pyverlet.compile.stealing import claim_evenly, none_claimed
 
 _ONE = np.uint64(1)
@@ -159,6 +160,27 @@ def leap(position, velocity, acceleration, h, reference, square, origin, moved, 
 
 
 @parallel_kernel
+def set_off(position, velocity, acceleration, inverse_mass, gx, gy, h, reference, square, origin, moved, claims):
+    """`leap` under gravity, which becomes the acceleration of all but pinned particles: how a frame begins.
+
+    Returns whether anyone has strayed, and the acceleration, m/s^2.
+    """
+    x, start, none = position.reshape(-1), reference.reshape(-1), position[:0]
+    blocks, found = (position.shape[0] + _BLOCK - 1) // _BLOCK, 0
+    none_claimed(claims)
+    for part in prange(claims.shape[0]):
+        block = claim_evenly(claims, blocks, part)
+        while block >= 0:
+            a, b = block * _BLOCK, min((block + 1) * _BLOCK, position.shape[0])
+            newton_block(acceleration[a:b], none, inverse_mass[a:b], gx, gy)
+            kick_drift(position[a:b], velocity[a:b], acceleration[a:b], h)
+            found += int(any_strayed(x, start, a, b, square))
+            set_out(position[a:b], origin[a:b], moved[a:b])
+            block = claim_evenly(claims, blocks, part)
+    return found > 0, np.sqrt(gx * gx + gy * gy)
+
+
+@parallel_kernel
 def take_rows(out, source, index):
     """out[k] = source[index[k]] for (n, 2) arrays, of one dtype or two: links take float32 to float64."""
     for k in prange(index.shape[0]):
@@ -191,7 +213,9 @@ def put_motion(
     """The way back: index is a permutation, so every row has one writer. Angles turn by the mean of the spins before and now."""
     for k in prange(index.shape[0]):
         i = np.int64(index[k])
-        angle[i] += half_dt * (np.float64(to_spin[i]) + np.float64(spin[k]))
+        turns = np.float64(to_spin[i]) + np.float64(spin[k])
+        if turns != 0.0:  # smooth circles do not, and to look up their angles takes a fifth of all this
+            angle[i] += half_dt * turns
         copy_row(to_position, i, position, k)
         copy_row(to_velocity, i, velocity, k)
         copy_row(to_acceleration, i, acceleration, k)
@@ -232,47 +256,6 @@ def any_differs(a, b, c, d, e, f, a_now, b_now, c_now, d_now, e_now, f_now):
     return found > 0
 
 
-@parallel_kernel
-def pick_falling(resting, velocity, acceleration, before, particle, lag, dt):
-    """Circles that touch others but fall as if alone rest on nobody: those whose velocity has followed half of a or more.
-
-    before: (n, 2) velocities dt seconds ago, by `particle`. lag: s, how far behind `velocity` is.
-    """
-    half = dt / (dt + dt)
-    for k in prange(resting.shape[0]):
-        if resting[k] == IN_PILE:
-            i = np.int64(particle[k])
-            ax, ay = acceleration[k, 0], acceleration[k, 1]
-            gained = (velocity[k, 0] + lag * ax - before[i, 0]) * ax + (velocity[k, 1] + lag * ay - before[i, 1]) * ay
-            if gained > half * dt * (ax * ax + ay * ay):
-                resting[k] = 0
-
-
-@parallel_kernel
-def remember_rest(acceleration, velocity, resting, left, lean, h):
-    """Scale the accelerations of those that are held, so that h / 2 of it makes of what they carry weight with no velocity.
-
-    Nothing for who rests on a wall alone: it has none. Among others that is lean |a| h against a; at a wall what there is of it.
-    left: (n, 2) acceleration that obstacles leave to those they hold, m/s^2, or (0, 2): that is no weight, and remains.
-    """
-    zero, one = h - h, h / h
-    for i in prange(acceleration.shape[0]):
-        if resting[i] != 0:
-            ax, ay = acceleration[i, 0], acceleration[i, 1]
-            part = zero
-            if resting[i] & IN_PILE:
-                part = lean
-            if resting[i] == ON_WALL | IN_PILE:
-                along = -(velocity[i, 0] * ax + velocity[i, 1] * ay)
-                square = h * (ax * ax + ay * ay)
-                part = min(max(along / square, zero), lean) if square > zero else zero
-            part *= one + one
-            ax, ay = part * ax, part * ay
-            if left.shape[0] > 0 and resting[i] == ON_WALL:
-                ax, ay = left[i, 0], left[i, 1]
-            acceleration[i, 0], acceleration[i, 1] = ax, ay
-
-
 @kernel
 def clear_pinned(vectors, inverse_mass):
     """Set the rows of pinned particles to 0."""
@@ -284,18 +267,55 @@ def clear_pinned(vectors, inverse_mass):
 
 
 @kernel
-def any_nan(vectors):
-    """Whether the first column of an (n, 2) array has a NaN."""
+def _any_nan(numbers):
     found = False
-    for i in range(vectors.shape[0]):
-        found |= vectors[i, 0] != vectors[i, 0]
+    for k in range(numbers.shape[0]):  # from 0, of a slice: only then are eight compared at a time
+        found |= numbers[k] != numbers[k]
     return found
 
 
+@parallel_kernel
+def any_nan(vectors):
+    """Whether an (n, 2) array has a NaN."""
+    numbers = vectors.reshape(-1)
+    found = 0
+    for block in prange((numbers.shape[0] + _BLOCK - 1) // _BLOCK):
+        found += int(_any_nan(numbers[block * _BLOCK : min((block + 1) * _BLOCK, numbers.shape[0])]))
+    return found > 0
+
+
 @kernel
-def _any_non_finite(numbers, first, stop):
+def _kick_free(velocity, acceleration, inverse_mass, h):
+    n = inverse_mass.shape[0]
+    packed, none = n - n % LANES, h - h
+    zero, kick = spread(none), spread(h)
+    for k in range(0, packed, LANES):
+        w = load(inverse_mass, k)
+        ax, ay = load_rows(acceleration, k)
+        ax, ay = where_zero(w, zero, ax), where_zero(w, zero, ay)
+        vx, vy = load_rows(velocity, k)
+        store_rows(acceleration, k, ax, ay)
+        store_rows(velocity, k, vx + kick * ax, vy + kick * ay)
+    for i in range(packed, n):
+        ax, ay = acceleration[i, 0], acceleration[i, 1]
+        if inverse_mass[i] == none:
+            ax = ay = none
+        acceleration[i, 0], acceleration[i, 1] = ax, ay
+        velocity[i, 0], velocity[i, 1] = velocity[i, 0] + h * ax, velocity[i, 1] + h * ay
+
+
+@parallel_kernel
+def kick_free(velocity, acceleration, inverse_mass, h):
+    """v += h a; accelerations of pinned particles are 0."""
+    for block in prange((inverse_mass.shape[0] + _BLOCK - 1) // _BLOCK):
+        a, b = block * _BLOCK, min((block + 1) * _BLOCK, inverse_mass.shape[0])
+        _kick_free(velocity[a:b], acceleration[a:b], inverse_mass[a:b], h)
+
+
+@kernel
+def _any_non_finite(numbers):
     found = False
-    for k in range(first, stop):
+    for k in range(numbers.shape[0]):
         found |= numbers[k] - numbers[k] != 0  # x - x is 0 for finite numbers, NaN for others
     return found
 
@@ -306,7 +326,7 @@ def first_non_finite(vectors):
     numbers = vectors.reshape(-1)
     found = 0
     for block in prange((numbers.shape[0] + _BLOCK - 1) // _BLOCK):
-        found += int(_any_non_finite(numbers, block * _BLOCK, min((block + 1) * _BLOCK, numbers.shape[0])))
+        found += int(_any_non_finite(numbers[block * _BLOCK : min((block + 1) * _BLOCK, numbers.shape[0])]))
     if found > 0:
         for i in range(vectors.shape[0]):
             if not (np.isfinite(vectors[i, 0]) and np.isfinite(vectors[i, 1])):
@@ -319,19 +339,11 @@ def first_non_finite(vectors):
 
 @driver
 def take_up(velocity, acceleration, inverse_mass, h):
-    """`clear_pinned` of accelerations, and v += h a. False, and nothing is done, if there is a NaN among the accelerations."""
+    """`kick_free`; or False, and nothing is done, if there is a NaN among the accelerations."""
     if any_nan(acceleration):
         return False
-    clear_pinned(acceleration, inverse_mass)
-    add_scaled(velocity, acceleration, h)
+    kick_free(velocity, acceleration, inverse_mass, h)
     return True
-
-
-@driver
-def leave(acceleration, velocity, resting, left, lean, h, half):
-    """`remember_rest`, and v += half a."""
-    remember_rest(acceleration, velocity, resting, left, lean, h)
-    add_scaled(velocity, acceleration, half)
 
 
 @driver

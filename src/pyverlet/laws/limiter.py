@@ -84,12 +84,17 @@ class Watch:
         start = (then.position, then.velocity, then.spin, then.radius, then.mass)
         return float(measure.gained(*start, *motion, *self._gravity))
 
-    def close(self, slots: Slots, contacts: ContactSolver | None) -> None:
-        """The frame is over: take back what has been gained too much, and let circles grow at a pace that gains less."""
+    def close(self, slots: Slots, contacts: ContactSolver | None) -> bool:
+        """The frame is over: take back what has been gained too much, and let circles grow at a pace that gains less.
+
+        Returns whether all positions and velocities are known to be finite: so they are if their energy is.
+        """
+        finite = False
         if self._forces.gravity != self._gravity:  # it has turned on the way, and drove the world
             risen = 0.0
         else:
             gained = self._gained(slots)
+            finite = not slots.pins and abs(gained) < np.inf  # what is pinned has none
             room = SURPLUS * fall(slots.total_mass, self._gravity, self._room.extent())
             risen = gained / room if room > 0.0 else 0.0
             if room < gained < np.inf:
@@ -97,11 +102,13 @@ class Watch:
                 there = self._mechanical(self._start, (0.0, 0.0)) + abs(self._held)
                 surplus = gained - max(room, SURPLUS * there)
                 if surplus > 0.0 and gained > _rounding(slots):
+                    finite = False
                     raised = self.take_back(slots, contacts.listed() if contacts else _NOBODY, surplus)
                     left = self._put_back(slots, raised, gained - surplus)
                     slots.taken = gained - left
         if contacts:
             contacts.growth.heed(risen)
+        return finite
 
     def _kinetic(self) -> Array:
         """(n,) J, at the start of the frame, in the user's order."""

@@ -6,7 +6,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from pyverlet.kernels import motion
+from pyverlet.kernels import leaving, motion
 from pyverlet.state.state import Slots
 
 Array = NDArray[Any]
@@ -37,10 +37,17 @@ def strayed(state: Slots, reference: Array, distance: float) -> bool:
     return bool(motion.strayed(state.position, reference, state.real(distance * distance)))
 
 
-def leap(state: Slots, h: float, reference: Array, distance: float, origin: Array, moved: Array) -> bool:
-    """Velocity += h * acceleration, position += h * velocity, moved = position - origin; whether anyone has then strayed."""
-    where, square = (state.position, state.velocity, state.acceleration, state.real(h)), state.real(distance * distance)
-    return bool(motion.leap(*where, reference, square, origin, moved, state.claims()))
+def set_off(
+    state: Slots, gravity: tuple[float, float], h: float, reference: Array, distance: float, origin: Array, moved: Array
+) -> tuple[bool, float]:
+    """Under gravity alone velocity += h * acceleration, position += h * velocity, moved = position - origin.
+
+    Returns whether anyone has then strayed, and the acceleration, m/s^2.
+    """
+    where, real = (state.position, state.velocity, state.acceleration, state.inverse_mass), state.real
+    numbers = (*state.reals(*gravity, h), reference, real(distance * distance))
+    found, strongest = motion.set_off(*where, *numbers, origin, moved, state.claims())
+    return bool(found), float(strongest)
 
 
 def pick_falling(state: Slots, before: Array, lag: float, dt: float) -> None:
@@ -49,7 +56,7 @@ def pick_falling(state: Slots, before: Array, lag: float, dt: float) -> None:
     before: (n, 2) velocities dt seconds ago, m/s, in the user's order.
     """
     moving = state.velocity, state.acceleration, before, state.particle
-    motion.pick_falling(state.resting, *moving, *state.reals(lag, dt))
+    leaving.pick_falling(state.resting, *moving, *state.reals(lag, dt))
 
 
 def leave(state: Slots, h: float) -> None:
@@ -58,7 +65,7 @@ def leave(state: Slots, h: float) -> None:
     Scales the accelerations of those that are held, so that h / 2 of it does that, and kicks all by it.
     """
     held = state.acceleration, state.velocity, state.resting, state.along
-    motion.leave(*held, *state.reals(state.lean, h, 0.5 * h))
+    leaving.leave(*held, *state.reals(state.lean, h, 0.5 * h))
     state.along = state.along[:0].copy()  # of use no more, and as large as a column
 
 

@@ -20,6 +20,7 @@ from pyverlet.laws.contacts.broadphase import Strips
 from pyverlet.laws.contacts.collisions import ContactSolver
 from pyverlet.laws.contacts.wide import Wide
 from pyverlet.laws.ledger import Page
+from pyverlet.state.moves import set_off
 
 Array = NDArray[Any]
 
@@ -59,6 +60,20 @@ class Substeps:
         """Whether who is told of the stages of a frame can be told later: it is but the clock, `mark`, or sums of energies."""
         self._books = done if isinstance(done, Page) and done.plain else None
         return self._books is not None or done == mark
+
+    def sets_off(self, world: Any, contacts: ContactSolver | None, h: float) -> bool:
+        """The first integration under gravity, with what contacts need to know of it, in one pass. False: there is more to it."""
+        state, forces = world._slots, world._force_sum
+        if contacts is None or forces.forces or not world.integrator.leaps:
+            return False
+        strips, wide = contacts.steady(state), contacts.packed(state)
+        if strips is None or wide is None:
+            return False
+        contacts.broad_phase.strayed, forces.strongest = set_off(
+            state, forces.gravity, h, strips.checked, strips.allowed, wide.origin, wide.moved
+        )
+        self._out = wide.moved
+        return True
 
     def go(self, world: Any, contacts: ContactSolver, substep: int, h: float, lag: float) -> int:
         """From after the integration of `substep`, whose list is good, as far as it goes: the substep that is next.

@@ -120,19 +120,19 @@ class World(Measures, Queries, Doors):
         self._team.gather(self.threads, self.profile.frame_ms)
         self.profile.begin()
         books = self._open_books(h)
-        self._frame(h, self._listen(h, books or self.profile.mark))
-        self._refuse_non_finite(h)
+        if not self._frame(h, self._listen(h, books or self.profile.mark)):
+            self._refuse_non_finite(h)
         self._accept(dt, h, books)
         self.profile.end()
 
-    def _frame(self, h: float, done: Callable[[str], None]) -> None:
-        """The table of contents of the engine. `done` is called with the name of each stage as it ends."""
+    def _frame(self, h: float, done: Callable[[str], None]) -> bool:
+        """The table of contents of the engine; `done` hears which stage has ended. True if all is known to be finite."""
         state, forces, integrator = self._slots, self._force_sum, self.integrator
         contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course or None
         lag, state.drop, state.h, run = integrator.velocity_lag * h, integrator.drop, h, self._run.begin(contacts)
         parts: list[Any] = [part for part in (contacts, links, course) if part]
         if not self._open(h, done):
-            return
+            return False
         compiled = contacts and run.tells(done, self.profile.mark)
         watch, substep = self._watch(h) if contacts or course else None, 0
         while substep < self.substeps:
@@ -140,7 +140,8 @@ class World(Measures, Queries, Doors):
             if not run.leapt:
                 for part in parts:
                     part.before(state, h)
-                integrator.step(state, forces, self.time + substep * h, h)
+                if not run.sets_off(self, contacts, h):
+                    integrator.step(state, forces, self.time + substep * h, h)
             done("integrate")
             if contacts:
                 contacts.find(state, lag)
@@ -165,8 +166,7 @@ class World(Measures, Queries, Doors):
                 links.after(state, h)
                 done("links")
             substep += 1
-        self._finish(contacts, watch, h, marked=run.marked)
-        done("finish")
+        return self._finish(contacts, watch, h, done, marked=run.marked)
 
     def _watch(self, h: float) -> Watch | None:
         """Who looks after the energy of this frame, if nothing but contacts, links and obstacles could raise it."""
@@ -213,15 +213,16 @@ class World(Measures, Queries, Doors):
         with contacts.aside() if contacts else nullcontext():
             links.solve(self._slots, h)
 
-    def _finish(self, contacts: ContactSolver | None, watch: Watch | None, h: float, *, marked: bool) -> None:
+    def _finish(self, contacts: ContactSolver | None, watch: Watch | None, h: float, done: Any, *, marked: bool) -> bool:
         """The substeps are done: who rests, the velocities of now, and no more energy than there may be."""
         if contacts:
             lag = self.integrator.velocity_lag * h
             contacts.end(self._slots, self._state, lag, self.substeps * h, self.gravity, marked=marked)
         self.boundary.leave(self._slots)
         self.integrator.end(self._slots, h)
-        if watch:
-            watch.close(self._slots, contacts)
+        finite = watch.close(self._slots, contacts) if watch else False
+        done("finish")
+        return finite
 
     def _accept(self, dt: float, h: float, books: Any) -> None:
         """The frame has gone well: what it made of the state is the truth now."""
@@ -231,7 +232,7 @@ class World(Measures, Queries, Doors):
         self._course.end(dt)
         self.links.scatter()
         if self._events:
-            pairs = self._contacts.heard(self._slots) if self._contacts and len(self) > 1 else None
+            pairs = self._contacts.packed(self._slots) if self._contacts and len(self) > 1 else None
             self._events.close(self._slots, self._state, pairs, self._place())
         self.profile.mark("scatter")
         self.time, self.frames, self._h_last = self.time + dt, self.frames + 1, h

@@ -116,8 +116,8 @@ class ContactSolver:
         if self._packed:
             events.collect(state, self._wide)
 
-    def heard(self, state: Slots) -> Wide | None:
-        """The list in which is noted who has met since it was made, if there is one about the circles of now."""
+    def packed(self, state: Slots) -> Wide | None:
+        """The pairs in packs, if there are any about the circles of now. In them is noted who has met since they were made."""
         return self._wide if self._packed and len(self._wide.origin) == len(state) else None
 
     def _list(self, state: Slots) -> None:
