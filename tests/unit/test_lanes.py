@@ -28,6 +28,7 @@ from pyverlet.compile.lanes import (
     where_above,
     where_zero,
     which_above,
+    which_set,
     widen,
 )
 
@@ -115,6 +116,21 @@ def test_rows_and_numbers_come_lane_by_lane(dtype: Any) -> None:
     assert numbers.tobytes() == expected.tobytes()
     bits = (points[:, 0] > dtype(0.3)).reshape(3, LANES)
     assert above.tolist() == [sum(1 << lane for lane in np.flatnonzero(row)) for row in bits]
+
+
+@kernel
+def look_at_bytes(flags: Any, mask: Any, found: Any) -> None:
+    for k in range(0, flags.shape[0], LANES):
+        found[k // LANES] = which_set(flags, k, mask)
+
+
+@pytest.mark.parametrize("mask", [1, 2, 0x80, 0xFF])
+def test_bytes_are_looked_at_eight_at_a_time(mask: int) -> None:
+    flags = np.random.default_rng(4).integers(0, 256, 8 * LANES).astype(np.uint8)
+    flags[:LANES] = 0
+    found = np.zeros(8, np.int64)
+    look_at_bytes(flags, mask, found)
+    assert found.tolist() == [sum(1 << lane for lane in np.flatnonzero(row & mask)) for row in flags.reshape(8, LANES)]
 
 
 @kernel

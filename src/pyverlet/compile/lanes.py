@@ -24,6 +24,9 @@ LANES = 8
 ALL = (1 << LANES) - 1
 """What `which_above` gives if it is so in every lane."""
 
+ANY = 0xFF
+"""Any bit of a byte."""
+
 _INT32, _INT64 = ir.IntType(32), ir.IntType(64)
 
 
@@ -200,6 +203,25 @@ def which_above(typing: Any, a: Any, b: Any) -> Any:
         return builder.zext(bits, _INT64)
 
     return types.int64(a, b), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def which_set(typing: Any, array: Any, k: Any, mask: Any) -> Any:
+    """The lanes in which array[k : k + LANES] & mask is not 0, of an (n,) array of uint8; as the bits of a number."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        byte = ir.IntType(8)
+        eight = ir.VectorType(byte, LANES)
+        value = builder.load(pointer(context, builder, array, args[0], args[1], eight))
+        value.align = 1
+        asked = builder.insert_element(ir.Constant(eight, ir.Undefined), builder.trunc(args[2], byte), ir.Constant(_INT32, 0))
+        asked = builder.shuffle_vector(
+            asked, ir.Constant(eight, ir.Undefined), ir.Constant(ir.VectorType(_INT32, LANES), [0] * LANES)
+        )
+        some = builder.icmp_unsigned("!=", builder.and_(value, asked), ir.Constant(eight, [0] * LANES))
+        return builder.zext(builder.bitcast(some, ir.IntType(LANES)), _INT64)
+
+    return types.int64(array, k, types.int64), generate
 
 
 def pointer(context: Any, builder: Any, array: Any, value: Any, index: Any, item: Any) -> Any:

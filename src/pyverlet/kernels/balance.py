@@ -14,7 +14,8 @@ from __future__ import annotations
 
 from pyverlet.compile.bits import lowest_bit
 from pyverlet.compile.jit import kernel
-from pyverlet.compile.lanes import LANES, load, spread, which_above
+from pyverlet.compile.lanes import ANY, LANES, larger, load, load_rows, spread, store, where_set, which_above, which_set
+from pyverlet.compile.rows import store_rows
 from pyverlet.kernels.clusters import join, settle
 from pyverlet.kernels.loans import PINNED
 from pyverlet.kernels.motion import IN_PILE
@@ -29,18 +30,33 @@ _XX, _XY, _YY = 7, 8, 9
 @kernel
 def set_out(velocity, acceleration, spin, held, h, before, spin_before):
     """Note the velocities from which contacts begin; of those that are held without gravity's share, which counts as theirs."""
-    for i in range(spin.shape[0]):
-        share = h if held[i] else h - h
-        before[i, 0] = velocity[i, 0] - share * acceleration[i, 0]
-        before[i, 1] = velocity[i, 1] - share * acceleration[i, 1]
+    zero, all_of_it, packed = spread(h - h), spread(h), len(spin) - len(spin) % LANES
+    for k in range(0, packed, LANES):
+        share = where_set(which_set(held, k, ANY), all_of_it, zero)
+        vx, vy = load_rows(velocity, k)
+        ax, ay = load_rows(acceleration, k)
+        store_rows(before, k, vx - share * ax, vy - share * ay)
+        store(spin_before, k, load(spin, k))
+    for i in range(packed, len(spin)):
+        part = h if held[i] else h - h
+        before[i, 0] = velocity[i, 0] - part * acceleration[i, 0]
+        before[i, 1] = velocity[i, 1] - part * acceleration[i, 1]
         spin_before[i] = spin[i]
+
+
+@kernel
+def _any_pinned(inverse_mass):
+    found = False
+    for i in range(inverse_mass.shape[0]):
+        found |= inverse_mass[i] == 0
+    return found
 
 
 @kernel
 def cluster(begin, lanes, lane_i, lane_j, normal, inverse_mass, root):
     """root[i]: the lowest member of the cluster of i, by the pairs that touch and have not bounced."""
     none = normal.dtype.type(0)
-    zero = spread(none)
+    zero, pins = spread(none), _any_pinned(inverse_mass)
     for i in range(root.shape[0]):
         root[i] = i
     for s in range(lanes.shape[0]):
@@ -51,7 +67,7 @@ def cluster(begin, lanes, lane_i, lane_j, normal, inverse_mass, root):
                 lane = lowest_bit(touches)
                 touches &= touches - 1
                 i, j = lane_i[k + lane], lane_j[k + lane]
-                if inverse_mass[i] > none and inverse_mass[j] > none:
+                if not pins or (inverse_mass[i] > none and inverse_mass[j] > none):
                     join(root, i, j)
     settle(root)
 
@@ -63,24 +79,42 @@ def _lent(mass, inverse_mass, lighter, i):
 
 
 @kernel
-def note_walls(velocity, unpushed, inverse_mass, touched, root, sums, held):
+def _note_wall(i, velocity, unpushed, inverse_mass, touched, root, sums):
+    dx, dy = velocity[i, 0] - unpushed[i, 0], velocity[i, 1] - unpushed[i, 1]
+    if touched[i] and (dx != 0 or dy != 0 or touched[i] & PINNED) and inverse_mass[i] > 0:
+        pinned = 1.0 if touched[i] & PINNED else 0.0
+        r = root[i]
+        sums[r, _XX] += dx * dx + pinned
+        sums[r, _XY] += dx * dy
+        sums[r, _YY] += dy * dy + pinned
+
+
+@kernel
+def note_walls(velocity, unpushed, inverse_mass, touched, root, sums, pushed, held):
     """Begin the sums of each cluster with how walls have pushed it: the squares and the product of what that did to velocities.
 
-    velocity: (n, 2) m/s, now. unpushed: the same before walls. held[i] becomes 1 if walls have pushed the cluster of i.
+    velocity: (n, 2) m/s, now. unpushed: the same before walls. held[i] becomes 1 if walls have pushed the cluster of i, and so
+    does pushed[i], whatever i itself is.
     """
-    for i in range(root.shape[0]):
+    n = root.shape[0]
+    zero, packed = spread(velocity.dtype.type(0)), n - n % LANES
+    for i in range(n):
         if root[i] == i:
             sums[i, _XX], sums[i, _XY], sums[i, _YY] = 0.0, 0.0, 0.0
-    for i in range(root.shape[0]):
-        dx, dy = velocity[i, 0] - unpushed[i, 0], velocity[i, 1] - unpushed[i, 1]
-        if touched[i] and (dx != 0 or dy != 0 or touched[i] & PINNED) and inverse_mass[i] > 0:
-            pinned = 1.0 if touched[i] & PINNED else 0.0
-            r = root[i]
-            sums[r, _XX] += dx * dx + pinned
-            sums[r, _XY] += dx * dy
-            sums[r, _YY] += dy * dy + pinned
-    for i in range(root.shape[0]):
-        held[i] = touched[i] != 0 and inverse_mass[i] > 0 and sums[root[i], _XX] + sums[root[i], _YY] > 0
+    for k in range(0, packed, LANES):
+        vx, vy = load_rows(velocity, k)
+        ux, uy = load_rows(unpushed, k)
+        dx, dy = vx - ux, vy - uy
+        some = which_above(larger(larger(dx, zero - dx), larger(dy, zero - dy)), zero) | which_set(touched, k, PINNED)
+        while some != 0:  # in a heap hardly anybody
+            _note_wall(k + lowest_bit(some), velocity, unpushed, inverse_mass, touched, root, sums)
+            some &= some - 1
+    for i in range(packed, n):
+        _note_wall(i, velocity, unpushed, inverse_mass, touched, root, sums)
+    for i in range(n):  # roots come before what they are the roots of
+        pushed[i] = sums[i, _XX] + sums[i, _YY] > 0 if root[i] == i else pushed[root[i]]
+    for i in range(n):
+        held[i] = (touched[i] != 0) & (inverse_mass[i] > 0) & (pushed[i] != 0)
 
 
 @kernel

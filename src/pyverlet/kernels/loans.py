@@ -19,8 +19,21 @@ that momentum is.
 from __future__ import annotations
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
-from pyverlet.compile.lanes import LANES, larger, load, smaller, spread, where_above, where_set, which_above
-from pyverlet.compile.rows import put_four, take_four
+from pyverlet.compile.lanes import (
+    ANY,
+    LANES,
+    larger,
+    load,
+    load_rows,
+    smaller,
+    spread,
+    where_above,
+    where_set,
+    where_zero,
+    which_above,
+    which_set,
+)
+from pyverlet.compile.rows import put_four, store_four, store_rows, take_four
 from pyverlet.ground.constants import LENT
 
 # What a circle touches: another that has not bounced off; a pinned one.
@@ -57,11 +70,19 @@ def pull(position, acceleration, inverse_mass, lighter, held, fall):
     """Move each circle that walls hold, through others, by what a (m / m' - 1) does to its position: so its weight
     is that of its own mass. fall: s^2.
     """
-    one = lighter.dtype.type(1)
-    for i in range(position.shape[0]):
+    one, by = spread(lighter.dtype.type(1)), spread(fall)
+    packed = len(lighter) - len(lighter) % LANES
+    for k in range(0, packed, LANES):
+        light, w = load(lighter, k), load(inverse_mass, k)
+        x, y = load_rows(position, k)
+        ax, ay = load_rows(acceleration, k)
+        more, bits = (light / w - one) * by, which_set(held, k, ANY)
+        px, py = where_zero(light - w, x, x + more * ax), where_zero(light - w, y, y + more * ay)
+        store_rows(position, k, where_set(bits, px, x), where_set(bits, py, y))
+    for i in range(packed, len(lighter)):
         w = inverse_mass[i]
         if held[i] and lighter[i] != w:
-            more = (lighter[i] / w - one) * fall
+            more = (lighter[i] / w - lighter.dtype.type(1)) * fall
             position[i, 0] += more * acceleration[i, 0]
             position[i, 1] += more * acceleration[i, 1]
 
@@ -72,11 +93,24 @@ def take_up(position, velocity, acceleration, inverse_mass, lighter, held, touch
 
     Not before contacts: to those it is no motion, and would be an impact.
     """
-    one = lighter.dtype.type(1)
-    for i in range(position.shape[0]):
+    one, kicks, falls = spread(lighter.dtype.type(1)), spread(kick), spread(fall)
+    packed = len(lighter) - len(lighter) % LANES
+    for k in range(0, packed, LANES):
+        light, w = load(lighter, k), load(inverse_mass, k)
+        bits, met = which_set(held, k, ANY), which_set(touched, k, ANY)
+        ax, ay = load_rows(acceleration, k)
+        more = light / w - one
+        vx, vy = load_rows(velocity, k)
+        ux, uy = where_zero(light - w, vx, vx + more * kicks * ax), where_zero(light - w, vy, vy + more * kicks * ay)
+        store_rows(velocity, k, where_set(bits & met, ux, vx), where_set(bits & met, uy, vy))
+        if bits & ~met != 0:
+            x, y = load_rows(position, k)
+            px, py = where_zero(light - w, x, x - more * falls * ax), where_zero(light - w, y, y - more * falls * ay)
+            store_rows(position, k, where_set(bits & ~met, px, x), where_set(bits & ~met, py, y))
+    for i in range(packed, len(lighter)):
         w = inverse_mass[i]
         if held[i] and lighter[i] != w:
-            more = lighter[i] / w - one
+            more = lighter[i] / w - lighter.dtype.type(1)
             if touched[i]:
                 velocity[i, 0] += more * kick * acceleration[i, 0]
                 velocity[i, 1] += more * kick * acceleration[i, 1]
@@ -88,10 +122,14 @@ def take_up(position, velocity, acceleration, inverse_mass, lighter, held, touch
 @kernel
 def _gather(mass, inverse_mass, lent, busy, rows, a, b):
     """rows: what each of the circles from a up to b has lent, kg, its mass, whether it lends; and that it touches nobody."""
-    none = lent.dtype.type(0)
-    for i in range(a, b):
-        waits = _PINNED if inverse_mass[i] == none else _WAITS if busy[i] > none else _LENDS
-        rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3] = lent[i], mass[i], waits, none
+    none, packed = lent.dtype.type(0), b - (b - a) % LANES
+    zero, waiting, pinned = spread(none), spread(lent.dtype.type(_WAITS)), spread(lent.dtype.type(_PINNED))
+    for k in range(a, packed, LANES):
+        waits = where_zero(load(inverse_mass, k), pinned, where_above(load(busy, k), zero, waiting, zero))
+        store_four(rows, k, load(lent, k), load(mass, k), waits, zero)
+    for i in range(packed, b):
+        waits_i = _PINNED if inverse_mass[i] == none else _WAITS if busy[i] > none else _LENDS
+        rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3] = lent[i], mass[i], waits_i, none
 
 
 @kernel
