@@ -37,8 +37,9 @@ class Fusing:
 
     def __init__(self, patch: pytest.MonkeyPatch, *, by_strips: bool) -> None:
         self._patch, self._by_strips, self.substeps, self.leaps = patch, by_strips, 0, 0
+        self.first_leaps = 0
         patch.setattr(substeps, "FUSED_FROM", 2 if by_strips else 10**9)
-        go = substeps.Substeps.go
+        go, leaps_first = substeps.Substeps.go, substeps.Substeps.leaps_first
 
         def counted(run: substeps.Substeps, world: pv.World, contacts: Any, substep: int, *numbers: float) -> int:
             reached = go(run, world, contacts, substep, *numbers)
@@ -46,7 +47,13 @@ class Fusing:
             self.leaps += max(reached - substep - 1, 0) + run.leapt
             return reached
 
+        def first(run: substeps.Substeps, world: pv.World, contacts: Any, h: float) -> bool:
+            leapt = leaps_first(run, world, contacts, h)
+            self.first_leaps += leapt
+            return leapt
+
         patch.setattr(substeps.Substeps, "go", counted)
+        patch.setattr(substeps.Substeps, "leaps_first", first)
 
     def undo(self) -> None:
         take_the_long_way(self._patch)
@@ -151,6 +158,7 @@ def test_borders_between_threads_change_no_bit(parts: int, monkeypatch: pytest.M
 def test_with_any_integrator(integrator: pv.Integrator, fusing: Fusing) -> None:
     world = heap(3000, 0.7, integrator=integrator)
     assert fusing.has(world)
+    assert (fusing.first_leaps > 0) == integrator.leaps
     fusing.undo()
     assert same(world, heap(3000, 0.7, integrator=integrator))
 
@@ -182,6 +190,7 @@ def test_radii_that_differ_and_pinned_circles(fusing: Fusing) -> None:
 
     world = uneven()
     assert fusing.has(world)
+    assert fusing.first_leaps
     fusing.undo()
     assert same(world, uneven())
 

@@ -10,8 +10,8 @@ import pytest
 from pyverlet.kernels import motion
 from pyverlet.laws.contacts.grids import Grids
 
-ROWS = 2 * motion._BLOCK + 7
-AT = [0, motion._BLOCK - 1, motion._BLOCK, ROWS - 1]
+ROWS = 2 * motion.BLOCK + 7
+AT = [0, motion.BLOCK - 1, motion.BLOCK, ROWS - 1]
 
 
 @pytest.mark.parametrize("row", AT)

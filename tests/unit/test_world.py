@@ -290,6 +290,20 @@ def test_nan_written_by_the_user_is_found_where_it_enters() -> None:
         world.step(1 / 60)
 
 
+@pytest.mark.parametrize("gravity", [(0, 0), (0, -9.81), (3, 0)])
+@pytest.mark.parametrize("what", ["position", "velocity"])
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_it_is_found_where_the_energy_is_watched(what: str, axis: int, value: float, gravity: tuple[float, float]) -> None:
+    # That a frame of contacts is finite is known from its energy, sum(m v^2 / 2 - m g x): no row may be missing in it.
+    world = pv.World(gravity=gravity)
+    world.add(position=[(0, 0), (1, 0), (2, 0)], radius=0.5)
+    world.step(1 / 60)
+    getattr(world, what)[2, axis] = value
+    with pytest.raises(pv.NonFiniteError, match=r"particle 2 .* stage 'gather'"):
+        world.step(1 / 60)
+
+
 def test_errors_travel_between_processes() -> None:
     error = pickle.loads(pickle.dumps(pv.NonFiniteError(3, "contacts", 1.5)))
     assert "particle 3" in str(error)

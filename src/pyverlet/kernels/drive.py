@@ -9,7 +9,7 @@ import numpy as np
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange, variant
 from pyverlet.kernels.forces import attract, drag
-from pyverlet.kernels.motion import add_scaled, any_strayed, kick_drift, newton_block, set_out
+from pyverlet.kernels.motion import BLOCK, add_scaled, any_strayed, kick_drift, newton_block, set_out
 
 DRAG, UNIFORM, SPRING, ATTRACTION = range(4)
 """Kinds of forces. Vector and numbers of each: velocity of the medium, (linear, quadratic); newtons; centre, (stiffness,);
@@ -20,9 +20,6 @@ NUMBERS = 2
 
 CALLS = False
 """Whether there are functions of the user's own."""
-
-_BLOCK = 2048
-"""Particles that one thread takes at a time."""
 
 
 @kernel
@@ -98,8 +95,8 @@ def _drive(
     """
     where, start = position.reshape(-1), reference.reshape(-1)
     largest, found = gx - gx, 0
-    for block in prange((inverse_mass.shape[0] + _BLOCK - 1) // _BLOCK):
-        a, b = block * _BLOCK, min((block + 1) * _BLOCK, inverse_mass.shape[0])
+    for block in prange((inverse_mass.shape[0] + BLOCK - 1) // BLOCK):
+        a, b = block * BLOCK, min((block + 1) * BLOCK, inverse_mass.shape[0])
         largest = max(
             largest,
             some(

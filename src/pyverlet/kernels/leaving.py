@@ -11,12 +11,9 @@ from pyverlet.compile.jit import driver, kernel, parallel_kernel, prange
 from pyverlet.compile.lanes import copy_row
 from pyverlet.ground.constants import STANDS_OUT
 from pyverlet.kernels.meetings import ROUND
-from pyverlet.kernels.motion import IN_PILE, ON_WALL, add_scaled
+from pyverlet.kernels.motion import BLOCK, IN_PILE, ON_WALL, add_scaled
 
 _ONE = np.uint64(1)
-
-_BLOCK = 2048
-"""Particles that one thread looks at, at a time."""
 
 
 @kernel
@@ -93,8 +90,8 @@ def pick_falling(resting, velocity, acceleration, before, particle, lag, dt):
 
     before: (n, 2) velocities dt seconds ago, by `particle`. lag: s, how far behind `velocity` is.
     """
-    for block in prange((resting.shape[0] + _BLOCK - 1) // _BLOCK):
-        a, b = block * _BLOCK, min((block + 1) * _BLOCK, resting.shape[0])
+    for block in prange((resting.shape[0] + BLOCK - 1) // BLOCK):
+        a, b = block * BLOCK, min((block + 1) * BLOCK, resting.shape[0])
         _pick_falling(resting[a:b], velocity[a:b], acceleration[a:b], before, particle[a:b], lag, dt)
 
 
@@ -125,8 +122,8 @@ def remember_rest(acceleration, velocity, resting, left, lean, h):
     Nothing for who rests on a wall alone: it has none. Among others that is lean |a| h against a; at a wall what there is of it.
     left: (n, 2) acceleration that obstacles leave to those they hold, m/s^2, or (0, 2): that is no weight, and remains.
     """
-    for block in prange((resting.shape[0] + _BLOCK - 1) // _BLOCK):
-        first, stop = block * _BLOCK, min((block + 1) * _BLOCK, resting.shape[0])
+    for block in prange((resting.shape[0] + BLOCK - 1) // BLOCK):
+        first, stop = block * BLOCK, min((block + 1) * BLOCK, resting.shape[0])
         _remember_rest(acceleration[first:stop], velocity[first:stop], resting[first:stop], lean, h)
         for i in range(first, min(stop, left.shape[0])):
             if resting[i] == ON_WALL:

@@ -108,15 +108,9 @@ def join(circles, pairs, lending):
     """Walls have pushed: who hangs together, and is held by them."""
     cluster(pairs.begin, pairs.lanes, pairs.lane_i, pairs.lane_j, pairs.normal, circles.inverse_mass, lending.root)
     note_walls(
-        circles.velocity,
-        lending.unpushed,
-        circles.inverse_mass,
-        lending.touched,
-        lending.root,
-        lending.sums,
-        lending.open_to,
+        circles.velocity, lending.unpushed, circles.inverse_mass, lending.touched, lending.root, lending.sums, lending.open_to,
         lending.held,
-    )
+    )  # fmt: skip
 
 
 @driver

@@ -18,8 +18,8 @@ _ONE = np.uint64(1)
 # What holds a particle at rest: a wall, others, or both.
 ON_WALL, IN_PILE = 1, 2
 
-_BLOCK = 2048
-"""Particles that one thread looks at, at a time."""
+BLOCK = 2048
+"""Particles that one thread takes at a time, here and wherever one pass over all is made."""
 
 
 @parallel_kernel
@@ -80,8 +80,8 @@ def newton(acceleration, force, inverse_mass, gx, gy):
     force: (n, 2), or (0, 2) where gravity alone acts.
     """
     largest = gx - gx
-    for block in prange((inverse_mass.shape[0] + _BLOCK - 1) // _BLOCK):
-        a, b = block * _BLOCK, min((block + 1) * _BLOCK, inverse_mass.shape[0])
+    for block in prange((inverse_mass.shape[0] + BLOCK - 1) // BLOCK):
+        a, b = block * BLOCK, min((block + 1) * BLOCK, inverse_mass.shape[0])
         largest = max(largest, newton_block(acceleration[a:b], force[a:b], inverse_mass[a:b], gx, gy))
     return np.sqrt(largest)
 
@@ -90,8 +90,8 @@ def newton(acceleration, force, inverse_mass, gx, gy):
 def newton_kick_drift(position, velocity, acceleration, force, inverse_mass, gx, gy, h, ahead):
     """v -= ahead a with the a of before, `newton`, v += h a, x += h v: block by block, for the caches' sake."""
     largest = gx - gx
-    for block in prange((inverse_mass.shape[0] + _BLOCK - 1) // _BLOCK):
-        a, b = block * _BLOCK, min((block + 1) * _BLOCK, inverse_mass.shape[0])
+    for block in prange((inverse_mass.shape[0] + BLOCK - 1) // BLOCK):
+        a, b = block * BLOCK, min((block + 1) * BLOCK, inverse_mass.shape[0])
         if ahead != 0:
             add_scaled(velocity[a:b], acceleration[a:b], -ahead)
         largest = max(largest, newton_block(acceleration[a:b], force[a:b], inverse_mass[a:b], gx, gy))
@@ -136,46 +136,48 @@ def strayed(position, reference, square):
     """
     x, start = position.reshape(-1), reference.reshape(-1)
     found = 0
-    for block in prange((position.shape[0] + _BLOCK - 1) // _BLOCK):
-        first = block * _BLOCK
-        found += int(any_strayed(x, start, first, min(first + _BLOCK, position.shape[0]), square))
+    for block in prange((position.shape[0] + BLOCK - 1) // BLOCK):
+        first = block * BLOCK
+        found += int(any_strayed(x, start, first, min(first + BLOCK, position.shape[0]), square))
     return found > 0
+
+
+@kernel
+def _leap(position, velocity, acceleration, h, reference, square, origin, moved, a, b):
+    """What `leap` does, of the particles from a up to b."""
+    kick_drift(position[a:b], velocity[a:b], acceleration[a:b], h)
+    set_out(position[a:b], origin[a:b], moved[a:b])
+    return any_strayed(position.reshape(-1), reference.reshape(-1), a, b, square)
 
 
 @parallel_kernel
 def leap(position, velocity, acceleration, h, reference, square, origin, moved, claims):
     """`kick_drift`, whether anyone has `strayed` by it, and `set_out` for the contacts: block by block, for the caches' sake."""
-    x, start = position.reshape(-1), reference.reshape(-1)
-    blocks, found = (position.shape[0] + _BLOCK - 1) // _BLOCK, 0
+    blocks, found = (position.shape[0] + BLOCK - 1) // BLOCK, 0
     none_claimed(claims)
     for part in prange(claims.shape[0]):
         block = claim_evenly(claims, blocks, part)
         while block >= 0:
-            a, b = block * _BLOCK, min((block + 1) * _BLOCK, position.shape[0])
-            kick_drift(position[a:b], velocity[a:b], acceleration[a:b], h)
-            found += int(any_strayed(x, start, a, b, square))
-            set_out(position[a:b], origin[a:b], moved[a:b])
+            a, b = block * BLOCK, min((block + 1) * BLOCK, position.shape[0])
+            found += int(_leap(position, velocity, acceleration, h, reference, square, origin, moved, a, b))
             block = claim_evenly(claims, blocks, part)
     return found > 0
 
 
 @parallel_kernel
-def set_off(position, velocity, acceleration, inverse_mass, gx, gy, h, reference, square, origin, moved, claims):
+def first_leap(position, velocity, acceleration, inverse_mass, gx, gy, h, reference, square, origin, moved, claims):
     """`leap` under gravity, which becomes the acceleration of all but pinned particles: how a frame begins.
 
     Returns whether anyone has strayed, and the acceleration, m/s^2.
     """
-    x, start, none = position.reshape(-1), reference.reshape(-1), position[:0]
-    blocks, found = (position.shape[0] + _BLOCK - 1) // _BLOCK, 0
+    blocks, found, none = (position.shape[0] + BLOCK - 1) // BLOCK, 0, position[:0]
     none_claimed(claims)
     for part in prange(claims.shape[0]):
         block = claim_evenly(claims, blocks, part)
         while block >= 0:
-            a, b = block * _BLOCK, min((block + 1) * _BLOCK, position.shape[0])
+            a, b = block * BLOCK, min((block + 1) * BLOCK, position.shape[0])
             newton_block(acceleration[a:b], none, inverse_mass[a:b], gx, gy)
-            kick_drift(position[a:b], velocity[a:b], acceleration[a:b], h)
-            found += int(any_strayed(x, start, a, b, square))
-            set_out(position[a:b], origin[a:b], moved[a:b])
+            found += int(_leap(position, velocity, acceleration, h, reference, square, origin, moved, a, b))
             block = claim_evenly(claims, blocks, part)
     return found > 0, np.sqrt(gx * gx + gy * gy)
 
@@ -247,8 +249,8 @@ def _rows_differ(then, now, first, stop):
 def any_differs(a, b, c, d, e, f, a_now, b_now, c_now, d_now, e_now, f_now):
     """Whether any of six arrays differs from what it is now; they are equally long now."""
     found = 0
-    for block in prange((a_now.shape[0] + _BLOCK - 1) // _BLOCK):
-        x, y = block * _BLOCK, min((block + 1) * _BLOCK, a_now.shape[0])
+    for block in prange((a_now.shape[0] + BLOCK - 1) // BLOCK):
+        x, y = block * BLOCK, min((block + 1) * BLOCK, a_now.shape[0])
         found += int(
             _rows_differ(a, a_now, x, y) or _rows_differ(b, b_now, x, y) or _rows_differ(c, c_now, x, y)
             or _rows_differ(d, d_now, x, y) or _rows_differ(e, e_now, x, y) or _rows_differ(f, f_now, x, y)
@@ -264,24 +266,6 @@ def clear_pinned(vectors, inverse_mass):
         if inverse_mass[i] == zero:
             vectors[i, 0] = zero
             vectors[i, 1] = zero
-
-
-@kernel
-def _any_nan(numbers):
-    found = False
-    for k in range(numbers.shape[0]):  # from 0, of a slice: only then are eight compared at a time
-        found |= numbers[k] != numbers[k]
-    return found
-
-
-@parallel_kernel
-def any_nan(vectors):
-    """Whether an (n, 2) array has a NaN."""
-    numbers = vectors.reshape(-1)
-    found = 0
-    for block in prange((numbers.shape[0] + _BLOCK - 1) // _BLOCK):
-        found += int(_any_nan(numbers[block * _BLOCK : min((block + 1) * _BLOCK, numbers.shape[0])]))
-    return found > 0
 
 
 @kernel
@@ -307,27 +291,33 @@ def _kick_free(velocity, acceleration, inverse_mass, h):
 @parallel_kernel
 def kick_free(velocity, acceleration, inverse_mass, h):
     """v += h a; accelerations of pinned particles are 0."""
-    for block in prange((inverse_mass.shape[0] + _BLOCK - 1) // _BLOCK):
-        a, b = block * _BLOCK, min((block + 1) * _BLOCK, inverse_mass.shape[0])
+    for block in prange((inverse_mass.shape[0] + BLOCK - 1) // BLOCK):
+        a, b = block * BLOCK, min((block + 1) * BLOCK, inverse_mass.shape[0])
         _kick_free(velocity[a:b], acceleration[a:b], inverse_mass[a:b], h)
 
 
 @kernel
 def _any_non_finite(numbers):
     found = False
-    for k in range(numbers.shape[0]):
+    for k in range(numbers.shape[0]):  # from 0, of a slice: only then are eight looked at at a time
         found |= numbers[k] - numbers[k] != 0  # x - x is 0 for finite numbers, NaN for others
     return found
 
 
 @parallel_kernel
-def first_non_finite(vectors):
-    """Index of the first row that is NaN or infinite; -1 if all are finite."""
+def any_non_finite(vectors):
+    """Whether an (n, 2) array has a NaN or an infinity."""
     numbers = vectors.reshape(-1)
     found = 0
-    for block in prange((numbers.shape[0] + _BLOCK - 1) // _BLOCK):
-        found += int(_any_non_finite(numbers[block * _BLOCK : min((block + 1) * _BLOCK, numbers.shape[0])]))
-    if found > 0:
+    for block in prange((numbers.shape[0] + BLOCK - 1) // BLOCK):
+        found += int(_any_non_finite(numbers[block * BLOCK : min((block + 1) * BLOCK, numbers.shape[0])]))
+    return found > 0
+
+
+@driver
+def first_non_finite(vectors):
+    """Index of the first row that is NaN or infinite; -1 if all are finite."""
+    if any_non_finite(vectors):
         for i in range(vectors.shape[0]):
             if not (np.isfinite(vectors[i, 0]) and np.isfinite(vectors[i, 1])):
                 return i
@@ -339,8 +329,8 @@ def first_non_finite(vectors):
 
 @driver
 def take_up(velocity, acceleration, inverse_mass, h):
-    """`kick_free`; or False, and nothing is done, if there is a NaN among the accelerations."""
-    if any_nan(acceleration):
+    """`kick_free`; or False, and nothing is done, if there is a NaN or an infinity among the accelerations."""
+    if any_non_finite(acceleration):
         return False
     kick_free(velocity, acceleration, inverse_mass, h)
     return True
@@ -349,4 +339,4 @@ def take_up(velocity, acceleration, inverse_mass, h):
 @driver
 def all_finite(position, velocity):
     """Whether no row is NaN or infinite."""
-    return first_non_finite(position) < 0 and first_non_finite(velocity) < 0
+    return not (any_non_finite(position) or any_non_finite(velocity))

@@ -37,7 +37,7 @@ def strayed(state: Slots, reference: Array, distance: float) -> bool:
     return bool(motion.strayed(state.position, reference, state.real(distance * distance)))
 
 
-def set_off(
+def first_leap(
     state: Slots, gravity: tuple[float, float], h: float, reference: Array, distance: float, origin: Array, moved: Array
 ) -> tuple[bool, float]:
     """Under gravity alone velocity += h * acceleration, position += h * velocity, moved = position - origin.
@@ -46,7 +46,7 @@ def set_off(
     """
     where, real = (state.position, state.velocity, state.acceleration, state.inverse_mass), state.real
     numbers = (*state.reals(*gravity, h), reference, real(distance * distance))
-    found, strongest = motion.set_off(*where, *numbers, origin, moved, state.claims())
+    found, strongest = motion.first_leap(*where, *numbers, origin, moved, state.claims())
     return bool(found), float(strongest)
 
 

@@ -20,7 +20,7 @@ from pyverlet.laws.contacts.broadphase import Strips
 from pyverlet.laws.contacts.collisions import ContactSolver
 from pyverlet.laws.contacts.wide import Wide
 from pyverlet.laws.ledger import Page
-from pyverlet.state.moves import set_off
+from pyverlet.state.moves import first_leap
 
 Array = NDArray[Any]
 
@@ -61,7 +61,7 @@ class Substeps:
         self._books = done if isinstance(done, Page) and done.plain else None
         return self._books is not None or done == mark
 
-    def sets_off(self, world: Any, contacts: ContactSolver | None, h: float) -> bool:
+    def leaps_first(self, world: Any, contacts: ContactSolver | None, h: float) -> bool:
         """The first integration under gravity, with what contacts need to know of it, in one pass. False: there is more to it."""
         state, forces = world._slots, world._force_sum
         if contacts is None or forces.forces or not world.integrator.leaps:
@@ -69,7 +69,7 @@ class Substeps:
         strips, wide = contacts.steady(state), contacts.packed(state)
         if strips is None or wide is None:
             return False
-        contacts.broad_phase.strayed, forces.strongest = set_off(
+        contacts.broad_phase.strayed, forces.strongest = first_leap(
             state, forces.gravity, h, strips.checked, strips.allowed, wide.origin, wide.moved
         )
         self._out = wide.moved

@@ -140,7 +140,7 @@ class World(Measures, Queries, Doors):
             if not run.leapt:
                 for part in parts:
                     part.before(state, h)
-                if not run.sets_off(self, contacts, h):
+                if not run.leaps_first(self, contacts, h):
                     integrator.step(state, forces, self.time + substep * h, h)
             done("integrate")
             if contacts:
