@@ -15,7 +15,7 @@ from pyverlet.kernels import bounds
 from pyverlet.kernels import cage as kernels
 from pyverlet.laws.rooms import Circle
 from pyverlet.state.moves import bodies
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 
 H = 1 / 480
 CHANGED = ("position", "velocity", "resting", "hits")

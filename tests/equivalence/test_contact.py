@@ -16,7 +16,7 @@ from pyverlet.kernels.bounds import impact_time
 from pyverlet.kernels.tables import Law
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.wide import Wide
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 
 H = 1 / 480
 

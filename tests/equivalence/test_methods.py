@@ -13,7 +13,8 @@ import pyverlet as pv
 from pyverlet.ground.constants import SKIN_MOST, WORTH_THINNING
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.collisions import find_contacts
-from pyverlet.state.state import Slots, State
+from pyverlet.state.slots import Slots
+from pyverlet.state.state import State
 
 
 def random_state(seed: int, n: int, room: float, spread: float, dtype: np.dtype[Any]) -> State:

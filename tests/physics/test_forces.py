@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.state.state import Slots, State
+from pyverlet.state.slots import Slots
+from pyverlet.state.state import State
 
 DT, SUBSTEPS = 1 / 60, 8
 H = DT / SUBSTEPS

@@ -12,7 +12,7 @@ from pyverlet.ground.constants import SURPLUS
 from pyverlet.lab.physics import energy as rows
 from pyverlet.lab.physics.energy import scale
 from pyverlet.laws import limiter
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 
 G = 9.81
 

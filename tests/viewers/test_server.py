@@ -26,7 +26,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
 import pyverlet as pv
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 from pyverlet.viewers.launch import server_config
 from pyverlet.viewers.looks import Look
 from pyverlet.viewers.protocol import MAX_MESSAGE

@@ -12,7 +12,7 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.laws.forces import Push
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 from pyverlet.viewers.commands import Command, Drag, Pause, Poke, Release, Reset, SetGravity, SetSubsteps, Step
 from pyverlet.viewers.hands import LEASH
 from pyverlet.viewers.session import Session

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.compile.jit import driver, kernel, parallel_kernel, prange
+from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.compile.lanes import copy_row
 from pyverlet.ground.constants import STANDS_OUT
 from pyverlet.kernels.meetings import ROUND
@@ -116,8 +116,9 @@ def _remember_rest(acceleration, velocity, resting, lean, h):
 
 
 @parallel_kernel
-def remember_rest(acceleration, velocity, resting, left, lean, h):
+def leave(acceleration, velocity, resting, left, lean, h, half):
     """Scale the accelerations of those that are held, so that h / 2 of it makes of what they carry weight with no velocity.
+    Then v += half a.
 
     Nothing for who rests on a wall alone: it has none. Among others that is lean |a| h against a; at a wall what there is of it.
     left: (n, 2) acceleration that obstacles leave to those they hold, m/s^2, or (0, 2): that is no weight, and remains.
@@ -128,10 +129,4 @@ def remember_rest(acceleration, velocity, resting, left, lean, h):
         for i in range(first, min(stop, left.shape[0])):
             if resting[i] == ON_WALL:
                 copy_row(acceleration, i, left, i)
-
-
-@driver
-def leave(acceleration, velocity, resting, left, lean, h, half):
-    """`remember_rest`, and v += half a."""
-    remember_rest(acceleration, velocity, resting, left, lean, h)
-    add_scaled(velocity, acceleration, half)
+        add_scaled(velocity[first:stop], acceleration[first:stop], half)

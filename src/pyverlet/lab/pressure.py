@@ -14,7 +14,7 @@ from pyverlet.lab.table import Table
 from pyverlet.laws.contacts.collisions import Collisions
 from pyverlet.laws.rooms import Box
 from pyverlet.scenes.gas import henderson
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 from pyverlet.world.world import World
 
 STEPS = (0.01, 0.03, 0.1, 0.2, 0.3)

@@ -16,7 +16,8 @@ from pyverlet.ground.errors import InputError
 from pyverlet.lab.solver import Acceleration, Solution, solve
 from pyverlet.laws.forces import Drag, PointSpring
 from pyverlet.laws.integrators import RK4, Integrator
-from pyverlet.state.state import Slots, State
+from pyverlet.state.slots import Slots
+from pyverlet.state.state import State
 from pyverlet.world.world import World
 
 Floats = NDArray[np.float64]

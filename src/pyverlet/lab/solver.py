@@ -12,7 +12,8 @@ from pyverlet.compile import jit
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.laws.integrators import Integrator, PositionVerlet
-from pyverlet.state.state import Slots, State
+from pyverlet.state.slots import Slots
+from pyverlet.state.state import State
 
 Floats = NDArray[np.float64]
 Acceleration = Callable[[float, Any, Any], ArrayLike]

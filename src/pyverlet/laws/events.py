@@ -12,7 +12,8 @@ from pyverlet.kernels import events as kernels
 from pyverlet.laws.contacts.wide import Wide
 from pyverlet.laws.obstacles import Course
 from pyverlet.laws.rooms import Boundary
-from pyverlet.state.state import Slots, State
+from pyverlet.state.slots import Slots
+from pyverlet.state.state import State
 
 Array = NDArray[Any]
 Told = tuple[Array, Array, Array]

@@ -18,7 +18,7 @@ import numpy as np
 
 from pyverlet.kernels import motion
 from pyverlet.state.moves import advance, leave
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 
 
 class Forces(Protocol):

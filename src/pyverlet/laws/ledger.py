@@ -11,7 +11,7 @@ import numpy as np
 from pyverlet.kernels import measure
 from pyverlet.laws.forces import Conservative, ForceSum
 from pyverlet.laws.links import Links
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 
 
 @dataclass

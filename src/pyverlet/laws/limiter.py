@@ -29,7 +29,8 @@ from pyverlet.laws.contacts.collisions import ContactSolver
 from pyverlet.laws.forces import Conservative, Drag, ForceSum
 from pyverlet.laws.links import Links
 from pyverlet.laws.rooms import Boundary
-from pyverlet.state.state import Slots, State
+from pyverlet.state.slots import Slots
+from pyverlet.state.state import State
 
 Array = NDArray[Any]
 Listed = tuple[Array, Array, Array, Array]

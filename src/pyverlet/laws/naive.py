@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import naive
 from pyverlet.laws.rooms import Boundary, Box, Circle, Extent
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 
 Array = NDArray[Any]
 

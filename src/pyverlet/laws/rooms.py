@@ -21,7 +21,7 @@ from pyverlet.kernels import bounds, cage, frame, leaving, meetings
 from pyverlet.laws.turning import surface
 from pyverlet.state.moves import bodies
 from pyverlet.state.seam import NONE, Seam
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 
 Array = NDArray[Any]
 Extent = tuple[float, float, float, float]

@@ -16,7 +16,8 @@ from pyverlet.ground.constants import SLEEP_AFTER_S, SLEEP_NEAR, SLEEP_SPEED
 from pyverlet.kernels import sleep as kernels
 from pyverlet.laws.contacts.broadphase import PairList
 from pyverlet.laws.forces import Drag
-from pyverlet.state.state import Slots, State
+from pyverlet.state.slots import Slots
+from pyverlet.state.state import State
 
 Array = NDArray[Any]
 

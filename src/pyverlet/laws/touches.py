@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from pyverlet.laws.events import WALL
 from pyverlet.laws.obstacles import Course, facing_of
 from pyverlet.laws.rooms import Boundary
-from pyverlet.state.state import Slots, State
+from pyverlet.state.slots import Slots
+from pyverlet.state.state import State
 
 Array = NDArray[Any]
 Floats = NDArray[np.float64]

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 
 
 @contextmanager

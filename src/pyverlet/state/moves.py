@@ -7,7 +7,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from pyverlet.kernels import leaving, motion
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 
 Array = NDArray[Any]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.kernels import wire
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 
 
 class Moment:

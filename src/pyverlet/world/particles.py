@@ -15,7 +15,8 @@ from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.group import Column, Group
-from pyverlet.state.state import EVERYONE, Slots, State
+from pyverlet.state.slots import Slots
+from pyverlet.state.state import EVERYONE, State
 from pyverlet.world.turns import Shared, in_turn
 
 Array = NDArray[Any]

@@ -22,7 +22,7 @@ from pyverlet.laws.links import Angle, Area, Link, Pin, Rope, Spring, Stick
 from pyverlet.laws.obstacles import Segment
 from pyverlet.laws.rooms import Boundary, Box, Circle, Open, Periodic
 from pyverlet.state.group import Group
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 from pyverlet.world.world import World
 
 _ROOMS = (Open, Circle, Box, Periodic)

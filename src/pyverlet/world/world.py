@@ -26,7 +26,8 @@ from pyverlet.laws.rooms import Boundary, Open
 from pyverlet.laws.sleep import Sleep, laws
 from pyverlet.laws.touches import Touches
 from pyverlet.state.moves import first_non_finite
-from pyverlet.state.state import Slots, State
+from pyverlet.state.slots import Slots
+from pyverlet.state.state import State
 from pyverlet.world.actors import Actor
 from pyverlet.world.convenience import Doors
 from pyverlet.world.measures import Measures
@@ -201,8 +202,7 @@ class World(Measures, Queries, Doors):
             checks.positive("mass", self._state.mass, infinite_is="pinned")
             self.boundary.check(self._state.radius)
         except InputError:
-            # So that the next frame sees them as new, and refuses them again.
-            self._slots = Slots(self.dtype, sleeps=self._sleep is not None)
+            self._slots = Slots(self.dtype, sleeps=self._sleep is not None)  # new to the next frame, which refuses them again
             raise
         if self._contacts:
             self._contacts.broad_phase.forget()

@@ -29,7 +29,7 @@ from pyverlet.kernels import pairs as kernels
 from pyverlet.laws.contacts.crowd import Crowd, free_skin
 from pyverlet.laws.contacts.grids import Grids
 from pyverlet.state.moves import strayed
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 
 Array = NDArray[Any]
 

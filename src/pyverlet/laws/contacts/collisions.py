@@ -22,7 +22,8 @@ from pyverlet.laws.contacts.wide import Wide
 from pyverlet.laws.events import Events
 from pyverlet.laws.sleep import Sleep
 from pyverlet.state.moves import pick_falling
-from pyverlet.state.state import Slots, State
+from pyverlet.state.slots import Slots
+from pyverlet.state.state import State
 
 Unlist = Callable[[PairList, Any], None]
 """Takes pairs that are no contacts, since a link says so, from a list; the second argument is the user's index in each slot."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.kernels import seam as kernels
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 
 if TYPE_CHECKING:
     from pyverlet.laws.contacts.grids import Grids

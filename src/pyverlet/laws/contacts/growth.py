@@ -9,7 +9,7 @@ import numpy as np
 from pyverlet.ground.constants import GROWTH, PACE_FRAMES, SMALLEST, SURPLUS_SOUGHT
 from pyverlet.kernels import overlap
 from pyverlet.laws.contacts.broadphase import PairList
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 
 
 class Growth:

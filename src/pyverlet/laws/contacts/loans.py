@@ -13,7 +13,7 @@ from pyverlet.compile.rows import WIDTH
 from pyverlet.ground.constants import FED, LOAN_S, PUSHED, SUNK
 from pyverlet.kernels import balance, lending
 from pyverlet.laws.contacts.wide import Wide
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 
 Array = NDArray[Any]
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pyverlet.kernels import pegs as kernels
 from pyverlet.laws.contacts.broadphase import PairList, rows_of
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 
 Array = NDArray[Any]
 

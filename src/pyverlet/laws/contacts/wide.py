@@ -18,7 +18,7 @@ from pyverlet.kernels.kinds import BOUNCING, HEARD, ROUGH, SMOOTH
 from pyverlet.kernels.seam import close_gaps
 from pyverlet.laws.contacts.broadphase import PairList, rows_of
 from pyverlet.state.seam import NONE, Seam
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 
 Array = NDArray[Any]
 

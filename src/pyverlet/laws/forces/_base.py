@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from pyverlet.compile.native import both
 from pyverlet.ground.errors import InputError
 from pyverlet.state.moves import newton, newton_kick_drift
-from pyverlet.state.state import Slots, State
+from pyverlet.state.slots import Slots
+from pyverlet.state.state import State
 
 
 @runtime_checkable

@@ -11,7 +11,8 @@ from pyverlet.kernels import forces
 from pyverlet.kernels.drive import ATTRACTION
 from pyverlet.laws.forces._base import Row
 from pyverlet.state.group import Group
-from pyverlet.state.state import Slots, State
+from pyverlet.state.slots import Slots
+from pyverlet.state.state import State
 
 
 class Attractor:

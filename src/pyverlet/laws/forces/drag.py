@@ -13,7 +13,7 @@ from pyverlet.ground.errors import InputError
 from pyverlet.kernels import forces
 from pyverlet.kernels.drive import DRAG
 from pyverlet.laws.forces._base import Row
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 
 Field = Callable[[NDArray[Any], NDArray[Any], float], Any]
 

@@ -13,7 +13,8 @@ import numpy as np
 from pyverlet.compile.native import Native, NotCompiled
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.kernels import forces
-from pyverlet.state.state import Slots, State
+from pyverlet.state.slots import Slots
+from pyverlet.state.state import State
 
 Function = Callable[[float, float, float, float, float, float], tuple[float, float]]
 Potential = Callable[[float, float, float], float]

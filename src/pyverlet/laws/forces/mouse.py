@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 
 
 class Grip:

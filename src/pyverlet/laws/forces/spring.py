@@ -10,7 +10,8 @@ from pyverlet.ground import checks
 from pyverlet.kernels.drive import SPRING
 from pyverlet.laws.forces._base import Row
 from pyverlet.state.group import Group
-from pyverlet.state.state import Slots, State
+from pyverlet.state.slots import Slots
+from pyverlet.state.state import State
 
 
 class PointSpring:

@@ -21,7 +21,8 @@ from pyverlet.laws.links._pool import Pool
 from pyverlet.laws.links._work import Past, Work
 from pyverlet.laws.links.pin import PinPool
 from pyverlet.state.seam import Seam
-from pyverlet.state.state import Slots, State
+from pyverlet.state.slots import Slots
+from pyverlet.state.state import State
 
 AnyLink = TypeVar("AnyLink", bound=Link)
 

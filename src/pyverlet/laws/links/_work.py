@@ -11,7 +11,8 @@ from pyverlet.ground import memory
 from pyverlet.ground.constants import REST_ACCELERATIONS
 from pyverlet.kernels import links, motion
 from pyverlet.state.seam import NONE
-from pyverlet.state.state import Slots, State
+from pyverlet.state.slots import Slots
+from pyverlet.state.state import State
 
 Array = NDArray[Any]
 

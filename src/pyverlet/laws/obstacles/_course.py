@@ -15,7 +15,7 @@ from pyverlet.laws.obstacles._base import Obstacle, Obstacles
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.moves import bodies
 from pyverlet.state.seam import NONE
-from pyverlet.state.state import Slots
+from pyverlet.state.slots import Slots
 
 Array = NDArray[Any]
 
