@@ -5,7 +5,8 @@
 restitution, friction, masses and services cost, `python -m benchmarks links` what
 hangs together costs and how far it is stretched, `python -m benchmarks page` how fast the live page is,
 `python -m benchmarks data` what it costs to keep worlds, to step many, and to sweep settings, `python -m benchmarks busy` what
-frames take beside other programs, and `python -m benchmarks soak` whether anything grows in a page that is served for long.
+frames take beside other programs, `python -m benchmarks soak` whether anything grows in a page that is served for long, and
+`python -m benchmarks beside --checkout FOLDER` this version beside another one.
 """
 
 from __future__ import annotations
@@ -22,8 +23,9 @@ from pathlib import Path
 import numpy as np
 
 import pyverlet as pv
-from benchmarks import busy, data, links, materials, own, page, physics, soak
+from benchmarks import beside, busy, data, links, materials, own, page, physics, soak
 from benchmarks.engines import CAREFUL, DT, ENGINES, RADIUS, Array, Engine
+from pyverlet.compile import jit
 from pyverlet.scenes import report
 
 SETTLE_SECONDS = 10.0
@@ -125,7 +127,7 @@ def main() -> None:
     parser.add_argument(
         "table",
         nargs="?",
-        choices=("speed", "physics", "own", "page", "materials", "links", "data", "busy", "soak"),
+        choices=("speed", "physics", "own", "page", "materials", "links", "data", "busy", "soak", "beside"),
         default="speed",
         help="what to compare",
     )
@@ -136,8 +138,10 @@ def main() -> None:
     parser.add_argument("--million", action="store_true", help="own: a million discs too, half an hour")
     parser.add_argument("--scene", default="cage", help="page: what is shown")
     parser.add_argument("--seconds", type=float, default=12.0, help="page: how long each is watched")
-    parser.add_argument("--threads", type=int, help="page: that the physics may use")
+    parser.add_argument("--threads", type=int, help="page, beside: that the physics may use")
     parser.add_argument("--minutes", type=float, default=60.0, help="soak: how long")
+    parser.add_argument("--checkout", type=Path, help="beside: the folder of another version's sources")
+    parser.add_argument("--turns", type=int, default=60, help="beside: of each version")
     parser.add_argument("--busy-frames", type=int, default=1200, help="busy: frames of each world")
     arguments = parser.parse_args()
     if arguments.table == "physics":
@@ -157,6 +161,15 @@ def main() -> None:
     if arguments.table == "soak":
         if not soak.main(arguments.minutes):
             sys.exit(1)
+        return
+    if arguments.table == "beside":
+        if arguments.checkout is None:
+            parser.error("beside needs --checkout FOLDER: which version to run beside this one")
+        threads = [arguments.threads] if arguments.threads else sorted({1, jit.max_threads()})
+        try:
+            beside.main(arguments.checkout, arguments.particles or [20_000, 100_000], threads, arguments.turns)
+        except pv.InputError as error:
+            sys.exit(str(error))
         return
     if arguments.table == "busy":
         if not busy.main((arguments.particles or [20_000])[0], arguments.busy_frames):

@@ -45,3 +45,24 @@ def test_the_cost_of_a_force_of_ones_own_is_measured() -> None:
     run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=True)
     assert "60 circles" in run.stdout
     assert float(run.stdout.split("ratio")[1]) > 0
+
+
+@pytest.mark.slow
+def test_this_version_is_as_fast_as_itself() -> None:
+    command = [sys.executable, "-m", "benchmarks", "beside", "--checkout", str(ROOT), "--particles", "60", "--turns", "4"]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=True)
+    first = run.stdout.split("ratio")[1].splitlines()[1].split()
+    there, here, ratio = float(first[4]), float(first[5]), float(first[6])
+    assert 0.2 < ratio < 5.0  # that the two are what is divided, on however noisy a machine
+    assert ratio == pytest.approx(here / there, rel=0.5)
+    assert run.stdout.count("8, 8 substeps") == len(run.stdout.split("ratio")[1].splitlines()) - 1
+
+
+@pytest.mark.parametrize(
+    ("options", "said"), [([], "needs --checkout FOLDER"), (["--checkout", "nowhere"], "checkout is 'nowhere'")]
+)
+def test_beside_what_is_asked_in_a_sentence(options: list[str], said: str) -> None:
+    run = subprocess.run([sys.executable, "-m", "benchmarks", "beside", *options], cwd=ROOT, capture_output=True, text=True)
+    assert run.returncode != 0
+    assert said in run.stderr
+    assert "Traceback" not in run.stderr

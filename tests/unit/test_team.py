@@ -80,6 +80,18 @@ def test_when_another_program_begins_they_go_at_once() -> None:
     assert late.sum() < 30
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_a_machine_that_is_now_a_little_slower_is_tried_anew(seed: int) -> None:
+    # Not by so much that a few frames say so: two threads, 0.55 times one until then, are 1.4 times as slow from now on.
+    def crowded(threads: int, rng: np.random.Generator) -> float:
+        return quiet(1, rng) * (1.4 if threads > 1 else 1.0)
+
+    team = Team()
+    run(team, 2, quiet, 12_000, seed)
+    used, _ = run(team, 2, crowded, 600, seed + 100)
+    assert np.mean(np.array(used[100:]) == 1) > 0.9
+
+
 def test_one_thread_is_never_a_matter_of_trials() -> None:
     used, _ = run(Team(), 1, quiet, 500, 0)
     assert set(used) == {1}

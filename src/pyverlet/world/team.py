@@ -8,7 +8,7 @@ bits: now and then a few are run with another number, and what was faster is kep
 from __future__ import annotations
 
 from collections import deque
-from math import sqrt
+from math import inf, sqrt
 
 from pyverlet.compile import jit
 
@@ -27,6 +27,9 @@ late on somebody's screen."""
 
 _DISASTER = 8.0
 """One is enough if it took so many times as long: where a core is kept busy by somebody of a low priority, it may be seconds."""
+
+_CHANGED = 1.25
+"""Frames that cost so many times what they did when fewer threads were last tried: what that has shown holds no longer."""
 
 _OUTLIER = 6.0
 """Times the shortest: longer frames count as this, or one in which the machine stood still would say all."""
@@ -74,6 +77,7 @@ class Team:
         self._recent: deque[float] = deque(maxlen=_KEPT)
         self._trial: deque[float] = deque(maxlen=_RUN)
         self._fewer: float | None = None  # cost of the next smaller number, as of the last trial
+        self._judged = inf  # least cost of the number in use since then
         self._down = self._up = _SOONEST  # pauses before the next trial
         self._wait = [2 * _RUN, _SOONEST]  # frames until a trial of fewer, and of more
 
@@ -87,7 +91,7 @@ class Team:
         if self._now > 0 and self._fewer is not None and self._hopeless(self._recent, self._fewer):
             self._put_off(2)
             self._settle(self._now - 1, deque())
-        elif self._now > 0 and self._wait[0] <= 0:
+        elif self._now > 0 and (self._wait[0] <= 0 or self._has_changed()):
             self._other = self._now - 1
         elif self._now < len(self._steps) - 1 and self._wait[1] <= 0:
             self._other = self._now + 1
@@ -99,7 +103,8 @@ class Team:
         if there * _GAIN < here:
             self._settle(self._other, self._trial)
         else:
-            self._fewer, self._down, self._up = there, min(2 * self._down, _LATEST), _SOONEST
+            self._fewer, self._judged = there, here
+            self._down, self._up = min(2 * self._down, _LATEST), _SOONEST
             self._settle(self._now, self._recent)
 
     def _judge_more(self) -> None:
@@ -119,6 +124,14 @@ class Team:
         """Whether this is no number for a busy machine, `fewer` being what a smaller one costs."""
         return sum(ms > _HOPELESS * fewer for ms in [*frames][-_RUN:]) > 2
 
+    def _has_changed(self) -> bool:
+        """Whether the frames since it was last looked at cost more than they were judged to."""
+        if self._wait[0] % _KEPT or len(self._recent) < _KEPT:
+            return False
+        now = cost(self._recent)
+        changed, self._judged = now > _CHANGED * self._judged, min(now, self._judged)
+        return changed
+
     def _put_off(self, times: int) -> None:
         """More threads have not been worth it: they are tried again later than last time."""
         self._up = min(times * self._up, _LATEST)
@@ -127,7 +140,7 @@ class Team:
         """Go on with this number, which these frames were run with."""
         fell = step < self._now
         if step != self._now:
-            self._down = _SOONEST
+            self._down, self._judged = _SOONEST, inf
         if fell:
             self._fewer = None
         self._now = self._other = step
