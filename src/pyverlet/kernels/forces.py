@@ -10,8 +10,18 @@ import numpy as np
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.kernels.seam import nearest
 
+_ONE = np.uint64(1)
+
 _BLOCK = 4096
 """Particles that one thread takes at a time."""
+
+
+@kernel
+def _resistance(ux, uy, w, linear, quadratic, h, half):
+    """Times -u it is the force on one. All is computed, whether it counts or not: so it is done for eight at a time."""
+    c, whole = linear + quadratic * np.sqrt(ux * ux + uy * uy), w * h
+    most = half / whole
+    return most if c * whole > half else c
 
 
 @kernel
@@ -21,16 +31,20 @@ def drag(force, velocity, wind, inverse_mass, linear, quadratic, h):
     No more than m u / 2 h, which takes half of u in a substep of h seconds: resistance turns nobody round. With m u / h
     integrators of Stormer's kind, which reckon with the acceleration of the substep before, swing for ever.
     """
-    many, half = wind.shape[0] > 1, force.dtype.type(0.5)
-    for i in range(velocity.shape[0]):
-        k = i if many else 0
-        ux = velocity[i, 0] - wind[k, 0]
-        uy = velocity[i, 1] - wind[k, 1]
-        c = linear + quadratic * np.sqrt(ux * ux + uy * uy)
-        if c * inverse_mass[i] * h > half:
-            c = half / (inverse_mass[i] * h)
-        force[i, 0] -= c * ux
-        force[i, 1] -= c * uy
+    f, v, air, half = force.reshape(-1), velocity.reshape(-1), wind.reshape(-1), force.dtype.type(0.5)
+    if wind.shape[0] > 1:
+        for k in range(inverse_mass.shape[0]):
+            i = np.uint64(2 * k)
+            ux, uy = v[i] - air[i], v[i + _ONE] - air[i + _ONE]
+            c = _resistance(ux, uy, inverse_mass[np.uint64(k)], linear, quadratic, h, half)
+            f[i], f[i + _ONE] = f[i] - c * ux, f[i + _ONE] - c * uy
+        return
+    x, y = air[0], air[1]
+    for k in range(inverse_mass.shape[0]):
+        i = np.uint64(2 * k)
+        ux, uy = v[i] - x, v[i + _ONE] - y
+        c = _resistance(ux, uy, inverse_mass[np.uint64(k)], linear, quadratic, h, half)
+        f[i], f[i + _ONE] = f[i] - c * ux, f[i + _ONE] - c * uy
 
 
 @kernel

@@ -8,16 +8,23 @@ from pyverlet.compile.jit import kernel
 from pyverlet.kernels.clusters import find_root, join
 from pyverlet.kernels.seam import nearest
 
+_ONE = np.uint64(1)
+
 
 @kernel
-def count_calm(velocity, spin, radius, island, limit, dt, calm):
-    """calm[i] += dt for everyone awake whose speed, that of the rim included, is at most sqrt(limit * radius); else it is 0."""
-    zero = calm.dtype.type(0)
-    for i in range(calm.shape[0]):
-        if island[i] < 0:
-            rim = spin[i] * radius[i]
-            square = velocity[i, 0] * velocity[i, 0] + velocity[i, 1] * velocity[i, 1] + rim * rim
-            calm[i] = calm[i] + dt if square <= limit * radius[i] else zero
+def count_calm(velocity, spin, radius, inverse_mass, island, limit, dt, after, calm):
+    """calm[i] += dt for everyone awake whose speed, that of the rim included, is at most sqrt(limit * radius); else it is 0.
+
+    Returns whether anyone who is awake, and not pinned, has been calm for `after` seconds.
+    """
+    v, zero, none, tired = velocity.reshape(-1), calm.dtype.type(0), spin.dtype.type(0), False
+    for n in range(calm.shape[0]):
+        i, k = np.uint64(n), np.uint64(2 * n)
+        vx, vy, rim, awake = v[k], v[k + _ONE], spin[i] * radius[i], island[i] < 0
+        longer = calm[i] + dt if vx * vx + vy * vy + rim * rim <= limit * radius[i] else zero
+        calm[i] = longer if awake else calm[i]
+        tired |= awake & (longer >= after) & (inverse_mass[i] > none)
+    return tired
 
 
 @kernel

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pyverlet.kernels import measure
-from pyverlet.laws.forces import Conservative, ForceSum
+from pyverlet.laws.forces import ForceSum, has_potential
 from pyverlet.laws.links import Links
 from pyverlet.state.slots import Slots
 
@@ -100,8 +100,8 @@ class Page:
     ) -> None:  # fmt: skip
         self._books, self._state, self._links, self._done = books, state, links or None, done
         self._gravity, self._t, self._h, self._lag = forces.gravity, t, h, lag
-        self._holding = [force for force in forces.forces if isinstance(force, Conservative)]
-        self._working = [force for force in forces.forces if not isinstance(force, Conservative)]
+        self._holding = [force for force in forces.forces if has_potential(force)]
+        self._working = [force for force in forces.forces if not has_potential(force)]
         self._open = replace(books.ledger)
         self._contacts, self._resting = 0.0, books._resting
         self._now = _Instant(0.0, 0.0, {})

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from pyverlet.ground.constants import ONE_THREAD_BELOW, SLEEP_NEAR, SURPLUS
 from pyverlet.kernels import clusters, measure
 from pyverlet.laws.contacts.collisions import ContactSolver
-from pyverlet.laws.forces import Conservative, Drag, ForceSum
+from pyverlet.laws.forces import Drag, ForceSum, has_potential
 from pyverlet.laws.links import Links
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
@@ -55,7 +55,7 @@ class Watch:
     def __init__(self, start: State, forces: ForceSum, links: Links, room: Boundary) -> None:
         self._start, self._forces, self._links, self._room = start, forces, links, room
         self._gravity = forces.gravity
-        self._kept: list[Any] = [force for force in forces.forces if isinstance(force, Conservative)]
+        self._kept: list[Any] = [force for force in forces.forces if has_potential(force)]
         self._plain = len(start) < ONE_THREAD_BELOW and not (self._kept or links.give)
         # What links hold is not known any more when the frame is over.
         by_forces, by_links = (0.0, 0.0) if self._plain else self._holds(start)
@@ -270,7 +270,7 @@ def undriven(world: Any, h: float, h_last: float | None) -> bool:
         return False
     if any(g != 0 and period > 0 for g, period in zip(world.gravity, world.boundary.seam.period, strict=True)):
         return False  # who falls for ever gains for ever
-    if world.forces and not all(isinstance(force, Drag | Conservative) for force in world.forces):
+    if world.forces and not all(isinstance(force, Drag) or has_potential(force) for force in world.forces):
         return False
     return not world.obstacles or not any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
 

@@ -85,9 +85,9 @@ class Sleep:
         """At the end of a frame: let islands that have been calm long enough fall asleep. Whether there were any."""
         real = slots.real
         limit = real(SLEEP_SPEED**2 * gravity)
-        kernels.count_calm(slots.velocity, slots.spin, slots.radius, slots.island, limit, np.float32(dt), slots.calm)
-        tired = (slots.calm >= SLEEP_AFTER_S) & (slots.island < 0) & (slots.inverse_mass > 0)
-        if self._laws is None or not tired.any():
+        awake = (slots.velocity, slots.spin, slots.radius, slots.inverse_mass, slots.island)
+        tired = kernels.count_calm(*awake, limit, np.float32(dt), np.float32(SLEEP_AFTER_S), slots.calm)
+        if self._laws is None or not tired:
             return False
         root = np.empty(len(slots), np.int64)
         which = pairs.listed()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import reduce
-from typing import Any, NamedTuple, Protocol, TypeVar, runtime_checkable
+from typing import Any, NamedTuple, Protocol, TypeGuard, TypeVar, runtime_checkable
 
 from numpy.typing import NDArray
 
@@ -28,6 +28,11 @@ class Conservative(Protocol):
 
     def potential(self, state: State) -> float:
         """Potential energy of all particles, J."""
+
+
+def has_potential(force: Any) -> TypeGuard[Conservative]:
+    """Whether it is Conservative, by the name of its method: `isinstance` takes 7 us to say no."""
+    return hasattr(force, "potential")
 
 
 Row = tuple[int, tuple[float, float], tuple[float, float]]

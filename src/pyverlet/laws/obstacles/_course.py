@@ -42,6 +42,8 @@ class Course:
         self._own_segments = self._segments = np.zeros(0, kernels.SEGMENT)
         self._moving: list[int] = []
         self._binned_for = -1.0  # largest radius the cells were filled for; negative: fill them anew
+        self._measured: tuple[Slots, int] | None = None  # of what radii `_largest` is the largest
+        self._largest = 0.0
         self._cells: tuple[Any, ...] = ()
         self._order: Array | None = None
         self._rest = np.empty((0, 2))  # what rounding has taken from places in the substep before
@@ -120,10 +122,11 @@ class Course:
 
     def set_up(self, state: Slots, time: float, h: float) -> None:
         """Place the obstacles, and make room for what is noted of those they hold; arguments: as for `collide`."""
-        largest = float(state.radius.max(initial=0.0))
-        if self._moving or self._binned_for != largest:
+        if self._measured != (state, state.given):
+            self._measured, self._largest = (state, state.given), float(state.radius.max(initial=0.0))
+        if self._moving or self._binned_for != self._largest:
             kernels.place(self._segments, self._bodies, time, h)
-            self._bin(largest)
+            self._bin(self._largest)
         if len(state.along) != len(state):
             state.along = np.empty_like(state.position)
         if time == 0.0 or self._order is not state.particle:  # every new order is a new array
