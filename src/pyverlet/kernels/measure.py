@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
-from pyverlet.compile.lanes import LANES, add_lanes, load, load_rows, spread, where_above, widen
+from pyverlet.compile.lanes import LANES, add_lanes, load, load_rows, spread, where_above, where_zero, which_above, widen
 
 
 @kernel
@@ -31,9 +31,10 @@ def _mechanical(position, velocity, acceleration, lag, spin, radius, mass, gx, g
     """`mechanical` of the particles from `first` up to `stop`: eight sums at once, for one waits for every addition."""
     zero, half, quarter, inf = spread(0.0), spread(0.5), spread(0.25), spread(np.inf)
     later, down_x, down_y = spread(np.float64(lag)), spread(np.float64(gx)), spread(np.float64(gy))
+    none, some = spread(spin.dtype.type(0)), spread(spin.dtype.type(1))
     sums, packed = zero, stop - (stop - first) % LANES
     for k in range(first, packed, LANES):
-        m, turning = widen(load(mass, k)), widen(load(radius, k)) * widen(load(spin, k))
+        m, w = widen(load(mass, k)), load(spin, k)
         x, y = load_rows(position, k)
         vx, vy = load_rows(velocity, k)
         vx, vy = widen(vx), widen(vy)
@@ -42,7 +43,11 @@ def _mechanical(position, velocity, acceleration, lag, spin, radius, mass, gx, g
             vx, vy = vx + later * widen(ax), vy + later * widen(ay)
         height = down_x * widen(x) + down_y * widen(y)
         m = where_above(inf, m, m, zero)  # a pinned particle has none
-        sums = sums + m * (half * (vx * vx + vy * vy) + quarter * turning * turning - height)
+        energy = half * (vx * vx + vy * vy)
+        if which_above(where_zero(w, none, some), none) != 0:  # smooth circles do not turn: a fourth of the work
+            turning = widen(load(radius, k)) * widen(w)
+            energy = energy + quarter * turning * turning
+        sums = sums + m * (energy - height)
     total = add_lanes(sums, LANES)
     for i in range(packed, stop):
         m = np.float64(mass[i])
