@@ -179,7 +179,7 @@ class Circle(_Walls):
     def compiled(self, state: Slots) -> tuple[int, tuple[float, ...]] | None:
         if type(self) is not Circle or self.moves:
             return None
-        if self.restitution == 0.0 == self.friction and state.smooth and not len(state.spent):
+        if self.restitution == 0.0 == self.friction and state.smooth:  # then its walls take nothing that an account would note
             return frame.SMOOTH_CAGE, (*self.center, self.radius, 0.0, 0.0, 0.0)
         return frame.CAGE, (*self.center, self.radius, 0.0, self.restitution, self.friction)
 
