@@ -25,7 +25,7 @@ from pyverlet.kernels.lending import Lending, Terms, even_up, join, leave_out, l
 from pyverlet.kernels.linked import Linked, Linking, look, look_alone, note_pull, note_pull_alone, solve, solve_alone
 from pyverlet.kernels.measure import mechanical
 from pyverlet.kernels.meetings import collide
-from pyverlet.kernels.motion import leap
+from pyverlet.kernels.motion import first_leap, leap
 from pyverlet.kernels.sweeps import push, relax
 from pyverlet.kernels.tables import Circles, Law, Pairs
 
@@ -70,13 +70,25 @@ class Room(NamedTuple):
     mu: Any
 
 
+class Start(NamedTuple):
+    """Where a call begins. looks, sets_out: as for `push`, in the first substep. opens: 1 if that has yet to be integrated: under
+    gravity (gx, gy), m/s^2, and nothing else.
+    """
+
+    looks: Any
+    sets_out: Any
+    opens: Any
+    gx: Any
+    gy: Any
+
+
 class Services(NamedTuple):
     """What a world has beside circles, a room and gravity; empty arrays for what it has not.
 
     h, lag: s, in float64. gravity: (x, y), m/s^2; down: the same in float64. forces: what `drive` takes, (kind, vector, number,
     force, period_x, period_y), and ahead. course: what `meetings.collide` takes, (segments, bodies, cells, walls, along, rest,
     drop). mass: (n,) kg. energies: (substeps, LOOKS) J, becomes what `measure.mechanical` says after the integration of each
-    substep, but of the first and of the one that is handed back, and after its contacts, links and so on; without links at its
+    substep, but of the one that is handed back, and of the first unless it opens, and after its contacts, links and so on; without links at its
     end only. links: what `kernels.linked` takes, its arrays and numbers, where there are any; loans: what
     `kernels.lending` takes; empty where nobody lends. began: when the frame did, s.
     """
@@ -167,20 +179,20 @@ def _still(circles, pairs, law, cut, marks, claims):
 
 
 def _substeps(
-    substep, stop, last, circles, pairs, law, room, services, function, cut, looks, sets_out, checked, far, claims, spent, clock
+    substep, stop, last, circles, pairs, law, room, services, function, cut, start, checked, far, claims, spent, clock
 ):  # fmt: skip
-    """From after the integration of `substep`, whose list of pairs is good, up to the end of substep `stop` - 1.
+    """From `start`, in `substep`, whose list of pairs is good, up to the end of substep `stop` - 1.
 
     last: the substep whose end is that of the frame. circles, pairs, law: `kernels.tables`. services: `Services`, or nothing.
     function: what the user's functions of forces have become, by itself, for Numba is slow to tell the type of what holds one.
-    looks, sets_out: as for `push`, in the first substep. checked, far: as for `leap`. spent, clock: as for `note`, (address,
-    tick).
+    start: `Start`. checked, far: as for `leap`. spent, clock: as for `note`, (address, tick).
 
     Returns the substep that is next, whether it has been integrated and the list of pairs needs a look, and if so under what
     largest acceleration, m/s^2.
     """
     circles, pairs, law = Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Law(*law)
-    room, strongest, begins = Room(*room), law.h - law.h, law.rubs != 0
+    room, start, strongest, begins = Room(*room), Start(*start), law.h - law.h, law.rubs != 0
+    looks, sets_out = start.looks, start.sets_out
     if SERVED:
         services = Services(*services)
         kind, vector, number, force, period_x, period_y = services.forces
@@ -192,6 +204,16 @@ def _substeps(
         begins = begins or segments.shape[0] > 0
     if LINKED:
         linked, linking = Linked(*borrowed(services.links[0])), Linking(*services.links[1])
+    if start.opens != 0:
+        strayed = first_leap(
+            circles.position, circles.velocity, circles.acceleration, circles.inverse_mass, start.gx, start.gy, law.h, checked,
+            far, circles.origin, circles.moved, claims,
+        )  # fmt: skip
+        note(spent, INTEGRATE, clock[0], clock[1])
+        if strayed:
+            return substep, True, strongest
+        if SERVED:
+            _look_at_energy(energies, substep, INTEGRATED, circles, mass, lag, down, spent, clock)
     while True:
         push(circles, pairs, law, cut, looks, sets_out, claims)
         if SERVED and lends:

@@ -166,10 +166,7 @@ def leap(position, velocity, acceleration, h, reference, square, origin, moved, 
 
 @parallel_kernel
 def first_leap(position, velocity, acceleration, inverse_mass, gx, gy, h, reference, square, origin, moved, claims):
-    """`leap` under gravity, which becomes the acceleration of all but pinned particles: how a frame begins.
-
-    Returns whether anyone has strayed, and the acceleration, m/s^2.
-    """
+    """`leap` under gravity, which becomes the acceleration of all but pinned particles: how a frame begins."""
     blocks, found, none = (position.shape[0] + BLOCK - 1) // BLOCK, 0, position[:0]
     none_claimed(claims)
     for part in prange(claims.shape[0]):
@@ -179,7 +176,7 @@ def first_leap(position, velocity, acceleration, inverse_mass, gx, gy, h, refere
             newton_block(acceleration[a:b], none, inverse_mass[a:b], gx, gy)
             found += int(_leap(position, velocity, acceleration, h, reference, square, origin, moved, a, b))
             block = claim_evenly(claims, blocks, part)
-    return found > 0, np.sqrt(gx * gx + gy * gy)
+    return found > 0
 
 
 @parallel_kernel

@@ -117,14 +117,14 @@ class Page:
         """Whether energies are all there is to know after each stage."""
         return not (self._working or self._holding or (self._links and self._links.give))
 
-    def read(self, energies: Any, substep: int, reached: int) -> None:
-        """Stages have gone by since the integration of `substep`, up to the end of the one before `reached`.
+    def read(self, energies: Any, substep: int, reached: int, *, opens: bool) -> None:
+        """Stages have gone by since the integration of `substep`, with it if it `opens`, up to the end of that before `reached`.
 
         energies: (substeps, LOOKS) J, as in `kernels.frame.Services`.
         """
         for k in range(substep, reached):
             integrated, touched, joined, stilled, pulled = map(float, energies[k])
-            if k > substep:
+            if opens or k > substep:
                 self._book("integrate", integrated)
             if self._links:
                 self._book("contacts", touched)

@@ -55,7 +55,7 @@ class Watch:
     def __init__(self, start: State, forces: ForceSum, links: Links, room: Boundary) -> None:
         self._start, self._forces, self._links, self._room = start, forces, links, room
         self._gravity = forces.gravity
-        self._kept: list[Any] = [force for force in forces.forces if has_potential(force)]
+        self._kept: list[Any] = [force for force in forces.forces if has_potential(force)] if forces.forces else []
         self._plain = len(start) < ONE_THREAD_BELOW and not (self._kept or links.give)
         # What links hold is not known any more when the frame is over.
         by_forces, by_links = (0.0, 0.0) if self._plain else self._holds(start)
@@ -268,7 +268,8 @@ def undriven(world: Any, h: float, h_last: float | None) -> bool:
         return False
     if world._slots.pins and pinned_move(world._slots):
         return False
-    if any(g != 0 and period > 0 for g, period in zip(world.gravity, world.boundary.seam.period, strict=True)):
+    seam = world.boundary.seam
+    if seam and any(g != 0 and period > 0 for g, period in zip(world.gravity, seam.period, strict=True)):
         return False  # who falls for ever gains for ever
     if world.forces and not all(isinstance(force, Drag) or has_potential(force) for force in world.forces):
         return False

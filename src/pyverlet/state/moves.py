@@ -38,16 +38,14 @@ def strayed(state: Slots, reference: Array, distance: float) -> bool:
 
 
 def first_leap(
-    state: Slots, gravity: tuple[float, float], h: float, reference: Array, distance: float, origin: Array, moved: Array
-) -> tuple[bool, float]:
+    state: Slots, gravity: tuple[float, float], h: float, reference: Array, distance: Any, origin: Array, moved: Array
+) -> bool:
     """Under gravity alone velocity += h * acceleration, position += h * velocity, moved = position - origin.
 
-    Returns whether anyone has then strayed, and the acceleration, m/s^2.
+    distance: the square of that in `strayed`, in the dtype of the state. Returns whether anyone has then strayed.
     """
-    where, real = (state.position, state.velocity, state.acceleration, state.inverse_mass), state.real
-    numbers = (*state.reals(*gravity, h), reference, real(distance * distance))
-    found, strongest = motion.first_leap(*where, *numbers, origin, moved, state.claims())
-    return bool(found), float(strongest)
+    where = state.position, state.velocity, state.acceleration, state.inverse_mass
+    return bool(motion.first_leap(*where, *state.reals(*gravity, h), reference, distance, origin, moved, state.claims()))
 
 
 def pick_falling(state: Slots, before: Array, lag: float, dt: float) -> None:
@@ -66,7 +64,8 @@ def leave(state: Slots, h: float) -> None:
     """
     held = state.acceleration, state.velocity, state.resting, state.along
     leaving.leave(*held, *state.reals(state.lean, h, 0.5 * h))
-    state.along = state.along[:0].copy()  # of use no more, and as large as a column
+    if len(state.along):
+        state.along = state.along[:0].copy()  # of use no more, and as large as a column
 
 
 def first_non_finite(state: Slots) -> int:

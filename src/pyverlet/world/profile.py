@@ -54,8 +54,8 @@ class Profile:
         self.frame_ms = (perf_counter() - self._start) * 1e3
         self.frames += 1
         self._broken_off = False
-        self._complete[:] = self._spent
         self._total += self._spent
+        self._complete, self._spent = self._spent, self._complete
         self._spent.fill(0.0)
 
     @property

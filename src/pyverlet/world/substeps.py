@@ -61,44 +61,35 @@ class Substeps:
         self._books = done if isinstance(done, Page) and done.plain else None
         return self._books is not None or done == mark
 
-    def leaps_first(self, world: Any, contacts: ContactSolver | None, h: float) -> bool:
-        """The first integration under gravity, with what contacts need to know of it, in one pass. False: there is more to it."""
-        state, forces = world._slots, world._force_sum
-        if contacts is None or forces.forces or not world.integrator.leaps:
-            return False
-        strips, wide = contacts.steady(state), contacts.packed(state)
-        if strips is None or wide is None:
-            return False
-        contacts.broad_phase.strayed, forces.strongest = first_leap(
-            state, forces.gravity, h, strips.checked, strips.allowed, wide.origin, wide.moved
-        )
-        self._out = wide.moved
-        return True
-
-    def go(self, world: Any, contacts: ContactSolver, substep: int, h: float, lag: float) -> int:
+    def go(self, world: Any, contacts: ContactSolver, substep: int, h: float, lag: float, *, opens: bool = False) -> int:
         """From after the integration of `substep`, whose list is good, as far as it goes: the substep that is next.
 
-        `substep` itself: nothing has been done, for there is more to it than kernels.
+        opens: from before it, if nothing but gravity acts and the list was good so far. Negative: nothing has been done, for there
+        is more to it than kernels.
         """
-        out, self._out, self.leapt, state, forces = self._out, None, False, world._slots, world._force_sum
-        books = self._books
-        strips = contacts.steady(state)
-        if strips is None or world.boundary.compiled(state) is None or not (course := world._course).still:
-            return substep
+        state, forces, integrator, onlooker, books = world._slots, world._force_sum, world.integrator, world.onlooker, self._books
+        if opens and (forces.forces or onlooker or not integrator.leaps or not contacts.keeps(state)):
+            return -1
+        out, self._out, self.leapt = self._out, None, False
+        strips, room = contacts.steady(state), world.boundary
+        if strips is None or room.compiled(state) is None or not (course := world._course).still:
+            return -1
         links: Any = world.links.compiled(state, h) if world.links else ()
         if links is None:
-            return substep
+            return -1
         if course:
             course.set_up(state, substep * h, h)
+        if opens:
+            forces.strongest = float(np.sqrt(sum(g * g for g in state.reals(*forces.gravity))))
         wide = contacts.set_up(state, h, lag, forces.strongest)
-        walls, shape = world.boundary.compiled(state)  # that circles rub is known by now
+        walls, shape = room.compiled(state)  # that circles rub is known by now
         lends, loans = contacts.lending
         if smooth := walls == frame.SMOOTH_CAGE and not (links or lends):
             wide.leave_arriving()
         # Who rests is a question of all that pulls: links do so after the circles.
         last, known = -1 if links else world.substeps - 1, forces.compiled(state)
         # Who looks on may turn gravity, and see what a ledger sees.
-        leaps = world.integrator.leaps and known is not None and not world.onlooker
+        leaps = integrator.leaps and known is not None and not onlooker
         rows, native = known if leaps and known else ((), None)
         beside = "served" * bool(course or books or lends or rows or native)
         if links:
@@ -106,24 +97,25 @@ class Substeps:
         if native:
             beside += "_called"
         if smooth and not (beside or wide.asks) and len(state) >= FUSED_FROM and strips.in_order:
-            return self._strip_by_strip(world, contacts, wide, strips, shape, substep, leaps=leaps)
+            return self._strip_by_strip(world, contacts, wide, strips, shape, substep, leaps=leaps, opens=opens)
         services: Any = self._services(world, books, rows, links, loans, h, lag) if beside else ()
-        stop, looks, sets_out = world.substeps if leaps else substep + 1, wide.takes_looks(), lends or out is not wide.moved
+        stop, sets_out = world.substeps if leaps else substep + 1, not opens and (lends or out is not wide.moved)
+        begin = (wide.takes_looks(), int(sets_out), int(opens), *state.reals(*forces.gravity))
         reached, self.leapt, strongest = frame.frames[beside][wide.kind](
-            substep, stop, last, wide.circles, wide.arrays, wide.law, (walls, *map(state.real, shape)), tuple(services),
-            native or (), wide.cut(), looks, int(sets_out), strips.checked, state.real(strips.allowed * strips.allowed),
+            substep, stop, last, wide.circles, wide.arrays, wide.law, (walls, *state.reals(*shape)), tuple(services),
+            native or (), wide.cut(), begin, strips.checked, state.real(strips.allowed * strips.allowed),
             state.claims(), world.profile.spent, (clock.address(), clock.tick()),
         )  # fmt: skip
         if (rows or native) and (self.leapt or reached > substep + 1):
             forces.strongest, forces.t = float(strongest), world.time + (reached - (not self.leapt)) * h
         if books:
-            books.read(services.energies, substep, reached)
+            books.read(services.energies, substep, reached, opens=opens)
         self.marked = not links and reached > last
-        if self.marked:
+        if self.marked or reached == substep:  # who overlaps is yet to be looked for
             wide.has_marked()
         if self.leapt:
             contacts.broad_phase.strayed, self._out = True, wide.moved
-        contacts.broad_phase.aged(reached - substep - 1)
+        contacts.broad_phase.aged(reached - substep - (not opens))
         return int(reached)
 
     def _services(self, world: Any, books: Any, rows: Any, links: Any, loans: Any, h: float, lag: float) -> frame.Services:
@@ -144,14 +136,21 @@ class Substeps:
         )  # fmt: skip
 
     def _strip_by_strip(
-        self, world: Any, contacts: ContactSolver, wide: Wide, strips: Strips, room: Any, substep: int, *, leaps: bool
+        self, world: Any, contacts: ContactSolver, wide: Wide, strips: Strips, room: Any, substep: int, *, leaps: bool, opens: bool
     ) -> int:
-        """One substep, and the integration of the next if it `leaps`."""
+        """One substep, with its integration if it `opens`, and that of the next if it `leaps`."""
         state, last = world._slots, world.substeps - 1
+        far = state.real(strips.allowed * strips.allowed)
+        if opens:
+            self.leapt = first_leap(state, world.gravity, state.h, strips.checked, far, wide.origin, wide.moved)
+            world.profile.mark("integrate")
+            if self.leapt:
+                contacts.broad_phase.strayed, self._out = True, wide.moved
+                return substep
+            contacts.broad_phase.aged(1)
         self._share_out(strips, wide.lanes, state.dtype)
         self.leapt, self.marked = leaps and substep < last, substep == last
-        looks, far = wide.takes_looks(), state.real(strips.allowed * strips.allowed)
-        about = (strips.held, self._place, looks, int(self.leapt), int(self.marked), strips.checked, far)
+        about = (strips.held, self._place, wide.takes_looks(), int(self.leapt), int(self.marked), strips.checked, far)
         arrays = (*wide.arrays[: frame.NORMAL], self._normal, *wide.arrays[frame.NORMAL + 1 :])
         strayed = fused.substep(self._cut, wide.circles, arrays, wide.law, tuple(map(state.real, room[:3])), about)
         contacts.broad_phase.strayed = bool(strayed) if self.leapt else None

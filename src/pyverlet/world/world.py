@@ -141,13 +141,15 @@ class World(Measures, Queries, Doors):
             if not run.leapt:
                 for part in parts:
                     part.before(state, h)
-                if not run.leaps_first(self, contacts, h):
-                    integrator.step(state, forces, self.time + substep * h, h)
+                if compiled and (reached := run.go(self, contacts, substep, h, lag, opens=True)) >= 0:
+                    substep = reached
+                    continue
+                integrator.step(state, forces, self.time + substep * h, h)
             done("integrate")
             if contacts:
                 contacts.find(state, lag)
                 done("broad phase")
-                if compiled and (reached := run.go(self, contacts, substep, h, lag)) > substep:
+                if compiled and (reached := run.go(self, contacts, substep, h, lag)) >= 0:
                     substep = reached
                     continue
                 contacts.project(state, h, lag, forces.strongest)

@@ -218,7 +218,7 @@ class _SortedCells(BroadPhase):
         self._age += substeps
 
     def strips(self) -> Strips | None:
-        if self._allowed < 0:
+        if self._allowed < 0 or self._outlived:
             return None
         in_order = not self._grids.falls and len(self._grids.levels.base) == 1
         return Strips(self._held, self._checked, self._allowed, in_order)

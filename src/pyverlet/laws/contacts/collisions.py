@@ -146,6 +146,10 @@ class ContactSolver:
         alone = not ((self._sleep and self._sleep.anyone) or self._pegs) and state.size is state.radius
         return self.broad_phase.strips() if alone else None
 
+    def keeps(self, state: Slots) -> bool:
+        """Whether the pairs are packed and were listed well so far, and nobody borrows inertia: a frame may begin with them."""
+        return self._packed and not self._uneven and len(self._wide.origin) == len(state)
+
     def set_up(self, state: Slots, h: float, lag: float, strongest: float) -> Wide:
         """The pairs of now, with all that their sweeps need in this substep."""
         wide = self._pack(state)

@@ -280,7 +280,8 @@ class Links:
     def scatter(self) -> None:
         """The frame is good: what it did to the links holds."""
         self._past = self._work.end(self._state) if self._order else None
-        self.broken = np.empty(0, BROKEN)
+        if len(self.broken):
+            self.broken = np.empty(0, BROKEN)
         for pool in self._order:
             snapped = pool.broken()
             if len(snapped):
@@ -320,7 +321,7 @@ class Links:
     @property
     def give(self) -> bool:
         """Whether any may hold energy."""
-        return any(pool.gives for pool in self._order)
+        return bool(self._order) and any(pool.gives for pool in self._order)
 
     def stored(self, state: Slots) -> float:
         """The same in the middle of a frame, J, where the particles are now, without those that have broken in it."""
