@@ -264,11 +264,12 @@ def undriven(world: Any, h: float, h_last: float | None) -> bool:
     Forces have a potential or are drag, no obstacle, wall or pinned circle moves, gravity does not point along a period, and the
     integrator does not raise it either: of order 2 or more, and with a constant step, which `PositionVerlet` needs.
     """
-    if world.integrator.order < 2 or h_last not in (None, h) or world.boundary.moves:
+    room = world.boundary
+    if world.integrator.order < 2 or h_last not in (None, h) or room.moves:
         return False
     if world._slots.pins and pinned_move(world._slots):
         return False
-    seam = world.boundary.seam
+    seam = room.seam
     if seam and any(g != 0 and period > 0 for g, period in zip(world.gravity, seam.period, strict=True)):
         return False  # who falls for ever gains for ever
     if world.forces and not all(isinstance(force, Drag) or has_potential(force) for force in world.forces):

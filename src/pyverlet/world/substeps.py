@@ -80,7 +80,7 @@ class Substeps:
         if course:
             course.set_up(state, substep * h, h)
         if opens:
-            forces.strongest = float(np.sqrt(sum(g * g for g in state.reals(*forces.gravity))))
+            forces.fall(state)
         wide = contacts.set_up(state, h, lag, forces.strongest)
         walls, shape = room.compiled(state)  # that circles rub is known by now
         lends, loans = contacts.lending

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import reduce
 from typing import Any, NamedTuple, Protocol, TypeGuard, TypeVar, runtime_checkable
 
+import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.compile.native import both
@@ -44,6 +45,9 @@ class Known(NamedTuple):
 
     rows: tuple[Row, ...]
     native: Any
+
+
+_GRAVITY_ALONE = Known((), None)
 
 
 @runtime_checkable
@@ -88,11 +92,19 @@ class ForceSum:
         self.gravity = gravity
         self.forces = forces
         self.strongest = self.t = 0.0
+        self._pull: tuple[Any, float] = None, 0.0
 
     @property
     def velocity_dependent(self) -> bool:
         """Whether any of the forces may look at the velocity."""
         return bool(self.forces) and any(getattr(force, "velocity_dependent", True) for force in self.forces)
+
+    def fall(self, state: Slots) -> None:
+        """Gravity alone is to act in the next evaluation, which somebody else makes."""
+        pull = state.reals(*self.gravity)
+        if self._pull[0] is not pull:  # `reals` remembers what it has rounded
+            self._pull = pull, float(np.sqrt(pull[0] * pull[0] + pull[1] * pull[1]))
+        self.strongest = self._pull[1]
 
     def __call__(self, state: Slots, t: float) -> None:
         self.strongest = newton(state, self._summed(state, t), self.gravity)
@@ -103,6 +115,8 @@ class ForceSum:
 
     def compiled(self, state: Slots) -> Known | None:
         """All forces as compiled code adds them up by itself; None: one of them has to be asked."""
+        if not self.forces:
+            return _GRAVITY_ALONE
         rows, natives = [], []
         for force in self.forces:
             if native := getattr(force, "native", None):
