@@ -71,8 +71,8 @@ class Room(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Where a call begins. looks, sets_out: as for `push`, in the first substep. opens: 1 if that has yet to be integrated: under
-    gravity (gx, gy), m/s^2, and nothing else.
+    """Where a call begins. looks, sets_out: as for `push`, in the first substep. opens: 1 if that has yet to be integrated. gx, gy:
+    gravity, m/s^2.
     """
 
     looks: Any
@@ -85,7 +85,7 @@ class Start(NamedTuple):
 class Services(NamedTuple):
     """What a world has beside circles, a room and gravity; empty arrays for what it has not.
 
-    h, lag: s, in float64. gravity: (x, y), m/s^2; down: the same in float64. forces: what `drive` takes, (kind, vector, number,
+    h, lag: s, in float64. down: gravity, m/s^2, in float64. forces: what `drive` takes, (kind, vector, number,
     force, period_x, period_y), and ahead. course: what `meetings.collide` takes, (segments, bodies, cells, walls, along, rest,
     drop). mass: (n,) kg. energies: (substeps, LOOKS) J, becomes what `measure.mechanical` says after the integration of each
     substep, but of the one that is handed back, and of the first unless it opens, and after its contacts, links and so on; without links at its
@@ -95,7 +95,6 @@ class Services(NamedTuple):
 
     h: Any
     lag: Any
-    gravity: Any
     down: Any
     forces: Any
     ahead: Any
@@ -192,29 +191,45 @@ def _substeps(
     """
     circles, pairs, law = Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Law(*law)
     room, start, strongest, begins = Room(*room), Start(*start), law.h - law.h, law.rubs != 0
-    looks, sets_out = start.looks, start.sets_out
+    first, looks, sets_out = substep, start.looks, start.sets_out
     if SERVED:
         services = Services(*services)
         kind, vector, number, force, period_x, period_y = services.forces
         segments, bodies, cells, walls, along, rest, drop = services.course
-        gx, gy = services.gravity
         energies, mass, lag, down = services.energies, services.mass, services.lag, services.down
         loans, terms = Lending(*borrowed(services.loans[0])), Terms(*services.loans[1])
         lends = services.loans[0][0].shape[0] > 0
         begins = begins or segments.shape[0] > 0
     if LINKED:
         linked, linking = Linked(*borrowed(services.links[0])), Linking(*services.links[1])
-    if start.opens != 0:
-        strayed = first_leap(
-            circles.position, circles.velocity, circles.acceleration, circles.inverse_mass, start.gx, start.gy, law.h, checked,
-            far, circles.origin, circles.moved, claims,
-        )  # fmt: skip
-        note(spent, INTEGRATE, clock[0], clock[1])
-        if strayed:
-            return substep, True, strongest
-        if SERVED:
-            _look_at_energy(energies, substep, INTEGRATED, circles, mass, lag, down, spent, clock)
+    integrates = start.opens != 0
     while True:
+        if integrates:
+            if LINKED or CALLS or (SERVED and kind.shape[0] > 0):  # what links have pulled is not felt again
+                strongest, strayed = drive(
+                    circles.position, circles.velocity, circles.acceleration, circles.inverse_mass, mass, kind, vector, number,
+                    force, period_x, period_y, start.gx, start.gy, law.h, services.ahead, checked, far, circles.origin,
+                    circles.moved, function, services.began + substep * services.h,
+                )  # fmt: skip
+                law = _felt(law, strongest, services.h, circles.position)
+            elif start.opens != 0 and substep == first:
+                strayed = first_leap(
+                    circles.position, circles.velocity, circles.acceleration, circles.inverse_mass, start.gx, start.gy, law.h,
+                    checked, far, circles.origin, circles.moved, claims,
+                )  # fmt: skip
+            else:
+                strayed = leap(
+                    circles.position, circles.velocity, circles.acceleration, law.h, checked, far, circles.origin, circles.moved,
+                    claims,
+                )  # fmt: skip
+            note(spent, INTEGRATE, clock[0], clock[1])
+            if strayed:
+                return substep, True, strongest
+            if SERVED:
+                _look_at_energy(energies, substep, INTEGRATED, circles, mass, lag, down, spent, clock)
+            if SERVED and lends:
+                lend(circles, pairs, loans, terms, cut)
+                looks = sets_out = 1  # with the inertia of the moment others overlap deeply, and circles stand elsewhere
         push(circles, pairs, law, cut, looks, sets_out, claims)
         if SERVED and lends:
             settle(circles, pairs, loans, terms, cut)
@@ -254,32 +269,12 @@ def _substeps(
         substep += 1
         if substep == stop:
             return substep, False, strongest
+        looks, sets_out, integrates = 0, 0, True
         if begins:
             remember(circles.start, circles.position)
         if LINKED:
             look(linked, linking, circles.position, circles.velocity, circles.inverse_mass)
             note(spent, LINKS, clock[0], clock[1])
-        if LINKED or CALLS or (SERVED and kind.shape[0] > 0):  # what links have pulled is not felt again
-            strongest, strayed = drive(
-                circles.position, circles.velocity, circles.acceleration, circles.inverse_mass, mass, kind, vector, number, force,
-                period_x, period_y, gx, gy, law.h, services.ahead, checked, far, circles.origin, circles.moved, function,
-                services.began + substep * services.h,
-            )  # fmt: skip
-            law = _felt(law, strongest, services.h, circles.position)
-        else:
-            strayed = leap(
-                circles.position, circles.velocity, circles.acceleration, law.h, checked, far, circles.origin, circles.moved,
-                claims,
-            )  # fmt: skip
-        note(spent, INTEGRATE, clock[0], clock[1])
-        looks = sets_out = 0
-        if strayed:
-            return substep, True, strongest
-        if SERVED:
-            _look_at_energy(energies, substep, INTEGRATED, circles, mass, lag, down, spent, clock)
-        if SERVED and lends:
-            lend(circles, pairs, loans, terms, cut)
-            looks = sets_out = 1  # with the inertia of the moment others overlap deeply, and circles stand elsewhere
 
 
 project = for_each_kind(driver, _project, push=push)

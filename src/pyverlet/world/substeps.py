@@ -64,11 +64,12 @@ class Substeps:
     def go(self, world: Any, contacts: ContactSolver, substep: int, h: float, lag: float, *, opens: bool = False) -> int:
         """From after the integration of `substep`, whose list is good, as far as it goes: the substep that is next.
 
-        opens: from before it, if nothing but gravity acts and the list was good so far. Negative: nothing has been done, for there
-        is more to it than kernels.
+        opens: from before it, if the list was good so far. Negative: nothing has been done, for there is more to it than kernels.
         """
-        state, forces, integrator, onlooker, books = world._slots, world._force_sum, world.integrator, world.onlooker, self._books
-        if opens and (forces.forces or onlooker or not integrator.leaps or not contacts.keeps(state)):
+        state, forces, books = world._slots, world._force_sum, self._books
+        # Who looks on may turn gravity, and see what a ledger sees.
+        leaps = world.integrator.leaps and not world.onlooker and (known := forces.compiled(state)) is not None
+        if opens and not (leaps and contacts.keeps(state)):
             return -1
         out, self._out, self.leapt = self._out, None, False
         strips, room = contacts.steady(state), world.boundary
@@ -79,7 +80,7 @@ class Substeps:
             return -1
         if course:
             course.set_up(state, substep * h, h)
-        if opens:
+        if opens and not forces.forces:
             forces.fall(state)
         wide = contacts.set_up(state, h, lag, forces.strongest)
         walls, shape = room.compiled(state)  # that circles rub is known by now
@@ -87,9 +88,7 @@ class Substeps:
         if smooth := walls == frame.SMOOTH_CAGE and not (links or lends):
             wide.leave_arriving()
         # Who rests is a question of all that pulls: links do so after the circles.
-        last, known = -1 if links else world.substeps - 1, forces.compiled(state)
-        # Who looks on may turn gravity, and see what a ledger sees.
-        leaps = integrator.leaps and known is not None and not onlooker
+        last = -1 if links else world.substeps - 1
         rows, native = known if leaps and known else ((), None)
         beside = "served" * bool(course or books or lends or rows or native)
         if links:
@@ -106,7 +105,7 @@ class Substeps:
             native or (), wide.cut(), begin, strips.checked, state.real(strips.allowed * strips.allowed),
             state.claims(), world.profile.spent, (clock.address(), clock.tick()),
         )  # fmt: skip
-        if (rows or native) and (self.leapt or reached > substep + 1):
+        if (rows or native) and (opens or self.leapt or reached > substep + 1):
             forces.strongest, forces.t = float(strongest), world.time + (reached - (not self.leapt)) * h
         if books:
             books.read(services.energies, substep, reached, opens=opens)
@@ -130,7 +129,7 @@ class Substeps:
             )  # fmt: skip
         ahead = world.integrator.velocity_lag * h if world._force_sum.velocity_dependent else 0.0
         return frame.Services(
-            h, lag, state.reals(*gravity), gravity, (*self._table, state.force, *state.reals(*state.seam.period)),
+            h, lag, gravity, (*self._table, state.force, *state.reals(*state.seam.period)),
             state.real(ahead), world._course.compiled(state, world.boundary), state.mass,
             np.empty((world.substeps if books else 0, frame.LOOKS)), links, loans, world.time,
         )  # fmt: skip
