@@ -154,7 +154,7 @@ def test_a_substep_that_was_broken_off_leaves_nothing_behind() -> None:
         if frame == 5:
             w.gravity = (0, -5)
             assert w._contacts is not None
-            with mock.patch.object(w._contacts, "find", side_effect=KeyboardInterrupt), pytest.raises(KeyboardInterrupt):
+            with mock.patch.object(w._contacts, "set_up", side_effect=KeyboardInterrupt), pytest.raises(KeyboardInterrupt):
                 w.step(1 / 60)
 
     both(lambda: pour(boundary=ROOMS["cage"]()), 60, interrupt)

@@ -39,21 +39,16 @@ class Fusing:
         self._patch, self._by_strips, self.substeps, self.leaps = patch, by_strips, 0, 0
         self.first_leaps = 0
         patch.setattr(substeps, "FUSED_FROM", 2 if by_strips else 10**9)
-        go, leaps_first = substeps.Substeps.go, substeps.Substeps.leaps_first
+        go = substeps.Substeps.go
 
-        def counted(run: substeps.Substeps, world: pv.World, contacts: Any, substep: int, *numbers: float) -> int:
-            reached = go(run, world, contacts, substep, *numbers)
-            self.substeps += reached - substep
-            self.leaps += max(reached - substep - 1, 0) + run.leapt
-            return reached
-
-        def first(run: substeps.Substeps, world: pv.World, contacts: Any, h: float) -> bool:
-            leapt = leaps_first(run, world, contacts, h)
-            self.first_leaps += leapt
-            return leapt
+        def counted(run: substeps.Substeps, *about: Any, opens: bool = False) -> bool:
+            before, gone = run.substep, go(run, *about, opens=opens)
+            self.first_leaps += gone and opens
+            self.substeps += (done := run.substep - before)
+            self.leaps += max(done - 1, 0) + (run.leapt and done > 0)
+            return gone
 
         patch.setattr(substeps.Substeps, "go", counted)
-        patch.setattr(substeps.Substeps, "leaps_first", first)
 
     def undo(self) -> None:
         take_the_long_way(self._patch)
@@ -453,15 +448,15 @@ def test_a_frame_that_was_broken_off_leaves_nothing_behind(fusing: Fusing) -> No
     def interrupted() -> pv.World:
         world = heap(3000, 0.7)
         assert world._contacts is not None
-        find, last = world._contacts.find, world.frames + 5
+        set_up, last = world._contacts.set_up, world.frames + 5
 
-        def interrupt(state: Any, lag: float) -> None:
+        def interrupt(*about: Any) -> Any:
             if world.frames == last:
                 raise KeyboardInterrupt
-            find(state, lag)
+            return set_up(*about)
 
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(world._contacts, "find", interrupt)
+            patch.setattr(world._contacts, "set_up", interrupt)
             with pytest.raises(KeyboardInterrupt):
                 world.run(seconds=0.2)
         world.position[:50] = world.position[-50:] + 1e-3  # nobody may rely on who was near whom before

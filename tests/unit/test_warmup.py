@@ -189,8 +189,8 @@ def test_rehearsals_of_larger_worlds_do_what_these_do(monkeypatch: pytest.Monkey
     def spy(owner: type, name: str) -> None:
         method = getattr(owner, name)
 
-        def spied(*given: Any) -> Any:
-            result = method(*given)
+        def spied(*given: Any, **options: Any) -> Any:
+            result = method(*given, **options)
             if result:
                 done.add(name)
             return result

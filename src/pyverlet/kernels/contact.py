@@ -80,7 +80,7 @@ def _push_strip(s, to, circles, pairs, law, looks):
             if BOUNCES:
                 store(depths, k, zero)
             continue
-        done, at = 0, k * law.mixed
+        done, at, lively = 0, k * law.mixed, 0
         mu = zero
         if LISTENS and not BOUNCES and touching != 0:
             vxi, vyi = take(velocity, lane_i, k)
@@ -88,6 +88,8 @@ def _push_strip(s, to, circles, pairs, law, looks):
             _hear(heard, k, touching, zero - (dx * (vxj - vxi) + dy * (vyj - vyi)), where_zero(distance, r, distance))
         if BOUNCES:
             e, mu = load(made_of[E], at), load(made_of[MU], at)
+            lively = which_above(e + mu, zero)  # else these pairs neither bounce nor rub, whatever others do
+        if BOUNCES and (lively != 0 or law.listens != 0):
             if RUBS:
                 sxi, syi, turned_i, carries_i = take_four(rows, lane_i, k)
                 sxj, syj, turned_j, carries_j = take_four(rows, lane_j, k)

@@ -71,8 +71,8 @@ class Room(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Where a call begins. looks, sets_out: as for `push`, in the first substep. opens: 1 if that has yet to be integrated. gx, gy:
-    gravity, m/s^2.
+    """Where a call begins. looks, sets_out: as for `push`, in the first substep. opens: 1 if that is yet to be integrated.
+    gx, gy: gravity, m/s^2.
     """
 
     looks: Any
@@ -88,8 +88,8 @@ class Services(NamedTuple):
     h, lag: s, in float64. down: gravity, m/s^2, in float64. forces: what `drive` takes, (kind, vector, number,
     force, period_x, period_y), and ahead. course: what `meetings.collide` takes, (segments, bodies, cells, walls, along, rest,
     drop). mass: (n,) kg. energies: (substeps, LOOKS) J, becomes what `measure.mechanical` says after the integration of each
-    substep, but of the one that is handed back, and of the first unless it opens, and after its contacts, links and so on; without links at its
-    end only. links: what `kernels.linked` takes, its arrays and numbers, where there are any; loans: what
+    substep, but of the one that is handed back, and of the first unless it opens; after its contacts, links and so on; without
+    links at its end only. links: what `kernels.linked` takes, its arrays and numbers, where there are any; loans: what
     `kernels.lending` takes; empty where nobody lends. began: when the frame did, s.
     """
 

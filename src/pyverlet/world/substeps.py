@@ -35,12 +35,13 @@ class Substeps:
     """The substeps of one frame of a world after another.
 
     Attributes:
-        leapt: whether the integration of the next substep has been done already.
+        substep: the one that is next.
+        leapt: whether its integration has been done already.
         marked: whether the last substep has marked who rests.
     """
 
     def __init__(self) -> None:
-        self.leapt = self.marked = False
+        self.substep, self.leapt, self.marked = 0, False, False
         self._out: Array | None = None  # `moved` of the pairs that has been set out for this substep
         self._held: Array | None = None
         self._cut = self._place = np.zeros(0, np.int64)
@@ -51,7 +52,7 @@ class Substeps:
 
     def begin(self, contacts: ContactSolver | None) -> Substeps:
         """A frame begins. That before may have been broken off, and the user may have changed everything since."""
-        self.leapt, self.marked, self._out = False, False, None
+        self.substep, self.leapt, self.marked, self._out = 0, False, False, None
         if contacts:
             contacts.broad_phase.strayed = None
         return self
@@ -61,23 +62,26 @@ class Substeps:
         self._books = done if isinstance(done, Page) and done.plain else None
         return self._books is not None or done == mark
 
-    def go(self, world: Any, contacts: ContactSolver, substep: int, h: float, lag: float, *, opens: bool = False) -> int:
-        """From after the integration of `substep`, whose list is good, as far as it goes: the substep that is next.
+    def go(self, world: Any, contacts: ContactSolver, h: float, lag: float, *, opens: bool = False) -> bool:
+        """From after the integration of `substep`, whose list is good, as far as it goes.
 
-        opens: from before it, if the list was good so far. Negative: nothing has been done, for there is more to it than kernels.
+        opens: from before it, if the list was good so far. False: nothing has been done, for there is more to it than kernels.
         """
-        state, forces, books = world._slots, world._force_sum, self._books
+        state, forces, books, substep = world._slots, world._force_sum, self._books, self.substep
         # Who looks on may turn gravity, and see what a ledger sees.
         leaps = world.integrator.leaps and not world.onlooker and (known := forces.compiled(state)) is not None
         if opens and not (leaps and contacts.keeps(state)):
-            return -1
+            return False
         out, self._out, self.leapt = self._out, None, False
         strips, room = contacts.steady(state), world.boundary
         if strips is None or room.compiled(state) is None or not (course := world._course).still:
-            return -1
+            return False
         links: Any = world.links.compiled(state, h) if world.links else ()
         if links is None:
-            return -1
+            return False
+        if opens:  # as far as is known now the list is good
+            contacts.broad_phase.aged(1)
+            world.profile.mark("broad phase")
         if course:
             course.set_up(state, substep * h, h)
         if opens and not forces.forces:
@@ -96,7 +100,8 @@ class Substeps:
         if native:
             beside += "_called"
         if smooth and not (beside or wide.asks) and len(state) >= FUSED_FROM and strips.in_order:
-            return self._strip_by_strip(world, contacts, wide, strips, shape, substep, leaps=leaps, opens=opens)
+            self._strip_by_strip(world, contacts, wide, strips, shape, leaps=leaps, opens=opens)
+            return True
         services: Any = self._services(world, books, rows, links, loans, h, lag) if beside else ()
         stop, sets_out = world.substeps if leaps else substep + 1, not opens and (lends or out is not wide.moved)
         begin = (wide.takes_looks(), int(sets_out), int(opens), *state.reals(*forces.gravity))
@@ -114,8 +119,9 @@ class Substeps:
             wide.has_marked()
         if self.leapt:
             contacts.broad_phase.strayed, self._out = True, wide.moved
-        contacts.broad_phase.aged(reached - substep - (not opens))
-        return int(reached)
+        contacts.broad_phase.aged(reached - substep - 1)
+        self.substep = int(reached)
+        return True
 
     def _services(self, world: Any, books: Any, rows: Any, links: Any, loans: Any, h: float, lag: float) -> frame.Services:
         """What the world has beside circles, a room and gravity: `rows` of forces, obstacles, `books`, links, loans."""
@@ -135,8 +141,8 @@ class Substeps:
         )  # fmt: skip
 
     def _strip_by_strip(
-        self, world: Any, contacts: ContactSolver, wide: Wide, strips: Strips, room: Any, substep: int, *, leaps: bool, opens: bool
-    ) -> int:
+        self, world: Any, contacts: ContactSolver, wide: Wide, strips: Strips, room: Any, *, leaps: bool, opens: bool
+    ) -> None:
         """One substep, with its integration if it `opens`, and that of the next if it `leaps`."""
         state, last = world._slots, world.substeps - 1
         far = state.real(strips.allowed * strips.allowed)
@@ -145,10 +151,10 @@ class Substeps:
             world.profile.mark("integrate")
             if self.leapt:
                 contacts.broad_phase.strayed, self._out = True, wide.moved
-                return substep
-            contacts.broad_phase.aged(1)
+                contacts.broad_phase.aged(-1)
+                return
         self._share_out(strips, wide.lanes, state.dtype)
-        self.leapt, self.marked = leaps and substep < last, substep == last
+        self.leapt, self.marked = leaps and self.substep < last, self.substep == last
         about = (strips.held, self._place, wide.takes_looks(), int(self.leapt), int(self.marked), strips.checked, far)
         arrays = (*wide.arrays[: frame.NORMAL], self._normal, *wide.arrays[frame.NORMAL + 1 :])
         strayed = fused.substep(self._cut, wide.circles, arrays, wide.law, tuple(map(state.real, room[:3])), about)
@@ -156,7 +162,7 @@ class Substeps:
         if self.marked:
             wide.has_marked()
         world.profile.mark("fused")
-        return substep + 1
+        self.substep += 1
 
     def _share_out(self, strips: Strips, lanes: Array, dtype: np.dtype[Any]) -> None:
         """Which strips each thread does, as nearly as many lanes as can be, and where each strip keeps its normals."""

@@ -134,23 +134,21 @@ class World(Measures, Queries, Doors):
         parts: list[Any] = [part for part in (contacts, links, course) if part]
         if not self._open(h, done):
             return False
-        compiled = contacts and run.tells(done, self.profile.mark)
-        watch, substep = self._watch(h) if contacts or course else None, 0
-        while substep < self.substeps:
-            self._show(substep, h, lag)
+        compiled = run.tells(done, self.profile.mark)
+        watch = self._watch(h) if contacts or course else None
+        while run.substep < self.substeps:
+            self._show(run.substep * h, lag)
             if not run.leapt:
                 for part in parts:
                     part.before(state, h)
-                if compiled and (reached := run.go(self, contacts, substep, h, lag, opens=True)) >= 0:
-                    substep = reached
+                if contacts and compiled and run.go(self, contacts, h, lag, opens=True):
                     continue
-                integrator.step(state, forces, self.time + substep * h, h)
+                integrator.step(state, forces, self.time + run.substep * h, h)
             done("integrate")
             if contacts:
                 contacts.find(state, lag)
                 done("broad phase")
-                if compiled and (reached := run.go(self, contacts, substep, h, lag)) >= 0:
-                    substep = reached
+                if compiled and run.go(self, contacts, h, lag):
                     continue
                 contacts.project(state, h, lag, forces.strongest)
                 done("contacts")
@@ -160,7 +158,7 @@ class World(Measures, Queries, Doors):
             self.boundary.confine(state, h, lag, REST_ACCELERATIONS * forces.strongest * h)
             done("bounds")
             if course:
-                course.collide(state, self.boundary, substep * h, h, lag, REST_ACCELERATIONS * forces.strongest * h)
+                course.collide(state, self.boundary, run.substep * h, h, lag, REST_ACCELERATIONS * forces.strongest * h)
                 done("obstacles")
             if contacts:
                 contacts.still(state, h)
@@ -168,7 +166,7 @@ class World(Measures, Queries, Doors):
             if links:
                 links.after(state, h)
                 done("links")
-            substep += 1
+            run.substep += 1
         return self._finish(contacts, watch, h, done, marked=run.marked)
 
     def _watch(self, h: float) -> Watch | None:
@@ -240,9 +238,9 @@ class World(Measures, Queries, Doors):
         self.time, self.frames, self._h_last = self.time + dt, self.frames + 1, h
         self._coarse.look(self, h)
 
-    def _show(self, done: int, h: float, lag: float) -> None:
-        if self.onlooker and done:
-            self.onlooker(Moment(self._slots, self.time + done * h, lag))
+    def _show(self, since: float, lag: float) -> None:
+        if self.onlooker and since:
+            self.onlooker(Moment(self._slots, self.time + since, lag))
             self.profile.mark("pictures")
 
     def _open_books(self, h: float) -> Any:
