@@ -135,7 +135,7 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=60, help="frames measured for each engine")
     parser.add_argument("--csv", type=Path, help="write the rows to this file too")
     parser.add_argument("--plot", type=Path, help="draw the cost against the number of discs into this file")
-    parser.add_argument("--million", action="store_true", help="own: a million discs too, half an hour")
+    parser.add_argument("--million", action="store_true", help="own, materials: a million discs too, half an hour")
     parser.add_argument("--scene", default="cage", help="page: what is shown")
     parser.add_argument("--seconds", type=float, default=12.0, help="page: how long each is watched")
     parser.add_argument("--threads", type=int, help="page, beside: that the physics may use")
@@ -153,7 +153,7 @@ def main() -> None:
         page.main(arguments.scene, arguments.particles or [20_000, 100_000, 1_000_000], arguments.seconds, arguments.threads)
         return
     if arguments.table == "materials":
-        materials.main((arguments.particles or [20_000])[0], arguments.csv)
+        materials.main((arguments.particles or [20_000])[0], arguments.csv, million=arguments.million)
         return
     if arguments.table == "links":
         links.main(arguments.csv)

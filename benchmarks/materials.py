@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,12 @@ SETTLE_SECONDS = 10.0
 
 FRAMES = 20
 """Of each world in a turn, at least."""
+
+GAS_FRAMES = 60
+"""That is its start: without restitution it has lost half its speed by then."""
+
+MILLION_SECONDS, MILLION_FRAMES = 10.0, 10
+"""How long a million have fallen, and how many frames are looked at then."""
 
 
 @dataclass(frozen=True)
@@ -154,6 +161,49 @@ def compare(materials: tuple[Material, ...], particles: int, threads: int) -> li
     return rows
 
 
+def gas(particles: int, threads: int) -> list[Row]:
+    """A gas that covers 0.3 of its box, which begins without restitution, and with e = 1; frame by frame in turn."""
+    cells, rng = int(np.ceil(np.sqrt(particles))), np.random.default_rng(0)
+    side = float(np.sqrt(np.pi * particles / 0.3)) * RADIUS
+    middle = (np.arange(cells) + 0.5) * side / cells
+    place = np.stack(np.meshgrid(middle, middle), axis=-1).reshape(-1, 2)[:particles]
+    place = place + rng.uniform(-0.5, 0.5, place.shape) * (side / cells - 2.02 * RADIUS)
+    angle = rng.uniform(0, 2 * np.pi, particles)
+    worlds, rows = [], []
+    for e in (0.0, 1.0):
+        for _ in range(2):  # the first compiles
+            box, law = pv.Box((0, 0), (side, side), restitution=e), pv.Collisions(restitution=e)
+            world = pv.World(boundary=box, gravity=(0, 0), collisions=law, substeps=8, threads=threads)
+            world.add(position=place, velocity=3 * np.column_stack((np.cos(angle), np.sin(angle))), radius=RADIUS, mass=1.0)
+            world.step(DT)
+        worlds.append(world)
+    times: list[list[float]] = [[], []]
+    for _ in range(GAS_FRAMES):
+        for world, spent in zip(worlds, times, strict=True):
+            start = perf_counter()
+            world.step(DT)
+            spent.append(1e3 * (perf_counter() - start))
+    for world, spent, name, asked in zip(worlds, times, ("gas, e = 0, at its start", "gas, e = 1"), (1.0, 1.2), strict=True):
+        found, ms = world.overlap(), float(np.quantile(spent, 0.25))
+        rows.append(Row(name, particles, threads, ms, ms / float(np.quantile(times[0], 0.25)), asked, found.mean, found.max))
+    return rows
+
+
+def falling(threads: int, settled: Row) -> list[Row]:
+    """A million that have fallen for a while and go on falling; the ratio is that of a circle's time, to `settled`."""
+    world = pv.scenes.get("cage").world(particles=1_000_000)
+    world.threads = threads
+    world.run(seconds=MILLION_SECONDS, dt=DT)
+    spent = []
+    for _ in range(MILLION_FRAMES):
+        start = perf_counter()
+        world.step(DT)
+        spent.append(1e3 * (perf_counter() - start))
+    found, ms = world.overlap(), float(np.mean(spent))  # some frames make the list anew, some do not
+    ratio = ms / len(world) / (settled.ms_per_frame / settled.particles)
+    return [Row("a million that still falls", len(world), threads, ms, ratio, 2.0, found.mean, found.max)]
+
+
 def peers(particles: int, threads: int) -> list[Row]:
     """Ours, pymunk and Box2D, with e = 0.3 and mu = 0.5 on the same heap; ratios are to ours."""
     position, cage = heap(particles)
@@ -179,11 +229,15 @@ def peers(particles: int, threads: int) -> list[Row]:
     return rows
 
 
-def main(particles: int, path: Path | None) -> None:
+def main(particles: int, path: Path | None, *, million: bool) -> None:
     """Print the tables; write them as CSV and JSON if asked to."""
     rows: list[Row] = []
     for threads in (1, 2):
-        for part in (compare(LARGE, particles, threads), *([compare(SMALL, 1_000, 1)] if threads == 1 else [])):
+        large = compare(LARGE, particles, threads)
+        others = [gas(particles, threads)]
+        others += [compare(SMALL, 1_000, 1)] if threads == 1 else []
+        others += [falling(threads, large[0])] if million else []
+        for part in (large, *others):
             print(f"\n{part[0].particles:,} circles, {threads} thread{'s' * (threads > 1)}, 8 substeps, radii 1:1 unless said")
             print(f"{'world':<34}{'ms a frame':>11}{'ratio':>8}{'asked':>8}{'mean overlap':>14}{'max':>8}")
             for row in part:
