@@ -91,8 +91,7 @@ class Substeps:
         lends, loans = contacts.lending
         if smooth := walls == frame.SMOOTH_CAGE and not (links or lends):
             wide.leave_arriving()
-        # Who rests is a question of all that pulls: links do so after the circles.
-        last = -1 if links else world.substeps - 1
+        last = world.substeps - 1
         rows, native = known if leaps and known else ((), None)
         beside = "served" * bool(course or books or lends or rows or native)
         if links:
@@ -114,7 +113,7 @@ class Substeps:
             forces.strongest, forces.t = float(strongest), world.time + (reached - (not self.leapt)) * h
         if books:
             books.read(services.energies, substep, reached, opens=opens)
-        self.marked = not links and reached > last
+        self.marked = reached > last
         if self.marked or reached == substep:  # who overlaps is yet to be looked for
             wide.has_marked()
         if self.leapt:
