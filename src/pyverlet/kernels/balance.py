@@ -2,8 +2,8 @@
 
 Contacts solved with m' in place of m keep the sum of m' v, but it is the sum of m v that must be kept. Over a substep they differ
 by the sum of (m' - m) dv, with the dv of everything but links, and gravity's. A cluster are circles that hang together by
-contacts (`kernels.hanging`). To each that sum is given as a velocity that all its circles share, and what angular momentum lacks by turning it as a
-whole. No contact notices: nothing in the cluster moves against anything else in it by that.
+contacts (`kernels.hanging`). To each that sum is given as a velocity that all its circles share, and what angular momentum lacks
+by turning it as a whole. No contact notices: nothing in the cluster moves against anything else in it by that.
 
 Where a wall, an obstacle or a pinned circle pushes back, momentum is not kept, and what is lacking is theirs to give: what stands
 on a floor gets what is lacking along it, and what walls hold in several directions nothing. Given it all the same, light circles
@@ -130,10 +130,16 @@ def _lent(lending, inverse_mass, i):
 def balance(circles, lending, root, rubs):
     """Give to each cluster what its momentum and its angular momentum lack.
 
-    rubs: whether spins take part. `Lending.sums`, of each root: m, m x (2), what momentum lacks (2), I, what angular momentum about
-    the centre lacks, and the three numbers of `note_walls`.
+    rubs: whether spins take part. `Lending.sums`, of each root: m, m x (2), what momentum lacks (2), I, what angular momentum
+    about the centre lacks, and the three numbers of `note_walls`.
     """
-    position, velocity, spin, radius, inverse_mass = circles.position, circles.velocity, circles.spin, circles.radius, circles.inverse_mass
+    position, velocity, spin, radius, inverse_mass = (
+        circles.position,
+        circles.velocity,
+        circles.spin,
+        circles.radius,
+        circles.inverse_mass,
+    )
     mass, before, spin_before, sums = lending.mass, lending.before, lending.spin_before, lending.sums
     among, count = lending.among, 0
     for c in range(lending.found.shape[0]):

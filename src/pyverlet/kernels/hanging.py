@@ -15,7 +15,10 @@ from pyverlet.compile.lanes import ALL, LANES
 from pyverlet.kernels.clusters import join
 
 AROUND = 128
-"""Circles looked at around one that has lost a contact."""
+"""Circles looked at around one that has lost a contact, at most."""
+
+# And at first: who is left alone is found out sooner from its own side.
+_NEXT = 16
 
 # One in so many circles may have lost a contact; if more have, all are joined anew.
 _MANY = 64
@@ -42,8 +45,8 @@ def list_lanes(begin, lanes, lane_i, lane_j, first, where):
 
 
 @kernel
-def _around(i, j, pairs, hanging):
-    """How many circles hang together with i; they are listed in `found`. 0 if j is one of them, -1 if they are too many."""
+def _around(i, j, most, pairs, hanging):
+    """How many circles hang together with i: they are listed in `found`. 0 if j is one of them, -1 if more than `most`."""
     first, where, touch, found, seen = hanging.first, hanging.where, hanging.touch, hanging.found, hanging.seen
     hanging.sets[1] += 1
     turn, count, k = hanging.sets[1], 1, 0
@@ -59,7 +62,7 @@ def _around(i, j, pairs, hanging):
                 if other == j:
                     return 0
                 if seen[other] != turn:
-                    if count == found.shape[0]:
+                    if count == most:
                         return -1
                     found[count] = other
                     seen[other] = turn
@@ -87,10 +90,13 @@ def _part(i, j, pairs, hanging):
     """The pair i, j no longer touches. False: it is not known what follows."""
     if hanging.root[i] != hanging.root[j]:  # what has been taken out since may have joined others
         return False
-    count = _around(i, j, pairs, hanging)
-    if count < 0:
-        count = _around(j, i, pairs, hanging)
-    return count == 0 or (count > 0 and _take_out(count, hanging))
+    for most in (_NEXT, AROUND):
+        count = _around(i, j, most, pairs, hanging)
+        if count < 0:
+            count = _around(j, i, most, pairs, hanging)
+        if count >= 0:
+            return count == 0 or _take_out(count, hanging)
+    return False
 
 
 @kernel

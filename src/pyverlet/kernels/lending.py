@@ -44,8 +44,8 @@ class Lending:
 class Hanging:
     """Who hangs together (`kernels.hanging`).
 
-    root: (n,) the lowest member of each one's cluster; heads: (n,) those that are roots, and sets: (2,) how many of them, -1: it
-    is not known yet, and how often something was looked for. touch, changed: by pack, and changes: by strip: `kernels.loans.share`.
+    root: (n,) the lowest member of each one's cluster; heads: (n,) those that are roots; sets: (2,) how many of them, -1: it is
+    not known yet, and how often something was looked for. touch, changed: by pack, and changes: by strip: `kernels.loans.share`.
     first: (n + 1,) and where: `kernels.hanging.list_lanes`. found: (k,), seen: (n,) scratch.
     """
 
@@ -62,8 +62,8 @@ class Hanging:
 
 
 class Terms(NamedTuple):
-    """kick, s, and fall, s^2: what a becomes a change of velocity, and of position, by; part: of a loan given back in a substep of
-    h seconds; sunk, m/s: see `kernels.loans.begin`.
+    """kick, s, and fall, s^2: by what a becomes a change of velocity, and of position; part: of a loan given back in a substep
+    of h seconds; sunk, m/s: see `kernels.loans.begin`.
     """
 
     kick: Any
@@ -79,7 +79,7 @@ def lend(circles, pairs, lending, terms, cut, rubs):
 
     `moved` is set anew, too: circles stand elsewhere.
     """
-    begin(circles, lending, terms, rubs)
+    begin(circles, lending, terms, pairs.made_of.shape[1] > 0, rubs)
     share_out(pairs.begin, pairs.lanes, pairs.lane_i, pairs.lane_j, cut, lending.lighter, pairs.share, pairs.reduced)
 
 

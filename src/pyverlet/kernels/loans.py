@@ -57,7 +57,7 @@ def _inertia(mass, lent, least):
 
 
 @kernel
-def _begin(a, b, circles, lending, terms, rubs):
+def _begin(a, b, circles, lending, terms, bounces, rubs):
     """What `begin` does, of the circles from a up to b."""
     position, velocity, acceleration, spin = circles.position, circles.velocity, circles.acceleration, circles.spin
     inverse_mass, origin, moved, rows = circles.inverse_mass, circles.origin, circles.moved, circles.inertia
@@ -72,13 +72,16 @@ def _begin(a, b, circles, lending, terms, rubs):
         inertia = larger(m + loan, keeps)
         light = where_zero(w, w, where_zero(loan, w, one / inertia))
         store(lighter, k, light)
-        store(calm, k, where_zero(loan, where_zero(waits, zero, sunk), sunk))
+        if bounces:
+            store(calm, k, where_zero(loan, where_zero(waits, zero, sunk), sunk))
         store_rows(rows, k, inertia, where_zero(w, nobody, where_above(waits, zero, nobody, keeps)))
         stands = which_set(held, k, ANY)
         ax, ay = load_rows(acceleration, k)
         vx, vy = load_rows(velocity, k)
         x, y = load_rows(position, k)
         startx, starty = load_rows(origin, k)
+        if rubs:
+            store(spin_before, k, load(spin, k))
         part = where_set(stands, kick, zero)
         store_rows(before, k, vx - part * ax, vy - part * ay)
         more = where_set(stands, where_zero(light - w, zero, (light / w - one) * fall), zero)
@@ -91,22 +94,21 @@ def _begin(a, b, circles, lending, terms, rubs):
         rows[i, 1] = real(-1) if w == 0 or busy[i] > 0 else real(1 - LENT) * mass[i]
         lighter[i] = w if w == 0 or loan == 0 else real(1) / rows[i, 0]
         calm[i] = real(0) if loan == 0 and busy[i] == 0 else terms.sunk
+        spin_before[i] = spin[i]
         part = terms.kick if held[i] else real(0)
         more = (lighter[i] / w - real(1)) * terms.fall if held[i] and lighter[i] != w else real(0)
         for axis in range(2):
             before[i, axis] = velocity[i, axis] - part * acceleration[i, axis]
             position[i, axis] += more * acceleration[i, axis]
             moved[i, axis] = position[i, axis] - origin[i, axis]
-    if rubs:
-        for i in range(a, b):
-            spin_before[i] = spin[i]
 
 
 @parallel_kernel
-def begin(circles, lending, terms, rubs):
+def begin(circles, lending, terms, bounces, rubs):
     """A substep's contacts begin.
 
-    lighter: 1 / m' of each circle, 1/kg. calm: `sunk` for who lends, or may not yet, else 0. inertia: m', kg, and what of it the
+    lighter: 1 / m' of each circle, 1/kg. calm, if any pair `bounces` or rubs: `sunk` for who lends, or may not yet,
+    else 0. inertia: m', kg, and what of it the
     circle keeps whatever others ask for, negative if it neither lends nor borrows. before, and spin_before if any pair `rubs`:
     velocities from which contacts begin; of those that walls hold without gravity's share, which counts as theirs.
 
@@ -114,7 +116,7 @@ def begin(circles, lending, terms, rubs):
     """
     n = circles.position.shape[0]
     for c in prange((n + CHUNK - 1) // CHUNK):
-        _begin(c * CHUNK, min((c + 1) * CHUNK, n), circles, lending, terms, rubs)
+        _begin(c * CHUNK, min((c + 1) * CHUNK, n), circles, lending, terms, bounces, rubs)
 
 
 @kernel
@@ -148,9 +150,9 @@ def _share_strip(s, pairs, rows, hanging):
 def share(circles, pairs, hanging, cut, claims):
     """Even out the inertia of each touching pair that has not bounced; nobody lends more than the part LENT of the own mass.
 
-    Who is in such a pair has a negative inertia then. touch: these pairs, a bit for each, and a byte for each pack. Packs in which
-    that is not what it was are noted in `changed`, changes[s] of them from the first pack of strip s on, the lanes that have
-    changed in the lowest bits.
+    Who is in such a pair has a negative inertia then. touch: these pairs, a bit for each, and a byte for each pack. Packs in
+    which that is not what it was are noted in `changed`, changes[s] of them from the first pack of strip s on, the lanes that
+    have changed in the lowest bits.
     """
     for parity in range(2):
         none_claimed(claims)

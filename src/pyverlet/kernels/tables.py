@@ -81,7 +81,7 @@ class Pairs:
 class Law(NamedTuple):
     """Numbers of a substep, and what there is to do in it.
 
-    varied: 1, or 0 if share is the same for all and has one pack only; sized: the same of reach; mixed: of `made_of`. rubs: whether
+    varied: 1, or 0 if share is the same for all and has one pack only; sized, mixed: the same of reach, `made_of`. rubs: whether
     any pair may rub; listens: whether somebody listens to who meets how fast; accounts: whether somebody asks what impacts take.
     arrives: 1 if what becomes of `moved` is to be added to positions and velocities when all pairs have been gone through, 0 if
     the room does that; always 1 where pairs may bounce. feed: FED / PUSHED / h, 1/s. most: the largest part of the contact

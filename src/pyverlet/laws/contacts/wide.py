@@ -37,7 +37,7 @@ class Wide:
         lane_i, lane_j: slots; those of strip s from begin[s] to begin[s] + lanes[s], the first apart[s] unlikely to touch soon.
         gap: (2, room) from i to j when the list was made, m.
         origin: (n, 2) where circles were then. moved: (n, 2) how far they have come since.
-        reach, share, reduced: m, what part of a push moves i, and kg; one for each lane, or (LANES,) if they are the same for all.
+        reach, share, reduced: m, what part of a push moves i, kg; one for each lane, or (LANES,) if they are the same for all.
         made_of: (6, room) or (6, LANES) what each pair is made of: rows of `kernels.tables`.
         normal: (2, room) of pairs that touch, for others 0. depth: (room,) their overlap, m.
         slip: (room,) what contacts have slipped, m.
