@@ -182,8 +182,8 @@ class OneByOne:
                 slide = np.array([rub * n[1], -(rub * n[0])], s.dtype)
                 self.slid[i] -= slide * share
                 self.slid[j] += slide * (real(1) - share)
-                self.turned[i] += rub * (real(2) * share / s.radius[i])
-                self.turned[j] += rub * (real(2) * (real(1) - share) / s.radius[j])
+                self.turned[i] += rub * share * (real(2) / s.radius[i])
+                self.turned[j] += rub * (real(1) - share) * (real(2) / s.radius[j])
                 self.held[k] = rub
             self.moved[i] = self.moved[i] - c * share
             self.moved[j] = self.moved[j] + c * (real(1) - share)
@@ -245,8 +245,8 @@ class OneByOne:
                 given = self.held[k] * law.feed
                 rub = max(min(given - real(1) / real(3) * slides, cone), -cone) - given
                 c = np.array([c[0] - rub * n[1], c[1] + rub * n[0]], s.dtype)
-                s.spin[i] += rub * (real(2) * share / s.radius[i])
-                s.spin[j] += rub * (real(2) * (real(1) - share) / s.radius[j])
+                s.spin[i] += rub * share * (real(2) / s.radius[i])
+                s.spin[j] += rub * (real(1) - share) * (real(2) / s.radius[j])
                 moved = since[j] - since[i]
                 slipped = self.slip.get((i, j), real(0)) + moved[0] * n[1] - moved[1] * n[0]
                 slipped = slipped + (self.turn[i] * s.radius[i] + self.turn[j] * s.radius[j])

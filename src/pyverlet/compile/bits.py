@@ -69,6 +69,32 @@ def write_all(typing: Any, array: Any, where: Any, value: Any) -> Any:
     return types.void(array, where, value), generate
 
 
+@intrinsic  # type: ignore[untyped-decorator]
+def which_are(typing: Any, array: Any, k: Any, value: Any) -> Any:
+    """The lanes in which array[k : k + LANES] is `value`, of an (n,) array of 32 bits; as the bits of a number."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        found = builder.load(pointer(context, builder, array, args[0], args[1], ir.VectorType(_INT32, LANES)))
+        found.align = 4
+        same = builder.icmp_unsigned("==", found, _spread_int(builder, args[2]))
+        return builder.zext(builder.bitcast(same, ir.IntType(LANES)), _INT64)
+
+    return types.int64(array, k, value), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def store_bits(typing: Any, array: Any, k: Any, bits: Any) -> Any:
+    """array[k : k + LANES] = 1 for the lanes that are set in `bits`, else 0, on an (n,) array of uint8."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        eight = ir.VectorType(ir.IntType(8), LANES)
+        some = builder.bitcast(builder.trunc(args[2], ir.IntType(LANES)), ir.VectorType(ir.IntType(1), LANES))
+        builder.store(builder.zext(some, eight), pointer(context, builder, array, args[0], args[1], eight)).align = 1
+        return context.get_dummy_value()
+
+    return types.void(array, k, bits), generate
+
+
 def _spread_int(builder: Any, value: Any) -> Any:
     empty = ir.Constant(ir.VectorType(_INT32, LANES), ir.Undefined)
     first = builder.insert_element(empty, builder.trunc(value, _INT32), ir.Constant(_INT32, 0))

@@ -39,6 +39,7 @@ def _own(circles, i, x, y, turn):
     circles.spin_before[i] += turn
     circles.lent[i] = 0
     circles.busy[i] = LOAN_S
+    circles.inertia[i, 1] = -1
 
 
 @kernel
@@ -154,7 +155,7 @@ def treat(bits, k, at, circles, pairs, law, spent):
                 done |= ((done >> (lane - 1)) & 1) << lane  # a pair repeated to fill the pack
                 continue
             dx, dy = _apart(i, j, k + lane, circles, pairs)
-            one, reach = at + lane * law.mixed, pairs.reach[(k + lane) * law.varied]
+            one, reach = at + lane * law.mixed, pairs.reach[(k + lane) * law.sized]
             vx = v[j, 0] - v[i, 0] + law.lag * (a[j, 0] - a[i, 0])
             vy = v[j, 1] - v[i, 1] + law.lag * (a[j, 1] - a[i, 1])
             along = dx * vx + dy * vy

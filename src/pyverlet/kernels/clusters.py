@@ -19,11 +19,12 @@ def find_root(root, i):
 
 @kernel
 def join(root, i, j):
-    """The sets of i and j become one."""
+    """The sets of i and j become one; whether they were two."""
     if root[i] == root[j]:  # so it is for most, when most are joined
-        return
+        return False
     a, b = find_root(root, np.int64(i)), find_root(root, np.int64(j))
     root[max(a, b)] = min(a, b)
+    return a != b
 
 
 @kernel

@@ -40,7 +40,7 @@ from pyverlet.ground.constants import DEEP_PART, DEEP_SWEEPS, FED, GRIP, LARGEST
 from pyverlet.kernels.bounce import slow_lanes, treat
 from pyverlet.kernels.kinds import BOUNCES, LISTENS, RUBS, for_each_kind
 from pyverlet.kernels.motion import IN_PILE
-from pyverlet.kernels.tables import MASS, MU, NEW, R_I, R_J, TURN_I, TURN_J, E
+from pyverlet.kernels.tables import MU, NEW, R_I, R_J, TURN_I, TURN_J, E
 
 ANSWER = -GRIP * PUSHED / (3.0 * FED)
 """Of what a contact has slipped: the push along the tangent that answers it."""
@@ -71,7 +71,7 @@ def _push_strip(s, to, circles, pairs, law, looks):
         xi, yi = take(moved, lane_i, k)
         xj, yj = take(moved, lane_j, k)
         dx, dy = load(gap[0], k) + (xj - xi), load(gap[1], k) + (yj - yi)
-        r, part = load(reach, k * law.varied), load(share, k * law.varied)
+        r, part = load(reach, k * law.sized), load(share, k * law.varied)
         distance = square_root(dx * dx + dy * dy)
         touching = which_above(r, distance)
         if (k < close or BOUNCES) and touching == 0:
@@ -105,8 +105,10 @@ def _push_strip(s, to, circles, pairs, law, looks):
                 closing = zero - (dx * (vxj - vxi) + dy * (vyj - vyi))
                 if law.listens != 0:
                     _hear(heard, k, touching, closing, where_zero(distance, r, distance))
-                slow = slow_lanes(calm, lane_i, lane_j, k, rest)
-                done = live & (which_above(free * larger(closing, zero - closing), slow * distance) | restless)
+                speed = free * larger(closing, zero - closing)
+                done = live & (which_above(speed, rest * distance) | restless)
+                if done != 0 and calm.shape[0] > 0:
+                    done &= which_above(speed, slow_lanes(calm, lane_i, lane_j, k, rest) * distance) | restless
                 if done != 0:
                     done = treat(done, k, at, circles, pairs, law, spent)
                     xi, yi = take(moved, lane_i, k)
@@ -130,8 +132,8 @@ def _push_strip(s, to, circles, pairs, law, looks):
                 # Beside the pushes, which it must not change: with it in `moved` single circles of rough piles spun for ever.
                 sx, sy = rub * ny, zero - rub * nx
                 turned_i, turned_j = (
-                    turned_i + rub * load(made_of[TURN_I], at),
-                    turned_j + rub * load(made_of[TURN_J], at),
+                    turned_i + rub * part * load(made_of[TURN_I], at),
+                    turned_j + rub * (one - part) * load(made_of[TURN_J], at),
                 )
                 put_four(rows, lane_i, k, sxi - sx * part, syi - sy * part, turned_i, carries_i)
                 put_four(rows, lane_j, k, sxj + sx * (one - part), syj + sy * (one - part), turned_j, carries_j)
@@ -163,7 +165,7 @@ def refine_strip(s, circles, pairs, law):
             xi, yi = take(moved, lane_i, k)
             xj, yj = take(moved, lane_j, k)
             dx, dy = load(pairs.gap[0], k) + (xj - xi), load(pairs.gap[1], k) + (yj - yi)
-            r, part = load(pairs.reach, k * law.varied), load(pairs.share, k * law.varied)
+            r, part = load(pairs.reach, k * law.sized), load(pairs.share, k * law.varied)
             distance = square_root(dx * dx + dy * dy)
             excess = where_zero(larger(distance - nearest * r, zero), zero, larger(near * r - distance, zero))
             if which_above(excess, zero) == 0:
@@ -185,7 +187,7 @@ def _relax_strip(s, to, circles, pairs, law):
     # Named here: in a loop each reading would count who holds the array.
     velocity, rows, moved, carries = circles.velocity, circles.rows, circles.moved, circles.carries
     lane_i, lane_j, reach, share, made_of = pairs.lane_i, pairs.lane_j, pairs.reach, pairs.share, pairs.made_of
-    normal, depths, slips = pairs.normal, pairs.depth, pairs.slip
+    normal, depths, slips, reduced = pairs.normal, pairs.depth, pairs.slip, pairs.reduced
     calm = circles.calm
     real = velocity.dtype.type
     zero, one, third, half3 = spread(real(0)), spread(real(1)), spread(real(1) / real(3)), spread(real(1.5))
@@ -212,14 +214,15 @@ def _relax_strip(s, to, circles, pairs, law):
         speed, at = vx * nx + vy * ny, k * law.mixed
         struck = 0
         if BOUNCES:
-            slow = slow_lanes(calm, lane_i, lane_j, k, rest)
-            fast = which_above(zero - speed, slow) & which_above(load(made_of[E], at), zero)
+            fast = which_above(zero - speed, rest) & which_above(load(made_of[E], at), zero)
+            if fast != 0 and calm.shape[0] > 0:
+                fast &= which_above(zero - speed, slow_lanes(calm, lane_i, lane_j, k, rest))
             if fast != 0:  # has been struck since its turn in the first sweep, unless both carry weight
                 struck = fast & which_above(one - pick(carries, lane_i, k) * pick(carries, lane_j, k), zero)
                 speed = where_set(struck, zero, speed)
             if law.accounts != 0:  # what was fed, too, has pushed them apart
                 given = where_set(struck, zero, fed * load(depths, k)) - speed
-                squeezed = load(made_of[MASS], at) * load(reach, k * law.varied) * given
+                squeezed = load(reduced, k * law.varied) * load(reach, k * law.sized) * given
                 lever += add_lanes(squeezed, _distinct(lane_i, lane_j, k))
         cx, cy = speed * nx, speed * ny
         if RUBS:
@@ -235,10 +238,11 @@ def _relax_strip(s, to, circles, pairs, law):
                 cone = mu * larger(depth * fed - larger(speed, zero), zero)
                 rub = larger(smaller(given - third * slides, cone), zero - cone) - given
                 if law.accounts != 0:
-                    mass = load(made_of[MASS], at)
+                    mass = load(reduced, k * law.varied)
                     taken += add_lanes(mass * rub * (slides + half3 * rub), _distinct(lane_i, lane_j, k))
                 cx, cy = cx - rub * ny, cy + rub * nx
-                turned_i, turned_j = rub * load(made_of[TURN_I], at), rub * load(made_of[TURN_J], at)
+                turned_i = rub * part * load(made_of[TURN_I], at)
+                turned_j = rub * (one - part) * load(made_of[TURN_J], at)
                 si, sj = si + turned_i, sj + turned_j
                 # Measured from where the substep started; the velocity would count feeds that have moved nobody yet.
                 ui, wi = take(moved, lane_i, k)

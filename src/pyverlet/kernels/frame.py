@@ -21,7 +21,7 @@ from pyverlet.kernels.cage import confine as confine_in_cage
 from pyverlet.kernels.cage import hold
 from pyverlet.kernels.drive import drive, drive_called
 from pyverlet.kernels.kinds import for_each_kind
-from pyverlet.kernels.lending import Lending, Terms, even_up, join, leave_out, lend, set_aside, settle
+from pyverlet.kernels.lending import Hanging, Lending, Terms, even_up, join, leave_out, lend, set_aside, settle
 from pyverlet.kernels.linked import Linked, Linking, look, look_alone, note_pull, note_pull_alone, solve, solve_alone
 from pyverlet.kernels.measure import mechanical
 from pyverlet.kernels.meetings import collide
@@ -112,7 +112,7 @@ def _felt(law, strongest, h, position):
     g, real = np.float64(strongest), position.dtype.type
     carried = CARRIED_WEIGHT * g * h if g > 0 else np.inf
     return Law(
-        law.varied, law.mixed, law.rubs, law.listens, law.accounts, law.arrives, law.h, law.lag, law.feed, law.most,
+        law.varied, law.sized, law.mixed, law.rubs, law.listens, law.accounts, law.arrives, law.h, law.lag, law.feed, law.most,
         law.deep, real(REST_ACCELERATIONS * g * h), law.grazes, 1 if g > 0 else 0, real(carried),
     )  # fmt: skip
 
@@ -197,7 +197,8 @@ def _substeps(
         kind, vector, number, force, period_x, period_y = services.forces
         segments, bodies, cells, walls, along, rest, drop = services.course
         energies, mass, lag, down = services.energies, services.mass, services.lag, services.down
-        loans, terms = Lending(*borrowed(services.loans[0])), Terms(*services.loans[1])
+        loans, hanging = Lending(*borrowed(services.loans[0])), Hanging(*borrowed(services.loans[1]))
+        terms = Terms(*services.loans[2])
         lends = services.loans[0][0].shape[0] > 0
         begins = begins or segments.shape[0] > 0
     if LINKED:
@@ -228,11 +229,11 @@ def _substeps(
             if SERVED:
                 _look_at_energy(energies, substep, INTEGRATED, circles, mass, lag, down, spent, clock)
             if SERVED and lends:
-                lend(circles, pairs, loans, terms, cut)
-                looks = sets_out = 1  # with the inertia of the moment others overlap deeply, and circles stand elsewhere
+                lend(circles, pairs, loans, terms, cut, law.rubs != 0)
+                looks = 1  # with the inertia of the moment others overlap deeply
         push(circles, pairs, law, cut, looks, sets_out, claims)
         if SERVED and lends:
-            settle(circles, pairs, loans, terms, cut)
+            settle(circles, pairs, loans, hanging, terms, cut, claims)
         note(spent, CONTACTS, clock[0], clock[1])
         if LINKED:
             _look_at_energy(energies, substep, TOUCHED, circles, mass, lag, down, spent, clock)
@@ -255,10 +256,10 @@ def _substeps(
             )  # fmt: skip
             note(spent, OBSTACLES, clock[0], clock[1])
         if SERVED and lends:
-            join(circles, pairs, loans)
+            join(circles, pairs, loans, hanging)
         relax(circles, pairs, law, cut, 1 if substep == last else 0, claims)
         if SERVED and lends:
-            even_up(circles, loans, law.rubs)
+            even_up(circles, loans, hanging, law.rubs)
         note(spent, VELOCITIES, clock[0], clock[1])
         if SERVED:
             _look_at_energy(energies, substep, STILLED, circles, mass, lag, down, spent, clock)

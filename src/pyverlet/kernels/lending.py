@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 
 from pyverlet.compile.bundle import borrowed, bundle
 from pyverlet.compile.jit import driver, kernel
-from pyverlet.kernels.balance import balance, cluster, note_walls, set_out
-from pyverlet.kernels.loans import give_back, pull, share, take_up, weigh
-from pyverlet.kernels.packs import share_anew
+from pyverlet.kernels.balance import balance, note_walls
+from pyverlet.kernels.hanging import follow
+from pyverlet.kernels.loans import begin, share, take_up
+from pyverlet.kernels.packs import share_out
 from pyverlet.kernels.tables import Circles, Pairs
 
 
@@ -18,8 +19,8 @@ from pyverlet.kernels.tables import Circles, Pairs
 class Lending:
     """Who has lent how much, by slot (`laws.contacts.loans`), and scratch of a substep.
 
-    mass, lent: (n,) kg; busy: (n,) s; calm: (n,) m/s; held, touched, open_to, among: (n,); lighter: (n,) 1/kg; before, unpushed,
-    aside: (n, 2) m/s; spin_before: (n,) rad/s; rows: (n, 4); root: (n,); sums: (n, 10).
+    mass, lent: (n,) kg; busy: (n,) s; calm: (n,) m/s; held, touched, what: (n,); lighter: (n,) 1/kg; before, unpushed,
+    aside: (n, 2) m/s; spin_before: (n,) rad/s; sums: (n, 10); among: (n,); found: for each `kernels.loans.CHUNK` of circles.
     """
 
     mass: Any
@@ -33,16 +34,36 @@ class Lending:
     spin_before: Any
     unpushed: Any
     aside: Any
-    rows: Any
-    root: Any
+    what: Any
     sums: Any
-    open_to: Any
     among: Any
+    found: Any
+
+
+@bundle
+class Hanging:
+    """Who hangs together (`kernels.hanging`).
+
+    root: (n,) the lowest member of each one's cluster; heads: (n,) those that are roots; sets: (2,) how many of them, -1: it is
+    not known yet, and how often something was looked for. touch, changed: by pack, and changes: by strip: `kernels.loans.share`.
+    first: (n + 1,) and where: `kernels.hanging.list_lanes`. found: (k,), seen: (n,) scratch.
+    """
+
+    root: Any
+    heads: Any
+    sets: Any
+    touch: Any
+    changed: Any
+    changes: Any
+    first: Any
+    where: Any
+    found: Any
+    seen: Any
 
 
 class Terms(NamedTuple):
-    """kick, s, and fall, s^2: see `kernels.loans.take_up`; part: of a loan given back in a substep of h seconds; sunk, m/s: see
-    `kernels.loans.weigh`.
+    """kick, s, and fall, s^2: by what a becomes a change of velocity, and of position; part: of a loan given back in a substep
+    of h seconds; sunk, m/s: see `kernels.loans.begin`.
     """
 
     kick: Any
@@ -53,16 +74,13 @@ class Terms(NamedTuple):
 
 
 @driver
-def lend(circles, pairs, lending, terms, cut):
-    """The inertia with which this substep's contacts are solved; each is pulled at by its own weight all the same."""
-    weigh(
-        lending.mass, circles.inverse_mass, lending.lent, lending.busy, terms.sunk, lending.lighter, lending.calm,
-    )  # fmt: skip
-    set_out(circles.velocity, circles.acceleration, circles.spin, lending.held, terms.kick, lending.before, lending.spin_before)
-    pull(circles.position, circles.acceleration, circles.inverse_mass, lending.lighter, lending.held, terms.fall)
-    share_anew(
-        pairs.begin, pairs.lanes, pairs.lane_i, pairs.lane_j, cut, circles.radius, lending.lighter, pairs.share, pairs.made_of
-    )
+def lend(circles, pairs, lending, terms, cut, rubs):
+    """The inertia with which this substep's contacts are solved; each is pulled at by its own weight all the same.
+
+    `moved` is set anew, too: circles stand elsewhere.
+    """
+    begin(circles, lending, terms, pairs.made_of.shape[1] > 0, rubs)
+    share_out(pairs.begin, pairs.lanes, pairs.lane_i, pairs.lane_j, cut, lending.lighter, pairs.share, pairs.reduced)
 
 
 @kernel
@@ -72,18 +90,10 @@ def _copy(to, velocity):
 
 
 @driver
-def settle(circles, pairs, lending, terms, cut):
+def settle(circles, pairs, lending, hanging, terms, cut, claims):
     """Those that touch lend each other; those that do not have fallen by themselves. What changes velocities next is walls."""
-    share(
-        pairs.begin, pairs.lanes, pairs.lane_i, pairs.lane_j, pairs.normal, cut, lending.mass, circles.inverse_mass, lending.lent,
-        lending.busy, lending.touched, lending.rows,
-    )  # fmt: skip
-    take_up(
-        circles.position, circles.velocity, circles.acceleration, circles.inverse_mass, lending.lighter, lending.held,
-        lending.touched, terms.kick, terms.fall,
-    )  # fmt: skip
-    give_back(lending.mass, terms.part, terms.h, lending.lent, lending.busy)
-    _copy(lending.unpushed, circles.velocity)
+    share(circles, pairs, hanging, cut, claims)
+    take_up(circles, lending, terms)
 
 
 @kernel
@@ -104,38 +114,34 @@ def leave_out(circles, lending):
 
 
 @driver
-def join(circles, pairs, lending):
+def join(circles, pairs, lending, hanging):
     """Walls have pushed: who hangs together, and is held by them."""
-    cluster(pairs.begin, pairs.lanes, pairs.lane_i, pairs.lane_j, pairs.normal, circles.inverse_mass, lending.root)
-    note_walls(
-        circles.velocity, lending.unpushed, circles.inverse_mass, lending.touched, lending.root, lending.sums, lending.open_to,
-        lending.held,
-    )  # fmt: skip
+    follow(pairs, hanging)
+    note_walls(circles, lending, hanging)
 
 
 @driver
-def even_up(circles, lending, rubs):
+def even_up(circles, lending, hanging, rubs):
     """The substep is done: give those who have met with borrowed inertia what their momentum lacks."""
-    balance(
-        circles.position, circles.velocity, circles.spin, circles.radius, lending.mass, circles.inverse_mass, lending.lighter,
-        lending.touched, lending.before, lending.spin_before, lending.root, rubs != 0, lending.sums, lending.open_to,
-        lending.among,
-    )  # fmt: skip
+    balance(circles, lending, hanging.root, rubs != 0)
 
 
 # ---- called from Python, which has plain tuples ------------------------------------------------------------------------------
 
 
 @driver
-def call_lend(circles, pairs, lending, terms, cut):
+def call_lend(circles, pairs, lending, terms, cut, rubs):
     """`lend`."""
-    lend(Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Lending(*borrowed(lending)), Terms(*terms), cut)
+    lend(Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Lending(*borrowed(lending)), Terms(*terms), cut, rubs != 0)
 
 
 @driver
-def call_settle(circles, pairs, lending, terms, cut):
+def call_settle(circles, pairs, lending, hanging, terms, cut, claims):
     """`settle`."""
-    settle(Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Lending(*borrowed(lending)), Terms(*terms), cut)
+    settle(
+        Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Lending(*borrowed(lending)), Hanging(*borrowed(hanging)),
+        Terms(*terms), cut, claims,
+    )  # fmt: skip
 
 
 @driver
@@ -151,12 +157,12 @@ def call_leave_out(circles, lending):
 
 
 @driver
-def call_join(circles, pairs, lending):
+def call_join(circles, pairs, lending, hanging):
     """`join`."""
-    join(Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Lending(*borrowed(lending)))
+    join(Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Lending(*borrowed(lending)), Hanging(*borrowed(hanging)))
 
 
 @driver
-def call_even_up(circles, lending, rubs):
+def call_even_up(circles, lending, hanging, rubs):
     """`even_up`."""
-    even_up(Circles(*borrowed(circles)), Lending(*borrowed(lending)), rubs)
+    even_up(Circles(*borrowed(circles)), Lending(*borrowed(lending)), Hanging(*borrowed(hanging)), rubs)

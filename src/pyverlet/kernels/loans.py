@@ -18,6 +18,9 @@ that momentum is.
 
 from __future__ import annotations
 
+import numpy as np
+
+from pyverlet.compile.bits import store_bits
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.compile.lanes import (
     ANY,
@@ -25,166 +28,202 @@ from pyverlet.compile.lanes import (
     larger,
     load,
     load_rows,
+    put,
     smaller,
     spread,
+    store,
+    take,
     where_above,
     where_set,
     where_zero,
     which_above,
     which_set,
 )
-from pyverlet.compile.rows import put_four, store_four, store_rows, take_four
+from pyverlet.compile.rows import store_rows
+from pyverlet.compile.stealing import claim, none_claimed
 from pyverlet.ground.constants import LENT
 
-# What a circle touches: another that has not bounced off; a pinned one.
-TOUCHED, PINNED = 1, 2
-
-# Whether a circle lends: yes; not for now; never, and who touches it is told so.
-_LENDS, _WAITS, _PINNED = 0, 1, 2
-
-# Circles one thread takes at a time.
-_CHUNK = 1024
+CHUNK = 1024
+"""Circles one thread takes at a time."""
 
 # Of the own mass: less than this is no loan but the rounding of one.
 _NOTHING = 1e-7
 
 
 @kernel
-def _inertia(mass, lent, i):
+def _inertia(mass, lent, least):
     """m + lent, at least what nobody may lend: the mass may have been changed since."""
-    return max(mass[i] + lent[i], mass.dtype.type(1 - LENT) * mass[i])
+    return max(mass + lent, least * mass)
 
 
 @kernel
-def weigh(mass, inverse_mass, lent, busy, sunk, lighter, calm):
-    """lighter: 1 / m' of each circle, 1/kg. calm: `sunk`, m/s, for who lends, or may not yet, else 0."""
-    none, one = mass.dtype.type(0), mass.dtype.type(1)
-    for i in range(mass.shape[0]):
-        w = inverse_mass[i]
-        lighter[i] = w if w == none or lent[i] == none else one / _inertia(mass, lent, i)
-        calm[i] = none if lent[i] == none and busy[i] == none else sunk
-
-
-@kernel
-def pull(position, acceleration, inverse_mass, lighter, held, fall):
-    """Move each circle that walls hold, through others, by what a (m / m' - 1) does to its position: so its weight
-    is that of its own mass. fall: s^2.
-    """
-    one, by = spread(lighter.dtype.type(1)), spread(fall)
-    packed = len(lighter) - len(lighter) % LANES
-    for k in range(0, packed, LANES):
-        light, w = load(lighter, k), load(inverse_mass, k)
-        x, y = load_rows(position, k)
-        ax, ay = load_rows(acceleration, k)
-        more, bits = (light / w - one) * by, which_set(held, k, ANY)
-        px, py = where_zero(light - w, x, x + more * ax), where_zero(light - w, y, y + more * ay)
-        store_rows(position, k, where_set(bits, px, x), where_set(bits, py, y))
-    for i in range(packed, len(lighter)):
-        w = inverse_mass[i]
-        if held[i] and lighter[i] != w:
-            more = (lighter[i] / w - lighter.dtype.type(1)) * fall
-            position[i, 0] += more * acceleration[i, 0]
-            position[i, 1] += more * acceleration[i, 1]
-
-
-@kernel
-def take_up(position, velocity, acceleration, inverse_mass, lighter, held, touched, kick, fall):
-    """After `pull`, and contacts: do the same to velocities, kick (s), of who has touched another; take it back for the others.
-
-    Not before contacts: to those it is no motion, and would be an impact.
-    """
-    one, kicks, falls = spread(lighter.dtype.type(1)), spread(kick), spread(fall)
-    packed = len(lighter) - len(lighter) % LANES
-    for k in range(0, packed, LANES):
-        light, w = load(lighter, k), load(inverse_mass, k)
-        bits, met = which_set(held, k, ANY), which_set(touched, k, ANY)
-        ax, ay = load_rows(acceleration, k)
-        more = light / w - one
-        vx, vy = load_rows(velocity, k)
-        ux, uy = where_zero(light - w, vx, vx + more * kicks * ax), where_zero(light - w, vy, vy + more * kicks * ay)
-        store_rows(velocity, k, where_set(bits & met, ux, vx), where_set(bits & met, uy, vy))
-        if bits & ~met != 0:
-            x, y = load_rows(position, k)
-            px, py = where_zero(light - w, x, x - more * falls * ax), where_zero(light - w, y, y - more * falls * ay)
-            store_rows(position, k, where_set(bits & ~met, px, x), where_set(bits & ~met, py, y))
-    for i in range(packed, len(lighter)):
-        w = inverse_mass[i]
-        if held[i] and lighter[i] != w:
-            more = lighter[i] / w - lighter.dtype.type(1)
-            if touched[i]:
-                velocity[i, 0] += more * kick * acceleration[i, 0]
-                velocity[i, 1] += more * kick * acceleration[i, 1]
-            else:
-                position[i, 0] -= more * fall * acceleration[i, 0]
-                position[i, 1] -= more * fall * acceleration[i, 1]
-
-
-@kernel
-def _gather(mass, inverse_mass, lent, busy, rows, a, b):
-    """rows: what each of the circles from a up to b has lent, kg, its mass, whether it lends; and that it touches nobody."""
-    none, packed = lent.dtype.type(0), b - (b - a) % LANES
-    zero, waiting, pinned = spread(none), spread(lent.dtype.type(_WAITS)), spread(lent.dtype.type(_PINNED))
+def _begin(a, b, circles, lending, terms, bounces, rubs):
+    """What `begin` does, of the circles from a up to b."""
+    position, velocity, acceleration, spin = circles.position, circles.velocity, circles.acceleration, circles.spin
+    inverse_mass, origin, moved, rows = circles.inverse_mass, circles.origin, circles.moved, circles.inertia
+    mass, lent, busy, held = lending.mass, lending.lent, lending.busy, lending.held
+    lighter, calm, before, spin_before = lending.lighter, lending.calm, lending.before, lending.spin_before
+    real, packed = mass.dtype.type, b - (b - a) % LANES
+    zero, one, least, nobody = spread(real(0)), spread(real(1)), spread(real(1 - LENT)), spread(real(-1))
+    sunk, kick, fall = spread(terms.sunk), spread(terms.kick), spread(terms.fall)
     for k in range(a, packed, LANES):
-        waits = where_zero(load(inverse_mass, k), pinned, where_above(load(busy, k), zero, waiting, zero))
-        store_four(rows, k, load(lent, k), load(mass, k), waits, zero)
+        m, w, loan, waits = load(mass, k), load(inverse_mass, k), load(lent, k), load(busy, k)
+        keeps = least * m
+        inertia = larger(m + loan, keeps)
+        light = where_zero(w, w, where_zero(loan, w, one / inertia))
+        store(lighter, k, light)
+        if bounces:
+            store(calm, k, where_zero(loan, where_zero(waits, zero, sunk), sunk))
+        store_rows(rows, k, inertia, where_zero(w, nobody, where_above(waits, zero, nobody, keeps)))
+        stands = which_set(held, k, ANY)
+        ax, ay = load_rows(acceleration, k)
+        vx, vy = load_rows(velocity, k)
+        x, y = load_rows(position, k)
+        startx, starty = load_rows(origin, k)
+        if rubs:
+            store(spin_before, k, load(spin, k))
+        part = where_set(stands, kick, zero)
+        store_rows(before, k, vx - part * ax, vy - part * ay)
+        more = where_set(stands, where_zero(light - w, zero, (light / w - one) * fall), zero)
+        x, y = x + more * ax, y + more * ay
+        store_rows(position, k, x, y)
+        store_rows(moved, k, x - startx, y - starty)
     for i in range(packed, b):
-        waits_i = _PINNED if inverse_mass[i] == none else _WAITS if busy[i] > none else _LENDS
-        rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3] = lent[i], mass[i], waits_i, none
-
-
-@kernel
-def _scatter(rows, lent, touched, a, b):
-    """And what each has lent then, and whom it touches."""
-    for i in range(a, b):
-        lent[i], touched[i] = rows[i, 0], rows[i, 3]
-
-
-@kernel
-def _share_strip(begin, end, lane_i, lane_j, normal, rows):
-    """The pairs that touch and have not bounced, in the lanes from `begin` up to `end`."""
-    real = rows.dtype.type
-    zero, half, least = spread(real(0)), spread(real(0.5)), spread(real(1 - LENT))
-    waiting, pinned = spread(real(_WAITS)), spread(real(_PINNED))
-    one, both = spread(real(TOUCHED)), spread(real(TOUCHED | PINNED))
-    for k in range(begin, end, LANES):
-        nx, ny = load(normal[0], k), load(normal[1], k)
-        touches = which_above(nx * nx + ny * ny, zero)
-        if touches == 0:
-            continue
-        li, mi, waits_i, touched_i = take_four(rows, lane_i, k)
-        lj, mj, waits_j, touched_j = take_four(rows, lane_j, k)
-        waits = larger(waits_i, waits_j)
-        flow = larger(smaller(half * ((mi + li) - (mj + lj)), (mi + li) - least * mi), least * mj - (mj + lj))
-        flow = where_set(touches & which_above(waiting, waits), flow, zero)
-        mark = where_set(touches, where_above(pinned, waits, one, both), zero)
-        put_four(rows, lane_i, k, li - flow, mi, waits_i, larger(touched_i, mark))
-        put_four(rows, lane_j, k, lj + flow, mj, waits_j, larger(touched_j, mark))
+        w, loan = inverse_mass[i], lent[i]
+        rows[i, 0] = _inertia(mass[i], loan, real(1 - LENT))
+        rows[i, 1] = real(-1) if w == 0 or busy[i] > 0 else real(1 - LENT) * mass[i]
+        lighter[i] = w if w == 0 or loan == 0 else real(1) / rows[i, 0]
+        calm[i] = real(0) if loan == 0 and busy[i] == 0 else terms.sunk
+        spin_before[i] = spin[i]
+        part = terms.kick if held[i] else real(0)
+        more = (lighter[i] / w - real(1)) * terms.fall if held[i] and lighter[i] != w else real(0)
+        for axis in range(2):
+            before[i, axis] = velocity[i, axis] - part * acceleration[i, axis]
+            position[i, axis] += more * acceleration[i, axis]
+            moved[i, axis] = position[i, axis] - origin[i, axis]
 
 
 @parallel_kernel
-def share(begin, lanes, lane_i, lane_j, normal, cut, mass, inverse_mass, lent, busy, touched, rows):
-    """Even out the inertia of each touching pair that has not bounced; nobody lends more than the part LENT of the own mass.
+def begin(circles, lending, terms, bounces, rubs):
+    """A substep's contacts begin.
 
-    touched[i] becomes TOUCHED for who is in such a pair, with PINNED if one of them is pinned, else 0. cut: as for
-    `kernels.sweeps.push`. rows: (n, 4) scratch.
+    lighter: 1 / m' of each circle, 1/kg. calm, if any pair `bounces` or rubs: `sunk` for who lends, or may not yet,
+    else 0. inertia: m', kg, and what of it the
+    circle keeps whatever others ask for, negative if it neither lends nor borrows. before, and spin_before if any pair `rubs`:
+    velocities from which contacts begin; of those that walls hold without gravity's share, which counts as theirs.
+
+    Who is held, through others, is moved by what a (m / m' - 1) does to its position: so its weight is that of its own mass.
     """
-    count = mass.shape[0]
-    for c in prange((count + _CHUNK - 1) // _CHUNK):
-        _gather(mass, inverse_mass, lent, busy, rows, c * _CHUNK, min((c + 1) * _CHUNK, count))
-    for parity in range(2):
-        for part in prange(cut.shape[1] - 1):
-            for half in range(cut[parity, part], cut[parity, part + 1]):
-                a = begin[2 * half + parity]
-                _share_strip(a, a + lanes[2 * half + parity], lane_i, lane_j, normal, rows)
-    for c in prange((count + _CHUNK - 1) // _CHUNK):
-        _scatter(rows, lent, touched, c * _CHUNK, min((c + 1) * _CHUNK, count))
+    n = circles.position.shape[0]
+    for c in prange((n + CHUNK - 1) // CHUNK):
+        _begin(c * CHUNK, min((c + 1) * CHUNK, n), circles, lending, terms, bounces, rubs)
 
 
 @kernel
-def give_back(mass, part, h, lent, busy):
-    """Give this part of every loan back; h: s, that have gone by."""
-    for i in range(mass.shape[0]):
-        busy[i] = max(busy[i] - h, h - h)
-        lent[i] -= part * lent[i]
-        if abs(lent[i]) < mass.dtype.type(_NOTHING) * mass[i]:
-            lent[i] = h - h
+def _share_strip(s, pairs, rows, hanging):
+    """Of strip s."""
+    lane_i, lane_j, normal, touch, changed = pairs.lane_i, pairs.lane_j, pairs.normal, hanging.touch, hanging.changed
+    real, a, count = rows.dtype.type, pairs.begin[s], 0
+    zero, half = spread(real(0)), spread(real(0.5))
+    for k in range(a, a + pairs.lanes[s], LANES):
+        nx, ny = load(normal[0], k), load(normal[1], k)
+        touches = which_above(nx * nx + ny * ny, zero)
+        now = np.uint8(touches)
+        if now != touch[k // LANES]:
+            changed[a // LANES + count] = (k << LANES) | np.int64(touch[k // LANES] ^ now)
+            touch[k // LANES] = now
+            count += 1
+        if touches == 0:
+            continue
+        i, keeps_i = take(rows, lane_i, k)
+        j, keeps_j = take(rows, lane_j, k)
+        mi, mj = larger(i, zero - i), larger(j, zero - j)
+        flow = larger(smaller(half * (mi - mj), mi - keeps_i), keeps_j - mj)
+        lend = touches & which_above(keeps_i, zero) & which_above(keeps_j, zero)
+        flow = where_set(lend, flow, zero)
+        put(rows, lane_i, k, where_set(touches, flow - mi, i), keeps_i)
+        put(rows, lane_j, k, where_set(touches, zero - (mj + flow), j), keeps_j)
+    hanging.changes[s] = count
+
+
+@parallel_kernel
+def share(circles, pairs, hanging, cut, claims):
+    """Even out the inertia of each touching pair that has not bounced; nobody lends more than the part LENT of the own mass.
+
+    Who is in such a pair has a negative inertia then. touch: these pairs, a bit for each, and a byte for each pack. Packs in
+    which that is not what it was are noted in `changed`, changes[s] of them from the first pack of strip s on, the lanes that
+    have changed in the lowest bits.
+    """
+    for parity in range(2):
+        none_claimed(claims)
+        for part in prange(claims.shape[0]):
+            half = claim(claims, cut[parity], part)
+            while half >= 0:
+                _share_strip(2 * half + parity, pairs, circles.inertia, hanging)
+                half = claim(claims, cut[parity], part)
+
+
+@kernel
+def _take_up(a, b, circles, lending, terms):
+    """What `take_up` does, of the circles from a up to b."""
+    position, velocity, acceleration = circles.position, circles.velocity, circles.acceleration
+    inverse_mass, rows = circles.inverse_mass, circles.inertia
+    mass, lent, busy, held, touched = lending.mass, lending.lent, lending.busy, lending.held, lending.touched
+    lighter, unpushed = lending.lighter, lending.unpushed
+    real, packed = mass.dtype.type, b - (b - a) % LANES
+    zero, one, least, nothing = spread(real(0)), spread(real(1)), spread(real(1 - LENT)), spread(real(_NOTHING))
+    part, h, kick, fall = spread(terms.part), spread(terms.h), spread(terms.kick), spread(terms.fall)
+    for k in range(a, packed, LANES):
+        m, w, loan, waits = load(mass, k), load(inverse_mass, k), load(lent, k), load(busy, k)
+        inertia, _ = load_rows(rows, k)
+        met, stands = which_above(zero, inertia), which_set(held, k, ANY)
+        store_bits(touched, k, met)
+        now = larger(inertia, zero - inertia)
+        # As it is where nothing has flowed: a sum with m would round it, and it would never come to an end.
+        changed = where_zero(now - larger(m + loan, least * m), loan, now - m)
+        loan = where_zero(w, loan, where_above(waits, zero, loan, changed))
+        loan = loan - part * loan
+        store(lent, k, where_above(nothing * m, larger(loan, zero - loan), zero, loan))
+        if which_above(waits, zero) != 0:
+            store(busy, k, larger(waits - h, zero))
+        light = load(lighter, k)
+        ax, ay = load_rows(acceleration, k)
+        vx, vy = load_rows(velocity, k)
+        more = where_zero(light - w, zero, light / w - one)
+        by = where_set(met & stands, more * kick, zero)
+        vx, vy = vx + by * ax, vy + by * ay
+        store_rows(velocity, k, vx, vy)
+        store_rows(unpushed, k, vx, vy)
+        if stands & ~met != 0:
+            x, y = load_rows(position, k)
+            by = where_set(stands & ~met, more * fall, zero)
+            store_rows(position, k, x - by * ax, y - by * ay)
+    for i in range(packed, b):
+        w, m = inverse_mass[i], mass[i]
+        touched[i] = rows[i, 0] < 0
+        now = abs(rows[i, 0])
+        if w > 0 and not busy[i] > 0 and now != _inertia(m, lent[i], real(1 - LENT)):
+            lent[i] = now - m
+        lent[i] -= terms.part * lent[i]
+        if abs(lent[i]) < real(_NOTHING) * m:
+            lent[i] = 0
+        busy[i] = max(busy[i] - terms.h, real(0))
+        more = lighter[i] / w - real(1) if held[i] and lighter[i] != w else real(0)
+        for axis in range(2):
+            if touched[i]:
+                velocity[i, axis] += more * terms.kick * acceleration[i, axis]
+            else:
+                position[i, axis] -= more * terms.fall * acceleration[i, axis]
+            unpushed[i, axis] = velocity[i, axis]
+
+
+@parallel_kernel
+def take_up(circles, lending, terms):
+    """After `begin`, and contacts: what that did to positions is done to velocities, of who has touched another; for the others
+    it is taken back. Not before contacts: to those it is no motion, and would be an impact.
+
+    What has flowed becomes loans, and a part of each goes back. unpushed: the velocities, before walls push.
+    """
+    n = circles.position.shape[0]
+    for c in prange((n + CHUNK - 1) // CHUNK):
+        _take_up(c * CHUNK, min((c + 1) * CHUNK, n), circles, lending, terms)

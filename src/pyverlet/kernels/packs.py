@@ -15,7 +15,6 @@ import numpy as np
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.compile.lanes import ALL, LANES, larger, pick, spread, store, take, which_above
 from pyverlet.ground.constants import CLOSE
-from pyverlet.kernels.tables import MASS, TURN_I, TURN_J
 
 # Golden angle, rad: coincident centres part in directions spread evenly over the circle.
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
@@ -124,17 +123,15 @@ def pack(origin, radius, first, count, pair_i, pair_j, used, begin, lanes, apart
 
 
 @kernel
-def share_out(begin, lanes, lane_i, lane_j, radius, inverse_mass, reach, share):
-    """reach: r_i + r_j. share: the part of a push that moves i, w_i / (w_i + w_j); j has the rest."""
+def add_radii(begin, lanes, lane_i, lane_j, radius, reach):
+    """reach: r_i + r_j."""
     for s in range(lanes.shape[0]):
         for k in range(begin[s], begin[s] + lanes[s]):
-            i, j = lane_i[k], lane_j[k]
-            reach[k] = radius[i] + radius[j]
-            share[k] = inverse_mass[i] / (inverse_mass[i] + inverse_mass[j])
+            reach[k] = radius[lane_i[k]] + radius[lane_j[k]]
 
 
 @kernel
-def compose(begin, lanes, lane_i, lane_j, radius, inverse_mass, restitution, friction, e, mu, made_of):
+def compose(begin, lanes, lane_i, lane_j, radius, restitution, friction, e, mu, made_of):
     """What each pair is made of, the rows of `tables.Pairs.made_of`.
 
     Of two circles the larger restitution counts, and the geometric mean of the frictions; e and mu, those of all, stand for ones
@@ -148,34 +145,30 @@ def compose(begin, lanes, lane_i, lane_j, radius, inverse_mass, restitution, fri
             ei, ej = restitution[i] if restitution[i] >= zero else e, restitution[j] if restitution[j] >= zero else e
             given = friction[i] >= zero or friction[j] >= zero
             mui, muj = friction[i] if friction[i] >= zero else mu, friction[j] if friction[j] >= zero else mu
-            wi, wj = inverse_mass[i], inverse_mass[j]
-            part = wi / (wi + wj)
             made_of[0, k] = max(ei, ej)
             made_of[1, k] = np.sqrt(mui * muj) if given else mu
             made_of[2, k], made_of[3, k] = radius[i], radius[j]
-            made_of[4, k], made_of[5, k] = two * part / radius[i], two * (two / two - part) / radius[j]
-            made_of[6, k] = two / two / (wi + wj)
+            made_of[4, k], made_of[5, k] = two / radius[i], two / radius[j]
 
 
 @kernel
-def _share_strip(begin, end, lane_i, lane_j, radius, inverse_mass, share, made_of):
-    real = share.dtype.type
-    one, two = spread(real(1)), spread(real(2))
+def _share_strip(begin, end, lane_i, lane_j, inverse_mass, share, reduced):
+    one = spread(share.dtype.type(1))
     for k in range(begin, end, LANES):
         wi, wj = pick(inverse_mass, lane_i, k), pick(inverse_mass, lane_j, k)
-        part = wi / (wi + wj)
-        store(share, k, part)
-        if made_of.shape[1] > 0:
-            store(made_of[TURN_I], k, two * part / pick(radius, lane_i, k))
-            store(made_of[TURN_J], k, two * (one - part) / pick(radius, lane_j, k))
-            store(made_of[MASS], k, one / (wi + wj))
+        store(share, k, wi / (wi + wj))
+        if reduced.shape[0] > 0:
+            store(reduced, k, one / (wi + wj))
 
 
 @parallel_kernel
-def share_anew(begin, lanes, lane_i, lane_j, cut, radius, inverse_mass, share, made_of):
-    """What of `share_out` and `compose` goes by inverse masses, when these have changed. cut: as for `kernels.sweeps.push`."""
+def share_out(begin, lanes, lane_i, lane_j, cut, inverse_mass, share, reduced):
+    """share: the part of a push that moves i, w_i / (w_i + w_j); j has the rest. reduced: 1 / (w_i + w_j), kg, if it has room.
+
+    cut: as for `kernels.sweeps.push`.
+    """
     for parity in range(2):
         for part in prange(cut.shape[1] - 1):
             for half in range(cut[parity, part], cut[parity, part + 1]):
                 a = begin[2 * half + parity]
-                _share_strip(a, a + lanes[2 * half + parity], lane_i, lane_j, radius, inverse_mass, share, made_of)
+                _share_strip(a, a + lanes[2 * half + parity], lane_i, lane_j, inverse_mass, share, reduced)

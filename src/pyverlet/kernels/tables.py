@@ -15,14 +15,13 @@ NEW = np.inf
 """The slip of a pair that did not touch in the substep before. What it slips in its first one, it may have slipped before it
 met."""
 
-E, MU, R_I, R_J, TURN_I, TURN_J, MASS = range(7)
-"""Rows of `Pairs.made_of`: restitution, friction, radii m, what a push turns each disc by (2 / r times its share), reduced mass
-kg."""
+E, MU, R_I, R_J, TURN_I, TURN_J = range(6)
+"""Rows of `Pairs.made_of`: restitution, friction, radii m, and 2 / r: a push turns each disc by that times its share."""
 
 
 @bundle
 class Circles:
-    """Circles by slot; what each is: `Slots`, of contacts `Wide`, and the last five `Loans`: empty where nobody lends.
+    """Circles by slot; what each is: `Slots`, of contacts `Wide`, and the last six `Loans`: empty where nobody lends.
 
     rows: (n, 4), where circles rub, what a pair reads and writes of each, side by side. In the first sweep: what friction moves
     it by (2), m, what that turns it by, rad, whether it carries weight. In the second: velocity (2), spin, `turn`.
@@ -53,6 +52,7 @@ class Circles:
     lent: Any
     busy: Any
     calm: Any
+    inertia: Any
 
 
 @bundle
@@ -67,6 +67,7 @@ class Pairs:
     gap: Any
     reach: Any
     share: Any
+    reduced: Any
     made_of: Any
     normal: Any
     depth: Any
@@ -80,7 +81,7 @@ class Pairs:
 class Law(NamedTuple):
     """Numbers of a substep, and what there is to do in it.
 
-    varied: 1, or 0 if reach and share are the same for all and have one pack only; mixed: the same of `made_of`. rubs: whether
+    varied: 1, or 0 if share is the same for all and has one pack only; sized, mixed: the same of reach, `made_of`. rubs: whether
     any pair may rub; listens: whether somebody listens to who meets how fast; accounts: whether somebody asks what impacts take.
     arrives: 1 if what becomes of `moved` is to be added to positions and velocities when all pairs have been gone through, 0 if
     the room does that; always 1 where pairs may bounce. feed: FED / PUSHED / h, 1/s. most: the largest part of the contact
@@ -90,6 +91,7 @@ class Law(NamedTuple):
     """
 
     varied: Any
+    sized: Any
     mixed: Any
     rubs: Any
     listens: Any

@@ -156,14 +156,14 @@ class ContactSolver:
         if self._rubs(state):
             self._slips.start(wide, state.particle)
         self._lends = self._uneven and strongest > 0
-        noted = self._loans.begin(state, h, strongest) if self._lends else None
+        noted = self._loans.begin(state, wide, h, strongest) if self._lends else None
         wide.set_up(state, h, lag, strongest, REST_ACCELERATIONS * strongest * h, len(state.spent) > 0, noted)
         if self._lends:
             self._loans.lend(wide)
         return wide
 
     @property
-    def lending(self) -> tuple[bool, tuple[Any, Any]]:
+    def lending(self) -> tuple[bool, tuple[Any, Any, Any]]:
         """Whether circles lend each other inertia since `set_up`, and what `kernels.lending` takes."""
         return self._lends, self._loans.compiled if self._lends else self._loans.nobody
 
@@ -173,7 +173,7 @@ class ContactSolver:
         wide = self.set_up(state, h, lag, strongest)
         wide.push(state)
         if self._lends:
-            self._loans.settle(wide)
+            self._loans.settle(state, wide)
 
     def still(self, state: Slots, h: float) -> None:
         """Take from touching circles the velocity that projection has put in, rub them, and hold who is too large for a gap."""

@@ -9,9 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.compile.rows import WIDTH
+from pyverlet.compile.lanes import LANES
 from pyverlet.ground.constants import FED, LOAN_S, PUSHED, SUNK
-from pyverlet.kernels import balance, lending
+from pyverlet.kernels import balance, hanging, lending
+from pyverlet.kernels.loans import CHUNK
 from pyverlet.laws.contacts.wide import Wide
 from pyverlet.state.slots import Slots
 
@@ -31,14 +32,14 @@ class Loans:
     """Who has lent how much to the others, and what that changes for the contacts of a substep. Costs nothing until `begin`.
 
     Attributes:
-        compiled: what `kernels.lending` takes since `begin`, (arrays, terms).
+        compiled: what `kernels.lending` takes since `begin`, (arrays, arrays of `kernels.hanging`, terms).
         nobody: the same, empty, of worlds where nobody lends.
     """
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self._dtype = dtype
         self.forget()
-        self.compiled = self.nobody = self._arrays(np.empty(0, dtype)), (dtype.type(0),) * 5
+        self.compiled = self.nobody = self._arrays(np.empty(0, dtype)), self._hanging, (dtype.type(0),) * 5
 
     def forget(self) -> None:
         """Nobody has lent anything."""
@@ -49,27 +50,44 @@ class Loans:
         """Room for what lasts a substep."""
         self._lighter, self._touched = np.empty(count, self._dtype), np.empty(count, np.uint8)
         self._before, self._spin_before = np.empty((count, 2), self._dtype), np.empty(count, self._dtype)
-        self._unpushed, self._aside = np.empty((2, count, 2), self._dtype)
-        self._rows, self._calm = np.empty((count, WIDTH), self._dtype), np.zeros(count, self._dtype)
-        self._root, self._among = np.empty((2, count), np.int64)
-        self._sums, self._open_to = np.empty((count, 10)), np.empty(count, np.uint8)
+        self._unpushed, self._aside, self._inertia = np.empty((3, count, 2), self._dtype)
+        self._calm = np.zeros(count, self._dtype)
+        self._what, self._sums = np.empty(count, np.uint8), np.empty((count, 10))
+        self._among, self._found = np.empty(count, np.int32), np.zeros(-(-count // CHUNK), np.int64)
+        none = np.empty(0, np.int64)
+        self._strips, self._hanging = none, self._unknown(none, none, 0, 0)
 
-    def begin(self, state: Slots, h: float, strongest: float) -> tuple[Array, ...]:
+    def _unknown(self, lanes: Array, first: Array, packs: int, count: int) -> tuple[Array, ...]:
+        """Of circles that hang together who knows how."""
+        root, heads, seen = np.zeros((3, count), np.int32)
+        sets, changed = np.array([-1, 0]), np.empty(packs, np.int64)
+        where, found = np.empty(2 * LANES * packs, np.int32), np.empty(hanging.AROUND, np.int64)
+        return root, heads, sets, np.zeros(packs, np.uint8), changed, np.zeros_like(lanes), first, where, found, seen
+
+    def _hang(self, wide: Wide, count: int) -> None:
+        """The list of pairs is new."""
+        first = np.empty(count + 1, np.int64)
+        self._strips, self._hanging = wide.lanes, self._unknown(wide.lanes, first, len(wide.lane_i) // LANES, count)
+        hanging.list_lanes(wide.begin, wide.lanes, wide.lane_i, wide.lane_j, *self._hanging[6:8])
+
+    def begin(self, state: Slots, wide: Wide, h: float, strongest: float) -> tuple[Array, ...]:
         """Contacts will be solved with lent inertia. Where an impact notes what it does by masses of their own: before,
-        spin_before, lent, busy; and calm. strongest: m/s^2, that anybody feels.
+        spin_before, lent, busy; and calm, and inertia. strongest: m/s^2, that anybody feels.
         """
         if self._kept.particle is not state.particle:
             self._follow(state)
+        if self._strips is not wide.lanes:
+            self._hang(wide, len(state))
         # At rest a substep ends with the velocity -(1 - PUSHED / FED) a h: the same for all that way.
         terms = state.reals(h, (state.drop - 1 + PUSHED / FED) * h * h, min(h / LOAN_S, 1.0), SUNK * strongest * LOAN_S, h)
-        self.compiled = self._arrays(state.mass), terms
-        return self._before, self._spin_before, self._kept.lent, self._kept.busy, self._calm
+        self.compiled = self._arrays(state.mass), self._hanging, terms
+        return self._before, self._spin_before, self._kept.lent, self._kept.busy, self._calm, self._inertia
 
     def _arrays(self, mass: Array) -> tuple[Array, ...]:
         _, lent, busy, held = self._kept
         return (
             mass, lent, busy, self._calm, held, self._lighter, self._touched, self._before, self._spin_before, self._unpushed,
-            self._aside, self._rows, self._root, self._sums, self._open_to, self._among,
+            self._aside, self._what, self._sums, self._among, self._found,
         )  # fmt: skip
 
     def _follow(self, state: Slots) -> None:
@@ -87,11 +105,12 @@ class Loans:
 
     def lend(self, wide: Wide) -> None:
         """The inertia with which this substep's contacts are solved; each is pulled at by its own weight all the same."""
-        lending.call_lend(wide.circles, wide.arrays, *self.compiled, wide.cut())
+        arrays, _, terms = self.compiled
+        lending.call_lend(wide.circles, wide.arrays, arrays, terms, wide.cut(), int(wide.rubs))
 
-    def settle(self, wide: Wide) -> None:
+    def settle(self, state: Slots, wide: Wide) -> None:
         """Those that touch lend each other; those that do not have fallen by themselves."""
-        lending.call_settle(wide.circles, wide.arrays, *self.compiled, wide.cut())
+        lending.call_settle(wide.circles, wide.arrays, *self.compiled, wide.cut(), state.claims())
 
     @contextmanager
     def aside(self, wide: Wide) -> Iterator[None]:
@@ -102,11 +121,11 @@ class Loans:
 
     def join(self, wide: Wide) -> None:
         """Walls have pushed: who hangs together, and is held by them."""
-        lending.call_join(wide.circles, wide.arrays, self.compiled[0])
+        lending.call_join(wide.circles, wide.arrays, *self.compiled[:2])
 
     def even_up(self, wide: Wide) -> None:
         """The substep is done: give those who have met with borrowed inertia what their momentum lacks."""
-        lending.call_even_up(wide.circles, self.compiled[0], int(wide.rubs))
+        lending.call_even_up(wide.circles, *self.compiled[:2], int(wide.rubs))
 
     # ---- beyond substeps -----------------------------------------------------------------------------------------------------
 

@@ -22,7 +22,7 @@ from pyverlet.state.slots import Slots
 
 Array = NDArray[Any]
 
-_ROWS = tables.MASS + 1
+_ROWS = tables.TURN_J + 1
 _ARRIVES = tables.Law._fields.index("arrives")
 
 
@@ -37,8 +37,8 @@ class Wide:
         lane_i, lane_j: slots; those of strip s from begin[s] to begin[s] + lanes[s], the first apart[s] unlikely to touch soon.
         gap: (2, room) from i to j when the list was made, m.
         origin: (n, 2) where circles were then. moved: (n, 2) how far they have come since.
-        reach, share: m, and what part of a push moves i; one for each lane, or (LANES,) if they are the same for all.
-        made_of: (7, room) or (7, LANES) what each pair is made of: rows of `kernels.tables`.
+        reach, share, reduced: m, what part of a push moves i, kg; one for each lane, or (LANES,) if they are the same for all.
+        made_of: (6, room) or (6, LANES) what each pair is made of: rows of `kernels.tables`.
         normal: (2, room) of pairs that touch, for others 0. depth: (room,) their overlap, m.
         slip: (room,) what contacts have slipped, m.
         closing: (room,) largest speed of approach since the last `collect`, m/s; negative: has not touched.
@@ -61,12 +61,12 @@ class Wide:
         self.origin = self.moved = np.empty((0, 2), dtype)
         self._spare = COLOURS * LANES  # lanes of a strip beyond its pairs: twice as many as any needed in the last list
         self._known: Any = None  # what the tables were made from
-        self._varied = self._mixed = 0
+        self._varied = self._sized = self._mixed = 0
         self._deeps = np.zeros(0, np.int64)  # packs of each strip that overlap deeply
         self._looks = True  # whether they are to be noted, once a frame
         self.spent = np.zeros((1, 3))
-        none = np.empty(0, dtype)
-        self._lent, self._nobody = False, (np.empty((0, 2), dtype), none, none, none, none)
+        none, rows = np.empty(0, dtype), np.empty((0, 2), dtype)
+        self._lent, self._nobody = False, (rows, none, none, none, none, rows)
         self._hold_circles(0)
 
     @property
@@ -92,7 +92,7 @@ class Wide:
         self.lanes, self.apart = (np.empty(len(pairs.count), np.int64) for _ in range(2))
         which = pairs.listed()
         while True:
-            self.begin = np.concatenate(([0], np.cumsum(need)))
+            self.begin = np.concatenate(([0], np.cumsum(-(-need // LANES) * LANES)))
             if not self.begin[-1] <= len(self.lane_i) <= 1.1 * self.begin[-1]:
                 self._make_room(int(self.begin[-1]))
             used = np.full(len(origin), -1, np.int64)
@@ -165,15 +165,20 @@ class Wide:
         """Bring the tables up to date with the sizes, masses and materials of now."""
         self._known = state.size, state.given
         size, inverse_mass, (e, mu) = state.size, state.inverse_mass, self._settings
-        self._varied = int(any(_differ(values) for values in (size, state.radius, inverse_mass)))
-        self._mixed = int(self._varied or _differ(state.restitution) or _differ(state.friction))
+        self._varied, self._sized = int(_differ(inverse_mass)), int(_differ(size))
+        self._mixed = int(any(_differ(values) for values in (state.radius, state.restitution, state.friction)))
         self.rubs = max(mu, state.most_friction) > 0.0
         self.asks = self.weighs or self._bears or self.rubs or max(e, state.most_restitution) > 0.0
+        self.reach, self.share = np.full(LANES, size[0] + size[0]), np.full(LANES, self._dtype.type(0.5))
+        if self._sized:
+            self.reach = memory.empty(len(self.lane_i), self._dtype)
+            packs.add_radii(*self._lanes(), size, self.reach)
+        with np.errstate(divide="ignore"):
+            self.reduced = np.full(LANES if self.asks else 0, 1 / (inverse_mass[0] + inverse_mass[0]))
         if self._varied:
-            self.reach, self.share = (memory.empty(len(self.lane_i), self._dtype) for _ in range(2))
-            packs.share_out(self.begin, self.lanes, self.lane_i, self.lane_j, size, inverse_mass, self.reach, self.share)
-        else:
-            self.reach, self.share = np.full(LANES, size[0] + size[0]), np.full(LANES, self._dtype.type(0.5))
+            self.share = memory.empty(len(self.lane_i), self._dtype)
+            self.reduced = memory.empty(len(self.lane_i) if self.asks else 0, self._dtype)
+            packs.share_out(*self._lanes(), self.cut(), inverse_mass, self.share, self.reduced)
         if self.normal.shape != self.gap.shape:
             self.normal = memory.empty(self.gap.shape, self._dtype)
         if not self.asks:
@@ -183,7 +188,7 @@ class Wide:
         lane = np.zeros(LANES, np.uint32)
         begin, lanes, i, j = self.listed() if self._mixed else (np.zeros(1, np.int64), np.full(1, LANES), lane, lane)
         materials = state.restitution, state.friction, state.real(e), state.real(mu)
-        packs.compose(begin, lanes, i, j, state.radius, inverse_mass, *materials, self.made_of)
+        packs.compose(begin, lanes, i, j, state.radius, *materials, self.made_of)
         if len(self.depth) != len(self.lane_i):
             self.depth = np.empty(len(self.lane_i), self._dtype)
         if len(self._carries) != len(state):
@@ -220,13 +225,13 @@ class Wide:
         carried = CARRIED_WEIGHT * strongest * h if strongest > 0 else np.inf
         deep, grazes = (DEEP_LENT, 0.0) if noted else (DEEP, 1.0)
         self.law = (
-            self._varied, self._mixed, int(self.rubs), int(self._listens), int(accounts or self.weighs),
+            self._varied, self._sized, self._mixed, int(self.rubs), int(self._listens), int(accounts or self.weighs),
             1, *state.reals(h, lag, FED / PUSHED / h, LARGEST_PUSH, deep, rest_speed, grazes), int(strongest > 0),
             state.real(carried),
         )  # fmt: skip
         self.arrays = (
-            self.begin, self.lanes, self.apart, self.lane_i, self.lane_j, self.gap, self.reach, self.share, self.made_of,
-            self.normal, self.depth, self.slip, self.closing, self._deep, self._deeps, self.spent,
+            self.begin, self.lanes, self.apart, self.lane_i, self.lane_j, self.gap, self.reach, self.share, self.reduced,
+            self.made_of, self.normal, self.depth, self.slip, self.closing, self._deep, self._deeps, self.spent,
         )  # fmt: skip
 
     def leave_arriving(self) -> None:
