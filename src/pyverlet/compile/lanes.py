@@ -277,6 +277,20 @@ def _columns(builder: Any, rows: Any) -> list[Any]:
     return [builder.shuffle_vector(rows, empty, order(range(axis, 2 * LANES, 2))) for axis in range(2)]
 
 
+_QUARTERS = (0, 1, 4, 5), (2, 3, 6, 7)
+_EVEN = (0, 2, 8, 10, 4, 6, 12, 14)
+"""Rows of two float32 in two registers, so that no number has to leave its half of one when they become columns, or columns rows:
+that takes twice as many instructions, of the slower kind."""
+
+
+def _joined(builder: Any, parts: list[Any]) -> Any:
+    """Vectors of one length, one after the other."""
+    while len(parts) > 1:
+        double = order(range(2 * parts[0].type.count))
+        parts = [builder.shuffle_vector(a, b, double) for a, b in zip(parts[::2], parts[1::2], strict=True)]
+    return parts[0]
+
+
 def pointers(context: Any, builder: Any, array: Any, index: Any, args: Any, width: int = 2) -> list[Any]:
     """Pointers to the rows, or numbers, index[k], index[k + 1], ... of an (n, width), or (n,), array."""
     zero, real = ir.Constant(_INT64, 0), context.get_value_type(array.dtype)
@@ -293,14 +307,16 @@ def take(typing: Any, array: Any, index: Any, k: Any) -> Any:
     both = types.UniTuple(lanes, 2)
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        parts = []
+        rows = []
         for row in pointers(context, builder, array, index, args):
-            parts.append(builder.load(row))
-            parts[-1].align = array.dtype.bitwidth // 8
-        while len(parts) > 1:
-            double = order(range(2 * parts[0].type.count))
-            parts = [builder.shuffle_vector(a, b, double) for a, b in zip(parts[::2], parts[1::2], strict=True)]
-        return context.make_tuple(builder, both, _columns(builder, parts[0]))
+            rows.append(builder.load(row))
+            rows[-1].align = array.dtype.bitwidth // 8
+        if array.dtype == types.float32:
+            first, second = (_joined(builder, [rows[lane] for lane in lanes]) for lanes in _QUARTERS)
+            columns = [builder.shuffle_vector(first, second, order(axis + lane for lane in _EVEN)) for axis in range(2)]
+        else:
+            columns = _columns(builder, _joined(builder, rows))
+        return context.make_tuple(builder, both, columns)
 
     return both(array, index, k), generate
 
@@ -310,8 +326,18 @@ def put(typing: Any, array: Any, index: Any, k: Any, x: Any, y: Any) -> Any:
     """Rows index[k : k + LANES] of an (n, 2) array = (x, y). Lanes of one row must hold the same value."""
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        columns, single = args[3:5], array.dtype == types.float32
+        if single:
+            turns = (order(n + LANES * axis for n in lanes for axis in range(2)) for lanes in _QUARTERS)
+            turned = [builder.shuffle_vector(*columns, turn) for turn in turns]
         for lane, row in enumerate(pointers(context, builder, array, index, args)):
-            written = builder.store(builder.shuffle_vector(args[3], args[4], order([lane, lane + LANES])), row)
+            if single:
+                half = next(k for k, lanes in enumerate(_QUARTERS) if lane in lanes)
+                where = 2 * _QUARTERS[half].index(lane)
+                pair = builder.shuffle_vector(turned[half], turned[half], order([where, where + 1]))
+            else:
+                pair = builder.shuffle_vector(*columns, order([lane, lane + LANES]))
+            written = builder.store(pair, row)
             written.align = array.dtype.bitwidth // 8
         return context.get_dummy_value()
 

@@ -1,4 +1,4 @@
-"""What the packs of `kernels.chains` keep of their rows: made ready for a substep, moved ahead, noted; and the user's tables."""
+"""What the packs of `kernels.chains` keep of their rows: made ready for a substep, noted; and the user's tables."""
 
 from __future__ import annotations
 
@@ -19,20 +19,30 @@ from pyverlet.compile.lanes import (
     where_above,
     where_zero,
     which_above,
-    widen,
 )
-from pyverlet.compile.rounding import lanes_like
+from pyverlet.compile.stealing import claim_evenly, none_claimed
 from pyverlet.ground.constants import LINK_BOWED, LINK_GIVE, LINK_LEAST_N, LINK_MEMORY_S, LINK_RESOLVED
-from pyverlet.kernels.seam import nearest, nearest_lanes
+from pyverlet.kernels.seam import apart_lanes, nearest
 
-COLUMNS = (
-    "rest", "rope", "stiffness", "soft", "damping", "intact", "force", "last", "lam", "give", "offset", "turn", "bow", "along_x",
-    "along_y", "held",
-)  # fmt: skip
-"""What is kept of a row, in the dtype of the world: rope, soft, intact and held are 1 or 0, the stiffness of what is not soft is
-0. held: a rope that pulled when it was solved last."""
+COLUMNS = ("weight", "gap_x", "gap_y", "along_x", "along_y", "turn", "give", "lam", "rest", "force")
+"""What is kept of a row, in the dtype of the world. weight: of its first node, 1/kg. gap: from there to the second one as the
+integrator has put them, m. give: -1 of the broken, 0 where nothing can move. lam: between substeps what it pulled with, N."""
 
-REST, ROPE, STIFFNESS, SOFT, DAMPING, INTACT, FORCE, LAST, LAM, GIVE, OFFSET, TURN, BOW, AX, AY, HELD = range(len(COLUMNS))
+MORE = ("goal", "soft", "stiffness", "damping", "rope", "held")
+"""The same of rows in packs that hold springs or ropes, the rest of which is not looked at. goal: the length that its force leads
+to, in place of rest; soft, rope and held are 1 or 0, the stiffness of what is not soft is 0; held: a rope that pulled when it was
+solved last.
+
+Of each kind eight rows stand beside each other, column after column, then the next eight: what is read together lies together.
+Item 8 k + l of a column of ROW numbers is at 8 k * ROW + LANES * column + l. The names below have LANES in them."""
+
+ROW, EXTRA = len(COLUMNS), len(MORE)
+"""How many numbers there are of each row, of either kind."""
+
+W, DX, DY, AX, AY, TURN, GIVE, LAM, REST, FORCE = range(0, LANES * ROW, LANES)
+GOAL, SOFT, STIFFNESS, DAMPING, ROPE, HELD = range(0, LANES * EXTRA, LANES)
+
+BROKEN = -1.0
 
 ROPES, SOFTS = 1, 2
 """Bits of what is in a pack."""
@@ -44,6 +54,9 @@ _MOST = 1e15
 """(frequency * h)^2: beyond that it is all settled, and its square no number in float32. Links crushed between a wall and what
 moves on have come to that."""
 
+_CHUNK = 1024
+"""Rows that are noted by one thread at a time, of a multiple of LANES."""
+
 
 @kernel
 def _settled(s, resolved, most):
@@ -53,44 +66,56 @@ def _settled(s, resolved, most):
 
 
 @kernel
-def _prepare_pack(p, start, node, holds, row, position, period_x, period_y, earlier, weight, h):
-    """From where a substep starts, and a substep `earlier`: what the rows of a pack are to satisfy. See kernels.links."""
+def at(k):
+    """Where item k of the rows stands in the first column."""
+    return k // LANES * (LANES * ROW) + k % LANES
+
+
+@kernel
+def prepare_pack(p, start, node, holds, row, more, begun, predicted, back, weight, shift, period_x, period_y, h):
+    """What the rows of a pack are to satisfy; soft ones move their nodes by the lam they start from."""
     real = row.dtype.type
-    zero, one, tiny, resolved = spread(real(0)), spread(real(1)), spread(real(1e-12)), spread(real(LINK_RESOLVED * LINK_RESOLVED))
+    zero, one, tiny, resolved = spread(real(0)), spread(real(1)), spread(real(1e-24)), spread(real(LINK_RESOLVED * LINK_RESOLVED))
     quarter, half, two, three = spread(real(0.25)), spread(real(0.5)), spread(real(2)), spread(real(3))
-    straight, steeper = spread(real(LINK_BOWED)), spread(real(1.0 / (1.0 - LINK_BOWED)))
+    straight = spread(real(LINK_BOWED))
     one_h, hh, per_h, rigid = spread(real(h)), spread(real(h * h)), spread(real(1.0 / h)), spread(real(LINK_GIVE))
     per_hh, least, most = spread(real(1.0 / (h * h))), spread(real(_LEAST)), spread(real(_MOST))
-    soft = holds[p] & SOFTS
-    begin, end = start[p], start[p + 1]
-    shift = LANES * p
+    ropes, soft = holds[p] & ROPES, holds[p] & SOFTS
+    begin, end = start[p], start[p + 1] - LANES
     bowed = 0
-    xi, yi = take(position, node, begin + shift)
-    wi = lanes_like(pick(weight, node, begin + shift), row)
-    ui, vi = take(earlier, node, begin + shift)
+    fx = fy = zero
+    xi, yi = take(begun, node, begin)
+    pi, qi = take(predicted, node, begin)
+    ui, vi = take(back, node, begin)
+    wi = pick(weight, node, begin)
     for k in range(begin, end, LANES):
-        xj, yj = take(position, node, k + shift + LANES)
-        wj = lanes_like(pick(weight, node, k + shift + LANES), row)
-        dx, dy = lanes_like(nearest_lanes(xj - xi, period_x), row), lanes_like(nearest_lanes(yj - yi, period_y), row)
-        length = square_root(dx * dx + dy * dy)
-        bend = one / larger(length, tiny)
-        store(row[AX], k, where_zero(length, one, dx * bend))
-        store(row[AY], k, dy * bend)
-        ww, force, rest = wi + wj, load(row[FORCE], k), load(row[REST], k)
+        xj, yj = take(begun, node, k + LANES)
+        pj, qj = take(predicted, node, k + LANES)
+        wj = pick(weight, node, k + LANES)
+        here, there = ROW * k, EXTRA * k
+        dx, dy = apart_lanes(xi, xj, period_x, row), apart_lanes(yi, yj, period_y, row)
+        square = dx * dx + dy * dy
+        length = square_root(square)
+        bend = length * (one / larger(square, tiny))
+        ax, ay = where_zero(length, one, dx * bend), dy * bend
+        ww, force, rest, before = wi + wj, load(row, here + FORCE), load(row, here + REST), load(row, here + GIVE)
         swing = hh * larger(force, zero - force) * bend * ww  # (frequency of swinging sideways * h)^2
         turn = _settled(swing, resolved, most)
-        bow = larger(turn - straight, zero) * steeper * hh * larger(force, zero) * bend
-        bowed |= which_above(bow, zero)
-        store(row[TURN], k, turn)
-        store(row[BOW], k, bow)
-        store(row[HELD], k, where_above(load(row[LAST], k), zero, one, zero))
-        give, offset, lam = rigid * ww, zero, zero
+        bowed |= which_above(turn * where_above(force, zero, one, zero), straight)
+        give, lam = rigid * ww, zero
+        store(row, here + W, wi)
+        store(row, here + DX, apart_lanes(pi, pj, period_x, row))
+        store(row, here + DY, apart_lanes(qi, qj, period_y, row))
+        store(row, here + AX, ax)
+        store(row, here + AY, ay)
+        store(row, here + TURN, turn)
+        if ropes:
+            store(more, there + HELD, where_above(load(row, here + LAM), zero, one, zero))
         if soft:
-            uj, vj = take(earlier, node, k + shift + LANES)
-            ex, ey = lanes_like(nearest_lanes(uj - ui, period_x), row), lanes_like(nearest_lanes(vj - vi, period_y), row)
-            ui, vi = uj, vj
-            here, slack = load(row[SOFT], k), load(row[ROPE], k)
-            stiffness, damping = load(row[STIFFNESS], k), load(row[DAMPING], k)
+            uj, vj = take(back, node, k + LANES)
+            ex, ey = dx - (uj - ui), dy - (vj - vi)
+            is_soft, slack = load(more, there + SOFT), load(more, there + ROPE)
+            stiffness, damping = load(more, there + STIFFNESS), load(more, there + DAMPING)
             c0, cm = length - rest, square_root(ex * ex + ey * ey) - rest
             c0 = where_above(slack, zero, larger(c0, zero), c0)  # a slack rope has no stretch to remember
             cm = where_above(slack, zero, larger(cm, zero), cm)
@@ -102,72 +127,89 @@ def _prepare_pack(p, start, node, holds, row, position, period_x, period_y, earl
             k0 = stiffness * (one - q) * half + rate * (one - two * part)
             km = stiffness * (one - q) * quarter - rate * (one - part)
             per = one / larger(kp, least)
-            give = give + here * (per * per_hh)
-            offset = here * ((k0 * c0 + km * cm) * per)
-            lam = zero - here * (one - slack) * load(row[INTACT], k) * (one - q) * load(row[LAST], k) * hh
-        store(row[GIVE], k, give)
-        store(row[OFFSET], k, offset)
-        store(row[LAM], k, lam)
-        xi, yi, wi = xj, yj, wj
+            give = give + is_soft * (per * per_hh)
+            store(more, there + GOAL, rest - is_soft * ((k0 * c0 + km * cm) * per))
+            lam = zero - is_soft * (one - slack) * (one - q) * load(row, here + LAM) * hh
+            lam = where_above(zero, before, zero, lam)
+            gx, gy = ax * lam, ay * lam
+            mx, my = take(shift, node, k)
+            put(shift, node, k, mx + wi * (fx - gx), my + wi * (fy - gy))
+            fx, fy, ui, vi = gx, gy, uj, vj
+        store(row, here + GIVE, where_above(zero, before, before, give))
+        store(row, here + LAM, lam)
+        xi, yi, pi, qi, wi = xj, yj, pj, qj, wj
+    store(row, ROW * end + W, wi)
+    if soft:
+        mx, my = take(shift, node, end)
+        put(shift, node, end, mx + wi * fx, my + wi * fy)
     return bowed != 0
 
 
 @parallel_kernel
-def prepare(start, node, holds, bowed, row, position, period_x, period_y, earlier, weight, h):
-    """Before the integrator moves: every row's equation C+ + offset + give lam = 0, and which packs resist being turned."""
-    for p in prange(holds.shape[0]):
-        bowed[p] = _prepare_pack(p, start, node, holds, row, position, period_x, period_y, earlier, weight, h)
-
-
-@kernel
-def _ahead_pack(p, start, node, row, position, weight):
-    """Move the nodes of a pack by the lam its rows start from."""
-    begin, end, shift = start[p], start[p + 1], LANES * p
-    fx = fy = spread(0.0)
-    for k in range(begin, end + 1, LANES):
-        gx = gy = spread(0.0)
-        if k < end:
-            lam = widen(load(row[LAM], k))
-            gx, gy = widen(load(row[AX], k)) * lam, widen(load(row[AY], k)) * lam
-        x, y = take(position, node, k + shift)
-        w = pick(weight, node, k + shift)
-        put(position, node, k + shift, x + w * (fx - gx), y + w * (fy - gy))
-        fx, fy = gx, gy
-
-
-@parallel_kernel
-def _ahead(first, stop, start, node, holds, row, position, weight):
-    for p in prange(first, stop):
-        if holds[p] & SOFTS:
-            _ahead_pack(p, start, node, row, position, weight)
+def _prepare(
+    soft, first, stop, start, node, holds, bowed, row, more, begun, predicted, back, weight, shift, period_x, period_y, h, claims,
+):  # fmt: skip
+    for part in prange(claims.shape[0]):
+        k = claim_evenly(claims, stop - first, part)
+        while k >= 0:
+            p = first + k
+            if holds[p] & SOFTS or not soft:
+                bowed[p] = prepare_pack(
+                    p, start, node, holds, row, more, begun, predicted, back, weight, shift, period_x, period_y, h
+                )
+            k = claim_evenly(claims, stop - first, part)
 
 
 @driver
-def ahead(colour, start, node, holds, row, position, weight):
-    """Move all nodes by the lam their rows start from, colour by colour."""
+def prepare(
+    soft, colour, start, node, holds, bowed, row, more, begun, predicted, back, weight, shift, period_x, period_y, h, claims,
+):  # fmt: skip
+    """Every row's equation, length = goal - give lam, and which packs resist being turned; or only those of `soft` packs.
+
+    From where a substep has `begun`, the way `back` from there to a substep before, and where the integrator has put all.
+    Nodes move by the lam their rows start from, in `shift`, so colour by colour.
+    """
     for c in range(colour.shape[0] - 1):
-        _ahead(colour[c], colour[c + 1], start, node, holds, row, position, weight)
+        some = not soft
+        for p in range(colour[c], colour[c + 1]):
+            some |= (holds[p] & SOFTS) != 0
+        if some:
+            none_claimed(claims)
+            _prepare(
+                soft, colour[c], colour[c + 1], start, node, holds, bowed, row, more, begun, predicted, back, weight, shift,
+                period_x, period_y, h, claims,
+            )  # fmt: skip
 
 
 @kernel
-def note_force(row, h):
-    """The pull in N, which for rigid links is noisy; let the force shown follow it. That of the broken stays what it was."""
+def note_rows(begin, end, row, h):
+    """`note_force` of the items from `begin` to `end`."""
     real = row.dtype.type
     part, rate = spread(real(h / (h + LINK_MEMORY_S))), spread(real(-1.0 / (h * h)))
     zero, least = spread(real(0)), spread(real(LINK_LEAST_N))
-    for k in range(0, row.shape[1], LANES):
-        last, force = load(row[LAM], k) * rate, load(row[FORCE], k)
-        store(row[LAST], k, last)
-        force = force + part * load(row[INTACT], k) * (last - force)
-        store(row[FORCE], k, where_above(larger(force, zero - force), least, force, zero))
+    for k in range(begin, end, LANES):
+        here = ROW * k
+        last, force = load(row, here + LAM) * rate, load(row, here + FORCE)
+        now = force + part * (last - force)
+        now = where_above(larger(now, zero - now), least, now, zero)
+        store(row, here + LAM, last)
+        store(row, here + FORCE, where_above(zero, load(row, here + GIVE), force, now))
+
+
+@parallel_kernel
+def note_force(row, h):
+    """The pull in N, which for rigid links is noisy; let the force shown follow it. That of the broken stays what it was."""
+    items = row.shape[0] // ROW
+    for c in prange((items + _CHUNK - 1) // _CHUNK):
+        note_rows(c * _CHUNK, min((c + 1) * _CHUNK, items), row, h)
 
 
 @kernel
 def snap(row, strength):
     """Break every row that pulls or pushes harder than its strength, N."""
-    for k in range(row.shape[1]):
-        if abs(row[FORCE, k]) > strength[k]:
-            row[INTACT, k] = 0
+    for k in range(strength.shape[0]):
+        if abs(row[at(k) + FORCE]) > strength[k]:
+            row[at(k) + GIVE] = BROKEN
 
 
 # ---- between the tables of the user's links and the packs ---------------------------------------------------------------------
@@ -176,21 +218,21 @@ def snap(row, strength):
 @kernel
 def take_up(source, row, intact, force, last):
     """A frame begins: what of the rows changes. source: which row stands in each item, -1 for none."""
-    for k in range(source.shape[0]):
-        r = source[k]
-        row[INTACT, k] = row[FORCE, k] = row[LAST, k] = 0
+    for n in range(source.shape[0]):
+        r, k = source[n], at(n)
+        row[k + GIVE], row[k + FORCE], row[k + LAM] = BROKEN, 0, 0
         if r >= 0:
-            row[INTACT, k], row[FORCE, k], row[LAST, k] = intact[r], force[r], last[r]
+            row[k + GIVE], row[k + FORCE], row[k + LAM] = 0 if intact[r] else BROKEN, force[r], last[r]
 
 
 @kernel
 def hand_over(place, row, intact, force, last):
     """A frame is over: the same the other way. place: (rows,) the item each row stands in."""
     for r in range(place.shape[0]):
-        k = place[r]
-        whole = row[INTACT, k] != 0.0
+        k = at(place[r])
+        whole = row[k + GIVE] >= 0.0
         intact[r] = whole
-        force[r], last[r] = (row[FORCE, k], row[LAST, k]) if whole else (0.0, 0.0)
+        force[r], last[r] = (row[k + FORCE], row[k + LAM]) if whole else (0.0, 0.0)
 
 
 @kernel
@@ -198,7 +240,7 @@ def intact(place, row):
     """(rows,) who is whole now."""
     out = np.empty(place.shape[0], np.uint8)
     for r in range(place.shape[0]):
-        out[r] = row[INTACT, place[r]] != 0.0
+        out[r] = row[at(place[r]) + GIVE] >= 0.0
     return out
 
 

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 from pyverlet.compile.bundle import bundle
 from pyverlet.compile.jit import driver, kernel, variant
-from pyverlet.kernels.chain_rows import note_force, prepare, snap
-from pyverlet.kernels.chains import passes
-from pyverlet.kernels.links import add_pull, hand_back, look_back, take_twice
+from pyverlet.kernels.chain_passes import passes
+from pyverlet.kernels.chain_rows import snap
+from pyverlet.kernels.links import add_pull, hand_back, look_back, set_out
 from pyverlet.kernels.ties import note_ties, tie
 
 
@@ -22,11 +22,10 @@ class Linked:
 
     slot: Any
     start: Any
-    earlier: Any
-    position: Any
+    back: Any
     predicted: Any
+    shift: Any
     weight: Any
-    pull: Any
     calm: Any
     colour: Any
     begin: Any
@@ -35,9 +34,11 @@ class Linked:
     lanes: Any
     bowed: Any
     row: Any
+    more: Any
     rooms: Any
     wide: Any
     strength: Any
+    claims: Any
     tied: Any
     point: Any
     tie_stiffness: Any
@@ -45,66 +46,64 @@ class Linked:
     tie_strength: Any
     tie_intact: Any
     tie_give: Any
-    tie_offset: Any
+    tie_left: Any
+    tie_way: Any
+    tie_kept: Any
     tie_lam: Any
     tie_last: Any
     tie_force: Any
 
 
 class Linking(NamedTuple):
-    """Numbers of a substep. times: passes, there and back. gives, brittle: whether any chain has springs, or may break; rest: s,
+    """Numbers of a substep. count: of the linked; times: passes, there and back; brittle: whether any chain may break; rest: s,
     see `kernels.links.add_pull`.
     """
 
     h: Any
     period_x: Any
     period_y: Any
+    count: Any
     times: Any
-    gives: Any
     brittle: Any
     rest: Any
 
 
 @driver
 def look(linked, linking, position, velocity, inverse_mass):
-    """Before the integrator: where everybody starts, and what each row is to satisfy. Arrays are by slot."""
+    """Before the integrator: where everybody starts. Arrays are by slot."""
     look_back(
         linked.slot, position, velocity, inverse_mass, linking.period_x, linking.period_y, linked.calm, linking.h, linked.start,
-        linked.earlier, linked.weight,
-    )  # fmt: skip
-    prepare(
-        linked.begin, linked.node, linked.holds, linked.bowed, linked.row, linked.start, linking.period_x, linking.period_y,
-        linked.earlier, linked.weight, linking.h,
+        linked.back, linked.weight,
     )  # fmt: skip
 
 
 @driver
 def solve(linked, linking, position, velocity):
     """Move the linked particles to where their links allow, and break those that pull too hard."""
-    take_twice(linked.position, linked.predicted, position, linked.slot)
+    set_out(linked.predicted, linked.shift, position, linked.slot)
     tie(
-        linked.position, linked.weight, linked.start, linked.earlier, linked.tied, linked.point, linking.period_x,
+        linked.predicted, linked.weight, linked.start, linked.back, linked.tied, linked.point, linking.period_x,
         linking.period_y, linked.tie_stiffness, linked.tie_damping, linked.tie_intact, linking.h, linked.tie_give,
-        linked.tie_offset,
+        linked.tie_left, linked.tie_way, linked.tie_kept,
     )  # fmt: skip
     passes(
-        linking.times, linking.gives, linked.colour, linked.begin, linked.node, linked.holds, linked.lanes, linked.bowed,
-        linked.row, linked.position, linking.period_x, linking.period_y, linked.weight, linked.rooms, linked.wide,
+        linking.times, linked.colour, linked.begin, linked.node, linked.holds, linked.lanes, linked.bowed, linked.row,
+        linked.more, linked.shift, linking.h, linked.rooms, linked.wide, linked.claims, linked.start, linked.predicted,
+        linked.back, linked.weight, linking.period_x, linking.period_y,
     )  # fmt: skip
-    note_force(linked.row, linking.h)
     if linking.brittle:
         snap(linked.row, linked.strength)
     note_ties(
-        linked.position, linked.start, linked.tied, linked.point, linking.period_x, linking.period_y, linked.tie_strength,
-        linked.tie_intact, linking.h, linked.tie_give, linked.tie_offset, linked.tie_lam, linked.tie_last, linked.tie_force,
+        linked.shift, linked.predicted, linked.tied, linked.tie_strength, linked.tie_intact, linking.h, linked.tie_give,
+        linked.tie_left, linked.tie_way, linked.tie_kept, linked.tie_lam, linked.tie_last, linked.tie_force,
     )  # fmt: skip
-    hand_back(position, velocity, linked.slot, linked.position, linked.predicted, 1.0 / linking.h, linked.pull)
+    hand_back(position, velocity, linked.slot, linking.count, linked.predicted, linked.shift, 1.0 / linking.h)
 
 
 @driver
 def note_pull(linked, linking, acceleration):
     """When velocities are done: what links did is part of the acceleration."""
-    add_pull(acceleration, linked.slot, linked.pull, linked.calm, linking.rest)
+    add_pull(acceleration, linked.slot, linked.shift, 1.0 / linking.h, linked.calm, linking.rest)
 
 
 look_alone, solve_alone, note_pull_alone = (kernel(variant(each.function, "alone")) for each in (look, solve, note_pull))

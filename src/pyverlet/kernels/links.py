@@ -12,7 +12,10 @@ For a soft link the C of the force is a C+ + b C0 + c C-, of the end, the start 
 damps nor explodes, (1, 0, 0) is XPBD and settles links stiffer than the substep can follow; `blend` goes from one to the other.
 
 Rows are solved colour by colour (Gauss-Seidel); those of one colour share no particle. kernels.chains solves whole chains of
-distances at once. Everything here is float64, on a compact copy of the linked particles.
+distances at once.
+
+All of that is done on a compact copy of the linked particles, in the dtype of the world: where a substep starts, where the
+integrator has put them, and by how much links have moved them since, which is little and keeps its digits.
 """
 
 from __future__ import annotations
@@ -20,8 +23,13 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.compile.lanes import LANES, load, load_rows, pick, put, spread, square_root, store, take, where_above
+from pyverlet.compile.rows import store_rows
 from pyverlet.ground.constants import LINK_GIVE, LINK_LEAST_N, LINK_MEMORY_S, LINK_RESOLVED
-from pyverlet.kernels.seam import image_near
+from pyverlet.kernels.seam import apart_lanes
+
+_CHUNK = 1024
+"""Particles that one thread takes at a time."""
 
 
 @kernel
@@ -153,56 +161,94 @@ def recall(past_number, past_start, past_left, past_calm, number, position, part
             start[k, 0], start[k, 1], calm[k] = past_start[r, 0], past_start[r, 1], past_calm[r]
 
 
+@kernel
+def _look_back(
+    begin, end, slot, position, velocity, inverse_mass, period_x, period_y, calm, h, start, back, weight,
+):  # fmt: skip
+    """`look_back` of those from `begin` to `end`, eight at a time."""
+    step = spread(start.dtype.type(h))
+    for k in range(begin, end, LANES):
+        x, y = take(position, slot, k)
+        vx, vy = take(velocity, slot, k)
+        before_x, before_y = load_rows(start, k)
+        store_rows(start, k, x, y)
+        vx, vy, most = step * vx, step * vy, step * load(calm, k)
+        gone_x, gone_y = apart_lanes(before_x, x, period_x, start), apart_lanes(before_y, y, period_y, start)
+        dx, dy = vx - gone_x, vy - gone_y
+        off, most = dx * dx + dy * dy, most * most
+        store_rows(back, k, where_above(most, off, gone_x, vx), where_above(most, off, gone_y, vy))
+        store(weight, k, pick(inverse_mass, slot, k))
+
+
 @parallel_kernel
-def look_back(slot, position, velocity, inverse_mass, period_x, period_y, calm, h, start, earlier, weight):
-    """Copy who is linked: where a substep starts; `earlier`, where everybody was a substep ago; the inverse mass.
+def look_back(slot, position, velocity, inverse_mass, period_x, period_y, calm, h, start, back, weight):
+    """Copy who is linked: where a substep starts; the way `back` to where everybody was a substep ago; the inverse mass.
 
     That is by the velocity, or, by memory of `start`, where rest has put another velocity in. Contacts at rest carry weight by
     small velocities that move nobody, and links would take them for motion. calm: (k,) m/s, by how much the velocity may differ
     from the way gone and still be of that kind; beyond it there was an impact. NaN: unknown. In a periodic room what is
     remembered may be another image of where they were.
+
+    Here and below, `slot` has a multiple of LANES of entries: the last one is repeated, and so is what belongs to it.
     """
-    for k in prange(slot.shape[0]):
-        s = slot[k]
-        before_x, before_y = start[k, 0], start[k, 1]
-        start[k, 0], start[k, 1] = position[s, 0], position[s, 1]
-        x, y = start[k, 0] - h * np.float64(velocity[s, 0]), start[k, 1] - h * np.float64(velocity[s, 1])
-        bx = image_near(before_x, start[k, 0], period_x)
-        by = image_near(before_y, start[k, 1], period_y)
-        dx, dy, most = x - bx, y - by, h * calm[k]
-        if dx * dx + dy * dy <= most * most:
-            x, y = bx, by
-        earlier[k, 0], earlier[k, 1] = x, y
-        weight[k] = inverse_mass[s]
+    for c in prange((slot.shape[0] + _CHUNK - 1) // _CHUNK):
+        _look_back(
+            c * _CHUNK, min((c + 1) * _CHUNK, slot.shape[0]), slot, position, velocity, inverse_mass, period_x, period_y, calm,
+            h, start, back, weight,
+        )  # fmt: skip
+
+
+@kernel
+def _set_out(begin, end, predicted, shift, source, slot):
+    zero = spread(shift.dtype.type(0))
+    for k in range(begin, end, LANES):
+        x, y = take(source, slot, k)
+        store_rows(predicted, k, x, y)
+        store_rows(shift, k, zero, zero)
 
 
 @parallel_kernel
-def take_twice(position, predicted, source, slot):
-    """Where the integrator has put who is linked, in two copies: one to solve on."""
-    for k in prange(slot.shape[0]):
-        s = slot[k]
-        for axis in range(2):
-            position[k, axis] = predicted[k, axis] = source[s, axis]
+def set_out(predicted, shift, source, slot):
+    """Where the integrator has put who is linked, and that links have not moved them yet."""
+    for c in prange((slot.shape[0] + _CHUNK - 1) // _CHUNK):
+        _set_out(c * _CHUNK, min((c + 1) * _CHUNK, slot.shape[0]), predicted, shift, source, slot)
+
+
+@kernel
+def _hand_back(begin, end, position, velocity, slot, predicted, shift, rate):
+    per = spread(shift.dtype.type(rate))
+    for k in range(begin, end, LANES):
+        x, y = load_rows(predicted, k)
+        dx, dy = load_rows(shift, k)
+        vx, vy = take(velocity, slot, k)
+        put(position, slot, k, x + dx, y + dy)
+        put(velocity, slot, k, vx + dx * per, vy + dy * per)
 
 
 @parallel_kernel
-def hand_back(position, velocity, slot, solved, predicted, rate, pull):
-    """Give the particles in `slot` their solved positions, and their velocities what that came to; pull: m/s^2 it was."""
-    for k in prange(slot.shape[0]):
-        s = slot[k]
-        for axis in range(2):
-            shift = solved[k, axis] - predicted[k, axis]
-            position[s, axis] = solved[k, axis]
-            velocity[s, axis] += shift * rate
-            pull[k, axis] = shift * rate * rate
+def hand_back(position, velocity, slot, count, predicted, shift, rate):
+    """Give the `count` particles in `slot` their solved positions, and their velocities what that came to."""
+    for k in range(count, shift.shape[0]):
+        shift[k, 0], shift[k, 1] = shift[count - 1, 0], shift[count - 1, 1]
+    for c in prange((slot.shape[0] + _CHUNK - 1) // _CHUNK):
+        _hand_back(c * _CHUNK, min((c + 1) * _CHUNK, slot.shape[0]), position, velocity, slot, predicted, shift, rate)
+
+
+@kernel
+def _add_pull(begin, end, acceleration, slot, shift, rate, calm, rest):
+    per, most = spread(shift.dtype.type(rate * rate)), spread(shift.dtype.type(rest))
+    for k in range(begin, end, LANES):
+        ax, ay = take(acceleration, slot, k)
+        px, py = load_rows(shift, k)
+        px, py = per * px, per * py
+        store(calm, k, most * (square_root(ax * ax + ay * ay) + square_root(px * px + py * py)))
+        put(acceleration, slot, k, ax + px, ay + py)
 
 
 @parallel_kernel
-def add_pull(acceleration, slot, pull, calm, rest):
-    """acceleration[slot[k]] += pull[k], (n, 2); no slot comes twice. calm[k] becomes what both are in `rest` seconds, m/s."""
-    for k in prange(slot.shape[0]):
-        s = slot[k]
-        ax, ay = np.float64(acceleration[s, 0]), np.float64(acceleration[s, 1])
-        calm[k] = rest * (np.sqrt(ax * ax + ay * ay) + np.sqrt(pull[k, 0] * pull[k, 0] + pull[k, 1] * pull[k, 1]))
-        acceleration[s, 0] += pull[k, 0]
-        acceleration[s, 1] += pull[k, 1]
+def add_pull(acceleration, slot, shift, rate, calm, rest):
+    """acceleration[slot[k]] += shift[k] / h^2, what links pull with, m/s^2; no slot comes twice. rate: 1 / h. calm[k] becomes
+    what both are in `rest` seconds, m/s.
+    """
+    for c in prange((slot.shape[0] + _CHUNK - 1) // _CHUNK):
+        _add_pull(c * _CHUNK, min((c + 1) * _CHUNK, slot.shape[0]), acceleration, slot, shift, rate, calm, rest)

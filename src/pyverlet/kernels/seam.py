@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
-from pyverlet.compile.lanes import LANES, nearest_whole, spread
+from pyverlet.compile.lanes import LANES, nearest_whole, spread, widen
+from pyverlet.compile.rounding import lanes_like
 from pyverlet.ground.constants import CLOSE
 from pyverlet.kernels.packs import aside
 
@@ -29,6 +30,14 @@ def nearest_lanes(difference, period):
         return difference
     wide = spread(period)
     return difference - wide * nearest_whole(difference / wide)
+
+
+@kernel
+def apart_lanes(a, b, period, like):
+    """From a to the nearest image of b, lane by lane, in the dtype of `like`; by float64, for no float32 holds a period."""
+    if not period > 0:
+        return b - a
+    return lanes_like(nearest_lanes(widen(b) - widen(a), period), like)
 
 
 @kernel

@@ -8,8 +8,9 @@ import numpy as np
 
 from pyverlet.compile import jit
 from pyverlet.compile.lanes import LANES
+from pyverlet.compile.stealing import Claims
 from pyverlet.ground.constants import LINK_COLOURS, LINKS_ONE_THREAD_BELOW
-from pyverlet.kernels import chain_rows, chains, runs
+from pyverlet.kernels import chain_passes, chain_rows, chains, runs
 from pyverlet.laws.links._link import Array
 from pyverlet.laws.links._pool import MOVING, Pool, held
 from pyverlet.laws.links._work import Work
@@ -22,6 +23,7 @@ class ChainPool(Pool):
     def __init__(self, dtype: np.dtype[Any]) -> None:
         super().__init__(0, rest=np.float64, upper=np.float64)
         self.dtype = dtype
+        self._claims = Claims()
 
     def pack(self, work: Work) -> None:
         """By colour, and within a colour long runs first, so that runs of a pack are as long as each other."""
@@ -39,72 +41,72 @@ class ChainPool(Pool):
         run_at = _place(order, opens)
         self._lanes = np.diff(np.append(opens, number))
         longest = np.maximum.reduceat(length[order], opens) if number else np.zeros(0, np.int64)
-        self._start = LANES * np.concatenate((np.zeros(1, np.int64), np.cumsum(longest)))
+        self._start = LANES * np.concatenate((np.zeros(1, np.int64), np.cumsum(longest + 1)))
         new = (np.diff(colour[order][opens], prepend=-1) != 0) | alone[order][opens]
         self._colour = np.append(np.flatnonzero(new), len(opens))
         self.colours = len(self._colour) - 1
         self._lay_out(given, ends, run_at, longest, length)
         self._place = np.empty(count, np.int64)
         self._place[self._source[self._source >= 0][::-1]] = np.flatnonzero(self._source >= 0)[::-1]
-        self._row = np.zeros((len(chain_rows.COLUMNS), len(self._source)), self.dtype)
+        self._row = np.zeros(chain_rows.ROW * len(self._source), self.dtype)
+        self._more = np.zeros(chain_rows.EXTRA * len(self._source), self.dtype)
         self._strength = np.full(len(self._source), np.inf)
         self._bowed = np.zeros(len(opens), np.uint8)
         parts = 1 if len(work) < LINKS_ONE_THREAD_BELOW else jit.max_threads()
         items = LANES * (int(longest.max(initial=0)) + 1)
-        self._rooms, self._wide = np.zeros((parts, chains.SCRATCH, items), self.dtype), np.zeros((parts, chains.WIDE, items))
+        self._rooms, self._wide = np.zeros((parts, chains.SCRATCH * items), self.dtype), np.zeros((parts, chains.WIDE * items))
         self.stale, self.changed = False, True
 
     def _lay_out(self, given: Array, ends: Array, run_at: Array, longest: Array, length: Array) -> None:
-        """Which row stands in each item, -1 for none, and which particle in each item of the nodes.
+        """Which row stands in each item, -1 for none, and which particle.
 
         given: rows, run after run; ends: (rows, 2) their particles.
         """
         begin = np.concatenate((np.zeros(1, np.int64), np.cumsum(length)))
-        pack, step = _within(longest)
-        run = run_at[pack]
-        source = np.where(step[:, None] < length[run], given[np.minimum(begin[run] + step[:, None], len(given) - 1)], -1)
         pack, step = _within(longest + 1)
-        run = run_at[pack]
-        step = np.minimum(step[:, None], length[run])
+        run, step = run_at[pack], step[:, None]
+        source = np.where(step < length[run], given[np.minimum(begin[run] + step, len(given) - 1)], -1)
+        step = np.minimum(step, length[run])
         node = ends[begin[run] + np.minimum(step, length[run] - 1), (step == length[run]).astype(int)]
         self._source, self._node = source.ravel(), node.astype(np.uint32).ravel()
 
     def begin(self) -> None:
-        row, source, rows = self._row, self._source, self.rows
+        source, rows = self._source, self.rows
         if self.changed:
             self.changed, here = False, source >= 0
             stiffness, rope = rows["stiffness"][source], here & np.isfinite(rows["upper"][source])
             soft = here & np.isfinite(stiffness)
-            row[chain_rows.REST], row[chain_rows.DAMPING] = rows["rest"][source] * here, rows["damping"][source] * here
-            row[chain_rows.ROPE], row[chain_rows.SOFT], row[chain_rows.STIFFNESS] = rope, soft, np.where(soft, stiffness, 0.0)
+            _write(self._row, chain_rows.ROW, chain_rows.REST, rows["rest"][source] * here)
+            _write(self._more, chain_rows.EXTRA, chain_rows.DAMPING, rows["damping"][source] * here)
+            _write(self._more, chain_rows.EXTRA, chain_rows.STIFFNESS, np.where(soft, stiffness, 0.0))
+            _write(self._more, chain_rows.EXTRA, chain_rows.ROPE, rope)
+            _write(self._more, chain_rows.EXTRA, chain_rows.SOFT, soft)
             self._strength[:] = rows["strength"][source]
             self.brittle = bool(np.isfinite(self._strength).any())
             kinds = (chain_rows.ROPES * rope + chain_rows.SOFTS * soft).astype(np.uint8)
             self._holds = np.bitwise_or.reduceat(kinds, self._start[:-1]) if len(kinds) else kinds
             self.gives = bool(soft.any())
-        chain_rows.take_up(source, row, *(rows[name] for name in MOVING))
+        chain_rows.take_up(source, self._row, *(rows[name] for name in MOVING))
 
     def before(self, work: Work, h: float) -> None:
+        self._h = h
         chain_rows.prepare(
-            self._start, self._node, self._holds, self._bowed, self._row, work.start, *work.seam.period, work.earlier,
-            work.weight, h,
+            False, self._colour, self._start, self._node, self._holds, self._bowed, self._row, self._more, work.start,
+            work.predicted, work.back, work.weight, work.shift, *work.seam.period, h, self._claims(),
         )  # fmt: skip
-
-    def ahead(self, work: Work) -> None:
-        if self.gives:
-            chain_rows.ahead(self._colour, self._start, self._node, self._holds, self._row, work.position, work.weight)
 
     def arrays(self) -> tuple[Array, ...]:
         """As `kernels.linked.Linked` has them."""
         return (
-            self._colour, self._start, self._node, self._holds, self._lanes, self._bowed, self._row, self._rooms, self._wide,
-            self._strength,
+            self._colour, self._start, self._node, self._holds, self._lanes, self._bowed, self._row, self._more, self._rooms,
+            self._wide, self._strength, self._claims(),
         )  # fmt: skip
 
     def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
-        chains.sweep(
-            back, skip, self._colour, self._start, self._node, self._holds, self._lanes, self._bowed, self._row, work.position,
-            *work.seam.period, work.weight, self._rooms, self._wide,
+        chain_passes.sweep(
+            back, skip, False, False, self._colour, self._start, self._node, self._holds, self._lanes, self._bowed, self._row,
+            self._more, work.shift, self._h, self._rooms, self._wide, self._claims(), work.start, work.predicted, work.back,
+            work.weight, *work.seam.period,
         )  # fmt: skip
 
     def note(self, work: Work, h: float) -> None:
@@ -118,7 +120,7 @@ class ChainPool(Pool):
         return np.flatnonzero(chain_rows.intact(self._place, self._row) != self.rows["intact"])
 
     def pulled(self) -> Array:
-        return np.asarray(self._row[chain_rows.FORCE][self._place])
+        return np.asarray(self._row[self._place // LANES * (LANES * chain_rows.ROW) + self._place % LANES + chain_rows.FORCE])
 
     def end(self) -> None:
         chain_rows.hand_over(self._place, self._row, *(self.rows[name] for name in MOVING))
@@ -144,6 +146,11 @@ def _place(order: Array, opens: Array) -> Array:
     end = np.append(opens[1:], len(order))
     where = np.minimum(opens[:, None] + np.arange(LANES), end[:, None] - 1)
     return np.asarray(order[where])
+
+
+def _write(rows: Array, width: int, column: int, values: Array) -> None:
+    """What a column of rows, which have so many, holds by their items."""
+    rows.reshape(-1, width, LANES)[:, column // LANES] = values.reshape(-1, LANES)
 
 
 def _within(count: Array) -> tuple[Array, Array]:

@@ -69,15 +69,12 @@ class Pool(ABC):
     def begin(self) -> None:
         """A frame begins: take up who is intact."""
 
-    @abstractmethod
-    def before(self, work: Work, h: float) -> None:
-        """Before the integrator moves: look at the start of the substep."""
-
     def tie(self, work: Work, h: float) -> None:
         """After the integrator, before any pool is solved: what concerns single particles."""
 
-    def ahead(self, work: Work) -> None:
-        """Then: move the particles as far as the pull of the substep before is a good guess."""
+    @abstractmethod
+    def before(self, work: Work, h: float) -> None:
+        """Then: what the rows are to satisfy; move the particles as far as the pull of the substep before is a good guess."""
 
     @abstractmethod
     def sweep(self, work: Work, *, back: bool, skip: bool) -> None:

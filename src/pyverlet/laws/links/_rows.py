@@ -80,20 +80,19 @@ class RowPool(Pool):
     def before(self, work: Work, h: float) -> None:
         row, which = self._row, (self._first, self._particle, self._row["rest"], 0, len(self._order))
         if self.gives:
-            self.measure(work.earlier, *work.seam.period, *which, row["earlier"], self._gradient, row["bend"])
-        self.measure(work.start, *work.seam.period, *which, row["start"], self._along, row["bend"])
+            earlier = work.start - work.back.astype(np.float64)
+            self.measure(earlier, *work.seam.period, *which, row["earlier"], self._gradient, row["bend"])
+        self.measure(work.start.astype(np.float64), *work.seam.period, *which, row["start"], self._along, row["bend"])
         links.prepare(
             self._first, self._particle, work.weight, row["stiffness"], row["damping"], row["upper"], h, row["start"],
             row["earlier"], self._along, row["bend"], row["force"], row["last"], row["give"],
             row["offset"], row["turn"], row["bow"], row["lam"],
         )  # fmt: skip
-
-    def ahead(self, work: Work) -> None:
-        if not self.gives:
-            return
-        which = (self._first, self._particle, work.weight, self._row["intact"], self._along, self._row["lam"])
-        for a, b in self.parts:
-            links.begin_rows(int(self._run[a]), int(self._run[b]), work.position, *which)
+        if self.gives:
+            position, given = work.position, (self._first, self._particle, work.weight, row["intact"], self._along, row["lam"])
+            for a, b in self.parts:
+                links.begin_rows(int(self._run[a]), int(self._run[b]), position, *given)
+            work.position = position
 
     def _together(self) -> Iterator[tuple[int, int]]:
         """Runs a to b that may be solved beside each other; those of the last colour may share particles and stand alone."""
@@ -107,16 +106,17 @@ class RowPool(Pool):
                 yield from zip(range(begin, end), range(begin + 1, end + 1), strict=True)
 
     def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
-        row = self._row
+        row, position = self._row, work.position
         parts = self.parts[::-1] if back else self.parts
         for a, b in parts[1:] if skip else parts:
             begin, end = int(self._run[a]), int(self._run[b])
             which = (self._first, self._particle, row["rest"], begin, end)
-            self.measure(work.position, *work.seam.period, *which, row["value"], self._gradient, row["bend"])
+            self.measure(position, *work.seam.period, *which, row["value"], self._gradient, row["bend"])
             links.solve_rows(
-                begin, end, work.position, self._first, self._particle, work.weight, row["upper"], row["intact"], row["value"],
+                begin, end, position, self._first, self._particle, work.weight, row["upper"], row["intact"], row["value"],
                 self._gradient, self._along, row["turn"], row["give"], row["offset"], row["lam"],
             )  # fmt: skip
+        work.position = position
 
     def note(self, work: Work, h: float) -> None:
         row = self._row

@@ -44,7 +44,7 @@ class Links:
         self._order: list[Pool] = []
         self._next_owner = 0
         self._few = True
-        self._work = Work(np.empty(0, np.int64), 0)
+        self._work = Work(np.empty(0, np.int64), 0, state.dtype)
         self._past: Past | None = None
         self._iterations = 1
         self._apart, self._apart_stale = np.empty((0, 2), np.int64), False
@@ -155,7 +155,7 @@ class Links:
             among = np.zeros(len(self._state), bool)
             for pool in self._order:
                 among[pool.entries["particle"]] = True
-            self._work = Work(np.flatnonzero(among), len(self._state))
+            self._work = Work(np.flatnonzero(among), len(self._state), self._state.dtype)
             for pool in self._order:
                 pool.pack(self._work)
             self._few = len(self._work) < LINKS_ONE_THREAD_BELOW
@@ -194,7 +194,7 @@ class Links:
         if self._linked is None:
             self._linked = (*self._work.arrays(), *chains.arrays(), *self._pins.arrays())
         rest = REST_ACCELERATIONS * h
-        numbers = (h, *self._work.seam.period, self._iterations, int(chains.gives), int(chains.brittle), rest)
+        numbers = (h, *self._work.seam.period, len(self._work), self._iterations, int(chains.brittle), rest)
         return self._linked, numbers
 
     def _know_apart(self) -> None:
@@ -233,8 +233,6 @@ class Links:
                 linked.call_look(*given, state.position, state.velocity, state.inverse_mass)
                 return
             self._work.look(state, h)
-            for pool in self._order:
-                pool.before(self._work, h)
 
     def solve(self, state: Slots, h: float) -> None:
         """Move the linked particles to where their links allow, and break those that pull too hard."""
@@ -250,6 +248,8 @@ class Links:
         work.take(state)
         for pool in self._order:
             pool.tie(work, h)
+        for pool in self._order:
+            pool.before(work, h)
         # There and back: one way only, the links about a common particle throw it in a circle, faster and faster.
         if pools := [pool for pool in self._order if pool.colours]:
             self._passes(pools)
@@ -260,8 +260,6 @@ class Links:
     def _passes(self, pools: list[Pool]) -> None:
         """All of them there, and all of them back."""
         work = self._work
-        for pool in pools:
-            pool.ahead(work)
         several = sum(pool.colours for pool in pools) > 1
         for _ in range(self._iterations if several else 1):
             for pool in pools:

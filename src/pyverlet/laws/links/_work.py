@@ -1,4 +1,4 @@
-"""The solver's copy of the particles that have links: compact, in float64, made anew in every substep."""
+"""The solver's copy of the particles that have links: compact, in the dtype of the world, made anew in every substep."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.compile.lanes import LANES
 from pyverlet.ground import memory
 from pyverlet.ground.constants import REST_ACCELERATIONS
 from pyverlet.kernels import links, motion
@@ -38,27 +39,30 @@ def nobody(dtype: np.dtype[Any]) -> Past:
 class Work:
     """The linked particles.
 
+    All arrays have a multiple of eight of rows: the last particle is repeated.
+
     Args:
         particle: (m,) the user's indices, ascending.
         count: of all particles.
+        dtype: of their positions.
 
     Attributes:
         compact: (n,) where each of the user's particles is in here; only that of linked ones means anything.
-        start, earlier: (m, 2) where each was at the start of this substep, and a substep before that, m.
-        position, predicted: (m, 2) where the solver has it, and where the integrator had put it, m.
+        start: (m, 2) where each was at the start of this substep, m, and the way `back` to a substep before that.
+        predicted: (m, 2) where the integrator, and then its pin, had put it, and how far links have moved it by now, its `shift`.
         weight: (m,) inverse mass, as the rows feel it, 1/kg.
-        pull: (m, 2) acceleration by all links in this substep, m/s^2.
     """
 
-    def __init__(self, particle: Array, count: int) -> None:
+    def __init__(self, particle: Array, count: int, dtype: np.dtype[Any]) -> None:
         self.particle = particle
         self.compact = np.zeros(count, np.int64)
         self.compact[particle] = np.arange(len(particle))
-        self.start, self.earlier, self.position, self.predicted = np.zeros((4, len(particle), 2))
-        self._where, self.pull = np.zeros((2, len(particle), 2))
-        self.weight = np.zeros(len(particle))
-        self._slot = np.zeros(len(particle), np.int64)
-        self._calm = np.full(len(particle), np.nan)
+        rows = -(-len(particle) // LANES) * LANES
+        self.start, self.back, self.predicted, self.shift = np.zeros((4, rows, 2), dtype)
+        self._where = np.zeros((rows, 2))
+        self.weight = np.zeros(rows, dtype)
+        self._slot = np.zeros(rows, np.uint32)
+        self._calm = np.full(rows, np.nan, dtype)
         self.seam = NONE
         self._order: Array | None = None
 
@@ -69,9 +73,11 @@ class Work:
         """(m,) where the particles stand in the engine's order."""
         if self._order is not state.particle:  # every new order is a new array
             self._order = state.particle
-            slot_of = np.empty(len(state.particle), np.int64)
+            slot_of = np.empty(len(state.particle), np.uint32)
             slot_of[state.particle] = np.arange(len(slot_of))
-            self._slot[:] = slot_of[self.particle]
+            count = len(self)
+            self._slot[:count] = slot_of[self.particle]
+            self._slot[count:] = self._slot[count - 1 : count]
         return self._slot
 
     def begin(self, state: State, past: Past | None) -> None:
@@ -82,35 +88,43 @@ class Work:
     def end(self, state: State) -> Past:
         """The frame is good: what is to be remembered."""
         number, left = (memory.taken(array, self.particle) for array in (state.number, state.position))
-        return Past(number, self.start.copy(), left, self._calm.copy())
+        start, calm = (array[: len(self)].astype(np.float64) for array in (self.start, self._calm))
+        return Past(number, start, left, calm)
 
     def arrays(self) -> tuple[Array, ...]:
         """As `kernels.linked.Linked` has them; the slots are right once `slots` has been asked."""
-        return (
-            self._slot, self.start, self.earlier, self.position, self.predicted, self.weight, self.pull, self._calm,
-        )  # fmt: skip
+        return self._slot, self.start, self.back, self.predicted, self.shift, self.weight, self._calm
 
     def look(self, state: Slots, h: float) -> None:
         """Before the integrator: where they are, and where they were."""
         slot = self.slots(state)
         links.look_back(
-            slot, state.position, state.velocity, state.inverse_mass, *self.seam.period, self._calm, h, self.start, self.earlier,
+            slot, state.position, state.velocity, state.inverse_mass, *self.seam.period, self._calm, h, self.start, self.back,
             self.weight,
         )  # fmt: skip
 
     def take(self, state: Slots) -> None:
         """After the integrator and the contacts."""
-        links.take_twice(self.position, self.predicted, state.position, self.slots(state))
+        links.set_out(self.predicted, self.shift, state.position, self.slots(state))
 
     def where(self, state: Slots) -> Array:
         """(m, 2) where they are now, m; good until asked again."""
         motion.take_rows(self._where, state.position, self.slots(state))
         return self._where
 
+    @property
+    def position(self) -> Array:
+        """(m, 2) where links have them by now, m, in float64. Assign to move them."""
+        return np.asarray(self.predicted + self.shift.astype(np.float64))
+
+    @position.setter
+    def position(self, value: Array) -> None:
+        self.shift[:] = value - self.predicted
+
     def give(self, state: Slots, h: float) -> None:
         """Hand the result back."""
-        links.hand_back(state.position, state.velocity, self.slots(state), self.position, self.predicted, 1 / h, self.pull)
+        links.hand_back(state.position, state.velocity, self.slots(state), len(self), self.predicted, self.shift, 1 / h)
 
     def after(self, state: Slots, h: float) -> None:
         """After the contacts: what the links did is part of the acceleration, for integrators that remember it."""
-        links.add_pull(state.acceleration, self.slots(state), self.pull, self._calm, REST_ACCELERATIONS * h)
+        links.add_pull(state.acceleration, self.slots(state), self.shift, 1 / h, self._calm, REST_ACCELERATIONS * h)

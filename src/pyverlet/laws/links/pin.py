@@ -88,7 +88,7 @@ class PinPool(Pool):
         self.stale, self.changed = False, True
         self._particle = work.compact[self.entries["particle"]]
         self._give, self._lam, self._last, self._force = np.zeros((4, len(self.rows)))
-        self._offset = np.zeros((len(self.rows), 2))
+        self._left, self._way, self._kept = np.zeros((3, len(self.rows), 2))
         self._intact = np.zeros(len(self.rows), np.uint8)
 
     def begin(self) -> None:
@@ -102,7 +102,7 @@ class PinPool(Pool):
         rows = self.rows
         return (
             self._particle, rows["point"], rows["stiffness"], rows["damping"], rows["strength"], self._intact, self._give,
-            self._offset, self._lam, self._last, self._force,
+            self._left, self._way, self._kept, self._lam, self._last, self._force,
         )  # fmt: skip
 
     def before(self, work: Work, h: float) -> None:
@@ -111,16 +111,18 @@ class PinPool(Pool):
     def tie(self, work: Work, h: float) -> None:
         rows, about = self.rows, (self._particle, self.rows["point"], *work.seam.period)
         ties.tie(
-            work.position, work.weight, work.start, work.earlier, *about, rows["stiffness"], rows["damping"], self._intact, h,
-            self._give, self._offset,
+            work.predicted, work.weight, work.start, work.back, *about, rows["stiffness"], rows["damping"], self._intact, h,
+            self._give, self._left, self._way, self._kept,
         )  # fmt: skip
 
     def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
         pass
 
     def note(self, work: Work, h: float) -> None:
-        about = (self._particle, self.rows["point"], *work.seam.period, self.rows["strength"], self._intact)
-        ties.note_ties(work.position, work.start, *about, h, self._give, self._offset, self._lam, self._last, self._force)
+        ties.note_ties(
+            work.shift, work.predicted, self._particle, self.rows["strength"], self._intact, h, self._give, self._left,
+            self._way, self._kept, self._lam, self._last, self._force,
+        )  # fmt: skip
 
     def broken(self) -> Array:
         return np.flatnonzero(self._intact != self.rows["intact"])
