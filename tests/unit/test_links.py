@@ -226,6 +226,24 @@ def test_particles_that_go_take_their_links_along() -> None:
     assert chain.force.shape == (2,)
 
 
+def test_links_removed_between_frames_leave_all_at_once() -> None:
+    world = pv.World(collisions=None)
+    group = world.add(position=np.column_stack((np.arange(6), np.zeros(6))), radius=0.1)
+    links = [world.links.append(pv.Stick(group, i, i + 1, length=1 + 0.1 * i)) for i in range(4)]
+    world.links.remove(links[0])
+    world.links.remove(links[2])
+    late = world.links.append(pv.Stick(group, 4, 5, length=2.0))
+    links[3].length = 1.5
+    again = world.links.append(links[0])  # while its rows of before may still be there
+    assert sorted(map(tuple, world.links.joined().tolist())) == [(0, 1), (1, 2), (3, 4), (4, 5)]
+    assert [link.length.tolist() for link in (links[1], links[3], late, again)] == [[1.1], [1.5], [2.0], [1.0]]
+    saved = world.save()
+    world.links.remove(late)
+    world.restore(saved)
+    assert len(world.links.joined()) == 4
+    world.step(1 / 60)
+
+
 def test_links_to_removed_particles_are_refused() -> None:
     world = pv.World(collisions=None)
     group = world.add(position=np.column_stack((np.arange(5), np.zeros(5))), radius=0.1)

@@ -41,12 +41,12 @@ class Links:
         self._state = state
         self._links: list[Link] = []
         self._pools: dict[Any, Pool] = {}
-        self._order: list[Pool] = []
-        self._next_owner = 0
+        self._sorted: list[Pool] = []
+        self._leaving: dict[Pool, list[int]] = {}
+        self._next_owner, self._iterations = 0, 1
         self._few = True
         self._work = Work(np.empty(0, np.int64), 0, state.dtype)
         self._past: Past | None = None
-        self._iterations = 1
         self._apart, self._apart_stale = np.empty((0, 2), np.int64), False
         self._partners = np.zeros(1, np.int64), np.empty(0, np.int64)
         self._apart_changed = False
@@ -74,7 +74,7 @@ class Links:
         family = link._family
         if family not in self._pools:
             self._pools[family] = link._new_pool()
-            self._order = sorted(self._pools.values(), key=lambda pool: pool.turn)
+            self._sorted = sorted(self._pools.values(), key=lambda pool: pool.turn)
         link._pool = self._pools[family]
         link._id = self._next_owner
         link._where = link._pool.append(link._id, link.particles, link._columns())
@@ -101,11 +101,19 @@ class Links:
         """
         if link._pool is None or link not in self._links:
             raise InputError(f"{link!r} is not among this world's links; allowed is one that was appended")
-        pool = link._pool
-        pool.keep(pool.rows["owner"] != link._id)
+        self._leaving.setdefault(link._pool, []).append(link._id)
         self._links.remove(link)
         link._pool = None
-        self._find_rows(pool)
+        self._apart_stale = True
+
+    @property
+    def _order(self) -> list[Pool]:
+        """The pools as they are solved. Removed links leave them when somebody asks: many take no longer than one."""
+        leaving, self._leaving = self._leaving, {}
+        for pool, owners in leaving.items():
+            pool.keep(~np.isin(pool.rows["owner"], owners))
+            self._find_rows(pool)
+        return self._sorted
 
     def __len__(self) -> int:
         return len(self._links)
@@ -119,10 +127,11 @@ class Links:
     def _find_rows(self, pool: Pool) -> None:
         """Rows have gone: tell those that stay where theirs are now. Owners stand in the order appended."""
         self._apart_stale = True
-        owner = pool.rows["owner"]
-        for link in self._links:
-            if link._pool is pool:
-                link._where = slice(*map(int, np.searchsorted(owner, (link._id, link._id + 1))))
+        links = [link for link in self._links if link._pool is pool]
+        owner, numbers = pool.rows["owner"], [link._id for link in links]
+        begin, end = (np.searchsorted(owner, numbers, side).tolist() for side in ("left", "right"))
+        for link, first, stop in zip(links, begin, end, strict=True):
+            link._where = slice(first, stop)
 
     def renumber(self, new: NDArray[np.int64]) -> None:
         """Particles have been removed: new[i] is what the user's index i is now, -1 if it is gone, and its links with it."""
@@ -259,13 +268,12 @@ class Links:
 
     def _passes(self, pools: list[Pool]) -> None:
         """All of them there, and all of them back."""
-        work = self._work
         several = sum(pool.colours for pool in pools) > 1
         for _ in range(self._iterations if several else 1):
             for pool in pools:
-                pool.sweep(work, back=False, skip=False)
+                pool.sweep(self._work, back=False, skip=False)
             for pool in reversed(pools) if several else ():
-                pool.sweep(work, back=True, skip=pool is pools[-1])  # its last colour has just been solved
+                pool.sweep(self._work, back=True, skip=pool is pools[-1])  # its last colour has just been solved
 
     def after(self, state: Slots, h: float) -> None:
         """After the contacts: what the links did is part of the acceleration, for integrators that remember it."""
@@ -290,8 +298,7 @@ class Links:
 
     def _note(self, pool: Pool, snapped: Array) -> Array:
         """The BROKEN entries of these rows of a pool."""
-        note = np.empty(len(snapped), BROKEN)
-        number = {link._id: k for k, link in enumerate(self._links)}
+        note, number = np.empty(len(snapped), BROKEN), {link._id: k for k, link in enumerate(self._links)}
         for k, row in enumerate(snapped):
             link = self._links[number[int(pool.rows["owner"][row])]]
             within = int(row) - link._where.start
@@ -371,7 +378,8 @@ class Links:
 
     def save(self) -> Any:
         """A copy of all there is about links."""
-        pools = {family: (pool, pool.rows.copy(), pool.entries.copy()) for family, pool in self._pools.items()}
+        by_family = {family: pool for family, pool in self._pools.items() if pool in self._order}
+        pools = {family: (pool, pool.rows.copy(), pool.entries.copy()) for family, pool in by_family.items()}
         links = [(link, link.particles, link._where) for link in self._links]
         return links, pools, self.broken, self._apart_changed, self._past
 
