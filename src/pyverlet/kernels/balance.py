@@ -56,10 +56,10 @@ def _look(c, a, b, circles, lending):
 @kernel
 def _note_wall(i, circles, lending, hanging):
     """Add to the sums of the cluster of i what a wall has done to it."""
-    to, velocity, unpushed = lending.sums[hanging.root[i]], circles.velocity, lending.unpushed
-    if circles.inverse_mass[i] == 0:  # whoever it touches is held in all directions
-        to[_XX] += 1.0
-        to[_YY] += 1.0
+    r, velocity, unpushed = hanging.root[i], circles.velocity, lending.unpushed
+    to = lending.sums[r]
+    if circles.inverse_mass[i] == 0:  # whoever it touches is held in all directions, however hard walls push in one
+        lending.what[r] = _HELD
     elif lending.touched[i]:
         dx, dy = float(velocity[i, 0] - unpushed[i, 0]), float(velocity[i, 1] - unpushed[i, 1])
         to[_XX] += dx * dx
@@ -74,12 +74,15 @@ def _sum_up(circles, lending, hanging):
     for k in range(hanging.sets[0]):
         r = heads[k]
         sums[r, _XX], sums[r, _XY], sums[r, _YY] = 0.0, 0.0, 0.0
+        what[r] = 0
     for c in range(lending.found.shape[0]):
         for k in range(c * CHUNK, c * CHUNK + lending.found[c]):
             _note_wall(lending.among[k], circles, lending, hanging)
     for k in range(hanging.sets[0]):
         r = heads[k]
         xx, xy, yy = sums[r, _XX], sums[r, _XY], sums[r, _YY]
+        if what[r] == _HELD:
+            continue
         what[r] = _HELD if xx + yy > 0 else 0
         if xx * yy - xy * xy <= _ACROSS * (xx + yy) * (xx + yy):
             what[r] |= _ALONG if xx + yy > 0 else _FREE
