@@ -43,11 +43,13 @@ def test_clusters_are_those_of_the_pairs_that_touch(friction: float, *, pinned: 
         world.step(1 / 60)
         if frame == 200:
             world.velocity[::7] += (0.0, 1.5)  # some leave it for a while
-        assert world._contacts.lending[0]
-        begin, lanes, lane_i, lane_j, normal = world._contacts._wide.touching()
+        contacts = world._contacts
+        assert contacts
+        assert contacts.lending[0]
+        begin, lanes, lane_i, lane_j, normal = contacts._wide.touching()
         k = np.concatenate([np.arange(a, a + count) for a, count in zip(begin, lanes, strict=False)])
         k = k[(normal[:, k] != 0).any(axis=0)]
-        root, heads, sets = world._contacts.lending[1][1][:3]
+        root, heads, sets = contacts.lending[1][1][:3]
         expected = lowest_of_each(len(world), lane_i[k], lane_j[k])
         assert (root == expected).all()
         assert sorted(set(heads[: sets[0]])) == sorted(set(expected))
