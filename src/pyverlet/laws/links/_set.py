@@ -286,8 +286,7 @@ class Links:
     def scatter(self) -> None:
         """The frame is good: what it did to the links holds."""
         self._past = self._work.end(self._state) if self._order else None
-        if len(self.broken):
-            self.broken = np.empty(0, BROKEN)
+        self.broken = self.broken[:0]
         for pool in self._order:
             snapped = pool.broken()
             if len(snapped):
