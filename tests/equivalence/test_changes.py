@@ -13,6 +13,7 @@ import pyverlet as pv
 from pyverlet.laws.contacts.collisions import ContactSolver
 from pyverlet.laws.integrators import BY_NAME
 from pyverlet.state.group import Group
+from pyverlet.world.substeps import Substeps
 
 ROOMS = {
     "cage": lambda: pv.Circle(radius=8),
@@ -68,6 +69,58 @@ def test_any_integrator_in_any_room(room: str, integrator: str) -> None:
 @pytest.mark.parametrize("collisions", [None, pv.Collisions(), pv.Collisions(friction=0.3), pv.Collisions(restitution=0.5)])
 def test_any_contacts(dtype: Any, collisions: Any) -> None:
     both(lambda: pour(boundary=ROOMS["cage"](), dtype=dtype, collisions=collisions), 60)
+
+
+def test_friction_comes_among_circles_that_bounce_and_carry_weight() -> None:
+    # What friction reads of each circle begins then; who carries weight has been known for long.
+    def rub(w: pv.World, frame: int) -> None:
+        if frame == 170:
+            w.friction[:] = 0.5
+
+    both(lambda: pour(boundary=ROOMS["cage"](), collisions=pv.Collisions(restitution=0.3)), 180, rub)
+
+
+@pv.force
+def a_breeze(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tuple[float, float]:
+    return 0.3 * mass - 0.1 * vx, 0.2 * t
+
+
+def with_drag(w: pv.World) -> None:
+    w.forces.append(pv.Drag(linear=0.05))
+
+
+def with_a_function(w: pv.World) -> None:
+    w.forces.append(a_breeze)
+
+
+def with_a_chain(w: pv.World) -> None:
+    group = w.add(position=[(0.5 * k - 1, 6.5) for k in range(5)], radius=0.1)
+    w.links.append(pv.Stick(group, range(4), range(1, 5)))
+
+
+def with_a_segment(w: pv.World) -> None:
+    w.obstacles.append(pv.Segment((-3, -4), (3, -5)))
+
+
+@pytest.mark.parametrize("ledger", [False, True], ids=["", "ledger"])
+@pytest.mark.parametrize("change", [with_drag, with_a_function, with_a_chain, with_a_segment, lambda w: None])
+def test_one_call_begins_a_frame_and_goes_through_it(change: Any, monkeypatch: pytest.MonkeyPatch, *, ledger: bool) -> None:
+    opened, go = [], Substeps.go
+
+    def watched(run: Substeps, *about: Any, opens: bool = False) -> bool:
+        gone = go(run, *about, opens=opens)
+        opened.append(opens and gone)
+        return gone
+
+    def made() -> pv.World:
+        w = pour(boundary=ROOMS["cage"](), ledger=ledger)
+        change(w)
+        return w
+
+    monkeypatch.setattr(Substeps, "go", watched)
+    both(made, 60)
+    # Work of forces that have no potential is asked for after every stage.
+    assert any(opened) == (not (ledger and change in (with_drag, with_a_function)))
 
 
 def a_push(w: Any) -> None:

@@ -192,7 +192,7 @@ class Kernel:
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the variant for the threads in use."""
-        # Called ten times a frame, which is half of what a frame of ten circles takes: nothing is asked twice.
+        # What `_in_use` says, mostly without its call: this is called nine times in the smallest frame.
         if not (self.parallel and (getattr(_chosen, "wanted", None) or _in_use())[1]):
             return self._alone(*arguments)
         if pool.layer() != "workqueue":

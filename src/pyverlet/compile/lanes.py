@@ -277,10 +277,11 @@ def _columns(builder: Any, rows: Any) -> list[Any]:
     return [builder.shuffle_vector(rows, empty, order(range(axis, 2 * LANES, 2))) for axis in range(2)]
 
 
-_QUARTERS = (0, 1, 4, 5), (2, 3, 6, 7)
+_HALVES = (0, 1, 4, 5), (2, 3, 6, 7)
 _EVEN = (0, 2, 8, 10, 4, 6, 12, 14)
-"""Rows of two float32 in two registers, so that no number has to leave its half of one when they become columns, or columns rows:
-that takes twice as many instructions, of the slower kind."""
+"""Which lanes' rows of two float32 stand in each of two registers, and where the x of each lane is in both, one after the other.
+So no number has to leave its half of a register when they become columns, or columns rows: that takes twice as many instructions,
+of the slower kind."""
 
 
 def _joined(builder: Any, parts: list[Any]) -> Any:
@@ -312,7 +313,7 @@ def take(typing: Any, array: Any, index: Any, k: Any) -> Any:
             rows.append(builder.load(row))
             rows[-1].align = array.dtype.bitwidth // 8
         if array.dtype == types.float32:
-            first, second = (_joined(builder, [rows[lane] for lane in lanes]) for lanes in _QUARTERS)
+            first, second = (_joined(builder, [rows[lane] for lane in half]) for half in _HALVES)
             columns = [builder.shuffle_vector(first, second, order(axis + lane for lane in _EVEN)) for axis in range(2)]
         else:
             columns = _columns(builder, _joined(builder, rows))
@@ -328,13 +329,12 @@ def put(typing: Any, array: Any, index: Any, k: Any, x: Any, y: Any) -> Any:
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         columns, single = args[3:5], array.dtype == types.float32
         if single:
-            turns = (order(n + LANES * axis for n in lanes for axis in range(2)) for lanes in _QUARTERS)
+            turns = (order(n + LANES * axis for n in half for axis in range(2)) for half in _HALVES)
             turned = [builder.shuffle_vector(*columns, turn) for turn in turns]
         for lane, row in enumerate(pointers(context, builder, array, index, args)):
             if single:
-                half = next(k for k, lanes in enumerate(_QUARTERS) if lane in lanes)
-                where = 2 * _QUARTERS[half].index(lane)
-                pair = builder.shuffle_vector(turned[half], turned[half], order([where, where + 1]))
+                register, where = divmod(sum(_HALVES, ()).index(lane), LANES // 2)
+                pair = builder.shuffle_vector(turned[register], turned[register], order([2 * where, 2 * where + 1]))
             else:
                 pair = builder.shuffle_vector(*columns, order([lane, lane + LANES]))
             written = builder.store(pair, row)

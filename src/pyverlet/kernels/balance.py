@@ -136,13 +136,8 @@ def balance(circles, lending, root, rubs):
     rubs: whether spins take part. `Lending.sums`, of each root: m, m x (2), what momentum lacks (2), I, what angular momentum
     about the centre lacks, and the three numbers of `note_walls`.
     """
-    position, velocity, spin, radius, inverse_mass = (
-        circles.position,
-        circles.velocity,
-        circles.spin,
-        circles.radius,
-        circles.inverse_mass,
-    )
+    position, velocity, spin = circles.position, circles.velocity, circles.spin
+    radius, inverse_mass = circles.radius, circles.inverse_mass
     mass, before, spin_before, sums = lending.mass, lending.before, lending.spin_before, lending.sums
     among, count = lending.among, 0
     for c in range(lending.found.shape[0]):

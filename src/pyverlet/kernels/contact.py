@@ -131,10 +131,8 @@ def _push_strip(s, to, circles, pairs, law, looks):
                 rub = larger(smaller(answer * where_above(spread(real(NEW)), slipped, slipped, zero), cone), zero - cone)
                 # Beside the pushes, which it must not change: with it in `moved` single circles of rough piles spun for ever.
                 sx, sy = rub * ny, zero - rub * nx
-                turned_i, turned_j = (
-                    turned_i + rub * part * load(made_of[TURN_I], at),
-                    turned_j + rub * (one - part) * load(made_of[TURN_J], at),
-                )
+                turned_i = turned_i + rub * part * load(made_of[TURN_I], at)
+                turned_j = turned_j + rub * (one - part) * load(made_of[TURN_J], at)
                 put_four(rows, lane_i, k, sxi - sx * part, syi - sy * part, turned_i, carries_i)
                 put_four(rows, lane_j, k, sxj + sx * (one - part), syj + sy * (one - part), turned_j, carries_j)
         put(moved, lane_i, k, xi - cx * part, yi - cy * part)

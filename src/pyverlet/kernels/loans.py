@@ -107,10 +107,10 @@ def _begin(a, b, circles, lending, terms, bounces, rubs):
 def begin(circles, lending, terms, bounces, rubs):
     """A substep's contacts begin.
 
-    lighter: 1 / m' of each circle, 1/kg. calm, if any pair `bounces` or rubs: `sunk` for who lends, or may not yet,
-    else 0. inertia: m', kg, and what of it the
-    circle keeps whatever others ask for, negative if it neither lends nor borrows. before, and spin_before if any pair `rubs`:
-    velocities from which contacts begin; of those that walls hold without gravity's share, which counts as theirs.
+    lighter: 1 / m' of each circle, 1/kg. calm, if any pair `bounces` or rubs: `sunk` for who lends, or may not yet, else 0.
+    inertia: m', kg, and what of it the circle keeps whatever others ask for, negative if it neither lends nor borrows. before,
+    and spin_before if any pair `rubs`: velocities from which contacts begin; of those that walls hold without gravity's share,
+    which counts as theirs.
 
     Who is held, through others, is moved by what a (m / m' - 1) does to its position: so its weight is that of its own mass.
     """

@@ -114,8 +114,8 @@ class Substeps:
         if books:
             books.read(services.energies, substep, reached, opens=opens)
         self.marked = reached > last
-        if self.marked or reached == substep:  # who overlaps is yet to be looked for
-            wide.has_marked()
+        if self.marked or reached == substep:
+            wide.look_anew()
         if self.leapt:
             contacts.broad_phase.strayed, self._out = True, wide.moved
         contacts.broad_phase.aged(reached - substep - 1)
@@ -159,7 +159,7 @@ class Substeps:
         strayed = fused.substep(self._cut, wide.circles, arrays, wide.law, tuple(map(state.real, room[:3])), about)
         contacts.broad_phase.strayed = bool(strayed) if self.leapt else None
         if self.marked:
-            wide.has_marked()
+            wide.look_anew()
         world.profile.mark("fused")
         self.substep += 1
 

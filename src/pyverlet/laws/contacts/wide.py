@@ -208,11 +208,13 @@ class Wide:
 
         noted: where circles lend inertia, where impacts note what they do: `Loans.begin`.
         """
-        if not self.fits(state) or (self._lent and noted is None):
+        if fresh := not self.fits(state) or (self._lent and noted is None):
             self.fit(state)
         self._lent = noted is not None
         if self.asks:
             np.bitwise_and(state.fed, CARRIES, out=self._carries, casting="unsafe")
+            if fresh:  # each first sweep finds them as the second one before has left them: there may have been none
+                self._rows[:, :3], self._rows[:, 3] = 0, self._carries
         turn = self._turn if self.rubs else self._turn[:0]
         if self.rubs:
             np.multiply(self._rough, state.real((state.drop - PUSHED / FED) * h), out=self._leans)
@@ -243,8 +245,8 @@ class Wide:
         looks, self._looks = int(self._looks), self._lent
         return looks
 
-    def has_marked(self) -> None:
-        """Who rests has been marked in `state.resting`: the frame is over, and the next one looks anew."""
+    def look_anew(self) -> None:
+        """The next sweep is to note who overlaps deeply."""
         self._looks = True
 
     def touching(self) -> tuple[Array, Array, Array, Array, Array]:
@@ -265,7 +267,7 @@ class Wide:
     def mark_resting(self, state: Slots) -> None:
         """Note in `state.resting` who touches another."""
         sweeps.mark_touching(self.lanes, self.begin, self.lane_i, self.lane_j, self.normal, state.resting, self.cut())
-        self.has_marked()
+        self.look_anew()
 
 
 def _differ(values: Array) -> bool:
