@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
+from pyverlet.kernels import events as kernels
 
 METHODS: list[Any] = [pv.Fast(), pv.BruteForce()]
 
@@ -27,6 +28,29 @@ def follow(world: pv.World, frames: int) -> list[tuple[str, int, int]]:
         told += [("begin", int(a), int(b)) for a, b in world.events.begin[["a", "b"]].tolist()]
         told += [("end", int(a), int(b)) for a, b in world.events.end.tolist()]
     return told
+
+
+@pytest.mark.parametrize(("gone", "new"), [(0, 0), (0, 5), (5, 0), (40, 60), (100, 3)])
+def test_keys_are_replaced_in_order(gone: int, new: int) -> None:
+    # The same by NumPy's sets; 100 are all there are.
+    numbers = np.random.default_rng(gone).permutation(1_000)
+    keys, come = np.sort(numbers[:100]), np.sort(numbers[100 : 100 + new])
+    left = np.sort(numbers[:gone])
+    assert kernels.replaced(keys, left, come).tolist() == np.union1d(np.setdiff1d(keys, left), come).tolist()
+
+
+@pytest.mark.parametrize("last", [False, True])
+def test_who_is_gone_is_not_told_of(last: bool) -> None:
+    # Three in a row touch; one of them goes. What was between it and others is told to nobody, the rest goes on.
+    world = pv.World(gravity=(0, 0), collisions=pv.Collisions(), dtype=np.float64, events=True)
+    group = world.add(position=[(0, 0), (0.999, 0), (1.998, 0)], radius=0.5)
+    world.step(1 / 60)
+    assert world.events.begin[["a", "b"]].tolist() == [(0, 1), (1, 2)]
+    group.remove([False, False, True] if last else [True, False, False])
+    world.step(1 / 60)
+    assert len(world.events.begin) == 0
+    assert (world.events.end["a"] < 2).all()
+    assert (world.events.end["b"] < 2).all()
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 import pytest
 
-from pyverlet.compile.bits import count_bits, lowest_bit, write_all, write_chosen
+from pyverlet.compile.bits import count_bits, distinct_lanes, lowest_bit, write_all, write_chosen
 from pyverlet.compile.jit import kernel
 from pyverlet.compile.lanes import (
     LANES,
@@ -156,6 +156,22 @@ def test_lanes_are_chosen_by_bits() -> None:
     assert lowest[rows.any(axis=1)].tolist() == rows[rows.any(axis=1)].argmax(axis=1).tolist()
     assert found[: len(expected)].tolist() == expected.tolist()
     assert of[: len(expected)].tolist() == (expected // LANES * LANES).tolist()
+
+
+@kernel
+def count_pairs(index: Any, other: Any) -> Any:
+    return distinct_lanes(index, other, LANES)
+
+
+@pytest.mark.parametrize("pairs", range(1, LANES + 1))
+def test_a_pack_that_repeats_its_last_pair_counts_it_once(pairs: int) -> None:
+    # Pairs of a pack share no circle, so those before the last are all different; what stands before the pack says nothing.
+    index, other = np.full((2, 2 * LANES), 5, np.uint32)
+    index[LANES:] = [5 + 2 * min(lane, pairs - 1) for lane in range(LANES)]
+    other[LANES:] = index[LANES:] + 1
+    assert count_pairs(index, other) == pairs
+    other[-1] += 100  # the same first circle alone is no repetition
+    assert count_pairs(index, other) == LANES
 
 
 @kernel

@@ -9,7 +9,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from pyverlet.compile.lanes import LANES, order, pointer
+from pyverlet.compile.lanes import ALL, LANES, order, pointer
 
 _INT32, _INT64 = ir.IntType(32), ir.IntType(64)
 
@@ -93,6 +93,24 @@ def store_bits(typing: Any, array: Any, k: Any, bits: Any) -> Any:
         return context.get_dummy_value()
 
     return types.void(array, k, bits), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def distinct_lanes(typing: Any, index: Any, other: Any, k: Any) -> Any:
+    """How many pairs a pack, from lane k on of both, holds before it repeats its last one to be full."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        eight, before, alike = ir.VectorType(_INT32, LANES), order([0, *range(LANES - 1)]), None
+        for array, value in ((index, args[0]), (other, args[1])):
+            numbers = builder.load(pointer(context, builder, array, value, args[2], eight))
+            numbers.align = 4
+            same = builder.icmp_unsigned("==", numbers, builder.shuffle_vector(numbers, numbers, before))
+            alike = same if alike is None else builder.and_(alike, same)
+        bits = builder.and_(builder.bitcast(alike, ir.IntType(LANES)), ir.Constant(ir.IntType(LANES), ALL - 1))
+        repeated = builder.zext(builder.ctlz(builder.not_(bits), ir.Constant(ir.IntType(1), 0)), _INT64)
+        return builder.sub(ir.Constant(_INT64, LANES), repeated)
+
+    return types.int64(index, other, k), generate
 
 
 def _spread_int(builder: Any, value: Any) -> Any:

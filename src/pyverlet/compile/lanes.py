@@ -277,11 +277,22 @@ def _columns(builder: Any, rows: Any) -> list[Any]:
     return [builder.shuffle_vector(rows, empty, order(range(axis, 2 * LANES, 2))) for axis in range(2)]
 
 
-_HALVES = (0, 1, 4, 5), (2, 3, 6, 7)
-_EVEN = (0, 2, 8, 10, 4, 6, 12, 14)
-"""Which lanes' rows of two float32 stand in each of two registers, and where the x of each lane is in both, one after the other.
-So no number has to leave its half of a register when they become columns, or columns rows: that takes twice as many instructions,
-of the slower kind."""
+_TURNS = {
+    32: (((0, 1, 4, 5), (2, 3, 6, 7)), (0, 2, 8, 10, 4, 6, 12, 14)),
+    64: (((0, 2), (1, 3), (4, 6), (5, 7)), (0, 4, 2, 6)),
+}
+"""By the bits of a number: which lanes' rows of two stand in each register, and where the x of each lane is in two registers, one
+after the other. So no number has to leave its half of a register when they become columns, or columns rows: that takes twice as
+many instructions, of the slower kind."""
+
+
+def unmerged(builder: Any, vector: Any) -> Any:
+    """The same, and LLVM does not look through it: shuffles that rows are to share it would else do again for each of them."""
+    if "x86_64" not in str(builder.module.triple):  # there few shuffles can be done at a time
+        return vector
+    kind, bits = ir.FunctionType(vector.type, [vector.type]), 32 if vector.type.element == ir.FloatType() else 64
+    fence = cgutils.get_or_insert_function(builder.module, kind, f"llvm.arithmetic.fence.v{vector.type.count}f{bits}")
+    return builder.call(fence, [vector])
 
 
 def _joined(builder: Any, parts: list[Any]) -> Any:
@@ -308,15 +319,13 @@ def take(typing: Any, array: Any, index: Any, k: Any) -> Any:
     both = types.UniTuple(lanes, 2)
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        rows = []
+        rows, (registers, even) = [], _TURNS[array.dtype.bitwidth]
         for row in pointers(context, builder, array, index, args):
             rows.append(builder.load(row))
             rows[-1].align = array.dtype.bitwidth // 8
-        if array.dtype == types.float32:
-            first, second = (_joined(builder, [rows[lane] for lane in half]) for half in _HALVES)
-            columns = [builder.shuffle_vector(first, second, order(axis + lane for lane in _EVEN)) for axis in range(2)]
-        else:
-            columns = _columns(builder, _joined(builder, rows))
+        held = [_joined(builder, [rows[lane] for lane in lanes]) for lanes in registers]
+        twos, turns = [*zip(held[::2], held[1::2], strict=True)], (order(axis + place for place in even) for axis in range(2))
+        columns = [_joined(builder, [builder.shuffle_vector(*two, turn) for two in twos]) for turn in turns]
         return context.make_tuple(builder, both, columns)
 
     return both(array, index, k), generate
@@ -327,18 +336,21 @@ def put(typing: Any, array: Any, index: Any, k: Any, x: Any, y: Any) -> Any:
     """Rows index[k : k + LANES] of an (n, 2) array = (x, y). Lanes of one row must hold the same value."""
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        columns, single = args[3:5], array.dtype == types.float32
-        if single:
-            turns = (order(n + LANES * axis for n in half for axis in range(2)) for half in _HALVES)
-            turned = [builder.shuffle_vector(*columns, turn) for turn in turns]
-        for lane, row in enumerate(pointers(context, builder, array, index, args)):
-            if single:
-                register, where = divmod(sum(_HALVES, ()).index(lane), LANES // 2)
-                pair = builder.shuffle_vector(turned[register], turned[register], order([2 * where, 2 * where + 1]))
-            else:
-                pair = builder.shuffle_vector(*columns, order([lane, lane + LANES]))
-            written = builder.store(pair, row)
-            written.align = array.dtype.bitwidth // 8
+        places, (registers, _) = pointers(context, builder, array, index, args), _TURNS[array.dtype.bitwidth]
+        single, double = array.dtype == types.float32, ir.DoubleType()
+        for lanes in registers:
+            turn = order(lane + LANES * axis for lane in lanes for axis in range(2))
+            turned = unmerged(builder, builder.shuffle_vector(*args[3:5], turn))
+            if single:  # a row is as long as a float64, and is stored as one, from either half of a register
+                turned = builder.bitcast(turned, ir.VectorType(double, len(lanes)))
+            for number, lane in enumerate(lanes):
+                if single:
+                    row = builder.extract_element(turned, ir.Constant(_INT32, number))
+                    written = builder.store(row, builder.bitcast(places[lane], double.as_pointer()))
+                else:
+                    row = builder.shuffle_vector(turned, turned, order([2 * number, 2 * number + 1]))
+                    written = builder.store(row, places[lane])
+                written.align = array.dtype.bitwidth // 8
         return context.get_dummy_value()
 
     return types.void(array, index, k, x, y), generate

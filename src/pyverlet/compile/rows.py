@@ -11,7 +11,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from pyverlet.compile.lanes import LANES, LanesType, order, pointer, pointers
+from pyverlet.compile.lanes import LANES, LanesType, order, pointer, pointers, unmerged
 
 WIDTH = 4
 
@@ -40,7 +40,7 @@ def _rows(builder: Any, columns: Any) -> list[Any]:
     pairs = []
     for part in (_FIRST, _LAST):
         ab, cd = builder.shuffle_vector(a, b, part), builder.shuffle_vector(c, d, part)
-        pairs += [builder.shuffle_vector(ab, cd, half) for half in (_LOW, _HIGH)]
+        pairs += [unmerged(builder, builder.shuffle_vector(ab, cd, half)) for half in (_LOW, _HIGH)]
     empty = ir.Constant(pairs[0].type, ir.Undefined)
     halves = order(range(_HALF)), order(range(_HALF, LANES))
     return [builder.shuffle_vector(pair, empty, half) for half in halves for pair in pairs]

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pyverlet.compile.bits import distinct_lanes
 from pyverlet.compile.jit import kernel
 from pyverlet.compile.lanes import (
     LANES,
@@ -221,7 +222,7 @@ def _relax_strip(s, to, circles, pairs, law):
             if law.accounts != 0:  # what was fed, too, has pushed them apart
                 given = where_set(struck, zero, fed * load(depths, k)) - speed
                 squeezed = load(reduced, k * law.varied) * load(reach, k * law.sized) * given
-                lever += add_lanes(squeezed, _distinct(lane_i, lane_j, k))
+                lever += add_lanes(squeezed, distinct_lanes(lane_i, lane_j, k))
         cx, cy = speed * nx, speed * ny
         if RUBS:
             mu = load(made_of[MU], at)
@@ -237,7 +238,7 @@ def _relax_strip(s, to, circles, pairs, law):
                 rub = larger(smaller(given - third * slides, cone), zero - cone) - given
                 if law.accounts != 0:
                     mass = load(reduced, k * law.varied)
-                    taken += add_lanes(mass * rub * (slides + half3 * rub), _distinct(lane_i, lane_j, k))
+                    taken += add_lanes(mass * rub * (slides + half3 * rub), distinct_lanes(lane_i, lane_j, k))
                 cx, cy = cx - rub * ny, cy + rub * nx
                 turned_i = rub * part * load(made_of[TURN_I], at)
                 turned_j = rub * (one - part) * load(made_of[TURN_J], at)
@@ -259,15 +260,6 @@ def _relax_strip(s, to, circles, pairs, law):
     if BOUNCES and law.accounts != 0:
         pairs.spent[s, 1] += taken
         pairs.spent[s, 2] += lever
-
-
-@kernel
-def _distinct(lane_i, lane_j, k):
-    """Lanes of a pack before it repeats its last pair to be full."""
-    lanes = LANES
-    while lanes > 1 and lane_i[k + lanes - 1] == lane_i[k + lanes - 2] and lane_j[k + lanes - 1] == lane_j[k + lanes - 2]:
-        lanes -= 1
-    return lanes
 
 
 @kernel

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet.compile.jit import kernel
+from pyverlet.compile.lanes import ALL, LANES, load, spread, store, which_above, which_set
 
 
 @kernel
@@ -46,40 +47,47 @@ def recall(first, count, pair_i, pair_j, touched, particle, keys):
 def changed(first, count, pair_i, pair_j, closing, touched, particle, new, speeds, gone):
     """Keys and speeds of pairs that have touched and had not, keys of those that had and have not; closing becomes -1.
 
-    touched: (room,) bool, whether each had, becomes whether it has. Returns how many are new, and gone.
+    The pairs come in packs of eight. touched: (room,) bool, whether each had, becomes whether it has. Returns how many are new,
+    and gone.
     """
     begun = ended = 0
+    zero, silent = spread(closing.dtype.type(0)), spread(closing.dtype.type(-1))
     for s in range(first.shape[0]):
-        for k in range(first[s], first[s] + count[s]):
-            now = closing[k] >= 0
-            if now != touched[k]:
-                key = _key(pair_i[k], pair_j[k], particle)
-                if now:
-                    new[begun], speeds[begun] = key, closing[k]
-                    begun += 1
-                else:
-                    gone[ended] = key
-                    ended += 1
-                touched[k] = now
-            closing[k] = -1
+        for pack in range(first[s], first[s] + count[s], LANES):
+            differs = (ALL - which_above(zero, load(closing, pack))) ^ which_set(touched, pack, 1)
+            if differs != 0:  # in a heap at rest, for hardly any pack
+                for k in range(pack, pack + LANES):
+                    now = closing[k] >= 0
+                    if now == touched[k]:
+                        continue
+                    key = _key(pair_i[k], pair_j[k], particle)
+                    if now:
+                        new[begun], speeds[begun] = key, closing[k]
+                        begun += 1
+                    else:
+                        gone[ended] = key
+                        ended += 1
+                    touched[k] = now
+            store(closing, pack, silent)
     return begun, ended
 
 
 @kernel
 def replaced(keys, gone, new):
     """The keys without those that are gone, and with the new ones; all ascend. gone: some of them, new: none."""
-    out, at, left = np.empty(keys.shape[0] - gone.shape[0] + new.shape[0], np.int64), 0, 0
-    to = 0
-    for k in range(keys.shape[0]):
-        if left < gone.shape[0] and gone[left] == keys[k]:
-            left += 1
-            continue
-        while at < new.shape[0] and new[at] < keys[k]:
+    out = np.empty(keys.shape[0] - gone.shape[0] + new.shape[0], np.int64)
+    k = to = at = left = 0
+    while left < gone.shape[0] or at < new.shape[0]:
+        leaves = at == new.shape[0] or (left < gone.shape[0] and gone[left] < new[at])
+        stop = k + np.searchsorted(keys[k:], gone[left] if leaves else new[at])
+        out[to : to + stop - k] = keys[k:stop]
+        to += stop - k
+        if leaves:
+            k, left = stop + 1, left + 1
+        else:
             out[to] = new[at]
-            at, to = at + 1, to + 1
-        out[to] = keys[k]
-        to += 1
-    out[to:] = new[at:]
+            k, to, at = stop, to + 1, at + 1
+    out[to:] = keys[k:]
     return out
 
 

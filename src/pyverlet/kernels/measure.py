@@ -6,6 +6,7 @@ import numpy as np
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.compile.lanes import LANES, add_lanes, load, load_rows, spread, where_above, where_zero, which_above, widen
+from pyverlet.kernels.motion import BLOCK
 
 
 @kernel
@@ -21,9 +22,6 @@ def energies(position, velocity, spin, radius, mass, gx, gy):
             turning += 0.25 * m * r * r * w * w
             height -= m * (gx * np.float64(position[i, 0]) + gy * np.float64(position[i, 1]))
     return motion, turning, height
-
-
-_BLOCK = 4096
 
 
 @kernel
@@ -68,10 +66,10 @@ def mechanical(position, velocity, acceleration, lag, spin, radius, mass, gx, gy
 
     Blocks of a fixed size are summed apart, and then together in order: any number of threads gives the same bits.
     """
-    blocks = (mass.shape[0] + _BLOCK - 1) // _BLOCK
+    blocks = (mass.shape[0] + BLOCK - 1) // BLOCK
     part = np.zeros(blocks)
     for block in prange(blocks):
-        first, stop = block * _BLOCK, min((block + 1) * _BLOCK, mass.shape[0])
+        first, stop = block * BLOCK, min((block + 1) * BLOCK, mass.shape[0])
         part[block] = _mechanical(position, velocity, acceleration, lag, spin, radius, mass, gx, gy, first, stop)
     total = 0.0
     for block in range(blocks):

@@ -96,14 +96,14 @@ class Events:
 
     def close(self, slots: Slots, state: State, pairs: Wide | None, place: Place) -> None:
         """The frame has gone well: what was heard is what happened; `pairs`: the list of now; `place`: who and what they met."""
-        at_wall = slots.hits >= 0
+        at_wall = np.flatnonzero(slots.hits >= 0)
         walls, wall_speeds = slots.particle[at_wall].astype(np.int64) << 32, slots.hits[at_wall].astype(float)
-        if pairs and pairs.touched is self._known and not (self._keys or len(slots.asleep)):
+        if pairs and pairs.touched is self._known and not (self._keys or (len(slots.island) and len(slots.asleep))):
             told, speeds = self._compare_pairs(slots, state, pairs, walls, wall_speeds)
         else:
             told, speeds = self._compare_keys(slots, state, pairs, walls, wall_speeds)
         gone, new, self._touching = told
-        self.end, met = _contacts(gone, state), _contacts(new, state)
+        self.end, met = _contacts(np.concatenate((gone, new)), len(gone), state)
         self.begin = place.hits(met, speeds, state)
         self.hit = self.begin[speeds >= self._hit_speed]
         self.forget()
@@ -211,8 +211,15 @@ class Place(NamedTuple):
         return np.where(np.isfinite(gap), gap, np.nan), into, surface
 
 
+def _as_indices(state: State) -> bool:
+    """Whether numbers are indices, for nobody has gone but the last that came."""
+    return not len(state) or bool(state.number[-1] == len(state) - 1)
+
+
 def _numbered(keys: Array, state: State) -> Array:
     """Keys from numbers, which particles keep, in the place of keys from indices, which they do not."""
+    if _as_indices(state):
+        return keys
     b = (keys & _LOWER) - 1
     return np.asarray((state.number[keys >> 32] << 32) + np.where(b >= 0, state.number[b] + 1, 0))
 
@@ -225,20 +232,23 @@ def _among(keys: Array, others: Array) -> Array:
     return np.asarray(others[where] == keys)
 
 
-def _contacts(keys: Array, state: State) -> Array:
-    """CONTACT from keys, by the indices particles have now; without those that are no more."""
+def _contacts(keys: Array, split: int, state: State) -> tuple[Array, Array]:
+    """CONTACT from the first `split` keys, and from the others, by the indices of now; without particles that are no more."""
+    lower = keys & _LOWER
     a, alive = _index(keys >> 32, state)
-    b, other = _index((keys & _LOWER) - 1, state)
-    wall = (keys & _LOWER) == 0
+    b, other = _index(lower - 1, state)
+    wall = lower == 0
     kept = alive & (other | wall)
-    found = np.empty(np.count_nonzero(kept), CONTACT)
-    found["a"], found["b"] = a[kept], np.where(wall, WALL, b)[kept]
-    return found
+    found = np.empty(len(keys), CONTACT)
+    found["a"], found["b"] = a, np.where(wall, WALL, b)
+    return found[:split][kept[:split]], found[split:][kept[split:]]
 
 
 def _index(number: Array, state: State) -> tuple[Array, Array]:
     """(index, whether there is one) of the particles with these numbers."""
     if not len(state):
         return np.zeros(len(number), np.int64), np.zeros(len(number), bool)
+    if _as_indices(state):
+        return number, (number >= 0) & (number < len(state))
     where = np.searchsorted(state.number, number).clip(max=len(state) - 1)
     return where, np.asarray(state.number[where] == number)

@@ -122,9 +122,8 @@ class Page:
 
         energies: (substeps, LOOKS) J, as in `kernels.frame.Services`.
         """
-        for k in range(substep, reached):
-            integrated, touched, joined, stilled, pulled = map(float, energies[k])
-            if opens or k > substep:
+        for k, (integrated, touched, joined, stilled, pulled) in enumerate(energies[substep:reached].tolist()):
+            if opens or k > 0:
                 self._book("integrate", integrated)
             if self._links:
                 self._book("contacts", touched)
@@ -190,8 +189,8 @@ class Page:
 
     def _beyond_seam(self) -> float:
         """J by which particles are higher where a frame has them than where their images inside a periodic room are."""
-        s, g = self._state, np.array(self._gravity)
-        if not (g * s.seam.period).any():
+        s = self._state
+        if not s.seam or not ((g := np.array(self._gravity)) * s.seam.period).any():
             return 0.0
         free = np.isfinite(s.mass)
         beyond = s.position[free].astype(float) - s.seam.wrapped(s.position[free])
