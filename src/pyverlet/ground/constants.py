@@ -30,6 +30,10 @@ WORTH_LOOKING: Final = 0.3
 REBUILD_PAIRS: Final = 20.0
 """Candidate pairs that contacts solve in a substep in the time in which the list is built anew; all for each particle."""
 
+REBUILD_CALL: Final = 100_000.0
+"""Likewise, in all, in the time that it takes to build a list however few they are: without it worlds of 400 made a new one in
+every other frame."""
+
 WORTH_THINNING: Final = 0.3
 """Pairs for each particle that a step of the skin must spare for a list that is still good to be made anew: heaps at rest notice
 the other order of their pairs, by 1e-6 m g R of 20,000, and would stir for ever for the sake of fewer."""

@@ -29,6 +29,19 @@ def _corner(distance, one, other):
 
 
 @kernel
+def beside(first, count, pair_i, pair_j, inverse_mass, circle, peg):
+    """Circles and pegs that are listed as near each other, into `circle` and `peg` (pairs,). Returns how many there are."""
+    found = 0
+    for s in range(first.shape[0]):
+        for k in range(first[s], first[s] + count[s]):
+            i, j = np.int64(pair_i[k]), np.int64(pair_j[k])
+            if (inverse_mass[i] == 0) != (inverse_mass[j] == 0):
+                circle[found], peg[found] = (j, i) if inverse_mass[i] == 0 else (i, j)
+                found += 1
+    return found
+
+
+@kernel
 def narrow(position, radius, circle, first, second, found):
     """Which of these circles cannot pass between these pegs, and would be held by both at more than a right angle.
 

@@ -110,7 +110,7 @@ class Page:
 
     def __call__(self, stage: str) -> None:
         self._done(stage)
-        self._book(stage, None)
+        self._book(stage)
 
     @property
     def plain(self) -> bool:
@@ -122,18 +122,26 @@ class Page:
 
         energies: (substeps, LOOKS) J, as in `kernels.frame.Services`.
         """
+        page, contacts, now = self._open, self._contacts, self._now.energy
         for k, (integrated, touched, joined, stilled, pulled) in enumerate(energies[substep:reached].tolist()):
             if opens or k > 0:
-                self._book("integrate", integrated)
+                self._t += self._h
+                # The first integration gives back what the last frame has left out.
+                page.residual += integrated - now + self._resting
+                contacts -= self._resting
+                self._resting, now = 0.0, integrated
             if self._links:
-                self._book("contacts", touched)
-                self._book("links", joined)
-            self._book("velocities", stilled)
+                contacts += touched - now
+                page.links += joined - touched
+                now = joined
+            contacts += stilled - now
+            now = stilled
             if self._links:
-                self._book("links", pulled)
+                page.links += pulled - now
+                now = pulled
+        self._contacts, self._now, self._settled = contacts, _Instant(now, 0.0, {}), True
 
-    def _book(self, stage: str, energy: float | None) -> None:
-        """`energy`: of now, J, if it is known already."""
+    def _book(self, stage: str) -> None:
         if stage == "gather":
             self._state.keep_account()
             self._now = self._look(0.0)
@@ -143,7 +151,7 @@ class Page:
         elif stage == "integrate":
             self._t += self._h
             self._settled = False
-            before, self._now = self._now, self._look(self._lag) if energy is None else _Instant(energy, 0.0, {})
+            before, self._now = self._now, self._look(self._lag)
             gained = self._now.energy - before.energy
             for account, power in self._now.power.items():
                 work = 0.5 * self._h * (before.power[account] + power)
@@ -155,13 +163,11 @@ class Page:
             self._resting = 0.0
         elif stage == "links":
             # Before the contacts they move what they join; after them they are but part of the acceleration.
-            known = None if energy is None else _Instant(energy, 0.0, {})
-            before, self._now = self._now, known or self._look(self._lag, moved=not self._settled, works=self._settled)
+            before, self._now = self._now, self._look(self._lag, moved=not self._settled, works=self._settled)
             self._open.links += self._now.energy - before.energy
         elif stage == "velocities" or (stage == "contacts" and self._links):
             self._settled = stage == "velocities"
-            known = None if energy is None else _Instant(energy, 0.0, {})
-            before, self._now = self._now, known or self._look(self._lag, works=self._settled and not self._links)
+            before, self._now = self._now, self._look(self._lag, works=self._settled and not self._links)
             self._contacts += self._now.energy - before.energy
         elif stage == "finish":
             # Velocities as users see them: those of circles at rest without what carries their weight.
@@ -171,8 +177,7 @@ class Page:
             self._risen = self._beyond_seam()
         else:
             return
-        if energy is None:
-            self._done("ledger")
+        self._done("ledger")
 
     def close(self, spent: tuple[float, float, float, float]) -> None:
         """The frame has gone well; `spent` is what impacts, friction, the energy limiter and the room say they have given, J."""

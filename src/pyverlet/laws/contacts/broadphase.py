@@ -14,6 +14,7 @@ from pyverlet.compile.lanes import LANES
 from pyverlet.ground import checks, memory
 from pyverlet.ground.constants import (
     FUSED_FROM,
+    REBUILD_CALL,
     REBUILD_PAIRS,
     SAMPLE,
     SKIN,
@@ -225,7 +226,7 @@ class _SortedCells(BroadPhase):
 
     def follow(self, state: Slots) -> None:
         # Looked at between frames only: within one they are gone through in different ways, which must give the same bits.
-        self._outlived = self._adapts and self._excess > WORTH_THINNING and self._excess * self._age > REBUILD_PAIRS
+        self._outlived = self._adapts and self._excess > WORTH_THINNING and self._excess * self._age > self._worth()
         if not state.seam or self._allowed < 0:
             return
         state.seam.follow(state.position, self._checked)
@@ -266,10 +267,14 @@ class _SortedCells(BroadPhase):
         self._checked, self._allowed = memory.copy(state.position), 0.5 * slack
         return True
 
+    def _worth(self) -> float:
+        """Pairs for each particle that contacts solve in a substep in the time in which the list is built anew."""
+        return REBUILD_PAIRS + REBUILD_CALL / max(len(self.built), 1)
+
     def _adapt(self) -> None:
         """Towards the skin where a substep pays as little as it can for rebuilding and for pairs that are listed for nothing."""
         # A list lives about as long as its skin is thick: a step up saves this much for each particle and substep.
-        saved = REBUILD_PAIRS / self._age * (1.0 - 1.0 / SKIN_STEP)
+        saved = self._worth() / self._age * (1.0 - 1.0 / SKIN_STEP)
         self._hold = max(self._hold - 1, 0)
         if self._excess > saved * SKIN_STEP:
             self.skin_diameters = max(self.skin_diameters / SKIN_STEP, SKIN_LEAST)

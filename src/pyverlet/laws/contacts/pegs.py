@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.kernels import pegs as kernels
-from pyverlet.laws.contacts.broadphase import PairList, rows_of
+from pyverlet.laws.contacts.broadphase import PairList
 from pyverlet.state.slots import Slots
 
 Array = NDArray[Any]
@@ -26,7 +26,7 @@ class Pegs:
 
     def look(self, state: Slots, pairs: PairList) -> None:
         """The list is new: who is near two pegs."""
-        circle, first, second = self._between = _near_two(state.inverse_mass == 0, pairs)
+        circle, first, second = self._between = _near_two(state.inverse_mass, pairs)
         found = np.empty(len(circle), np.int64)
         kernels.narrow(state.position, state.radius, circle, first, second, found)
         self._between = circle[found > 0], first[found > 0], second[found > 0]
@@ -43,14 +43,14 @@ class Pegs:
             kernels.hold(state.position, state.velocity, state.resting, state.size, *self._between, self._side)
 
 
-def _near_two(pinned: Array, pairs: PairList) -> tuple[Array, Array, Array]:
+def _near_two(inverse_mass: Array, pairs: PairList) -> tuple[Array, Array, Array]:
     """Slots of circles and of two pegs that are listed as near them; each circle with any two of its pegs."""
     none = np.empty(0, np.int64)
-    if np.count_nonzero(pinned) < 2:
+    if np.count_nonzero(inverse_mass) > len(inverse_mass) - 2:
         return none, none, none
-    rows = rows_of(*pairs.listed()).astype(np.int64)
-    rows = rows[pinned[rows[:, 0]] != pinned[rows[:, 1]]]
-    circle, peg = np.where(pinned[rows[:, :1]], rows[:, ::-1], rows).T
+    circle, peg = (np.empty(int(pairs.count.sum()), np.int64) for _ in range(2))
+    near = kernels.beside(*pairs.listed(), inverse_mass, circle, peg)
+    circle, peg = circle[:near], peg[:near]
     order = np.lexsort((peg, circle))
     circle, peg, found = circle[order], peg[order], []
     for apart in range(1, int(np.bincount(circle).max(initial=0))):

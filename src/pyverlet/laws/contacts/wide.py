@@ -121,6 +121,10 @@ class Wide:
         """
         threads = jit.threads_in_use()
         if self._cut.shape[1] != threads + 1:
+            strips = len(self.lanes)
+            if threads == 1:
+                self._cut = np.array([[0, (strips + 1) // 2], [0, strips // 2]])
+                return self._cut
             self._cut = np.empty((2, threads + 1), np.int64)
             for parity in range(2):
                 before = np.concatenate(([0], np.cumsum(self.lanes[parity::2])))
