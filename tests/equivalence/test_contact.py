@@ -102,7 +102,8 @@ class OneByOne:
 
     def carry(self, i: int, by: Any) -> None:
         to = self.slots.position[i] + by
-        self.moved[i] += to - self.slots.position[i]
+        origin = self.wide.origin[i]
+        self.moved[i] += (to - origin) - (self.slots.position[i] - origin)
         self.slots.position[i] = to
 
     def bounce(self, i: int, j: int, d: Any, reach: Any, e: Any, mu: Any) -> bool:

@@ -58,22 +58,26 @@ class Scale:
         state.force[k, 1] += self.stiffness * (1.5 - x) - self.damping * v  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.slow)])
-def test_unequal_circles_that_bounce_come_to_rest(seed: int) -> None:
+def test_unequal_circles_that_bounce_come_to_rest() -> None:
     # What falls on each other while nobody lends met fast enough to bounce, and so lent nothing: 5e-3 to 1e-2 m g R for ever.
     # Beside the whole heap's swing in the smooth room, which nothing stops: a turn about the centre.
-    world = pv.scenes.get("cage").world(particles=150, threads=1)
-    world.mass = np.where(np.random.default_rng(seed).random(150) < 0.5, 1.0, 100.0)
-    world.collisions = pv.Collisions(restitution=0.3, friction=0.5)
-    world.run(seconds=8)
-    mass, left = world.mass.astype(float), []
-    for _ in range(5):
-        (x, y), (vx, vy) = world.position.T.astype(float), world.velocity.T.astype(float)
-        turn = mass @ (x * vy - y * vx) / (mass @ (x * x + y * y))
-        left.append(0.5 * mass @ ((vx + turn * y) ** 2 + (vy - turn * x) ** 2))
-        world.run(seconds=0.5)
+    def restless(seed: int) -> float:
+        world = pv.scenes.get("cage").world(particles=150, threads=1)
+        world.mass = np.where(np.random.default_rng(seed).random(150) < 0.5, 1.0, 100.0)
+        world.collisions = pv.Collisions(restitution=0.3, friction=0.5)
+        world.run(seconds=8)
+        mass, left = world.mass.astype(float), []
+        for _ in range(5):
+            (x, y), (vx, vy) = world.position.T.astype(float), world.velocity.T.astype(float)
+            turn = mass @ (x * vy - y * vx) / (mass @ (x * x + y * y))
+            left.append(0.5 * mass @ ((vx + turn * y) ** 2 + (vy - turn * x) ** 2))
+            world.run(seconds=0.5)
+        return float(np.median(left)) / (mass.sum() * G)
+
     # Here and there one slips a little farther: of 12 seeds one in four, by up to 1e-3; the others have 1e-6 to 1e-5.
-    assert np.median(left) < 1e-4 * mass.sum() * G * 0.5
+    found = sorted(restless(seed) for seed in range(5))
+    assert found[2] < 1e-4 * 0.5
+    assert found[-1] < 1e-3
 
 
 @pytest.mark.parametrize("speed", [0.3, 1.0])
@@ -182,9 +186,13 @@ def test_struck_while_they_touch_unequal_circles_keep_angular_momentum_and_energ
     assert left < energy
 
 
-@pytest.mark.parametrize("friction", [0.0, pytest.param(0.4, marks=pytest.mark.slow)])
-def test_sliding_on_a_floor_unequal_circles_keep_what_momentum_is_along_it(friction: float) -> None:
-    world, group = two_heaps(4, 0, friction, (0.0, -G))
+@pytest.mark.parametrize(
+    ("friction", "seed"), [(0.0, 0), (0.0, 12), (0.0, 28), (0.0, 43), pytest.param(0.4, 0, marks=pytest.mark.slow)]
+)
+def test_sliding_on_a_floor_unequal_circles_keep_what_momentum_is_along_it(friction: float, seed: int) -> None:
+    # The floor gives momentum only across it, also where energy is taken back of what moves as a whole: with the last three seeds
+    # of the smooth ones a twentieth of it, and more, was lost in one frame.
+    world, group = two_heaps(4, seed, friction, (0.0, -G))
     world.boundary = pv.Box((-100, float(group.position[:, 1].min()) - 5), (100, 100))
     start, scale = world.momentum()[0], 3 * float(group.mass.sum())
     for _ in range(180):

@@ -30,7 +30,7 @@ WORTH_LOOKING: Final = 0.3
 REBUILD_PAIRS: Final = 20.0
 """Candidate pairs that contacts solve in a substep in the time in which the list is built anew; all for each particle."""
 
-REBUILD_CALL: Final = 100_000.0
+REBUILD_CALL: Final = 60_000.0
 """Likewise, in all, in the time that it takes to build a list however few they are: without it worlds of 400 made a new one in
 every other frame."""
 

@@ -13,10 +13,11 @@ from pyverlet.kernels.tables import MU, R_I, R_J, E
 
 @kernel
 def _carry(circles, i, x, y):
-    """Move circle i by (x, y), which is no push and feeds nobody: `moved` gets what the position gets, rounded alike."""
-    to_x, to_y = circles.position[i, 0] + x, circles.position[i, 1] + y
-    circles.moved[i, 0] += to_x - circles.position[i, 0]
-    circles.moved[i, 1] += to_y - circles.position[i, 1]
+    """Move circle i by (x, y), which is no push and feeds nobody: `moved` gets what `position - origin` gets, rounded alike."""
+    from_x, from_y = circles.position[i, 0], circles.position[i, 1]
+    to_x, to_y = from_x + x, from_y + y
+    circles.moved[i, 0] += (to_x - circles.origin[i, 0]) - (from_x - circles.origin[i, 0])
+    circles.moved[i, 1] += (to_y - circles.origin[i, 1]) - (from_y - circles.origin[i, 1])
     circles.position[i, 0], circles.position[i, 1] = to_x, to_y
 
 

@@ -8,8 +8,10 @@ links, less the work of gravity and of the forces with a potential, by the trape
 
 1. The velocities within the cluster, beside those with which it moves and turns as a whole: that keeps its momentum and its
    angular momentum. Kinetic energy goes with the square, so all are multiplied by sqrt(1 - taken / energy).
-2. The velocities and spins of all in it: its turning, which pushes have changed, and if its momentum is not what it was, what it
-   moves with as a whole: then it was not alone, for nothing thrusts itself off nothing.
+2. The velocities and spins of all in it: its turning, which pushes have changed, and of what it moves with as a whole the part
+   along what has changed its momentum beside gravity: there it was not alone, for nothing thrusts itself off nothing. A smooth
+   floor leaves the momentum along it as it is. Forces that depend on the place leave none: then it is all of it. So it is, too,
+   where what follows is not enough, as in a crowd that is wedged in.
 3. What circles have been raised against these forces in this frame: they are lowered by a part of that, and have grown by that
    part less. Not those that a wall has raised because they were beyond it: it would do so again.
 4. Their way. Where lowering pushes circles into walls, or forces hold them elsewhere, it may not do: those that could not give
@@ -50,10 +52,10 @@ _INSIDE = 0.99
 
 
 class Watch:
-    """Looks after the energy of one frame. `start`: the user's arrays, which stay as they are until the frame is accepted."""
+    """Looks after the energy of a frame of dt seconds. `start`: the user's arrays, as they are until the frame is accepted."""
 
-    def __init__(self, start: State, forces: ForceSum, links: Links, room: Boundary) -> None:
-        self._start, self._forces, self._links, self._room = start, forces, links, room
+    def __init__(self, start: State, forces: ForceSum, links: Links, room: Boundary, dt: float) -> None:
+        self._start, self._forces, self._links, self._room, self._dt = start, forces, links, room, dt
         self._gravity = forces.gravity
         self._kept: list[Any] = [force for force in forces.forces if has_potential(force)] if forces.forces else []
         self._plain = len(start) < ONE_THREAD_BELOW and not (self._kept or links.give)
@@ -143,14 +145,20 @@ class Watch:
         v = whole + _slowed(left, within)[cluster, None] * (v - whole)
         left = np.maximum(left - within, 0)
         # 2. As a whole: about where it drifts to if it was alone.
-        drift = np.where(self._pushed(slots, mass, add)[cluster, None], 0.0, _mean(mass, v, add))
+        drift, along = _mean(mass, v, add), self._pushed(slots, mass, add)
+        pushed = np.hypot(*along.T) > 0
+        drift -= (drift * along).sum(axis=1)[:, None] * along
+        if self._kept:
+            drift[pushed] = 0.0
         kinetic = add(_kinetic(mass, v - drift, slots.radius, slots.spin))
         slower = _slowed(left, kinetic)[cluster]
         left = np.maximum(left - kinetic, 0)
-        slots.velocity[taken_from] = (drift + slower[:, None] * (v - drift))[taken_from]
         slots.spin *= slower.astype(slots.dtype)
         # 3. What has been raised.
         lift = np.where((slots.hits < 0) | self._was_inside()[order], np.maximum(lift, 0), 0)
+        rest = np.where(pushed, np.maximum(left - add(lift), 0), 0)
+        across = _slowed(rest, add(0.5 * mass * (drift * drift).sum(axis=1)))[cluster]
+        slots.velocity[taken_from] = (across[:, None] * drift + slower[:, None] * (v - drift))[taken_from]
         part = np.minimum(_ratio(left, add(lift)), 1)[cluster]
         strength = np.hypot(*pull.T)
         drop = part * np.minimum(_ratio(lift, strength), np.hypot(*moved.T))  # who is near where a spring pulls to feels little
@@ -185,10 +193,12 @@ class Watch:
         return left if none < allowed and left <= allowed * _NEARLY else come(0.0)
 
     def _pushed(self, slots: Slots, mass: Array, add: _Sums) -> Array:
-        """(n,) bool, clusters whose momentum has changed in this frame by more than rounding does."""
+        """(n, 2) unit vectors along what has changed the momentum of each cluster in this frame beside gravity; 0: rounding."""
         now, then = slots.velocity.astype(float), self._start.velocity[slots.particle].astype(float)
-        change = np.hypot(*(add(mass * column) for column in (now - then).T))
-        return np.asarray(change > _ROUNDED * add(mass * np.hypot(*now.T)))
+        change = mass[:, None] * (now - then)
+        push = np.column_stack([add(column) for column in (change - self._dt * mass[:, None] * self._gravity).T])
+        size, scale = np.hypot(*push.T), add(mass * np.hypot(*now.T) + np.hypot(*change.T))
+        return np.asarray(_ratio(push, np.where(size > _ROUNDED * scale, size, 0.0)[:, None] * np.ones(2))[add.cluster])
 
     def _pulls(self, slots: Slots, mass: Array) -> tuple[Array, Array]:
         """(n, 2) N, what gravity and forces with a potential do to each, at the start of the frame and now."""

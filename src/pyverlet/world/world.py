@@ -95,12 +95,11 @@ class World(Measures, Queries, Doors):
         self.links, self.forces, self.obstacles = Links(self._state), ForceList(), Obstacles()
         self._events, self._touches = Events() if events else None, Touches() if contacts else None
         self._sleep, self._books = Sleep() if sleep else None, Bookkeeper() if ledger else None
-        self._force_sum, self.actors = ForceSum(checks.vector("gravity", gravity), self.forces), list[Actor]()
-        self._course = Course(self.obstacles)
+        self._force_sum, self._course = ForceSum(checks.vector("gravity", gravity), self.forces), Course(self.obstacles)
         self.integrator = PositionVerlet() if integrator is None else integrator
         self.boundary = Open() if boundary is None else boundary
         self.collisions, self.substeps, self.threads = collisions, substeps, threads
-        self.time, self.frames, self.profile = 0.0, 0, Profile()
+        self.time, self.frames, self.profile, self.actors = 0.0, 0, Profile(), list[Actor]()
         self._run, self._coarse, self._team = Substeps(), Coarse(), Team()
         self.onlooker: Callable[[Moment], None] | None = None
         """Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins."""
@@ -171,7 +170,8 @@ class World(Measures, Queries, Doors):
 
     def _watch(self, h: float) -> Watch | None:
         """Who looks after the energy of this frame, if nothing but contacts, links and obstacles could raise it."""
-        return Watch(self._state, self._force_sum, self.links, self.boundary) if undriven(self, h, self._h_last) else None
+        about = self._state, self._force_sum, self.links, self.boundary, self.substeps * h
+        return Watch(*about) if undriven(self, h, self._h_last) else None
 
     def _open(self, h: float, done: Callable[[str], None]) -> bool:
         """Take up what users have set, and begin; False if nobody is awake."""
