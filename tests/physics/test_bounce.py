@@ -132,7 +132,7 @@ def test_elastic_gas_keeps_energy_and_angular_momentum(dtype: type) -> None:
         (0.4, 30.0, 1.0),
         (0.4, 30.0, 3.0),
         pytest.param(0.4, 1.0, None, marks=pytest.mark.slow),
-        pytest.param(0.5, 1.0, None, marks=pytest.mark.slow),,
+        pytest.param(0.5, 1.0, None, marks=pytest.mark.slow),
     ],
 )
 def test_an_elastic_gas_in_float32_is_neither_heated_nor_cooled(radius: float, heavy: float, skin: float | None) -> None:
