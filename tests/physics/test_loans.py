@@ -190,8 +190,8 @@ def test_struck_while_they_touch_unequal_circles_keep_angular_momentum_and_energ
     ("friction", "seed"), [(0.0, 0), (0.0, 12), (0.0, 28), (0.0, 43), pytest.param(0.4, 0, marks=pytest.mark.slow)]
 )
 def test_sliding_on_a_floor_unequal_circles_keep_what_momentum_is_along_it(friction: float, seed: int) -> None:
-    # The floor gives momentum only across it, also where energy is taken back of what moves as a whole: with the last three seeds
-    # of the smooth ones a twentieth of it, and more, was lost in one frame.
+    # The floor gives momentum only across it, also where energy is taken back of what moves as a whole: with three of these
+    # seeds up to a twentieth of the sum of m v was lost in one frame.
     world, group = two_heaps(4, seed, friction, (0.0, -G))
     world.boundary = pv.Box((-100, float(group.position[:, 1].min()) - 5), (100, 100))
     start, scale = world.momentum()[0], 3 * float(group.mass.sum())
