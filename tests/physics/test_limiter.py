@@ -59,11 +59,11 @@ def test_crowds_without_room_bring_no_energy(radius: float) -> None:
     # frame.
     world = pv.World(boundary=pv.Circle(radius=10, restitution=0.3), gravity=(0, -G), substeps=32)
     world.add(position=np.random.default_rng(1).uniform(-4, 4, (7, 2)), radius=radius, allow_overlap=True)
-    before, most = world.energy().total, SURPLUS * 7 * G * 20
+    before, most = world.energy().total, 1e-4 * 7 * G * 20  # what physics.md promises
     for _ in range(900):
         world.step(1 / 60)
         now = world.energy().total
-        assert now - before <= most * (1 + 2e-2)
+        assert now - before <= most
         before = now
     assert np.all(np.hypot(*world.position.T) + radius <= 10 * (1 + 1e-4))
 
@@ -283,12 +283,12 @@ def test_circles_added_to_a_crowd_that_moves_raise_no_energy(gravity: tuple[floa
 
 
 @pytest.mark.slow  # it compiles what only it needs
-def test_nets_of_springs_bring_no_energy(taken: list[float]) -> None:
+@pytest.mark.parametrize("restitution", [0.2, 0.3, 0.5])
+def test_nets_of_springs_bring_no_energy(restitution: float, taken: list[float]) -> None:
     # Springs that one pass does not solve are stretched by more than their force says: 8e-4 of the scale in a frame, in a crash
     # against the ceiling that gravity points at. The potential of a force is no scale: it is known but for a constant.
-    world = pv.World(
-        boundary=pv.Box((-10, -10), (10, 10), friction=0.622), gravity=(16.4, 12.7), collisions=pv.Collisions(restitution=0.401)
-    )
+    law = pv.Collisions(restitution=restitution)
+    world = pv.World(boundary=pv.Box((-10, -10), (10, 10), friction=0.622), gravity=(16.4, 12.7), collisions=law)
     pv.soft_body(world, [(-2, -1), (1, -1), (1, 2)], spacing=0.4, filled=True)
     world.forces.append(pv.ConstantForce((-0.158, -4.32)))
     for _ in range(40):

@@ -11,7 +11,7 @@ links, less the work of gravity and of the forces with a potential, by the trape
 2. The velocities and spins of all in it: its turning, which pushes have changed, and of what it moves with as a whole the part
    along what has changed its momentum beside gravity: there it was not alone, for nothing thrusts itself off nothing. A smooth
    floor leaves the momentum along it as it is. Forces that depend on the place leave none: then it is all of it. So it is, too,
-   where what follows is not enough, as in a crowd that is wedged in.
+   under gravity, where what follows is not enough: in a crowd that is wedged in, or among masses of 1:1000 in free fall.
 3. What circles have been raised against these forces in this frame: they are lowered by a part of that, and have grown by that
    part less. Not those that a wall has raised because they were beyond it: it would do so again.
 4. Their way. Where lowering pushes circles into walls, or forces hold them elsewhere, it may not do: those that could not give
@@ -156,7 +156,7 @@ class Watch:
         slots.spin *= slower.astype(slots.dtype)
         # 3. What has been raised.
         lift = np.where((slots.hits < 0) | self._was_inside()[order], np.maximum(lift, 0), 0)
-        rest = np.where(pushed, np.maximum(left - add(lift), 0), 0)
+        rest = np.where(pushed | any(self._gravity), np.maximum(left - add(lift), 0), 0)
         across = _slowed(rest, add(0.5 * mass * (drift * drift).sum(axis=1)))[cluster]
         slots.velocity[taken_from] = (across[:, None] * drift + slower[:, None] * (v - drift))[taken_from]
         part = np.minimum(_ratio(left, add(lift)), 1)[cluster]
