@@ -198,7 +198,7 @@ class Watch:
         change = mass[:, None] * (now - then)
         push = np.column_stack([add(column) for column in (change - self._dt * mass[:, None] * self._gravity).T])
         size, scale = np.hypot(*push.T), add(mass * np.hypot(*now.T) + np.hypot(*change.T))
-        return np.asarray(_ratio(push, np.where(size > _ROUNDED * scale, size, 0.0)[:, None] * np.ones(2))[add.cluster])
+        return _ratio(push, np.where(size > _ROUNDED * scale, size, 0.0)[:, None])[add.cluster]
 
     def _pulls(self, slots: Slots, mass: Array) -> tuple[Array, Array]:
         """(n, 2) N, what gravity and forces with a potential do to each, at the start of the frame and now."""
