@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from pyverlet.compile.jit import driver, parallel_kernel, prange
-from pyverlet.compile.lanes import LANES
 from pyverlet.compile.stealing import claim_evenly, none_claimed
-from pyverlet.kernels.chain_rows import SOFTS, note_rows, prepare, prepare_pack
+from pyverlet.kernels.chain_rows import SOFTS, note_pack, prepare, prepare_pack
 from pyverlet.kernels.chains import solve_pack
 
 
 @parallel_kernel
 def _solve(
-    prepares, notes, first, stop, start, node, holds, lanes, bowed, row, more, shift, h, rooms, wide, claims, begun, predicted,
-    back, weight, period_x, period_y,
+    prepares, notes, first, stop, start, node, holds, lanes, bowed, torn, row, more, shift, h, rooms, wide, claims, begun,
+    predicted, back, weight, period_x, period_y,
 ):  # fmt: skip
     for part in prange(claims.shape[0]):
         k = claim_evenly(claims, stop - first, part)
@@ -24,35 +23,36 @@ def _solve(
                 )
             solve_pack(p, start, node, holds, lanes, bowed, row, more, shift, h * h, rooms[part], wide[part])
             if notes:
-                note_rows(start[p], start[p + 1] - LANES, row, h)
+                note_pack(p, start, holds, row, more, torn, h)
             k = claim_evenly(claims, stop - first, part)
 
 
 @driver
 def sweep(
-    homeward, skip, prepares, notes, colour, start, node, holds, lanes, bowed, row, more, shift, h, rooms, wide, claims, begun,
-    predicted, back, weight, period_x, period_y,
+    homeward, skip, prepares, notes, colour, start, node, holds, lanes, bowed, torn, row, more, shift, h, rooms, wide, claims,
+    begun, predicted, back, weight, period_x, period_y,
 ):  # fmt: skip
     """Solve all packs, colour by colour or `homeward` from the last one, without the first colour on the way if `skip`.
 
     Colour c is packs colour[c] to colour[c + 1], which share no particle. rooms, wide: (parts, SCRATCH or WIDE times the items of
     the longest pack): as many packs are solved beside each other. claims: see `compile.stealing`. prepares: hard ones are
-    prepared on the way; notes: their force is noted if they do not come again. So rows are not fetched for that once more.
+    prepared on the way; notes: their force is noted, and who breaks, if they do not come again (`chain_rows.note_pack`). So rows
+    are not fetched for that once more.
     """
     colours = colour.shape[0] - 1
     for n in range(1 if skip else 0, colours):
         c = colours - 1 - n if homeward else n
         none_claimed(claims)
         _solve(
-            prepares, notes and (homeward or c == colours - 1), colour[c], colour[c + 1], start, node, holds, lanes, bowed, row,
-            more, shift, h, rooms, wide, claims, begun, predicted, back, weight, period_x, period_y,
+            prepares, notes and (homeward or c == colours - 1), colour[c], colour[c + 1], start, node, holds, lanes, bowed, torn,
+            row, more, shift, h, rooms, wide, claims, begun, predicted, back, weight, period_x, period_y,
         )  # fmt: skip
 
 
 @driver
 def passes(
-    times, colour, start, node, holds, lanes, bowed, row, more, shift, h, rooms, wide, claims, begun, predicted, back, weight,
-    period_x, period_y,
+    times, colour, start, node, holds, lanes, bowed, torn, row, more, shift, h, rooms, wide, claims, begun, predicted, back,
+    weight, period_x, period_y,
 ):  # fmt: skip
     """There and back so many times, from the lam that rows start from; once, one way, where there is a single colour."""
     prepare(
@@ -63,6 +63,6 @@ def passes(
     for turn in range(turns):
         for homeward in range(2 if several else 1):
             sweep(
-                homeward, homeward, turn + homeward == 0, turn == turns - 1, colour, start, node, holds, lanes, bowed, row, more,
-                shift, h, rooms, wide, claims, begun, predicted, back, weight, period_x, period_y,
+                homeward, homeward, turn + homeward == 0, turn == turns - 1, colour, start, node, holds, lanes, bowed, torn, row,
+                more, shift, h, rooms, wide, claims, begun, predicted, back, weight, period_x, period_y,
             )  # fmt: skip

@@ -22,16 +22,17 @@ from pyverlet.compile.lanes import (
 )
 from pyverlet.compile.stealing import claim_evenly, none_claimed
 from pyverlet.ground.constants import LINK_BOWED, LINK_GIVE, LINK_LEAST_N, LINK_MEMORY_S, LINK_RESOLVED
+from pyverlet.kernels.motion import BLOCK
 from pyverlet.kernels.seam import apart_lanes, nearest
 
 COLUMNS = ("weight", "gap_x", "gap_y", "along_x", "along_y", "turn", "give", "lam", "rest", "force")
 """What is kept of a row, in the dtype of the world. weight: of its first node, 1/kg. gap: from there to the second one as the
 integrator has put them, m. give: -1 of the broken, 0 where nothing can move. lam: between substeps what it pulled with, N."""
 
-MORE = ("goal", "soft", "stiffness", "damping", "rope", "held")
-"""The same of rows in packs that hold springs or ropes, the rest of which is not looked at. goal: the length that its force leads
-to, in place of rest; soft, rope and held are 1 or 0, the stiffness of what is not soft is 0; held: a rope that pulled when it was
-solved last.
+MORE = ("goal", "soft", "stiffness", "damping", "rope", "held", "strength")
+"""The same of rows in packs that hold springs, ropes or what may break, the rest of which is not looked at. goal: the length that
+its force leads to, in place of rest; soft, rope and held are 1 or 0, the stiffness of what is not soft is 0; held: a rope that
+pulled when it was solved last; strength: N at which it breaks.
 
 Of each kind eight rows stand beside each other, column after column, then the next eight: what is read together lies together.
 Item 8 k + l of a column of ROW numbers is at 8 k * ROW + LANES * column + l. The names below have LANES in them."""
@@ -39,12 +40,17 @@ Item 8 k + l of a column of ROW numbers is at 8 k * ROW + LANES * column + l. Th
 ROW, EXTRA = len(COLUMNS), len(MORE)
 """How many numbers there are of each row, of either kind."""
 
+KEPT = 3
+"""And how many of them change from frame to frame."""
+
 W, DX, DY, AX, AY, TURN, GIVE, LAM, REST, FORCE = range(0, LANES * ROW, LANES)
-GOAL, SOFT, STIFFNESS, DAMPING, ROPE, HELD = range(0, LANES * EXTRA, LANES)
+GOAL, SOFT, STIFFNESS, DAMPING, ROPE, HELD, STRENGTH = range(0, LANES * EXTRA, LANES)
+
+_INTACT, _FORCE, _LAST = range(0, LANES * KEPT, LANES)
 
 BROKEN = -1.0
 
-ROPES, SOFTS = 1, 2
+ROPES, SOFTS, BRITTLE = 1, 2, 4
 """Bits of what is in a pack."""
 
 _LEAST = 1e-25
@@ -182,34 +188,37 @@ def prepare(
 
 
 @kernel
-def note_rows(begin, end, row, h):
-    """`note_force` of the items from `begin` to `end`."""
+def note_pack(p, start, holds, row, more, torn, h):
+    """The pull in N, which for rigid links is noisy; let the force shown follow it. That of the broken stays what it was.
+
+    Break those that pull or push harder than their strength; torn[p]: there are such.
+    """
+    begin, end = start[p], start[p + 1] - LANES
     real = row.dtype.type
     part, rate = spread(real(h / (h + LINK_MEMORY_S))), spread(real(-1.0 / (h * h)))
-    zero, least = spread(real(0)), spread(real(LINK_LEAST_N))
+    zero, least, broken = spread(real(0)), spread(real(LINK_LEAST_N)), spread(real(BROKEN))
+    brittle, snaps = holds[p] & BRITTLE, 0
     for k in range(begin, end, LANES):
         here = ROW * k
-        last, force = load(row, here + LAM) * rate, load(row, here + FORCE)
+        give, last, force = load(row, here + GIVE), load(row, here + LAM) * rate, load(row, here + FORCE)
         now = force + part * (last - force)
         now = where_above(larger(now, zero - now), least, now, zero)
         store(row, here + LAM, last)
-        store(row, here + FORCE, where_above(zero, load(row, here + GIVE), force, now))
+        force = where_above(zero, give, force, now)
+        store(row, here + FORCE, force)
+        if brittle:
+            size, strength = larger(force, zero - force), load(more, EXTRA * k + STRENGTH)
+            snaps |= which_above(where_above(zero, give, zero, size), strength)
+            store(row, here + GIVE, where_above(size, strength, broken, give))
+    if snaps != 0:
+        torn[p] = 1
 
 
 @parallel_kernel
-def note_force(row, h):
-    """The pull in N, which for rigid links is noisy; let the force shown follow it. That of the broken stays what it was."""
-    items = row.shape[0] // ROW
-    for c in prange((items + _CHUNK - 1) // _CHUNK):
-        note_rows(c * _CHUNK, min((c + 1) * _CHUNK, items), row, h)
-
-
-@kernel
-def snap(row, strength):
-    """Break every row that pulls or pushes harder than its strength, N."""
-    for k in range(strength.shape[0]):
-        if abs(row[at(k) + FORCE]) > strength[k]:
-            row[at(k) + GIVE] = BROKEN
+def note(start, holds, row, more, torn, h):
+    """`note_pack` of all packs."""
+    for p in prange(start.shape[0] - 1):
+        note_pack(p, start, holds, row, more, torn, h)
 
 
 # ---- between the tables of the user's links and the packs ---------------------------------------------------------------------
@@ -217,7 +226,7 @@ def snap(row, strength):
 
 @kernel
 def take_up(source, row, intact, force, last):
-    """A frame begins: what of the rows changes. source: which row stands in each item, -1 for none."""
+    """What of the rows changes, from the tables. source: which row stands in each item, -1 for none."""
     for n in range(source.shape[0]):
         r, k = source[n], at(n)
         row[k + GIVE], row[k + FORCE], row[k + LAM] = BROKEN, 0, 0
@@ -225,14 +234,34 @@ def take_up(source, row, intact, force, last):
             row[k + GIVE], row[k + FORCE], row[k + LAM] = 0 if intact[r] else BROKEN, force[r], last[r]
 
 
+@parallel_kernel
+def keep(row, kept):
+    """A frame is over: `kept` (KEPT numbers an item, laid out as rows are) becomes what of the rows changes."""
+    items = row.shape[0] // ROW
+    for c in prange((items + _CHUNK - 1) // _CHUNK):
+        for k in range(c * _CHUNK, min((c + 1) * _CHUNK, items), LANES):
+            store(kept, KEPT * k + _INTACT, load(row, ROW * k + GIVE))
+            store(kept, KEPT * k + _FORCE, load(row, ROW * k + FORCE))
+            store(kept, KEPT * k + _LAST, load(row, ROW * k + LAM))
+
+
 @kernel
-def hand_over(place, row, intact, force, last):
-    """A frame is over: the same the other way. place: (rows,) the item each row stands in."""
+def go_back(row, kept):
+    """The way back, after a frame that was not good."""
+    for k in range(0, row.shape[0] // ROW, LANES):
+        store(row, ROW * k + GIVE, load(kept, KEPT * k + _INTACT))
+        store(row, ROW * k + FORCE, load(kept, KEPT * k + _FORCE))
+        store(row, ROW * k + LAM, load(kept, KEPT * k + _LAST))
+
+
+@kernel
+def hand_over(place, kept, intact, force, last):
+    """The tables become what was kept. place: (rows,) the item each row stands in."""
     for r in range(place.shape[0]):
-        k = at(place[r])
-        whole = row[k + GIVE] >= 0.0
+        k = place[r] // LANES * (LANES * KEPT) + place[r] % LANES
+        whole = kept[k + _INTACT] >= 0.0
         intact[r] = whole
-        force[r], last[r] = (row[k + FORCE], row[k + LAM]) if whole else (0.0, 0.0)
+        force[r], last[r] = (kept[k + _FORCE], kept[k + _LAST]) if whole else (0.0, 0.0)
 
 
 @kernel
@@ -245,15 +274,50 @@ def intact(place, row):
 
 
 @kernel
-def energy(position, period_x, period_y, ends, rest, upper, stiffness, intact):
-    """Energy of rows of finite stiffness, J: none of the broken, nor of slack ropes. ends: (rows, 2) rows of `position`."""
+def _stretch(i, j, position, period_x, period_y, rest):
+    """How much further i and j are from each other than `rest`, m."""
+    dx = nearest(np.float64(position[j, 0]) - np.float64(position[i, 0]), period_x)
+    dy = nearest(np.float64(position[j, 1]) - np.float64(position[i, 1]), period_y)
+    return np.sqrt(dx * dx + dy * dy) - rest
+
+
+@kernel
+def _held(first, stop, position, period_x, period_y, ends, rest, upper, stiffness, intact):
+    """Energy of the rows from `first` up to `stop` that give, J: none of the broken, nor of slack ropes."""
     total = 0.0
-    for r in range(ends.shape[0]):
-        if not (intact[r] and stiffness[r] < np.inf):
-            continue
-        i, j = ends[r, 0], ends[r, 1]
-        dx, dy = nearest(position[j, 0] - position[i, 0], period_x), nearest(position[j, 1] - position[i, 1], period_y)
-        value = np.sqrt(dx * dx + dy * dy) - rest[r]
-        if value > 0.0 or upper[r] > 0.0:
-            total += stiffness[r] * value * value
+    for r in range(first, stop):
+        if intact[r] and stiffness[r] < np.inf:
+            value = _stretch(ends[r, 0], ends[r, 1], position, period_x, period_y, rest[r])
+            if value > 0.0 or upper[r] > 0.0:
+                total += stiffness[r] * value * value
     return 0.5 * total
+
+
+@parallel_kernel
+def energy(position, period_x, period_y, ends, rest, upper, stiffness, intact):
+    """What all rows hold, J. ends: (rows, 2) rows of `position`.
+
+    Blocks are summed apart, and then together in order: any number of threads gives the same bits.
+    """
+    rows = ends.shape[0]
+    part = np.zeros((rows + BLOCK - 1) // BLOCK)
+    for block in prange(part.shape[0]):
+        first, stop = block * BLOCK, min((block + 1) * BLOCK, rows)
+        part[block] = _held(first, stop, position, period_x, period_y, ends, rest, upper, stiffness, intact)
+    total = 0.0
+    for block in range(part.shape[0]):
+        total += part[block]
+    return total
+
+
+@kernel
+def share_gain(before, now, period_x, period_y, ends, rest, upper, stiffness, intact, mass, share):
+    """Add what each row holds at the positions of `now` beyond that `before`, J, to the share of its first free particle."""
+    for r in range(ends.shape[0]):
+        if intact[r] and stiffness[r] < np.inf:
+            i, j = ends[r, 0], ends[r, 1]
+            then = _stretch(i, j, before, period_x, period_y, rest[r])
+            later = _stretch(i, j, now, period_x, period_y, rest[r])
+            if upper[r] <= 0.0:
+                then, later = max(then, 0.0), max(later, 0.0)
+            share[i if mass[i] < np.inf else j] += 0.5 * stiffness[r] * (later * later - then * then)

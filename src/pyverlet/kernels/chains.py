@@ -10,8 +10,13 @@ node is a = w (near / pivot), a sum of what gives: in that form nothing large ca
 
 A taut link also resists being turned, as a string does: by its tension over its length, `bow`. Without it a light rope would
 be thrown sideways by its own tension as soon as substeps are too long for its fastest swing. Where that matters (`bow` > 0) each
-link is a 2 x 2 matrix B = d n^T / give + bow (1 - n n^T), and the run is eliminated node by node: X is what the nodes so far put
-against a move of the present one; beyond the link that is X (X + B)^-1 B, as for springs in series.
+row is two equations: also across the link, along t, t . (x_r+1 - x_r) + tau / bow = 0. What the rows so far leave of the mobility
+of a node is a matrix A then, w at the first. With N = [n t], D = [d t] and C = diag(give, 1 / bow), of a row
+
+    E = N^T A D + C,    K = E + w N^T D,    K (lam, tau) = (right, 0) + N^T y + w N^T f,    A becomes w N E K^-1 N^T
+
+where w is of its second node, y where the rows so far have left its first one, and f the force of the next row. As columns of C
+and D may be scaled alike, tau is had as bow times a length, and nothing is divided by a bow of 0.
 
 Eight runs of one colour are a pack: they share no particle. Number k of lane l in a pack is item 8 k + l of it. A run that is
 shorter than its pack repeats its last node, with rows that are broken; a pack that has fewer runs repeats its last one: both
@@ -71,17 +76,15 @@ _NX, _NY, _RIGHT, _ACTIVE, _MX, _MY, _STEP, _BOW = range(0, LANES * _SPARE, LANE
 direction over the length, two of elimination, and lam before. After those of all rows stands what only packs need that have
 ropes or are bowed: the direction, right, who pulls, the move of the node, the step of lam, and `bow`."""
 
-_G0, _G1, _I = 0, LANES, 2 * LANES
+_ZED, _TURNS, _I = 0, LANES, 2 * LANES
+"""And in float64 of what is bowed: what either force is without that of the next row, and the inverse of what gives, a 2 x 2."""
 
 SCRATCH, WIDE = _PLAIN + _SPARE, 6
 """Numbers for each item of one pack, in the dtype of the rows and in float64."""
 
-_HEAVY = 1e-40
-"""1/kg: the inverse mass that pinned nodes have where one is divided by."""
-
 
 @kernel
-def _eliminate(fresh, keeps, kinds, begin, end, node, row, more, shift, hh, room):
+def _eliminate(fresh, keeps, bows, kinds, begin, end, node, row, more, shift, hh, room):
     """From the first row of a pack to the last: how each stands now and who pulls, or, if not `fresh`, who pulls by now; and what
     the rows so far leave to the next one. The direction of the force follows the row.
     """
@@ -135,6 +138,8 @@ def _eliminate(fresh, keeps, kinds, begin, end, node, row, more, shift, hh, room
             mx, my, bx, by = load(room, too + _NX), load(room, too + _NY), load(row, here + AX), load(row, here + AY)
             right, pulls, lam = load(room, too + _RIGHT), load(room, too + _ACTIVE), load(room, to + _LAM)
             md = mx * bx + my * by
+        if bows:
+            continue
         wj = load(row, here + LANES * ROW + W)
         c, cc = nx * bx + ny * by, mx * ax + my * ay
         store(room, to + _U, w * c * per)
@@ -150,66 +155,67 @@ def _eliminate(fresh, keeps, kinds, begin, end, node, row, more, shift, hh, room
 
 
 @kernel
-def _eliminate_nodes(begin, end, row, room, wide):
-    """The steps of lam and the moves of the nodes, with what resists being turned: in float64, for masses of the pinned have no
-    bounds.
+def _eliminate_bowed(begin, end, row, room, wide):
+    """The steps of lam and the moves of the nodes, with what resists being turned: in float64. Of the little mobility that a load
+    of a hundred thousand times a node's weight leaves along a run, float32 would leave nothing across it.
     """
-    zero, one, heavy = spread(0.0), spread(1.0), spread(_HEAVY)
+    zero, one = spread(0.0), spread(1.0)
     spare = _PLAIN * (end - begin + LANES)
-    x00 = x01 = x10 = x11 = gx = gy = zero
+    mx, my, yx, yy = one, zero, zero, zero
+    w = widen(load(row, ROW * begin + W))
+    g00 = g11 = w
+    g01 = g10 = zero
     for k in range(begin, end, LANES):
-        here, to, broad = ROW * k, _PLAIN * (k - begin), WIDE * (k - begin)
-        too = spare + _SPARE * (k - begin)
+        here, to, too = ROW * k, _PLAIN * (k - begin), spare + _SPARE * (k - begin)
         nx, ny = widen(load(room, too + _NX)), widen(load(room, too + _NY))
         dx, dy = widen(load(row, here + AX)), widen(load(row, here + AY))
-        active, mass = widen(load(room, too + _ACTIVE)), one / larger(widen(load(row, here + W)), heavy)
-        stiff, across = where_zero(active, zero, one / widen(load(row, here + GIVE))), active * widen(load(room, too + _BOW))
-        b00, b01 = stiff * dx * nx + across * (one - nx * nx), stiff * dx * ny - across * nx * ny
-        b10, b11 = stiff * dy * nx - across * nx * ny, stiff * dy * ny + across * (one - ny * ny)
-        store(wide, broad + _G0, gx)
-        store(wide, broad + _G1, gy)
-        push = stiff * widen(load(room, too + _RIGHT)) + where_zero(active, zero - widen(load(room, to + _LAM)), zero)
-        x00 = x00 + mass
-        x11 = x11 + mass
-        d00, d01, d10, d11 = x00 + b00, x01 + b01, x10 + b10, x11 + b11
-        over = one / (d00 * d11 - d01 * d10)
-        i00, i01, i10, i11 = d11 * over, zero - d01 * over, zero - d10 * over, d00 * over
+        pulls, w = widen(load(room, too + _ACTIVE)), widen(load(row, here + LANES * ROW + W))
+        bow = pulls * widen(load(room, too + _BOW))
+        # What is left of the mobility of the first node, along the link and across it.
+        c, s = mx * nx + my * ny, mx * ny - my * nx
+        f00, f01, f10, f11 = g00 * c + g01 * s, g01 * c - g00 * s, g10 * c + g11 * s, g11 * c - g10 * s
+        h00, h01, h10, h11 = c * f00 + s * f10, c * f01 + s * f11, c * f10 - s * f00, c * f11 - s * f01
+        md, td = pulls * (nx * dx + ny * dy), pulls * (nx * dy - ny * dx)
+        e00 = h00 * md + h01 * td + (one - pulls) + pulls * widen(load(row, here + GIVE))
+        e01, e10, e11 = bow * h01, h10 * md + h11 * td, bow * h11 + one
+        k00, k10, k11 = e00 + w * md, e10 + w * td, e11 + w * bow
+        over = one / (k00 * k11 - e01 * k10)
+        i00, i01, i10, i11 = k11 * over, zero - e01 * over, zero - k10 * over, k00 * over
+        along, across = pulls * (widen(load(room, too + _RIGHT)) + nx * yx + ny * yy), nx * yy - ny * yx
+        z, turns = i00 * along + i01 * across, i10 * along + i11 * across
+        broad = WIDE * (k - begin)
+        store(wide, broad + _ZED, z)
+        store(wide, broad + _TURNS, turns)
         store(wide, broad + _I, i00)
         store(wide, broad + _I + LANES, i01)
         store(wide, broad + _I + 2 * LANES, i10)
         store(wide, broad + _I + 3 * LANES, i11)
-        # What is carried over the link: X D^-1 d right / give + B D^-1 g
-        px, py = i00 * dx * push + i01 * dy * push, i10 * dx * push + i11 * dy * push
-        qx, qy = i00 * gx + i01 * gy, i10 * gx + i11 * gy
-        gx, gy = x00 * px + x01 * py + b00 * qx + b01 * qy, x10 * px + x11 * py + b10 * qx + b11 * qy
-        # X becomes X D^-1 B.
-        m00, m01 = i00 * b00 + i01 * b10, i00 * b01 + i01 * b11
-        m10, m11 = i10 * b00 + i11 * b10, i10 * b01 + i11 * b11
-        x00, x01, x10, x11 = x00 * m00 + x01 * m10, x00 * m01 + x01 * m11, x10 * m00 + x11 * m10, x10 * m01 + x11 * m11
-    mass = one / larger(widen(load(row, ROW * end + W)), heavy)
-    x00 = x00 + mass
-    x11 = x11 + mass
-    over = one / (x00 * x11 - x01 * x10)
-    mx, my = (x11 * gx - x01 * gy) * over, (x00 * gy - x10 * gx) * over
-    store(room, spare + _SPARE * (end - begin) + _MX, lanes_like(mx, row))
-    store(room, spare + _SPARE * (end - begin) + _MY, lanes_like(my, row))
+        z, turns = pulls * z + (pulls - one) * widen(load(room, to + _LAM)), bow * turns
+        yx, yy = w * (dx * z - ny * turns), w * (dy * z + nx * turns)
+        g00, g01 = w * (e00 * i00 + e01 * i10), w * (e00 * i01 + e01 * i11)
+        g10, g11 = w * (e10 * i00 + e11 * i10), w * (e10 * i01 + e11 * i11)
+        mx, my = nx, ny
+    fx = fy = zero
     for k in range(end - LANES, begin - LANES, -LANES):
         here, to, broad = ROW * k, _PLAIN * (k - begin), WIDE * (k - begin)
         too = spare + _SPARE * (k - begin)
         nx, ny = widen(load(room, too + _NX)), widen(load(room, too + _NY))
         dx, dy = widen(load(row, here + AX)), widen(load(row, here + AY))
-        active, right = widen(load(room, too + _ACTIVE)), widen(load(room, too + _RIGHT))
-        stiff, across = where_zero(active, zero, one / widen(load(row, here + GIVE))), active * widen(load(room, too + _BOW))
-        out = nx * mx + ny * my
-        known = where_zero(active, zero - widen(load(room, to + _LAM)), zero)
-        push = stiff * (right - out) + known
-        fx = load(wide, broad + _G0) - dx * push + across * (mx - nx * out)
-        fy = load(wide, broad + _G1) - dy * push + across * (my - ny * out)
-        mx = load(wide, broad + _I) * fx + load(wide, broad + _I + LANES) * fy
-        my = load(wide, broad + _I + 2 * LANES) * fx + load(wide, broad + _I + 3 * LANES) * fy
-        store(room, too + _MX, lanes_like(mx, row))
-        store(room, too + _MY, lanes_like(my, row))
-        store(room, too + _STEP, lanes_like(push + stiff * (nx * mx + ny * my), row))
+        pulls, w = widen(load(room, too + _ACTIVE)), widen(load(row, here + LANES * ROW + W))
+        along, across = pulls * (w * (nx * fx + ny * fy)), w * (nx * fy - ny * fx)
+        i00, i01 = load(wide, broad + _I), load(wide, broad + _I + LANES)
+        i10, i11 = load(wide, broad + _I + 2 * LANES), load(wide, broad + _I + 3 * LANES)
+        step = load(wide, broad + _ZED) + i00 * along + i01 * across
+        turns = pulls * widen(load(room, too + _BOW)) * (load(wide, broad + _TURNS) + i10 * along + i11 * across)
+        step = where_zero(pulls, zero - widen(load(room, to + _LAM)), step)
+        bx, by = dx * step - ny * turns, dy * step + nx * turns
+        store(room, too + LANES * _SPARE + _MX, lanes_like(w * (bx - fx), row))
+        store(room, too + LANES * _SPARE + _MY, lanes_like(w * (by - fy), row))
+        store(room, too + _STEP, lanes_like(step, row))
+        fx, fy = bx, by
+    w = widen(load(row, ROW * begin + W))
+    store(room, spare + _MX, lanes_like(zero - w * fx, row))
+    store(room, spare + _MY, lanes_like(zero - w * fy, row))
 
 
 @kernel
@@ -219,7 +225,7 @@ def _move(bowed, keeps, begin, end, node, row, shift, room):
     bowed: steps and moves are known already, by `_eliminate_nodes`.
     """
     real = row.dtype.type
-    zero, one, limit = spread(real(0)), spread(real(1)), spread(real(LINK_TURN if end - begin > LANES else np.inf))
+    zero, limit = spread(real(0)), spread(real(LINK_TURN if end - begin > LANES else np.inf))
     spare = _PLAIN * (end - begin + LANES)
     step = u = fx = fy = most = zero
     tx = ty = ox = oy = zero  # of the row after this one: what it crosses, and the move of its last node
@@ -228,9 +234,7 @@ def _move(bowed, keeps, begin, end, node, row, shift, room):
         following, after = to + LANES * _PLAIN, too + LANES * _SPARE
         w = load(row, here + LANES * ROW + W)
         if bowed:
-            step = load(room, too + _STEP)
-            free = where_zero(w, zero, one)
-            mx, my = free * load(room, after + _MX), free * load(room, after + _MY)
+            step, mx, my = load(room, too + _STEP), load(room, after + _MX), load(room, after + _MY)
         else:
             step = load(room, to + _Z) + u * step
             u = load(room, to + _U)
@@ -247,8 +251,7 @@ def _move(bowed, keeps, begin, end, node, row, shift, room):
             store(room, after + _MY, my)
     w = load(row, ROW * begin + W)
     if bowed:
-        free = where_zero(w, zero, one)
-        mx, my = free * load(room, spare + _MX), free * load(room, spare + _MY)
+        mx, my = load(room, spare + _MX), load(room, spare + _MY)
     else:
         mx, my = zero - w * fx, zero - w * fy
     put(shift, node, begin, load(room, _SX) + mx, load(room, _SY) + my)
@@ -326,9 +329,9 @@ def solve_pack(p, start, node, holds, lanes, bowed, row, more, shift, hh, room, 
     ropes, bows = (holds[p] & ROPES) != 0, bowed[p] != 0 and end - begin > LANES
     keeps, fresh, far = ropes or bows, True, 0
     for _ in range(LINK_ROUNDS):
-        _eliminate(fresh, keeps, holds[p], begin, end, node, row, more, shift, hh, room)
+        _eliminate(fresh, keeps, bows, holds[p], begin, end, node, row, more, shift, hh, room)
         if bows:
-            _eliminate_nodes(begin, end, row, room, wide)
+            _eliminate_bowed(begin, end, row, room, wide)
         far = _move(bows, keeps, begin, end, node, row, shift, room)
         if not (ropes and _slack_changes(begin, end, row, more, room)):
             break

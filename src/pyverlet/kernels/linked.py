@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 from pyverlet.compile.bundle import bundle
 from pyverlet.compile.jit import driver, kernel, variant
 from pyverlet.kernels.chain_passes import passes
-from pyverlet.kernels.chain_rows import snap
 from pyverlet.kernels.links import add_pull, hand_back, look_back, set_out
 from pyverlet.kernels.ties import note_ties, tie
 
@@ -33,11 +32,11 @@ class Linked:
     holds: Any
     lanes: Any
     bowed: Any
+    torn: Any
     row: Any
     more: Any
     rooms: Any
     wide: Any
-    strength: Any
     claims: Any
     tied: Any
     point: Any
@@ -55,16 +54,13 @@ class Linked:
 
 
 class Linking(NamedTuple):
-    """Numbers of a substep. count: of the linked; times: passes, there and back; brittle: whether any chain may break; rest: s,
-    see `kernels.links.add_pull`.
-    """
+    """Numbers of a substep. count: of the linked; times: passes, there and back; rest: s, see `kernels.links.add_pull`."""
 
     h: Any
     period_x: Any
     period_y: Any
     count: Any
     times: Any
-    brittle: Any
     rest: Any
 
 
@@ -87,12 +83,10 @@ def solve(linked, linking, position, velocity):
         linked.tie_left, linked.tie_way, linked.tie_kept,
     )  # fmt: skip
     passes(
-        linking.times, linked.colour, linked.begin, linked.node, linked.holds, linked.lanes, linked.bowed, linked.row,
-        linked.more, linked.shift, linking.h, linked.rooms, linked.wide, linked.claims, linked.start, linked.predicted,
-        linked.back, linked.weight, linking.period_x, linking.period_y,
+        linking.times, linked.colour, linked.begin, linked.node, linked.holds, linked.lanes, linked.bowed, linked.torn,
+        linked.row, linked.more, linked.shift, linking.h, linked.rooms, linked.wide, linked.claims, linked.start,
+        linked.predicted, linked.back, linked.weight, linking.period_x, linking.period_y,
     )  # fmt: skip
-    if linking.brittle:
-        snap(linked.row, linked.strength)
     note_ties(
         linked.shift, linked.predicted, linked.tied, linked.tie_strength, linked.tie_intact, linking.h, linked.tie_give,
         linked.tie_left, linked.tie_way, linked.tie_kept, linked.tie_lam, linked.tie_last, linked.tie_force,

@@ -143,6 +143,27 @@ def snap(force, strength, intact):
             intact[r] = 0
 
 
+@parallel_kernel
+def remember(past_start, past_left, past_calm, position, particle, start, calm):
+    """A frame is over: what `recall` takes up. position: of all, in the user's order."""
+    for c in prange((particle.shape[0] + _CHUNK - 1) // _CHUNK):
+        for k in range(c * _CHUNK, min((c + 1) * _CHUNK, particle.shape[0])):
+            p = particle[k]
+            past_start[k, 0], past_start[k, 1], past_calm[k] = start[k, 0], start[k, 1], calm[k]
+            past_left[k, 0], past_left[k, 1] = position[p, 0], position[p, 1]
+
+
+@parallel_kernel
+def recall_all(past_start, past_left, past_calm, position, particle, start, calm):
+    """`recall`, if the same particles are linked as then, and none has come or gone."""
+    for c in prange((particle.shape[0] + _CHUNK - 1) // _CHUNK):
+        for k in range(c * _CHUNK, min((c + 1) * _CHUNK, particle.shape[0])):
+            p = particle[k]
+            calm[k] = np.nan
+            if past_left[k, 0] == position[p, 0] and past_left[k, 1] == position[p, 1]:
+                start[k, 0], start[k, 1], calm[k] = past_start[k, 0], past_start[k, 1], past_calm[k]
+
+
 @kernel
 def recall(past_number, past_start, past_left, past_calm, number, position, particle, start, calm):
     """A frame begins: what is remembered of each `particle`, in `start` and `calm`, if it is where it was left; NaN if not.

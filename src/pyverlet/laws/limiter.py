@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.constants import ONE_THREAD_BELOW, SLEEP_NEAR, SURPLUS
-from pyverlet.kernels import clusters, measure
+from pyverlet.kernels import clusters, measure, taking
 from pyverlet.laws.contacts.collisions import ContactSolver
 from pyverlet.laws.forces import Drag, ForceSum, has_potential
 from pyverlet.laws.links import Links
@@ -113,61 +113,26 @@ class Watch:
             contacts.growth.heed(risen)
         return finite
 
-    def _kinetic(self) -> Array:
-        """(n,) J, at the start of the frame, in the user's order."""
-        then = self._start
-        mass = np.where(np.isfinite(then.mass), then.mass, 0).astype(float)
-        return _kinetic(mass, then.velocity.astype(float), then.radius, then.spin)
-
     def take_back(self, slots: Slots, listed: Listed, surplus: float) -> Array:
         """Take so many J from those who have gained in this frame. (n,) bool: who had more than could be taken of motion."""
-        start, order = self._start, slots.particle
-        mass = np.where(slots.inverse_mass > 0, slots.mass, 0).astype(float)
-        x, v = slots.position.astype(float), slots.velocity.astype(float)
-        moved = slots.seam.nearest(x - start.position[order])
-        before, pull = self._pulls(slots, mass)
-        lift = -0.5 * ((before + pull) * moved).sum(axis=1)
-        cluster = self._clusters(slots, listed, moved)
-        x = x[cluster] + slots.seam.nearest(x - x[cluster])  # across the seam they hang together, too
-        add = _Sums(cluster)
-        gain = add(_kinetic(mass, v, slots.radius, slots.spin) - self._kinetic()[order] + lift)
-        if self._links:
-            gain += add((self._links.shares(slots.where()) - self._links.shares(start.position))[order])
-        gain = np.maximum(gain, 0)
-        if self._forces.forces:  # what has touched nobody has its gain from the integrator
-            gain *= (add(np.ones(len(slots))) > 1) | (add(slots.hits >= 0) > 0)
-        # Energy that forces and links hold may be more than they ever give: it is not answered alone.
-        left = gain * min(surplus / max(gain.sum(), 1e-300), 2.0)
-        taken_from = (left > 0)[cluster] & (mass > 0)
-        # 1. Within the cluster.
-        whole = _as_a_whole(mass, x, v, add)
-        within = add(0.5 * mass * ((v - whole) ** 2).sum(axis=1))
-        v = whole + _slowed(left, within)[cluster, None] * (v - whole)
-        left = np.maximum(left - within, 0)
-        # 2. As a whole: about where it drifts to if it was alone.
-        drift, along = _mean(mass, v, add), self._pushed(slots, mass, add)
-        pushed = np.hypot(*along.T) > 0
-        drift -= (drift * along).sum(axis=1)[:, None] * along
-        if self._kept:
-            drift[pushed] = 0.0
-        kinetic = add(_kinetic(mass, v - drift, slots.radius, slots.spin))
-        slower = _slowed(left, kinetic)[cluster]
-        left = np.maximum(left - kinetic, 0)
-        slots.spin *= slower.astype(slots.dtype)
-        # 3. What has been raised.
-        lift = np.where((slots.hits < 0) | self._was_inside()[order], np.maximum(lift, 0), 0)
-        rest = np.where(pushed | any(self._gravity), np.maximum(left - add(lift), 0), 0)
-        across = _slowed(rest, add(0.5 * mass * (drift * drift).sum(axis=1)))[cluster]
-        slots.velocity[taken_from] = (across[:, None] * drift + slower[:, None] * (v - drift))[taken_from]
-        part = np.minimum(_ratio(left, add(lift)), 1)[cluster]
-        strength = np.hypot(*pull.T)
-        drop = part * np.minimum(_ratio(lift, strength), np.hypot(*moved.T))  # who is near where a spring pulls to feels little
-        lower = slots.position + _ratio(drop, strength)[:, None] * pull
+        start, none = self._start, np.zeros(0)
+        before, pull = self._pulls(slots)
+        then = taking.Bodies(start.position, start.velocity, start.spin, start.radius, start.mass)
+        now = taking.Bodies(slots.position, slots.velocity, slots.spin, slots.radius, slots.mass)
+        limits = taking.Limits(
+            surplus, self._dt, self._gravity, *slots.seam.period, bool(self._forces.forces), bool(self._kept), _ROUNDED,
+        )  # fmt: skip
+        about = taking.About(np.zeros(0, np.int64), before, pull, slots.hits, slots.particle, self._was_inside(), none)
+        lift, part, moved, lower = np.empty(len(slots)), np.empty(len(slots)), *np.empty((2, len(slots), 2))
+        taking.raised(then, now, about, limits, lift, moved)
+        root = self._clusters(slots, listed, moved)
+        about = about._replace(root=root, share=self._links.gains(start.position, slots.where()) if self._links else none)
+        more = taking.take(then, now, about, limits, *taking.number_clusters(root), lift, moved, lower, part)
         if slots.size is not slots.radius:
-            slots.grown -= (part * (slots.grown - start.grown[order])).astype(slots.dtype)
+            slots.grown -= (part * (slots.grown - start.grown[slots.particle])).astype(slots.dtype)
             slots.resize()
         slots.position[:] = self._within_room(slots.position.astype(float), lower, slots.radius)
-        return np.asarray((left > 0)[cluster] & taken_from & (strength > 0))
+        return np.asarray(more)
 
     def _put_back(self, slots: Slots, raised: Array, allowed: float) -> float:
         """Let `raised` have come only so much of their way in this frame that no more than `allowed` J are gained; return that.
@@ -192,26 +157,17 @@ class Watch:
             left = come((allowed - none) / (left - none))
         return left if none < allowed and left <= allowed * _NEARLY else come(0.0)
 
-    def _pushed(self, slots: Slots, mass: Array, add: _Sums) -> Array:
-        """(n, 2) unit vectors along what has changed the momentum of each cluster in this frame beside gravity; 0: rounding."""
-        now, then = slots.velocity.astype(float), self._start.velocity[slots.particle].astype(float)
-        change = mass[:, None] * (now - then)
-        push = np.column_stack([add(column) for column in (change - self._dt * mass[:, None] * self._gravity).T])
-        size, scale = np.hypot(*push.T), add(mass * np.hypot(*now.T) + np.hypot(*change.T))
-        return _ratio(push, np.where(size > _ROUNDED * scale, size, 0.0)[:, None])[add.cluster]
-
-    def _pulls(self, slots: Slots, mass: Array) -> tuple[Array, Array]:
-        """(n, 2) N, what gravity and forces with a potential do to each, at the start of the frame and now."""
-        weight = mass[:, None] * self._forces.gravity
+    def _pulls(self, slots: Slots) -> tuple[Array, Array]:
+        """(n, 2) N, what forces with a potential do to each beside gravity, at the start of the frame and now; empty: nothing."""
         if not self._kept:
-            return weight, weight
+            return np.zeros((0, 2)), np.zeros((0, 2))
         now, pulls = slots.position, []
         for where in (self._start.position[slots.particle], now):
             slots.position = where
             slots.force.fill(0)
             for force in self._kept:
                 force.apply(slots, self._forces.t)
-            pulls.append(weight + np.where(mass > 0, 1.0, 0.0)[:, None] * slots.force)
+            pulls.append(slots.force.astype(float))
         slots.position = now
         return pulls[0], pulls[1]
 
@@ -238,20 +194,9 @@ class Watch:
         bodies = (slots.position, moved.astype(slots.dtype), slots.size, period_x, period_y, slots.inverse_mass)
         clusters.join_met(*bodies, *listed, slots.real(SLEEP_NEAR), root)
         if self._links:
-            rows = slots.slots_of(self._links.joined().ravel()).reshape(-1, 2)
-            clusters.join_rows(rows.astype(np.int64), slots.inverse_mass, root)
+            clusters.join_rows(slots.slots_of(self._links.joined()), slots.inverse_mass, root)
         clusters.settle(root)
         return root
-
-
-class _Sums:
-    """Sums over the members of each cluster, in the order of the slots, so that they never depend on threads."""
-
-    def __init__(self, cluster: Array) -> None:
-        self.cluster = cluster
-
-    def __call__(self, values: Array) -> Array:
-        return np.bincount(self.cluster, values, len(self.cluster))
 
 
 def fall(mass: float, gravity: tuple[float, float], extent: Extent | None) -> float:
@@ -290,32 +235,3 @@ def undriven(world: Any, h: float, h_last: float | None) -> bool:
 def pinned_move(state: State | Slots) -> bool:
     """Whether somebody pinned pushes others about: with infinite mass one goes on at its velocity, and nothing stops it."""
     return bool(measure.pinned_move(state.mass, state.velocity, state.spin))
-
-
-def _ratio(a: Array, b: Array) -> Array:
-    """a / b, and 0 where b is."""
-    return np.divide(a, b, out=np.zeros_like(a), where=b > 0)
-
-
-def _slowed(taken: Array, energy: Array) -> Array:
-    """What velocities are multiplied with to lose so much of their energy, or all."""
-    return np.asarray(np.sqrt(1 - np.minimum(_ratio(taken, energy), 1)))
-
-
-def _kinetic(mass: Array, velocity: Array, radius: Array, spin: Array) -> Array:
-    rim = radius.astype(float) * spin
-    return np.asarray(0.5 * mass * (velocity * velocity).sum(axis=1) + 0.25 * mass * rim * rim)
-
-
-def _as_a_whole(mass: Array, x: Array, v: Array, add: _Sums) -> Array:
-    """(n, 2) velocities, m/s, of the rigid motion of each cluster that has its momentum and its angular momentum."""
-    r, drift = x - _mean(mass, x, add), _mean(mass, v, add)
-    u = v - drift
-    turn = _ratio(add(mass * (r[:, 0] * u[:, 1] - r[:, 1] * u[:, 0])), add(mass * (r * r).sum(axis=1)))[add.cluster]
-    return np.asarray(drift + turn[:, None] * np.column_stack((-r[:, 1], r[:, 0])))
-
-
-def _mean(mass: Array, rows: Array, add: _Sums) -> Array:
-    """(n, 2) the mean of these over the mass of each cluster."""
-    total = add(mass)
-    return np.column_stack([_ratio(add(mass * column), total) for column in rows.T])[add.cluster]

@@ -16,6 +16,9 @@ from pyverlet.laws.links._pool import MOVING, Pool, held
 from pyverlet.laws.links._work import Work
 from pyverlet.state.seam import Seam
 
+ABOUT = ("rest", "upper", "stiffness")
+"""What the energy of a row depends on."""
+
 
 class ChainPool(Pool):
     """Runs in packs of eight that share no particle, as `kernels.chains` wants them, whose rows have the world's dtype."""
@@ -24,6 +27,7 @@ class ChainPool(Pool):
         super().__init__(0, rest=np.float64, upper=np.float64)
         self.dtype = dtype
         self._claims = Claims()
+        self._taken_up = self._under_way = False
 
     def pack(self, work: Work) -> None:
         """By colour, and within a colour long runs first, so that runs of a pack are as long as each other."""
@@ -50,12 +54,12 @@ class ChainPool(Pool):
         self._place[self._source[self._source >= 0][::-1]] = np.flatnonzero(self._source >= 0)[::-1]
         self._row = np.zeros(chain_rows.ROW * len(self._source), self.dtype)
         self._more = np.zeros(chain_rows.EXTRA * len(self._source), self.dtype)
-        self._strength = np.full(len(self._source), np.inf)
-        self._bowed = np.zeros(len(opens), np.uint8)
+        self._kept = np.zeros(chain_rows.KEPT * len(self._source), self.dtype)
+        self._bowed, self._torn = np.zeros((2, len(opens)), np.uint8)
         parts = 1 if len(work) < LINKS_ONE_THREAD_BELOW else jit.max_threads()
         items = LANES * (int(longest.max(initial=0)) + 1)
         self._rooms, self._wide = np.zeros((parts, chains.SCRATCH * items), self.dtype), np.zeros((parts, chains.WIDE * items))
-        self.stale, self.changed = False, True
+        self.stale, self.changed, self._taken_up = False, True, False
 
     def _lay_out(self, given: Array, ends: Array, run_at: Array, longest: Array, length: Array) -> None:
         """Which row stands in each item, -1 for none, and which particle.
@@ -81,12 +85,19 @@ class ChainPool(Pool):
             _write(self._more, chain_rows.EXTRA, chain_rows.STIFFNESS, np.where(soft, stiffness, 0.0))
             _write(self._more, chain_rows.EXTRA, chain_rows.ROPE, rope)
             _write(self._more, chain_rows.EXTRA, chain_rows.SOFT, soft)
-            self._strength[:] = rows["strength"][source]
-            self.brittle = bool(np.isfinite(self._strength).any())
-            kinds = (chain_rows.ROPES * rope + chain_rows.SOFTS * soft).astype(np.uint8)
+            strength = np.minimum(np.where(here, rows["strength"][source], np.inf), np.finfo(self.dtype).max)
+            brittle = strength < np.finfo(self.dtype).max
+            _write(self._more, chain_rows.EXTRA, chain_rows.STRENGTH, strength)
+            kinds = (chain_rows.ROPES * rope + chain_rows.SOFTS * soft + chain_rows.BRITTLE * brittle).astype(np.uint8)
             self._holds = np.bitwise_or.reduceat(kinds, self._start[:-1]) if len(kinds) else kinds
             self.gives = bool(soft.any())
-        chain_rows.take_up(source, self._row, *(rows[name] for name in MOVING))
+        if not self._taken_up:
+            chain_rows.take_up(source, self._row, *(rows[name] for name in MOVING))
+            chain_rows.keep(self._row, self._kept)
+        elif self._under_way:  # that frame was no good
+            chain_rows.go_back(self._row, self._kept)
+        self._torn.fill(0)
+        self._taken_up = self._under_way = True
 
     def before(self, work: Work, h: float) -> None:
         self._h = h
@@ -98,24 +109,22 @@ class ChainPool(Pool):
     def arrays(self) -> tuple[Array, ...]:
         """As `kernels.linked.Linked` has them."""
         return (
-            self._colour, self._start, self._node, self._holds, self._lanes, self._bowed, self._row, self._more, self._rooms,
-            self._wide, self._strength, self._claims(),
+            self._colour, self._start, self._node, self._holds, self._lanes, self._bowed, self._torn, self._row, self._more,
+            self._rooms, self._wide, self._claims(),
         )  # fmt: skip
 
     def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
         chain_passes.sweep(
-            back, skip, False, False, self._colour, self._start, self._node, self._holds, self._lanes, self._bowed, self._row,
-            self._more, work.shift, self._h, self._rooms, self._wide, self._claims(), work.start, work.predicted, work.back,
-            work.weight, *work.seam.period,
+            back, skip, False, False, self._colour, self._start, self._node, self._holds, self._lanes, self._bowed, self._torn,
+            self._row, self._more, work.shift, self._h, self._rooms, self._wide, self._claims(), work.start, work.predicted,
+            work.back, work.weight, *work.seam.period,
         )  # fmt: skip
 
     def note(self, work: Work, h: float) -> None:
-        chain_rows.note_force(self._row, h)
-        if self.brittle:
-            chain_rows.snap(self._row, self._strength)
+        chain_rows.note(self._start, self._holds, self._row, self._more, self._torn, h)
 
     def broken(self) -> Array:
-        if not self.brittle:
+        if not self._torn.any():
             return np.empty(0, np.int64)
         return np.flatnonzero(chain_rows.intact(self._place, self._row) != self.rows["intact"])
 
@@ -123,7 +132,15 @@ class ChainPool(Pool):
         return np.asarray(self._row[self._place // LANES * (LANES * chain_rows.ROW) + self._place % LANES + chain_rows.FORCE])
 
     def end(self) -> None:
-        chain_rows.hand_over(self._place, self._row, *(self.rows[name] for name in MOVING))
+        chain_rows.keep(self._row, self._kept)
+        self._under_way = False
+        if self._torn.any():
+            self._write()
+        else:  # nobody else's wholeness changes in a frame
+            self.rows.write_late(("force", "last"), self._write)
+
+    def _write(self) -> None:
+        chain_rows.hand_over(self._place, self._kept, *(self.rows[name] for name in MOVING))
 
     def stored(self, position: Array, seam: Seam) -> float:
         return self._energy(position, seam, self._ends, chain_rows.intact(self._place, self._row))
@@ -133,12 +150,19 @@ class ChainPool(Pool):
 
     def energies(self, position: Array, seam: Seam) -> Array:
         rows, ends = self.rows, self.entries["particle"].reshape(-1, 2)
-        away = np.hypot(*seam.nearest(position[ends[:, 1]] - position[ends[:, 0]]).T) - rows["rest"]
-        return held(rows["stiffness"], rows["upper"], rows["intact"], away)
+        way = position[ends[:, 1]].astype(float) - position[ends[:, 0]]
+        return held(rows["stiffness"], rows["upper"], rows["intact"], np.hypot(*seam.nearest(way).T) - rows["rest"])
+
+    def share_gain(self, before: Array, now: Array, seam: Seam, mass: Array, share: Array) -> None:
+        ends, about = self.entries["particle"].reshape(-1, 2), (self.rows[name] for name in ABOUT)
+        chain_rows.share_gain(before, now, *seam.period, ends, *about, self.rows["intact"], mass, share)
+
+    def lines(self) -> tuple[Array, Array]:
+        pairs, intact = self.entries["particle"].reshape(-1, 2), self.rows["intact"]
+        return (pairs, np.arange(len(pairs))) if intact.all() else (pairs[row := np.flatnonzero(intact)], row)
 
     def _energy(self, position: Array, seam: Seam, ends: Array, intact: Array) -> float:
-        rows = self.rows
-        return float(chain_rows.energy(position, *seam.period, ends, rows["rest"], rows["upper"], rows["stiffness"], intact))
+        return float(chain_rows.energy(position, *seam.period, ends, *(self.rows[name] for name in ABOUT), intact))
 
 
 def _place(order: Array, opens: Array) -> Array:

@@ -113,6 +113,13 @@ class Pool(ABC):
     def energies(self, position: Array, seam: Seam) -> Array:
         """(k,) the same, row by row."""
 
+    def share_gain(self, before: Array, now: Array, seam: Seam, mass: Array, share: Array) -> None:
+        """Add what each row holds at the positions of `now` beyond that `before` to the (n,) share of its first free particle."""
+        if len(particle := self.entries["particle"]):
+            entry = np.arange(len(particle)) + np.where(np.isfinite(mass[particle]), 0, len(particle))
+            whose = particle[np.minimum.reduceat(entry, self.first[:-1]) % len(particle)]
+            share += np.bincount(whose, self.energies(now, seam) - self.energies(before, seam), len(share))
+
     @abstractmethod
     def stored(self, position: Array, seam: Seam) -> float:
         """The same in the middle of a frame, of the rows that are intact then, at (m, 2) positions in the order of `Work`."""

@@ -147,6 +147,7 @@ class RowPool(Pool):
         return float(self.energies(position, seam).sum())
 
     def energies(self, position: Array, seam: Seam) -> Array:
+        position = position.astype(float)
         rows, first, particle = self.rows, self.first, self.entries["particle"]
         value, bend, gradient = np.empty(len(rows)), np.empty(len(rows)), np.empty((len(particle), 2))
         self.measure(position, *seam.period, first, particle, rows["rest"], 0, len(rows), value, gradient, bend)

@@ -203,7 +203,7 @@ class Links:
         if self._linked is None:
             self._linked = (*self._work.arrays(), *chains.arrays(), *self._pins.arrays())
         rest = REST_ACCELERATIONS * h
-        numbers = (h, *self._work.seam.period, len(self._work), self._iterations, int(chains.brittle), rest)
+        numbers = (h, *self._work.seam.period, len(self._work), self._iterations, rest)
         return self._linked, numbers
 
     def _know_apart(self) -> None:
@@ -308,18 +308,16 @@ class Links:
 
     def energy(self, where: Array | None = None) -> float:
         """Energy stored in links that give, J, with the particles where they are, or at (n, 2) other places, m."""
-        position = (self._state.position if where is None else where).astype(np.float64)
+        position = self._state.position if where is None else where
         return sum(pool.energy(position, self._state.seam) for pool in self._order)
 
-    def shares(self, where: Array) -> Array:
-        """(n,) the same in the user's order: what each link holds, at the first of its particles that is free to move."""
-        position, share = where.astype(np.float64), np.zeros(len(where))
+    def gains(self, before: Array, now: Array) -> Array:
+        """(n,) J that links hold `now` beyond what they held `before`, (n, 2) positions in the user's order: what each does, at
+        the first of its particles that is free to move.
+        """
+        share = np.zeros(len(now))
         for pool in self._order:
-            particle, entry = pool.entries["particle"], np.arange(len(pool.entries))
-            if len(particle):
-                entry += np.where(np.isfinite(self._state.mass[particle]), 0, len(entry))
-                whose = particle[np.minimum.reduceat(entry, pool.first[:-1]) % len(entry)]
-                share += np.bincount(whose, pool.energies(position, self._state.seam), len(where))
+            pool.share_gain(before, now, self._state.seam, self._state.mass, share)
         return share
 
     @property
@@ -380,7 +378,8 @@ class Links:
         by_family = {family: pool for family, pool in self._pools.items() if pool in self._order}
         pools = {family: (pool, pool.rows.copy(), pool.entries.copy()) for family, pool in by_family.items()}
         links = [(link, link.particles, link._where) for link in self._links]
-        return links, pools, self.broken, self._apart_changed, self._past
+        past = self._past and Past(*(array.copy() for array in self._past))
+        return links, pools, self.broken, self._apart_changed, past
 
     def restore(self, saved: Any) -> None:
         """Go back to what `save` returned, with the links of then."""

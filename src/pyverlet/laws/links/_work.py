@@ -63,6 +63,7 @@ class Work:
         self.weight = np.zeros(rows, dtype)
         self._slot = np.zeros(rows, np.uint32)
         self._calm = np.full(rows, np.nan, dtype)
+        self._past = nobody(dtype)
         self.seam = NONE
         self._order: Array | None = None
 
@@ -83,13 +84,18 @@ class Work:
     def begin(self, state: State, past: Past | None) -> None:
         """A frame begins: take up what is remembered of those who are where they were left."""
         self.seam = state.seam
-        links.recall(*(past or nobody(state.dtype)), state.number, state.position, self.particle, self.start, self._calm)
+        if past is self._past:
+            links.recall_all(*past[1:], state.position, self.particle, self.start, self._calm)
+        else:
+            links.recall(*(past or nobody(state.dtype)), state.number, state.position, self.particle, self.start, self._calm)
 
     def end(self, state: State) -> Past:
-        """The frame is good: what is to be remembered."""
-        number, left = (memory.taken(array, self.particle) for array in (state.number, state.position))
-        start, calm = (array[: len(self)].astype(np.float64) for array in (self.start, self._calm))
-        return Past(number, start, left, calm)
+        """The frame is good: what is to be remembered, until the `end` of the next."""
+        if len(self._past.number) != (count := len(self)):
+            number = memory.taken(state.number, self.particle)
+            self._past = Past(number, np.empty((count, 2)), np.empty((count, 2), state.dtype), np.empty(count))
+        links.remember(*self._past[1:], state.position, self.particle, self.start, self._calm)
+        return self._past
 
     def arrays(self) -> tuple[Array, ...]:
         """As `kernels.linked.Linked` has them; the slots are right once `slots` has been asked."""

@@ -144,5 +144,5 @@ class PinPool(Pool):
         return self._energies(position, self.entries["particle"], self.rows["intact"], seam)
 
     def _energies(self, position: Array, particle: Array, intact: Array, seam: Seam) -> Array:
-        away = np.hypot(*seam.nearest(position[particle] - self.rows["point"]).T)
+        away = np.hypot(*seam.nearest(position[particle].astype(float) - self.rows["point"]).T)
         return held(self.rows["stiffness"], np.inf, intact, away)
