@@ -225,8 +225,32 @@ def note(start, holds, row, more, torn, h):
 
 
 @kernel
+def lay(source, start, row, more, holds, rest, stiffness, damping, upper, strength):
+    """What of the rows frames leave alone, from the tables; holds[p]: what kinds of row are in pack p.
+
+    source: which row of the tables stands in each item, -1 for none.
+    """
+    real = row.dtype.type
+    zero, one, most = real(0), real(1), np.finfo(row.dtype).max
+    for p in range(start.shape[0] - 1):
+        kinds = 0
+        for n in range(start[p], start[p + 1]):
+            r, k, m = source[n], at(n), n // LANES * (LANES * EXTRA) + n % LANES
+            here = r >= 0
+            soft, rope = here and stiffness[r] < np.inf, here and upper[r] < np.inf
+            brittle = here and strength[r] < most
+            row[k + REST] = rest[r] if here else zero
+            more[m + DAMPING] = damping[r] if here else zero
+            more[m + STIFFNESS] = stiffness[r] if soft else zero
+            more[m + STRENGTH] = strength[r] if brittle else most
+            more[m + ROPE], more[m + SOFT] = one if rope else zero, one if soft else zero
+            kinds |= (ROPES if rope else 0) | (SOFTS if soft else 0) | (BRITTLE if brittle else 0)
+        holds[p] = kinds
+
+
+@kernel
 def take_up(source, row, intact, force, last):
-    """What of the rows changes, from the tables. source: which row stands in each item, -1 for none."""
+    """And what changes."""
     for n in range(source.shape[0]):
         r, k = source[n], at(n)
         row[k + GIVE], row[k + FORCE], row[k + LAM] = BROKEN, 0, 0

@@ -118,6 +118,23 @@ def colour_runs(first, particle, run_of, particles, colours, colour):
 
 
 @kernel
+def partners(pairs, particles):
+    """(begin, partner): partner[begin[i] : begin[i + 1]] stand in one of the (k, 2) pairs with particle i."""
+    begin = np.zeros(particles + 1, np.int64)
+    for k in range(pairs.shape[0]):
+        begin[pairs[k, 0] + 1] += 1
+        begin[pairs[k, 1] + 1] += 1
+    begin = np.cumsum(begin)
+    at, partner = begin[:-1].copy(), np.empty(2 * pairs.shape[0], np.int64)
+    for k in range(pairs.shape[0]):
+        i, j = pairs[k, 0], pairs[k, 1]
+        partner[at[i]], partner[at[j]] = j, i
+        at[i] += 1
+        at[j] += 1
+    return begin, partner
+
+
+@kernel
 def drop_pairs(first, count, pair_i, pair_j, particle, begin, partner):
     """Take pairs of linked particles from a pair list; partner[begin[i] : begin[i + 1]] are those of the user's particle i."""
     for s in range(first.shape[0]):

@@ -127,7 +127,8 @@ class Watch:
         taking.raised(then, now, about, limits, lift, moved)
         root = self._clusters(slots, listed, moved)
         about = about._replace(root=root, share=self._links.gains(start.position, slots.where()) if self._links else none)
-        more = taking.take(then, now, about, limits, *taking.number_clusters(root), lift, moved, lower, part)
+        cluster, count = taking.number_clusters(root)
+        more = taking.take(then, now, about, limits, cluster, count, lift, moved, lower, part)
         if slots.size is not slots.radius:
             slots.grown -= (part * (slots.grown - start.grown[slots.particle])).astype(slots.dtype)
             slots.resize()

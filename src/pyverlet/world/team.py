@@ -63,7 +63,9 @@ class Team:
         jit.use_threads(self.size(most, frame_ms), most)
 
     def size(self, most: int, frame_ms: float) -> int:
-        """Threads for the next frame, `most` at most; frame_ms is what the last one took, 0 if there was none."""
+        """Threads for the next frame, `most` at most; frame_ms is what the last one took, 0 if there was none, or none
+        to judge by: the energy limiter takes back on one thread, and long.
+        """
         if most != self._most:
             self._begin(most)
         elif most > 1 and frame_ms > 0.0:

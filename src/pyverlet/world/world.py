@@ -117,7 +117,7 @@ class World(Measures, Queries, Doors):
         h = checks.number("dt", dt, above=0.0) / self.substeps
         for actor in self.actors:
             actor.act(self, dt)
-        self._team.gather(self.threads, self.profile.frame_ms)
+        self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
         self.profile.begin()
         books = self._open_books(h)
         if not self._frame(h, self._listen(h, books or self.profile.mark)):

@@ -16,6 +16,9 @@ from pyverlet.laws.links._pool import MOVING, Pool, held
 from pyverlet.laws.links._work import Work
 from pyverlet.state.seam import Seam
 
+GIVEN = ("rest", "stiffness", "damping", "upper", "strength")
+"""Columns that frames leave alone."""
+
 ABOUT = ("rest", "upper", "stiffness")
 """What the energy of a row depends on."""
 
@@ -55,7 +58,7 @@ class ChainPool(Pool):
         self._row = np.zeros(chain_rows.ROW * len(self._source), self.dtype)
         self._more = np.zeros(chain_rows.EXTRA * len(self._source), self.dtype)
         self._kept = np.zeros(chain_rows.KEPT * len(self._source), self.dtype)
-        self._bowed, self._torn = np.zeros((2, len(opens)), np.uint8)
+        self._bowed, self._torn, self._holds = np.zeros((3, len(opens)), np.uint8)
         parts = 1 if len(work) < LINKS_ONE_THREAD_BELOW else jit.max_threads()
         items = LANES * (int(longest.max(initial=0)) + 1)
         self._rooms, self._wide = np.zeros((parts, chains.SCRATCH * items), self.dtype), np.zeros((parts, chains.WIDE * items))
@@ -77,20 +80,9 @@ class ChainPool(Pool):
     def begin(self) -> None:
         source, rows = self._source, self.rows
         if self.changed:
-            self.changed, here = False, source >= 0
-            stiffness, rope = rows["stiffness"][source], here & np.isfinite(rows["upper"][source])
-            soft = here & np.isfinite(stiffness)
-            _write(self._row, chain_rows.ROW, chain_rows.REST, rows["rest"][source] * here)
-            _write(self._more, chain_rows.EXTRA, chain_rows.DAMPING, rows["damping"][source] * here)
-            _write(self._more, chain_rows.EXTRA, chain_rows.STIFFNESS, np.where(soft, stiffness, 0.0))
-            _write(self._more, chain_rows.EXTRA, chain_rows.ROPE, rope)
-            _write(self._more, chain_rows.EXTRA, chain_rows.SOFT, soft)
-            strength = np.minimum(np.where(here, rows["strength"][source], np.inf), np.finfo(self.dtype).max)
-            brittle = strength < np.finfo(self.dtype).max
-            _write(self._more, chain_rows.EXTRA, chain_rows.STRENGTH, strength)
-            kinds = (chain_rows.ROPES * rope + chain_rows.SOFTS * soft + chain_rows.BRITTLE * brittle).astype(np.uint8)
-            self._holds = np.bitwise_or.reduceat(kinds, self._start[:-1]) if len(kinds) else kinds
-            self.gives = bool(soft.any())
+            self.changed = False
+            chain_rows.lay(source, self._start, self._row, self._more, self._holds, *(rows[name] for name in GIVEN))
+            self.gives = bool((self._holds & chain_rows.SOFTS).any())
         if not self._taken_up:
             chain_rows.take_up(source, self._row, *(rows[name] for name in MOVING))
             chain_rows.keep(self._row, self._kept)
@@ -154,8 +146,9 @@ class ChainPool(Pool):
         return held(rows["stiffness"], rows["upper"], rows["intact"], np.hypot(*seam.nearest(way).T) - rows["rest"])
 
     def share_gain(self, before: Array, now: Array, seam: Seam, mass: Array, share: Array) -> None:
-        ends, about = self.entries["particle"].reshape(-1, 2), (self.rows[name] for name in ABOUT)
-        chain_rows.share_gain(before, now, *seam.period, ends, *about, self.rows["intact"], mass, share)
+        ends, (rest, upper, stiffness) = self.entries["particle"].reshape(-1, 2), (self.rows[name] for name in ABOUT)
+        about = rest, upper, stiffness, self.rows["intact"]
+        chain_rows.share_gain(before, now, *seam.period, ends, *about, mass, share)
 
     def lines(self) -> tuple[Array, Array]:
         pairs, intact = self.entries["particle"].reshape(-1, 2), self.rows["intact"]
@@ -170,11 +163,6 @@ def _place(order: Array, opens: Array) -> Array:
     end = np.append(opens[1:], len(order))
     where = np.minimum(opens[:, None] + np.arange(LANES), end[:, None] - 1)
     return np.asarray(order[where])
-
-
-def _write(rows: Array, width: int, column: int, values: Array) -> None:
-    """What a column of rows, which have so many, holds by their items."""
-    rows.reshape(-1, width, LANES)[:, column // LANES] = values.reshape(-1, LANES)
 
 
 def _within(count: Array) -> tuple[Array, Array]:

@@ -64,6 +64,8 @@ class Distance(Link):
         self._change("rest", self._length)
 
     def _check(self, seam: Seam) -> None:
+        if not seam:
+            return
         half = 0.5 * seam.shortest
         if (wrong := np.flatnonzero(self._length > half)).size:
             k = int(wrong[0])

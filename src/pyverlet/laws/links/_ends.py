@@ -37,12 +37,14 @@ def parse(kind: str, ends: tuple[Any, ...], names: tuple[str, ...]) -> tuple[Sta
     if len(lengths) > 1:
         said = " and ".join(f"{name} has {len(column)}" for name, column in zip(names, columns, strict=True))
         raise InputError(f"{kind}: {said} indices; allowed are equally many, or one for all")
-    joined = np.column_stack(np.broadcast_arrays(*columns))
+    joined = np.empty((max(map(len, columns)), len(columns)), np.int64)
+    for n, column in enumerate(columns):
+        joined[:, n] = column
     for a in range(len(names)):
         for b in range(a):
-            same = np.flatnonzero(joined[:, a] == joined[:, b])
-            if len(same):
-                row = int(same[0])
+            same = joined[:, a] == joined[:, b]
+            if same.any():
+                row = int(np.flatnonzero(same)[0])
                 both = f"{names[b]}[{row}] and {names[a]}[{row}]"
                 raise InputError(f"{kind}: {both} are the same particle, {joined[row, a]}; allowed are different ones")
     return state, joined
@@ -66,15 +68,17 @@ def _brief(value: Any) -> str:
 def _column(kind: str, name: str, group: Any, index: Any) -> Indices:
     if not isinstance(group, Group):
         raise InputError(f"{kind}: the group of {name} is {_brief(group)}; allowed is what world.add returns")
-    everyone = group.index  # raises for a group whose particles were all removed
+    where = group._where  # raises for a group whose particles were all removed
+    count = where.stop - where.start
+    if type(index) is int and -count <= index < count:  # links may come one by one by the thousand
+        return np.array([where.start + index % count])
     array = np.atleast_1d(np.asarray(index))
     if array.ndim != 1 or array.dtype.kind not in "iu":
         raise InputError(f"{kind}: {name} is {_brief(index)}; allowed is an index in the group, or a (k,) array of them")
-    wrong = np.flatnonzero((array < -len(group)) | (array >= len(group)))
-    if len(wrong):
-        where = f"{name}[{wrong[0]}]" if np.ndim(index) else name
-        raise InputError(
-            f"{kind}: {where} is {array[wrong[0]]}; allowed is 0 to {len(group) - 1} for a group of {len(group)} particles"
-        )
-    numbers: Indices = everyone[array]
+    wrong = (array < -count) | (array >= count)
+    if wrong.any():
+        first = int(np.flatnonzero(wrong)[0])
+        which = f"{name}[{first}]" if np.ndim(index) else name
+        raise InputError(f"{kind}: {which} is {array[first]}; allowed is 0 to {count - 1} for a group of {count} particles")
+    numbers: Indices = where.start + np.where(array < 0, array + count, array).astype(np.int64)
     return numbers

@@ -31,9 +31,8 @@ class Link(ABC):
         self._state = state
         self.particles = particles
         self._pool: Pool | None = None  # where its numbers are once it is in a world
-        self._id = -1
+        self._id, self._version = -1, state.version
         self._number = state.number[particles]  # indices change when others are removed, numbers never do
-        self._where = slice(0, len(particles))
 
     def __len__(self) -> int:
         return len(self.particles)
@@ -60,6 +59,8 @@ class Link(ABC):
         Raises:
             InputError: one of the particles has been removed.
         """
+        if self._version == self._state.version:  # nobody has come or gone since
+            return
         known = self._state.number
         where = np.searchsorted(known, self._number)
         gone = where >= len(known)
@@ -71,6 +72,13 @@ class Link(ABC):
 
     def _check(self, seam: Seam) -> None:
         """Raise InputError if these do not fit into a room with this seam."""
+
+    @property
+    def _where(self) -> slice:
+        """Which rows of the pool are these: owners stand there in the order they were appended."""
+        assert self._pool is not None
+        first = int(np.searchsorted(self._pool.rows["owner"], self._id))
+        return slice(first, first + len(self))
 
     def _change(self, column: str, value: Any) -> None:
         """Write a column of the pool, if these are in a world."""
@@ -91,6 +99,9 @@ class Link(ABC):
 
 def several(kind: str, name: str, value: ArrayLike, count: int, *, above: float | None = None, infinite: bool = False) -> Floats:
     """(count,) floats from one for all or one each; at least 0, or greater than `above`; infinite only if said."""
+    one: Any = value  # as most are, and links may come by the thousand
+    if type(one) in (float, int) and (one >= 0.0 if above is None else one > above) and (infinite or one < np.inf):
+        return np.full(count, float(one))
     array: Floats = np.array(checks.column(f"{kind}: {name}", value, np.dtype(np.float64), count))
     wrong = ~((array >= 0.0) if above is None else (array > above))
     if not infinite:

@@ -39,7 +39,8 @@ class Links:
 
     def __init__(self, state: State) -> None:
         self._state = state
-        self._links: list[Link] = []
+        self._links: dict[int, Link] = {}  # by the numbers that own their rows, in the order appended
+        self._listed: list[Link] | None = None
         self._pools: dict[Any, Pool] = {}
         self._sorted: list[Pool] = []
         self._leaving: dict[Pool, list[int]] = {}
@@ -77,10 +78,10 @@ class Links:
             self._sorted = sorted(self._pools.values(), key=lambda pool: pool.turn)
         link._pool = self._pools[family]
         link._id = self._next_owner
-        link._where = link._pool.append(link._id, link.particles, link._columns())
+        link._pool.append(link._id, link.particles, link._columns())
         self._next_owner += 1
         self._apart_stale = True
-        self._links.append(link)
+        self._links[link._id], self._listed = link, None
         return link
 
     def extend(self, links: Iterable[Link]) -> None:
@@ -90,7 +91,7 @@ class Links:
 
     def check(self, seam: Seam) -> None:
         """Raise InputError if one of them does not fit into a room with this seam."""
-        for link in self._links:
+        for link in self:
             link._check(seam)
 
     def remove(self, link: Link) -> None:
@@ -99,11 +100,11 @@ class Links:
         Raises:
             InputError: it is not in this world.
         """
-        if link._pool is None or link not in self._links:
+        if link._pool is None or self._links.get(link._id) is not link:
             raise InputError(f"{link!r} is not among this world's links; allowed is one that was appended")
         self._leaving.setdefault(link._pool, []).append(link._id)
-        self._links.remove(link)
-        link._pool = None
+        del self._links[link._id]
+        link._pool = self._listed = None
         self._apart_stale = True
 
     @property
@@ -112,26 +113,18 @@ class Links:
         leaving, self._leaving = self._leaving, {}
         for pool, owners in leaving.items():
             pool.keep(~np.isin(pool.rows["owner"], owners))
-            self._find_rows(pool)
         return self._sorted
 
     def __len__(self) -> int:
         return len(self._links)
 
     def __iter__(self) -> Iterator[Link]:
-        return iter(self._links)
+        return iter(self._links.values())
 
     def __getitem__(self, number: int) -> Link:
-        return self._links[number]
-
-    def _find_rows(self, pool: Pool) -> None:
-        """Rows have gone: tell those that stay where theirs are now. Owners stand in the order appended."""
-        self._apart_stale = True
-        links = [link for link in self._links if link._pool is pool]
-        owner, numbers = pool.rows["owner"], [link._id for link in links]
-        begin, end = (np.searchsorted(owner, numbers, side).tolist() for side in ("left", "right"))
-        for link, first, stop in zip(links, begin, end, strict=True):
-            link._where = slice(first, stop)
+        if self._listed is None:
+            self._listed = list(self._links.values())
+        return self._listed[number]
 
     def renumber(self, new: NDArray[np.int64]) -> None:
         """Particles have been removed: new[i] is what the user's index i is now, -1 if it is gone, and its links with it."""
@@ -139,11 +132,11 @@ class Links:
             particle = new[pool.entries["particle"]]
             pool.entries["particle"][:] = particle
             pool.keep(np.minimum.reduceat(particle, pool.first[:-1]) >= 0 if len(particle) else np.zeros(0, bool))
-            self._find_rows(pool)
-        for link in self._links:
+        for link in self:
             moved = new[link.particles]
             link.particles = moved[(moved >= 0).all(axis=1)]
-        self._links = [link for link in self._links if len(link)]
+        self._links, self._listed = {number: link for number, link in self._links.items() if len(link)}, None
+        self._apart_stale = True
 
     @property
     def iterations(self) -> int:
@@ -211,9 +204,7 @@ class Links:
         if not self._apart_stale and (not self._links or len(self._partners[0]) == len(self._state) + 1):
             return
         before, self._apart, self._apart_stale = self._apart, self.apart(), False
-        both = np.concatenate((self._apart, self._apart[:, ::-1]))
-        both = both[np.argsort(both[:, 0], kind="stable")]
-        self._partners = np.searchsorted(both[:, 0], np.arange(len(self._state) + 1)), both[:, 1].copy()
+        self._partners = runs.partners(self._apart, len(self._state))
         self._apart_changed |= not np.array_equal(before, self._apart)
 
     def known_apart(self) -> Array:
@@ -297,9 +288,9 @@ class Links:
 
     def _note(self, pool: Pool, snapped: Array) -> Array:
         """The BROKEN entries of these rows of a pool."""
-        note, number = np.empty(len(snapped), BROKEN), {link._id: k for k, link in enumerate(self._links)}
+        note, number = np.empty(len(snapped), BROKEN), {owner: k for k, owner in enumerate(self._links)}
         for k, row in enumerate(snapped):
-            link = self._links[number[int(pool.rows["owner"][row])]]
+            link = self._links[int(pool.rows["owner"][row])]
             within = int(row) - link._where.start
             note[k] = (number[link._id], within, link.particles[within, 0], link.particles[within, -1], pool.pulled()[row])
         return note
@@ -377,23 +368,23 @@ class Links:
         """A copy of all there is about links."""
         by_family = {family: pool for family, pool in self._pools.items() if pool in self._order}
         pools = {family: (pool, pool.rows.copy(), pool.entries.copy()) for family, pool in by_family.items()}
-        links = [(link, link.particles, link._where) for link in self._links]
+        links = [(owner, link, link.particles) for owner, link in self._links.items()]
         past = self._past and Past(*(array.copy() for array in self._past))
         return links, pools, self.broken, self._apart_changed, past
 
     def restore(self, saved: Any) -> None:
         """Go back to what `save` returned, with the links of then."""
         links, pools, self.broken, apart_changed, self._past = saved
-        for link in self._links:
+        for link in self:
             link._pool = None
         for pool in self._order:
             pool.keep(np.zeros(len(pool.rows), bool))
         for family, (pool, rows, entries) in pools.items():
             pool.rows, pool.entries, pool.stale = rows.copy(), entries.copy(), True
             self._pools[family] = pool
-        self._links = [link for link, _, _ in links]
-        for link, particles, where in links:
-            link.particles, link._where, link._pool = particles, where, self._pools[link._family]
+        self._links, self._listed = {owner: link for owner, link, _ in links}, None
+        for owner, link, particles in links:
+            link.particles, link._id, link._pool = particles, owner, self._pools[link._family]
         self._apart_stale = True
         self._know_apart()
         self._apart_changed = apart_changed
