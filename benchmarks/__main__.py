@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 
 import pyverlet as pv
-from benchmarks import beside, busy, data, links, materials, own, page, physics, soak
+from benchmarks import beside, busy, data, linked_frames, links, materials, own, page, physics, soak
 from benchmarks.engines import CAREFUL, DT, ENGINES, RADIUS, Array, Engine
 from pyverlet.compile import jit
 from pyverlet.scenes import report
@@ -157,6 +157,7 @@ def main() -> None:
         return
     if arguments.table == "links":
         links.main(arguments.csv)
+        linked_frames.main(arguments.csv)
         return
     if arguments.table == "soak":
         if not soak.main(arguments.minutes):

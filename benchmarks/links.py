@@ -123,12 +123,12 @@ class Peer(Protocol):
 class Pyverlet:
     """Ours."""
 
-    def __init__(self, what: Linked, substeps: int = 8) -> None:
+    def __init__(self, what: Linked, substeps: int = 8, threads: int = 1) -> None:
         room: pv.Boundary = pv.Open()
         if what.floor is not None:
             (x0, _), (x1, y1) = what.position.min(axis=0) - 1.0, what.position.max(axis=0) + 1.0
             room = pv.Box((x0, what.floor), (x1, 2 * y1))
-        self.world = pv.World(boundary=room, substeps=substeps, threads=1)
+        self.world = pv.World(boundary=room, substeps=substeps, threads=threads)
         group = self.world.add(position=what.position, radius=RADIUS, mass=what.mass)
         group.pin(what.pegs)
         self.world.links.append(pv.Stick(group, *what.sticks.T, collide=False))
