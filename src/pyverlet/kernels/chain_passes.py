@@ -19,7 +19,7 @@ def _solve(
             p = first + k
             if prepares and not holds[p] & SOFTS:
                 bowed[p] = prepare_pack(
-                    p, start, node, holds, row, more, begun, predicted, back, weight, shift, period_x, period_y, h
+                    False, p, start, node, holds, row, more, begun, predicted, back, weight, shift, period_x, period_y, h
                 )
             solve_pack(p, start, node, holds, lanes, bowed, row, more, shift, h * h, rooms[part], wide[part])
             if notes:
@@ -51,13 +51,15 @@ def sweep(
 
 @driver
 def passes(
-    times, colour, start, node, holds, lanes, bowed, torn, row, more, shift, h, rooms, wide, claims, begun, predicted, back,
-    weight, period_x, period_y,
+    times, colour, start, node, holds, lanes, bowed, blended, torn, row, more, shift, h, rooms, wide, claims, begun, predicted,
+    back, weight, period_x, period_y,
 ):  # fmt: skip
     """There and back so many times, from the lam that rows start from; once, one way, where there is a single colour."""
     prepare(
-        True, colour, start, node, holds, bowed, row, more, begun, predicted, back, weight, shift, period_x, period_y, h, claims
-    )
+        True, colour, start, node, holds, bowed, blended, row, more, begun, predicted, back, weight, shift, period_x, period_y,
+        h, claims,
+    )  # fmt: skip
+
     several = colour.shape[0] > 2
     turns = times if several else 1
     for turn in range(turns):

@@ -29,10 +29,12 @@ COLUMNS = ("weight", "gap_x", "gap_y", "along_x", "along_y", "turn", "give", "la
 """What is kept of a row, in the dtype of the world. weight: of its first node, 1/kg. gap: from there to the second one as the
 integrator has put them, m. give: -1 of the broken, 0 where nothing can move. lam: between substeps what it pulled with, N."""
 
-MORE = ("goal", "soft", "stiffness", "damping", "rope", "held", "strength")
+MORE = ("goal", "soft", "stiffness", "damping", "rope", "held", "strength", "then", "before", "yields", "keeps")
 """The same of rows in packs that hold springs, ropes or what may break, the rest of which is not looked at. goal: the length that
 its force leads to, in place of rest; soft, rope and held are 1 or 0, the stiffness of what is not soft is 0; held: a rope that
-pulled when it was solved last; strength: N at which it breaks.
+pulled when it was solved last; strength: N at which it breaks. The last four are what a spring is blended of, which changes with
+masses and the step alone, and is kept for a frame: how its stretch at the start of a substep counts, and that before, beside the
+one at its end; what it gives, and what of its last pull it starts from, times h^2.
 
 Of each kind eight rows stand beside each other, column after column, then the next eight: what is read together lies together.
 Item 8 k + l of a column of ROW numbers is at 8 k * ROW + LANES * column + l. The names below have LANES in them."""
@@ -44,7 +46,7 @@ KEPT = 3
 """And how many of them change from frame to frame."""
 
 W, DX, DY, AX, AY, TURN, GIVE, LAM, REST, FORCE = range(0, LANES * ROW, LANES)
-GOAL, SOFT, STIFFNESS, DAMPING, ROPE, HELD, STRENGTH = range(0, LANES * EXTRA, LANES)
+GOAL, SOFT, STIFFNESS, DAMPING, ROPE, HELD, STRENGTH, THEN, BEFORE, YIELDS, KEEPS = range(0, LANES * EXTRA, LANES)
 
 _INTACT, _FORCE, _LAST = range(0, LANES * KEPT, LANES)
 
@@ -78,14 +80,33 @@ def at(k):
 
 
 @kernel
-def prepare_pack(p, start, node, holds, row, more, begun, predicted, back, weight, shift, period_x, period_y, h):
-    """What the rows of a pack are to satisfy; soft ones move their nodes by the lam they start from."""
+def _blend(k, row, more, ww, h, resolved, most):
+    """`kernels.links.blend`, of the springs among eight rows from item k on. ww: 1/kg."""
+    real = row.dtype.type
+    quarter, half, two, three = spread(real(0.25)), spread(real(0.5)), spread(real(2)), spread(real(3))
+    zero, one, least, per_hh = spread(real(0)), spread(real(1)), spread(real(_LEAST)), spread(real(1.0 / (h * h)))
+    one_h, hh, per_h, there = spread(real(h)), spread(real(h * h)), spread(real(1.0 / h)), EXTRA * k
+    is_soft, stiffness, damping = load(more, there + SOFT), load(more, there + STIFFNESS), load(more, there + DAMPING)
+    q = _settled(hh * stiffness * ww, resolved, most)
+    s = one_h * damping * ww
+    part = half + half * s / (one + s)
+    rate = damping * per_h
+    kp = stiffness * (one + three * q) * quarter + rate * part
+    k0 = stiffness * (one - q) * half + rate * (one - two * part)
+    km = stiffness * (one - q) * quarter - rate * (one - part)
+    per = is_soft * (one / larger(kp, least))
+    store(more, there + THEN, k0 * per)
+    store(more, there + BEFORE, km * per)
+    store(more, there + YIELDS, per * per_hh)
+    store(more, there + KEEPS, zero - is_soft * (one - load(more, there + ROPE)) * (one - q) * hh)
+
+
+@kernel
+def prepare_pack(fresh, p, start, node, holds, row, more, begun, predicted, back, weight, shift, period_x, period_y, h):
+    """What the rows of a pack are to satisfy; soft ones move their nodes by the lam they start from. fresh: blend them first."""
     real = row.dtype.type
     zero, one, tiny, resolved = spread(real(0)), spread(real(1)), spread(real(1e-24)), spread(real(LINK_RESOLVED * LINK_RESOLVED))
-    quarter, half, two, three = spread(real(0.25)), spread(real(0.5)), spread(real(2)), spread(real(3))
-    straight = spread(real(LINK_BOWED))
-    one_h, hh, per_h, rigid = spread(real(h)), spread(real(h * h)), spread(real(1.0 / h)), spread(real(LINK_GIVE))
-    per_hh, least, most = spread(real(1.0 / (h * h))), spread(real(_LEAST)), spread(real(_MOST))
+    straight, hh, rigid, most = spread(real(LINK_BOWED)), spread(real(h * h)), spread(real(LINK_GIVE)), spread(real(_MOST))
     ropes, soft = holds[p] & ROPES, holds[p] & SOFTS
     begin, end = start[p], start[p + 1] - LANES
     bowed = 0
@@ -120,22 +141,15 @@ def prepare_pack(p, start, node, holds, row, more, begun, predicted, back, weigh
         if soft:
             uj, vj = take(back, node, k + LANES)
             ex, ey = dx - (uj - ui), dy - (vj - vi)
-            is_soft, slack = load(more, there + SOFT), load(more, there + ROPE)
-            stiffness, damping = load(more, there + STIFFNESS), load(more, there + DAMPING)
+            slack = load(more, there + ROPE)
             c0, cm = length - rest, square_root(ex * ex + ey * ey) - rest
             c0 = where_above(slack, zero, larger(c0, zero), c0)  # a slack rope has no stretch to remember
             cm = where_above(slack, zero, larger(cm, zero), cm)
-            q = _settled(hh * stiffness * ww, resolved, most)
-            s = one_h * damping * ww
-            part = half + half * s / (one + s)
-            rate = damping * per_h
-            kp = stiffness * (one + three * q) * quarter + rate * part
-            k0 = stiffness * (one - q) * half + rate * (one - two * part)
-            km = stiffness * (one - q) * quarter - rate * (one - part)
-            per = one / larger(kp, least)
-            give = give + is_soft * (per * per_hh)
-            store(more, there + GOAL, rest - is_soft * ((k0 * c0 + km * cm) * per))
-            lam = zero - is_soft * (one - slack) * (one - q) * load(row, here + LAM) * hh
+            if fresh:
+                _blend(k, row, more, ww, h, resolved, most)
+            give = give + load(more, there + YIELDS)
+            store(more, there + GOAL, rest - (load(more, there + THEN) * c0 + load(more, there + BEFORE) * cm))
+            lam = load(more, there + KEEPS) * load(row, here + LAM)
             lam = where_above(zero, before, zero, lam)
             gx, gy = ax * lam, ay * lam
             mx, my = take(shift, node, k)
@@ -153,7 +167,8 @@ def prepare_pack(p, start, node, holds, row, more, begun, predicted, back, weigh
 
 @parallel_kernel
 def _prepare(
-    soft, first, stop, start, node, holds, bowed, row, more, begun, predicted, back, weight, shift, period_x, period_y, h, claims,
+    fresh, soft, first, stop, start, node, holds, bowed, row, more, begun, predicted, back, weight, shift, period_x, period_y, h,
+    claims,
 ):  # fmt: skip
     for part in prange(claims.shape[0]):
         k = claim_evenly(claims, stop - first, part)
@@ -161,20 +176,22 @@ def _prepare(
             p = first + k
             if holds[p] & SOFTS or not soft:
                 bowed[p] = prepare_pack(
-                    p, start, node, holds, row, more, begun, predicted, back, weight, shift, period_x, period_y, h
+                    fresh, p, start, node, holds, row, more, begun, predicted, back, weight, shift, period_x, period_y, h
                 )
             k = claim_evenly(claims, stop - first, part)
 
 
 @driver
 def prepare(
-    soft, colour, start, node, holds, bowed, row, more, begun, predicted, back, weight, shift, period_x, period_y, h, claims,
+    soft, colour, start, node, holds, bowed, blended, row, more, begun, predicted, back, weight, shift, period_x, period_y, h,
+    claims,
 ):  # fmt: skip
     """Every row's equation, length = goal - give lam, and which packs resist being turned; or only those of `soft` packs.
 
     From where a substep has `begun`, the way `back` from there to a substep before, and where the integrator has put all.
-    Nodes move by the lam their rows start from, in `shift`, so colour by colour.
+    Nodes move by the lam their rows start from, in `shift`, so colour by colour. blended: [1] if springs have been in this frame.
     """
+    fresh, blended[0] = blended[0] == 0, 1
     for c in range(colour.shape[0] - 1):
         some = not soft
         for p in range(colour[c], colour[c + 1]):
@@ -182,8 +199,8 @@ def prepare(
         if some:
             none_claimed(claims)
             _prepare(
-                soft, colour[c], colour[c + 1], start, node, holds, bowed, row, more, begun, predicted, back, weight, shift,
-                period_x, period_y, h, claims,
+                fresh, soft, colour[c], colour[c + 1], start, node, holds, bowed, row, more, begun, predicted, back, weight,
+                shift, period_x, period_y, h, claims,
             )  # fmt: skip
 
 

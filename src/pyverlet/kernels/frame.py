@@ -204,6 +204,9 @@ def _substeps(
     if LINKED:
         linked, linking = Linked(*borrowed(services.links[0])), Linking(*services.links[1])
     integrates = start.opens != 0
+    if LINKED and integrates:
+        look(linked, linking, circles.position, circles.velocity, circles.inverse_mass)
+        note(spent, LINKS, clock[0], clock[1])
     while True:
         if integrates:
             if LINKED or CALLS or (SERVED and kind.shape[0] > 0):  # what links have pulled is not felt again

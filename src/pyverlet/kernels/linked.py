@@ -32,6 +32,7 @@ class Linked:
     holds: Any
     lanes: Any
     bowed: Any
+    blended: Any
     torn: Any
     row: Any
     more: Any
@@ -83,8 +84,8 @@ def solve(linked, linking, position, velocity):
         linked.tie_left, linked.tie_way, linked.tie_kept,
     )  # fmt: skip
     passes(
-        linking.times, linked.colour, linked.begin, linked.node, linked.holds, linked.lanes, linked.bowed, linked.torn,
-        linked.row, linked.more, linked.shift, linking.h, linked.rooms, linked.wide, linked.claims, linked.start,
+        linking.times, linked.colour, linked.begin, linked.node, linked.holds, linked.lanes, linked.bowed, linked.blended,
+        linked.torn, linked.row, linked.more, linked.shift, linking.h, linked.rooms, linked.wide, linked.claims, linked.start,
         linked.predicted, linked.back, linked.weight, linking.period_x, linking.period_y,
     )  # fmt: skip
     note_ties(

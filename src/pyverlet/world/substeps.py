@@ -62,6 +62,14 @@ class Substeps:
         self._books = done if isinstance(done, Page) and done.plain else None
         return self._books is not None or done == mark
 
+    def open(self, world: Any, contacts: ContactSolver | None, h: float, lag: float) -> bool:
+        """Go from before the integration of `substep`, if there are contacts and that may be; else links note where it starts."""
+        if contacts and self.go(world, contacts, h, lag, opens=True):
+            return True
+        if world.links:
+            world.links.before(world._slots, h)
+        return False
+
     def go(self, world: Any, contacts: ContactSolver, h: float, lag: float, *, opens: bool = False) -> bool:
         """From after the integration of `substep`, whose list is good, as far as it goes.
 

@@ -130,7 +130,7 @@ class World(Measures, Queries, Doors):
         state, forces, integrator = self._slots, self._force_sum, self.integrator
         contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course or None
         lag, state.drop, state.h, run = integrator.velocity_lag * h, integrator.drop, h, self._run.begin(contacts)
-        parts: list[Any] = [part for part in (contacts, links, course) if part]
+        parts: list[Any] = [part for part in (contacts, course) if part]
         if not self._open(h, done):
             return False
         compiled = run.tells(done, self.profile.mark)
@@ -140,7 +140,7 @@ class World(Measures, Queries, Doors):
             if not run.leapt:
                 for part in parts:
                     part.before(state, h)
-                if contacts and compiled and run.go(self, contacts, h, lag, opens=True):
+                if run.open(self, contacts if compiled else None, h, lag):
                     continue
                 integrator.step(state, forces, self.time + run.substep * h, h)
             done("integrate")

@@ -31,6 +31,7 @@ class ChainPool(Pool):
         self.dtype = dtype
         self._claims = Claims()
         self._taken_up = self._under_way = False
+        self._blended = np.zeros(1, np.uint8)
 
     def pack(self, work: Work) -> None:
         """By colour, and within a colour long runs first, so that runs of a pack are as long as each other."""
@@ -89,20 +90,21 @@ class ChainPool(Pool):
         elif self._under_way:  # that frame was no good
             chain_rows.go_back(self._row, self._kept)
         self._torn.fill(0)
+        self._blended[0] = 0
         self._taken_up = self._under_way = True
 
     def before(self, work: Work, h: float) -> None:
         self._h = h
         chain_rows.prepare(
-            False, self._colour, self._start, self._node, self._holds, self._bowed, self._row, self._more, work.start,
-            work.predicted, work.back, work.weight, work.shift, *work.seam.period, h, self._claims(),
+            False, self._colour, self._start, self._node, self._holds, self._bowed, self._blended, self._row, self._more,
+            work.start, work.predicted, work.back, work.weight, work.shift, *work.seam.period, h, self._claims(),
         )  # fmt: skip
 
     def arrays(self) -> tuple[Array, ...]:
         """As `kernels.linked.Linked` has them."""
         return (
-            self._colour, self._start, self._node, self._holds, self._lanes, self._bowed, self._torn, self._row, self._more,
-            self._rooms, self._wide, self._claims(),
+            self._colour, self._start, self._node, self._holds, self._lanes, self._bowed, self._blended, self._torn,
+            self._row, self._more, self._rooms, self._wide, self._claims(),
         )  # fmt: skip
 
     def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
