@@ -123,6 +123,21 @@ def pack(origin, radius, first, count, pair_i, pair_j, used, begin, lanes, apart
 
 
 @kernel
+def _differ(values):
+    found = False
+    for i in range(values.shape[0]):
+        found |= values[i] != values[0]
+    return found
+
+
+@kernel
+def vary(inverse_mass, size, radius, restitution, friction):
+    """(varied, sized, mixed) of `tables.Law`: what is not the same for all circles."""
+    mixed = _differ(radius) or _differ(restitution) or _differ(friction)
+    return int(_differ(inverse_mass)), int(_differ(size)), int(mixed)
+
+
+@kernel
 def add_radii(begin, lanes, lane_i, lane_j, radius, reach):
     """reach: r_i + r_j."""
     for s in range(lanes.shape[0]):

@@ -95,11 +95,11 @@ class Grids:
             self._first = np.cumsum(count) - count
             self._own = np.empty((sum(count), 4), position.dtype)
             self._smaller = np.empty_like(self._own)
+            self._gap = min(float((BLOCK_ROWS / self.levels.along - 2 * self.levels.largest).min()), self._known)
         boxes = (self._first, self._own, self._smaller)
         grid.bound_displacements(position, built, self.order, self.levels, self.start, *boxes)
         near, far = grid.spreads(self.levels, *boxes)
-        gap = min((BLOCK_ROWS / self.levels.along - 2 * self.levels.largest).min(), self._known)
-        return min(skin - float(near), float(gap) - float(far))
+        return min(skin - float(near), self._gap - float(far))
 
 
 def _fit(position: Array, radius: Array, skin: float) -> grid.Levels:

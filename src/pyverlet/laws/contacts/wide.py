@@ -169,8 +169,8 @@ class Wide:
         """Bring the tables up to date with the sizes, masses and materials of now."""
         self._known = state.size, state.given
         size, inverse_mass, (e, mu) = state.size, state.inverse_mass, self._settings
-        self._varied, self._sized = int(_differ(inverse_mass)), int(_differ(size))
-        self._mixed = int(any(_differ(values) for values in (state.radius, state.restitution, state.friction)))
+        columns = inverse_mass, size, state.radius, state.restitution, state.friction
+        self._varied, self._sized, self._mixed = packs.vary(*columns)
         self.rubs = max(mu, state.most_friction) > 0.0
         self.asks = self.weighs or self._bears or self.rubs or max(e, state.most_restitution) > 0.0
         self.reach, self.share = np.full(LANES, size[0] + size[0]), np.full(LANES, self._dtype.type(0.5))
@@ -272,7 +272,3 @@ class Wide:
         """Note in `state.resting` who touches another."""
         sweeps.mark_touching(self.lanes, self.begin, self.lane_i, self.lane_j, self.normal, state.resting, self.cut())
         self.look_anew()
-
-
-def _differ(values: Array) -> bool:
-    return bool((values != values[0]).any())
