@@ -2,7 +2,9 @@
 
 One that has come joins two clusters, or none. Of one that has gone the question is whether its two circles still hang together by
 others. They mostly do, by way of a neighbour, and that is soon found; or one of them is left with nobody or a few, who become a
-cluster of their own. Where it takes longer to find out, all are joined anew. One thread: there is little to do.
+cluster of their own. Who was held together by those alone is asked when others of their contacts have gone in the same substep:
+whether these others' circles hang together with the one that the few have left first. Where it takes longer to find out, all are
+joined anew. One thread: there is little to do.
 """
 
 from __future__ import annotations
@@ -71,8 +73,8 @@ def _around(i, j, most, pairs, hanging):
 
 
 @kernel
-def _take_out(count, hanging):
-    """Those in `found` become a cluster of their own. False: without them the other would be without its root."""
+def _take_out(count, stays, hanging):
+    """Those in `found` become a cluster of their own, and leave `stays`. False: without them it would be without its root."""
     root, found, lowest = hanging.root, hanging.found, hanging.found[0]
     for k in range(count):
         if root[found[k]] == found[k]:
@@ -80,28 +82,40 @@ def _take_out(count, hanging):
         lowest = min(lowest, found[k])
     for k in range(count):
         root[found[k]] = lowest
+    hanging.left[lowest] = stays
     hanging.heads[hanging.sets[0]] = lowest
     hanging.sets[0] += 1
     return True
 
 
 @kernel
+def _stayed(i, hanging):
+    """Circle i, or, if it has been taken out in this substep, whom it has left, as far as that has not been taken out since."""
+    while hanging.left[hanging.root[i]] >= 0:
+        i = np.int64(hanging.left[hanging.root[i]])
+    return i
+
+
+@kernel
 def _part(i, j, pairs, hanging):
     """The pair i, j no longer touches. False: it is not known what follows."""
-    if hanging.root[i] != hanging.root[j]:  # what has been taken out since may have joined others
+    i, j = _stayed(i, hanging), _stayed(j, hanging)
+    if i == j:
+        return True
+    if hanging.root[i] != hanging.root[j]:
         return False
     for most in (_NEXT, AROUND):
-        count = _around(i, j, most, pairs, hanging)
+        count, stays = _around(i, j, most, pairs, hanging), j
         if count < 0:
-            count = _around(j, i, most, pairs, hanging)
+            count, stays = _around(j, i, most, pairs, hanging), i
         if count >= 0:
-            return count == 0 or _take_out(count, hanging)
+            return count == 0 or _take_out(count, stays, hanging)
     return False
 
 
 @kernel
-def _part_all(pairs, hanging):
-    """Pairs that no longer touch. False: all are to be joined anew."""
+def _part_each(pairs, hanging):
+    """One after the other."""
     changed, changes, begin, touch, lost = hanging.changed, hanging.changes, pairs.begin, hanging.touch, 0
     for s in range(changes.shape[0]):
         for m in range(begin[s] // LANES, begin[s] // LANES + changes[s]):
@@ -118,6 +132,16 @@ def _part_all(pairs, hanging):
                 if not _part(np.int64(pairs.lane_i[lane]), np.int64(pairs.lane_j[lane]), pairs, hanging):
                     return False
     return True
+
+
+@kernel
+def _part_all(pairs, hanging):
+    """Pairs that no longer touch. False: all are to be joined anew."""
+    before = hanging.sets[0]
+    known = _part_each(pairs, hanging)
+    for k in range(max(before, 0), hanging.sets[0]):
+        hanging.left[hanging.heads[k]] = -1
+    return known
 
 
 @kernel

@@ -46,7 +46,8 @@ class Hanging:
 
     root: (n,) the lowest member of each one's cluster; heads: (n,) those that are roots; sets: (2,) how many of them, -1: it is
     not known yet, and how often something was looked for. touch, changed: by pack, and changes: by strip: `kernels.loans.share`.
-    first: (n + 1,) and where: `kernels.hanging.list_lanes`. found: (k,), seen: (n,) scratch.
+    first: (n + 1,) and where: `kernels.hanging.list_lanes`. found: (k,), seen: (n,) scratch. left: (n,) whom the cluster of a
+    root was taken out of in this substep, else -1.
     """
 
     root: Any
@@ -59,6 +60,7 @@ class Hanging:
     where: Any
     found: Any
     seen: Any
+    left: Any
 
 
 class Terms(NamedTuple):

@@ -60,9 +60,10 @@ class Loans:
     def _unknown(self, lanes: Array, first: Array, packs: int, count: int) -> tuple[Array, ...]:
         """Of circles that hang together who knows how."""
         root, heads, seen = np.zeros((3, count), np.int32)
+        left = np.full(count, -1, np.int32)
         sets, changed = np.array([-1, 0]), np.empty(packs, np.int64)
         where, found = np.empty(2 * LANES * packs, np.int32), np.empty(hanging.AROUND, np.int64)
-        return root, heads, sets, np.zeros(packs, np.uint8), changed, np.zeros_like(lanes), first, where, found, seen
+        return root, heads, sets, np.zeros(packs, np.uint8), changed, np.zeros_like(lanes), first, where, found, seen, left
 
     def _hang(self, wide: Wide, count: int) -> None:
         """The list of pairs is new."""
