@@ -92,7 +92,7 @@ class Passing:
 
     def __init__(self, what: Linked, columns: int, *, single: bool) -> None:
         self._world, self._single = Pyverlet(what, threads=2).world, single
-        (self._group,) = self._world.groups()
+        (self._group,) = self._world.groups
         self._rng, self._columns, self._there = np.random.default_rng(1), columns, list[pv.Spring]()
 
     def _join(self, a: int | Array, b: int | Array) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet.compile.jit import kernel
+from pyverlet.compile.lanes import LANES
 
 _FREE = -1
 _GRID = 16
@@ -115,6 +116,47 @@ def colour_runs(first, particle, run_of, particles, colours, colour):
         for e in range(first[r], first[stop]):
             taken[particle[e]] |= one << np.uint64(c)
         r = stop
+
+
+@kernel
+def lay_out(given, ends, begin, length, run_at, start, source, node, place):
+    """Which row stands in each item of packs of runs, -1 for none, and which particle; and where each row stands first.
+
+    given, ends: rows, run after run, and (rows, 2) their particles; those of a run from its `begin` on. run_at: (packs, LANES).
+    """
+    for p in range(run_at.shape[0]):
+        for lane in range(LANES - 1, -1, -1):  # the last lanes may repeat a run
+            first, count = begin[run_at[p, lane]], length[run_at[p, lane]]
+            for n in range(start[p] + lane, start[p + 1], LANES):
+                step = (n - start[p]) // LANES
+                source[n] = -1
+                if step < count:
+                    source[n], node[n] = given[first + step], ends[first + step, 0]
+                    place[given[first + step]] = n
+                else:
+                    node[n] = ends[first + count - 1, 1]
+
+
+@kernel
+def number_pairs(pairs, particles):
+    """(k,) a number for each of the (k, 2) pairs i, j, the same as for j, i."""
+    number = np.empty(pairs.shape[0], np.int64)
+    for k in range(pairs.shape[0]):
+        i, j = pairs[k, 0], pairs[k, 1]
+        number[k] = min(i, j) * particles + max(i, j)
+    return number
+
+
+@kernel
+def numbered_pairs(number, particles):
+    """(k, 2) the pairs i < j of these numbers, which are sorted, each once."""
+    pairs, count, last = np.empty((number.shape[0], 2), np.int64), 0, np.int64(-1)
+    for k in range(number.shape[0]):
+        if number[k] != last:
+            last = number[k]
+            pairs[count, 0], pairs[count, 1] = last // particles, last % particles
+            count += 1
+    return pairs[:count].copy()
 
 
 @kernel

@@ -42,7 +42,7 @@ class ChainPool(Pool):
         runs.colour_runs(self.first, ends.ravel(), run_of, len(work), LINK_COLOURS, colour)
         length = np.bincount(run_of, minlength=number)
         alone = colour == LINK_COLOURS - 1  # these may share particles: each is a pack, and a colour, of its own
-        order = np.lexsort((np.where(alone, 0, -length), colour))
+        order = np.argsort(colour * (count + 1) - np.where(alone, 0, length), kind="stable")
         rank = np.arange(number) - np.searchsorted(colour[order], colour[order])
         lane = np.where(alone[order], 0, rank % LANES)
         opens = np.flatnonzero(lane == 0)
@@ -53,9 +53,9 @@ class ChainPool(Pool):
         new = (np.diff(colour[order][opens], prepend=-1) != 0) | alone[order][opens]
         self._colour = np.append(np.flatnonzero(new), len(opens))
         self.colours = len(self._colour) - 1
-        self._lay_out(given, ends, run_at, longest, length)
-        self._place = np.empty(count, np.int64)
-        self._place[self._source[self._source >= 0][::-1]] = np.flatnonzero(self._source >= 0)[::-1]
+        begin, items = np.cumsum(length) - length, int(self._start[-1])
+        self._source, self._node, self._place = np.empty(items, np.int64), np.empty(items, np.uint32), np.empty(count, np.int64)
+        runs.lay_out(given, ends, begin, length, run_at, self._start, self._source, self._node, self._place)
         self._row = np.zeros(chain_rows.ROW * len(self._source), self.dtype)
         self._more = np.zeros(chain_rows.EXTRA * len(self._source), self.dtype)
         self._kept = np.zeros(chain_rows.KEPT * len(self._source), self.dtype)
@@ -64,19 +64,6 @@ class ChainPool(Pool):
         items = LANES * (int(longest.max(initial=0)) + 1)
         self._rooms, self._wide = np.zeros((parts, chains.SCRATCH * items), self.dtype), np.zeros((parts, chains.WIDE * items))
         self.stale, self.changed, self._taken_up = False, True, False
-
-    def _lay_out(self, given: Array, ends: Array, run_at: Array, longest: Array, length: Array) -> None:
-        """Which row stands in each item, -1 for none, and which particle.
-
-        given: rows, run after run; ends: (rows, 2) their particles.
-        """
-        begin = np.concatenate((np.zeros(1, np.int64), np.cumsum(length)))
-        pack, step = _within(longest + 1)
-        run, step = run_at[pack], step[:, None]
-        source = np.where(step < length[run], given[np.minimum(begin[run] + step, len(given) - 1)], -1)
-        step = np.minimum(step, length[run])
-        node = ends[begin[run] + np.minimum(step, length[run] - 1), (step == length[run]).astype(int)]
-        self._source, self._node = source.ravel(), node.astype(np.uint32).ravel()
 
     def begin(self) -> None:
         source, rows = self._source, self.rows
@@ -165,9 +152,3 @@ def _place(order: Array, opens: Array) -> Array:
     end = np.append(opens[1:], len(order))
     where = np.minimum(opens[:, None] + np.arange(LANES), end[:, None] - 1)
     return np.asarray(order[where])
-
-
-def _within(count: Array) -> tuple[Array, Array]:
-    """Of so many items each: which each belongs to, and its number within."""
-    owner = np.repeat(np.arange(len(count)), count)
-    return owner, np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)

@@ -358,9 +358,9 @@ class Links:
         for pool in self._order:
             here, row = pool.lines()
             pairs.append(here[pool.rows["collide"][row] == 0])
-        both, count = np.sort(np.concatenate(pairs), axis=1), max(len(self._state), 1)
-        number = np.sort(both[:, 0] * count + both[:, 1])  # one number for each pair: sorted twenty times as fast
-        return np.column_stack(np.divmod(number[np.diff(number, prepend=-1) > 0], count))
+        count = max(len(self._state), 1)
+        number = np.sort(runs.number_pairs(np.concatenate(pairs), count))  # one for each pair: sorted twenty times as fast
+        return np.asarray(runs.numbered_pairs(number, count))
 
     # ---- save and restore ----------------------------------------------------------------------------------------------
 
