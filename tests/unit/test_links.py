@@ -91,6 +91,35 @@ def test_saving_continues_with_the_same_bits() -> None:
     assert world.state_hash() == ends[0][0]
 
 
+def test_a_frame_that_is_refused_leaves_links_as_they_were() -> None:
+    class Now:
+        bad = False
+
+        def apply(self, state: Any, t: float) -> None:
+            state.force[4] += (np.nan, 0.0) if self.bad and t > 0.51 else (0.0, 0.0)
+
+    ends = []
+    for refused in (False, True):
+        now, world = Now(), pv.World(collisions=None)
+        group = world.add(position=np.column_stack((0.4 * np.arange(9), np.zeros(9))), radius=0.1, mass=0.2)
+        group.pin([0])
+        stick = world.links.append(pv.Stick(group, range(4), range(1, 5)))
+        spring = world.links.append(pv.Spring(group, range(4, 8), range(5, 9), stiffness=80.0, damping=0.1))
+        world.forces.append(now)
+        world.run(seconds=0.5)
+        if refused:
+            before = stick.force, spring.force
+            now.bad = True
+            with pytest.raises(pv.NonFiniteError):
+                world.step(DT)
+            now.bad = False
+            assert (stick.force == before[0]).all()
+            assert (spring.force == before[1]).all()
+        world.run(seconds=0.3)
+        ends.append((world.state_hash(), stick.force.tobytes(), spring.force.tobytes()))
+    assert ends[0] == ends[1]
+
+
 @pytest.mark.parametrize("seed", [0, 2, 5])
 def test_saving_continues_with_the_same_bits_once_a_chain_has_broken(seed: int) -> None:
     rng = np.random.default_rng(seed)
