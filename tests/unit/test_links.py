@@ -91,6 +91,21 @@ def test_saving_continues_with_the_same_bits() -> None:
     assert world.state_hash() == ends[0][0]
 
 
+def test_links_go_on_when_somebody_joins_the_world() -> None:
+    ends = []
+    for joined in (False, True):
+        world = pv.World(collisions=None)
+        group = world.add(position=np.column_stack((0.4 * np.arange(5), np.zeros(5))), radius=0.1, mass=0.2)
+        group.pin([0])
+        spring = world.links.append(pv.Spring(group, range(4), range(1, 5), stiffness=80.0, damping=0.1))
+        world.run(seconds=0.5)
+        if joined:  # nobody has asked for the forces since
+            world.add(position=[(9.0, 9.0)], radius=0.1)
+        world.step(DT)
+        ends.append((spring.force.tobytes(), world.position[:5].tobytes()))
+    assert ends[0] == ends[1]
+
+
 def test_a_frame_that_is_refused_leaves_links_as_they_were() -> None:
     class Now:
         bad = False

@@ -35,6 +35,7 @@ class ChainPool(Pool):
 
     def pack(self, work: Work) -> None:
         """By colour, and within a colour long runs first, so that runs of a pack are as long as each other."""
+        self.rows.write()  # from what is packed otherwise from now on
         count, self._ends = len(self.rows), work.compact[self.entries["particle"]].reshape(-1, 2)
         given, ends, run_of = np.empty(count, np.int64), np.empty_like(self._ends), np.empty(count, np.int64)
         number = runs.find_runs(self._ends, self.rows["intact"], len(work), given, ends, run_of)
