@@ -37,8 +37,8 @@ class Distance(Link):
         super().__init__(state, particles)
         count = len(particles)
         if length is None:
-            a, b = state.position[particles[:, 0]].astype(np.float64), state.position[particles[:, 1]].astype(np.float64)
-            self._length: Floats = np.hypot(*state.seam.nearest(b - a).T)
+            places = state.position[particles].astype(np.float64)
+            self._length: Floats = np.hypot(*state.seam.nearest(places[:, 1] - places[:, 0]).T)
         else:
             self._length = several(kind, "length", length, count)
         self._stiffness = stiffness_of(kind, count, stiffness, compliance)

@@ -40,6 +40,8 @@ def parse(kind: str, ends: tuple[Any, ...], names: tuple[str, ...]) -> tuple[Sta
     joined = np.empty((max(map(len, columns)), len(columns)), np.int64)
     for n, column in enumerate(columns):
         joined[:, n] = column
+    if len(joined) == 1 and len(set(joined[0].tolist())) == len(names):
+        return state, joined
     for a in range(len(names)):
         for b in range(a):
             same = joined[:, a] == joined[:, b]
