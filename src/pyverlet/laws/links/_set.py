@@ -110,6 +110,8 @@ class Links:
     @property
     def _order(self) -> list[Pool]:
         """The pools as they are solved. Removed links leave them when somebody asks: many take no longer than one."""
+        if not self._leaving:
+            return self._sorted
         leaving, self._leaving = self._leaving, {}
         for pool, owners in leaving.items():
             pool.keep(~np.isin(pool.rows["owner"], owners))
