@@ -66,3 +66,18 @@ def test_beside_what_is_asked_in_a_sentence(options: list[str], said: str) -> No
     assert run.returncode != 0
     assert said in run.stderr
     assert "Traceback" not in run.stderr
+
+
+@pytest.mark.slow
+def test_links_that_come_and_go_are_as_many_as_stay() -> None:
+    code = """
+from benchmarks.linked_frames import PER_FRAME, STAY, Passing
+from benchmarks.links import cloth
+for single in (False, True):
+    world = Passing(cloth(10, 6, 3), 10, single=single)
+    kept = sum(map(len, world._world.links))
+    for _ in range(STAY + 5):
+        world.step()
+    assert sum(map(len, world._world.links)) == kept + STAY * PER_FRAME
+"""
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, timeout=300, check=True)

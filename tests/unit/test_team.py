@@ -41,6 +41,19 @@ def run(team: Team, cores: int, machine: Machine, frames: int, seed: int) -> tup
     return used, times[1:]
 
 
+def test_a_trial_is_put_off_while_frames_say_nothing() -> None:
+    team, frames = Team(), 0
+    while team.size(2, 1.0) == 2:  # until one thread is tried
+        frames += 1
+        assert frames < 100
+    assert team.size(2, 1.9) == 1
+    assert [team.size(2, 0.0) for _ in range(5)] == [2] * 5
+    assert team.size(2, 1.0) == 1  # it begins anew
+    used = [team.size(2, 1.9) for _ in range(20)]
+    assert used == sorted(used)
+    assert used[-1] == 2
+
+
 @pytest.mark.parametrize(("cores", "most"), [(2, 1.05), (4, 1.1), (16, 1.1)])
 @pytest.mark.parametrize("seed", [0, 1, *(pytest.param(each, marks=pytest.mark.slow) for each in range(2, 5))])
 def test_a_quiet_machine_is_used(cores: int, most: float, seed: int) -> None:

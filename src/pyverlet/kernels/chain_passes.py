@@ -59,7 +59,6 @@ def passes(
         True, colour, start, node, holds, bowed, blended, row, more, begun, predicted, back, weight, shift, period_x, period_y,
         h, claims,
     )  # fmt: skip
-
     several = colour.shape[0] > 2
     turns = times if several else 1
     for turn in range(turns):

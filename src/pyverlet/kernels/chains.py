@@ -76,8 +76,8 @@ _NX, _NY, _RIGHT, _ACTIVE, _MX, _MY, _STEP, _BOW = range(0, LANES * _SPARE, LANE
 direction over the length, two of elimination, and lam before. After those of all rows stands what only packs need that have
 ropes or are bowed: the direction, right, who pulls, the move of the node, the step of lam, and `bow`."""
 
-_ZED, _TURNS, _I = 0, LANES, 2 * LANES
-"""And in float64 of what is bowed: what either force is without that of the next row, and the inverse of what gives, a 2 x 2."""
+_ALONG, _ACROSS, _I = 0, LANES, 2 * LANES
+"""And in float64 of what is bowed: the forces along and across as they are without that of the next row, and K^-1, a 2 x 2."""
 
 SCRATCH, WIDE = _PLAIN + _SPARE, 6
 """Numbers for each item of one pack, in the dtype of the rows and in float64."""
@@ -184,8 +184,8 @@ def _eliminate_bowed(begin, end, row, room, wide):
         along, across = pulls * (widen(load(room, too + _RIGHT)) + nx * yx + ny * yy), nx * yy - ny * yx
         z, turns = i00 * along + i01 * across, i10 * along + i11 * across
         broad = WIDE * (k - begin)
-        store(wide, broad + _ZED, z)
-        store(wide, broad + _TURNS, turns)
+        store(wide, broad + _ALONG, z)
+        store(wide, broad + _ACROSS, turns)
         store(wide, broad + _I, i00)
         store(wide, broad + _I + LANES, i01)
         store(wide, broad + _I + 2 * LANES, i10)
@@ -205,8 +205,8 @@ def _eliminate_bowed(begin, end, row, room, wide):
         along, across = pulls * (w * (nx * fx + ny * fy)), w * (nx * fy - ny * fx)
         i00, i01 = load(wide, broad + _I), load(wide, broad + _I + LANES)
         i10, i11 = load(wide, broad + _I + 2 * LANES), load(wide, broad + _I + 3 * LANES)
-        step = load(wide, broad + _ZED) + i00 * along + i01 * across
-        turns = pulls * widen(load(room, too + _BOW)) * (load(wide, broad + _TURNS) + i10 * along + i11 * across)
+        step = load(wide, broad + _ALONG) + i00 * along + i01 * across
+        turns = pulls * widen(load(room, too + _BOW)) * (load(wide, broad + _ACROSS) + i10 * along + i11 * across)
         step = where_zero(pulls, zero - widen(load(room, to + _LAM)), step)
         bx, by = dx * step - ny * turns, dy * step + nx * turns
         store(room, too + LANES * _SPARE + _MX, lanes_like(w * (bx - fx), row))
@@ -222,7 +222,7 @@ def _eliminate_bowed(begin, end, row, room, wide):
 def _move(bowed, keeps, begin, end, node, row, shift, room):
     """Back from the last row to the first: the steps of lam, and nodes go where these lead. Which lanes' links it turns too far.
 
-    bowed: steps and moves are known already, by `_eliminate_nodes`.
+    bowed: steps and moves are known already, by `_eliminate_bowed`.
     """
     real = row.dtype.type
     zero, limit = spread(real(0)), spread(real(LINK_TURN if end - begin > LANES else np.inf))

@@ -115,7 +115,7 @@ def _part(i, j, pairs, hanging):
 
 @kernel
 def _part_each(pairs, hanging):
-    """One after the other."""
+    """`_part_all`, one after the other; whom clusters have left is remembered."""
     changed, changes, begin, touch, lost = hanging.changed, hanging.changes, pairs.begin, hanging.touch, 0
     for s in range(changes.shape[0]):
         for m in range(begin[s] // LANES, begin[s] // LANES + changes[s]):

@@ -15,6 +15,7 @@ import numpy as np
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.compile.lanes import ALL, LANES, larger, pick, spread, store, take, which_above
 from pyverlet.ground.constants import CLOSE
+from pyverlet.kernels.motion import differs
 
 # Golden angle, rad: coincident centres part in directions spread evenly over the circle.
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
@@ -123,18 +124,11 @@ def pack(origin, radius, first, count, pair_i, pair_j, used, begin, lanes, apart
 
 
 @kernel
-def _differ(values):
-    found = False
-    for i in range(values.shape[0]):
-        found |= values[i] != values[0]
-    return found
-
-
-@kernel
 def vary(inverse_mass, size, radius, restitution, friction):
     """(varied, sized, mixed) of `tables.Law`: what is not the same for all circles."""
-    mixed = _differ(radius) or _differ(restitution) or _differ(friction)
-    return int(_differ(inverse_mass)), int(_differ(size)), int(mixed)
+    varied, sized = differs(inverse_mass[:1], inverse_mass), differs(size[:1], size)
+    mixed = differs(radius[:1], radius) or differs(restitution[:1], restitution) or differs(friction[:1], friction)
+    return int(varied), int(sized), int(mixed)
 
 
 @kernel

@@ -26,13 +26,12 @@ class Bodies(NamedTuple):
 class About(NamedTuple):
     """What else is known of them, by slot but for the last two, which are in the user's order.
 
-    root: (n,) of the cluster of each; before, pull: (n, 2) N, what forces with a potential do to each beside gravity, at the
-    start of the frame and now, or empty. hits: as in `Slots`. order: (n,) the user's index. inside: (n,) whether it was above the
-    wall that gravity points to; share: (n,) J that links hold more of than at the start, or empty.
+    root: (n,) of the cluster of each; pull: (n, 2) N, what forces with a potential do to each beside gravity now, or empty. hits:
+    as in `Slots`. order: (n,) the user's index. inside: (n,) whether it was above the wall that gravity points to; share: (n,) J
+    that links hold more of than at the start, or empty.
     """
 
     root: Any
-    before: Any
     pull: Any
     hits: Any
     order: Any
@@ -55,14 +54,14 @@ class Limits(NamedTuple):
     rounded: Any
 
 
+_COLUMNS = 24
+
 (
     _COUNT, _HIT, _GAIN, _MASS, _X, _Y, _PX, _PY, _PUSH_X, _PUSH_Y, _SCALE, _TURN, _INERTIA, _WITHIN, _AS_ONE, _ALONG, _LIFT,
     _DRIFT_X, _DRIFT_Y, _SLOW_WITHIN, _SLOWER, _ACROSS, _LEFT, _PUSHED,
-) = range(24)  # fmt: skip
+) = range(_COLUMNS)  # fmt: skip
 """What is known of a cluster. Of momenta, places and so on first sums, then means. _WITHIN: J of its motion beside that as a
 whole, _AS_ONE: J of that but for its drift across what has pushed it, _ALONG: J of that. _LEFT: J still to be taken."""
-
-_COLUMNS = 24
 
 
 @kernel
@@ -86,7 +85,7 @@ def _kinetic(bodies, i, m):
 
 
 @kernel
-def number_clusters(root):
+def _number_clusters(root):
     """((n,) number of the cluster of each, how many): roots are the lowest of their clusters."""
     cluster, count = np.empty(root.shape[0], np.int64), 0
     for k in range(root.shape[0]):
@@ -108,15 +107,18 @@ def _pull(pull, k, m, limits):
 
 
 @kernel
-def raised(then, now, about, limits, lift, moved):
-    """lift: (n,) J, the work of each against gravity and forces in this frame, by the trapezoidal rule; moved: (n, 2) m."""
+def raised(then, now, order, before, pull, limits, lift, moved):
+    """lift: (n,) J, the work of each against gravity and forces in this frame, by the trapezoidal rule; moved: (n, 2) m.
+
+    before, pull: as `About.pull`, at the start of the frame and now.
+    """
     for k in range(lift.shape[0]):
-        i, m = about.order[k], _free(now.mass[k])
+        i, m = order[k], _free(now.mass[k])
         for axis in range(2):
             period = limits.period_x if axis == 0 else limits.period_y
             moved[k, axis] = nearest(np.float64(now.position[k, axis]) - np.float64(then.position[i, axis]), period)
-        ax, ay = _pull(about.before, k, m, limits)
-        bx, by = _pull(about.pull, k, m, limits)
+        ax, ay = _pull(before, k, m, limits)
+        bx, by = _pull(pull, k, m, limits)
         lift[k] = -0.5 * ((ax + bx) * moved[k, 0] + (ay + by) * moved[k, 1])
 
 
@@ -231,17 +233,15 @@ def _take_as_a_whole(now, about, limits, cluster, velocity, lift, of):
 
 
 @kernel
-def take(then, now, about, limits, cluster, clusters, lift, moved, lower, part):
+def take(then, now, about, limits, lift, moved, lower, part):
     """Take what is too much: from velocities and spins at once, and the rest as the `part` (n,) of what they have been raised by
     which circles are to be lowered: to `lower`, (n, 2) m. (n,) bool: of whom there was more than motion could give.
     """
+    cluster, clusters = _number_clusters(about.root)
     of, velocity, more = np.zeros((clusters, _COLUMNS)), np.empty_like(moved), np.zeros(cluster.shape[0], np.bool_)
     place = lower
     _sum_up(then, now, about, limits, cluster, lift, place, of)
     _share_out(limits, of)
-    taken = np.zeros(clusters, np.bool_)
-    for c in range(clusters):
-        taken[c] = of[c, _LEFT] > 0.0
     _take_within(now, cluster, place, velocity, of)
     _find_drift(limits, of)
     _take_as_a_whole(now, about, limits, cluster, velocity, lift, of)
@@ -249,7 +249,7 @@ def take(then, now, about, limits, cluster, clusters, lift, moved, lower, part):
     for k in range(cluster.shape[0]):
         own, m = of[cluster[k]], _free(now.mass[k])
         now.spin[k] *= real(own[_SLOWER])
-        if taken[cluster[k]] and m > 0.0:
+        if own[_GAIN] > 0.0 and m > 0.0:
             x, y = own[_DRIFT_X], own[_DRIFT_Y]
             now.velocity[k, 0] = real(own[_ACROSS] * x + own[_SLOWER] * (velocity[k, 0] - x))
             now.velocity[k, 1] = real(own[_ACROSS] * y + own[_SLOWER] * (velocity[k, 1] - y))
@@ -260,5 +260,5 @@ def take(then, now, about, limits, cluster, clusters, lift, moved, lower, part):
         # Near where a spring pulls to it is no further than the way.
         drop = part[k] * min(lift[k] / strength, way) / strength if strength > 0.0 else 0.0
         lower[k, 0], lower[k, 1] = np.float64(now.position[k, 0]) + drop * fx, np.float64(now.position[k, 1]) + drop * fy
-        more[k] = own[_LEFT] > 0.0 and taken[cluster[k]] and m > 0.0 and strength > 0.0
+        more[k] = own[_LEFT] > 0.0 and m > 0.0 and strength > 0.0
     return more

@@ -115,20 +115,19 @@ class Watch:
 
     def take_back(self, slots: Slots, listed: Listed, surplus: float) -> Array:
         """Take so many J from those who have gained in this frame. (n,) bool: who had more than could be taken of motion."""
-        start, none = self._start, np.zeros(0)
+        start = self._start
         before, pull = self._pulls(slots)
         then = taking.Bodies(start.position, start.velocity, start.spin, start.radius, start.mass)
         now = taking.Bodies(slots.position, slots.velocity, slots.spin, slots.radius, slots.mass)
         limits = taking.Limits(
             surplus, self._dt, self._gravity, *slots.seam.period, bool(self._forces.forces), bool(self._kept), _ROUNDED,
         )  # fmt: skip
-        about = taking.About(np.zeros(0, np.int64), before, pull, slots.hits, slots.particle, self._was_inside(), none)
         lift, part, moved, lower = np.empty(len(slots)), np.empty(len(slots)), *np.empty((2, len(slots), 2))
-        taking.raised(then, now, about, limits, lift, moved)
-        root = self._clusters(slots, listed, moved)
-        about = about._replace(root=root, share=self._links.gains(start.position, slots.where()) if self._links else none)
-        cluster, count = taking.number_clusters(root)
-        more = taking.take(then, now, about, limits, cluster, count, lift, moved, lower, part)
+        taking.raised(then, now, slots.particle, before, pull, limits, lift, moved)
+        share = self._links.gains(start.position, slots.where()) if self._links else np.zeros(0)
+        root, inside = self._clusters(slots, listed, moved), self._was_inside()
+        about = taking.About(root, pull, slots.hits, slots.particle, inside, share)
+        more = taking.take(then, now, about, limits, lift, moved, lower, part)
         if slots.size is not slots.radius:
             slots.grown -= (part * (slots.grown - start.grown[slots.particle])).astype(slots.dtype)
             slots.resize()

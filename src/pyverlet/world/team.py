@@ -70,6 +70,9 @@ class Team:
             self._begin(most)
         elif most > 1 and frame_ms > 0.0:
             self._learn(frame_ms)
+        else:  # such frames come one after the other: what is on trial would be used as long
+            self._other = self._now
+            self._trial.clear()
         return self._steps[self._other]
 
     def _begin(self, most: int) -> None:
