@@ -57,6 +57,7 @@ class Team:
 
     def __init__(self) -> None:
         self._most = 0
+        self._now = self._other = 0  # places in `_steps`: of the number in use, and of one on trial, if another
 
     def gather(self, most: int, frame_ms: float) -> None:
         """Have the kernels of the next frame use as many as seem best."""
@@ -78,7 +79,7 @@ class Team:
     def _begin(self, most: int) -> None:
         """As many as there may be, until something is known."""
         self._most, self._steps = most, ladder(most)
-        self._now = self._other = len(self._steps) - 1  # in use; on trial, if another
+        self._now = self._other = len(self._steps) - 1
         self._recent: deque[float] = deque(maxlen=_KEPT)
         self._trial: deque[float] = deque(maxlen=_RUN)
         self._fewer: float | None = None  # cost of the next smaller number, as of the last trial
