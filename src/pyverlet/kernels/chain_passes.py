@@ -1,10 +1,10 @@
-"""Passes over the packs of `kernels.chains`: colour by colour, there and back."""
+"""One pass over the packs of `kernels.chains`, colour by colour."""
 
 from __future__ import annotations
 
 from pyverlet.compile.jit import driver, parallel_kernel, prange
 from pyverlet.compile.stealing import claim_evenly, none_claimed
-from pyverlet.kernels.chain_rows import SOFTS, note_pack, prepare, prepare_pack
+from pyverlet.kernels.chain_rows import SOFTS, note_pack, prepare_pack
 from pyverlet.kernels.chains import solve_pack
 
 
@@ -28,42 +28,20 @@ def _solve(
 
 
 @driver
-def sweep(
-    homeward, skip, prepares, notes, colour, start, node, holds, lanes, bowed, torn, row, more, shift, h, rooms, wide, claims,
-    begun, predicted, back, weight, period_x, period_y,
-):  # fmt: skip
+def sweep(homeward, skip, prepares, notes, linked, linking):
     """Solve all packs, colour by colour or `homeward` from the last one, without the first colour on the way if `skip`.
 
     Colour c is packs colour[c] to colour[c + 1], which share no particle. rooms, wide: (parts, SCRATCH or WIDE times the items of
     the longest pack): as many packs are solved beside each other. claims: see `compile.stealing`. prepares: hard ones are
-    prepared on the way; notes: their force is noted, and who breaks, if they do not come again (`chain_rows.note_pack`). So rows
-    are not fetched for that once more.
+    prepared on the way; notes: their force is noted, and who breaks, if they do not come again (`chain_rows.note_pack`), as on
+    the way out only the last colour does not. So rows are not fetched for that once more.
     """
-    colours = colour.shape[0] - 1
+    colour, colours = linked.colour, linked.colour.shape[0] - 1
     for n in range(1 if skip else 0, colours):
         c = colours - 1 - n if homeward else n
-        none_claimed(claims)
+        none_claimed(linked.claims)
         _solve(
-            prepares, notes and (homeward or c == colours - 1), colour[c], colour[c + 1], start, node, holds, lanes, bowed, torn,
-            row, more, shift, h, rooms, wide, claims, begun, predicted, back, weight, period_x, period_y,
+            prepares, notes and (homeward or c == colours - 1), colour[c], colour[c + 1], linked.begin, linked.node, linked.holds,
+            linked.lanes, linked.bowed, linked.torn, linked.row, linked.more, linked.shift, linking.h, linked.rooms, linked.wide,
+            linked.claims, linked.start, linked.predicted, linked.back, linked.weight, linking.period_x, linking.period_y,
         )  # fmt: skip
-
-
-@driver
-def passes(
-    times, colour, start, node, holds, lanes, bowed, blended, torn, row, more, shift, h, rooms, wide, claims, begun, predicted,
-    back, weight, period_x, period_y,
-):  # fmt: skip
-    """There and back so many times, from the lam that rows start from; once, one way, where there is a single colour."""
-    prepare(
-        True, colour, start, node, holds, bowed, blended, row, more, begun, predicted, back, weight, shift, period_x, period_y,
-        h, claims,
-    )  # fmt: skip
-    several = colour.shape[0] > 2
-    turns = times if several else 1
-    for turn in range(turns):
-        for homeward in range(2 if several else 1):
-            sweep(
-                homeward, homeward, turn + homeward == 0, turn == turns - 1, colour, start, node, holds, lanes, bowed, torn, row,
-                more, shift, h, rooms, wide, claims, begun, predicted, back, weight, period_x, period_y,
-            )  # fmt: skip

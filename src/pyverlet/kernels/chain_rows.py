@@ -167,14 +167,13 @@ def prepare_pack(fresh, p, start, node, holds, row, more, begun, predicted, back
 
 @parallel_kernel
 def _prepare(
-    fresh, soft, first, stop, start, node, holds, bowed, row, more, begun, predicted, back, weight, shift, period_x, period_y, h,
-    claims,
+    fresh, first, stop, start, node, holds, bowed, row, more, begun, predicted, back, weight, shift, period_x, period_y, h, claims
 ):  # fmt: skip
     for part in prange(claims.shape[0]):
         k = claim_evenly(claims, stop - first, part)
         while k >= 0:
             p = first + k
-            if holds[p] & SOFTS or not soft:
+            if holds[p] & SOFTS:
                 bowed[p] = prepare_pack(
                     fresh, p, start, node, holds, row, more, begun, predicted, back, weight, shift, period_x, period_y, h
                 )
@@ -182,25 +181,24 @@ def _prepare(
 
 
 @driver
-def prepare(
-    soft, colour, start, node, holds, bowed, blended, row, more, begun, predicted, back, weight, shift, period_x, period_y, h,
-    claims,
-):  # fmt: skip
-    """Every row's equation, length = goal - give lam, and which packs resist being turned; or only those of `soft` packs.
+def prepare_soft(linked, linking):
+    """Every row's equation, length = goal - give lam, in packs that give, and which of them resist being turned.
 
-    From where a substep has `begun`, the way `back` from there to a substep before, and where the integrator has put all.
-    Nodes move by the lam their rows start from, in `shift`, so colour by colour. blended: [1] if springs have been in this frame.
+    From where a substep has begun, the way back from there to a substep before, and where the integrator has put all. Nodes
+    move by the lam their rows start from, in `shift`, so colour by colour. blended: [1] if springs have been in this frame.
     """
-    fresh, blended[0] = blended[0] == 0, 1
+    colour, holds = linked.colour, linked.holds
+    fresh, linked.blended[0] = linked.blended[0] == 0, 1
     for c in range(colour.shape[0] - 1):
-        some = not soft
+        some = False
         for p in range(colour[c], colour[c + 1]):
             some |= (holds[p] & SOFTS) != 0
         if some:
-            none_claimed(claims)
+            none_claimed(linked.claims)
             _prepare(
-                fresh, soft, colour[c], colour[c + 1], start, node, holds, bowed, row, more, begun, predicted, back, weight,
-                shift, period_x, period_y, h, claims,
+                fresh, colour[c], colour[c + 1], linked.begin, linked.node, holds, linked.bowed, linked.row, linked.more,
+                linked.start, linked.predicted, linked.back, linked.weight, linked.shift, linking.period_x, linking.period_y,
+                linking.h, linked.claims,
             )  # fmt: skip
 
 
@@ -229,13 +227,6 @@ def note_pack(p, start, holds, row, more, torn, h):
             store(row, here + GIVE, where_above(size, strength, broken, give))
     if snaps != 0:
         torn[p] = 1
-
-
-@parallel_kernel
-def note(start, holds, row, more, torn, h):
-    """`note_pack` of all packs."""
-    for p in prange(start.shape[0] - 1):
-        note_pack(p, start, holds, row, more, torn, h)
 
 
 # ---- between the tables of the user's links and the packs ---------------------------------------------------------------------

@@ -22,6 +22,7 @@ from pyverlet.kernels.cage import hold
 from pyverlet.kernels.drive import drive, drive_called
 from pyverlet.kernels.kinds import for_each_kind
 from pyverlet.kernels.lending import Hanging, Lending, Terms, even_up, join, leave_out, lend, set_aside, settle
+from pyverlet.kernels.link_rows import Rows
 from pyverlet.kernels.linked import Linked, Linking, look, look_alone, note_pull, note_pull_alone, solve, solve_alone
 from pyverlet.kernels.measure import mechanical
 from pyverlet.kernels.meetings import collide
@@ -89,7 +90,7 @@ class Services(NamedTuple):
     force, period_x, period_y), and ahead. course: what `meetings.collide` takes, (segments, bodies, cells, walls, along, rest,
     drop). mass: (n,) kg. energies: (substeps, LOOKS) J, becomes what `measure.mechanical` says after the integration of each
     substep, but of the one that is handed back, and of the first unless it opens; after its contacts, links and so on; without
-    links at its end only. links: what `kernels.linked` takes, its arrays and numbers, where there are any; loans: what
+    links at its end only. links: what `kernels.linked` takes, its arrays, rows and numbers, where there are any; loans: what
     `kernels.lending` takes; empty where nobody lends. began: when the frame did, s.
     """
 
@@ -202,7 +203,8 @@ def _substeps(
         lends = services.loans[0][0].shape[0] > 0
         begins = begins or segments.shape[0] > 0
     if LINKED:
-        linked, linking = Linked(*borrowed(services.links[0])), Linking(*services.links[1])
+        linked, rows = Linked(*borrowed(services.links[0])), Rows(*borrowed(services.links[1]))
+        linking = Linking(*services.links[2])
     integrates = start.opens != 0
     if LINKED and integrates:
         look(linked, linking, circles.position, circles.velocity, circles.inverse_mass)
@@ -242,7 +244,7 @@ def _substeps(
             _look_at_energy(energies, substep, TOUCHED, circles, mass, lag, down, spent, clock)
             if lends:
                 set_aside(circles, loans)
-            solve(linked, linking, circles.position, circles.velocity)
+            solve(linked, rows, linking, circles.position, circles.velocity)
             if lends:
                 leave_out(circles, loans)
             note(spent, LINKS, clock[0], clock[1])

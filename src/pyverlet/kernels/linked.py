@@ -1,7 +1,8 @@
 """What links do in a substep, each part of it one call: `look` before the integrator moves, `solve` after the contacts, and
 `note_pull` when velocities are done.
 
-For links of two particles' distance, and pins; rows of other kinds have Python call the same stages one by one.
+The law is that of `kernels.links`: pins first (`ties`), then passes over runs of distances (`chains`) and all other rows
+(`link_rows`), there and back, for one way only the links about a common particle throw it in a circle, faster and faster.
 """
 
 from __future__ import annotations
@@ -10,7 +11,9 @@ from typing import Any, NamedTuple
 
 from pyverlet.compile.bundle import bundle
 from pyverlet.compile.jit import driver, kernel, variant
-from pyverlet.kernels.chain_passes import passes
+from pyverlet.kernels.chain_passes import sweep
+from pyverlet.kernels.chain_rows import prepare_soft
+from pyverlet.kernels.link_rows import Rows, note_rows, prepare_rows, sweep_rows
 from pyverlet.kernels.links import add_pull, hand_back, look_back, set_out
 from pyverlet.kernels.ties import note_ties, tie
 
@@ -75,7 +78,25 @@ def look(linked, linking, position, velocity, inverse_mass):
 
 
 @driver
-def solve(linked, linking, position, velocity):
+def _passes(linked, rows, linking):
+    """There and back so many times, from the lam that rows start from; once, one way, where there is a single colour."""
+    h, period_x, period_y = linking.h, linking.period_x, linking.period_y
+    prepare_soft(linked, linking)
+    prepare_rows(rows, linked, period_x, period_y, h)
+    colours, parts = linked.colour.shape[0] - 1, rows.part.shape[0] - 1
+    several = colours + parts > 1
+    turns = linking.times if several else 1
+    for turn in range(turns):
+        last = turn == turns - 1
+        sweep(False, False, turn == 0, last and parts == 0, linked, linking)
+        sweep_rows(False, False, rows, linked, period_x, period_y)
+        if several:  # without what has just been solved
+            sweep_rows(True, True, rows, linked, period_x, period_y)
+            sweep(True, parts == 0, False, last, linked, linking)
+
+
+@driver
+def solve(linked, rows, linking, position, velocity):
     """Move the linked particles to where their links allow, and break those that pull too hard."""
     set_out(linked.predicted, linked.shift, position, linked.slot)
     tie(
@@ -83,11 +104,8 @@ def solve(linked, linking, position, velocity):
         linking.period_y, linked.tie_stiffness, linked.tie_damping, linked.tie_intact, linking.h, linked.tie_give,
         linked.tie_left, linked.tie_way, linked.tie_kept,
     )  # fmt: skip
-    passes(
-        linking.times, linked.colour, linked.begin, linked.node, linked.holds, linked.lanes, linked.bowed, linked.blended,
-        linked.torn, linked.row, linked.more, linked.shift, linking.h, linked.rooms, linked.wide, linked.claims, linked.start,
-        linked.predicted, linked.back, linked.weight, linking.period_x, linking.period_y,
-    )  # fmt: skip
+    _passes(linked, rows, linking)
+    note_rows(rows.intact, rows.number, linking.h)
     note_ties(
         linked.shift, linked.predicted, linked.tied, linked.tie_strength, linked.tie_intact, linking.h, linked.tie_give,
         linked.tie_left, linked.tie_way, linked.tie_kept, linked.tie_lam, linked.tie_last, linked.tie_force,
@@ -108,18 +126,18 @@ look_alone, solve_alone, note_pull_alone = (kernel(variant(each.function, "alone
 
 
 @driver
-def call_look(linked, linking, position, velocity, inverse_mass):
+def call_look(linked, _, linking, position, velocity, inverse_mass):
     """`look`."""
     look(Linked(*linked), Linking(*linking), position, velocity, inverse_mass)
 
 
 @driver
-def call_solve(linked, linking, position, velocity):
+def call_solve(linked, rows, linking, position, velocity):
     """`solve`."""
-    solve(Linked(*linked), Linking(*linking), position, velocity)
+    solve(Linked(*linked), Rows(*rows), Linking(*linking), position, velocity)
 
 
 @driver
-def call_note_pull(linked, linking, acceleration):
+def call_note_pull(linked, _, linking, acceleration):
     """`note_pull`."""
     note_pull(Linked(*linked), Linking(*linking), acceleration)

@@ -1,6 +1,6 @@
 """Links: constraints between particles, solved once a substep on the positions the integrator predicts.
 
-Row r has a value C(x), its gradient g, a stiffness k and a damping d (kernels.shapes measures them). It acts with the force
+A row has a value C(x), its gradient g, a stiffness k and a damping d (kernels.shapes measures them). It acts with the force
 F = -(k C + d dC/dt) along g. What is solved for is lam = F h^2; then x moves by w g lam and the velocity by that over h (Macklin
 et al. 2019, Small Steps in Physics Simulation). Two things differ from there, both for the sake of energy:
 
@@ -11,8 +11,8 @@ the pull makes particles swing sideways faster than substeps can follow (a light
 For a soft link the C of the force is a C+ + b C0 + c C-, of the end, the start and the substep before. (1/4, 1/2, 1/4) neither
 damps nor explodes, (1, 0, 0) is XPBD and settles links stiffer than the substep can follow; `blend` goes from one to the other.
 
-Rows are solved colour by colour (Gauss-Seidel); those of one colour share no particle. kernels.chains solves whole chains of
-distances at once.
+Rows are solved colour by colour (Gauss-Seidel); those of one colour share no particle. `kernels.chains` solves whole chains of
+distances at once, `kernels.link_rows` all other rows.
 
 All of that is done on a compact copy of the linked particles, in the dtype of the world: where a substep starts, where the
 integrator has put them, and by how much links have moved them since, which is little and keeps its digits.
@@ -25,7 +25,7 @@ import numpy as np
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.compile.lanes import LANES, load, load_rows, pick, put, spread, square_root, store, take, where_above
 from pyverlet.compile.rows import store_rows
-from pyverlet.ground.constants import LINK_GIVE, LINK_LEAST_N, LINK_MEMORY_S, LINK_RESOLVED
+from pyverlet.ground.constants import LINK_LEAST_N, LINK_MEMORY_S, LINK_RESOLVED
 from pyverlet.kernels.seam import apart_lanes
 
 _CHUNK = 1024
@@ -49,78 +49,6 @@ def blend(stiffness, damping, ww, h):
     p = 0.5 + 0.5 * s / (1.0 + s)
     rate = damping / h
     return kp + rate * p, k0 + rate * (1.0 - 2.0 * p), km - rate * (1.0 - p)
-
-
-@parallel_kernel
-def prepare(
-    first, particle, weight, stiffness, damping, upper, h, start, earlier, gradient, bend, force, last, give, offset,
-    turn, bow, lam,
-):  # fmt: skip
-    """From C0 `start`, C- `earlier` and the last force: row r is to satisfy C+ + offset + give lam = 0.
-
-    Its force acts along a direction that is the part `turn` of the way from the old gradient to the new; bow: see kernels.chains.
-    lam starts from the `last` pull, N, as far as the substep follows the motion.
-    """
-    for r in prange(stiffness.shape[0]):
-        ww = total = 0.0
-        for e in range(first[r], first[r + 1]):
-            total += weight[particle[e]]
-            ww += weight[particle[e]] * (gradient[e, 0] * gradient[e, 0] + gradient[e, 1] * gradient[e, 1])
-        give[r] = LINK_GIVE * ww
-        offset[r] = lam[r] = 0.0
-        swing = h * h * abs(force[r]) * bend[r] * total  # (frequency of swinging sideways * h)^2
-        turn[r] = share_settled(swing)
-        bow[r] = turn[r] * h * h * max(force[r], 0.0) * bend[r]
-        if stiffness[r] < np.inf:
-            kp, k0, km = blend(stiffness[r], damping[r], ww, h)
-            c0, cm = start[r], earlier[r]
-            if upper[r] <= 0.0:  # a slack rope has no stretch to remember
-                c0, cm = max(c0, 0.0), max(cm, 0.0)
-            give[r] += 1.0 / (h * h * max(kp, 1e-300))
-            offset[r] = (k0 * c0 + km * cm) / max(kp, 1e-300)
-            if upper[r] == np.inf:
-                lam[r] = -(1.0 - share_settled(h * h * stiffness[r] * ww)) * last[r] * h * h
-
-
-@parallel_kernel
-def begin_rows(begin, end, position, first, particle, weight, intact, along, lam):
-    """Move the particles of the rows `begin` to `end`, which share none, by the lam they start from."""
-    for r in prange(begin, end):
-        if intact[r] and lam[r] != 0.0:
-            for e in range(first[r], first[r + 1]):
-                w = weight[particle[e]] * lam[r]
-                if w != 0.0:
-                    position[particle[e], 0] += w * along[e, 0]
-                    position[particle[e], 1] += w * along[e, 1]
-
-
-@parallel_kernel
-def solve_rows(begin, end, position, first, particle, weight, upper, intact, value, gradient, along, turn, give, offset, lam):
-    """Move the particles of the rows `begin` to `end`, which share none; add to lam what it took."""
-    for r in prange(begin, end):
-        if not intact[r]:
-            continue
-        straight = turned = 0.0
-        for e in range(first[r], first[r + 1]):
-            w = weight[particle[e]]
-            along[e, 0] += turn[r] * (gradient[e, 0] - along[e, 0])
-            along[e, 1] += turn[r] * (gradient[e, 1] - along[e, 1])
-            straight += w * (gradient[e, 0] * gradient[e, 0] + gradient[e, 1] * gradient[e, 1])
-            turned += w * (gradient[e, 0] * along[e, 0] + gradient[e, 1] * along[e, 1])
-        if turned < 0.5 * straight:  # turned by more than 60 degrees in a substep: the old direction says nothing any more
-            turned = straight
-            for e in range(first[r], first[r + 1]):
-                along[e, 0], along[e, 1] = gradient[e, 0], gradient[e, 1]
-        if turned <= 0.0:
-            continue
-        step = -(value[r] + offset[r] + give[r] * lam[r]) / (turned + give[r])
-        step = min(step, upper[r] - lam[r])
-        lam[r] += step
-        for e in range(first[r], first[r + 1]):
-            w = weight[particle[e]] * step
-            if w != 0.0:
-                position[particle[e], 0] += w * along[e, 0]
-                position[particle[e], 1] += w * along[e, 1]
 
 
 @kernel

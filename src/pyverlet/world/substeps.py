@@ -85,8 +85,6 @@ class Substeps:
         if strips is None or room.compiled(state) is None or not (course := world._course).still:
             return False
         links: Any = world.links.compiled(state, h) if world.links else ()
-        if links is None:
-            return False
         if opens:  # as far as is known now the list is good
             contacts.broad_phase.aged(1)
             world.profile.mark("broad phase")

@@ -288,7 +288,7 @@ def _stored(world: World, h: float) -> tuple[float, float]:
     place, held, stiff = world.position.astype(float), 0.0, 0.0
     with np.errstate(divide="ignore"):
         weight = 1.0 / world.mass.astype(float)
-    for pool in world.links._order:
+    for pool in world.links._kept:
         energy, soft = pool.energies(place, world._state.seam), np.isfinite(pool.rows["stiffness"])
         stiffness = np.where(soft, pool.rows["stiffness"], 0.0)
         if (pool.rows["arity"] == 2).all():

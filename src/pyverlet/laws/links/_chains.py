@@ -10,7 +10,7 @@ from pyverlet.compile import jit
 from pyverlet.compile.lanes import LANES
 from pyverlet.compile.stealing import Claims
 from pyverlet.ground.constants import LINK_COLOURS, LINKS_ONE_THREAD_BELOW
-from pyverlet.kernels import chain_passes, chain_rows, chains, runs
+from pyverlet.kernels import chain_rows, chains, runs
 from pyverlet.laws.links._link import Array
 from pyverlet.laws.links._pool import MOVING, Pool, held
 from pyverlet.laws.links._work import Work
@@ -27,7 +27,7 @@ class ChainPool(Pool):
     """Runs in packs of eight that share no particle, as `kernels.chains` wants them, whose rows have the world's dtype."""
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
-        super().__init__(0, rest=np.float64, upper=np.float64)
+        super().__init__(rest=np.float64, upper=np.float64)
         self.dtype = dtype
         self._claims = Claims()
         self._taken_up = self._under_way = False
@@ -53,7 +53,6 @@ class ChainPool(Pool):
         self._start = LANES * np.concatenate((np.zeros(1, np.int64), np.cumsum(longest + 1)))
         new = (np.diff(colour[order][opens], prepend=-1) != 0) | alone[order][opens]
         self._colour = np.append(np.flatnonzero(new), len(opens))
-        self.colours = len(self._colour) - 1
         begin, items = np.cumsum(length) - length, int(self._start[-1])
         self._source, self._node, self._place = np.empty(items, np.int64), np.empty(items, np.uint32), np.empty(count, np.int64)
         runs.lay_out(given, ends, begin, length, run_at, self._start, self._source, self._node, self._place)
@@ -81,29 +80,12 @@ class ChainPool(Pool):
         self._blended[0] = 0
         self._taken_up = self._under_way = True
 
-    def before(self, work: Work, h: float) -> None:
-        self._h = h
-        chain_rows.prepare(
-            False, self._colour, self._start, self._node, self._holds, self._bowed, self._blended, self._row, self._more,
-            work.start, work.predicted, work.back, work.weight, work.shift, *work.seam.period, h, self._claims(),
-        )  # fmt: skip
-
     def arrays(self) -> tuple[Array, ...]:
         """As `kernels.linked.Linked` has them."""
         return (
             self._colour, self._start, self._node, self._holds, self._lanes, self._bowed, self._blended, self._torn,
             self._row, self._more, self._rooms, self._wide, self._claims(),
         )  # fmt: skip
-
-    def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
-        chain_passes.sweep(
-            back, skip, False, False, self._colour, self._start, self._node, self._holds, self._lanes, self._bowed, self._torn,
-            self._row, self._more, work.shift, self._h, self._rooms, self._wide, self._claims(), work.start, work.predicted,
-            work.back, work.weight, *work.seam.period,
-        )  # fmt: skip
-
-    def note(self, work: Work, h: float) -> None:
-        chain_rows.note(self._start, self._holds, self._row, self._more, self._torn, h)
 
     def broken(self) -> Array:
         if not self._torn.any():

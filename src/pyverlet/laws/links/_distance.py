@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import shapes
 from pyverlet.laws.links._chains import ChainPool
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import Floats, Link, several, stiffness_of
@@ -74,7 +73,7 @@ class Distance(Link):
 
     @property
     def _family(self) -> Any:
-        return shapes.distance
+        return ChainPool
 
     def _new_pool(self) -> Pool:
         return ChainPool(self._state.dtype)

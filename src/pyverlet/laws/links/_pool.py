@@ -22,25 +22,21 @@ class Pool(ABC):
     Attributes:
         rows: a row for each link, in the order added.
         entries: `particle`, the user's indices of the particles, row after row.
-        turn: pools are solved in this order and then back; who comes first holds best.
         drawn: whether its rows are lines between their particles.
         stale: rows have come or gone since `pack`.
         changed: numbers of rows have changed since `begin`.
         gives: whether any row stores energy, once a frame has begun.
-        colours: how many parts are solved one after the other, once packed.
     """
 
     drawn = True
     gives = False
 
-    def __init__(self, turn: int, **columns: Any) -> None:
-        self.turn = turn
+    def __init__(self, **columns: Any) -> None:
         self.rows = Table(
             owner=np.int64, arity=np.int64, stiffness=np.float64, damping=np.float64, strength=np.float64, intact=np.uint8,
             collide=np.uint8, force=np.float64, last=np.float64, **columns,
         )  # fmt: skip
         self.entries = Table(particle=np.int64)
-        self.colours = 0
         self.stale = self.changed = True
 
     def append(self, owner: int, particles: Array, columns: dict[str, Any]) -> slice:
@@ -69,20 +65,9 @@ class Pool(ABC):
     def begin(self) -> None:
         """A frame begins: take up who is intact."""
 
-    def tie(self, work: Work, h: float) -> None:
-        """After the integrator, before any pool is solved: what concerns single particles."""
-
     @abstractmethod
-    def before(self, work: Work, h: float) -> None:
-        """Then: what the rows are to satisfy; move the particles as far as the pull of the substep before is a good guess."""
-
-    @abstractmethod
-    def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
-        """Solve one colour after the other, or back from the last; without the first on the way if `skip`."""
-
-    @abstractmethod
-    def note(self, work: Work, h: float) -> None:
-        """After the passes: what does each pull with? Break those beyond their strength."""
+    def arrays(self) -> tuple[Array, ...]:
+        """What `kernels.linked` is handed of it."""
 
     @abstractmethod
     def broken(self) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any, TypeVar
 
@@ -18,6 +18,7 @@ from pyverlet.laws.contacts.broadphase import PairList
 from pyverlet.laws.links._chains import ChainPool
 from pyverlet.laws.links._link import Array, Link
 from pyverlet.laws.links._pool import Pool
+from pyverlet.laws.links._rows import RowPool
 from pyverlet.laws.links._work import Past, Work
 from pyverlet.laws.links.pin import PinPool
 from pyverlet.state.seam import Seam
@@ -42,7 +43,6 @@ class Links:
         self._links: dict[int, Link] = {}  # by the numbers that own their rows, in the order appended
         self._listed: list[Link] | None = None
         self._pools: dict[Any, Pool] = {}
-        self._sorted: list[Pool] = []
         self._leaving: dict[Pool, list[int]] = {}
         self._next_owner, self._iterations = 0, 1
         self._few = True
@@ -52,9 +52,8 @@ class Links:
         self._partners = np.zeros(1, np.int64), np.empty(0, np.int64)
         self._apart_changed = False
         self.broken = np.empty(0, BROKEN)
-        self._chains: ChainPool | None = None
-        self._pins = PinPool()
-        self._linked: tuple[Any, ...] | None = None
+        self._packed: dict[type[Pool], Pool] = {}
+        self._linked: tuple[Any, Any] | None = None
 
     # ---- a list --------------------------------------------------------------------------------------------------------
 
@@ -75,7 +74,6 @@ class Links:
         family = link._family
         if family not in self._pools:
             self._pools[family] = link._new_pool()
-            self._sorted = sorted(self._pools.values(), key=lambda pool: pool.turn)
         link._pool = self._pools[family]
         link._id = self._next_owner
         link._pool.append(link._id, link.particles, link._columns())
@@ -108,14 +106,12 @@ class Links:
         self._apart_stale = True
 
     @property
-    def _order(self) -> list[Pool]:
-        """The pools as they are solved. Removed links leave them when somebody asks: many take no longer than one."""
-        if not self._leaving:
-            return self._sorted
+    def _kept(self) -> Collection[Pool]:
+        """The pools. Removed links leave them when somebody asks: many take no longer than one."""
         leaving, self._leaving = self._leaving, {}
         for pool, owners in leaving.items():
             pool.keep(~np.isin(pool.rows["owner"], owners))
-        return self._sorted
+        return self._pools.values()
 
     def __len__(self) -> int:
         return len(self._links)
@@ -130,7 +126,7 @@ class Links:
 
     def renumber(self, new: NDArray[np.int64]) -> None:
         """Particles have been removed: new[i] is what the user's index i is now, -1 if it is gone, and its links with it."""
-        for pool in self._order:
+        for pool in self._kept:
             particle = new[pool.entries["particle"]]
             pool.entries["particle"][:] = particle
             pool.keep(np.minimum.reduceat(particle, pool.first[:-1]) >= 0 if len(particle) else np.zeros(0, bool))
@@ -153,19 +149,19 @@ class Links:
 
     def begin(self) -> bool:
         """A frame begins. True if other pairs than before are no contacts (`unlist`)."""
-        if not self._order:
+        if not self._kept:
             return False
-        if any(pool.stale for pool in self._order) or len(self._work.compact) != len(self._state):
+        if any(pool.stale for pool in self._kept) or len(self._work.compact) != len(self._state):
             among = np.zeros(len(self._state), bool)
-            for pool in self._order:
+            for pool in self._kept:
                 among[pool.entries["particle"]] = True
             self._work = Work(np.flatnonzero(among), len(self._state), self._state.dtype)
-            for pool in self._order:
+            for pool in self._kept:
                 pool.pack(self._work)
             self._few = len(self._work) < LINKS_ONE_THREAD_BELOW
             self._join()
         self._work.begin(self._state, self._past)
-        for pool in self._order:
+        for pool in self._kept:
             pool.begin()
         self._linked = None
         self._know_apart()
@@ -173,33 +169,25 @@ class Links:
         return changed
 
     def _join(self) -> None:
-        """Note what compiled code is handed, if chains and pins are all there is."""
-        chains: Any = next((pool for pool in self._order if isinstance(pool, ChainPool)), None)
-        pins: Any = next((pool for pool in self._order if isinstance(pool, PinPool)), None)
-        self._chains = None
-        if len(self._order) > (chains is not None) + (pins is not None):
-            return
-        chains, pins = chains or ChainPool(self._state.dtype), pins or PinPool()
-        for pool in (chains, pins):
-            if not len(pool.rows):
-                pool.pack(self._work)
-                pool.begin()
-        self._chains, self._pins = chains, pins
+        """Note what compiled code is handed: those that are not there are empty."""
+        kinds = {type(pool): pool for pool in self._kept}
+        empty = [pool for pool in (ChainPool(self._state.dtype), RowPool(), PinPool()) if type(pool) not in kinds]
+        for pool in empty:
+            pool.pack(self._work)
+            pool.begin()
+        self._packed = kinds | {type(pool): pool for pool in empty}
 
-    def compiled(self, state: Slots, h: float) -> tuple[Any, Any] | None:
-        """What `kernels.linked` is handed in the substeps of a frame, as plain tuples; None if Python is to call the stages.
+    def compiled(self, state: Slots, h: float) -> tuple[Any, Any, Any]:
+        """What `kernels.linked` is handed in the substeps of a frame, as plain tuples.
 
         Good as long as the order of the slots is.
         """
-        if self._chains is None:
-            return None
-        chains = self._chains
         self._work.slots(state)
         if self._linked is None:
-            self._linked = (*self._work.arrays(), *chains.arrays(), *self._pins.arrays())
-        rest = REST_ACCELERATIONS * h
-        numbers = (h, *self._work.seam.period, len(self._work), self._iterations, rest)
-        return self._linked, numbers
+            chains, rows, pins = (self._packed[kind].arrays() for kind in (ChainPool, RowPool, PinPool))
+            self._linked = (*self._work.arrays(), *chains, *pins), rows
+        numbers = (h, *self._work.seam.period, len(self._work), self._iterations, REST_ACCELERATIONS * h)
+        return *self._linked, numbers
 
     def _know_apart(self) -> None:
         """Bring the pairs that are no contacts up to date, and note if they are others than before."""
@@ -231,56 +219,23 @@ class Links:
     def before(self, state: Slots, h: float) -> None:
         """Before the integrator: remember where the substep starts."""
         with self._threads():
-            if (given := self.compiled(state, h)) is not None:
-                linked.call_look(*given, state.position, state.velocity, state.inverse_mass)
-                return
-            self._work.look(state, h)
+            linked.call_look(*self.compiled(state, h), state.position, state.velocity, state.inverse_mass)
 
     def solve(self, state: Slots, h: float) -> None:
         """Move the linked particles to where their links allow, and break those that pull too hard."""
         with self._threads():
-            if (given := self.compiled(state, h)) is not None:
-                linked.call_solve(*given, state.position, state.velocity)
-            else:
-                self._solve(state, h)
-
-    def _solve(self, state: Slots, h: float) -> None:
-        """`kernels.linked.solve`, with pools of other kinds."""
-        work = self._work
-        work.take(state)
-        for pool in self._order:
-            pool.tie(work, h)
-        for pool in self._order:
-            pool.before(work, h)
-        # There and back: one way only, the links about a common particle throw it in a circle, faster and faster.
-        if pools := [pool for pool in self._order if pool.colours]:
-            self._passes(pools)
-        for pool in self._order:
-            pool.note(work, h)
-        work.give(state, h)
-
-    def _passes(self, pools: list[Pool]) -> None:
-        """All of them there, and all of them back."""
-        several = sum(pool.colours for pool in pools) > 1
-        for _ in range(self._iterations if several else 1):
-            for pool in pools:
-                pool.sweep(self._work, back=False, skip=False)
-            for pool in reversed(pools) if several else ():
-                pool.sweep(self._work, back=True, skip=pool is pools[-1])  # its last colour has just been solved
+            linked.call_solve(*self.compiled(state, h), state.position, state.velocity)
 
     def after(self, state: Slots, h: float) -> None:
         """After the contacts: what the links did is part of the acceleration, for integrators that remember it."""
         with self._threads():
-            if (given := self.compiled(state, h)) is not None:
-                linked.call_note_pull(*given, state.acceleration)
-            else:
-                self._work.after(state, h)
+            linked.call_note_pull(*self.compiled(state, h), state.acceleration)
 
     def scatter(self) -> None:
         """The frame is good: what it did to the links holds."""
-        self._past = self._work.end(self._state) if self._order else None
+        self._past = self._work.end(self._state) if self._kept else None
         self.broken = self.broken[:0]
-        for pool in self._order:
+        for pool in self._kept:
             snapped = pool.broken()
             if len(snapped):
                 self.broken = np.concatenate((self.broken, self._note(pool, snapped)))
@@ -302,21 +257,21 @@ class Links:
     def energy(self, where: Array | None = None) -> float:
         """Energy stored in links that give, J, with the particles where they are, or at (n, 2) other places, m."""
         position = self._state.position if where is None else where
-        return sum(pool.energy(position, self._state.seam) for pool in self._order)
+        return sum(pool.energy(position, self._state.seam) for pool in self._kept)
 
     def gains(self, before: Array, now: Array) -> Array:
         """(n,) J that links hold `now` beyond what they held `before`, (n, 2) positions in the user's order: what each does, at
         the first of its particles that is free to move.
         """
         share = np.zeros(len(now))
-        for pool in self._order:
+        for pool in self._kept:
             pool.share_gain(before, now, self._state.seam, self._state.mass, share)
         return share
 
     @property
     def give(self) -> bool:
         """Whether any may hold energy."""
-        return bool(self._order) and any(pool.gives for pool in self._order)
+        return bool(self._kept) and any(pool.gives for pool in self._kept)
 
     def stored(self, state: Slots) -> float:
         """The same in the middle of a frame, J, where the particles are now, without those that have broken in it."""
@@ -324,7 +279,7 @@ class Links:
             return 0.0
         with self._threads():
             position = self._work.where(state)
-            return sum(pool.stored(position, state.seam) for pool in self._order if pool.gives)
+            return sum(pool.stored(position, state.seam) for pool in self._kept if pool.gives)
 
     def segments(self) -> tuple[Array, Array]:
         """Links as lines, without the broken: ends (m, 2, 2) in m, and what each pulls with (m,) in N, negative if it pushes.
@@ -339,7 +294,7 @@ class Links:
     def pulls(self) -> tuple[Array, Array]:
         """The same by particle: (m, 2) indices in place of ends, for who has their positions of the same moment."""
         pairs, force = [np.empty((0, 2), np.int64)], [np.empty(0)]
-        for pool in self._order:
+        for pool in self._kept:
             if pool.drawn:
                 here, row = pool.lines()
                 pairs.append(here)
@@ -348,7 +303,7 @@ class Links:
 
     def joined(self) -> Array:
         """(m, 2) indices of particles that hang together by links of any kind, drawn or not."""
-        return np.concatenate([np.empty((0, 2), np.int64), *(pool.lines()[0] for pool in self._order)])
+        return np.concatenate([np.empty((0, 2), np.int64), *(pool.lines()[0] for pool in self._kept)])
 
     def hold(self, particle: int) -> bool:
         """Whether a link that is whole joins the particle of this index to anything."""
@@ -357,7 +312,7 @@ class Links:
     def apart(self) -> Array:
         """(k, 2) sorted pairs i < j of particles that do not collide with each other, since a link says so."""
         pairs = [np.empty((0, 2), np.int64)]
-        for pool in self._order:
+        for pool in self._kept:
             here, row = pool.lines()
             pairs.append(here[pool.rows["collide"][row] == 0])
         count = max(len(self._state), 1)
@@ -368,8 +323,7 @@ class Links:
 
     def save(self) -> Any:
         """A copy of all there is about links."""
-        by_family = {family: pool for family, pool in self._pools.items() if pool in self._order}
-        pools = {family: (pool, pool.rows.copy(), pool.entries.copy()) for family, pool in by_family.items()}
+        pools = [(pool, pool.rows.copy(), pool.entries.copy()) for pool in self._kept]
         links = [(owner, link, link.particles) for owner, link in self._links.items()]
         past = self._past and Past(*(array.copy() for array in self._past))
         return links, pools, self.broken, self._apart_changed, past
@@ -379,11 +333,10 @@ class Links:
         links, pools, self.broken, apart_changed, self._past = saved
         for link in self:
             link._pool = None
-        for pool in self._order:
+        for pool in self._kept:
             pool.keep(np.zeros(len(pool.rows), bool))
-        for family, (pool, rows, entries) in pools.items():
+        for pool, rows, entries in pools:
             pool.rows, pool.entries, pool.stale = rows.copy(), entries.copy(), True
-            self._pools[family] = pool
         self._links, self._listed = {owner: link for owner, link, _ in links}, None
         for owner, link, particles in links:
             link.particles, link._id, link._pool = particles, owner, self._pools[link._family]

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from pyverlet.compile.lanes import LANES
 from pyverlet.ground import memory
-from pyverlet.ground.constants import REST_ACCELERATIONS
 from pyverlet.kernels import links, motion
 from pyverlet.state.seam import NONE
 from pyverlet.state.slots import Slots
@@ -101,36 +100,7 @@ class Work:
         """As `kernels.linked.Linked` has them; the slots are right once `slots` has been asked."""
         return self._slot, self.start, self.back, self.predicted, self.shift, self.weight, self._calm
 
-    def look(self, state: Slots, h: float) -> None:
-        """Before the integrator: where they are, and where they were."""
-        slot = self.slots(state)
-        links.look_back(
-            slot, state.position, state.velocity, state.inverse_mass, *self.seam.period, self._calm, h, self.start, self.back,
-            self.weight,
-        )  # fmt: skip
-
-    def take(self, state: Slots) -> None:
-        """After the integrator and the contacts."""
-        links.set_out(self.predicted, self.shift, state.position, self.slots(state))
-
     def where(self, state: Slots) -> Array:
         """(m, 2) where they are now, m; good until asked again."""
         motion.take_rows(self._where, state.position, self.slots(state))
         return self._where
-
-    @property
-    def position(self) -> Array:
-        """(m, 2) where links have them by now, m, in float64. Assign to move them."""
-        return np.asarray(self.predicted + self.shift.astype(np.float64))
-
-    @position.setter
-    def position(self, value: Array) -> None:
-        self.shift[:] = value - self.predicted
-
-    def give(self, state: Slots, h: float) -> None:
-        """Hand the result back."""
-        links.hand_back(state.position, state.velocity, self.slots(state), len(self), self.predicted, self.shift, 1 / h)
-
-    def after(self, state: Slots, h: float) -> None:
-        """After the contacts: what the links did is part of the acceleration, for integrators that remember it."""
-        links.add_pull(state.acceleration, self.slots(state), self.shift, 1 / h, self._calm, REST_ACCELERATIONS * h)

@@ -68,13 +68,13 @@ class Angle(Link):
 
     @property
     def _family(self) -> Any:
-        return shapes.angle
+        return RowPool
 
     def _new_pool(self) -> RowPool:
-        return RowPool(shapes.angle, turn=1, drawn=False)
+        return RowPool()
 
     def _columns(self) -> dict[str, Any]:
         return {
-            "rest": self._angle, "stiffness": self._stiffness, "damping": self._damping, "upper": np.inf,
+            "kind": shapes.ANGLE, "rest": self._angle, "stiffness": self._stiffness, "damping": self._damping, "upper": np.inf,
             "strength": self._strength, "collide": 1,
         }  # fmt: skip

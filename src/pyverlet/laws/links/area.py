@@ -66,15 +66,15 @@ class Area(Link):
 
     @property
     def _family(self) -> Any:
-        return shapes.area
+        return RowPool
 
     def _new_pool(self) -> RowPool:
-        return RowPool(shapes.area, turn=2, drawn=False)
+        return RowPool()
 
     def _columns(self) -> dict[str, Any]:
         return {
-            "rest": self._area, "stiffness": self._stiffness, "damping": self._damping, "upper": np.inf, "strength": np.inf,
-            "collide": 1,
+            "kind": shapes.AREA, "rest": self._area, "stiffness": self._stiffness, "damping": self._damping, "upper": np.inf,
+            "strength": np.inf, "collide": 1,
         }  # fmt: skip
 
 

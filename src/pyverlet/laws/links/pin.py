@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pyverlet.ground import checks
-from pyverlet.kernels import ties
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import Array, Floats, Link, several, stiffness_of
 from pyverlet.laws.links._pool import Pool, held
@@ -82,7 +81,7 @@ class PinPool(Pool):
     drawn = False
 
     def __init__(self) -> None:
-        super().__init__(0, point=(np.float64, (2,)))
+        super().__init__(point=(np.float64, (2,)))
 
     def pack(self, work: Work) -> None:
         self.stale, self.changed = False, True
@@ -103,25 +102,6 @@ class PinPool(Pool):
         return (
             self._particle, rows["point"], rows["stiffness"], rows["damping"], rows["strength"], self._intact, self._give,
             self._left, self._way, self._kept, self._lam, self._last, self._force,
-        )  # fmt: skip
-
-    def before(self, work: Work, h: float) -> None:
-        pass
-
-    def tie(self, work: Work, h: float) -> None:
-        rows, about = self.rows, (self._particle, self.rows["point"], *work.seam.period)
-        ties.tie(
-            work.predicted, work.weight, work.start, work.back, *about, rows["stiffness"], rows["damping"], self._intact, h,
-            self._give, self._left, self._way, self._kept,
-        )  # fmt: skip
-
-    def sweep(self, work: Work, *, back: bool, skip: bool) -> None:
-        pass
-
-    def note(self, work: Work, h: float) -> None:
-        ties.note_ties(
-            work.shift, work.predicted, self._particle, self.rows["strength"], self._intact, h, self._give, self._left,
-            self._way, self._kept, self._lam, self._last, self._force,
         )  # fmt: skip
 
     def broken(self) -> Array:
