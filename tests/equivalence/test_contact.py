@@ -154,7 +154,8 @@ class OneByOne:
         closing = -(d[0] * u[0] + d[1] * u[1])
         free = self.real(1) - self.carries[i] * self.carries[j]
         bounces = not law.weight and e > 0
-        if not (reach > distance and e + mu > 0 and (bounces or free * abs(closing) > law.rest_speed * distance)):
+        meeting = e > 0 or (mu > 0 and (i, j) not in self.slip)
+        if not (reach > distance and meeting and (bounces or free * abs(closing) > law.rest_speed * distance)):
             return False
         v = u + law.lag * (s.acceleration[j] - s.acceleration[i])
         along = d[0] * v[0] + d[1] * v[1]
@@ -175,6 +176,10 @@ class OneByOne:
             d = self.gap(k, i, j)
             distance = np.sqrt(d[0] * d[0] + d[1] * d[1])
             depth = real(0) if done else min(max(reach - distance, real(0)), real(LARGEST_PUSH) * reach)
+            if done:
+                self.slip[(i, j)] = real(0)
+            elif not depth > 0:
+                self.slip.pop((i, j), None)
             n = d * (real(1) / distance)
             c = n * (real(PUSHED) * depth)
             if mu > 0:
@@ -255,8 +260,6 @@ class OneByOne:
                 self.slip[(i, j)] = max(min(slipped, most), -most) if (i, j) in self.slip else real(0)
                 if not depth > 0:
                     del self.slip[(i, j)]
-            elif mu > 0:
-                self.slip.pop((i, j), None)
             v[i], v[j] = v[i] + c * share, v[j] - c * (real(1) - share)
 
 

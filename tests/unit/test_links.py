@@ -10,8 +10,8 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.kernels import runs
-from pyverlet.world.substeps import Substeps
 from pyverlet.viewers.hands import Hands
+from pyverlet.world.substeps import Substeps
 
 DT = 1 / 60
 

@@ -64,7 +64,7 @@ def _push_strip(s, to, circles, pairs, law, looks):
     real = moved.dtype.type
     zero, one, limit = spread(real(0)), spread(real(1)), spread(law.deep)
     pushed, most, rest = spread(real(PUSHED)), spread(law.most), spread(law.rest_speed)
-    answer = spread(real(ANSWER))
+    answer, new = spread(real(ANSWER)), spread(real(NEW))
     begin, end, count = pairs.begin[s], pairs.begin[s] + pairs.lanes[s], 0
     close, to = begin + pairs.apart[s], to - begin
     spent = pairs.spent[s] if law.accounts != 0 else pairs.spent[0, :0]
@@ -80,9 +80,13 @@ def _push_strip(s, to, circles, pairs, law, looks):
             store(normal[1], to + k, zero)
             if BOUNCES:
                 store(depths, k, zero)
+            if RUBS:
+                store(slips, k, new)
             continue
         done, at, lively = 0, k * law.mixed, 0
-        mu = zero
+        mu, slipped = zero, new
+        if RUBS:
+            slipped = load(slips, k)
         if LISTENS and not BOUNCES and touching != 0:
             vxi, vyi = take(velocity, lane_i, k)
             vxj, vyj = take(velocity, lane_j, k)
@@ -99,7 +103,9 @@ def _push_strip(s, to, circles, pairs, law, looks):
             free = one - carries_i * carries_j
             # Where nothing accelerates, nothing that bounces rests: not even who moves alike is pushed, and fed.
             restless = which_above(e, zero) if law.weight == 0 else 0
-            live = touching & which_above(e + spread(law.grazes) * mu, zero) & (which_above(free, zero) | restless)
+            # Without restitution they meet once, in the first substep of their contact: then they stay together.
+            meets = e + where_above(new, slipped, zero, spread(law.grazes) * mu) if RUBS else e
+            live = touching & which_above(meets, zero) & (which_above(free, zero) | restless)
             if live != 0 or law.listens != 0:
                 vxi, vyi = take(velocity, lane_i, k)
                 vxj, vyj = take(velocity, lane_j, k)
@@ -123,13 +129,14 @@ def _push_strip(s, to, circles, pairs, law, looks):
         nx, ny = dx * per_metre, dy * per_metre
         push = pushed * depth
         cx, cy = nx * push, ny * push
+        if RUBS:
+            store(slips, k, where_above(depth, zero, slipped, where_set(done, zero, new)))
         if BOUNCES:
             store(depths, k, depth)
             if RUBS and which_above(mu, zero) != 0:
                 # What the contact has slipped is answered as an overlap is, within the cone of friction.
-                slipped = load(slips, k)
                 cone = mu * push
-                rub = larger(smaller(answer * where_above(spread(real(NEW)), slipped, slipped, zero), cone), zero - cone)
+                rub = larger(smaller(answer * where_above(new, slipped, slipped, zero), cone), zero - cone)
                 # Beside the pushes, which it must not change: with it in `moved` single circles of rough piles spun for ever.
                 sx, sy = rub * ny, zero - rub * nx
                 turned_i = turned_i + rub * part * load(made_of[TURN_I], at)
@@ -200,8 +207,6 @@ def _relax_strip(s, to, circles, pairs, law):
         nx, ny = load(normal[0], to + k), load(normal[1], to + k)
         part = load(share, k * law.varied)
         if (k < close or RUBS) and which_above(nx * nx + ny * ny, zero) == 0:
-            if RUBS:
-                store(slips, k, new)
             continue
         if RUBS:
             xi, yi, si, turn_i = take_four(rows, lane_i, k)
@@ -250,7 +255,7 @@ def _relax_strip(s, to, circles, pairs, law):
                 slipped = before + (uj - ui) * ny - (wj - wi) * nx + rolled
                 most = cone * memory
                 slipped = where_above(new, before, larger(smaller(slipped, most), zero - most), zero)
-                store(slips, k, where_above(depth, zero, slipped, new))
+                store(slips, k, where_above(depth, zero, slipped, where_set(struck, new, before)))
         if RUBS:
             put_four(rows, lane_i, k, xi + cx * part, yi + cy * part, si, turn_i)
             put_four(rows, lane_j, k, xj - cx * (one - part), yj - cy * (one - part), sj, turn_j)

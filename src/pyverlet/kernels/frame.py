@@ -23,7 +23,20 @@ from pyverlet.kernels.drive import drive, drive_called
 from pyverlet.kernels.kinds import for_each_kind
 from pyverlet.kernels.lending import Hanging, Lending, Terms, even_up, join, leave_out, lend, set_aside, settle
 from pyverlet.kernels.link_rows import Rows
-from pyverlet.kernels.linked import Linked, Linking, look, look_alone, note_pull, note_pull_alone, solve, solve_alone
+from pyverlet.kernels.linked import (
+    Linked,
+    Linking,
+    lay_down,
+    lay_down_alone,
+    look,
+    look_alone,
+    note_pull,
+    note_pull_alone,
+    pick_up,
+    pick_up_alone,
+    solve,
+    solve_alone,
+)
 from pyverlet.kernels.measure import mechanical
 from pyverlet.kernels.meetings import collide
 from pyverlet.kernels.motion import first_leap, leap
@@ -48,7 +61,15 @@ BESIDE: dict[str, dict[str, Any]] = {
     "": {},
     "served": {"SERVED": True},
     "linked": {"SERVED": True, "LINKED": True},
-    "few_linked": {"SERVED": True, "LINKED": True, "look": look_alone, "solve": solve_alone, "note_pull": note_pull_alone},
+    "few_linked": {
+        "SERVED": True,
+        "LINKED": True,
+        "look": look_alone,
+        "solve": solve_alone,
+        "lay_down": lay_down_alone,
+        "pick_up": pick_up_alone,
+        "note_pull": note_pull_alone,
+    },
 }
 BESIDE |= {f"{name}_called": {**what, "CALLS": True, "drive": drive_called} for name, what in BESIDE.items() if name}
 """Frames are compiled for each of these. Links so few that it does not pay stay on one thread where circles use several."""
@@ -245,10 +266,12 @@ def _substeps(
             if lends:
                 set_aside(circles, loans)
             solve(linked, rows, linking, circles.position, circles.velocity)
+            note(spent, LINKS, clock[0], clock[1])
+            _look_at_energy(energies, substep, JOINED, circles, mass, lag, down, spent, clock)
+            lay_down(linked, linking, circles.velocity)
             if lends:
                 leave_out(circles, loans)
             note(spent, LINKS, clock[0], clock[1])
-            _look_at_energy(energies, substep, JOINED, circles, mass, lag, down, spent, clock)
         confine(room, circles, law, claims)
         note(spent, BOUNDS, clock[0], clock[1])
         if SERVED and segments.shape[0] > 0:
@@ -263,6 +286,12 @@ def _substeps(
         if SERVED and lends:
             join(circles, pairs, loans, hanging)
         relax(circles, pairs, law, cut, 1 if substep == last else 0, claims)
+        if LINKED:
+            if lends:
+                set_aside(circles, loans)
+            pick_up(linked, circles.velocity)
+            if lends:
+                leave_out(circles, loans)
         if SERVED and lends:
             even_up(circles, loans, hanging, law.rubs)
         note(spent, VELOCITIES, clock[0], clock[1])

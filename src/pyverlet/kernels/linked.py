@@ -14,7 +14,7 @@ from pyverlet.compile.jit import driver, kernel, variant
 from pyverlet.kernels.chain_passes import sweep
 from pyverlet.kernels.chain_rows import prepare_soft
 from pyverlet.kernels.link_rows import Rows, note_rows, prepare_rows, sweep_rows
-from pyverlet.kernels.links import add_pull, hand_back, look_back, set_out
+from pyverlet.kernels.links import add_pull, hand_back, look_back, set_down, set_out, shoulder
 from pyverlet.kernels.ties import note_ties, tie
 
 
@@ -29,6 +29,8 @@ class Linked:
     shift: Any
     weight: Any
     calm: Any
+    burden: Any
+    kept: Any
     colour: Any
     begin: Any
     node: Any
@@ -114,12 +116,26 @@ def solve(linked, rows, linking, position, velocity):
 
 
 @driver
+def lay_down(linked, linking, velocity):
+    """Before walls: velocities are without what carries the pull of links."""
+    set_down(velocity, linked.slot, linked.shift, 1.0 / linking.h, linked.calm, linked.burden, linked.kept)
+
+
+@driver
+def pick_up(linked, velocity):
+    """After the second sweep: they are with it again."""
+    shoulder(velocity, linked.slot, linked.burden, linked.kept)
+
+
+@driver
 def note_pull(linked, linking, acceleration):
     """When velocities are done: what links did is part of the acceleration."""
     add_pull(acceleration, linked.slot, linked.shift, 1.0 / linking.h, linked.calm, linking.rest)
 
 
-look_alone, solve_alone, note_pull_alone = (kernel(variant(each.function, "alone")) for each in (look, solve, note_pull))
+look_alone, solve_alone, lay_down_alone, pick_up_alone, note_pull_alone = (
+    kernel(variant(each.function, "alone")) for each in (look, solve, lay_down, pick_up, note_pull)
+)
 """The same, which stay on one thread also where circles use several."""
 
 # ---- called from Python, which has plain tuples ------------------------------------------------------------------------------
@@ -135,6 +151,18 @@ def call_look(linked, _, linking, position, velocity, inverse_mass):
 def call_solve(linked, rows, linking, position, velocity):
     """`solve`."""
     solve(Linked(*linked), Rows(*rows), Linking(*linking), position, velocity)
+
+
+@driver
+def call_lay_down(linked, _, linking, velocity):
+    """`lay_down`."""
+    lay_down(Linked(*linked), Linking(*linking), velocity)
+
+
+@driver
+def call_pick_up(linked, velocity):
+    """`pick_up`."""
+    pick_up(Linked(*linked), velocity)
 
 
 @driver

@@ -23,10 +23,25 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
-from pyverlet.compile.lanes import LANES, load, load_rows, pick, put, spread, square_root, store, take, where_above
+from pyverlet.compile.lanes import (
+    LANES,
+    load,
+    load_rows,
+    pick,
+    put,
+    spread,
+    square_root,
+    store,
+    take,
+    where_above,
+    where_zero,
+)
 from pyverlet.compile.rows import store_rows
-from pyverlet.ground.constants import LINK_LEAST_N, LINK_MEMORY_S, LINK_RESOLVED
+from pyverlet.ground.constants import FED, LINK_LEAST_N, LINK_MEMORY_S, LINK_RESOLVED, PUSHED, REST_ACCELERATIONS
 from pyverlet.kernels.seam import apart_lanes
+
+_CARRIED = 1.0 - PUSHED / FED
+"""Part of an acceleration, times h, that a contact at rest has in the velocity."""
 
 _CHUNK = 1024
 """Particles that one thread takes at a time."""
@@ -181,6 +196,57 @@ def hand_back(position, velocity, slot, count, predicted, shift, rate):
         shift[k, 0], shift[k, 1] = shift[count - 1, 0], shift[count - 1, 1]
     for c in prange((slot.shape[0] + _CHUNK - 1) // _CHUNK):
         _hand_back(c * _CHUNK, min((c + 1) * _CHUNK, slot.shape[0]), position, velocity, slot, predicted, shift, rate)
+
+
+@kernel
+def _set_down(begin, end, velocity, slot, shift, rate, calm, burden, kept):
+    per, most = spread(shift.dtype.type(_CARRIED * rate)), spread(shift.dtype.type(_CARRIED / REST_ACCELERATIONS))
+    zero, one = spread(shift.dtype.type(0)), spread(shift.dtype.type(1))
+    for k in range(begin, end, LANES):
+        vx, vy = take(velocity, slot, k)
+        x, y = load_rows(shift, k)
+        x, y, limit = per * x, per * y, most * load(calm, k)
+        size, limit = square_root(x * x + y * y), where_above(limit, zero, limit, zero)
+        part = where_above(size, limit, limit / size, one)
+        x, y = part * x, part * y
+        store_rows(burden, k, x, y)
+        store_rows(kept, k, vx, vy)
+        put(velocity, slot, k, vx + x, vy + y)
+
+
+@parallel_kernel
+def set_down(velocity, slot, shift, rate, calm, burden, kept):
+    """Links have pulled: from here on velocities are without what carries that, the `burden`, until `shoulder`.
+
+    A contact at rest holds against the acceleration a of a circle with a push c = -PUSHED / FED a h^2 in each substep, and ends
+    it with the velocity -(1 - PUSHED / FED) a h, so that nobody moves (docs/design/contact-law.md). For gravity that is the same
+    for all, and the second sweep sees no difference; what links pull with, shift / h^2, is another for each circle. Walls and
+    the second sweep would take it for motion, pass it on, and heaps of linked circles would not rest.
+
+    A jerk is motion: what is set down is no more than was felt in the substep before, by what `calm` says (0 if unknown).
+    rate: 1 / h. burden: becomes (k, 2) m/s; kept: (k, 2) the velocities of before.
+    """
+    for c in prange((slot.shape[0] + _CHUNK - 1) // _CHUNK):
+        _set_down(c * _CHUNK, min((c + 1) * _CHUNK, slot.shape[0]), velocity, slot, shift, rate, calm, burden, kept)
+
+
+@kernel
+def _shoulder(begin, end, velocity, slot, burden, kept):
+    for k in range(begin, end, LANES):
+        vx, vy = take(velocity, slot, k)
+        x, y = load_rows(burden, k)
+        before_x, before_y = load_rows(kept, k)
+        # To the bit what it was, where nobody has touched it.
+        vx = where_zero(vx - (before_x + x), before_x, vx - x)
+        vy = where_zero(vy - (before_y + y), before_y, vy - y)
+        put(velocity, slot, k, vx, vy)
+
+
+@parallel_kernel
+def shoulder(velocity, slot, burden, kept):
+    """The burden of `set_down` is taken up again."""
+    for c in prange((slot.shape[0] + _CHUNK - 1) // _CHUNK):
+        _shoulder(c * _CHUNK, min((c + 1) * _CHUNK, slot.shape[0]), velocity, slot, burden, kept)
 
 
 @kernel

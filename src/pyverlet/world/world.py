@@ -152,15 +152,20 @@ class World(Measures, Queries, Doors):
                 contacts.project(state, h, lag, forces.strongest)
                 done("contacts")
             if links:
-                self._solve(links, contacts, h)
+                self._aside(links.solve, contacts, h)
                 done("links")
+                if contacts:
+                    self._aside(links.lay_down, contacts, h)
             self.boundary.confine(state, h, lag, REST_ACCELERATIONS * forces.strongest * h)
             done("bounds")
             if course:
                 course.collide(state, self.boundary, run.substep * h, h, lag, REST_ACCELERATIONS * forces.strongest * h)
                 done("obstacles")
             if contacts:
-                contacts.still(state, h)
+                contacts.relax(state)
+                if links:
+                    self._aside(links.pick_up, contacts, h)
+                contacts.still(state)
             done("velocities")
             if links:
                 links.after(state, h)
@@ -209,9 +214,10 @@ class World(Measures, Queries, Doors):
             if len(self) > 1:
                 self._contacts.fit(self._slots)
 
-    def _solve(self, links: Links, contacts: ContactSolver | None, h: float) -> None:
+    def _aside(self, act: Callable[[Slots, float], None], contacts: ContactSolver | None, h: float) -> None:
+        """Links change velocities, which is no business of contacts."""
         with contacts.aside() if contacts else nullcontext():
-            links.solve(self._slots, h)
+            act(self._slots, h)
 
     def _finish(self, contacts: ContactSolver | None, watch: Watch | None, h: float, done: Any, *, marked: bool) -> bool:
         """The substeps are done: who rests, the velocities of now, and no more energy than there may be."""

@@ -175,11 +175,14 @@ class ContactSolver:
         if self._lends:
             self._loans.settle(state, wide)
 
-    def still(self, state: Slots, h: float) -> None:
-        """Take from touching circles the velocity that projection has put in, rub them, and hold who is too large for a gap."""
+    def relax(self, state: Slots) -> None:
+        """Take from touching circles the velocity that projection has put in, and rub them."""
         if self._lends:
             self._loans.join(self._wide)
         self._wide.relax(state)
+
+    def still(self, state: Slots) -> None:
+        """Velocities are done: even out what was lent, and hold who is too large for a gap."""
         if self._lends:
             self._loans.even_up(self._wide)
         self._pegs.hold(state)

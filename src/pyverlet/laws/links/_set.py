@@ -226,6 +226,16 @@ class Links:
         with self._threads():
             linked.call_solve(*self.compiled(state, h), state.position, state.velocity)
 
+    def lay_down(self, state: Slots, h: float) -> None:
+        """Before walls, where there are contacts: velocities are without what carries the pull of links."""
+        with self._threads():
+            linked.call_lay_down(*self.compiled(state, h), state.velocity)
+
+    def pick_up(self, state: Slots, h: float) -> None:
+        """After the contacts: they are with it again."""
+        with self._threads():
+            linked.call_pick_up(self.compiled(state, h)[0], state.velocity)
+
     def after(self, state: Slots, h: float) -> None:
         """After the contacts: what the links did is part of the acceleration, for integrators that remember it."""
         with self._threads():

@@ -62,6 +62,7 @@ class Work:
         self.weight = np.zeros(rows, dtype)
         self._slot = np.zeros(rows, np.uint32)
         self._calm = np.full(rows, np.nan, dtype)
+        self._burden, self._kept = np.zeros((2, rows, 2), dtype)
         self._past = nobody(dtype)
         self.seam = NONE
         self._order: Array | None = None
@@ -98,7 +99,17 @@ class Work:
 
     def arrays(self) -> tuple[Array, ...]:
         """As `kernels.linked.Linked` has them; the slots are right once `slots` has been asked."""
-        return self._slot, self.start, self.back, self.predicted, self.shift, self.weight, self._calm
+        return (
+            self._slot,
+            self.start,
+            self.back,
+            self.predicted,
+            self.shift,
+            self.weight,
+            self._calm,
+            self._burden,
+            self._kept,
+        )
 
     def where(self, state: Slots) -> Array:
         """(m, 2) where they are now, m; good until asked again."""
