@@ -176,7 +176,7 @@ class OneByOne:
             d = self.gap(k, i, j)
             distance = np.sqrt(d[0] * d[0] + d[1] * d[1])
             depth = real(0) if done else min(max(reach - distance, real(0)), real(LARGEST_PUSH) * reach)
-            if done:
+            if done and not e > 0:
                 self.slip[(i, j)] = real(0)
             elif not depth > 0:
                 self.slip.pop((i, j), None)

@@ -84,7 +84,7 @@ def _push_strip(s, to, circles, pairs, law, looks):
                 store(slips, k, new)
             continue
         done, at, lively = 0, k * law.mixed, 0
-        mu, slipped = zero, new
+        e, mu, slipped = zero, zero, new
         if RUBS:
             slipped = load(slips, k)
         if LISTENS and not BOUNCES and touching != 0:
@@ -129,8 +129,8 @@ def _push_strip(s, to, circles, pairs, law, looks):
         nx, ny = dx * per_metre, dy * per_metre
         push = pushed * depth
         cx, cy = nx * push, ny * push
-        if RUBS:
-            store(slips, k, where_above(depth, zero, slipped, where_set(done, zero, new)))
+        if RUBS:  # who has met without restitution stays
+            store(slips, k, where_above(depth, zero, slipped, where_above(e, zero, new, where_set(done, zero, new))))
         if BOUNCES:
             store(depths, k, depth)
             if RUBS and which_above(mu, zero) != 0:

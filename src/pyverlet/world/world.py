@@ -41,8 +41,7 @@ from pyverlet.world.turns import in_turn
 
 Array = NDArray[Any]
 
-# For scenes whose collisions argument is left alone: a fresh default each time, while None means no collisions.
-_DEFAULT_COLLISIONS = Collisions()
+_DEFAULT_COLLISIONS = Collisions()  # for scenes whose argument is left alone, while None means no collisions
 
 
 class World(Measures, Queries, Doors):
@@ -152,20 +151,14 @@ class World(Measures, Queries, Doors):
                 contacts.project(state, h, lag, forces.strongest)
                 done("contacts")
             if links:
-                self._aside(links.solve, contacts, h)
-                done("links")
-                if contacts:
-                    self._aside(links.lay_down, contacts, h)
+                self._solve(links, contacts, h, done)
             self.boundary.confine(state, h, lag, REST_ACCELERATIONS * forces.strongest * h)
             done("bounds")
             if course:
                 course.collide(state, self.boundary, run.substep * h, h, lag, REST_ACCELERATIONS * forces.strongest * h)
                 done("obstacles")
             if contacts:
-                contacts.relax(state)
-                if links:
-                    self._aside(links.pick_up, contacts, h)
-                contacts.still(state)
+                contacts.still(state, h, links and links.pick_up)
             done("velocities")
             if links:
                 links.after(state, h)
@@ -175,8 +168,8 @@ class World(Measures, Queries, Doors):
 
     def _watch(self, h: float) -> Watch | None:
         """Who looks after the energy of this frame, if nothing but contacts, links and obstacles could raise it."""
-        about = self._state, self._force_sum, self.links, self.boundary, self.substeps * h
-        return Watch(*about) if undriven(self, h, self._h_last) else None
+        about = self._state, self._force_sum, self.links, self.boundary
+        return Watch(*about, self.substeps * h) if undriven(self, h, self._h_last) else None
 
     def _open(self, h: float, done: Callable[[str], None]) -> bool:
         """Take up what users have set, and begin; False if nobody is awake."""
@@ -214,10 +207,12 @@ class World(Measures, Queries, Doors):
             if len(self) > 1:
                 self._contacts.fit(self._slots)
 
-    def _aside(self, act: Callable[[Slots, float], None], contacts: ContactSolver | None, h: float) -> None:
-        """Links change velocities, which is no business of contacts."""
+    def _solve(self, links: Links, contacts: ContactSolver | None, h: float, done: Callable[[str], None]) -> None:
         with contacts.aside() if contacts else nullcontext():
-            act(self._slots, h)
+            links.solve(self._slots, h)
+            done("links")
+            if contacts:
+                links.lay_down(self._slots, h)
 
     def _finish(self, contacts: ContactSolver | None, watch: Watch | None, h: float, done: Any, *, marked: bool) -> bool:
         """The substeps are done: who rests, the velocities of now, and no more energy than there may be."""
@@ -226,7 +221,7 @@ class World(Measures, Queries, Doors):
             contacts.end(self._slots, self._state, lag, self.substeps * h, self.gravity, marked=marked)
         self.boundary.leave(self._slots)
         self.integrator.end(self._slots, h)
-        finite = watch.close(self._slots, contacts) if watch else False
+        finite = watch is not None and watch.close(self._slots, contacts)
         done("finish")
         return finite
 
@@ -339,9 +334,8 @@ class World(Measures, Queries, Doors):
         if value is not None and not isinstance(value, Collisions):
             raise InputError(f"collisions is {value!r}; allowed are pyverlet.Collisions(...) and None")
         self._collisions = value
-        self._contacts = (
-            None if value is None else ContactSolver(value, self._state.dtype, self.links.unlist, self._events, self._sleep)
-        )
+        about = self._state.dtype, self.links.unlist, self._events, self._sleep
+        self._contacts = None if value is None else ContactSolver(value, *about)
 
     @property
     def threads(self) -> int:

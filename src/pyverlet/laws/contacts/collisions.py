@@ -175,14 +175,17 @@ class ContactSolver:
         if self._lends:
             self._loans.settle(state, wide)
 
-    def relax(self, state: Slots) -> None:
-        """Take from touching circles the velocity that projection has put in, and rub them."""
+    def still(self, state: Slots, h: float, after: Callable[[Slots, float], None] | None) -> None:
+        """Take from touching circles the velocity that projection has put in, rub them, and hold who is too large for a gap.
+
+        after: what others do to velocities as soon as that is done.
+        """
         if self._lends:
             self._loans.join(self._wide)
         self._wide.relax(state)
-
-    def still(self, state: Slots) -> None:
-        """Velocities are done: even out what was lent, and hold who is too large for a gap."""
+        if after:
+            with self.aside():
+                after(state, h)
         if self._lends:
             self._loans.even_up(self._wide)
         self._pegs.hold(state)

@@ -88,6 +88,7 @@ class Work:
             links.recall_all(*past[1:], state.position, self.particle, self.start, self._calm)
         else:
             links.recall(*(past or nobody(state.dtype)), state.number, state.position, self.particle, self.start, self._calm)
+        self._calm[len(self) :] = self._calm[len(self) - 1 : len(self)]  # the last one is repeated
 
     def end(self, state: State) -> Past:
         """The frame is good: what is to be remembered, until the `end` of the next."""
