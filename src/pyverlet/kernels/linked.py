@@ -1,5 +1,5 @@
-"""What links do in a substep, each part of it one call: `look` before the integrator moves, `solve` after the contacts, and
-`note_pull` when velocities are done.
+"""What links do in a substep, each part of it one call: `look` before the integrator moves, `solve` after the contacts,
+`lay_down` and `pick_up` around walls and the second sweep over contacts, and `note_pull` when velocities are done.
 
 The law is that of `kernels.links`: pins first (`ties`), then passes over runs of distances (`chains`) and all other rows
 (`link_rows`), there and back, for one way only the links about a common particle throw it in a circle, faster and faster.
