@@ -199,22 +199,15 @@ def changed(change: Any, fusing: Fusing) -> pv.World:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda world: setattr(world, "collisions", pv.Collisions(method=pv.BruteForce())),
-        lambda world: world.links.append(
-            pv.Angle(world.add(position=[(0, 99), (1, 99), (2, 99)], radius=0.1, allow_overlap=True), 0, 1, 2, compliance=0.1)
-        ),
-    ],
-    ids=["brute force", "angle"],
-)
-def test_whatever_more_there_is_goes_the_long_way(change: Any, fusing: Fusing) -> None:
-    world = changed(change, fusing)
+def test_brute_force_goes_the_long_way(fusing: Fusing) -> None:
+    def brutal(world: pv.World) -> None:
+        world.collisions = pv.Collisions(method=pv.BruteForce())
+
+    world = changed(brutal, fusing)
     assert not fusing.has(world)
     assert not fusing.substeps
     fusing.undo()
-    assert same(world, changed(change, fusing))
+    assert same(world, changed(brutal, fusing))
 
 
 class Thrust:
@@ -279,12 +272,14 @@ def test_forces_of_few_numbers_and_obstacles_that_stand_still_go_along(change: A
 
 
 def hang(world: pv.World) -> None:
-    """A chain from a pin, which breaks, and springs and ropes across it, in the midst of the heap."""
+    """A chain from a pin, which breaks, springs, ropes and angles across it, and areas, in the midst of the heap."""
     top = world.groups[0]
     world.links.append(pv.Stick(top, range(11), range(1, 12), breaking_force=50.0))
     world.links.append(pv.Pin(top, 0))
     world.links.append(pv.Spring(top, np.arange(10), np.arange(2, 12), stiffness=20.0, damping=0.1))
     world.links.append(pv.Rope(top, np.arange(0, 7, 3), np.arange(5, 12, 3)))
+    world.links.append(pv.Angle(top, np.arange(8), np.arange(1, 9), np.arange(2, 10), compliance=0.1, damping=0.01))
+    world.links.extend([pv.Area(top, [12, 13, 14], compliance=0.1), pv.Area(top, [13, 14, 15])])
 
 
 @pytest.mark.parametrize(
@@ -300,7 +295,7 @@ def hang(world: pv.World) -> None:
         slow(lambda world: setattr(world, "boundary", pv.Box((-99, -99), (99, 99), friction=0.2)), id="box"),
     ],
 )
-def test_chains_and_pins_go_along(change: Any, by_stages: Fusing) -> None:
+def test_links_go_along(change: Any, by_stages: Fusing) -> None:
     def linked(world: pv.World) -> None:
         change(world)
         hang(world)
