@@ -303,7 +303,7 @@ def test_who_is_pulled_into_an_elastic_wall_keeps_its_energy() -> None:
     world.links.append(pv.Pin(ball, 0, point=(0, -10), compliance=0.1))
     start, fall = world.energy().total, 0.5 * (10.6**2 - 10.1**2) / 0.1
     world.run(seconds=6)
-    assert world.energy().total == pytest.approx(start, abs=0.1 * fall)
+    assert world.energy().total == pytest.approx(start, abs=0.3 * fall)
 
 
 def test_newtons_cradle_passes_its_momentum_to_the_last_ball() -> None:

@@ -33,8 +33,8 @@ def sweep(homeward, skip, prepares, notes, linked, linking):
 
     Colour c is packs colour[c] to colour[c + 1], which share no particle. rooms, wide: (parts, SCRATCH or WIDE times the items of
     the longest pack): as many packs are solved beside each other. claims: see `compile.stealing`. prepares: hard ones are
-    prepared on the way; notes: their force is noted, and who breaks, if they do not come again (`chain_rows.note_pack`), as on
-    the way out only the last colour does not. So rows are not fetched for that once more.
+    prepared on the way; notes: their force is noted, and who breaks (`chain_rows.note_pack`), of the last colour alone on the way
+    out, for the others come again. So rows are not fetched for that once more.
     """
     colour, colours = linked.colour, linked.colour.shape[0] - 1
     for n in range(1 if skip else 0, colours):

@@ -54,7 +54,7 @@ def _area(a, b, corner, period_x, period_y, rest, gradient):
 
 @kernel
 def measure(kind, a, b, corner, period_x, period_y, rest, gradient):
-    """(C, bend) of a row of this kind, in its unit and per m^2 of its gradient; writes its gradient."""
+    """C of a row of this kind, in its unit, and how fast its gradient turns, that per m^2; writes its gradient."""
     if kind == ANGLE:
         return _angle(a, b, corner, period_x, period_y, rest, gradient)
     return _area(a, b, corner, period_x, period_y, rest, gradient)
