@@ -68,6 +68,47 @@ def test_crowds_without_room_bring_no_energy(radius: float) -> None:
     assert np.all(np.hypot(*world.position.T) + radius <= 10 * (1 + 1e-4))
 
 
+MISLAID = {
+    "below the cage": (pv.Circle(radius=10), None, (3, -27)),
+    "below the box": (pv.Box((-8, -8), (8, 8)), None, (1, -60)),
+    "below the floor of a strip": (pv.Periodic((-8, -8), (8, 8), axes="x"), None, (1, -9)),
+    "in a disc": (pv.Circle(radius=10), pv.Disc((0, 0), 5.0), (0.1, 1.2)),
+    "in a polygon": (pv.Circle(radius=10), pv.Polygon([(-4, -4), (4, -4), (4, 4), (-4, 4)]), (0.1, 1.2)),
+}
+
+
+@pytest.mark.parametrize("way", ["added", "moved", "let go"])
+@pytest.mark.parametrize("place", MISLAID)
+def test_who_has_been_put_where_nobody_can_be_is_out_after_a_frame(place: str, way: str) -> None:
+    # Out of the wall upwards it gains m g times metres. That was taken back, by having nobody come any part of their way.
+    room, obstacle, where = MISLAID[place]
+    world = pv.World(boundary=room, gravity=(0, -G))
+    if obstacle:
+        world.obstacles.append(obstacle)
+    world.add(position=[(6, 0)], radius=0.5)
+    world.step(1 / 60)
+    if way == "added":
+        world.add(position=[where], radius=0.5, allow_overlap=True)
+    else:
+        world.add(position=[where], radius=0.5, mass=np.inf)
+        world.step(1 / 60)
+        world.mass[1] = 1.0
+    if way == "moved":
+        world.position[1] = (-6, 0)
+        world.step(1 / 60)
+        world.position[1] = where
+    begun = world.frames
+    world.step(1 / 60)
+    out = world.position[1].astype(float)
+    assert not room.outside(out[None])[0]
+    assert world.is_free(out)
+    for _ in range(10):
+        world.step(1 / 60)
+    # The other one has gone on falling meanwhile: g t^2 / 2, which position Verlet has exactly; 1e-6 of 10 m is rounding.
+    t = (begun + 11) / 60
+    assert world.position[0, 1] == pytest.approx(-0.5 * G * t * t, abs=1e-5)
+
+
 def test_without_it_energy_rises_more(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pyverlet.world.world.undriven", lambda *_: False)
     assert rows.worst_rise(crowd(), 2.0)[0] > 5 * rows.MOST

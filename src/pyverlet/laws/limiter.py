@@ -13,13 +13,17 @@ links, less the work of gravity and of the forces with a potential, by the trape
    floor leaves the momentum along it as it is. Forces that depend on the place leave none: then it is all of it. So it is, too,
    under gravity, where what follows is not enough: in a crowd that is wedged in, or among masses of 1:1000 in free fall.
 3. What circles have been raised against these forces in this frame: they are lowered by a part of that, and have grown by that
-   part less. Not those that a wall has raised because they were beyond it: it would do so again.
+   part less. Not those that a wall has raised because they were partly beyond it: it would do so again.
 4. Their way. Where lowering pushes circles into walls, or forces hold them elsewhere, it may not do: those that could not give
    enough of their motion have come only a part of the way that they have come in this frame.
+
+Whose centre was outside the room or inside an obstacle when the frame began has been put there, and is brought back at once: what
+that has raised is no gain.
 """
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -30,6 +34,7 @@ from pyverlet.kernels import clusters, measure, taking
 from pyverlet.laws.contacts.collisions import ContactSolver
 from pyverlet.laws.forces import Drag, ForceSum, has_potential
 from pyverlet.laws.links import Links
+from pyverlet.laws.obstacles import Course
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
@@ -54,16 +59,16 @@ _INSIDE = 0.99
 class Watch:
     """Looks after the energy of a frame of dt seconds. `start`: the user's arrays, as they are until the frame is accepted."""
 
-    def __init__(self, start: State, forces: ForceSum, links: Links, room: Boundary, dt: float) -> None:
-        self._start, self._forces, self._links, self._room, self._dt = start, forces, links, room, dt
+    def __init__(self, start: State, forces: ForceSum, links: Links, room: Boundary, course: Course, dt: float) -> None:
+        self._start, self._forces, self._links, self._room, self._course, self._dt = start, forces, links, room, course, dt
         self._gravity = forces.gravity
         self._kept: list[Any] = [force for force in forces.forces if has_potential(force)] if forces.forces else []
         self._plain = len(start) < ONE_THREAD_BELOW and not (self._kept or links.give)
         # What links hold is not known any more when the frame is over.
-        by_forces, by_links = (0.0, 0.0) if self._plain else self._holds(start)
+        by_forces, self._by_links = (0.0, 0.0) if self._plain else self._holds(start)
         # A potential is known but for a constant, so that under gravity, which has a scale, it is none.
-        self._held = by_links if any(self._gravity) else by_forces + by_links
-        self._energy = 0.0 if self._plain else by_forces + by_links + self._mechanical(start, self._gravity)
+        self._held = self._by_links if any(self._gravity) else by_forces + self._by_links
+        self._energy = 0.0 if self._plain else by_forces + self._by_links + self._mechanical(start, self._gravity)
 
     def _mechanical(self, now: State | Slots, gravity: tuple[float, float]) -> float:
         moving, body = (now.position, now.velocity, now.velocity, 0.0), (now.spin, now.radius, now.mass)
@@ -71,13 +76,13 @@ class Watch:
 
     def _holds(self, now: State | Slots) -> tuple[float, float]:
         """Energy that forces hold, and links, J."""
-        by_forces = by_links = 0.0
-        if self._kept:
-            state = now.in_users_order() if isinstance(now, Slots) else now
-            by_forces = float(sum(force.potential(state) for force in self._kept))
+        by_links = 0.0
         if self._links.give:
             by_links = self._links.energy(now.where() if isinstance(now, Slots) else now.position)
-        return by_forces, by_links
+        return self._by_forces(now.in_users_order() if self._kept and isinstance(now, Slots) else now), by_links
+
+    def _by_forces(self, now: State | Slots) -> float:
+        return float(sum(force.potential(now) for force in self._kept))
 
     def _gained(self, now: Slots) -> float:
         """What the energy of all is now above that at the start, J."""
@@ -100,6 +105,8 @@ class Watch:
             finite = not slots.pins and abs(gained) < np.inf  # what is pinned has none
             room = SURPLUS * fall(slots.total_mass, self._gravity, self._room.extent())
             risen = gained / room if room > 0.0 else 0.0
+            if room < gained < np.inf and self._pardon_mislaid(slots):
+                gained = self._gained(slots)
             if room < gained < np.inf:
                 # Beside a fall, what there is: motion, and what forces and links hold.
                 there = self._mechanical(self._start, (0.0, 0.0)) + abs(self._held)
@@ -112,6 +119,21 @@ class Watch:
         if contacts:
             contacts.growth.heed(risen)
         return finite
+
+    def _pardon_mislaid(self, slots: Slots) -> bool:
+        """Let who was where nobody can be begin where it is now. False: there was nobody."""
+        start = self._start
+        mislaid = self._room.outside(start.position) | (self._course.covering(start.position) >= 0)
+        mislaid &= np.isfinite(start.mass)
+        if not mislaid.any():
+            return False
+        here = start.position.copy()
+        here[slots.particle] = np.where(mislaid[slots.particle, None], slots.position, here[slots.particle])
+        self._start = copy(start)
+        self._start.position = here
+        if not self._plain:
+            self._energy = self._by_forces(self._start) + self._by_links + self._mechanical(self._start, self._gravity)
+        return True
 
     def take_back(self, slots: Slots, listed: Listed, surplus: float) -> Array:
         """Take so many J from those who have gained in this frame. (n,) bool: who had more than could be taken of motion."""

@@ -140,7 +140,7 @@ def _use(world: World) -> None:
     world.step(1e-3)
     world.step(1e-3)  # by now somebody has moved far enough for a closer look at the list of pairs
     if world._contacts:
-        watch = Watch(world._state, world._force_sum, world.links, world.boundary, 1e-3)
+        watch = Watch(world._state, world._force_sum, world.links, world.boundary, world._course, 1e-3)
         watch.take_back(world._slots, world._contacts.listed(), 0.0)
     _lean(world)
     world.energy()

@@ -168,7 +168,7 @@ class World(Measures, Queries, Doors):
 
     def _watch(self, h: float) -> Watch | None:
         """Who looks after the energy of this frame, if nothing but contacts, links and obstacles could raise it."""
-        about = self._state, self._force_sum, self.links, self.boundary
+        about = self._state, self._force_sum, self.links, self.boundary, self._course
         return Watch(*about, self.substeps * h) if undriven(self, h, self._h_last) else None
 
     def _open(self, h: float, done: Callable[[str], None]) -> bool:
