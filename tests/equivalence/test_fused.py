@@ -445,10 +445,10 @@ def test_a_frame_that_was_broken_off_leaves_nothing_behind(fusing: Fusing) -> No
         assert world._contacts is not None
         set_up, last = world._contacts.set_up, world.frames + 5
 
-        def interrupt(*about: Any) -> Any:
+        def interrupt(*about: Any, **options: Any) -> Any:
             if world.frames == last:
                 raise KeyboardInterrupt
-            return set_up(*about)
+            return set_up(*about, **options)
 
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(world._contacts, "set_up", interrupt)

@@ -26,6 +26,8 @@ from pyverlet.kernels.link_rows import Rows
 from pyverlet.kernels.linked import (
     Linked,
     Linking,
+    hold_still,
+    hold_still_alone,
     lay_down,
     lay_down_alone,
     look,
@@ -65,6 +67,7 @@ BESIDE: dict[str, dict[str, Any]] = {
         "SERVED": True,
         "LINKED": True,
         "look": look_alone,
+        "hold_still": hold_still_alone,
         "solve": solve_alone,
         "lay_down": lay_down_alone,
         "pick_up": pick_up_alone,
@@ -257,6 +260,8 @@ def _substeps(
             if SERVED and lends:
                 lend(circles, pairs, loans, terms, cut, law.rubs != 0)
                 looks = 1  # with the inertia of the moment others overlap deeply
+        if LINKED and circles.calm.shape[0] > 0:
+            hold_still(linked, circles.calm, 1 if lends else 0)
         push(circles, pairs, law, cut, looks, sets_out, claims)
         if SERVED and lends:
             settle(circles, pairs, loans, hanging, terms, cut, claims)

@@ -25,9 +25,11 @@ import numpy as np
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.compile.lanes import (
     LANES,
+    larger,
     load,
     load_rows,
     pick,
+    place,
     put,
     spread,
     square_root,
@@ -196,6 +198,21 @@ def hand_back(position, velocity, slot, count, predicted, shift, rate):
         shift[k, 0], shift[k, 1] = shift[count - 1, 0], shift[count - 1, 1]
     for c in prange((slot.shape[0] + _CHUNK - 1) // _CHUNK):
         _hand_back(c * _CHUNK, min((c + 1) * _CHUNK, slot.shape[0]), position, velocity, slot, predicted, shift, rate)
+
+
+@kernel
+def _bear(begin, end, slot, calm, slow, keep):
+    zero, keep = spread(slow.dtype.type(0)), spread(slow.dtype.type(keep))
+    for k in range(begin, end, LANES):
+        felt = load(calm, k)
+        place(slow, slot, k, larger(keep * pick(slow, slot, k), where_above(felt, zero, felt, zero)))
+
+
+@parallel_kernel
+def bear(slot, calm, slow, keep):
+    """slow[slot[k]] = calm[k], or if `keep` is 1 the larger of both: contacts of linked circles are at rest up to there, m/s."""
+    for c in prange((slot.shape[0] + _CHUNK - 1) // _CHUNK):
+        _bear(c * _CHUNK, min((c + 1) * _CHUNK, slot.shape[0]), slot, calm, slow, keep)
 
 
 @kernel

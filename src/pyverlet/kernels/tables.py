@@ -21,7 +21,8 @@ E, MU, R_I, R_J, TURN_I, TURN_J = range(6)
 
 @bundle
 class Circles:
-    """Circles by slot; what each is: `Slots`, of contacts `Wide`, and the last six `Loans`: empty where nobody lends.
+    """Circles by slot; what each is: `Slots`, of contacts `Wide`, and the last six `Loans`: empty where nobody lends, but
+    for `calm`, which links fill, too.
 
     rows: (n, 4), where circles rub, what a pair reads and writes of each, side by side. In the first sweep: what friction moves
     it by (2), m, what that turns it by, rad, whether it carries weight. In the second: velocity (2), spin, `turn`.

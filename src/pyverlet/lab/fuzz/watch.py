@@ -98,14 +98,14 @@ def check(build: Build, deed: Deed, *, frames: int, dt: float, only: str | None 
 def _check(build: Build, deed: Deed, frames: int, dt: float, made: frozenset[str]) -> None:
     world = build(1)
     half = frames // 2
-    unsettled, lately = 0, deque[tuple[float, float]](maxlen=_SWING)
+    unsettled, seen = 0, _Seen()
     for frame in range(half):
-        unsettled = _frame(world, deed, frame, dt, made, lately, unsettled=unsettled)
+        unsettled = _frame(world, deed, frame, dt, made, seen, unsettled=unsettled)
     saved, file = world.save(), None
     if "file" in made and not world.actors and _is_plain(world):
         file = _through_a_file(world)
     for frame in range(half, frames):
-        unsettled = _frame(world, deed, frame, dt, made, lately, unsettled=unsettled)
+        unsettled = _frame(world, deed, frame, dt, made, seen, unsettled=unsettled)
     end = world.state_hash()
     if "contacts" in made:
         _compare_contacts(world, frames)
@@ -123,6 +123,18 @@ def _check(build: Build, deed: Deed, frames: int, dt: float, made: frozenset[str
             world.restore(saved)
         _run(world, deed, range(half, frames), dt)
         _same("restore", half, end, world.state_hash())
+
+
+class _Seen:
+    """What has been seen of a world.
+
+    Attributes:
+        lately: energies before the last frames that nothing drove, with their scale.
+        most: J, the largest sum of all its accounts without their signs, of which sums in float64 keep 1e-16.
+    """
+
+    def __init__(self) -> None:
+        self.lately, self.most = deque[tuple[float, float]](maxlen=_SWING), 0.0
 
 
 class _Noted:
@@ -198,12 +210,8 @@ def _told(name: str, frame: int) -> Iterator[None]:
         raise Broken(name, frame, f"{type(error).__name__}: {error}") from error
 
 
-def _frame(
-    world: World, deed: Deed, frame: int, dt: float, made: frozenset[str], lately: deque[tuple[float, float]], *, unsettled: int
-) -> int:
+def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str], seen: _Seen, *, unsettled: int) -> int:
     """One frame, `unsettled` if so many are to come in which the world may gain by what was done to it; then how many there are.
-
-    lately: energies before the last frames that nothing drove.
 
     Velocities are of half a step before, so the frame after a deed knows of it too; and overlap that a coarse step has left
     holds more energy when steps become shorter, until it is gone.
@@ -220,9 +228,9 @@ def _frame(
     driven = world.actors or touched or unsettled or pinned_move(world._state) or not undriven(world, h, world._h_last)
     driven = driven or not _uniform(world) or bool(world.links and world.overlap().max > _APART)
     if driven:
-        lately.clear()
+        seen.lately.clear()
     elif about_energy in made:
-        looks.append(_energy(about_energy, world, frame, dt, lately))
+        looks.append(_energy(about_energy, world, frame, dt, seen.lately))
     if "momentum" in made and not (world.actors or (touched and linked)) and _alone(world):
         looks.append(_momentum(world, frame, dt))
     try:
@@ -244,8 +252,8 @@ def _frame(
     if "ledger" in made and world.keeps_ledger:
         now = world.energy().total
         size = scale(world, _FALL_S) + abs(now)
-        turned_over = sum(map(abs, world.ledger.as_dict().values()))  # of which sums in float64 keep 1e-16
-        if abs(world.ledger.total - now) > _CLOSED * size + _of_rounding(world, dt) + 1e-14 * turned_over:
+        seen.most = max(seen.most, abs(now), sum(map(abs, world.ledger.as_dict().values())))
+        if abs(world.ledger.total - now) > _CLOSED * size + _of_rounding(world, dt) + 1e-14 * seen.most:
             raise Broken("ledger", frame, f"accounts add up to {world.ledger.total:.9g} J, energy is {now:.9g} J")
     return max(unsettled - 1, _EASED if before_deed[1] != world.substeps else int(touched))
 

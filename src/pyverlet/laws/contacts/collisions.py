@@ -150,14 +150,15 @@ class ContactSolver:
         """Whether the pairs are packed and were listed well so far, and nobody borrows inertia: a frame may begin with them."""
         return self._packed and not self._uneven and len(self._wide.origin) == len(state)
 
-    def set_up(self, state: Slots, h: float, lag: float, strongest: float) -> Wide:
-        """The pairs of now, with all that their sweeps need in this substep."""
+    def set_up(self, state: Slots, h: float, lag: float, strongest: float, *, linked: bool) -> Wide:
+        """The pairs of now, with all that their sweeps need in this substep. linked: whether links pull at any."""
         wide = self._pack(state)
         if self._rubs(state):
             self._slips.start(wide, state.particle)
         self._lends = self._uneven and strongest > 0
         noted = self._loans.begin(state, wide, h, strongest) if self._lends else None
-        wide.set_up(state, h, lag, strongest, REST_ACCELERATIONS * strongest * h, len(state.spent) > 0, noted)
+        rest_speed, accounts = REST_ACCELERATIONS * strongest * h, len(state.spent) > 0
+        wide.set_up(state, h, lag, strongest, rest_speed, accounts, noted, linked=linked)
         if self._lends:
             self._loans.lend(wide)
         return wide
@@ -167,10 +168,17 @@ class ContactSolver:
         """Whether circles lend each other inertia since `set_up`, and what `kernels.lending` takes."""
         return self._lends, self._loans.compiled if self._lends else self._loans.nobody
 
-    def project(self, state: Slots, h: float, lag: float, strongest: float) -> None:
-        """Let impacts bounce, move other overlapping circles apart, note who touches, and let those grip each other."""
+    def project(
+        self, state: Slots, h: float, lag: float, strongest: float, links: Callable[[Slots, float, Any, bool], None] | None
+    ) -> None:
+        """Let impacts bounce, move other overlapping circles apart, note who touches, and let those grip each other.
+
+        links: note, by slot, up to what speed contacts of who is linked are at rest; in the end, whether or beyond what is there.
+        """
         self._pegs.before(state, h)
-        wide = self.set_up(state, h, lag, strongest)
+        wide = self.set_up(state, h, lag, strongest, linked=links is not None)
+        if links and len(wide.calm):
+            links(state, h, wide.calm, self._lends)
         wide.push(state)
         if self._lends:
             self._loans.settle(state, wide)

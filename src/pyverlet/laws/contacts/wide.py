@@ -24,6 +24,8 @@ Array = NDArray[Any]
 
 _ROWS = tables.TURN_J + 1
 _ARRIVES = tables.Law._fields.index("arrives")
+_CALM = -2
+"""Where it is among what is noted."""
 
 
 class Wide:
@@ -45,6 +47,7 @@ class Wide:
         touched: (room,) bool, whether pairs have in the frame before, as events mark it.
         spent: (strips, 3) J that impacts, and friction, have taken in this frame, negative; and the virial of contacts: sum of
             what pushes each pair apart times their distance, N s m.
+        calm: (n,) m/s, up to which circles that lend inertia, or are linked, meet as contacts at rest do; (0,): none does.
         weighs: whether that is asked for.
         asks: whether any pair may bounce or rub, or the virial is asked for, or who carries weight. rubs: whether any may rub.
     """
@@ -65,8 +68,9 @@ class Wide:
         self._deeps = np.zeros(0, np.int64)  # packs of each strip that overlap deeply
         self._looks = True  # whether they are to be noted, once a frame
         self.spent = np.zeros((1, 3))
-        none, rows = np.empty(0, dtype), np.empty((0, 2), dtype)
-        self._lent, self._nobody = False, (rows, none, none, none, none, rows)
+        self.calm = none = np.empty(0, dtype)
+        rows = np.empty((0, 2), dtype)
+        self._lent, self._nobody = False, (rows, none, none, none)
         self._hold_circles(0)
 
     @property
@@ -206,11 +210,11 @@ class Wide:
 
     def set_up(
         self, state: Slots, h: float, lag: float, strongest: float, rest_speed: float, accounts: bool,
-        noted: tuple[Array, ...] | None,
+        noted: tuple[Array, ...] | None, *, linked: bool = False,
     ) -> None:  # fmt: skip
         """Everything that the sweeps of this substep, and of those that follow it alike, need: `circles`, `arrays` and `law`.
 
-        noted: where circles lend inertia, where impacts note what they do: `Loans.begin`.
+        noted: where circles lend inertia, where impacts note what they do: `Loans.begin`. linked: whether links pull at any.
         """
         if fresh := not self.fits(state) or (self._lent and noted is None):
             self.fit(state)
@@ -219,6 +223,9 @@ class Wide:
             np.bitwise_and(state.fed, CARRIES, out=self._carries, casting="unsafe")
             if fresh:  # each first sweep finds them as the second one before has left them: there may have been none
                 self._rows[:, :3], self._rows[:, 3] = 0, self._carries
+        if not noted:
+            noted = (*self._nobody, np.zeros(len(state) if linked and self.asks else 0, self._dtype), state.position[:0])
+        self.calm = noted[_CALM]
         turn = self._turn if self.rubs else self._turn[:0]
         if self.rubs:
             np.multiply(self._rough, state.real((state.drop - PUSHED / FED) * h), out=self._leans)
@@ -226,10 +233,10 @@ class Wide:
         self.circles = (
             state.position, state.velocity, state.acceleration, state.inverse_mass, self.origin, self.moved, state.resting,
             state.spin, self._carries, state.fed, self._rows, turn, self._lift, self._leans, state.start,
-            state.radius, state.restitution, state.friction, state.hits, state.spent, *(noted or self._nobody),
+            state.radius, state.restitution, state.friction, state.hits, state.spent, *noted,
         )  # fmt: skip
         carried = CARRIED_WEIGHT * strongest * h if strongest > 0 else np.inf
-        deep, grazes = (DEEP_LENT, 0.0) if noted else (DEEP, 1.0)
+        deep, grazes = (DEEP_LENT, 0.0) if self._lent else (DEEP, 1.0)
         self.law = (
             self._varied, self._sized, self._mixed, int(self.rubs), int(self._listens), int(accounts or self.weighs),
             1, *state.reals(h, lag, FED / PUSHED / h, LARGEST_PUSH, deep, rest_speed, grazes), int(strongest > 0),
