@@ -154,7 +154,7 @@ class OneByOne:
         closing = -(d[0] * u[0] + d[1] * u[1])
         free = self.real(1) - self.carries[i] * self.carries[j]
         bounces = not law.weight and e > 0
-        meeting = e > 0 or (mu > 0 and (i, j) not in self.slip)
+        meeting = (e > 0 or mu > 0) if (i, j) not in self.slip else e > 0 and (mu == 0 or not law.weight)
         if not (reach > distance and meeting and (bounces or free * abs(closing) > law.rest_speed * distance)):
             return False
         v = u + law.lag * (s.acceleration[j] - s.acceleration[i])
@@ -176,7 +176,7 @@ class OneByOne:
             d = self.gap(k, i, j)
             distance = np.sqrt(d[0] * d[0] + d[1] * d[1])
             depth = real(0) if done else min(max(reach - distance, real(0)), real(LARGEST_PUSH) * reach)
-            if done and not e > 0:
+            if done:
                 self.slip[(i, j)] = real(0)
             elif not depth > 0:
                 self.slip.pop((i, j), None)

@@ -103,8 +103,12 @@ def _push_strip(s, to, circles, pairs, law, looks):
             free = one - carries_i * carries_j
             # Where nothing accelerates, nothing that bounces rests: not even who moves alike is pushed, and fed.
             restless = which_above(e, zero) if law.weight == 0 else 0
-            # Without restitution they meet once, in the first substep of their contact: then they stay together.
-            meets = e + where_above(new, slipped, zero, spread(law.grazes) * mu) if RUBS else e
+            meets = e
+            if (
+                RUBS
+            ):  # they meet in the first substep of their contact: who overlaps in the next one, too, is held there by others
+                again = e if law.weight == 0 else where_above(mu, zero, zero, e)
+                meets = where_above(new, slipped, again, e + spread(law.grazes) * mu)
             live = touching & which_above(meets, zero) & (which_above(free, zero) | restless)
             if live != 0 or law.listens != 0:
                 vxi, vyi = take(velocity, lane_i, k)
@@ -129,8 +133,8 @@ def _push_strip(s, to, circles, pairs, law, looks):
         nx, ny = dx * per_metre, dy * per_metre
         push = pushed * depth
         cx, cy = nx * push, ny * push
-        if RUBS:  # who has met without restitution stays
-            store(slips, k, where_above(depth, zero, slipped, where_above(e, zero, new, where_set(done, zero, new))))
+        if RUBS:
+            store(slips, k, where_above(depth, zero, slipped, where_set(done, zero, new)))
         if BOUNCES:
             store(depths, k, depth)
             if RUBS and which_above(mu, zero) != 0:
