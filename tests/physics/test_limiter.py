@@ -68,6 +68,20 @@ def test_crowds_without_room_bring_no_energy(radius: float) -> None:
     assert np.all(np.hypot(*world.position.T) + radius <= 10 * (1 + 1e-4))
 
 
+def test_a_crowd_that_cannot_move_does_not_gain_what_it_would_fall_with() -> None:
+    # Six discs wedged into a cage, in one step a frame: they were put back to where they had been, with the velocity of their
+    # fall, m g dt more in each frame: 1e-3 of m g H after eight.
+    rng, g = np.random.default_rng(411340), (-9.67, -1.64)
+    world = pv.World(boundary=pv.Circle(radius=10, restitution=0.152), gravity=g, integrator=pv.RK4(), substeps=1)
+    place, velocity = rng.uniform(-4.67, 4.67, (6, 2)), rng.normal(0, 0.124, (6, 2))
+    world.add(position=place, radius=3.33, velocity=velocity, mass=30 ** rng.random(6))
+    most = 1e-4 * float(world.mass.sum()) * 20 * (abs(g[0]) + abs(g[1]))
+    for _ in range(60):
+        before = world.energy().total
+        world.step(1 / 15)
+        assert world.energy().total - before <= most
+
+
 MISLAID = {
     "below the cage": (pv.Circle(radius=10), None, (3, -27)),
     "below the box": (pv.Box((-8, -8), (8, 8)), None, (1, -60)),

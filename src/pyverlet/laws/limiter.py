@@ -15,7 +15,8 @@ links, less the work of gravity and of the forces with a potential, by the trape
 3. What circles have been raised against these forces in this frame: they are lowered by a part of that, and have grown by that
    part less. Not those that a wall has raised because they were partly beyond it: it would do so again.
 4. Their way. Where lowering pushes circles into walls, or forces hold them elsewhere, it may not do: those that could not give
-   enough of their motion have come only a part of the way that they have come in this frame.
+   enough of their motion have come only a part of the way that they have come in this frame. If they are where they were and have
+   gained all the same, it is what they move with as a whole: that is taken, too.
 
 Whose centre was outside the room or inside an obstacle when the frame began has been put there, and is brought back at once: what
 that has raised is no gain.
@@ -177,7 +178,20 @@ class Watch:
         none = come(0.0)
         if none < allowed:
             left = come((allowed - none) / (left - none))
-        return left if none < allowed and left <= allowed * _NEARLY else come(0.0)
+            if left <= allowed * _NEARLY:
+                return left
+            none = come(0.0)
+        if none > allowed * _NEARLY:
+            self._slow(slots, raised, none - allowed)
+        return self._gained(slots)
+
+    def _slow(self, slots: Slots, who: Array, surplus: float) -> None:
+        """Take so many J of the motion of `who`, or all of it."""
+        m, rim = slots.mass[who].astype(float), (slots.radius[who] * slots.spin[who]).astype(float)
+        motion = 0.5 * float(m @ (slots.velocity[who].astype(float) ** 2).sum(axis=1)) + 0.25 * float(m @ rim**2)
+        part = slots.real(np.sqrt(max(1.0 - surplus / motion, 0.0)) if motion > 0.0 else 1.0)
+        slots.velocity[who] *= part
+        slots.spin[who] *= part
 
     def _pulls(self, slots: Slots) -> tuple[Array, Array]:
         """(n, 2) N, what forces with a potential do to each beside gravity, at the start of the frame and now; empty: nothing."""

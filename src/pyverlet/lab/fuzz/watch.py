@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from pyverlet.compile import jit
 from pyverlet.data import snapshot
 from pyverlet.ground.errors import InputError, NonFiniteError
+from pyverlet.lab.fuzz.explained import of_rounding, rolled, rounded, stored
 from pyverlet.lab.fuzz.program import Build, Deed
 from pyverlet.lab.physics.energy import MOST, scale
 from pyverlet.laws.forces import ConstantForce, Drag, PointSpring, Wind
@@ -214,7 +215,8 @@ def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str]
     """One frame, `unsettled` if so many are to come in which the world may gain by what was done to it; then how many there are.
 
     Velocities are of half a step before, so the frame after a deed knows of it too; and overlap that a coarse step has left
-    holds more energy when steps become shorter, until it is gone.
+    holds more energy when steps become shorter, until it is gone. So do links that an obstacle has stretched by pushing out who
+    was in it at the beginning (docs/design/links.md, Energy).
     """
     before_deed = (world.version, world.substeps)
     energy_then, linked = world.energy().total, bool(world.links)
@@ -223,6 +225,7 @@ def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str]
     touched = before_deed != (world.version, world.substeps) or energy_then != world.energy().total
     touched |= bool(linked and not world.links)
     touched |= frame == 0 and len(world.obstacles) > 0  # which lift whoever starts inside them
+    eases = before_deed[1] != world.substeps or bool(frame == 0 and world.links and _in_obstacles(world))
     h = dt / world.substeps
     about_energy = "links" if world.links else "energy"
     driven = world.actors or touched or unsettled or pinned_move(world._state) or not undriven(world, h, world._h_last)
@@ -253,20 +256,16 @@ def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str]
         now = world.energy().total
         size = scale(world, _FALL_S) + abs(now)
         seen.most = max(seen.most, abs(now), sum(map(abs, world.ledger.as_dict().values())))
-        if abs(world.ledger.total - now) > _CLOSED * size + _of_rounding(world, dt) + 1e-14 * seen.most:
+        if abs(world.ledger.total - now) > _CLOSED * size + of_rounding(world, dt) + 1e-14 * seen.most:
             raise Broken("ledger", frame, f"accounts add up to {world.ledger.total:.9g} J, energy is {now:.9g} J")
-    return max(unsettled - 1, _EASED if before_deed[1] != world.substeps else int(touched))
+    return max(unsettled - 1, _EASED if eases else int(touched))
 
 
-def _of_rounding(world: World, dt: float) -> float:
-    """J, the energy of who moves by a rounding error of its place in a frame."""
-    slowest = float(np.finfo(world.dtype).eps * np.abs(world.position).max(initial=0.0)) / dt  # m/s
-    return 0.5 * _free_mass(world) * slowest**2
-
-
-def _free_mass(world: World) -> float:
-    """kg, of the last frame and of those pinned since."""
-    return float(np.where(np.isfinite(world.mass), world.mass, 0.0).sum(dtype=float)) + float(np.isinf(world.mass).sum())
+def _in_obstacles(world: World) -> bool:
+    """Whether anybody is, if only with its rim."""
+    course = world._course
+    course.covering(world.position)  # obstacles are placed for that
+    return len(course.seen()) > 0 and bool((course.facing(world.position)[0] < world.radius[:, None]).any())
 
 
 def _finite(world: World) -> bool:
@@ -287,49 +286,12 @@ def _uniform(world: World) -> bool:
     return all(isinstance(force, ConstantForce | Drag) and not isinstance(force, Wind) for force in world.forces)
 
 
-def _stored(world: World, h: float) -> tuple[float, float]:
-    """J that links hold, and the sum of their stiffness, N/m: none counts as stiffer than what it gives back in a substep of h.
-
-    Its particles then move by their stretch C, and get the energy of C / h. A link much stiffer than substeps can follow shows
-    more, where a wall or a pinned circle has stretched it after links were solved, and never gives that back.
-    """
-    place, held, stiff = world.position.astype(float), 0.0, 0.0
-    with np.errstate(divide="ignore"):
-        weight = 1.0 / world.mass.astype(float)
-    for pool in world.links._kept:
-        energy, soft = pool.energies(place, world._state.seam), np.isfinite(pool.rows["stiffness"])
-        stiffness = np.where(soft, pool.rows["stiffness"], 0.0)
-        if (pool.rows["arity"] == 2).all():
-            both = weight[pool.entries["particle"].reshape(-1, 2)].sum(axis=1)
-            part = 1.0 / np.maximum(stiffness * both * h * h, 1.0)
-            energy, stiffness = energy * part, stiffness * part
-        held, stiff = held + float(energy.sum()), stiff + float(stiffness.sum())
-    return held, stiff
-
-
-def _rounded(world: World, held: float, stiff: float) -> float:
-    """J that springs gain where places are rounded: those of stiffness k, stretched by C, k C d and k d^2 / 2."""
-    d = 4.0 * float(np.finfo(world.dtype).eps * np.abs(world.position).max(initial=0.0))
-    return float(np.sqrt(2.0 * held * stiff)) * d + 0.5 * stiff * d * d
-
-
-def _rolled(world: World, h: float) -> float:
-    """J a frame, of who rolls along a wall: a step of order 2 moves it freely, and friction then mends its velocity alone.
-
-    By a third of a h^2 / 2 too far for a disc that rolls, along a: measured is 0.21 m (a h)^2 a substep with what friction takes.
-    """
-    if world.integrator.velocity_lag:
-        return 0.0
-    gx, gy = world.gravity
-    return 0.25 * _free_mass(world) * (gx * gx + gy * gy) * h * h * world.substeps
-
-
 def _energy(name: str, world: World, frame: int, dt: float, lately: deque[tuple[float, float]]) -> Callable[[], None]:
     h = dt / world.substeps
 
     def total() -> tuple[float, float, float, float]:
         """J as it is shown, and without what links show and cannot give back in a substep: one of both must not have risen."""
-        now, (held, stiff) = world.energy(), _stored(world, h)
+        now, (held, stiff) = world.energy(), stored(world, h)
         return now.total, now.total - now.links + held, held, stiff
 
     shown, able, held, _ = total()
@@ -340,7 +302,7 @@ def _energy(name: str, world: World, frame: int, dt: float, lately: deque[tuple[
     def look() -> None:
         now_shown, now_able, held, stiff = total()
         rise = min(now_shown - shown, now_able - able)
-        if rise > MOST * size + _of_rounding(world, dt) + _rounded(world, held, stiff) + _rolled(world, h):
+        if rise > MOST * size + of_rounding(world, dt) + rounded(world, held, stiff) + rolled(world, h):
             share = f"{rise / size:.2e} of the scale, " if size else ""
             raise Broken(name, frame, f"up by {share}{rise:.4g} J")
 
