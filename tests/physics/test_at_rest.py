@@ -48,8 +48,7 @@ def test_a_rough_pile_reports_no_velocity() -> None:
         world.run(seconds=25)
         fastest.append(np.hypot(*world.velocity.T).max())
         assert abs(float(np.median(world.velocity[:, 1]))) < 0.01 * G * H
-    # One circle, wedged between four others, may show a velocity with which it does not move, in one pile of eight or so.
-    assert sorted(fastest)[-2] < 0.1 * G * H
+    assert max(fastest) < 0.1 * G * H
 
 
 def rough_heap(seed: int, link: str = "", e: float | None = None) -> pv.World:
