@@ -338,7 +338,7 @@ def test_circles_added_to_a_crowd_that_moves_raise_no_energy(gravity: tuple[floa
 
 
 @pytest.mark.slow  # it compiles what only it needs
-@pytest.mark.parametrize("restitution", [0.1, 0.3, 0.5])
+@pytest.mark.parametrize("restitution", [0.1, 0.15])
 def test_nets_of_springs_bring_no_energy(restitution: float, taken: list[float]) -> None:
     # Springs that one pass does not solve are stretched by more than their force says: 8e-4 of the scale in a frame, in a crash
     # against the ceiling that gravity points at. The potential of a force is no scale: it is known but for a constant.
