@@ -123,6 +123,18 @@ def test_who_has_been_put_where_nobody_can_be_is_out_after_a_frame(place: str, w
     assert world.position[0, 1] == pytest.approx(-0.5 * G * t * t, abs=1e-5)
 
 
+@pytest.mark.parametrize("place", ["in a disc", "in a polygon"])
+def test_who_is_covered_by_an_obstacle_is_out_after_a_frame(place: str) -> None:
+    room, obstacle, where = MISLAID[place]
+    world = pv.World(boundary=room, gravity=(0, -G))
+    world.add(position=[where], radius=0.5)
+    world.step(1 / 60)
+    assert obstacle
+    world.obstacles.append(obstacle)
+    world.step(1 / 60)
+    assert world.is_free(world.position[0])
+
+
 def test_without_it_energy_rises_more(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pyverlet.world.world.undriven", lambda *_: False)
     assert rows.worst_rise(crowd(), 2.0)[0] > 5 * rows.MOST

@@ -104,9 +104,8 @@ def _push_strip(s, to, circles, pairs, law, looks):
             # Where nothing accelerates, nothing that bounces rests: not even who moves alike is pushed, and fed.
             restless = which_above(e, zero) if law.weight == 0 else 0
             meets = e
-            if (
-                RUBS
-            ):  # they meet in the first substep of their contact: who overlaps in the next one, too, is held there by others
+            if RUBS:
+                # They meet in the first substep of their contact: who overlaps in the next one, too, is held there by others.
                 again = e if law.weight == 0 else where_above(mu, zero, zero, e)
                 meets = where_above(new, slipped, again, e + spread(law.grazes) * mu)
             live = touching & which_above(meets, zero) & (which_above(free, zero) | restless)

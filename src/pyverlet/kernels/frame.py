@@ -26,12 +26,12 @@ from pyverlet.kernels.link_rows import Rows
 from pyverlet.kernels.linked import (
     Linked,
     Linking,
-    hold_still,
-    hold_still_alone,
     lay_down,
     lay_down_alone,
     look,
     look_alone,
+    note_calm,
+    note_calm_alone,
     note_pull,
     note_pull_alone,
     pick_up,
@@ -67,7 +67,7 @@ BESIDE: dict[str, dict[str, Any]] = {
         "SERVED": True,
         "LINKED": True,
         "look": look_alone,
-        "hold_still": hold_still_alone,
+        "note_calm": note_calm_alone,
         "solve": solve_alone,
         "lay_down": lay_down_alone,
         "pick_up": pick_up_alone,
@@ -261,7 +261,7 @@ def _substeps(
                 lend(circles, pairs, loans, terms, cut, law.rubs != 0)
                 looks = 1  # with the inertia of the moment others overlap deeply
         if LINKED and circles.calm.shape[0] > 0:
-            hold_still(linked, circles.calm, 1 if lends else 0)
+            note_calm(linked, circles.calm, 1 if lends else 0)
         push(circles, pairs, law, cut, looks, sets_out, claims)
         if SERVED and lends:
             settle(circles, pairs, loans, hanging, terms, cut, claims)

@@ -1,4 +1,4 @@
-"""What links do in a substep, each part of it one call: `look` before the integrator moves, `hold_still` before the contacts and
+"""What links do in a substep, each part of it one call: `look` before the integrator moves, `note_calm` before the contacts and
 `solve` after them, `lay_down` and `pick_up` around walls and the second sweep, and `note_pull` when velocities are done.
 
 The law is that of `kernels.links`: pins first (`ties`), then passes over runs of distances (`chains`) and all other rows
@@ -14,7 +14,7 @@ from pyverlet.compile.jit import driver, kernel, variant
 from pyverlet.kernels.chain_passes import sweep
 from pyverlet.kernels.chain_rows import prepare_soft
 from pyverlet.kernels.link_rows import Rows, note_rows, prepare_rows, sweep_rows
-from pyverlet.kernels.links import add_pull, bear, hand_back, look_back, set_down, set_out, shoulder
+from pyverlet.kernels.links import add_pull, hand_back, look_back, set_down, set_out, shoulder, tell_calm
 from pyverlet.kernels.ties import note_ties, tie
 
 
@@ -80,9 +80,9 @@ def look(linked, linking, position, velocity, inverse_mass):
 
 
 @driver
-def hold_still(linked, calm, keep):
+def note_calm(linked, calm, keep):
     """Before contacts that may bounce or rub: how slowly, m/s, linked circles meet and are still at rest; calm: by slot."""
-    bear(linked.slot, linked.calm, calm, keep)
+    tell_calm(linked.slot, linked.calm, calm, keep)
 
 
 @driver
@@ -139,8 +139,8 @@ def note_pull(linked, linking, acceleration):
     add_pull(acceleration, linked.slot, linked.shift, 1.0 / linking.h, linked.calm, linking.rest)
 
 
-look_alone, hold_still_alone, solve_alone, lay_down_alone, pick_up_alone, note_pull_alone = (
-    kernel(variant(each.function, "alone")) for each in (look, hold_still, solve, lay_down, pick_up, note_pull)
+look_alone, note_calm_alone, solve_alone, lay_down_alone, pick_up_alone, note_pull_alone = (
+    kernel(variant(each.function, "alone")) for each in (look, note_calm, solve, lay_down, pick_up, note_pull)
 )
 """The same, which stay on one thread also where circles use several."""
 
@@ -154,9 +154,9 @@ def call_look(linked, _, linking, position, velocity, inverse_mass):
 
 
 @driver
-def call_hold_still(linked, calm, keep):
-    """`hold_still`."""
-    hold_still(Linked(*linked), calm, keep)
+def call_note_calm(linked, calm, keep):
+    """`note_calm`."""
+    note_calm(Linked(*linked), calm, keep)
 
 
 @driver

@@ -201,7 +201,7 @@ def hand_back(position, velocity, slot, count, predicted, shift, rate):
 
 
 @kernel
-def _bear(begin, end, slot, calm, slow, keep):
+def _tell_calm(begin, end, slot, calm, slow, keep):
     zero, keep = spread(slow.dtype.type(0)), spread(slow.dtype.type(keep))
     for k in range(begin, end, LANES):
         felt = load(calm, k)
@@ -209,10 +209,10 @@ def _bear(begin, end, slot, calm, slow, keep):
 
 
 @parallel_kernel
-def bear(slot, calm, slow, keep):
+def tell_calm(slot, calm, slow, keep):
     """slow[slot[k]] = calm[k], or if `keep` is 1 the larger of both: contacts of linked circles are at rest up to there, m/s."""
     for c in prange((slot.shape[0] + _CHUNK - 1) // _CHUNK):
-        _bear(c * _CHUNK, min((c + 1) * _CHUNK, slot.shape[0]), slot, calm, slow, keep)
+        _tell_calm(c * _CHUNK, min((c + 1) * _CHUNK, slot.shape[0]), slot, calm, slow, keep)
 
 
 @kernel

@@ -125,13 +125,12 @@ class Watch:
         """Let who was where nobody can be begin where it is now. False: there was nobody."""
         start = self._start
         mislaid = self._room.outside(start.position) | (self._course.covering(start.position) >= 0)
-        mislaid &= np.isfinite(start.mass)
-        if not mislaid.any():
+        who = (mislaid & np.isfinite(start.mass))[slots.particle]
+        if not who.any():
             return False
-        here = start.position.copy()
-        here[slots.particle] = np.where(mislaid[slots.particle, None], slots.position, here[slots.particle])
         self._start = copy(start)
-        self._start.position = here
+        self._start.position = start.position.copy()
+        self._start.position[slots.particle[who]] = slots.position[who]
         if not self._plain:
             self._energy = self._by_forces(self._start) + self._by_links + self._mechanical(self._start, self._gravity)
         return True

@@ -148,7 +148,7 @@ class World(Measures, Queries, Doors):
                 done("broad phase")
                 if compiled and run.go(self, contacts, h, lag):
                     continue
-                contacts.project(state, h, lag, forces.strongest, links and links.hold_still)
+                contacts.project(state, h, lag, forces.strongest, links and links.note_calm)
                 done("contacts")
             if links:
                 self._solve(links, contacts, h, done)

@@ -169,16 +169,17 @@ class ContactSolver:
         return self._lends, self._loans.compiled if self._lends else self._loans.nobody
 
     def project(
-        self, state: Slots, h: float, lag: float, strongest: float, links: Callable[[Slots, float, Any, bool], None] | None
+        self, state: Slots, h: float, lag: float, strongest: float, calms: Callable[[Slots, float, Any, bool], None] | None
     ) -> None:
         """Let impacts bounce, move other overlapping circles apart, note who touches, and let those grip each other.
 
-        links: note, by slot, up to what speed contacts of who is linked are at rest; in the end, whether or beyond what is there.
+        calms: where there are links, notes by slot up to what speed contacts of who is linked are at rest; the last argument says
+            whether what is there already counts if it is more.
         """
         self._pegs.before(state, h)
-        wide = self.set_up(state, h, lag, strongest, linked=links is not None)
-        if links and len(wide.calm):
-            links(state, h, wide.calm, self._lends)
+        wide = self.set_up(state, h, lag, strongest, linked=calms is not None)
+        if calms and len(wide.calm):
+            calms(state, h, wide.calm, self._lends)
         wide.push(state)
         if self._lends:
             self._loans.settle(state, wide)

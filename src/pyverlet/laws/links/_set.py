@@ -221,10 +221,10 @@ class Links:
         with self._threads():
             linked.call_look(*self.compiled(state, h), state.position, state.velocity, state.inverse_mass)
 
-    def hold_still(self, state: Slots, h: float, calm: Array, keep: bool) -> None:
-        """Before contacts that may bounce or rub: up to what speed, m/s, circles are at rest, by slot; keep: or beyond it."""
+    def note_calm(self, state: Slots, h: float, calm: Array, keep: bool) -> None:
+        """Before contacts that may bounce or rub: note by slot up to what speed, m/s, who is linked rests; keep: if more."""
         with self._threads():
-            linked.call_hold_still(self.compiled(state, h)[0], calm, int(keep))
+            linked.call_note_calm(self.compiled(state, h)[0], calm, int(keep))
 
     def solve(self, state: Slots, h: float) -> None:
         """Move the linked particles to where their links allow, and break those that pull too hard."""
