@@ -106,20 +106,26 @@ class Watch:
             finite = not slots.pins and abs(gained) < np.inf  # what is pinned has none
             room = SURPLUS * fall(slots.total_mass, self._gravity, self._room.extent())
             risen = gained / room if room > 0.0 else 0.0
-            if room < gained < np.inf and self._pardon_mislaid(slots):
+            surplus = self._surplus(gained, room, slots)
+            if surplus > 0.0 and self._pardon_mislaid(slots):
                 gained = self._gained(slots)
-            if room < gained < np.inf:
-                # Beside a fall, what there is: motion, and what forces and links hold.
-                there = self._mechanical(self._start, (0.0, 0.0)) + abs(self._held)
-                surplus = gained - max(room, SURPLUS * there)
-                if surplus > 0.0 and gained > _rounding(slots):
-                    finite = False
-                    raised = self.take_back(slots, contacts.listed() if contacts else _NOBODY, surplus)
-                    left = self._put_back(slots, raised, gained - surplus)
-                    slots.taken = gained - left
+                surplus = self._surplus(gained, room, slots)
+            if surplus > 0.0:
+                finite = False
+                raised = self.take_back(slots, contacts.listed() if contacts else _NOBODY, surplus)
+                left = self._put_back(slots, raised, gained - surplus)
+                slots.taken = gained - left
         if contacts:
             contacts.growth.heed(risen)
         return finite
+
+    def _surplus(self, gained: float, room: float, slots: Slots) -> float:
+        """What of this gain is too much, J. room: what a fall leaves room for."""
+        if not room < gained < np.inf or gained <= _rounding(slots):
+            return 0.0
+        # Beside a fall, what there is: motion, and what forces and links hold.
+        there = self._mechanical(self._start, (0.0, 0.0)) + abs(self._held)
+        return gained - max(room, SURPLUS * there)
 
     def _pardon_mislaid(self, slots: Slots) -> bool:
         """Let who was where nobody can be begin where it is now. False: there was nobody."""
