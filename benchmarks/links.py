@@ -232,6 +232,7 @@ ENGINES: tuple[tuple[str, Callable[[Linked], Peer], int], ...] = (
     ("pyverlet, 8 substeps", lambda what: Pyverlet(what), 8),
     ("Box2D (pyb2d3), 4 substeps", lambda what: Box2D(what, 4), 4),
     ("Box2D (pyb2d3), 8 substeps", lambda what: Box2D(what, 8), 8),
+    ("Box2D (pyb2d3), 32 substeps", lambda what: Box2D(what, 32), 32),
     ("pymunk, one step", lambda what: Pymunk(what, 1), 1),
     ("pymunk, 4 steps", lambda what: Pymunk(what, 4), 4),
     ("pymunk, 8 steps", lambda what: Pymunk(what, 8), 8),

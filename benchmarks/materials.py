@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 import pyverlet as pv
-from benchmarks.engines import DT, RADIUS, Array, Box2D, Engine, Pymunk
+from benchmarks.engines import DT, RADIUS, Array, Box2D, Engine, Pymunk, PymunkCareful
 from benchmarks.own import times_in_turn
 from benchmarks.tables import write
 
@@ -209,7 +209,7 @@ def peers(particles: int, threads: int) -> list[Row]:
     position, cage = heap(particles)
     ours = build(Material("pyverlet", 1.0, BOTH, {}), position, cage, threads)
     engines: list[Engine] = []
-    for engine in (Box2D, Pymunk):
+    for engine in (Box2D, Pymunk, PymunkCareful):
         try:
             engines.append(engine(ours.position.copy(), cage, restitution=0.3, friction=0.5))
         except ImportError:
@@ -221,7 +221,8 @@ def peers(particles: int, threads: int) -> list[Row]:
     quick = [float(np.quantile(spent, 0.25)) for spent in times]
     places = [ours.position, *(engine.position() for engine in engines)]
     rows = []
-    for name, asked, place, ms in zip(("pyverlet", "Box2D (pyb2d3)", "pymunk"), (1, 5, 30), places, quick, strict=False):
+    names = ("pyverlet", "Box2D (pyb2d3)", "pymunk", "pymunk, 8 steps")
+    for name, asked, place, ms in zip(names, (1, 5, 30, 30), places, quick, strict=False):
         again = pv.World(dtype=np.float64)
         again.add(position=place, radius=RADIUS)
         found = again.overlap()

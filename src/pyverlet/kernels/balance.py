@@ -1,13 +1,14 @@
 """What circles with borrowed inertia owe to momentum, given to them as a whole.
 
-Contacts solved with m' in place of m keep the sum of m' v, but it is the sum of m v that must be kept. Over a substep they differ
-by the sum of (m' - m) dv, with the dv of everything but links, and gravity's. A cluster are circles that hang together by
-contacts (`kernels.hanging`). To each that sum is given as a velocity that all its circles share, and what angular momentum lacks
-by turning it as a whole. No contact notices: nothing in the cluster moves against anything else in it by that.
+Contacts and links solved with m' in place of m keep the sum of m' v, but it is the sum of m v that must be kept. Over a
+substep they differ by the sum of (m' - m) dv, with the dv of everything but gravity. A cluster are circles that hang together by
+contacts, or by links (`kernels.hanging`). To each that sum is given as a velocity that all its circles share, and what angular
+momentum lacks by turning it as a whole. No contact notices: nothing in the cluster moves against anything else in it by that.
 
-Where a wall, an obstacle or a pinned circle pushes back, momentum is not kept, and what is lacking is theirs to give: what stands
-on a floor gets what is lacking along it, and what walls hold in several directions nothing. Given it all the same, light circles
-between a wall and a heavy one have their own small inertia against it, and contacts as stiff as for a large one: piles exploded.
+Where a wall, an obstacle, a pin or a pinned circle pushes back, momentum is not kept, and what is lacking is theirs to give: what
+stands on a floor gets what is lacking along it, and what walls hold in several directions nothing. Given it all the same, light
+circles between a wall and a heavy one have their own small inertia against it, and contacts as stiff as for a large one: piles
+exploded.
 """
 
 from __future__ import annotations
@@ -54,9 +55,9 @@ def _look(c, a, b, circles, lending):
 
 
 @kernel
-def _note_wall(i, circles, lending, hanging):
+def _note_wall(i, circles, lending, root):
     """Add to the sums of the cluster of i what a wall has done to it."""
-    r, velocity, unpushed = hanging.root[i], circles.velocity, lending.unpushed
+    r, velocity, unpushed = root[i], circles.velocity, lending.unpushed
     to = lending.sums[r]
     if circles.inverse_mass[i] == 0:  # whoever it touches is held in all directions, however hard walls push in one
         lending.what[r] = _HELD
@@ -68,17 +69,17 @@ def _note_wall(i, circles, lending, hanging):
 
 
 @kernel
-def _sum_up(circles, lending, hanging):
+def _sum_up(circles, lending, root, heads, count):
     """How walls push each cluster, and what follows from it."""
-    sums, heads, what = lending.sums, hanging.heads, lending.what
-    for k in range(hanging.sets[0]):
+    sums, what = lending.sums, lending.what
+    for k in range(count):
         r = heads[k]
         sums[r, _XX], sums[r, _XY], sums[r, _YY] = 0.0, 0.0, 0.0
         what[r] = 0
     for c in range(lending.found.shape[0]):
         for k in range(c * CHUNK, c * CHUNK + lending.found[c]):
-            _note_wall(lending.among[k], circles, lending, hanging)
-    for k in range(hanging.sets[0]):
+            _note_wall(lending.among[k], circles, lending, root)
+    for k in range(count):
         r = heads[k]
         xx, xy, yy = sums[r, _XX], sums[r, _XY], sums[r, _YY]
         if what[r] == _HELD:
@@ -86,23 +87,21 @@ def _sum_up(circles, lending, hanging):
         what[r] = _HELD if xx + yy > 0 else 0
         if xx * yy - xy * xy <= _ACROSS * (xx + yy) * (xx + yy):
             what[r] |= _ALONG if xx + yy > 0 else _FREE
-            for m in range(_XX):
-                sums[r, m] = 0.0
 
 
 @kernel
 def _tell(c, a, b, lending, root):
-    """held[i] becomes 1 for who has touched another of a cluster that walls push. Notes in `among` who has in one that is given
-    what is lacking, and in `found[c]` how many: in a heap hardly anybody.
+    """held[i] becomes 1 for who has touched another, or is linked, in a cluster that walls push. Notes in `among` who is in one
+    that is given what is lacking, and in `found[c]` how many: in a heap hardly anybody.
     """
-    touched, what, held, among, count = lending.touched, lending.what, lending.held, lending.among, 0
+    touched, linked, what, held, among, count = lending.touched, lending.linked, lending.what, lending.held, lending.among, 0
     for k in range(a, b, LANES):
         one = root[k]
         if k + LANES <= b and which_are(root, k, np.int64(one)) == ALL and what[one] <= _HELD:  # in a heap nearly always
-            store_bits(held, k, which_set(touched, k, ANY) if what[one] == _HELD else 0)
+            store_bits(held, k, which_set(touched, k, ANY) | which_set(linked, k, ANY) if what[one] == _HELD else 0)
             continue
         for i in range(k, min(k + LANES, b)):
-            is_so = np.int64(what[root[i]]) * touched[i]
+            is_so = np.int64(what[root[i]]) * (touched[i] | linked[i])
             held[i] = is_so & _HELD
             among[a + count] = i
             count += is_so > _HELD
@@ -110,17 +109,30 @@ def _tell(c, a, b, lending, root):
 
 
 @parallel_kernel
-def note_walls(circles, lending, hanging):
-    """Who is held by walls, through others; and the sums of each cluster begin with how they have pushed it: the squares and the
-    product of what that did to velocities.
+def note_walls(circles, lending, root, heads, count):
+    """How walls push each of the clusters, whose roots are heads[:count]: their sums end with the squares and the product of what
+    that did to velocities.
     """
-    n = hanging.root.shape[0]
-    chunks = (n + CHUNK - 1) // CHUNK
-    for c in prange(chunks):
+    n = root.shape[0]
+    for c in prange((n + CHUNK - 1) // CHUNK):
         _look(c, c * CHUNK, min((c + 1) * CHUNK, n), circles, lending)
-    _sum_up(circles, lending, hanging)
-    for c in prange(chunks):
-        _tell(c, c * CHUNK, min((c + 1) * CHUNK, n), lending, hanging.root)
+    _sum_up(circles, lending, root, heads, count)
+
+
+@kernel
+def note_pins(lending, root, slot, tied, intact):
+    """Who is tied to a point, as those in slot[tied] are where that is `intact`, is held as by one that is pinned."""
+    for t in range(tied.shape[0]):
+        if intact[t]:
+            lending.what[root[slot[tied[t]]]] = _HELD
+
+
+@parallel_kernel
+def tell(lending, root):
+    """Who is held by walls, through others, and who is to be given what momentum lacks."""
+    n = root.shape[0]
+    for c in prange((n + CHUNK - 1) // CHUNK):
+        _tell(c, c * CHUNK, min((c + 1) * CHUNK, n), lending, root)
 
 
 @kernel
@@ -130,28 +142,26 @@ def _lent(lending, inverse_mass, i):
 
 
 @kernel
-def balance(circles, lending, root, rubs):
-    """Give to each cluster what its momentum and its angular momentum lack.
+def _even(count, circles, lending, root, gains, now, before, rubs):
+    """Of the `count` circles in `among`, cluster by cluster: what momentum lacks where `before` has become `now` by lent inertia,
+    `gains` gains. All (n, 2); rubs: whether spins take part.
 
-    rubs: whether spins take part. `Lending.sums`, of each root: m, m x (2), what momentum lacks (2), I, what angular momentum
-    about the centre lacks, and the three numbers of `note_walls`.
+    `Lending.sums`, of each root: m, m x (2), what momentum lacks (2), I, what angular momentum about the centre lacks, and the
+    three numbers of `note_walls`.
     """
-    position, velocity, spin = circles.position, circles.velocity, circles.spin
-    radius, inverse_mass = circles.radius, circles.inverse_mass
-    mass, before, spin_before, sums = lending.mass, lending.before, lending.spin_before, lending.sums
-    among, count = lending.among, 0
-    for c in range(lending.found.shape[0]):
-        for k in range(c * CHUNK, c * CHUNK + lending.found[c]):
-            among[count] = among[k]
-            count += 1
+    position, spin, radius, inverse_mass = circles.position, circles.spin, circles.radius, circles.inverse_mass
+    mass, spin_before, sums, among = lending.mass, lending.spin_before, lending.sums, lending.among
+    for k in range(count):
+        for m in range(_XX):
+            sums[root[among[k]], m] = 0.0
     for k in range(count):
         i = among[k]
         r, own, lent = root[i], float(mass[i]), _lent(lending, inverse_mass, i)
         sums[r, 0] += own
         sums[r, 1] += own * position[i, 0]
         sums[r, 2] += own * position[i, 1]
-        sums[r, 3] += lent * (velocity[i, 0] - before[i, 0])
-        sums[r, 4] += lent * (velocity[i, 1] - before[i, 1])
+        sums[r, 3] += lent * (now[i, 0] - before[i, 0])
+        sums[r, 4] += lent * (now[i, 1] - before[i, 1])
     for k in range(count):
         i = among[k]
         if lending.what[root[i]] == _FREE:
@@ -159,7 +169,7 @@ def balance(circles, lending, root, rubs):
             x, y = position[i, 0] - sums[r, 1] / sums[r, 0], position[i, 1] - sums[r, 2] / sums[r, 0]
             half = 0.5 * radius[i] * radius[i] if rubs else 0.0
             sums[r, 5] += own * (x * x + y * y + half)
-            sums[r, 6] += lent * (x * (velocity[i, 1] - before[i, 1]) - y * (velocity[i, 0] - before[i, 0]))
+            sums[r, 6] += lent * (x * (now[i, 1] - before[i, 1]) - y * (now[i, 0] - before[i, 0]))
             if rubs:
                 sums[r, 6] += lent * half * (spin[i] - spin_before[i])
     for k in range(count):
@@ -171,10 +181,38 @@ def balance(circles, lending, root, rubs):
             vx, vy = (vx * to[_YY] - vy * to[_XY]) / pushed, (vy * to[_XX] - vx * to[_XY]) / pushed
         turn = to[6] / to[5] if to[5] > 0 else 0.0
         x, y = position[i, 0] - to[1] / to[0], position[i, 1] - to[2] / to[0]
-        velocity[i, 0] += vx - turn * y
-        velocity[i, 1] += vy + turn * x
+        gains[i, 0] += vx - turn * y
+        gains[i, 1] += vy + turn * x
         if rubs:
             spin[i] += turn
+
+
+@kernel
+def balance(circles, lending, root, rubs):
+    """Give to each cluster what its momentum and its angular momentum lack."""
+    among, count = lending.among, 0
+    for c in range(lending.found.shape[0]):
+        for k in range(c * CHUNK, c * CHUNK + lending.found[c]):
+            among[count] = among[k]
+            count += 1
+    _even(count, circles, lending, root, circles.velocity, circles.velocity, lending.before, rubs)
+
+
+@kernel
+def balance_pull(circles, lending, root, slot, shift, rate):
+    """After `balance`: likewise what links have added to accelerations (`kernels.links.add_pull`), for when the frame ends."""
+    count, pull, none = 0, lending.unpushed, lending.before
+    for c in range(lending.found.shape[0]):
+        count += lending.found[c]
+    if count == 0:
+        return
+    for k in range(count):
+        i = lending.among[k]
+        for axis in range(2):
+            pull[i, axis] = none[i, axis] = 0
+    for k in range(slot.shape[0]):
+        pull[slot[k], 0], pull[slot[k], 1] = rate * rate * shift[k, 0], rate * rate * shift[k, 1]
+    _even(count, circles, lending, root, circles.acceleration, pull, none, False)
 
 
 @kernel

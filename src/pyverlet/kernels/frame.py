@@ -16,12 +16,13 @@ from pyverlet.compile.clock import note
 from pyverlet.compile.jit import driver, kernel, parallel_kernel, prange, variant
 from pyverlet.compile.lanes import copy_row
 from pyverlet.ground.constants import CARRIED_WEIGHT, REST_ACCELERATIONS
+from pyverlet.kernels.balance import balance_pull
 from pyverlet.kernels.bounds import box
 from pyverlet.kernels.cage import confine as confine_in_cage
 from pyverlet.kernels.cage import hold
 from pyverlet.kernels.drive import drive, drive_called
 from pyverlet.kernels.kinds import for_each_kind
-from pyverlet.kernels.lending import Hanging, Lending, Terms, even_up, join, leave_out, lend, set_aside, settle
+from pyverlet.kernels.lending import Hanging, Lending, Terms, even_up, join, join_linked, lend, note_unpushed, settle, weigh
 from pyverlet.kernels.link_rows import Rows
 from pyverlet.kernels.linked import (
     Linked,
@@ -269,13 +270,13 @@ def _substeps(
         if LINKED:
             _look_at_energy(energies, substep, TOUCHED, circles, mass, lag, down, spent, clock)
             if lends:
-                set_aside(circles, loans)
+                weigh(linked.slot, linked.weight, loans.lighter)
             solve(linked, rows, linking, circles.position, circles.velocity)
             note(spent, LINKS, clock[0], clock[1])
             _look_at_energy(energies, substep, JOINED, circles, mass, lag, down, spent, clock)
             lay_down(linked, linking, circles.velocity)
             if lends:
-                leave_out(circles, loans)
+                note_unpushed(circles, loans)
             note(spent, LINKS, clock[0], clock[1])
         confine(room, circles, law, claims)
         note(spent, BOUNDS, clock[0], clock[1])
@@ -288,22 +289,22 @@ def _substeps(
                 law.lag, law.rest_speed, drop,
             )  # fmt: skip
             note(spent, OBSTACLES, clock[0], clock[1])
-        if SERVED and lends:
+        if LINKED and lends:
+            join_linked(circles, pairs, loans, hanging, linked.slot, linked.assembly, linked.tied, linked.tie_intact)
+        elif SERVED and lends:
             join(circles, pairs, loans, hanging)
         relax(circles, pairs, law, cut, 1 if substep == last else 0, claims)
         if LINKED:
-            if lends:
-                set_aside(circles, loans)
             pick_up(linked, circles.velocity)
-            if lends:
-                leave_out(circles, loans)
         if SERVED and lends:
-            even_up(circles, loans, hanging, law.rubs)
+            even_up(circles, loans, hanging.group if LINKED else hanging.root, law.rubs)
         note(spent, VELOCITIES, clock[0], clock[1])
         if SERVED:
             _look_at_energy(energies, substep, STILLED, circles, mass, lag, down, spent, clock)
         if LINKED:
             note_pull(linked, linking, circles.acceleration)
+            if lends:
+                balance_pull(circles, loans, hanging.group, linked.slot, linked.shift, 1.0 / services.h)
             note(spent, LINKS, clock[0], clock[1])
             _look_at_energy(energies, substep, PULLED, circles, mass, lag, down, spent, clock)
         substep += 1

@@ -171,6 +171,24 @@ def _settle(root, heads):
 
 
 @kernel
+def join_links(hanging, slot, assembly):
+    """After `follow`, group and chiefs: who hangs together by contacts or by links.
+
+    slot: (k,) of the linked; assembly: (k,) for each the place in there of the lowest of those that links join it to.
+    """
+    root, group, chiefs, count = hanging.root, hanging.group, hanging.chiefs, 0
+    for i in range(root.shape[0]):
+        group[i] = root[i]
+    for k in range(slot.shape[0]):
+        join(group, np.int64(slot[k]), np.int64(slot[assembly[k]]))
+    for i in range(root.shape[0]):
+        group[i] = group[group[i]]
+        chiefs[count] = i
+        count += group[i] == i
+    hanging.sets[2] = count
+
+
+@kernel
 def follow(pairs, hanging):
     """Bring root and heads up to date after `kernels.loans.share`."""
     root, touch, begin, joined = hanging.root, hanging.touch, pairs.begin, False

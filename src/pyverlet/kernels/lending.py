@@ -1,5 +1,9 @@
-"""Loans of inertia in a substep, in the order they are called: `lend` before the contacts, `settle` after them, `set_aside` and
-`leave_out` around links, `join` when walls have pushed, and `even_up` when velocities are done.
+"""Loans of inertia in a substep, in the order they are called: `lend` before the contacts, `settle` after them, `weigh` before
+links and `note_unpushed` after them, `join` or `join_linked` when walls have pushed, `even_up` when velocities are done, and
+`balance.balance_pull` when accelerations are.
+
+Links move circles by the inertia of the substep, too. What they pull on by the own mass while contacts push by another would not
+be in balance where contacts are: a light circle between a link and a heavy one would pass on its pull many times over.
 """
 
 from __future__ import annotations
@@ -7,10 +11,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from pyverlet.compile.bundle import borrowed, bundle
-from pyverlet.compile.jit import driver, kernel
-from pyverlet.kernels.balance import balance, note_walls
-from pyverlet.kernels.hanging import follow
-from pyverlet.kernels.loans import begin, share, take_up
+from pyverlet.compile.jit import driver, kernel, parallel_kernel, prange
+from pyverlet.compile.lanes import LANES, pick, store
+from pyverlet.kernels.balance import balance, balance_pull, note_pins, note_walls, tell
+from pyverlet.kernels.hanging import follow, join_links
+from pyverlet.kernels.loans import CHUNK, begin, share, take_up
 from pyverlet.kernels.packs import share_out
 from pyverlet.kernels.tables import Circles, Pairs
 
@@ -19,8 +24,9 @@ from pyverlet.kernels.tables import Circles, Pairs
 class Lending:
     """Who has lent how much, by slot (`laws.contacts.loans`), and scratch of a substep.
 
-    mass, lent: (n,) kg; busy: (n,) s; calm: (n,) m/s; held, touched, what: (n,); lighter: (n,) 1/kg; before, unpushed,
-    aside: (n, 2) m/s; spin_before: (n,) rad/s; sums: (n, 10); among: (n,); found: for each `kernels.loans.CHUNK` of circles.
+    mass, lent: (n,) kg; busy: (n,) s; calm: (n,) m/s; held, touched, what: (n,); linked: (n,) 1 for whom links join to others, or
+    to a point; lighter: (n,) 1/kg; before, unpushed: (n, 2) m/s; spin_before: (n,) rad/s; sums: (n, 10); among: (n,); found: for
+    each `kernels.loans.CHUNK` of circles.
     """
 
     mass: Any
@@ -30,10 +36,10 @@ class Lending:
     held: Any
     lighter: Any
     touched: Any
+    linked: Any
     before: Any
     spin_before: Any
     unpushed: Any
-    aside: Any
     what: Any
     sums: Any
     among: Any
@@ -44,8 +50,9 @@ class Lending:
 class Hanging:
     """Who hangs together (`kernels.hanging`).
 
-    root: (n,) the lowest member of each one's cluster; heads: (n,) those that are roots; sets: (2,) how many of them, -1: it is
-    not known yet, and how often something was looked for. touch, changed: by pack, and changes: by strip: `kernels.loans.share`.
+    root: (n,) the lowest member of each one's cluster; heads: (n,) those that are roots; sets: (3,) how many of them, -1: it is
+    not known yet, how often something was looked for, and how many chiefs. group, chiefs: (n,) as root and heads, of those that
+    hang together by contacts or links. touch, changed: by pack, and changes: by strip: `kernels.loans.share`.
     first: (n + 1,) and where: `kernels.hanging.list_lanes`. found: (k,), seen: (n,) scratch. left: (n,) whom the cluster of a
     root was taken out of in this substep, else -1.
     """
@@ -61,6 +68,8 @@ class Hanging:
     found: Any
     seen: Any
     left: Any
+    group: Any
+    chiefs: Any
 
 
 class Terms(NamedTuple):
@@ -85,12 +94,6 @@ def lend(circles, pairs, lending, terms, cut, rubs):
     share_out(pairs.begin, pairs.lanes, pairs.lane_i, pairs.lane_j, cut, lending.lighter, pairs.share, pairs.reduced)
 
 
-@kernel
-def _copy(to, velocity):
-    for i in range(velocity.shape[0]):
-        to[i, 0], to[i, 1] = velocity[i, 0], velocity[i, 1]
-
-
 @driver
 def settle(circles, pairs, lending, hanging, terms, cut, claims):
     """Those that touch lend each other; those that do not have fallen by themselves. What changes velocities next is walls."""
@@ -99,33 +102,48 @@ def settle(circles, pairs, lending, hanging, terms, cut, claims):
 
 
 @kernel
-def set_aside(circles, lending):
-    """Links come: what they change keeps momentum by itself."""
-    _copy(lending.aside, circles.velocity)
+def _weigh(begin, end, slot, weight, lighter):
+    for k in range(begin, end, LANES):
+        store(weight, k, pick(lighter, slot, k))
+
+
+@parallel_kernel
+def weigh(slot, weight, lighter):
+    """Links come: weight[k] = lighter[slot[k]], the inverse inertia of who is linked, 1/kg."""
+    for c in prange((slot.shape[0] + CHUNK - 1) // CHUNK):
+        _weigh(c * CHUNK, min((c + 1) * CHUNK, slot.shape[0]), slot, weight, lighter)
 
 
 @kernel
-def leave_out(circles, lending):
-    """That was theirs."""
-    velocity, aside, before, unpushed = circles.velocity, lending.aside, lending.before, lending.unpushed
+def note_unpushed(circles, lending):
+    """Links are done: it is from here on that walls push."""
+    velocity, unpushed = circles.velocity, lending.unpushed
     for i in range(velocity.shape[0]):
-        for axis in range(2):
-            change = velocity[i, axis] - aside[i, axis]
-            before[i, axis] += change
-            unpushed[i, axis] += change
+        unpushed[i, 0], unpushed[i, 1] = velocity[i, 0], velocity[i, 1]
 
 
 @driver
 def join(circles, pairs, lending, hanging):
-    """Walls have pushed: who hangs together, and is held by them."""
+    """Walls have pushed: who hangs together by contacts, and is held by them."""
     follow(pairs, hanging)
-    note_walls(circles, lending, hanging)
+    note_walls(circles, lending, hanging.root, hanging.heads, hanging.sets[0])
+    tell(lending, hanging.root)
 
 
 @driver
-def even_up(circles, lending, hanging, rubs):
-    """The substep is done: give those who have met with borrowed inertia what their momentum lacks."""
-    balance(circles, lending, hanging.root, rubs != 0)
+def join_linked(circles, pairs, lending, hanging, slot, assembly, tied, intact):
+    """The same where links hold some together, too, and pins some at a point: those `tied` to it, in the order of `slot`."""
+    follow(pairs, hanging)
+    join_links(hanging, slot, assembly)
+    note_walls(circles, lending, hanging.group, hanging.chiefs, hanging.sets[2])
+    note_pins(lending, hanging.group, slot, tied, intact)
+    tell(lending, hanging.group)
+
+
+@driver
+def even_up(circles, lending, root, rubs):
+    """The substep is done: give those who have met with borrowed inertia what their momentum lacks. root: what was told."""
+    balance(circles, lending, root, rubs != 0)
 
 
 # ---- called from Python, which has plain tuples ------------------------------------------------------------------------------
@@ -147,15 +165,15 @@ def call_settle(circles, pairs, lending, hanging, terms, cut, claims):
 
 
 @driver
-def call_set_aside(circles, lending):
-    """`set_aside`."""
-    set_aside(Circles(*borrowed(circles)), Lending(*borrowed(lending)))
+def call_weigh(slot, weight, lending):
+    """`weigh`."""
+    weigh(slot, weight, Lending(*borrowed(lending)).lighter)
 
 
 @driver
-def call_leave_out(circles, lending):
-    """`leave_out`."""
-    leave_out(Circles(*borrowed(circles)), Lending(*borrowed(lending)))
+def call_note_unpushed(circles, lending):
+    """`note_unpushed`."""
+    note_unpushed(Circles(*borrowed(circles)), Lending(*borrowed(lending)))
 
 
 @driver
@@ -165,6 +183,21 @@ def call_join(circles, pairs, lending, hanging):
 
 
 @driver
-def call_even_up(circles, lending, hanging, rubs):
+def call_join_linked(circles, pairs, lending, hanging, slot, assembly, tied, intact):
+    """`join_linked`."""
+    join_linked(
+        Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Lending(*borrowed(lending)), Hanging(*borrowed(hanging)), slot,
+        assembly, tied, intact,
+    )  # fmt: skip
+
+
+@driver
+def call_even_up(circles, lending, root, rubs):
     """`even_up`."""
-    even_up(Circles(*borrowed(circles)), Lending(*borrowed(lending)), Hanging(*borrowed(hanging)), rubs)
+    even_up(Circles(*borrowed(circles)), Lending(*borrowed(lending)), root, rubs)
+
+
+@driver
+def call_balance_pull(circles, lending, root, slot, shift, rate):
+    """`balance_pull`."""
+    balance_pull(Circles(*borrowed(circles)), Lending(*borrowed(lending)), root, slot, shift, rate)

@@ -31,6 +31,7 @@ class Linked:
     calm: Any
     burden: Any
     kept: Any
+    assembly: Any
     colour: Any
     begin: Any
     node: Any

@@ -41,7 +41,7 @@ from pyverlet.compile.lanes import (
 )
 from pyverlet.compile.rows import store_rows
 from pyverlet.compile.stealing import claim, none_claimed
-from pyverlet.ground.constants import LENT
+from pyverlet.ground.constants import LENT, UNEVEN
 
 CHUNK = 1024
 """Circles one thread takes at a time."""
@@ -169,9 +169,10 @@ def _take_up(a, b, circles, lending, terms):
     position, velocity, acceleration = circles.position, circles.velocity, circles.acceleration
     inverse_mass, rows = circles.inverse_mass, circles.inertia
     mass, lent, busy, held, touched = lending.mass, lending.lent, lending.busy, lending.held, lending.touched
-    lighter, unpushed = lending.lighter, lending.unpushed
+    lighter, unpushed, linked = lending.lighter, lending.unpushed, lending.linked
     real, packed = mass.dtype.type, b - (b - a) % LANES
     zero, one, least, nothing = spread(real(0)), spread(real(1)), spread(real(1 - LENT)), spread(real(_NOTHING))
+    most = spread(real(UNEVEN - 1))
     part, h, kick, fall = spread(terms.part), spread(terms.h), spread(terms.kick), spread(terms.fall)
     for k in range(a, packed, LANES):
         m, w, loan, waits = load(mass, k), load(inverse_mass, k), load(lent, k), load(busy, k)
@@ -182,6 +183,8 @@ def _take_up(a, b, circles, lending, terms):
         # As it is where nothing has flowed: a sum with m would round it, and it would never come to an end.
         changed = where_zero(now - larger(m + loan, least * m), loan, now - m)
         loan = where_zero(w, loan, where_above(waits, zero, loan, changed))
+        joined = which_set(linked, k, ANY)
+        loan = where_set(joined, smaller(loan, most * m), loan)
         loan = loan - part * loan
         store(lent, k, where_above(nothing * m, larger(loan, zero - loan), zero, loan))
         if which_above(waits, zero) != 0:
@@ -190,6 +193,7 @@ def _take_up(a, b, circles, lending, terms):
         ax, ay = load_rows(acceleration, k)
         vx, vy = load_rows(velocity, k)
         more = where_zero(light - w, zero, light / w - one)
+        met |= joined
         by = where_set(met & stands, more * kick, zero)
         vx, vy = vx + by * ax, vy + by * ay
         store_rows(velocity, k, vx, vy)
@@ -204,13 +208,15 @@ def _take_up(a, b, circles, lending, terms):
         now = abs(rows[i, 0])
         if w > 0 and not busy[i] > 0 and now != _inertia(m, lent[i], real(1 - LENT)):
             lent[i] = now - m
+        if linked[i]:
+            lent[i] = min(lent[i], real(UNEVEN - 1) * m)
         lent[i] -= terms.part * lent[i]
         if abs(lent[i]) < real(_NOTHING) * m:
             lent[i] = 0
         busy[i] = max(busy[i] - terms.h, real(0))
         more = lighter[i] / w - real(1) if held[i] and lighter[i] != w else real(0)
         for axis in range(2):
-            if touched[i]:
+            if touched[i] or linked[i]:
                 velocity[i, axis] += more * terms.kick * acceleration[i, axis]
             else:
                 position[i, axis] -= more * terms.fall * acceleration[i, axis]
@@ -219,10 +225,12 @@ def _take_up(a, b, circles, lending, terms):
 
 @parallel_kernel
 def take_up(circles, lending, terms):
-    """After `begin`, and contacts: what that did to positions is done to velocities, of who has touched another; for the others
-    it is taken back. Not before contacts: to those it is no motion, and would be an impact.
+    """After `begin`, and contacts: what that did to positions is done to velocities, of who has touched another, or is linked;
+    for the others it is taken back. Not before contacts: to those it is no motion, and would be an impact.
 
-    What has flowed becomes loans, and a part of each goes back. unpushed: the velocities, before walls push.
+    What has flowed becomes loans, and a part of each goes back. Who is linked borrows no more than makes it UNEVEN times as
+    heavy: with hundreds of times its inertia here and there a rope turned too far in a substep, and tore. unpushed: the
+    velocities, before walls push.
     """
     n = circles.position.shape[0]
     for c in prange((n + CHUNK - 1) // CHUNK):

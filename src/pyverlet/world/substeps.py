@@ -92,7 +92,7 @@ class Substeps:
             course.set_up(state, substep * h, h)
         if opens and not forces.forces:
             forces.fall(state)
-        wide = contacts.set_up(state, h, lag, forces.strongest, linked=bool(links))
+        wide = contacts.set_up(state, h, lag, forces.strongest, world.links if links else None)
         walls, shape = room.compiled(state)  # that circles rub is known by now
         lends, loans = contacts.lending
         if smooth := walls == frame.SMOOTH_CAGE and not (links or lends):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
@@ -148,7 +147,7 @@ class World(Measures, Queries, Doors):
                 done("broad phase")
                 if compiled and run.go(self, contacts, h, lag):
                     continue
-                contacts.project(state, h, lag, forces.strongest, links and links.note_calm)
+                contacts.project(state, h, lag, forces.strongest, links)
                 done("contacts")
             if links:
                 self._solve(links, contacts, h, done)
@@ -158,10 +157,12 @@ class World(Measures, Queries, Doors):
                 course.collide(state, self.boundary, run.substep * h, h, lag, REST_ACCELERATIONS * forces.strongest * h)
                 done("obstacles")
             if contacts:
-                contacts.still(state, h, links and links.pick_up)
+                contacts.still(state, h, links)
             done("velocities")
             if links:
                 links.after(state, h)
+                if contacts:
+                    contacts.balance_pull(h)
                 done("links")
             run.substep += 1
         return self._finish(contacts, watch, h, done, marked=run.marked)
@@ -208,11 +209,11 @@ class World(Measures, Queries, Doors):
                 self._contacts.fit(self._slots)
 
     def _solve(self, links: Links, contacts: ContactSolver | None, h: float, done: Callable[[str], None]) -> None:
-        with contacts.aside() if contacts else nullcontext():
-            links.solve(self._slots, h)
-            done("links")
-            if contacts:
-                links.lay_down(self._slots, h)
+        links.solve(self._slots, h)
+        done("links")
+        if contacts:
+            links.lay_down(self._slots, h)
+            contacts.note_unpushed()
 
     def _finish(self, contacts: ContactSolver | None, watch: Watch | None, h: float, done: Any, *, marked: bool) -> bool:
         """The substeps are done: who rests, the velocities of now, and no more energy than there may be."""

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.constants import FED, PUSHED, REST_ACCELERATIONS, UNEVEN
@@ -15,7 +15,7 @@ from pyverlet.ground.errors import InputError
 from pyverlet.kernels import overlap
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast, PairList, Strips
 from pyverlet.laws.contacts.growth import Growth
-from pyverlet.laws.contacts.loans import Lent, Loans
+from pyverlet.laws.contacts.loans import Joined, Lent, Loans
 from pyverlet.laws.contacts.pegs import Pegs
 from pyverlet.laws.contacts.slips import Kept, Slips
 from pyverlet.laws.contacts.wide import Wide
@@ -24,6 +24,8 @@ from pyverlet.laws.sleep import Sleep
 from pyverlet.state.moves import pick_falling
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
+
+Array = NDArray[Any]
 
 Unlist = Callable[[PairList, Any], None]
 """Takes pairs that are no contacts, since a link says so, from a list; the second argument is the user's index in each slot."""
@@ -53,6 +55,19 @@ class Collisions:
             raise InputError(f"method is {self.method!r}; allowed are pyverlet.Fast() and pyverlet.BruteForce()")
 
 
+class Linked(Protocol):
+    """What contacts ask of links; methods as in `laws.links.Links`."""
+
+    def together(self, state: Slots) -> Joined:
+        """Whom they join."""
+
+    def note_calm(self, state: Slots, h: float, calm: Array, keep: bool) -> None:
+        """Up to what speed contacts of who is linked are at rest; keep: what is there already counts if it is more."""
+
+    def pick_up(self, state: Slots, h: float) -> None:
+        """What they carry."""
+
+
 class Overlap(NamedTuple):
     """Overlap of the touching pairs, as a fraction of the contact distance r_i + r_j."""
 
@@ -80,6 +95,7 @@ class ContactSolver:
         self._packed = False
         self._uneven = False  # whether masses differ so much that contacts need loans of inertia
         self._lends = False  # in this substep
+        self._joined: Joined | None = None  # who borrows and is linked, in this substep
         self._sleep = sleep
         self._slips = Slips(dtype)
         self._loans = Loans(dtype)
@@ -150,15 +166,16 @@ class ContactSolver:
         """Whether the pairs are packed and were listed well so far, and nobody borrows inertia: a frame may begin with them."""
         return self._packed and not self._uneven and len(self._wide.origin) == len(state)
 
-    def set_up(self, state: Slots, h: float, lag: float, strongest: float, *, linked: bool) -> Wide:
-        """The pairs of now, with all that their sweeps need in this substep. linked: whether links pull at any."""
+    def set_up(self, state: Slots, h: float, lag: float, strongest: float, links: Linked | None) -> Wide:
+        """The pairs of now, with all that their sweeps need in this substep."""
         wide = self._pack(state)
         if self._rubs(state):
             self._slips.start(wide, state.particle)
         self._lends = self._uneven and strongest > 0
-        noted = self._loans.begin(state, wide, h, strongest) if self._lends else None
+        self._joined = links.together(state) if links and self._lends else None
+        noted = self._loans.begin(state, wide, h, strongest, self._joined) if self._lends else None
         rest_speed, accounts = REST_ACCELERATIONS * strongest * h, len(state.spent) > 0
-        wide.set_up(state, h, lag, strongest, rest_speed, accounts, noted, linked=linked)
+        wide.set_up(state, h, lag, strongest, rest_speed, accounts, noted, linked=links is not None)
         if self._lends:
             self._loans.lend(wide)
         return wide
@@ -168,35 +185,37 @@ class ContactSolver:
         """Whether circles lend each other inertia since `set_up`, and what `kernels.lending` takes."""
         return self._lends, self._loans.compiled if self._lends else self._loans.nobody
 
-    def project(
-        self, state: Slots, h: float, lag: float, strongest: float, calms: Callable[[Slots, float, Any, bool], None] | None
-    ) -> None:
-        """Let impacts bounce, move other overlapping circles apart, note who touches, and let those grip each other.
-
-        calms: where there are links, notes by slot up to what speed contacts of who is linked are at rest; the last argument says
-            whether what is there already counts if it is more.
-        """
+    def project(self, state: Slots, h: float, lag: float, strongest: float, links: Linked | None) -> None:
+        """Let impacts bounce, move other overlapping circles apart, note who touches, and let those grip each other."""
         self._pegs.before(state, h)
-        wide = self.set_up(state, h, lag, strongest, linked=calms is not None)
-        if calms and len(wide.calm):
-            calms(state, h, wide.calm, self._lends)
+        wide = self.set_up(state, h, lag, strongest, links)
+        if links and len(wide.calm):
+            links.note_calm(state, h, wide.calm, self._lends)
         wide.push(state)
         if self._lends:
             self._loans.settle(state, wide)
+            if self._joined:
+                self._loans.weigh(self._joined)
 
-    def still(self, state: Slots, h: float, after: Callable[[Slots, float], None] | None) -> None:
-        """Take from touching circles the velocity that projection has put in, rub them, and hold who is too large for a gap.
-
-        after: what others do to velocities as soon as that is done.
-        """
+    def note_unpushed(self) -> None:
+        """Links are done: what changes velocities next is walls."""
         if self._lends:
-            self._loans.join(self._wide)
+            self._loans.note_unpushed(self._wide)
+
+    def balance_pull(self, h: float) -> None:
+        """Links have added to accelerations what they pulled with."""
+        if self._joined:
+            self._loans.balance_pull(self._wide, self._joined, h)
+
+    def still(self, state: Slots, h: float, links: Linked | None) -> None:
+        """Take from touching circles the velocity that projection has put in, rub them, and hold who is too large for a gap."""
+        if self._lends:
+            self._loans.join(self._wide, self._joined)
         self._wide.relax(state)
-        if after:
-            with self.aside():
-                after(state, h)
+        if links:
+            links.pick_up(state, h)
         if self._lends:
-            self._loans.even_up(self._wide)
+            self._loans.even_up(self._wide, self._joined)
         self._pegs.hold(state)
 
     def spent(self) -> Any:
@@ -215,10 +234,6 @@ class ContactSolver:
         """A frame begins; `walls_bounce`: whether walls or obstacles throw circles back, and ask who carries weight."""
         self._wide.spent.fill(0)
         self._wide.bear(walls_bounce)
-
-    def aside(self) -> AbstractContextManager[None]:
-        """While others, who keep momentum by themselves, change velocities between `project` and `still`."""
-        return self._loans.aside(self._wide) if self._lends else nullcontext()
 
     def listed(self) -> tuple[Any, Any, Any, Any]:
         """first, count, pair_i, pair_j of the pairs of now."""

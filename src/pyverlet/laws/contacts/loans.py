@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.compile.bundle import fields
 from pyverlet.compile.lanes import LANES
 from pyverlet.ground.constants import FED, LOAN_S, PUSHED, SUNK
 from pyverlet.kernels import balance, hanging, lending
@@ -18,6 +17,8 @@ from pyverlet.state.slots import Slots
 
 Array = NDArray[Any]
 
+_ROOT, _GROUP = (fields(lending.Hanging).index(name) for name in ("root", "group"))
+
 
 class Lent(NamedTuple):
     """By slot: the particle in it; kg it has borrowed, negative: lent; s for which it does neither; whether walls hold it."""
@@ -26,6 +27,19 @@ class Lent(NamedTuple):
     lent: Array
     busy: Array
     held: Array
+
+
+class Joined(NamedTuple):
+    """Whom links join, as `kernels.linked.Linked` has them: their slots, the inverse mass links move them by, 1/kg, and how far,
+    m; with whom they hang together; and who is tied to a point, if the pin is intact.
+    """
+
+    slot: Array
+    weight: Array
+    shift: Array
+    assembly: Array
+    tied: Array
+    intact: Array
 
 
 class Loans:
@@ -48,9 +62,9 @@ class Loans:
 
     def _fit(self, count: int) -> None:
         """Room for what lasts a substep."""
-        self._lighter, self._touched = np.empty(count, self._dtype), np.empty(count, np.uint8)
+        self._lighter, self._touched, self._linked = np.empty(count, self._dtype), *np.zeros((2, count), np.uint8)
         self._before, self._spin_before = np.empty((count, 2), self._dtype), np.empty(count, self._dtype)
-        self._unpushed, self._aside, self._inertia = np.empty((3, count, 2), self._dtype)
+        self._unpushed, self._inertia = np.empty((2, count, 2), self._dtype)
         self._calm = np.zeros(count, self._dtype)
         self._what, self._sums = np.empty(count, np.uint8), np.empty((count, 10))
         self._among, self._found = np.empty(count, np.int32), np.zeros(-(-count // CHUNK), np.int64)
@@ -59,11 +73,12 @@ class Loans:
 
     def _unknown(self, lanes: Array, first: Array, packs: int, count: int) -> tuple[Array, ...]:
         """Of circles that hang together who knows how."""
-        root, heads, seen = np.zeros((3, count), np.int32)
+        root, heads, seen, group, chiefs = np.zeros((5, count), np.int32)
         left = np.full(count, -1, np.int32)
-        sets, changed = np.array([-1, 0]), np.empty(packs, np.int64)
+        sets, changed = np.array([-1, 0, 0]), np.empty(packs, np.int64)
         where, found = np.empty(2 * LANES * packs, np.int32), np.empty(hanging.AROUND, np.int64)
-        return root, heads, sets, np.zeros(packs, np.uint8), changed, np.zeros_like(lanes), first, where, found, seen, left
+        touch, changes = np.zeros(packs, np.uint8), np.zeros_like(lanes)
+        return root, heads, sets, touch, changed, changes, first, where, found, seen, left, group, chiefs
 
     def _hang(self, wide: Wide, count: int) -> None:
         """The list of pairs is new."""
@@ -71,7 +86,7 @@ class Loans:
         self._strips, self._hanging = wide.lanes, self._unknown(wide.lanes, first, len(wide.lane_i) // LANES, count)
         hanging.list_lanes(wide.begin, wide.lanes, wide.lane_i, wide.lane_j, *self._hanging[6:8])
 
-    def begin(self, state: Slots, wide: Wide, h: float, strongest: float) -> tuple[Array, ...]:
+    def begin(self, state: Slots, wide: Wide, h: float, strongest: float, joined: Joined | None) -> tuple[Array, ...]:
         """Contacts will be solved with lent inertia. Where an impact notes what it does by masses of their own: before,
         spin_before, lent, busy; and calm, and inertia. strongest: m/s^2, that anybody feels.
         """
@@ -79,6 +94,9 @@ class Loans:
             self._follow(state)
         if self._strips is not wide.lanes:
             self._hang(wide, len(state))
+        self._linked.fill(0)
+        if joined:
+            self._linked[joined.slot] = 1
         # At rest a substep ends with the velocity -(1 - PUSHED / FED) a h: the same for all that way.
         terms = state.reals(h, (state.drop - 1 + PUSHED / FED) * h * h, min(h / LOAN_S, 1.0), SUNK * strongest * LOAN_S, h)
         self.compiled = self._arrays(state.mass), self._hanging, terms
@@ -87,8 +105,8 @@ class Loans:
     def _arrays(self, mass: Array) -> tuple[Array, ...]:
         _, lent, busy, held = self._kept
         return (
-            mass, lent, busy, self._calm, held, self._lighter, self._touched, self._before, self._spin_before, self._unpushed,
-            self._aside, self._what, self._sums, self._among, self._found,
+            mass, lent, busy, self._calm, held, self._lighter, self._touched, self._linked, self._before, self._spin_before,
+            self._unpushed, self._what, self._sums, self._among, self._found,
         )  # fmt: skip
 
     def _follow(self, state: Slots) -> None:
@@ -113,20 +131,32 @@ class Loans:
         """Those that touch lend each other; those that do not have fallen by themselves."""
         lending.call_settle(wide.circles, wide.arrays, *self.compiled, wide.cut(), state.claims())
 
-    @contextmanager
-    def aside(self, wide: Wide) -> Iterator[None]:
-        """Meanwhile links, which keep momentum by themselves, change velocities."""
-        lending.call_set_aside(wide.circles, self.compiled[0])
-        yield
-        lending.call_leave_out(wide.circles, self.compiled[0])
+    def weigh(self, joined: Joined) -> None:
+        """Links come, and move whom they join by the inertia of now."""
+        lending.call_weigh(joined.slot, joined.weight, self.compiled[0])
 
-    def join(self, wide: Wide) -> None:
+    def note_unpushed(self, wide: Wide) -> None:
+        """They are done: what changes velocities next is walls."""
+        lending.call_note_unpushed(wide.circles, self.compiled[0])
+
+    def join(self, wide: Wide, joined: Joined | None) -> None:
         """Walls have pushed: who hangs together, and is held by them."""
-        lending.call_join(wide.circles, wide.arrays, *self.compiled[:2])
+        arrays, hanging, _ = self.compiled
+        if joined:
+            slot, _, _, *others = joined
+            lending.call_join_linked(wide.circles, wide.arrays, arrays, hanging, slot, *others)
+        else:
+            lending.call_join(wide.circles, wide.arrays, arrays, hanging)
 
-    def even_up(self, wide: Wide) -> None:
+    def even_up(self, wide: Wide, joined: Joined | None) -> None:
         """The substep is done: give those who have met with borrowed inertia what their momentum lacks."""
-        lending.call_even_up(wide.circles, *self.compiled[:2], int(wide.rubs))
+        arrays, hanging, _ = self.compiled
+        lending.call_even_up(wide.circles, arrays, hanging[_GROUP if joined else _ROOT], int(wide.rubs))
+
+    def balance_pull(self, wide: Wide, joined: Joined, h: float) -> None:
+        """What links have added to accelerations keeps momentum, too."""
+        arrays, hanging, _ = self.compiled
+        lending.call_balance_pull(wide.circles, arrays, hanging[_GROUP], joined.slot, joined.shift, 1 / h)
 
     # ---- beyond substeps -----------------------------------------------------------------------------------------------------
 

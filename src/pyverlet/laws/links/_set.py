@@ -15,6 +15,7 @@ from pyverlet.ground.constants import LINKS_ONE_THREAD_BELOW, REST_ACCELERATIONS
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import linked, runs
 from pyverlet.laws.contacts.broadphase import PairList
+from pyverlet.laws.contacts.loans import Joined
 from pyverlet.laws.links._chains import ChainPool
 from pyverlet.laws.links._link import Array, Link
 from pyverlet.laws.links._pool import Pool
@@ -26,6 +27,9 @@ from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
 AnyLink = TypeVar("AnyLink", bound=Link)
+
+_PIN_INTACT = 5
+"""Where it is among what `PinPool.arrays` gives."""
 
 BROKEN = np.dtype([("link", np.int64), ("row", np.int64), ("i", np.int64), ("j", np.int64), ("force", np.float64)])
 """Number of the link in `world.links`, row of it, its first and last particle, and what it pulled with when it broke, N."""
@@ -188,6 +192,14 @@ class Links:
             self._linked = (*self._work.arrays(), *chains, *pins), rows
         numbers = (h, *self._work.seam.period, len(self._work), self._iterations, REST_ACCELERATIONS * h)
         return *self._linked, numbers
+
+    def together(self, state: Slots) -> Joined:
+        """Whom links join, and with whom: what contacts ask of them. Good as long as the order of the slots is."""
+        if not self._work.assembled:
+            self._work.assemble(self.joined())
+        pins = self._packed[PinPool].arrays()
+        work = self._work
+        return Joined(work.slots(state), work.weight, work.shift, work.assembly, pins[0], pins[_PIN_INTACT])
 
     def _know_apart(self) -> None:
         """Bring the pairs that are no contacts up to date, and note if they are others than before."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pyverlet.compile.lanes import LANES
 from pyverlet.ground import memory
-from pyverlet.kernels import links, motion
+from pyverlet.kernels import clusters, links, motion
 from pyverlet.state.seam import NONE
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
@@ -50,6 +50,7 @@ class Work:
         start: (m, 2) where each was at the start of this substep, m, and the way `back` to a substep before that.
         predicted: (m, 2) where the integrator, and then its pin, had put it, and how far links have moved it by now, its `shift`.
         weight: (m,) inverse mass, as the rows feel it, 1/kg.
+        assembly: (m,) row in here of the first of those each hangs together with by links, once that is `assembled`.
     """
 
     def __init__(self, particle: Array, count: int, dtype: np.dtype[Any]) -> None:
@@ -60,6 +61,7 @@ class Work:
         self.start, self.back, self.predicted, self.shift = np.zeros((4, rows, 2), dtype)
         self._where = np.zeros((rows, 2))
         self.weight = np.zeros(rows, dtype)
+        self.assembly, self.assembled = np.arange(rows), False
         self._slot = np.zeros(rows, np.uint32)
         self._calm = np.full(rows, np.nan, dtype)
         self._burden, self._kept = np.zeros((2, rows, 2), dtype)
@@ -69,6 +71,13 @@ class Work:
 
     def __len__(self) -> int:
         return len(self.particle)
+
+    def assemble(self, joined: Array) -> None:
+        """Note who hangs together. joined: (k, 2) the user's indices of those that links join."""
+        clusters.join_rows(self.compact[joined], np.ones(len(self.weight)), self.assembly)
+        clusters.settle(self.assembly)
+        self.assembled = True
+        self.assembly[len(self) :] = self.assembly[len(self) - 1 : len(self)]
 
     def slots(self, state: Slots) -> Array:
         """(m,) where the particles stand in the engine's order."""
@@ -110,6 +119,7 @@ class Work:
             self._calm,
             self._burden,
             self._kept,
+            self.assembly,
         )
 
     def where(self, state: Slots) -> Array:
