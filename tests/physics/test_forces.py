@@ -77,6 +77,23 @@ def test_the_wind_takes_everything_along() -> None:
     assert balls.velocity == pytest.approx(np.array([(3, -1), (3, -1)]), rel=1e-9)
 
 
+@pytest.mark.parametrize("joined", ["touching", "linked", "a soft body"])
+def test_the_wind_takes_along_what_hangs_together(joined: str) -> None:
+    # v = u (1 - exp(-c t / m)), for all alike. What the wind gave was taken for what contacts had put in too much, and taken back.
+    world = pv.World(gravity=(0, 0), dtype=np.float64)
+    if joined == "a soft body":
+        pv.soft_body(world, [(-2, -1), (1, -1), (1, 2)], spacing=0.4, filled=True)
+        world.mass = 0.5
+    else:
+        pair = world.add(position=[(0, 0), (0.999, 0)], radius=0.5 if joined == "touching" else 0.3, mass=0.5)
+        if joined == "linked":
+            world.links.append(pv.Stick(pair, 0, 1))
+    world.forces.append(pv.Wind((2, 0), linear=0.05))
+    centre = world.velocity.mean(axis=0)
+    world.run(seconds=2, dt=DT)
+    assert world.velocity.mean(axis=0) - centre == pytest.approx([2 * (1 - np.exp(-0.05 * 2 / 0.5)), 0], abs=2 * 0.1 * H)
+
+
 def test_a_field_of_wind_has_a_velocity_at_each_place() -> None:
     # A shear flow, u = (y, 0): what drifts with it at its own height moves at that speed.
     world = lone_world(pv.Wind(lambda x, y, t: (y, 0.0), linear=50.0))

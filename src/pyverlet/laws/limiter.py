@@ -257,7 +257,7 @@ def _rounding(slots: Slots) -> float:
 def undriven(world: Any, h: float, h_last: float | None) -> bool:
     """Whether nothing but contacts and links could raise the energy of a world.
 
-    Forces have a potential or are drag, no obstacle, wall or pinned circle moves, gravity does not point along a period, and the
+    Forces have a potential or are drag, which wind is not, no obstacle, wall or pinned circle moves, gravity does not point along a period, and the
     integrator does not raise it either: of order 2 or more, and with a constant step, which `PositionVerlet` needs.
     """
     room = world.boundary
@@ -268,7 +268,7 @@ def undriven(world: Any, h: float, h_last: float | None) -> bool:
     seam = room.seam
     if seam and any(g != 0 and period > 0 for g, period in zip(world.gravity, seam.period, strict=True)):
         return False  # who falls for ever gains for ever
-    if world.forces and not all(isinstance(force, Drag) or has_potential(force) for force in world.forces):
+    if world.forces and not all(type(force) is Drag or has_potential(force) for force in world.forces):
         return False
     return not world.obstacles or not any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
 
