@@ -79,7 +79,7 @@ def test_the_wind_takes_everything_along() -> None:
 
 @pytest.mark.parametrize("joined", ["touching", "linked", "a soft body"])
 def test_the_wind_takes_along_what_hangs_together(joined: str) -> None:
-    # v = u (1 - exp(-c t / m)), for all alike. What the wind gave was taken for what contacts had put in too much, and taken back.
+    # v = u (1 - exp(-c t / m)), for all alike. What the wind gave was taken for what contacts had put in too much.
     world = pv.World(gravity=(0, 0), dtype=np.float64)
     if joined == "a soft body":
         pv.soft_body(world, [(-2, -1), (1, -1), (1, 2)], spacing=0.4, filled=True)

@@ -257,8 +257,9 @@ def _rounding(slots: Slots) -> float:
 def undriven(world: Any, h: float, h_last: float | None) -> bool:
     """Whether nothing but contacts and links could raise the energy of a world.
 
-    Forces have a potential or are drag, which wind is not, no obstacle, wall or pinned circle moves, gravity does not point along a period, and the
-    integrator does not raise it either: of order 2 or more, and with a constant step, which `PositionVerlet` needs.
+    Forces have a potential or are drag, which wind is not, no obstacle, wall or pinned circle moves, gravity does not point along
+    a period, and the integrator does not raise it either: of order 2 or more, and with a constant step, which `PositionVerlet`
+    needs.
     """
     room = world.boundary
     if world.integrator.order < 2 or h_last not in (None, h) or room.moves:

@@ -154,6 +154,9 @@ class Slots:
         for name in (*SET, "grown"):
             memory.take(self._given.get(name, state.grown), self.particle, getattr(self, name))  # one number, if that of all
         self.weigh()
+        # Summed in the user's order: that of slots, and with it the last bit, is another when a saved world is taken up.
+        self.total_mass = float(state.mass.sum(dtype=float, where=(free := np.isfinite(state.mass))))
+        self.pins = not free.all()
         self.most_restitution, self.most_friction = (float(a.max(initial=-1.0)) for a in (self.restitution, self.friction))
         filters = (state.category != 1).any() or (state.mask != EVERYONE).any()
         order = self.particle if filters else self.particle[:0]
@@ -167,8 +170,6 @@ class Slots:
         with np.errstate(divide="ignore"):  # a mass of 0 is refused by the world, with a sentence
             np.divide(1, self.mass, out=self.inverse_mass)
         self.inverse_mass[self.asleep] = 0
-        self.total_mass = float(self.mass.sum(dtype=float, where=(free := np.isfinite(self.mass))))
-        self.pins = not free.all()
 
     def _keep(self, slots: Any) -> None:
         """Remember what outlives a change of size, of these slots."""
