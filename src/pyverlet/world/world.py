@@ -160,9 +160,7 @@ class World(Measures, Queries, Doors):
                 contacts.still(state, h, links)
             done("velocities")
             if links:
-                links.after(state, h)
-                if contacts:
-                    contacts.balance_pull(h)
+                links.after(state, h, contacts.balance_pull if contacts else None)
                 done("links")
             run.substep += 1
         return self._finish(contacts, watch, h, done, marked=run.marked)

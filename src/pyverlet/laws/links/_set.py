@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any, TypeVar
 
@@ -253,10 +253,14 @@ class Links:
         with self._threads():
             linked.call_pick_up(self.compiled(state, h)[0], state.velocity)
 
-    def after(self, state: Slots, h: float) -> None:
-        """After the contacts: what the links did is part of the acceleration, for integrators that remember it."""
+    def after(self, state: Slots, h: float, balance: Callable[[float], None] | None = None) -> None:
+        """After the contacts: what the links did is part of the acceleration, for integrators that remember it. `balance`: who is
+        told of it, with h.
+        """
         with self._threads():
             linked.call_note_pull(*self.compiled(state, h), state.acceleration)
+        if balance:
+            balance(h)
 
     def scatter(self) -> None:
         """The frame is good: what it did to the links holds."""
