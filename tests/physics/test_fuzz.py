@@ -38,6 +38,7 @@ def test_some_random_worlds(seed: int) -> None:
         *(41, 75, 168, 1522, pytest.param(2146, marks=pytest.mark.slow), 2167, 61, 92, 100674, 100904, 105154, 105428, 116757),
         *(pytest.param(each, marks=pytest.mark.slow) for each in (102853, 103593, 104756, 104863, 106417, 106603, 107129)),
         *(400023, 410579, 411340, 411737),
+        *(700313, 700585, 702660, 702781, 704622),
     ],
 )
 def test_seeds_that_once_failed(seed: int) -> None:

@@ -41,7 +41,7 @@ class About(NamedTuple):
 
 class Limits(NamedTuple):
     """surplus: J to be taken; dt: s; gravity: m/s^2. forced: whether there are forces beside gravity; kept: with a potential.
-    rounded: what counts as a push, of what momenta come to.
+    rounded: what counts as a push, of what momenta come to; grain: 1/s, of a place, the velocity it is rounded by, over rounded.
     """
 
     surplus: Any
@@ -52,6 +52,7 @@ class Limits(NamedTuple):
     forced: Any
     kept: Any
     rounded: Any
+    grain: Any
 
 
 _COLUMNS = 24
@@ -147,6 +148,7 @@ def _sum_up(then, now, about, limits, cluster, lift, place, of):
         to[_PUSH_X] += gone_x - limits.dt * m * limits.gravity[0]
         to[_PUSH_Y] += gone_y - limits.dt * m * limits.gravity[1]
         to[_SCALE] += m * np.sqrt(vx * vx + vy * vy) + np.sqrt(gone_x * gone_x + gone_y * gone_y)
+        to[_SCALE] += m * limits.grain * max(abs(np.float64(now.position[k, 0])), abs(np.float64(now.position[k, 1])))
 
 
 @kernel

@@ -48,7 +48,8 @@ _NOBODY: Listed = (np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.
 """No pairs."""
 
 _ROUNDED = 1e-5
-"""Of what momenta come to without their signs: less is rounding, in float32 by eight substeps of a thousand circles or so."""
+"""Of what momenta come to without their signs: less is rounding, in float32 by eight substeps of a thousand circles or so. Beside
+it what contacts make of rounded places: velocities, over h."""
 
 _NEARLY = 1.01
 """Times what may be gained: more is too much, which lowering could not take back."""
@@ -149,6 +150,7 @@ class Watch:
         now = taking.Bodies(slots.position, slots.velocity, slots.spin, slots.radius, slots.mass)
         limits = taking.Limits(
             surplus, self._dt, self._gravity, *slots.seam.period, bool(self._forces.forces), bool(self._kept), _ROUNDED,
+            float(np.finfo(slots.dtype).eps) / (slots.h * _ROUNDED),
         )  # fmt: skip
         lift, part, moved, lower = np.empty(len(slots)), np.empty(len(slots)), *np.empty((2, len(slots), 2))
         taking.raised(then, now, slots.particle, before, pull, limits, lift, moved)
