@@ -244,21 +244,32 @@ def below(world: pv.World) -> float:
     return float(world.position[:, 1].min())
 
 
+ALONG: dict[str, Any] = {
+    "drag": lambda world: world.forces.append(pv.Drag(linear=0.1)),
+    "wind": lambda world: world.forces.append(pv.Wind((3, 1), linear=0.1, quadratic=0.2)),
+    "three forces": lambda world: world.forces.extend(
+        [pv.PointSpring(stiffness=3), pv.ConstantForce((1, 2)), pv.Attractor(strength=5)]
+    ),
+    "segment": lambda world: world.obstacles.append(pv.Segment((-9, below(world)), (9, below(world) + 1), restitution=0.3)),
+    "disc and drag": lambda world: (
+        world.obstacles.append(pv.Disc((0, below(world)), 1)),
+        world.forces.append(pv.Drag(quadratic=0.1)),
+    ),
+    "function": lambda world: world.forces.append(gust),
+    "functions and drag": lambda world: world.forces.extend([whirl, pv.Drag(linear=0.1), gust]),
+}
+"""What a frame takes along."""
+
+
 @pytest.mark.parametrize(
-    "change",
+    ("mu", "change"),
     [
-        lambda world: world.forces.append(pv.Drag(linear=0.1)),
-        lambda world: world.forces.append(pv.Wind((3, 1), linear=0.1, quadratic=0.2)),
-        lambda world: world.forces.extend([pv.PointSpring(stiffness=3), pv.ConstantForce((1, 2)), pv.Attractor(strength=5)]),
-        lambda world: world.obstacles.append(pv.Segment((-9, below(world)), (9, below(world) + 1), restitution=0.3)),
-        lambda world: (world.obstacles.append(pv.Disc((0, below(world)), 1)), world.forces.append(pv.Drag(quadratic=0.1))),
-        lambda world: world.forces.append(gust),
-        lambda world: world.forces.extend([whirl, pv.Drag(linear=0.1), gust]),
+        pytest.param(mu, change, id=f"{mu}-{name}", marks=[pytest.mark.slow] if mu and "function" in name else [])
+        for mu in (0.0, 0.5)
+        for name, change in ALONG.items()
     ],
-    ids=["drag", "wind", "three forces", "segment", "disc and drag", "function", "functions and drag"],
 )
-@pytest.mark.parametrize("mu", [0.0, 0.5])
-def test_forces_of_few_numbers_and_obstacles_that_stand_still_go_along(change: Any, mu: float, fusing: Fusing) -> None:
+def test_forces_of_few_numbers_and_obstacles_that_stand_still_go_along(mu: float, change: Any, fusing: Fusing) -> None:
     def rough(world: pv.World) -> None:
         world.collisions = pv.Collisions(friction=mu)
         change(world)

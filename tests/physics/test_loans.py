@@ -85,10 +85,11 @@ def test_unequal_circles_that_bounce_come_to_rest() -> None:
 @pytest.mark.parametrize("speed", [0.3, 1.0])
 def test_who_lends_nothing_bounces_however_slowly(speed: float) -> None:
     # In a fall together, above what is a contact at rest (4 g h = 0.08 m/s): they part with e times the speed they met with.
-    world = pv.World(collisions=pv.Collisions(restitution=0.5), dtype=np.float64)
+    world = pv.World(collisions=pv.Collisions(restitution=0.5))
     world.add(position=[(0, 0), (1.02, 0)], velocity=[(speed, 0), (0, 0)], radius=0.5, mass=[1.0, 100.0])
     world.run(seconds=0.2)
-    assert world.velocity[1, 0] - world.velocity[0, 0] == pytest.approx(0.5 * speed, rel=1e-9)
+    # What places are rounded by, over h: 6e-8 m times 480/s.
+    assert world.velocity[1, 0] - world.velocity[0, 0] == pytest.approx(0.5 * speed, abs=3e-5)
 
 
 @pytest.mark.parametrize("which", [0, 10])

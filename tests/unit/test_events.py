@@ -42,7 +42,7 @@ def test_keys_are_replaced_in_order(gone: int, new: int) -> None:
 @pytest.mark.parametrize("last", [False, True])
 def test_who_is_gone_is_not_told_of(last: bool) -> None:
     # Three in a row touch; one of them goes. What was between it and others is told to nobody, the rest goes on.
-    world = pv.World(gravity=(0, 0), collisions=pv.Collisions(), dtype=np.float64, events=True)
+    world = pv.World(gravity=(0, 0), collisions=pv.Collisions(), events=True)
     group = world.add(position=[(0, 0), (0.999, 0), (1.998, 0)], radius=0.5)
     world.step(1 / 60)
     assert world.events.begin[["a", "b"]].tolist() == [(0, 1), (1, 2)]
@@ -71,7 +71,7 @@ def test_a_bounce_begins_hits_and_ends(method: Any) -> None:
 
 
 def test_slow_contacts_are_no_hits() -> None:
-    world = pv.World(gravity=(0, 0), dtype=np.float64, events=True)
+    world = pv.World(gravity=(0, 0), events=True)
     world.add(position=[(1, 0), (-1, 0)], velocity=[(-0.4, 0), (0.4, 0)])
     begun = hits = 0
     for _ in range(120):
