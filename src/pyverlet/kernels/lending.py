@@ -96,7 +96,7 @@ def lend(circles, pairs, lending, terms, cut, rubs):
 
 @driver
 def settle(circles, pairs, lending, hanging, terms, cut, claims):
-    """Those that touch lend each other; those that do not have fallen by themselves. What changes velocities next is walls."""
+    """Those that touch lend each other; those that do not have fallen by themselves. Walls, or links, change velocities next."""
     share(circles, pairs, hanging, cut, claims)
     take_up(circles, lending, terms)
 
