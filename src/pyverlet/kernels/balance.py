@@ -61,7 +61,7 @@ def _note_wall(i, circles, lending, root):
     to = lending.sums[r]
     if circles.inverse_mass[i] == 0:  # whoever it touches is held in all directions, however hard walls push in one
         lending.what[r] = _HELD
-    elif lending.touched[i]:
+    elif lending.touched[i] or lending.linked[i]:
         dx, dy = float(velocity[i, 0] - unpushed[i, 0]), float(velocity[i, 1] - unpushed[i, 1])
         to[_XX] += dx * dx
         to[_XY] += dx * dy
