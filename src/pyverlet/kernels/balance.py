@@ -201,7 +201,7 @@ def balance(circles, lending, root, rubs):
 @kernel
 def balance_pull(circles, lending, root, slot, shift, rate):
     """After `balance`: likewise what links have added to accelerations (`kernels.links.add_pull`), for when the frame ends."""
-    count, pull, none = 0, lending.unpushed, lending.before
+    count, pull, none = 0, lending.unpushed, lending.before  # these two are of use no more in this substep
     for c in range(lending.found.shape[0]):
         count += lending.found[c]
     if count == 0:

@@ -22,7 +22,18 @@ from pyverlet.kernels.cage import confine as confine_in_cage
 from pyverlet.kernels.cage import hold
 from pyverlet.kernels.drive import drive, drive_called
 from pyverlet.kernels.kinds import for_each_kind
-from pyverlet.kernels.lending import Hanging, Lending, Terms, even_up, join, join_linked, lend, note_unpushed, settle, weigh
+from pyverlet.kernels.lending import (
+    Hanging,
+    Lending,
+    Terms,
+    even_up,
+    join,
+    join_linked,
+    lend,
+    note_unpushed,
+    settle,
+    tell_weights,
+)
 from pyverlet.kernels.link_rows import Rows
 from pyverlet.kernels.linked import (
     Linked,
@@ -270,7 +281,7 @@ def _substeps(
         if LINKED:
             _look_at_energy(energies, substep, TOUCHED, circles, mass, lag, down, spent, clock)
             if lends:
-                weigh(linked.slot, linked.weight, loans.lighter)
+                tell_weights(linked.slot, linked.weight, loans.lighter)
             solve(linked, rows, linking, circles.position, circles.velocity)
             note(spent, LINKS, clock[0], clock[1])
             _look_at_energy(energies, substep, JOINED, circles, mass, lag, down, spent, clock)

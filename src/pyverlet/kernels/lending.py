@@ -1,6 +1,6 @@
-"""Loans of inertia in a substep, in the order they are called: `lend` before the contacts, `settle` after them, `weigh` before
-links and `note_unpushed` after them, `join` or `join_linked` when walls have pushed, `even_up` when velocities are done, and
-`balance.balance_pull` when accelerations are.
+"""Loans of inertia in a substep, in the order they are called: `lend` before the contacts, `settle` after them, `tell_weights`
+before links and `note_unpushed` after them, `join` or `join_linked` when walls have pushed, `even_up` when velocities are done,
+and `balance.balance_pull` when accelerations are.
 
 Links move circles by the inertia of the substep, too. What they pull on by the own mass while contacts push by another would not
 be in balance where contacts are: a light circle between a link and a heavy one would pass on its pull many times over.
@@ -102,16 +102,16 @@ def settle(circles, pairs, lending, hanging, terms, cut, claims):
 
 
 @kernel
-def _weigh(begin, end, slot, weight, lighter):
+def _tell_weights(begin, end, slot, weight, lighter):
     for k in range(begin, end, LANES):
         store(weight, k, pick(lighter, slot, k))
 
 
 @parallel_kernel
-def weigh(slot, weight, lighter):
+def tell_weights(slot, weight, lighter):
     """Links come: weight[k] = lighter[slot[k]], the inverse inertia of who is linked, 1/kg."""
     for c in prange((slot.shape[0] + CHUNK - 1) // CHUNK):
-        _weigh(c * CHUNK, min((c + 1) * CHUNK, slot.shape[0]), slot, weight, lighter)
+        _tell_weights(c * CHUNK, min((c + 1) * CHUNK, slot.shape[0]), slot, weight, lighter)
 
 
 @kernel
@@ -165,9 +165,9 @@ def call_settle(circles, pairs, lending, hanging, terms, cut, claims):
 
 
 @driver
-def call_weigh(slot, weight, lending):
-    """`weigh`."""
-    weigh(slot, weight, Lending(*borrowed(lending)).lighter)
+def call_tell_weights(slot, weight, lending):
+    """`tell_weights`."""
+    tell_weights(slot, weight, Lending(*borrowed(lending)).lighter)
 
 
 @driver

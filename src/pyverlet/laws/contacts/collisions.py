@@ -195,7 +195,7 @@ class ContactSolver:
         if self._lends:
             self._loans.settle(state, wide)
             if self._joined:
-                self._loans.weigh(self._joined)
+                self._loans.tell_weights(self._joined)
 
     def note_unpushed(self) -> None:
         """Links are done: what changes velocities next is walls."""

@@ -131,9 +131,9 @@ class Loans:
         """Those that touch lend each other; those that do not have fallen by themselves."""
         lending.call_settle(wide.circles, wide.arrays, *self.compiled, wide.cut(), state.claims())
 
-    def weigh(self, joined: Joined) -> None:
+    def tell_weights(self, joined: Joined) -> None:
         """Links come, and move whom they join by the inertia of now."""
-        lending.call_weigh(joined.slot, joined.weight, self.compiled[0])
+        lending.call_tell_weights(joined.slot, joined.weight, self.compiled[0])
 
     def note_unpushed(self, wide: Wide) -> None:
         """They are done: what changes velocities next is walls."""

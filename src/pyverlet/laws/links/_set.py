@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.compile import jit
+from pyverlet.compile.bundle import fields
 from pyverlet.ground import checks
 from pyverlet.ground.constants import LINKS_ONE_THREAD_BELOW, REST_ACCELERATIONS
 from pyverlet.ground.errors import InputError
@@ -28,8 +29,8 @@ from pyverlet.state.state import State
 
 AnyLink = TypeVar("AnyLink", bound=Link)
 
-_PIN_INTACT = 5
-"""Where it is among what `PinPool.arrays` gives."""
+_PIN_INTACT = fields(linked.Linked).index("tie_intact") - fields(linked.Linked).index("tied")
+"""Where it is among what `PinPool.arrays` gives, which is in this order."""
 
 BROKEN = np.dtype([("link", np.int64), ("row", np.int64), ("i", np.int64), ("j", np.int64), ("force", np.float64)])
 """Number of the link in `world.links`, row of it, its first and last particle, and what it pulled with when it broke, N."""
