@@ -32,14 +32,15 @@ def test_some_random_worlds(seed: int) -> None:
 # inertia that hit a wall and touch nobody.
 # Then what the checks themselves took for failures: a single stick that a wall stretches, masks, springs to a point too stiff
 # for a substep, springs whose places are rounded, who rolls in coarse steps, who sleeps, a chain of stiff sticks,
-# accounts that have been turned over, a cloth that begins in an obstacle, forces taken away, and a linked circle moved.
+# accounts that have been turned over, a cloth that begins in an obstacle, forces taken away, a linked circle moved, and an angle
+# too stiff for a substep.
 @pytest.mark.parametrize(
     "seed",
     [
         *(41, 75, 168, 1522, pytest.param(2146, marks=pytest.mark.slow), 2167, 61, 92, 100674, 100904, 105154, 105428, 116757),
         *(pytest.param(each, marks=pytest.mark.slow) for each in (102853, 103593, 104756, 104863, 106417, 106603, 107129)),
         *(400023, 410579, 411340, 411737),
-        *(700313, 700585, 702660, 702781, 704622, 960983),
+        *(700313, 700585, 702660, 702781, 704622, 960983, 961085),
     ],
 )
 def test_seeds_that_once_failed(seed: int) -> None:

@@ -179,6 +179,10 @@ LINK_TURN: Final = 0.25
 LINK_ROUNDS: Final = 8
 """Times the rows of a rope are asked anew who pulls. Three have been enough for chains of 100; what is left is clamped."""
 
+LINK_SLIGHT: Final = 1e-5
+"""Of its length a rope may have pushed, or been stretched, in a substep: the next pass lets it go, or takes it up. By so much
+float32 rounds coordinates in a room of some 60 m, and for the sake of that large cloths were solved four times over."""
+
 LINKS_ONE_THREAD_BELOW: Final = 4096
 """Worlds with fewer linked particles solve links on one thread: each colour is a meeting of the threads."""
 

@@ -46,7 +46,7 @@ from pyverlet.compile.lanes import (
     widen,
 )
 from pyverlet.compile.rounding import lanes_like
-from pyverlet.ground.constants import LINK_BOWED, LINK_ROUNDS, LINK_TAUT, LINK_TURN
+from pyverlet.ground.constants import LINK_BOWED, LINK_ROUNDS, LINK_SLIGHT, LINK_TAUT, LINK_TURN
 from pyverlet.kernels.chain_rows import (
     AX,
     AY,
@@ -132,6 +132,7 @@ def _eliminate(fresh, keeps, bows, kinds, begin, end, node, row, more, shift, hh
                 store(room, too + _NY, my)
                 store(room, too + _RIGHT, right)
                 store(room, too + _ACTIVE, pulls)
+            if bows:
                 store(room, too + _BOW, larger(turn - straight, zero) * steeper * larger(load(row, here + FORCE), zero) * bend)
             xi, yi = xj, yj
         else:
@@ -219,21 +220,41 @@ def _eliminate_bowed(begin, end, row, room, wide):
 
 
 @kernel
-def _move(bowed, keeps, begin, end, node, row, shift, room):
-    """Back from the last row to the first: the steps of lam, and nodes go where these lead. Which lanes' links it turns too far.
+def _ask(k, here, too, out_x, out_y, lam, row, more, room):
+    """A rope pulls or does nothing: of the rows from item k on, whose ends have moved apart by `out`, those that would push let
+    go, and those that the others stretch begin. Which lanes' are off by so much that they are to be solved again.
+    """
+    real = row.dtype.type
+    zero, one, active = spread(real(0)), spread(real(1)), load(room, too + _ACTIVE)
+    rope = where_above(load(row, here + GIVE), zero, load(more, EXTRA * k + ROPE), zero)
+    out = load(room, too + _NX) * out_x + load(room, too + _NY) * out_y
+    ends = active * rope * where_above(lam, zero, one, zero)
+    begins = (one - active) * rope * where_above(out, load(room, too + _RIGHT), one, zero)
+    active = active + begins - ends
+    store(room, too + _ACTIVE, active)
+    store(more, EXTRA * k + HELD, active)
+    pushed = ends * lam * (load(row, here + W) + load(row, here + LANES * ROW + W))
+    stretched = begins * (out - load(room, too + _RIGHT))
+    return which_above(larger(pushed, stretched), spread(real(LINK_SLIGHT)) * load(row, here + REST))
 
-    bowed: steps and moves are known already, by `_eliminate_bowed`.
+
+@kernel
+def _move(bows, ropes, begin, end, node, row, more, shift, room):
+    """Back from the last row to the first: the steps of lam, and nodes go where these lead. Which lanes' links it turns too far,
+    and, of ropes, which lanes' are to be solved again with others that pull.
+
+    bows: steps and moves are known already, by `_eliminate_bowed`.
     """
     real = row.dtype.type
     zero, limit = spread(real(0)), spread(real(LINK_TURN if end - begin > LANES else np.inf))
-    spare = _PLAIN * (end - begin + LANES)
-    step = u = fx = fy = most = zero
+    spare, again = _PLAIN * (end - begin + LANES), 0
+    step = u = fx = fy = most = lam = zero
     tx = ty = ox = oy = zero  # of the row after this one: what it crosses, and the move of its last node
     for k in range(end - LANES, begin - LANES, -LANES):
         here, to, too = ROW * k, _PLAIN * (k - begin), spare + _SPARE * (k - begin)
         following, after = to + LANES * _PLAIN, too + LANES * _SPARE
         w = load(row, here + LANES * ROW + W)
-        if bowed:
+        if bows:
             step, mx, my = load(room, too + _STEP), load(room, after + _MX), load(room, after + _MY)
         else:
             step = load(room, to + _Z) + u * step
@@ -241,47 +262,24 @@ def _move(bowed, keeps, begin, end, node, row, shift, room):
             bx, by = load(row, here + AX) * step, load(row, here + AY) * step
             mx, my = w * (bx - fx), w * (by - fy)
             fx, fy = bx, by
-        store(row, here + LAM, load(room, to + _LAM) + step)
+        if ropes and k + LANES < end:
+            again |= _ask(k + LANES, here + LANES * ROW, after, ox - mx, oy - my, lam, row, more, room)
+        lam = load(room, to + _LAM) + step
+        store(row, here + LAM, lam)
         put(shift, node, k + LANES, load(room, following + _SX) + mx, load(room, following + _SY) + my)
         across = tx * (oy - my) - ty * (ox - mx)
         most = larger(most, larger(across, zero - across))
         tx, ty, ox, oy = load(room, to + _TX), load(room, to + _TY), mx, my
-        if keeps:
-            store(room, after + _MX, mx)
-            store(room, after + _MY, my)
     w = load(row, ROW * begin + W)
-    if bowed:
+    if bows:
         mx, my = load(room, spare + _MX), load(room, spare + _MY)
     else:
         mx, my = zero - w * fx, zero - w * fy
     put(shift, node, begin, load(room, _SX) + mx, load(room, _SY) + my)
-    if keeps:
-        store(room, spare + _MX, mx)
-        store(room, spare + _MY, my)
+    if ropes:
+        again |= _ask(begin, ROW * begin, spare, ox - mx, oy - my, lam, row, more, room)
     across = tx * (oy - my) - ty * (ox - mx)
-    return which_above(larger(most, larger(across, zero - across)), limit)
-
-
-@kernel
-def _slack_changes(begin, end, row, more, room):
-    """A rope pulls or does nothing: let go of rows that would push, take up those the others stretch; whether any changed."""
-    real = row.dtype.type
-    zero, one = spread(real(0)), spread(real(1))
-    spare = _PLAIN * (end - begin + LANES)
-    changed = 0
-    for k in range(begin, end, LANES):
-        here, too = ROW * k, spare + _SPARE * (k - begin)
-        after = too + LANES * _SPARE
-        active = load(room, too + _ACTIVE)
-        rope = where_above(load(row, here + GIVE), zero, load(more, EXTRA * k + ROPE), zero)
-        dx, dy = load(room, after + _MX) - load(room, too + _MX), load(room, after + _MY) - load(room, too + _MY)
-        out = load(room, too + _NX) * dx + load(room, too + _NY) * dy
-        ends = active * rope * where_above(load(row, here + LAM), zero, one, zero)
-        begins = (one - active) * rope * where_above(out, load(room, too + _RIGHT), one, zero)
-        changed |= which_above(ends + begins, zero)
-        store(room, too + _ACTIVE, active + begins - ends)
-        store(more, EXTRA * k + HELD, active + begins - ends)
-    return changed != 0
+    return which_above(larger(most, larger(across, zero - across)), limit), again
 
 
 @kernel
@@ -332,8 +330,8 @@ def solve_pack(p, start, node, holds, lanes, bowed, row, more, shift, hh, room, 
         _eliminate(fresh, keeps, bows, holds[p], begin, end, node, row, more, shift, hh, room)
         if bows:
             _eliminate_bowed(begin, end, row, room, wide)
-        far = _move(bows, keeps, begin, end, node, row, shift, room)
-        if not (ropes and _slack_changes(begin, end, row, more, room)):
+        far, again = _move(bows, ropes, begin, end, node, row, more, shift, room)
+        if again == 0:
             break
         fresh = False
     if far != 0:

@@ -23,7 +23,10 @@ SHEAR = 0.2
 """N/m a kilogram: little, so that the folds show."""
 
 PEGS = 9
-"""The cloth hangs from."""
+"""The cloth hangs from at least."""
+
+SPAN = 6
+"""Columns from peg to peg at most: threads carry that many, and twice as much while the cloth falls into its folds."""
 
 STRENGTH = 25.0
 """Weights of a column of the cloth that a thread carries before it breaks."""
@@ -33,7 +36,7 @@ LEAST = 12
 
 
 def build(settings: Settings) -> World:
-    """A cloth hangs from nine pegs.
+    """A cloth hangs from nine pegs, a wide one from more.
 
     Each thread breaks beyond a force, so that whoever drags hard enough tears it; colours in a window or a film show the pull. Of
     the particles those that do not fill a row lie on the floor.
@@ -56,7 +59,8 @@ def build(settings: Settings) -> World:
         world, (-width / 2, height), width=width, height=height, columns=columns, rows=rows, mass=mass, radius=0.4 * SPACING,
         slack=SLACK, shear=SHEAR * mass, breaking_force=STRENGTH * mass / columns * 9.81,
     )  # fmt: skip
-    cloth.group.pin(np.unique(np.linspace(0, columns - 1, PEGS).astype(int)))
+    pegs = max(PEGS, -((1 - columns) // SPAN) + 1)
+    cloth.group.pin(np.unique(np.linspace(0, columns - 1, pegs).astype(int)))
     loose = settings.particles - columns * rows
     if loose:
         x = SPACING * (np.arange(loose) - (loose - 1) / 2)

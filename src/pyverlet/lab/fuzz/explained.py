@@ -10,8 +10,9 @@ from pyverlet.world.world import World
 def stored(world: World, h: float) -> tuple[float, float]:
     """J that links hold, and the sum of their stiffness, N/m: none counts as stiffer than what it gives back in a substep of h.
 
-    Its particles then move by their stretch C, and get the energy of C / h. A link much stiffer than substeps can follow shows
-    more, where a wall or a pinned circle has stretched it after links were solved, and never gives that back.
+    What it measures, C, then goes back to 0, and its particles, of inverse masses w, have C^2 / (2 h^2 sum(w |grad C|^2)) J.
+    A link much stiffer than substeps can follow shows more, where a wall or a pinned circle has stretched it after links were
+    solved, and never gives that back.
     """
     place, held, stiff = world.position.astype(float), 0.0, 0.0
     with np.errstate(divide="ignore"):
@@ -19,9 +20,9 @@ def stored(world: World, h: float) -> tuple[float, float]:
     for pool in world.links._kept:
         energy, soft = pool.energies(place, world._state.seam), np.isfinite(pool.rows["stiffness"])
         stiffness = np.where(soft, pool.rows["stiffness"], 0.0)
-        if (pool.rows["arity"] == 2).all():
-            both = weight[pool.entries["particle"].reshape(-1, 2)].sum(axis=1)
-            part = 1.0 / np.maximum(stiffness * both * h * h, 1.0)
+        if len(energy):
+            moved = weight[pool.entries["particle"]] * (pool.gradients(place, world._state.seam) ** 2).sum(axis=1)
+            part = 1.0 / np.maximum(stiffness * np.add.reduceat(moved, pool.first[:-1]) * h * h, 1.0)
             energy, stiffness = energy * part, stiffness * part
         held, stiff = held + float(energy.sum()), stiff + float(stiffness.sum())
     return held, stiff

@@ -106,6 +106,10 @@ class Pool(ABC):
             share += np.bincount(whose, self.energies(now, seam) - self.energies(before, seam), len(share))
 
     @abstractmethod
+    def gradients(self, position: Array, seam: Seam) -> Array:
+        """(entries, 2) how what each row measures changes with the place of each of its particles."""
+
+    @abstractmethod
     def stored(self, position: Array, seam: Seam) -> float:
         """The same in the middle of a frame, of the rows that are intact then, at (m, 2) positions in the order of `Work`."""
 
@@ -114,3 +118,9 @@ def held(stiffness: Array, upper: Array | float, intact: Array, value: Array) ->
     """(k,) energy of rows, J: none of the rigid, of the broken, nor of slack ropes."""
     pulled = np.isfinite(stiffness) & (intact != 0) & ~((upper <= 0.0) & (value < 0.0))
     return 0.5 * np.where(pulled, stiffness, 0.0) * value * value
+
+
+def unit(way: Array) -> Array:
+    """(k, 2) the directions of ways (k, 2), along x where there is none."""
+    length = np.hypot(*way.T)[:, None]
+    return np.asarray(np.divide(way, length, out=np.tile((1.0, 0.0), (len(way), 1)), where=length > 0))

@@ -77,16 +77,21 @@ class RowPool(Pool):
 
     def stored(self, position: Array, seam: Seam) -> float:
         number = self._number.T
-        value = _values(self._first, self._kind, number[link_rows.REST], position[self._particle], seam)
+        value, _ = _measured(self._first, self._kind, number[link_rows.REST], position[self._particle], seam)
         return float(held(number[link_rows.STIFFNESS], number[link_rows.UPPER], self._intact, value).sum())
 
     def energy(self, position: Array, seam: Seam) -> float:
         return float(self.energies(position, seam).sum())
 
     def energies(self, position: Array, seam: Seam) -> Array:
-        rows = self.rows
-        value = _values(self.first, rows["kind"], rows["rest"], position[self.entries["particle"]], seam)
+        rows, (value, _) = self.rows, self._measured(position, seam)
         return held(rows["stiffness"], rows["upper"], rows["intact"], value)
+
+    def gradients(self, position: Array, seam: Seam) -> Array:
+        return self._measured(position, seam)[1]
+
+    def _measured(self, position: Array, seam: Seam) -> tuple[Array, Array]:
+        return _measured(self.first, self.rows["kind"], self.rows["rest"], position[self.entries["particle"]], seam)
 
 
 def _entries(first: Array, arity: Array, rows: Array) -> Array:
@@ -96,9 +101,9 @@ def _entries(first: Array, arity: Array, rows: Array) -> Array:
     return np.asarray(np.repeat(first[rows], count) + within)
 
 
-def _values(first: Array, kind: Array, rest: Any, corner: Array, seam: Seam) -> Array:
-    """(k,) what each row measures, with its particles in `corner`."""
+def _measured(first: Array, kind: Array, rest: Any, corner: Array, seam: Seam) -> tuple[Array, Array]:
+    """(k,) what each row measures, with its particles in `corner`, and (entries, 2) its gradients."""
     value, gradient = np.empty(len(kind)), np.empty((len(corner), 2))
     rest = np.ascontiguousarray(rest)
     link_rows.measure_rows(first, kind, rest, corner.astype(np.float64), *seam.period, gradient, value)
-    return value
+    return value, gradient
