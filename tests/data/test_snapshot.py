@@ -220,6 +220,25 @@ def test_features_have_something_to_remember() -> None:
     assert (world._state.grown < 1).any()
 
 
+def test_links_are_solved_alike_whoever_was_pinned_on_the_way(tmp_path: Path) -> None:
+    """Ropes with heavy loads are solved beside those with pins; a world that is loaded packs them as they are pinned by then."""
+    columns, rows = 24, 40
+    world, number = pv.World(), np.arange(rows * columns).reshape(rows, columns)
+    place = np.column_stack((number.ravel() % columns, -0.5 * (number.ravel() // columns)))
+    group = world.add(position=place, radius=0.1, mass=np.where(number.ravel() < (rows - 1) * columns, 0.1, 40.0))
+    world.links.append(pv.Rope(group, number[:-1].T.ravel(), number[1:].T.ravel(), collide=False))
+    group.pin(number[0, ::3])
+    world.run(seconds=0.3)
+    group.pin(number[0, 1::3])
+    group.pin(number[5, 2::3])
+    world.run(seconds=0.3)
+    pv.save(world, tmp_path / "a.pvsnap")
+    again = pv.load(tmp_path / "a.pvsnap", exact=True)
+    for each in (world, again):
+        each.run(seconds=0.5)
+    assert again.state_hash() == world.state_hash()
+
+
 def test_groups_go_on_naming_their_particles(tmp_path: Path) -> None:
     world = heap()
     gone, left = world.add(position=(1, 40)), world.add(position=[(3, 40), (5, 40)], radius=0.2)

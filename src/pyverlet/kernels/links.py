@@ -98,6 +98,15 @@ def remember(past_start, past_left, past_calm, position, particle, start, calm):
             past_left[k, 0], past_left[k, 1] = position[p, 0], position[p, 1]
 
 
+@kernel
+def pins_differ(mass, particle, pinned):
+    """Whether anybody among these particles has been pinned since, or let go."""
+    differ = False
+    for k in range(particle.shape[0]):
+        differ |= (mass[particle[k]] == np.inf) != pinned[k]
+    return differ
+
+
 @parallel_kernel
 def recall_all(past_start, past_left, past_calm, position, particle, start, calm):
     """`recall`, if the same particles are linked as then, and none has come or gone."""

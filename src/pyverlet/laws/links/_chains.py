@@ -34,7 +34,10 @@ class ChainPool(Pool):
         self._blended = np.zeros(1, np.uint8)
 
     def pack(self, work: Work) -> None:
-        """By colour, and within a colour long runs first, so that runs of a pack are as long as each other."""
+        """By colour, and within a colour long runs first, so that runs of a pack are as long as each other.
+
+        Of those alike in that, those with a pin: they carry weight, and a pack in which one resists being turned is solved so.
+        """
         self.rows.write()  # from what is packed otherwise from now on
         count, self._ends = len(self.rows), work.compact[self.entries["particle"]].reshape(-1, 2)
         given, ends, run_of = np.empty(count, np.int64), np.empty_like(self._ends), np.empty(count, np.int64)
@@ -43,7 +46,8 @@ class ChainPool(Pool):
         runs.colour_runs(self.first, ends.ravel(), run_of, len(work), LINK_COLOURS, colour)
         length = np.bincount(run_of, minlength=number)
         alone = colour == LINK_COLOURS - 1  # these may share particles: each is a pack, and a colour, of its own
-        order = np.argsort(colour * (count + 1) - np.where(alone, 0, length), kind="stable")
+        pinned = np.bincount(run_of, work.pinned[ends].any(axis=1), number) > 0
+        order = np.lexsort((~(pinned | alone), np.where(alone, 0, -length), colour))
         rank = np.arange(number) - np.searchsorted(colour[order], colour[order])
         lane = np.where(alone[order], 0, rank % LANES)
         opens = np.flatnonzero(lane == 0)

@@ -51,7 +51,7 @@ class Links:
         self._leaving: dict[Pool, list[int]] = {}
         self._next_owner, self._iterations = 0, 1
         self._few = True
-        self._work = Work(np.empty(0, np.int64), 0, state.dtype)
+        self._work = Work(np.empty(0, np.int64), state.mass[:0], state.dtype)
         self._past: Past | None = None
         self._apart, self._apart_stale = np.empty((0, 2), np.int64), False
         self._partners = np.zeros(1, np.int64), np.empty(0, np.int64)
@@ -156,11 +156,11 @@ class Links:
         """A frame begins. True if other pairs than before are no contacts (`unlist`)."""
         if not self._kept:
             return False
-        if any(pool.stale for pool in self._kept) or len(self._work.compact) != len(self._state):
+        if any(pool.stale for pool in self._kept) or not self._work.good(self._state):
             among = np.zeros(len(self._state), bool)
             for pool in self._kept:
                 among[pool.entries["particle"]] = True
-            self._work = Work(np.flatnonzero(among), len(self._state), self._state.dtype)
+            self._work = Work(np.flatnonzero(among), self._state.mass, self._state.dtype)
             for pool in self._kept:
                 pool.pack(self._work)
             self._few = len(self._work) < LINKS_ONE_THREAD_BELOW

@@ -42,7 +42,7 @@ class Work:
 
     Args:
         particle: (m,) the user's indices, ascending.
-        count: of all particles.
+        mass: (n,) of all particles, kg.
         dtype: of their positions.
 
     Attributes:
@@ -50,12 +50,14 @@ class Work:
         start: (m, 2) where each was at the start of this substep, m, and the way `back` to a substep before that.
         predicted: (m, 2) where the integrator, and then its pin, had put it, and how far links have moved it by now, its `shift`.
         weight: (m,) inverse mass, as the rows feel it, 1/kg.
+        pinned: (m,) bool, whose mass is infinite.
         assembly: (m,) row in here of the first of those each hangs together with by links, once that is `assembled`.
     """
 
-    def __init__(self, particle: Array, count: int, dtype: np.dtype[Any]) -> None:
+    def __init__(self, particle: Array, mass: Array, dtype: np.dtype[Any]) -> None:
         self.particle = particle
-        self.compact = np.zeros(count, np.int64)
+        self.pinned = np.isinf(mass[particle])
+        self.compact = np.zeros(len(mass), np.int64)
         self.compact[particle] = np.arange(len(particle))
         rows = -(-len(particle) // LANES) * LANES
         self.start, self.back, self.predicted, self.shift = np.zeros((4, rows, 2), dtype)
@@ -71,6 +73,10 @@ class Work:
 
     def __len__(self) -> int:
         return len(self.particle)
+
+    def good(self, state: State) -> bool:
+        """Whether all is as it was when this was made, but for links: how many there are, and who is pinned."""
+        return len(self.compact) == len(state) and not links.pins_differ(state.mass, self.particle, self.pinned)
 
     def assemble(self, joined: Array) -> None:
         """Note who hangs together. joined: (k, 2) the user's indices of those that links join."""
