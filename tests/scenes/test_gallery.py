@@ -29,7 +29,6 @@ def test_a_wide_cloth_hangs_from_its_pegs() -> None:
         world.step(1 / 60)
         broken += len(world.links.broken)
     assert broken == 0
-    assert np.isinf(world.mass).sum() >= 8_000**0.5 / 6
 
 
 @pytest.mark.slow  # the test of the pegs alone has more of them

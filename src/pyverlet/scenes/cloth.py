@@ -59,7 +59,7 @@ def build(settings: Settings) -> World:
         world, (-width / 2, height), width=width, height=height, columns=columns, rows=rows, mass=mass, radius=0.4 * SPACING,
         slack=SLACK, shear=SHEAR * mass, breaking_force=STRENGTH * mass / columns * 9.81,
     )  # fmt: skip
-    pegs = max(PEGS, -((1 - columns) // SPAN) + 1)
+    pegs = max(PEGS, 1 - (1 - columns) // SPAN)
     cloth.group.pin(np.unique(np.linspace(0, columns - 1, pegs).astype(int)))
     loose = settings.particles - columns * rows
     if loose:
