@@ -225,17 +225,16 @@ def _ask(k, here, too, out_x, out_y, lam, row, more, room):
     go, and those that the others stretch begin. Which lanes' are off by so much that they are to be solved again.
     """
     real = row.dtype.type
-    zero, one, active = spread(real(0)), spread(real(1)), load(room, too + _ACTIVE)
+    zero, one, active, right = spread(real(0)), spread(real(1)), load(room, too + _ACTIVE), load(room, too + _RIGHT)
     rope = where_above(load(row, here + GIVE), zero, load(more, EXTRA * k + ROPE), zero)
     out = load(room, too + _NX) * out_x + load(room, too + _NY) * out_y
     ends = active * rope * where_above(lam, zero, one, zero)
-    begins = (one - active) * rope * where_above(out, load(room, too + _RIGHT), one, zero)
+    begins = (one - active) * rope * where_above(out, right, one, zero)
     active = active + begins - ends
     store(room, too + _ACTIVE, active)
     store(more, EXTRA * k + HELD, active)
     pushed = ends * lam * (load(row, here + W) + load(row, here + LANES * ROW + W))
-    stretched = begins * (out - load(room, too + _RIGHT))
-    return which_above(larger(pushed, stretched), spread(real(LINK_SLIGHT)) * load(row, here + REST))
+    return which_above(larger(pushed, begins * (out - right)), spread(real(LINK_SLIGHT)) * load(row, here + REST))
 
 
 @kernel
