@@ -20,10 +20,8 @@ def stored(world: World, h: float) -> tuple[float, float]:
     for pool in world.links._kept:
         energy, soft = pool.energies(place, world._state.seam), np.isfinite(pool.rows["stiffness"])
         stiffness = np.where(soft, pool.rows["stiffness"], 0.0)
-        if len(energy):
-            moved = weight[pool.entries["particle"]] * (pool.gradients(place, world._state.seam) ** 2).sum(axis=1)
-            part = 1.0 / np.maximum(stiffness * np.add.reduceat(moved, pool.first[:-1]) * h * h, 1.0)
-            energy, stiffness = energy * part, stiffness * part
+        part = 1.0 / np.maximum(stiffness * pool.mobility(place, weight, world._state.seam) * h * h, 1.0)
+        energy, stiffness = energy * part, stiffness * part
         held, stiff = held + float(energy.sum()), stiff + float(stiffness.sum())
     return held, stiff
 

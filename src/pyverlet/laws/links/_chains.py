@@ -12,7 +12,7 @@ from pyverlet.compile.stealing import Claims
 from pyverlet.ground.constants import LINK_COLOURS, LINKS_ONE_THREAD_BELOW
 from pyverlet.kernels import chain_rows, chains, runs
 from pyverlet.laws.links._link import Array
-from pyverlet.laws.links._pool import MOVING, Pool, held, unit
+from pyverlet.laws.links._pool import MOVING, Pool, held
 from pyverlet.laws.links._work import Work
 from pyverlet.state.seam import Seam
 
@@ -117,17 +117,9 @@ class ChainPool(Pool):
         return self._energy(position, seam, self.entries["particle"].reshape(-1, 2), self.rows["intact"])
 
     def energies(self, position: Array, seam: Seam) -> Array:
-        rows, length = self.rows, np.hypot(*self._ways(position, seam).T)
-        return held(rows["stiffness"], rows["upper"], rows["intact"], length - rows["rest"])
-
-    def gradients(self, position: Array, seam: Seam) -> Array:
-        along = unit(self._ways(position, seam))
-        return np.stack((-along, along), axis=1).reshape(-1, 2)
-
-    def _ways(self, position: Array, seam: Seam) -> Array:
-        """(k, 2) m, from the first end of each to the second."""
-        ends = self.entries["particle"].reshape(-1, 2)
-        return seam.nearest(position[ends[:, 1]].astype(float) - position[ends[:, 0]])
+        rows, ends = self.rows, self.entries["particle"].reshape(-1, 2)
+        way = position[ends[:, 1]].astype(float) - position[ends[:, 0]]
+        return held(rows["stiffness"], rows["upper"], rows["intact"], np.hypot(*seam.nearest(way).T) - rows["rest"])
 
     def share_gain(self, before: Array, now: Array, seam: Seam, mass: Array, share: Array) -> None:
         ends, (rest, upper, stiffness) = self.entries["particle"].reshape(-1, 2), (self.rows[name] for name in ABOUT)

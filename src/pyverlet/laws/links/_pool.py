@@ -105,9 +105,9 @@ class Pool(ABC):
             whose = particle[np.minimum.reduceat(entry, self.first[:-1]) % len(particle)]
             share += np.bincount(whose, self.energies(now, seam) - self.energies(before, seam), len(share))
 
-    @abstractmethod
-    def gradients(self, position: Array, seam: Seam) -> Array:
-        """(entries, 2) how what each row measures changes with the place of each of its particles."""
+    def mobility(self, position: Array, inverse_mass: Array, seam: Seam) -> Array:
+        """(k,) sum of w |grad C|^2 over the particles of each row, C being what it measures; gradients of distances are 1."""
+        return np.asarray(np.add.reduceat(inverse_mass[self.entries["particle"]], self.first[:-1]))
 
     @abstractmethod
     def stored(self, position: Array, seam: Seam) -> float:
@@ -118,9 +118,3 @@ def held(stiffness: Array, upper: Array | float, intact: Array, value: Array) ->
     """(k,) energy of rows, J: none of the rigid, of the broken, nor of slack ropes."""
     pulled = np.isfinite(stiffness) & (intact != 0) & ~((upper <= 0.0) & (value < 0.0))
     return 0.5 * np.where(pulled, stiffness, 0.0) * value * value
-
-
-def unit(way: Array) -> Array:
-    """(k, 2) the directions of ways (k, 2), along x where there is none."""
-    length = np.hypot(*way.T)[:, None]
-    return np.asarray(np.divide(way, length, out=np.tile((1.0, 0.0), (len(way), 1)), where=length > 0))

@@ -87,8 +87,10 @@ class RowPool(Pool):
         rows, (value, _) = self.rows, self._measured(position, seam)
         return held(rows["stiffness"], rows["upper"], rows["intact"], value)
 
-    def gradients(self, position: Array, seam: Seam) -> Array:
-        return self._measured(position, seam)[1]
+    def mobility(self, position: Array, inverse_mass: Array, seam: Seam) -> Array:
+        _, gradient = self._measured(position, seam)
+        moved = inverse_mass[self.entries["particle"]] * (gradient**2).sum(axis=1)
+        return np.asarray(np.add.reduceat(moved, self.first[:-1]))
 
     def _measured(self, position: Array, seam: Seam) -> tuple[Array, Array]:
         return _measured(self.first, self.rows["kind"], self.rows["rest"], position[self.entries["particle"]], seam)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pyverlet.ground import checks
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import Array, Floats, Link, several, stiffness_of
-from pyverlet.laws.links._pool import Pool, held, unit
+from pyverlet.laws.links._pool import Pool, held
 from pyverlet.laws.links._work import Work
 from pyverlet.state.seam import Seam
 
@@ -122,9 +122,6 @@ class PinPool(Pool):
 
     def energies(self, position: Array, seam: Seam) -> Array:
         return self._energies(position, self.entries["particle"], self.rows["intact"], seam)
-
-    def gradients(self, position: Array, seam: Seam) -> Array:
-        return unit(seam.nearest(position[self.entries["particle"]].astype(float) - self.rows["point"]))
 
     def _energies(self, position: Array, particle: Array, intact: Array, seam: Seam) -> Array:
         away = np.hypot(*seam.nearest(position[particle].astype(float) - self.rows["point"]).T)
