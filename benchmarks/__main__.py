@@ -52,7 +52,7 @@ class Row:
 def settled_heap(particles: int) -> tuple[Array, float, float]:
     """Positions of a settled cage, its radius, and the seconds spent on compiling."""
     world = pv.scenes.get("cage").world(particles=particles)
-    compile_s = pv.warm_up(world)
+    compile_s = pv.warm_up(world, settings=False)
     world.run(seconds=SETTLE_SECONDS, dt=DT)
     extent = world.boundary.extent()
     assert extent is not None

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 import pyverlet as pv
 from pyverlet.compile.lanes import LANES
 from pyverlet.ground.constants import DEEP, DEEP_PART, DEEP_SWEEPS, FED, GRIP, LARGEST_PUSH, PUSHED
+from pyverlet.kernels import frame
 from pyverlet.kernels.bounds import impact_time
 from pyverlet.kernels.tables import Law
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast
@@ -301,11 +302,11 @@ def test_eight_at_once_are_one_by_one(seed: int, n: int, spread: float, dtype: A
         wide.set_up(slots, H, 0.5 * H, strongest, 4 * strongest * H, False, None)
     reference = OneByOne(other, wide, memory)
     wide.cut()
-    wide.push(slots)
+    wide.do(frame.TOUCHED, slots)
     reference.push()
     for name in ("position", "velocity", "spin"):
         assert getattr(slots, name).tobytes() == getattr(other, name).tobytes(), name
-    wide.relax(slots)
+    wide.do(frame.STILLED, slots)
     reference.relax()
     for name in ("velocity", "spin"):
         assert getattr(slots, name).tobytes() == getattr(other, name).tobytes(), name
@@ -323,7 +324,7 @@ def test_coincident_centres_part(dtype: Any) -> None:
     slots.velocity[:] = 0.0
     _, packs = packed(slots, Fast())
     packs.set_up(slots, H, 0.0, 0.0, 0.0, False, None)
-    packs.push(slots)
+    packs.do(frame.TOUCHED, slots)
     # LARGEST_PUSH of the contact distance at most is seen, PUSHED of it is taken.
     parted = np.hypot(*(slots.position[1] - slots.position[0]))
     assert parted == pytest.approx(PUSHED * LARGEST_PUSH, rel=1e-5)

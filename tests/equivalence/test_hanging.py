@@ -46,7 +46,7 @@ def test_clusters_are_those_of_the_pairs_that_touch(friction: float, *, pinned: 
         contacts = world._contacts
         assert contacts
         assert contacts.lending[0]
-        begin, lanes, lane_i, lane_j, normal = contacts._wide.touching()
+        begin, lanes, lane_i, lane_j, normal = contacts.wide.touching()
         k = np.concatenate([np.arange(a, a + count) for a, count in zip(begin, lanes, strict=False)])
         k = k[(normal[:, k] != 0).any(axis=0)]
         root, heads, sets = contacts.lending[1][1][:3]

@@ -181,7 +181,7 @@ def test_no_contact_is_missed_while_the_list_is_kept(spread: float) -> None:
     for _ in range(60):
         world.step(1 / 60)
         assert world._contacts is not None
-        listed = world._slots.particle[world._contacts._wide.pairs()]
+        listed = world._slots.particle[world._contacts.wide.pairs()]
         known = set(map(tuple, np.sort(listed, axis=1).tolist()))
         assert set(map(tuple, find_contacts(world._state, BruteForce()).tolist())) <= known
 

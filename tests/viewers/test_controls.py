@@ -276,7 +276,7 @@ def test_all_is_compiled_before_a_scene_is_shown(wait_until: WaitUntil, monkeypa
         progress(1, 2)  # as of a kernel that begins to compile
         ready.append((world, world.frames))
 
-    monkeypatch.setattr("pyverlet.viewers.session.warm_up", warm_up)
+    monkeypatch.setattr("pyverlet.viewers.session.warm_up_to_show", warm_up)
     with Session(plan.open(), repertoire=plan) as session:
         session.subscribe(lambda: seen.append(session.latest.status.busy))
         session.submit(Build("box", 20))

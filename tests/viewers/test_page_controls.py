@@ -154,7 +154,7 @@ def test_colours_say_what_they_say(page: Page, program: Serve, colouring: str) -
     page.emulate_media(color_scheme="dark")
     visit(page, program("box", 100).address)
     assert comes_true(page, lambda: number(page, "time") > 0.3)
-    pause(page)  # before the choice: the scale follows what was usual, far above what is when a busy machine pauses after the landing
+    pause(page)  # before the choice: the scale follows what was usual, and lags behind what is while the circles land
     page.get_by_test_id("colour").select_option(colouring)
     page.wait_for_timeout(500)
     inks = np.array(page.evaluate("() => Array.from({length: 100}, (_, i) => window.pyverlet.ink(i))"))

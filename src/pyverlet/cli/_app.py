@@ -253,7 +253,7 @@ def bench(
 def compile_kernels(world: World) -> float:
     """The seconds its kernels took to compile or load."""
     with Progress("compiling kernels, once") as progress:
-        return warm_up(world, progress)
+        return warm_up(world, progress, settings=False)
 
 
 def _measure(

@@ -66,7 +66,10 @@ OPEN, SMOOTH_CAGE, CAGE, FOUR_WALLS = range(4)
 
 INTEGRATED, TOUCHED, JOINED, STILLED, PULLED = range(5)
 LOOKS = 5
-"""At the energy in a substep: where a ledger looks."""
+"""At the energy in a substep: where a ledger looks. What leads there from the one before is a part of a substep."""
+
+WHOLE = -1
+"""All parts of it, in place of one of the numbers above."""
 
 SERVED = LINKED = CALLS = False
 """Whether there may be more in a world than circles, a room and gravity: `Services`; links; functions of the user's own."""
@@ -109,12 +112,14 @@ class Room(NamedTuple):
 
 class Start(NamedTuple):
     """Where a call begins. looks, sets_out: as for `push`, in the first substep. opens: 1 if that is yet to be integrated.
+    part: `WHOLE`, or the part of a substep that is all there is to do: what contacts do in it, not links, walls and obstacles.
     gx, gy: gravity, m/s^2.
     """
 
     looks: Any
     sets_out: Any
     opens: Any
+    part: Any
     gx: Any
     gy: Any
 
@@ -204,16 +209,6 @@ def _look_at_energy(energies, substep, when, circles, mass, lag, down, spent, cl
         note(spent, LEDGER, clock[0], clock[1])
 
 
-def _project(circles, pairs, law, cut, looks, sets_out, claims):
-    """The first sweep over the pairs, called from Python, which has plain tuples."""
-    push(Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Law(*law), cut, looks, sets_out, claims)
-
-
-def _still(circles, pairs, law, cut, marks, claims):
-    """The second one."""
-    relax(Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Law(*law), cut, marks, claims)
-
-
 def _substeps(
     substep, stop, last, circles, pairs, law, room, services, function, cut, start, checked, far, claims, spent, clock
 ):  # fmt: skip
@@ -228,7 +223,7 @@ def _substeps(
     """
     circles, pairs, law = Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Law(*law)
     room, start, strongest, begins = Room(*room), Start(*start), law.h - law.h, law.rubs != 0
-    first, looks, sets_out = substep, start.looks, start.sets_out
+    first, looks, sets_out, part, whole = substep, start.looks, start.sets_out, start.part, start.part == WHOLE
     if SERVED:
         services = Services(*services)
         kind, vector, number, force, period_x, period_y = services.forces
@@ -269,29 +264,31 @@ def _substeps(
                 return substep, True, strongest
             if SERVED:
                 _look_at_energy(energies, substep, INTEGRATED, circles, mass, lag, down, spent, clock)
+        if whole or part == TOUCHED:
             if SERVED and lends:
                 lend(circles, pairs, loans, terms, cut, law.rubs != 0)
                 looks = 1  # with the inertia of the moment others overlap deeply
-        if LINKED and circles.calm.shape[0] > 0:
-            note_calm(linked, circles.calm, 1 if lends else 0)
-        push(circles, pairs, law, cut, looks, sets_out, claims)
-        if SERVED and lends:
-            settle(circles, pairs, loans, hanging, terms, cut, claims)
-        note(spent, CONTACTS, clock[0], clock[1])
-        if LINKED:
-            _look_at_energy(energies, substep, TOUCHED, circles, mass, lag, down, spent, clock)
-            if lends:
+            if LINKED and circles.calm.shape[0] > 0:
+                note_calm(linked, circles.calm, 1 if lends else 0)
+            push(circles, pairs, law, cut, looks, sets_out, claims)
+            if SERVED and lends:
+                settle(circles, pairs, loans, hanging, terms, cut, claims)
+            if LINKED and lends:
                 tell_weights(linked.slot, linked.weight, loans.lighter)
+            note(spent, CONTACTS, clock[0], clock[1])
+        if LINKED and whole:
+            _look_at_energy(energies, substep, TOUCHED, circles, mass, lag, down, spent, clock)
             solve(linked, rows, linking, circles.position, circles.velocity)
             note(spent, LINKS, clock[0], clock[1])
             _look_at_energy(energies, substep, JOINED, circles, mass, lag, down, spent, clock)
             lay_down(linked, linking, circles.velocity)
-            if lends:
-                note_unpushed(circles, loans)
             note(spent, LINKS, clock[0], clock[1])
-        confine(room, circles, law, claims)
-        note(spent, BOUNDS, clock[0], clock[1])
-        if SERVED and segments.shape[0] > 0:
+        if LINKED and lends and (whole or part == JOINED):
+            note_unpushed(circles, loans)
+        if whole:
+            confine(room, circles, law, claims)
+            note(spent, BOUNDS, clock[0], clock[1])
+        if SERVED and segments.shape[0] > 0 and whole:
             until = substep * services.h + services.h
             collide(
                 segments, bodies, until, *cells, walls, along, rest, circles.position, circles.velocity, circles.acceleration,
@@ -300,22 +297,24 @@ def _substeps(
                 law.lag, law.rest_speed, drop,
             )  # fmt: skip
             note(spent, OBSTACLES, clock[0], clock[1])
-        if LINKED and lends:
-            join_linked(circles, pairs, loans, hanging, linked.slot, linked.assembly, linked.tied, linked.tie_intact)
-        elif SERVED and lends:
-            join(circles, pairs, loans, hanging)
-        relax(circles, pairs, law, cut, 1 if substep == last else 0, claims)
-        if LINKED:
-            pick_up(linked, circles.velocity)
-        if SERVED and lends:
-            even_up(circles, loans, hanging.group if LINKED else hanging.root, law.rubs)
-        note(spent, VELOCITIES, clock[0], clock[1])
-        if SERVED:
+        if whole or part == STILLED:
+            if LINKED and lends:
+                join_linked(circles, pairs, loans, hanging, linked.slot, linked.assembly, linked.tied, linked.tie_intact)
+            elif SERVED and lends:
+                join(circles, pairs, loans, hanging)
+            relax(circles, pairs, law, cut, 1 if substep == last else 0, claims)
+            if LINKED:
+                pick_up(linked, circles.velocity)
+            if SERVED and lends:
+                even_up(circles, loans, hanging.group if LINKED else hanging.root, law.rubs)
+            note(spent, VELOCITIES, clock[0], clock[1])
+        if SERVED and whole:
             _look_at_energy(energies, substep, STILLED, circles, mass, lag, down, spent, clock)
-        if LINKED:
+        if LINKED and whole:
             note_pull(linked, linking, circles.acceleration)
-            if lends:
-                balance_pull(circles, loans, hanging.group, linked.slot, linked.shift, 1.0 / services.h)
+        if LINKED and lends and (whole or part == PULLED):
+            balance_pull(circles, loans, hanging.group, linked.slot, linked.shift, 1.0 / services.h)
+        if LINKED and whole:
             note(spent, LINKS, clock[0], clock[1])
             _look_at_energy(energies, substep, PULLED, circles, mass, lag, down, spent, clock)
         substep += 1
@@ -329,8 +328,6 @@ def _substeps(
             note(spent, LINKS, clock[0], clock[1])
 
 
-project = for_each_kind(driver, _project, push=push)
-still = for_each_kind(driver, _still, relax=relax)
 frames = {
     beside: for_each_kind(driver, variant(_substeps, beside, **constants), push=push, relax=relax)
     for beside, constants in BESIDE.items()

@@ -10,14 +10,13 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from pyverlet.compile.bundle import borrowed, bundle
+from pyverlet.compile.bundle import bundle
 from pyverlet.compile.jit import driver, kernel, parallel_kernel, prange
 from pyverlet.compile.lanes import LANES, pick, store
-from pyverlet.kernels.balance import balance, balance_pull, note_pins, note_walls, tell
+from pyverlet.kernels.balance import balance, note_pins, note_walls, tell
 from pyverlet.kernels.hanging import follow, join_links
 from pyverlet.kernels.loans import CHUNK, begin, share, take_up
 from pyverlet.kernels.packs import share_out
-from pyverlet.kernels.tables import Circles, Pairs
 
 
 @bundle
@@ -144,60 +143,3 @@ def join_linked(circles, pairs, lending, hanging, slot, assembly, tied, intact):
 def even_up(circles, lending, root, rubs):
     """The substep is done: give those who have met with borrowed inertia what their momentum lacks. root: what was told."""
     balance(circles, lending, root, rubs != 0)
-
-
-# ---- called from Python, which has plain tuples ------------------------------------------------------------------------------
-
-
-@driver
-def call_lend(circles, pairs, lending, terms, cut, rubs):
-    """`lend`."""
-    lend(Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Lending(*borrowed(lending)), Terms(*terms), cut, rubs != 0)
-
-
-@driver
-def call_settle(circles, pairs, lending, hanging, terms, cut, claims):
-    """`settle`."""
-    settle(
-        Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Lending(*borrowed(lending)), Hanging(*borrowed(hanging)),
-        Terms(*terms), cut, claims,
-    )  # fmt: skip
-
-
-@driver
-def call_tell_weights(slot, weight, lending):
-    """`tell_weights`."""
-    tell_weights(slot, weight, Lending(*borrowed(lending)).lighter)
-
-
-@driver
-def call_note_unpushed(circles, lending):
-    """`note_unpushed`."""
-    note_unpushed(Circles(*borrowed(circles)), Lending(*borrowed(lending)))
-
-
-@driver
-def call_join(circles, pairs, lending, hanging):
-    """`join`."""
-    join(Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Lending(*borrowed(lending)), Hanging(*borrowed(hanging)))
-
-
-@driver
-def call_join_linked(circles, pairs, lending, hanging, slot, assembly, tied, intact):
-    """`join_linked`."""
-    join_linked(
-        Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Lending(*borrowed(lending)), Hanging(*borrowed(hanging)), slot,
-        assembly, tied, intact,
-    )  # fmt: skip
-
-
-@driver
-def call_even_up(circles, lending, root, rubs):
-    """`even_up`."""
-    even_up(Circles(*borrowed(circles)), Lending(*borrowed(lending)), root, rubs)
-
-
-@driver
-def call_balance_pull(circles, lending, root, slot, shift, rate):
-    """`balance_pull`."""
-    balance_pull(Circles(*borrowed(circles)), Lending(*borrowed(lending)), root, slot, shift, rate)

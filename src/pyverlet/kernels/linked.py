@@ -155,12 +155,6 @@ def call_look(linked, _, linking, position, velocity, inverse_mass):
 
 
 @driver
-def call_note_calm(linked, calm, keep):
-    """`note_calm`."""
-    note_calm(Linked(*linked), calm, keep)
-
-
-@driver
 def call_solve(linked, rows, linking, position, velocity):
     """`solve`."""
     solve(Linked(*linked), Rows(*rows), Linking(*linking), position, velocity)
@@ -170,12 +164,6 @@ def call_solve(linked, rows, linking, position, velocity):
 def call_lay_down(linked, _, linking, velocity):
     """`lay_down`."""
     lay_down(Linked(*linked), Linking(*linking), velocity)
-
-
-@driver
-def call_pick_up(linked, velocity):
-    """`pick_up`."""
-    pick_up(Linked(*linked), velocity)
 
 
 @driver

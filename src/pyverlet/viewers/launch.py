@@ -189,11 +189,11 @@ def _why_not(error: OSError, host: str, port: int) -> str:
 
 def compile_for(exhibit: Exhibit) -> None:
     """All that its worlds need."""
-    from pyverlet import warm_up
+    from pyverlet.world.warmup import warm_up_to_show
 
     with Progress("compiling kernels, once") as progress:
         for each in exhibit.panels.worlds:
-            warm_up(each, progress)
+            warm_up_to_show(each, progress)
 
 
 def address(host: str, listener: socket.socket) -> str:

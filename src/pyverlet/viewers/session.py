@@ -31,7 +31,7 @@ from pyverlet.viewers.rhythm import PICTURE_S, Rhythm
 from pyverlet.viewers.stage import Stage
 from pyverlet.world.clock import Clock, FrameBudget
 from pyverlet.world.moments import Moment
-from pyverlet.world.warmup import warm_up
+from pyverlet.world.warmup import warm_up_to_show
 
 if TYPE_CHECKING:
     from pyverlet.world.panels import Panels
@@ -255,7 +255,7 @@ class Session(Door):
         try:
             exhibit = self._repertoire.build(name, particles, self._on_the_way(name))
             for world in exhibit.panels.worlds:  # what is left to compile would stop a frame later, unsaid
-                warm_up(world, lambda *_: self._say_busy(f"compiling what {name} needs, once"))
+                warm_up_to_show(world, lambda *_: self._say_busy(f"compiling what {name} needs, once"))
             self._enter(exhibit)
         except _Stopped:
             return

@@ -30,6 +30,12 @@ _ROOMS = (Open, Circle, Box, Periodic)
 
 def rehearse(world: World) -> None:
     """What this world needs: frames of a small one of the same kind, its forces, and sleep."""
+    if world.collisions:  # stage by stage, as beside pegs or moving obstacles; lists come last, for helpers begin with them
+        law = {"restitution": world.collisions.restitution, "friction": world.collisions.friction}
+        staged = _small(world.dtype, world.threads, Open, **law)
+        _make_alike(staged, world)
+        _obstruct(staged, world)
+        staged.step(1e-3)
     small = _lattice(
         max(
             _enough(world.threads),
@@ -46,8 +52,7 @@ def rehearse(world: World) -> None:
     small.integrator, small.substeps = world.integrator, 2  # the second leans on the first
     if world.links:
         _link(small, {type(link) for link in world.links})
-    if world.obstacles:
-        small.obstacles.append(Segment((0, 0), (1, 0), restitution=max(each.restitution for each in world.obstacles)))
+    if _obstruct(small, world):
         small.is_free((0, 0))
     known = Slots(world.dtype)
     for force in _ours(world):
@@ -55,12 +60,6 @@ def rehearse(world: World) -> None:
             small.forces.append(force)
     _make_alike(small, world)
     _use(small)
-    if world.collisions:  # stage by stage, as beside pegs or moving obstacles
-        law = {"restitution": world.collisions.restitution, "friction": world.collisions.friction}
-        staged = _small(world.dtype, world.threads, Open, **law)
-        _make_alike(staged, world)
-        staged.obstacles.extend(small.obstacles)
-        staged.step(1e-3)
     if len(world) >= FUSED_FROM:
         _fuse(world)
     if len(world) and type(world.boundary) not in _ROOMS:  # one circle in the world's own room, which has kernels of its own
@@ -80,6 +79,13 @@ def _make_alike(small: World, world: World) -> None:
         small.mass[-1] = np.inf
     if len(world):
         small.restitution[0], small.friction[0] = world.restitution.max(), world.friction.max()
+
+
+def _obstruct(small: World, world: World) -> bool:
+    """An obstacle, if there are any: as elastic as the most elastic."""
+    if world.obstacles:
+        small.obstacles.append(Segment((0, 0), (1, 0), restitution=max(each.restitution for each in world.obstacles)))
+    return len(small.obstacles) > 0
 
 
 def _fuse(world: World) -> None:
@@ -140,12 +146,16 @@ def _use(world: World) -> None:
     world.step(1e-3)
     world.step(1e-3)  # by now somebody has moved far enough for a closer look at the list of pairs
     if world._contacts:
-        watch = Watch(world._state, world._force_sum, world.links, world.boundary, world._course, 1e-3)
-        watch.take_back(world._slots, world._contacts.listed(), 0.0)
+        _take_back(world, world._slots, world._contacts.listed())
     _lean(world)
     world.energy()
     world.momentum()
     world.overlap()
+
+
+def _take_back(world: World, slots: Slots, listed: tuple[Any, ...]) -> None:
+    """Contacts have brought energy."""
+    Watch(world._state, world._force_sum, world.links, world.boundary, world._course, 1e-3).take_back(slots, listed, 0.0)
 
 
 def _lean(world: World) -> None:
@@ -183,16 +193,18 @@ def _small(dtype: np.dtype[Any], threads: int, boundary: type[Boundary], elastic
     return _lattice(_enough(threads), dtype, boundary, elastic, how, threads=threads)
 
 
-def _pairs(dtype: np.dtype[Any], threads: int) -> None:
-    """Grids and lists: made, found too old once somebody has moved, and made anew."""
+def _lists(dtype: np.dtype[Any], threads: int) -> None:
+    """Grids and lists: made, found too old once somebody has moved, and made anew; and what is taken back by them."""
     world = _lattice(_enough(threads), dtype, Open, 0.0, None, threads=threads)
     jit.use_threads(world.threads)
     world.overlap()
     slots, phase = Slots(dtype), Fast().start(dtype)
     slots.gather(world._state)
+    slots.h = 1e-3
     for _ in range(2):
         phase.update(slots)
         slots.position[-1] += 10.0
+    _take_back(world, slots, phase.list.listed())
 
 
 def _cages(dtype: np.dtype[Any], threads: int) -> None:
@@ -204,21 +216,26 @@ def _cages(dtype: np.dtype[Any], threads: int) -> None:
 
 
 def _boxes(dtype: np.dtype[Any], threads: int) -> None:
-    """Circles in a box."""
-    _small(dtype, threads, Box, 0.5).step(1e-3)
+    """Circles that bounce, in a box."""
+    _small(dtype, threads, Box, 0.5, restitution=0.5).step(1e-3)
 
 
-def _loans(dtype: np.dtype[Any], threads: int) -> None:
-    """Circles of very different masses that bounce and rub."""
-    _uneven(dtype, threads, restitution=0.5, friction=0.5)
+def _uneven(dtype: np.dtype[Any], threads: int) -> None:
+    """Circles of very different masses."""
+    _lend(dtype, threads)
 
 
-def _refined(dtype: np.dtype[Any], threads: int) -> None:
-    """Circles of very different masses that do not."""
-    _uneven(dtype, threads)
+def _uneven_rough(dtype: np.dtype[Any], threads: int) -> None:
+    """The same, that rub."""
+    _lend(dtype, threads, friction=0.5)
 
 
-def _uneven(dtype: np.dtype[Any], threads: int, **collisions: float) -> None:
+def _uneven_bouncing(dtype: np.dtype[Any], threads: int) -> None:
+    """The same, that bounce."""
+    _lend(dtype, threads, restitution=0.5)
+
+
+def _lend(dtype: np.dtype[Any], threads: int, **collisions: float) -> None:
     world = _small(dtype, threads, Open, **collisions)
     world.mass[0] *= 2 * UNEVEN
     world.step(1e-3)
@@ -233,6 +250,6 @@ def _motion(dtype: np.dtype[Any], threads: int) -> None:
 
 
 PARTS: dict[str, Callable[[np.dtype[Any], int], None]] = {
-    part.__name__: part for part in (_cages, _pairs, _loans, _boxes, _refined, _motion)
+    part.__name__: part for part in (_lists, _motion, _cages, _uneven_rough, _boxes, _uneven, _uneven_bouncing)
 }
-"""Each compiles a part of what circles of a dtype on so many threads may need. Those first that take longest."""
+"""Each compiles a part of what circles of a dtype on so many threads may need. First what each world needs."""

@@ -31,6 +31,15 @@ _KEPT = 8
 """Strips whose normals a thread keeps at a time: those between the first stage and the last, and one more, in pairs."""
 
 
+_OF_LENT_AND_LINKED = frame.JOINED, frame.PULLED
+"""Parts in which contacts have nothing to do but for linked circles that borrow inertia."""
+
+
+def _linked(world: Any) -> str:
+    """Which kernels go through a world with links."""
+    return "few_linked" if world.links.stand_back else "linked"
+
+
 class Substeps:
     """The substeps of one frame of a world after another.
 
@@ -101,15 +110,17 @@ class Substeps:
         rows, native = known if leaps and known else ((), None)
         beside = "served" * bool(course or books or lends or rows or native)
         if links:
-            beside = "few_linked" if world.links.stand_back else "linked"
+            beside = _linked(world)
         if native:
             beside += "_called"
         if smooth and not (beside or wide.asks) and len(state) >= FUSED_FROM and strips.in_order:
             self._strip_by_strip(world, contacts, wide, strips, shape, leaps=leaps, opens=opens)
             return True
-        services: Any = self._services(world, books, rows, links, loans, h, lag) if beside else ()
+        services: Any = ()
+        if beside:
+            services = self._services(world, books, rows, course.compiled(state, room), links, loans, h, lag)
         stop, sets_out = world.substeps if leaps else substep + 1, not opens and (lends or out is not wide.moved)
-        begin = (wide.takes_looks(), int(sets_out), int(opens), *state.reals(*forces.gravity))
+        begin = (wide.takes_looks(), int(sets_out), int(opens), frame.WHOLE, *state.reals(*forces.gravity))
         reached, self.leapt, strongest = frame.frames[beside][wide.kind](
             substep, stop, last, wide.circles, wide.arrays, wide.law, (walls, *state.reals(*shape)), tuple(services),
             native or (), wide.cut(), begin, strips.checked, state.real(strips.allowed * strips.allowed),
@@ -128,7 +139,47 @@ class Substeps:
         self.substep = int(reached)
         return True
 
-    def _services(self, world: Any, books: Any, rows: Any, links: Any, loans: Any, h: float, lag: float) -> frame.Services:
+    # ---- stage by stage ------------------------------------------------------------------------------------------------------
+
+    def touch(self, world: Any, contacts: ContactSolver, h: float, lag: float) -> None:
+        """Impacts bounce, other overlapping circles are moved apart and grip each other."""
+        contacts.pegs.before(world._slots, h)
+        contacts.set_up(world._slots, h, lag, world._force_sum.strongest, world.links or None)
+        self._do(frame.TOUCHED, world, contacts, h, lag)
+
+    def solve(self, world: Any, contacts: ContactSolver | None, h: float, lag: float, done: Callable[[str], None]) -> None:
+        """Links move their circles; after that it is walls that change velocities."""
+        world.links.solve(world._slots, h)
+        done("links")
+        if contacts:
+            world.links.lay_down(world._slots, h)
+            self._do(frame.JOINED, world, contacts, h, lag)
+
+    def still(self, world: Any, contacts: ContactSolver, h: float, lag: float) -> None:
+        """Take from touching circles the velocity that `touch` has put in, rub them, and hold who is too large for a gap."""
+        self._do(frame.STILLED, world, contacts, h, lag)
+        contacts.pegs.hold(world._slots)
+
+    def note_pull(self, world: Any, contacts: ContactSolver | None, h: float, lag: float) -> None:
+        """What links pulled with is part of accelerations, and momentum is to be kept by that, too."""
+        world.links.after(world._slots, h)
+        if contacts:
+            self._do(frame.PULLED, world, contacts, h, lag)
+
+    def _do(self, part: int, world: Any, contacts: ContactSolver, h: float, lag: float) -> None:
+        """What contacts do in one part of a substep, as `kernels.frame` names them."""
+        lends, loans = contacts.lending
+        if part in _OF_LENT_AND_LINKED and not lends:
+            return
+        state, links = world._slots, world.links.compiled(world._slots, h) if world.links else ()
+        services: Any = ()
+        if beside := _linked(world) if links else "served" * lends:
+            services = tuple(self._services(world, None, (), world._course.nothing(state), links, loans, h, lag))
+        contacts.wide.do(part, state, beside, services)
+
+    def _services(
+        self, world: Any, books: Any, rows: Any, course: Any, links: Any, loans: Any, h: float, lag: float
+    ) -> frame.Services:
         """What the world has beside circles, a room and gravity: `rows` of forces, obstacles, `books`, links, loans."""
         state, gravity = world._slots, world._force_sum.gravity
         if self._rows != (rows, state.dtype):
@@ -141,7 +192,7 @@ class Substeps:
         ahead = world.integrator.velocity_lag * h if world._force_sum.velocity_dependent else 0.0
         return frame.Services(
             h, lag, gravity, (*self._table, state.force, *state.reals(*state.seam.period)),
-            state.real(ahead), world._course.compiled(state, world.boundary), state.mass,
+            state.real(ahead), course, state.mass,
             np.empty((world.substeps if books else 0, frame.LOOKS)), links, loans, world.time,
         )  # fmt: skip
 

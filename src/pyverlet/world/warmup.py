@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import os
 import subprocess
@@ -9,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,8 @@ import numpy as np
 
 from pyverlet.compile import jit
 from pyverlet.ground.file_lock import PATIENCE_S
+from pyverlet.kernels import frame
+from pyverlet.kernels.kinds import BOUNCING, HEARD, ROUGH, SMOOTH
 from pyverlet.world.rehearsals import PARTS, rehearse
 from pyverlet.world.world import World
 
@@ -28,28 +32,48 @@ OF_CIRCLES = (
 MOST_HELPERS = 3
 """Processes that help to compile: beyond that the longest part is what takes the time."""
 
+OTHER_KINDS = (HEARD, BOUNCING, ROUGH, *(f"{beside}_{SMOOTH}" for beside in frame.BESIDE if beside))
+"""How the names of kernels end that a plain world of smooth circles does not need, nor its like of another kind."""
+
 Progress = Callable[[int, int], None]
 
 
-def warm_up(world: World, progress: Progress | None = None) -> float:
+class Rest(Enum):
+    """When to compile what a world needs only once settings are changed."""
+
+    NOW, LATER, NEVER = range(3)
+
+
+def warm_up(world: World, progress: Progress | None = None, *, settings: bool = True) -> float:
     """Compile or load every kernel this world may need, without touching it.
 
-    The first time on a machine all kernels that circles of the world's dtype need are compiled, so that nothing stalls when a
-    setting is changed later: for one thread, or for several if the world uses several, and on all cores. Those of links,
-    obstacles, the ledger and sleep are compiled when a world has them first. The compiled code is kept on disk, and later only
-    what is in use is loaded.
+    The first time on a machine that is done on all cores, for one thread, or for several if the world uses several. The compiled
+    code is kept on disk, and later only what is in use is loaded. What links, obstacles, a ledger, events and sleep need is
+    compiled for a world that has them.
 
     Args:
         world: the world about to be stepped.
         progress: called as progress(done, total) when a kernel begins to compile; not at all if none needs to.
+        settings: compile also what circles of its dtype need in other rooms, of other materials and masses, so that nothing
+            stalls when that is changed later: it takes twice as long.
 
     Returns:
         Seconds spent.
     """
+    return _warm_up(world, progress, Rest.NOW if settings else Rest.NEVER)
+
+
+def warm_up_to_show(world: World, progress: Progress | None = None) -> float:
+    """The same, without waiting for what settings need: other processes, which stand back for all others, go on with that.
+
+    They end with this one. Where none can be started, what is changed to compiles what it needs.
+    """
+    return _warm_up(world, progress, Rest.LATER)
+
+
+def _warm_up(world: World, progress: Progress | None, rest: Rest) -> float:
     start = time.perf_counter()
-    total = sum(name.split(".")[-2] in OF_CIRCLES for name in jit.KERNELS)
-    done = 0
-    helpers: list[_Helper] = []
+    total, done, helpers = _expected(rest), 0, list[_Helper]()
 
     def started() -> None:
         nonlocal done
@@ -59,12 +83,22 @@ def warm_up(world: World, progress: Progress | None = None) -> float:
 
     with jit.watch_compiling(started):
         if missing := _missing(world.dtype, world.threads):
-            with _helping(world.dtype, world.threads, len(missing)) as helpers:
-                _compile(world.dtype, world.threads, missing)
-        rehearse(world)
+            with _helping(world.dtype, world.threads, len(missing), stay=rest is Rest.LATER) as helping:
+                if rest is Rest.NOW:
+                    helpers = helping  # else most of what they compile is for later
+                    _compile(world.dtype, world.threads, missing)
+                rehearse(world)
+        else:
+            rehearse(world)
     if done and progress:
         progress(total, total)
     return time.perf_counter() - start
+
+
+def _expected(rest: Rest) -> int:
+    """About how many kernels are to be compiled: of circles, and if only one world's, of one kind without services."""
+    found = [name.rpartition(".") for name in jit.KERNELS if name.split(".")[-2] in OF_CIRCLES]
+    return sum(rest is Rest.NOW or not name.endswith(OTHER_KINDS) for _, _, name in found)
 
 
 # ---- the first time ----------------------------------------------------------------------------------------------------
@@ -117,6 +151,13 @@ def _remember(dtype: np.dtype[Any], threads: int, part: str) -> None:
 # ---- other processes -----------------------------------------------------------------------------------------------------
 
 
+_ASIDE = getattr(subprocess, "CREATE_NO_WINDOW", 0) | getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)
+"""On Windows, no window, and others have the cores first."""
+
+_STAND_BACK = 10
+"""The same elsewhere, as for `os.nice`."""
+
+
 class _Helper:
     """A process that compiles parts into the same folder, and ends with us. Whatever becomes of it, we compile the rest.
 
@@ -137,7 +178,7 @@ class _Helper:
         # Not multiprocessing: it would run the user's own script again. -P: nor take the user's files for modules.
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-c", code], env=env, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL, creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+            stderr=subprocess.DEVNULL, creationflags=_ASIDE,
         )  # fmt: skip
         self.done = 0
         self._reader = threading.Thread(target=self._count, daemon=True)
@@ -147,6 +188,11 @@ class _Helper:
         assert self._process.stdout is not None
         while self._process.stdout.read(1):
             self.done += 1
+
+    @property
+    def busy(self) -> bool:
+        """Whether it has not come to its end."""
+        return self._process.poll() is None
 
     def end(self) -> None:
         """Nothing is left to do."""
@@ -158,23 +204,38 @@ class _Helper:
                 pipe.close()
 
 
+_staying: list[_Helper] = []
+"""Helpers that go on when we do not wait for them any longer."""
+
+
+@atexit.register
+def _send_away() -> None:
+    while _staying:
+        _staying.pop().end()
+
+
 @contextlib.contextmanager
-def _helping(dtype: np.dtype[Any], threads: int, parts: int) -> Iterator[list[_Helper]]:
+def _helping(dtype: np.dtype[Any], threads: int, parts: int, *, stay: bool = False) -> Iterator[list[_Helper]]:
     """Helpers, as many as there are cores and parts for; none where they would not be Python, or could not hand anything over.
 
-    Only one process at a time has helpers: of many that start at once each would bring its own.
+    Only one process at a time has helpers: of many that start at once each would bring its own. stay: they go on afterwards, one
+    of them even if there is but one core.
     """
-    count = min(jit.max_threads() - 1, parts - 1, MOST_HELPERS)
-    helpers: list[_Helper] = []
+    count, helpers = min(jit.max_threads() - 1, parts - 1, MOST_HELPERS), list[_Helper]()
+    if stay:
+        count = 0 if any(helper.busy for helper in _staying) else max(count, 1)
     with jit.turn("helpers", 0.0) as mine:
         try:
             if mine and jit.cache_dir() and _python():
                 with contextlib.suppress(OSError):
                     helpers.extend(_Helper(dtype, threads) for _ in range(count))
             yield helpers
+            if stay:
+                _staying.extend(helpers)
         finally:
             for helper in helpers:
-                helper.end()
+                if helper not in _staying:
+                    helper.end()
 
 
 def _python() -> bool:
@@ -183,7 +244,9 @@ def _python() -> bool:
 
 
 def help_compiling(dtype: str, threads: int) -> None:
-    """What a helper does: compile parts, and write a byte whenever a kernel begins to."""
+    """What a helper does: compile parts, and write a byte whenever a kernel begins to. Whoever else wants a core has it first."""
+    if hasattr(os, "nice"):
+        os.nice(_STAND_BACK)
 
     def end_with_parent() -> None:
         sys.stdin.buffer.read()

@@ -147,20 +147,20 @@ class World(Measures, Queries, Doors):
                 done("broad phase")
                 if compiled and run.go(self, contacts, h, lag):
                     continue
-                contacts.project(state, h, lag, forces.strongest, links)
+                run.touch(self, contacts, h, lag)
                 done("contacts")
             if links:
-                self._solve(links, contacts, h, done)
+                run.solve(self, contacts, h, lag, done)
             self.boundary.confine(state, h, lag, REST_ACCELERATIONS * forces.strongest * h)
             done("bounds")
             if course:
                 course.collide(state, self.boundary, run.substep * h, h, lag, REST_ACCELERATIONS * forces.strongest * h)
                 done("obstacles")
             if contacts:
-                contacts.still(state, h, links)
+                run.still(self, contacts, h, lag)
             done("velocities")
             if links:
-                links.after(state, h, contacts.balance_pull if contacts else None)
+                run.note_pull(self, contacts, h, lag)
                 done("links")
             run.substep += 1
         return self._finish(contacts, watch, h, done, marked=run.marked)
@@ -205,13 +205,6 @@ class World(Measures, Queries, Doors):
             self._contacts.broad_phase.forget()
             if len(self) > 1:
                 self._contacts.fit(self._slots)
-
-    def _solve(self, links: Links, contacts: ContactSolver | None, h: float, done: Callable[[str], None]) -> None:
-        links.solve(self._slots, h)
-        done("links")
-        if contacts:
-            links.lay_down(self._slots, h)
-            contacts.note_unpushed()
 
     def _finish(self, contacts: ContactSolver | None, watch: Watch | None, h: float, done: Any, *, marked: bool) -> bool:
         """The substeps are done: who rests, the velocities of now, and no more energy than there may be."""

@@ -15,7 +15,7 @@ from pyverlet.ground.errors import InputError
 from pyverlet.kernels import overlap
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast, PairList, Strips
 from pyverlet.laws.contacts.growth import Growth
-from pyverlet.laws.contacts.loans import Joined, Lent, Loans
+from pyverlet.laws.contacts.loans import Lent, Loans
 from pyverlet.laws.contacts.pegs import Pegs
 from pyverlet.laws.contacts.slips import Kept, Slips
 from pyverlet.laws.contacts.wide import Wide
@@ -58,14 +58,8 @@ class Collisions:
 class Linked(Protocol):
     """What contacts ask of links; methods as in `laws.links.Links`."""
 
-    def together(self, state: Slots) -> Joined:
-        """Whom they join."""
-
-    def note_calm(self, state: Slots, h: float, calm: Array, keep: bool) -> None:
-        """Up to what speed contacts of who is linked are at rest; keep: what is there already counts if it is more."""
-
-    def pick_up(self, state: Slots, h: float) -> None:
-        """What they carry."""
+    def together(self, state: Slots) -> Array:
+        """Slots of those they join."""
 
 
 class Overlap(NamedTuple):
@@ -77,7 +71,11 @@ class Overlap(NamedTuple):
 
 
 class ContactSolver:
-    """The contact stages of a substep, in the order `World.step` calls them."""
+    """The contact stages of a substep: who is near whom, and what `kernels.frame` needs to go through them.
+
+    Attributes:
+        pegs: who may be too large for a gap between pinned circles; where there are any, a substep is more than its sweeps.
+    """
 
     def __init__(
         self,
@@ -91,15 +89,14 @@ class ContactSolver:
         self.broad_phase = settings.method.start(dtype)
         self._unlist = unlist
         self._seen = 0
-        self._wide = Wide(dtype, settings.restitution, settings.friction, listens=events is not None)
+        self.wide = Wide(dtype, settings.restitution, settings.friction, listens=events is not None)
         self._packed = False
         self._uneven = False  # whether masses differ so much that contacts need loans of inertia
         self._lends = False  # in this substep
-        self._joined: Joined | None = None  # who borrows and is linked, in this substep
         self._sleep = sleep
         self._slips = Slips(dtype)
         self._loans = Loans(dtype)
-        self.growth, self._pegs = Growth(), Pegs()
+        self.growth, self.pegs = Growth(), Pegs()
         self.broad_phase.replacing = self._slips.stop
         if events is not None:
             self.broad_phase.renewing = lambda state, pairs: self._collect(state, events)
@@ -119,7 +116,7 @@ class ContactSolver:
             state.note_start()
         else:
             self._slips.forget()
-            self._wide.drop_slips()
+            self.wide.drop_slips()
 
     def find(self, state: Slots, lag: float) -> None:
         """Broad phase: bring the list of candidate pairs up to date, and note events before contacts change a velocity."""
@@ -131,11 +128,11 @@ class ContactSolver:
     def _collect(self, state: Slots, events: Events) -> None:
         """Tell the events who has met, and how fast."""
         if self._packed:
-            events.collect(state, self._wide)
+            events.collect(state, self.wide)
 
     def packed(self, state: Slots) -> Wide | None:
         """The pairs in packs, if there are any about the circles of now. In them is noted who has met since they were made."""
-        return self._wide if self._packed and len(self._wide.origin) == len(state) else None
+        return self.wide if self._packed and len(self.wide.origin) == len(state) else None
 
     def _list(self, state: Slots) -> None:
         self.broad_phase.update(state)
@@ -147,24 +144,24 @@ class ContactSolver:
             self._uneven = bool(len(free)) and float(free.max()) > UNEVEN * float(free.min()) and not state.seam
             self._lends &= self._uneven
             self._packed = False
-            self._pegs.look(state, self.broad_phase.list)
+            self.pegs.look(state, self.broad_phase.list)
 
     def _pack(self, state: Slots) -> Wide:
         if not self._packed:
-            self._wide.take(self.broad_phase.list, self.broad_phase.built, state.radius, state.seam)
+            self.wide.take(self.broad_phase.list, self.broad_phase.built, state.radius, state.seam)
             self._packed = True
             if self._sleep is None:
                 self.broad_phase.release()
-        return self._wide
+        return self.wide
 
     def steady(self, state: Slots) -> Strips | None:
         """Where strips stand, if a substep's contacts are but the two sweeps; None: there is more to them."""
-        alone = not ((self._sleep and self._sleep.anyone) or self._pegs) and state.size is state.radius
+        alone = not ((self._sleep and self._sleep.anyone) or self.pegs) and state.size is state.radius
         return self.broad_phase.strips() if alone else None
 
     def keeps(self, state: Slots) -> bool:
         """Whether the pairs are packed and were listed well so far, and nobody borrows inertia: a frame may begin with them."""
-        return self._packed and not self._uneven and len(self._wide.origin) == len(state)
+        return self._packed and not self._uneven and len(self.wide.origin) == len(state)
 
     def set_up(self, state: Slots, h: float, lag: float, strongest: float, links: Linked | None) -> Wide:
         """The pairs of now, with all that their sweeps need in this substep."""
@@ -172,12 +169,10 @@ class ContactSolver:
         if self._rubs(state):
             self._slips.start(wide, state.particle)
         self._lends = self._uneven and strongest > 0
-        self._joined = links.together(state) if links and self._lends else None
-        noted = self._loans.begin(state, wide, h, strongest, self._joined) if self._lends else None
+        linked = links.together(state) if links and self._lends else None
+        noted = self._loans.begin(state, wide, h, strongest, linked) if self._lends else None
         rest_speed, accounts = REST_ACCELERATIONS * strongest * h, len(state.spent) > 0
         wide.set_up(state, h, lag, strongest, rest_speed, accounts, noted, linked=links is not None)
-        if self._lends:
-            self._loans.lend(wide)
         return wide
 
     @property
@@ -185,59 +180,26 @@ class ContactSolver:
         """Whether circles lend each other inertia since `set_up`, and what `kernels.lending` takes."""
         return self._lends, self._loans.compiled if self._lends else self._loans.nobody
 
-    def project(self, state: Slots, h: float, lag: float, strongest: float, links: Linked | None) -> None:
-        """Let impacts bounce, move other overlapping circles apart, note who touches, and let those grip each other."""
-        self._pegs.before(state, h)
-        wide = self.set_up(state, h, lag, strongest, links)
-        if links and len(wide.calm):
-            links.note_calm(state, h, wide.calm, self._lends)
-        wide.push(state)
-        if self._lends:
-            self._loans.settle(state, wide)
-            if self._joined:
-                self._loans.tell_weights(self._joined)
-
-    def note_unpushed(self) -> None:
-        """Links are done: what changes velocities next is walls."""
-        if self._lends:
-            self._loans.note_unpushed(self._wide)
-
-    def balance_pull(self, h: float) -> None:
-        """Links have added to accelerations what they pulled with."""
-        if self._joined:
-            self._loans.balance_pull(self._wide, self._joined, h)
-
-    def still(self, state: Slots, h: float, links: Linked | None) -> None:
-        """Take from touching circles the velocity that projection has put in, rub them, and hold who is too large for a gap."""
-        if self._lends:
-            self._loans.join(self._wide, self._joined)
-        self._wide.relax(state)
-        if links:
-            links.pick_up(state, h)
-        if self._lends:
-            self._loans.even_up(self._wide, self._joined)
-        self._pegs.hold(state)
-
     def spent(self) -> Any:
         """(2,) J that impacts, and friction, have taken in this frame, negative."""
-        return self._wide.spent[:, :2].sum(axis=0)
+        return self.wide.spent[:, :2].sum(axis=0)
 
     def weigh(self, asked: bool) -> None:
         """Whether somebody asks for the virial."""
-        self._wide.weigh(asked)
+        self.wide.weigh(asked)
 
     def virial(self) -> float:
         """Sum over all contacts of this frame of what pushes them apart times their distance, N s m."""
-        return float(self._wide.spent[:, 2].sum())
+        return float(self.wide.spent[:, 2].sum())
 
     def clear_notes(self, walls_bounce: bool) -> None:
         """A frame begins; `walls_bounce`: whether walls or obstacles throw circles back, and ask who carries weight."""
-        self._wide.spent.fill(0)
-        self._wide.bear(walls_bounce)
+        self.wide.spent.fill(0)
+        self.wide.bear(walls_bounce)
 
     def listed(self) -> tuple[Any, Any, Any, Any]:
         """first, count, pair_i, pair_j of the pairs of now."""
-        return self._wide.listed() if self._packed else self.broad_phase.list.listed()
+        return self.wide.listed() if self._packed else self.broad_phase.list.listed()
 
     def save(self) -> tuple[Any, Kept, Lent, tuple[float, float]]:
         """What outlives a frame: the list, what friction remembers, who has lent what, the pace of growth."""
@@ -275,7 +237,7 @@ class ContactSolver:
         """
         state.lean = state.drop - PUSHED / FED
         if not marked:
-            self._wide.mark_resting(state)
+            self.wide.mark_resting(state)
         if self._lends:
             self._loans.let_fall(state)
         else:

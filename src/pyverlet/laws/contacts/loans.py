@@ -7,17 +7,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.compile.bundle import fields
 from pyverlet.compile.lanes import LANES
 from pyverlet.ground.constants import FED, LOAN_S, PUSHED, SUNK
-from pyverlet.kernels import balance, hanging, lending
+from pyverlet.kernels import balance, hanging
 from pyverlet.kernels.loans import CHUNK
 from pyverlet.laws.contacts.wide import Wide
 from pyverlet.state.slots import Slots
 
 Array = NDArray[Any]
-
-_ROOT, _GROUP = (fields(lending.Hanging).index(name) for name in ("root", "group"))
 
 
 class Lent(NamedTuple):
@@ -27,19 +24,6 @@ class Lent(NamedTuple):
     lent: Array
     busy: Array
     held: Array
-
-
-class Joined(NamedTuple):
-    """Whom links join, as `kernels.linked.Linked` has them: their slots, the inverse mass links move them by, 1/kg, and how far,
-    m; with whom they hang together; and who is tied to a point, if the pin is intact.
-    """
-
-    slot: Array
-    weight: Array
-    shift: Array
-    assembly: Array
-    tied: Array
-    intact: Array
 
 
 class Loans:
@@ -86,17 +70,17 @@ class Loans:
         self._strips, self._hanging = wide.lanes, self._unknown(wide.lanes, first, len(wide.lane_i) // LANES, count)
         hanging.list_lanes(wide.begin, wide.lanes, wide.lane_i, wide.lane_j, *self._hanging[6:8])
 
-    def begin(self, state: Slots, wide: Wide, h: float, strongest: float, joined: Joined | None) -> tuple[Array, ...]:
+    def begin(self, state: Slots, wide: Wide, h: float, strongest: float, linked: Array | None) -> tuple[Array, ...]:
         """Contacts will be solved with lent inertia. Where an impact notes what it does by masses of their own: before,
-        spin_before, lent, busy; and calm, and inertia. strongest: m/s^2, that anybody feels.
+        spin_before, lent, busy; and calm, and inertia. strongest: m/s^2, that anybody feels. linked: slots of whom links join.
         """
         if self._kept.particle is not state.particle:
             self._follow(state)
         if self._strips is not wide.lanes:
             self._hang(wide, len(state))
         self._linked.fill(0)
-        if joined:
-            self._linked[joined.slot] = 1
+        if linked is not None:
+            self._linked[linked] = 1
         # At rest a substep ends with the velocity -(1 - PUSHED / FED) a h: the same for all that way.
         terms = state.reals(h, (state.drop - 1 + PUSHED / FED) * h * h, min(h / LOAN_S, 1.0), SUNK * strongest * LOAN_S, h)
         self.compiled = self._arrays(state.mass), self._hanging, terms
@@ -119,44 +103,6 @@ class Loans:
             columns.append(kept[state.particle])
         self._kept = Lent(state.particle, *columns)
         self._fit(len(state))
-
-    # ---- the stages of a substep, as `kernels.lending` has them --------------------------------------------------------------
-
-    def lend(self, wide: Wide) -> None:
-        """The inertia with which this substep's contacts are solved; each is pulled at by its own weight all the same."""
-        arrays, _, terms = self.compiled
-        lending.call_lend(wide.circles, wide.arrays, arrays, terms, wide.cut(), int(wide.rubs))
-
-    def settle(self, state: Slots, wide: Wide) -> None:
-        """Those that touch lend each other; those that do not have fallen by themselves."""
-        lending.call_settle(wide.circles, wide.arrays, *self.compiled, wide.cut(), state.claims())
-
-    def tell_weights(self, joined: Joined) -> None:
-        """Links come, and move whom they join by the inertia of now."""
-        lending.call_tell_weights(joined.slot, joined.weight, self.compiled[0])
-
-    def note_unpushed(self, wide: Wide) -> None:
-        """They are done: what changes velocities next is walls."""
-        lending.call_note_unpushed(wide.circles, self.compiled[0])
-
-    def join(self, wide: Wide, joined: Joined | None) -> None:
-        """Walls have pushed: who hangs together, and is held by them."""
-        arrays, hanging, _ = self.compiled
-        if joined:
-            slot, _, _, *others = joined
-            lending.call_join_linked(wide.circles, wide.arrays, arrays, hanging, slot, *others)
-        else:
-            lending.call_join(wide.circles, wide.arrays, arrays, hanging)
-
-    def even_up(self, wide: Wide, joined: Joined | None) -> None:
-        """The substep is done: give those who have met with borrowed inertia what their momentum lacks."""
-        arrays, hanging, _ = self.compiled
-        lending.call_even_up(wide.circles, arrays, hanging[_GROUP if joined else _ROOT], int(wide.rubs))
-
-    def balance_pull(self, wide: Wide, joined: Joined, h: float) -> None:
-        """What links have added to accelerations keeps momentum, too."""
-        arrays, hanging, _ = self.compiled
-        lending.call_balance_pull(wide.circles, arrays, hanging[_GROUP], joined.slot, joined.shift, 1 / h)
 
     # ---- beyond substeps -----------------------------------------------------------------------------------------------------
 

@@ -27,6 +27,8 @@ _ARRIVES = tables.Law._fields.index("arrives")
 _CALM = -2
 """Where it is among what is noted."""
 
+_NO_TIME = np.zeros(1)
+
 
 class Wide:
     """The pairs of one list, packed each time the list is made anew.
@@ -267,13 +269,18 @@ class Wide:
     def _lanes(self) -> tuple[Array, Array, Array, Array]:
         return self.begin, self.lanes, self.lane_i, self.lane_j
 
-    def push(self, state: Slots) -> None:
-        """Impacts, overlaps and slips; circles are then where that has moved them."""
-        frame.project[self.kind](self.circles, self.arrays, self.law, self.cut(), self.takes_looks(), 1, state.claims())
+    def do(self, part: int, state: Slots, beside: str = "", services: tuple[Any, ...] = ()) -> None:
+        """One part of a substep by itself; beside, services: as for `kernels.frame`.
 
-    def relax(self, state: Slots) -> None:
-        """Touching circles neither approach nor slip."""
-        frame.still[self.kind](self.circles, self.arrays, self.law, self._cut, 0, state.claims())
+        `TOUCHED`: impacts, overlaps and slips; circles are then where that has moved them. `STILLED`: touching circles neither
+        approach nor slip.
+        """
+        looks = self.takes_looks() if part == frame.TOUCHED else 0
+        nothing = state.reals(0, 0, 0, 0, 0, 0)
+        frame.frames[beside][self.kind](
+            0, 1, -1, self.circles, self.arrays, self.law, (frame.OPEN, *nothing), services, (), self.cut(),
+            (looks, 1, 0, part, *nothing[:2]), self.origin, nothing[0], state.claims(), _NO_TIME, (0, 0.0),
+        )  # fmt: skip
 
     def mark_resting(self, state: Slots) -> None:
         """Note in `state.resting` who touches another."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any, TypeVar
 
@@ -10,13 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.compile import jit
-from pyverlet.compile.bundle import fields
 from pyverlet.ground import checks
 from pyverlet.ground.constants import LINKS_ONE_THREAD_BELOW, REST_ACCELERATIONS
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import linked, runs
 from pyverlet.laws.contacts.broadphase import PairList
-from pyverlet.laws.contacts.loans import Joined
 from pyverlet.laws.links._chains import ChainPool
 from pyverlet.laws.links._link import Array, Link
 from pyverlet.laws.links._pool import Pool
@@ -29,7 +27,6 @@ from pyverlet.state.state import State
 
 AnyLink = TypeVar("AnyLink", bound=Link)
 
-_PIN_INTACT = fields(linked.Linked).index("tie_intact") - fields(linked.Linked).index("tied")
 """Where it is among what `PinPool.arrays` gives, which is in this order."""
 
 BROKEN = np.dtype([("link", np.int64), ("row", np.int64), ("i", np.int64), ("j", np.int64), ("force", np.float64)])
@@ -194,13 +191,11 @@ class Links:
         numbers = (h, *self._work.seam.period, len(self._work), self._iterations, REST_ACCELERATIONS * h)
         return *self._linked, numbers
 
-    def together(self, state: Slots) -> Joined:
-        """Whom links join, and with whom: what contacts ask of them. Good as long as the order of the slots is."""
+    def together(self, state: Slots) -> Array:
+        """Slots of those they join, as long as the order of the slots is; from then on kernels know with whom."""
         if not self._work.assembled:
             self._work.assemble(self.joined())
-        pins = self._packed[PinPool].arrays()
-        work = self._work
-        return Joined(work.slots(state), work.weight, work.shift, work.assembly, pins[0], pins[_PIN_INTACT])
+        return self._work.slots(state)
 
     def _know_apart(self) -> None:
         """Bring the pairs that are no contacts up to date, and note if they are others than before."""
@@ -234,11 +229,6 @@ class Links:
         with self._threads():
             linked.call_look(*self.compiled(state, h), state.position, state.velocity, state.inverse_mass)
 
-    def note_calm(self, state: Slots, h: float, calm: Array, keep: bool) -> None:
-        """Before contacts that may bounce or rub: note by slot up to what speed, m/s, who is linked rests; keep: if more."""
-        with self._threads():
-            linked.call_note_calm(self.compiled(state, h)[0], calm, int(keep))
-
     def solve(self, state: Slots, h: float) -> None:
         """Move the linked particles to where their links allow, and break those that pull too hard."""
         with self._threads():
@@ -249,19 +239,10 @@ class Links:
         with self._threads():
             linked.call_lay_down(*self.compiled(state, h), state.velocity)
 
-    def pick_up(self, state: Slots, h: float) -> None:
-        """After the contacts: they are with it again."""
-        with self._threads():
-            linked.call_pick_up(self.compiled(state, h)[0], state.velocity)
-
-    def after(self, state: Slots, h: float, balance: Callable[[float], None] | None = None) -> None:
-        """After the contacts: what the links did is part of the acceleration, for integrators that remember it. `balance`: who is
-        told of it, with h.
-        """
+    def after(self, state: Slots, h: float) -> None:
+        """After the contacts: what the links did is part of the acceleration, for integrators that remember it."""
         with self._threads():
             linked.call_note_pull(*self.compiled(state, h), state.acceleration)
-        if balance:
-            balance(h)
 
     def scatter(self) -> None:
         """The frame is good: what it did to the links holds."""

@@ -135,9 +135,13 @@ class Course:
     def compiled(self, state: Slots, room: Boundary) -> tuple[Any, ...]:
         """What `kernels.meetings.collide` takes: segments, bodies, cells, walls, along, rest, drop; empty without obstacles."""
         if not self:
-            return self._segments, self._bodies, _NO_CELLS, _NO_WALLS, state.along, state.position[:0], state.drop
+            return self.nothing(state)
         walls = np.array(room.walls(), float)
         return self._segments, self._bodies, self._cells, walls, state.along, self._rest, state.drop
+
+    def nothing(self, state: Slots) -> tuple[Any, ...]:
+        """The same if there were none."""
+        return self._segments[:0], self._bodies[:0], _NO_CELLS, _NO_WALLS, state.along, state.position[:0], state.drop
 
     def end(self, dt: float) -> None:
         """At the end of a frame that went well: the obstacles are where they moved to."""
