@@ -134,6 +134,26 @@ def test_a_helper_ends_with_its_parent() -> None:
     raise AssertionError("it still runs")
 
 
+def test_what_is_for_later_is_compiled_behind_us_and_not_beyond(tmp_path: Path) -> None:
+    code = TINY + (
+        "for _ in range(2): warmup.warm_up_to_show(pv.World())\n"
+        "helper, = warmup._staying\n"
+        "assert helper.busy and not helper.done and set(warmup._missing(np.dtype(np.float32), 1)) == {'one', 'two'}\n"
+        "print(helper._process.pid)"
+    )
+    pid = int(run(code, tmp_path, NUMBA_NUM_THREADS="1"))
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
+
+
+def test_only_what_a_world_needs_is_compiled_if_settings_stay(tmp_path: Path) -> None:
+    code = (
+        TINY
+        + "pv.warm_up(pv.World(), settings=False)\nprint(len(warmup._missing(np.dtype(np.float32), 1)), len(warmup._staying))"
+    )
+    assert run(code, tmp_path, NUMBA_NUM_THREADS="1").split() == ["2", "0"]
+
+
 def test_ctrl_c_ends_helpers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(jit, "max_threads", lambda: 2)
     with pytest.raises(KeyboardInterrupt), warmup._helping(np.dtype(np.float64), 1, 7) as helpers:

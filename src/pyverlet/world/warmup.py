@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from enum import Enum
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -72,24 +73,30 @@ def warm_up_to_show(world: World, progress: Progress | None = None) -> float:
 
 
 def _warm_up(world: World, progress: Progress | None, rest: Rest) -> float:
-    start = time.perf_counter()
+    start, missing = time.perf_counter(), _missing(world.dtype, world.threads)
     total, done, helpers = _expected(rest), 0, list[_Helper]()
+    with contextlib.ExitStack() as ending:
 
-    def started() -> None:
-        nonlocal done
-        done += 1
-        if progress:
-            progress(min(done + sum(helper.done for helper in helpers), total), total)
+        @cache
+        def call_helpers() -> None:
+            if missing:
+                about = world.dtype, world.threads, len(missing)
+                helpers.extend(ending.enter_context(_helping(*about, stay=rest is Rest.LATER)))
 
-    with jit.watch_compiling(started):
-        if missing := _missing(world.dtype, world.threads):
-            with _helping(world.dtype, world.threads, len(missing), stay=rest is Rest.LATER) as helping:
-                if rest is Rest.NOW:
-                    helpers = helping  # else most of what they compile is for later
-                    _compile(world.dtype, world.threads, missing)
-                rehearse(world)
-        else:
+        def started() -> None:
+            nonlocal done
+            done += 1
+            call_helpers()
+            if progress:  # of what helpers compile most is for later, if anything is
+                progress(min(done + sum(helper.done for helper in helpers if rest is Rest.NOW), total), total)
+
+        with jit.watch_compiling(started):
+            if rest is Rest.NOW:
+                call_helpers()
+                _compile(world.dtype, world.threads, missing)
             rehearse(world)
+        if rest is Rest.LATER:
+            call_helpers()
     if done and progress:
         progress(total, total)
     return time.perf_counter() - start
@@ -221,9 +228,10 @@ def _helping(dtype: np.dtype[Any], threads: int, parts: int, *, stay: bool = Fal
     Only one process at a time has helpers: of many that start at once each would bring its own. stay: they go on afterwards, one
     of them even if there is but one core.
     """
-    count, helpers = min(jit.max_threads() - 1, parts - 1, MOST_HELPERS), list[_Helper]()
-    if stay:
-        count = 0 if any(helper.busy for helper in _staying) else max(count, 1)
+    cores, helpers = jit.max_threads(), list[_Helper]()
+    count = min(max(cores - 1, 1) if stay else cores - 1, parts if stay else parts - 1, MOST_HELPERS)
+    if stay and any(helper.busy for helper in _staying):
+        count = 0
     with jit.turn("helpers", 0.0) as mine:
         try:
             if mine and jit.cache_dir() and _python():
