@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
 
 import pyverlet as pv
 from pyverlet import scenes
+from pyverlet.compile import jit
 from pyverlet.viewers import levers
 from pyverlet.viewers.commands import (
     Build,
@@ -283,6 +285,34 @@ def test_all_is_compiled_before_a_scene_is_shown(wait_until: WaitUntil, monkeypa
         wait_until(lambda: session.latest.shape.scene == "box" and session.latest.status.frames > 0)
     assert [(len(world), frames) for world, frames in ready] == [(20, 0)]
     assert "compiling what box needs, once" in seen
+
+
+class Compiles(pv.Actor):
+    """Acts as a frame that another process compiles just now: once, in the fifth."""
+
+    def act(self, world: pv.World, dt: float) -> None:
+        if world.frames == 4:
+            with jit._turn_or_wait("a kernel"):
+                pass
+
+
+def test_a_frame_that_waits_for_a_compiler_says_so(wait_until: WaitUntil, monkeypatch: pytest.MonkeyPatch) -> None:
+    turn = jit.turn
+
+    @contextlib.contextmanager
+    def taken(name: str, patience: float = 1.0) -> Iterator[bool]:
+        with turn(name, patience) as mine:
+            yield mine and (name != "a kernel" or patience > 0)
+
+    monkeypatch.setattr(jit, "turn", taken)
+    world, seen = pv.World(), list[str | None]()
+    world.add(position=(0, 0))
+    world.actors.append(Compiles())
+    with Session(world) as session:
+        session.subscribe(lambda: seen.append(session.latest.status.busy))
+        wait_until(lambda: session.latest.status.frames > 8)
+        assert session.latest.status.busy is None
+    assert [text for text in seen if text] == ["compiling what this needs, once"]
 
 
 def test_a_session_that_stops_does_not_wait_for_a_scene(wait_until: WaitUntil) -> None:

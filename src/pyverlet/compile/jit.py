@@ -26,10 +26,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-from numba.core import event as numba_event
 from numba.extending import typeof_impl
 
-from pyverlet.compile import pool
+from pyverlet.compile import pool, watching
 from pyverlet.ground import file_lock
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -118,6 +117,18 @@ def turn(name: str, patience: float = file_lock.PATIENCE_S) -> Iterator[bool]:
         return
     with file_lock.turn(folder / "turns", name, patience=patience) as mine:
         yield mine
+
+
+@contextlib.contextmanager
+def _turn_or_wait(name: str) -> Iterator[None]:
+    """The turn of a kernel; who watches is told if another process compiles it just now, and we wait."""
+    with turn(name, 0.0) as mine:
+        if mine:
+            yield
+            return
+    watching.tell()
+    with turn(name):
+        yield
 
 
 @contextlib.contextmanager
@@ -242,7 +253,7 @@ class Kernel:
     def _first(self, variant: str, *arguments: Any) -> Any:
         """The first call: no two processes compile a kernel at a time, and whoever comes second finds it on disk."""
         dispatcher = getattr(self, variant)
-        with _compiling, turn(f"{variant} {self.function.__module__}.{self.function.__qualname__}"), _litter():
+        with _compiling, _turn_or_wait(f"{variant} {self.function.__module__}.{self.function.__qualname__}"), _litter():
             try:
                 result = dispatcher(*arguments)
             except numba.core.errors.NumbaError:
@@ -372,23 +383,8 @@ def one_thread(only_if: bool = True) -> Iterator[None]:
         use_threads(count, 2 if several else 1)
 
 
-class _CompileListener(numba_event.Listener):  # type: ignore[misc]
-    def __init__(self, ours: set[Any], started: Callable[[], None]) -> None:
-        self._ours = ours
-        self._started = started
-
-    def on_start(self, event: Any) -> None:
-        if event.data["dispatcher"].py_func.__code__ in self._ours:
-            self._started()
-
-    def on_end(self, event: Any) -> None:
-        pass
-
-
 @contextlib.contextmanager
 def watch_compiling(started: Callable[[], None]) -> Iterator[None]:
-    """Call `started` whenever one of our kernels begins to compile (not when it is loaded from disk)."""
-    with numba_event.install_listener(
-        "numba:compile", _CompileListener({kernel.function.__code__ for kernel in KERNELS.values()}, started)
-    ):
+    """Call `started` whenever one of our kernels begins to compile, or another process is about it (not when it is on disk)."""
+    with watching.told({kernel.function.__code__ for kernel in KERNELS.values()}, started):
         yield

@@ -23,6 +23,11 @@ class Errands:
         """Have something done; returns at once."""
         self._queue.put(errand)
 
+    @property
+    def here(self) -> bool:
+        """Whether it is this thread that runs them."""
+        return self._runner == threading.get_ident()
+
     def run(self) -> None:
         """Do what there is to do, here."""
         while True:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.compile import jit
 from pyverlet.ground import checks
 from pyverlet.ground.constants import FRAME_BUDGET_MS
 from pyverlet.ground.errors import PyverletError
@@ -41,6 +42,8 @@ _log = logging.getLogger(__name__)
 
 MAX_CATCH_UP = 4
 """Late frames made up for at once; more are dropped and counted. A world that is too slow runs slow, smoothly."""
+
+_COMPILING = "compiling what this needs, once"
 
 IDLE_S = 0.1
 """Longest nap while nothing moves: on some systems Ctrl-C waits for it to end."""
@@ -100,7 +103,7 @@ class Session(Door):
         a parallel kernel, and with two teams alive every frame takes twice as long.
         """
         self._last = time.perf_counter()
-        with self._errands.by_this_thread():
+        with self._errands.by_this_thread(), jit.watch_compiling(self._wait_for_compiling):
             while not self._stopping.is_set():
                 wait = self.turn()
                 if self._held():
@@ -144,6 +147,11 @@ class Session(Door):
             return now + self._dt - time.perf_counter()
         return now + (1.0 - self._clock.alpha) * self._dt - time.perf_counter()
 
+    def _wait_for_compiling(self) -> None:
+        """In the middle of a frame, after a setting was changed: for seconds nothing moves."""
+        if self._errands.here and self._busy is None:
+            self._say_busy(_COMPILING)
+
     def _held(self) -> bool:
         return self._paused or self._error is not None
 
@@ -166,6 +174,8 @@ class Session(Door):
         else:
             self._gauges.budget.record(1000.0 * (time.perf_counter() - began))
             self._gauges.passed(float(self._stage.panels.time))
+        finally:
+            self._busy = None if self._busy == _COMPILING else self._busy
 
     def _obey_next(self) -> None:
         """Wait for a command and obey it and all behind it."""
