@@ -174,7 +174,7 @@ def test_a_ledger_of_few_links_costs_little() -> None:
 
 def test_what_links_store_is_known_in_the_middle_of_a_frame() -> None:
     # The solver's compact copy against the table of links in the user's order.
-    world = scenes.get("cloth").world(particles=300, dtype=np.float64)
+    world = scenes.get("cloth").world(particles=300, dtype=np.float64, restitution=0.0, friction=0.0)
     world.links.append(pv.Pin(world.add(position=(0, 0)), 0, point=(0.1, 0.2), compliance=1e-4))
     world.run(seconds=0.3)
     assert world.energy().links > 0

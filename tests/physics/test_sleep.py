@@ -173,7 +173,7 @@ def test_save_and_restore_keep_the_sleepers_and_the_bits() -> None:
 
 
 def test_contacts_of_sleepers_go_on() -> None:
-    world = troughs(events=True)
+    world = troughs(events=True, collisions=pv.Collisions(restitution=0.1))
     fill(world, 10)
     settle(world)
     assert world.asleep.all()
