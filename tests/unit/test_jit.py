@@ -135,7 +135,7 @@ def test_warm_up_reports_progress_and_leaves_nothing_to_compile(tmp_path: Path) 
         "with jit.watch_compiling(lambda: late.append(1)): world.run(seconds=0.1)\n"
         "assert 1 not in late\n"
     )
-    subprocess.run([sys.executable, "-c", code], env={**os.environ, "PYVERLET_CACHE_DIR": str(tmp_path)}, check=True, timeout=300)
+    subprocess.run([sys.executable, "-c", code], env={**os.environ, "PYVERLET_CACHE_DIR": str(tmp_path)}, check=True, timeout=900)
 
 
 def test_float32_stays_float32() -> None:
