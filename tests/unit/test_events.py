@@ -235,10 +235,8 @@ def test_to_listen_changes_no_bit(room: pv.Boundary, collisions: pv.Collisions) 
 def test_marked_in_the_list_or_by_key_the_same_events(options: dict[str, Any], dtype: str) -> None:
     # Where the list of pairs stays, only what has changed in it is sorted; without the marks all that touch is, in every frame.
     def world() -> pv.World:
-        rng, now = (
-            np.random.default_rng(5),
-            pv.World(events=True, dtype=dtype, **{"boundary": pv.Box((-6, -6), (6, 6)), **options}),
-        )
+        now = pv.World(events=True, dtype=dtype, **{"boundary": pv.Box((-6, -6), (6, 6)), **options})
+        rng = np.random.default_rng(5)
         now.add(position=rng.uniform(-5, 5, (150, 2)), radius=rng.uniform(0.1, 0.4, 150), velocity=rng.normal(0, 3, (150, 2)))
         return now
 

@@ -56,7 +56,7 @@ def warm_up(world: World, progress: Progress | None = None, *, settings: bool = 
         world: the world about to be stepped.
         progress: called as progress(done, total) when a kernel begins to compile; not at all if none needs to.
         settings: compile also what circles of its dtype need in other rooms, of other materials and masses, so that nothing
-            stalls when that is changed later: it takes twice as long.
+            stalls when that is changed later: it takes two to three times as long.
 
     Returns:
         Seconds spent.
@@ -228,8 +228,8 @@ def _helping(dtype: np.dtype[Any], threads: int, parts: int, *, stay: bool = Fal
     Only one process at a time has helpers: of many that start at once each would bring its own. stay: they go on afterwards, one
     of them even if there is but one core.
     """
-    cores, helpers = jit.max_threads(), list[_Helper]()
-    count = min(max(cores - 1, 1) if stay else cores - 1, parts if stay else parts - 1, MOST_HELPERS)
+    least, helpers = int(stay), list[_Helper]()
+    count = min(max(jit.max_threads() - 1, least), parts - 1 + least, MOST_HELPERS)
     if stay and any(helper.busy for helper in _staying):
         count = 0
     with jit.turn("helpers", 0.0) as mine:

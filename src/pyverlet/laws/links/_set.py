@@ -27,8 +27,6 @@ from pyverlet.state.state import State
 
 AnyLink = TypeVar("AnyLink", bound=Link)
 
-"""Where it is among what `PinPool.arrays` gives, which is in this order."""
-
 BROKEN = np.dtype([("link", np.int64), ("row", np.int64), ("i", np.int64), ("j", np.int64), ("force", np.float64)])
 """Number of the link in `world.links`, row of it, its first and last particle, and what it pulled with when it broke, N."""
 
