@@ -14,7 +14,6 @@ from pyverlet.compile import jit
 from pyverlet.kernels import bounds
 from pyverlet.kernels import cage as kernels
 from pyverlet.laws.rooms import Circle
-from pyverlet.state.moves import bodies
 from pyverlet.state.slots import Slots
 
 H = 1 / 480
@@ -46,22 +45,18 @@ def crowd(seed: int, n: int, speed: float, dtype: Any) -> Slots:
 
 def hold(slots: Slots, lag: float) -> None:
     """The smooth cage of radius 10 m about (1, 2), eight at a time."""
-    real, moved = slots.real, np.empty_like(slots.position)
-    bodies = (slots.position, slots.velocity, slots.acceleration, slots.radius, slots.inverse_mass, slots.resting, slots.hits)
-    kernels.hold(*map(real, (1, 2, 10)), *bodies, *map(real, (H, lag, 0.08)), 0, moved, moved, real(0), slots.claims())
+    kernels.hold(slots.circles(), *slots.reals(1, 2, 10, H, lag, 0.08), 0, slots.real(0), slots.claims())
 
 
 def meet_one_by_one(slots: Slots, lag: float, restitution: float = 0.0, friction: float = 0.0) -> None:
     """The cage of radius 10 m about (1, 2), circle after circle."""
     slots.resting[:] = 0
-    arrays = bodies(slots)
     for i in np.flatnonzero(slots.inverse_mass > 0):
-        seen = bounds.look(i, *arrays)._asdict()  # Python has numbers of one size only
+        seen = bounds.look(i, slots.circles())._asdict()  # Python has numbers of one size only
         whole = ("fed", "resting", "to_impact", "to_friction")
         body = bounds.Body(**{name: value if name in whole else slots.real(value) for name, value in seen.items()})
         body = bounds.at_cage(body, *slots.reals(1, 2, 10, H, lag, restitution, friction, 0.08))
-        position, velocity, _, spin, *_, fed, resting, hits, spent, _, turn, _ = arrays
-        bounds.put(i, body, position, velocity, spin, fed, resting, hits, spent, turn)
+        bounds.put(i, body, slots.circles())
 
 
 @given(

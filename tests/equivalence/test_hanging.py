@@ -45,11 +45,11 @@ def test_clusters_are_those_of_the_pairs_that_touch(friction: float, *, pinned: 
             world.velocity[::7] += (0.0, 1.5)  # some leave it for a while
         contacts = world._contacts
         assert contacts
-        assert contacts.lending[0]
+        assert contacts.lends
         begin, lanes, lane_i, lane_j, normal = contacts.wide.touching()
         k = np.concatenate([np.arange(a, a + count) for a, count in zip(begin, lanes, strict=False)])
         k = k[(normal[:, k] != 0).any(axis=0)]
-        root, heads, sets = contacts.lending[1][1][:3]
+        root, heads, sets = contacts.lent()[1].arrays[:3]
         expected = lowest_of_each(len(world), lane_i[k], lane_j[k])
         assert (root == expected).all()
         assert sorted(set(heads[: sets[0]])) == sorted(set(expected))

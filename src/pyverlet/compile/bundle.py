@@ -1,17 +1,21 @@
-"""Many arrays under one name, handed from kernel to kernel as a single pointer.
+"""Many arrays under one name, handed to kernels, and from kernel to kernel, as a single pointer.
 
-To a compiled function an array is ten numbers and a count of who holds it. A tuple of forty is copied for every call, which in a
-world of ten circles takes longer than what is called does. Numba's structrefs are kept in memory once and handed on.
+To a compiled function an array is ten numbers and a count of who holds it. A tuple of forty is taken apart whenever Python calls
+and copied for every call from kernel to kernel; of a function that took three of them more than half of what compiling took was
+that. Numba's structrefs are kept in memory once and handed on.
 """
 
 from __future__ import annotations
 
+from operator import is_
 from typing import Any
 
 from llvmlite import ir
 from numba import types
 from numba.experimental import structref
 from numba.extending import intrinsic
+
+from pyverlet.compile.jit import kernel, variant
 
 
 class _Bundle(types.StructRef):  # type: ignore[misc]
@@ -21,19 +25,37 @@ class _Bundle(types.StructRef):  # type: ignore[misc]
 
 
 def bundle(described: type) -> Any:
-    """What a class with annotations describes, to be made and read by them in compiled code.
-
-    Reading a field counts who holds the array: outside of inner loops.
-    """
+    """What a class with annotations describes, in that order: made by `hold`, read by compiled code."""
     kind = structref.register(type("Type", (_Bundle,), {"__module__": described.__module__}))
     kind.__qualname__ = f"{described.__qualname__}.Type"  # compiled code is kept on disk under the names of its types
-    described.Type = kind  # type: ignore[attr-defined]
-    structref.define_constructor(described, kind, fields(described))
-    return described
+    about = {name: getattr(described, name) for name in ("__module__", "__qualname__", "__doc__")}
+    held: Any = type(described.__name__, (structref.StructRefProxy,), {**about, "Type": kind})
+    structref.define_constructor(held, kind, list(described.__annotations__))
+    structref.define_boxing(kind, held)
+    held.make = kernel(variant(make, described.__name__, Bundle=held))
+    return held
+
+
+def hold(described: Any, arrays: tuple[Any, ...], before: Any = None) -> Any:
+    """A bundle of these arrays, which its attribute `arrays` keeps; the one `before` if that is of the same."""
+    if before is not None and all(map(is_, arrays, before.arrays)):
+        return before
+    made = described.make(arrays)
+    made.arrays = arrays
+    return made
+
+
+Bundle: Any = None
+"""What `make` makes."""
+
+
+def make(arrays):  # type: ignore[no-untyped-def]
+    """A bundle, the arrays of which somebody else holds."""
+    return Bundle(*_borrowed(arrays))
 
 
 @intrinsic  # type: ignore[untyped-decorator]
-def borrowed(typing: Any, arrays: Any) -> Any:
+def _borrowed(typing: Any, arrays: Any) -> Any:
     """A tuple of the same arrays, held by whoever holds those: of these nobody counts who reads them out of a bundle.
 
     To count is an atomic operation, twice for each array that a function reads: more than a small strip of pairs takes.
@@ -48,8 +70,3 @@ def borrowed(typing: Any, arrays: Any) -> Any:
         return context.make_tuple(builder, arrays, lent)
 
     return arrays(arrays), generate
-
-
-def fields(described: type) -> list[str]:
-    """Names of what is in a bundle, in order."""
-    return list(described.__annotations__)

@@ -312,7 +312,11 @@ def variant(function: Callable[..., Any], name: str, **names: Any) -> Callable[.
 
 
 def kernel(function: Function) -> Function:
-    """Compile on first call, to one thread's code; may be called from other kernels."""
+    """Compile on first call, to one thread's code; may be called from other kernels.
+
+    Handed a literal, by a call in another kernel or by a variable that starts as one, Numba compiles it for that beside what it
+    compiles for numbers: `np.int64(0)` is none.
+    """
     return _declared(Kernel(function))  # type: ignore[no-any-return]
 
 

@@ -30,6 +30,9 @@ _XX, _XY, _YY = 7, 8, 9
 # What is so of a cluster: walls push it; what is lacking is given along the wall, or whatever its direction.
 _HELD, _ALONG, _FREE = 1, 2, 4
 
+# No literals: see `compile.jit.kernel`.
+_NONE, _FALSE = np.int64(0), np.bool_(False)
+
 
 @kernel
 def _look(c, a, b, circles, lending):
@@ -190,7 +193,7 @@ def _even(count, circles, lending, root, gains, now, before, rubs):
 @kernel
 def balance(circles, lending, root, rubs):
     """Give to each cluster what its momentum and its angular momentum lack."""
-    among, count = lending.among, 0
+    among, count = lending.among, _NONE
     for c in range(lending.found.shape[0]):
         for k in range(c * CHUNK, c * CHUNK + lending.found[c]):
             among[count] = among[k]
@@ -201,7 +204,7 @@ def balance(circles, lending, root, rubs):
 @kernel
 def balance_pull(circles, lending, root, slot, shift, rate):
     """After `balance`: likewise what links have added to accelerations (`kernels.links.add_pull`), for when the frame ends."""
-    count, pull, none = 0, lending.unpushed, lending.before  # these two are of use no more in this substep
+    count, pull, none = _NONE, lending.unpushed, lending.before  # these two are of use no more in this substep
     for c in range(lending.found.shape[0]):
         count += lending.found[c]
     if count == 0:
@@ -212,7 +215,7 @@ def balance_pull(circles, lending, root, slot, shift, rate):
             pull[i, axis] = none[i, axis] = 0
     for k in range(slot.shape[0]):
         pull[slot[k], 0], pull[slot[k], 1] = rate * rate * shift[k, 0], rate * rate * shift[k, 1]
-    _even(count, circles, lending, root, circles.acceleration, pull, none, False)
+    _even(count, circles, lending, root, circles.acceleration, pull, none, _FALSE)
 
 
 @kernel

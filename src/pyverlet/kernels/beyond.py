@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from pyverlet.compile.bits import lowest_bit
 from pyverlet.compile.jit import kernel
 from pyverlet.compile.lanes import LANES, load, load_rows, spread, which_above
@@ -21,7 +23,7 @@ def _list(beyond, k, inverse_mass, found, number):
 @kernel
 def beyond_circle(x0, y0, size, position, radius, inverse_mass, first, stop, found):
     """List the free circles from `first` up to `stop` that reach beyond the cage; returns how many."""
-    number = 0
+    number = np.int64(0)
     packed = stop - (stop - first) % LANES
     centre_x, centre_y, whole = spread(x0), spread(y0), spread(size)
     for k in range(first, packed, LANES):
@@ -41,7 +43,7 @@ def beyond_circle(x0, y0, size, position, radius, inverse_mass, first, stop, fou
 @kernel
 def beyond_box(x0, y0, x1, y1, position, radius, inverse_mass, first, stop, found):
     """The same for a box."""
-    number, zero = 0, position.dtype.type(0)  # not x0 - x0: a wall may be infinitely far away
+    number, zero = np.int64(0), position.dtype.type(0)  # not x0 - x0: a wall may be infinitely far away
     packed = stop - (stop - first) % LANES
     left, right, floor, ceiling, none = spread(x0), spread(x1), spread(y0), spread(y1), spread(zero)
     for k in range(first, packed, LANES):

@@ -59,39 +59,39 @@ class Body(NamedTuple):
 
 
 @kernel
-def look(
-    i, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
-    start, turn, lift,
-):  # fmt: skip
+def look(i, circles):
     """Circle i."""
-    zero = radius[i] - radius[i]
-    rubs, accounted = turn.shape[0] > 0, spent.shape[0] > 0
-    from_x, from_y = (start[i, 0], start[i, 1]) if rubs else (zero, zero)
+    position, velocity, acceleration, spent = circles.position, circles.velocity, circles.acceleration, circles.spent
+    radius = circles.radius[i]
+    zero = radius - radius
+    rubs, accounted = circles.turn.shape[0] > 0, spent.shape[0] > 0
+    from_x, from_y = (circles.start[i, 0], circles.start[i, 1]) if rubs else (zero, zero)
     share = position.dtype.type(PUSHED / FED) if rubs else zero
     return Body(
-        position[i, 0], position[i, 1], velocity[i, 0], velocity[i, 1], acceleration[i, 0], acceleration[i, 1], spin[i],
-        radius[i], inverse_mass[i], restitution[i], friction[i], np.int64(fed[i]), np.int64(resting[i]), hits[i],
-        spent[i, 0] if accounted else 0.0, spent[i, 1] if accounted else 0.0, from_x, from_y, share, turn[i] if rubs else zero,
-        lift[i] if rubs else zero,
+        position[i, 0], position[i, 1], velocity[i, 0], velocity[i, 1], acceleration[i, 0], acceleration[i, 1],
+        circles.spin[i], radius, circles.inverse_mass[i], circles.restitution[i], circles.friction[i], np.int64(circles.fed[i]),
+        np.int64(circles.resting[i]), circles.hits[i], spent[i, 0] if accounted else 0.0, spent[i, 1] if accounted else 0.0,
+        from_x, from_y, share, circles.turn[i] if rubs else zero, circles.lift[i] if rubs else zero,
     )  # fmt: skip
 
 
 @kernel
-def put(i, body, position, velocity, spin, fed, resting, hits, spent, turn):
+def put(i, body, circles):
     """Write down what has become of circle i."""
+    position, velocity, spent = circles.position, circles.velocity, circles.spent
     position[i, 0] = body.x
     position[i, 1] = body.y
     velocity[i, 0] = body.vx
     velocity[i, 1] = body.vy
-    spin[i] = body.spin
-    fed[i] = body.fed
-    resting[i] = body.resting
-    hits[i] = body.hit
+    circles.spin[i] = body.spin
+    circles.fed[i] = body.fed
+    circles.resting[i] = body.resting
+    circles.hits[i] = body.hit
     if spent.shape[0] > 0:
         spent[i, 0] = body.to_impact
         spent[i, 1] = body.to_friction
     if body.share > 0:
-        turn[i] = body.turn
+        circles.turn[i] = body.turn
 
 
 @kernel
@@ -294,7 +294,7 @@ def _at_box(b, x0, y0, x1, y1, h, lag, e, mu, rest_speed):
             inward = one if below > zero else -one
             nx, ny = (inward, zero) if axis == 0 else (zero, inward)
             held = b.resting
-            b = meet(noted(b, 0), nx, ny, below if below > zero else above, h, lag, e, mu, rest_speed)
+            b = meet(noted(b, np.int64(0)), nx, ny, below if below > zero else above, h, lag, e, mu, rest_speed)
             if b.resting != 0:
                 break
             b = noted(b, held)
@@ -304,33 +304,19 @@ def _at_box(b, x0, y0, x1, y1, h, lag, e, mu, rest_speed):
 
 
 @kernel
-def _box_some(
-    x0, y0, x1, y1, first, stop, position, velocity, acceleration, spin, radius, inverse_mass, restitution,
-    friction, fed, resting, hits, spent, start, turn, lift, h, lag, e, mu, rest_speed,
-):  # fmt: skip
+def _box_some(circles, x0, y0, x1, y1, first, stop, h, lag, e, mu, rest_speed):
     """What `box` does, for the circles from `first` up to `stop`."""
-    resting[first:stop] = 0
+    circles.resting[first:stop] = 0
     found = np.empty(_CHUNK, np.uint32)
-    for k in range(beyond_box(x0, y0, x1, y1, position, radius, inverse_mass, first, stop, found)):
+    for k in range(beyond_box(x0, y0, x1, y1, circles.position, circles.radius, circles.inverse_mass, first, stop, found)):
         i = found[k]
-        # Made here, and only for circles at a wall: a tuple is slow to hand over.
-        body = look(
-            i, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
-            start, turn, lift,
-        )  # fmt: skip
-        body = _at_box(body, x0, y0, x1, y1, h, lag, e, mu, rest_speed)
-        put(i, body, position, velocity, spin, fed, resting, hits, spent, turn)
+        put(i, _at_box(look(i, circles), x0, y0, x1, y1, h, lag, e, mu, rest_speed), circles)
 
 
 @parallel_kernel
-def box(
-    x0, y0, x1, y1, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits,
-    spent, start, turn, lift, h, lag, e, mu, rest_speed,
-):  # fmt: skip
-    """Four walls; in a corner both axes act, one after the other. position to lift: what `look` takes."""
-    for chunk in prange((radius.shape[0] + _CHUNK - 1) // _CHUNK):
-        _box_some(
-            x0, y0, x1, y1, chunk * _CHUNK, min((chunk + 1) * _CHUNK, radius.shape[0]), position, velocity, acceleration,
-            spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent, start, turn, lift, h, lag, e, mu,
-            rest_speed,
-        )  # fmt: skip
+def box(circles, x0, y0, x1, y1, h, lag, e, mu, rest_speed):
+    """Four walls; in a corner both axes act, one after the other."""
+    count = circles.radius.shape[0]
+    for chunk in prange((count + _CHUNK - 1) // _CHUNK):
+        first, stop = chunk * _CHUNK, min((chunk + 1) * _CHUNK, count)
+        _box_some(circles, x0, y0, x1, y1, first, stop, h, lag, e, mu, rest_speed)

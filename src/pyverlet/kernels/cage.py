@@ -68,8 +68,10 @@ def _wall(dx, dy, ux, uy, ax, ay, room, rest_speed, zero, half, h):
 
 
 @kernel
-def _hold(which, x0, y0, size, position, velocity, acceleration, radius, hits, h, lag, rest_speed):
+def _hold(which, circles, x0, y0, size, h, lag, rest_speed):
     """Hold the circles of `which`, all beyond the wall, on it; eight times the same is as good as once."""
+    position, velocity, acceleration = circles.position, circles.velocity, circles.acceleration
+    radius, hits = circles.radius, circles.hits
     none = h - h
     zero, half, h, lag = spread(none), spread(h / (h + h)), spread(h), spread(lag)
     x0, y0, size, rest_speed = spread(x0), spread(y0), spread(size), spread(rest_speed)
@@ -111,13 +113,13 @@ def _bits(fed, which, k, mask):
 
 
 @kernel
-def _rest(
-    which, x0, y0, size, position, velocity, acceleration, spin, radius, restitution, friction, fed, hits, start, turn, lift,
-    h, lag, e, mu, rest_speed,
-):  # fmt: skip
+def _rest(which, circles, x0, y0, size, h, lag, e, mu, rest_speed):
     """Hold the circles of `which`, all beyond a wall that may bounce and rub them; those that may bounce, and seven others of
     their pack each, are left to be looked at one by one. `which` then begins with them. Returns how many.
     """
+    position, velocity, acceleration, spin = circles.position, circles.velocity, circles.acceleration, circles.spin
+    radius, restitution, friction, fed, hits = circles.radius, circles.restitution, circles.friction, circles.fed, circles.hits
+    start, turn, lift = circles.start, circles.turn, circles.lift
     rubs, left = turn.shape[0] > 0, 0
     none = h - h
     zero, half, share = spread(none), spread(h / (h + h)), spread(position.dtype.type(PUSHED / FED))
@@ -176,10 +178,9 @@ def _rest(
 
 
 @kernel
-def hold_some(
-    x0, y0, size, position, velocity, acceleration, radius, inverse_mass, resting, hits, h, lag, rest_speed, begin, end
-):
+def hold_some(circles, x0, y0, size, h, lag, rest_speed, begin, end):
     """What `hold` does, for the circles from `begin` up to `end`."""
+    position, radius, inverse_mass, resting = circles.position, circles.radius, circles.inverse_mass, circles.resting
     found = np.empty(_CHUNK + 2 * LANES, np.uint32)
     for first in range(begin, end, _CHUNK):
         stop = min(first + _CHUNK, end)
@@ -190,20 +191,18 @@ def hold_some(
                 resting[found[k]] = 1
             lanes = (number + LANES - 1) // LANES * LANES
             found[number:lanes] = found[number - 1]
-            _hold(found[:lanes], x0, y0, size, position, velocity, acceleration, radius, hits, h, lag, rest_speed)
+            _hold(found[:lanes], circles, x0, y0, size, h, lag, rest_speed)
 
 
 @parallel_kernel
-def hold(
-    x0, y0, size, position, velocity, acceleration, radius, inverse_mass, resting, hits, h, lag, rest_speed,
-    arrives, origin, moved, feed, claims,
-):  # fmt: skip
+def hold(circles, x0, y0, size, h, lag, rest_speed, arrives, feed, claims):
     """All circles stay inside the cage of radius `size` about (x0, y0); `resting` is 1 for those that were beyond.
 
     arrives: 1 if contacts have `moved` them and they have yet to `arrive` there; or 0, and nobody looks at origin, moved and
     feed. claims: `_claims.Claims`.
     """
-    count = radius.shape[0]
+    position, velocity, origin, moved = circles.position, circles.velocity, circles.origin, circles.moved
+    count = position.shape[0]
     chunks = (count + _CHUNK - 1) // _CHUNK
     none_claimed(claims)
     for part in prange(claims.shape[0]):
@@ -212,55 +211,38 @@ def hold(
             a, b = chunk * _CHUNK, min((chunk + 1) * _CHUNK, count)
             if arrives:
                 arrive(position[a:b], velocity[a:b], origin[a:b], moved[a:b], feed)
-            bodies = (position, velocity, acceleration, radius, inverse_mass, resting, hits)
-            hold_some(x0, y0, size, *bodies, h, lag, rest_speed, a, b)
+            hold_some(circles, x0, y0, size, h, lag, rest_speed, a, b)
             chunk = claim_evenly(claims, chunks, part)
 
 
 @kernel
-def _confine_some(
-    x0, y0, size, first, stop, position, velocity, acceleration, spin, radius, inverse_mass, restitution,
-    friction, fed, resting, hits, spent, start, turn, lift, h, lag, e, mu, rest_speed,
-):  # fmt: skip
+def _confine_some(circles, x0, y0, size, first, stop, h, lag, e, mu, rest_speed):
     """What `confine` does, for the circles from `first` up to `stop`."""
+    resting = circles.resting
     resting[first:stop] = 0
     found = np.empty(_CHUNK + LANES, np.uint32)
-    number = beyond_circle(x0, y0, size, position, radius, inverse_mass, first, stop, found)
+    number = beyond_circle(x0, y0, size, circles.position, circles.radius, circles.inverse_mass, first, stop, found)
     if number == 0:
         return
     left = number
-    if spent.shape[0] == 0:
+    if circles.spent.shape[0] == 0:
         for k in range(number):
             resting[found[k]] = 1
         lanes = (number + LANES - 1) // LANES * LANES
         found[number:lanes] = found[number - 1]
-        left = _rest(
-            found[:lanes], x0, y0, size, position, velocity, acceleration, spin, radius, restitution, friction, fed, hits,
-            start, turn, lift, h, lag, e, mu, rest_speed,
-        )  # fmt: skip
+        left = _rest(found[:lanes], circles, x0, y0, size, h, lag, e, mu, rest_speed)
     for k in range(left):
         i = found[k]
         if k > 0 and i == found[k - 1]:  # to fill a pack
             continue
         resting[i] = 0
-        # Made here, and only for circles at a wall: a tuple is slow to hand over.
-        body = look(
-            i, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
-            start, turn, lift,
-        )  # fmt: skip
-        body = at_cage(body, x0, y0, size, h, lag, e, mu, rest_speed)
-        put_back(i, body, position, velocity, spin, fed, resting, hits, spent, turn)
+        put_back(i, at_cage(look(i, circles), x0, y0, size, h, lag, e, mu, rest_speed), circles)
 
 
 @parallel_kernel
-def confine(
-    x0, y0, size, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits,
-    spent, start, turn, lift, h, lag, e, mu, rest_speed,
-):  # fmt: skip
-    """A cage of any material: all circles stay inside that of radius `size` about (x0, y0). position to lift: as for `look`."""
-    for chunk in prange((radius.shape[0] + _CHUNK - 1) // _CHUNK):
-        _confine_some(
-            x0, y0, size, chunk * _CHUNK, min((chunk + 1) * _CHUNK, radius.shape[0]), position, velocity, acceleration,
-            spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent, start, turn, lift, h, lag, e, mu,
-            rest_speed,
-        )  # fmt: skip
+def confine(circles, x0, y0, size, h, lag, e, mu, rest_speed):
+    """A cage of any material: all circles stay inside that of radius `size` about (x0, y0)."""
+    count = circles.radius.shape[0]
+    for chunk in prange((count + _CHUNK - 1) // _CHUNK):
+        first, stop = chunk * _CHUNK, min((chunk + 1) * _CHUNK, count)
+        _confine_some(circles, x0, y0, size, first, stop, h, lag, e, mu, rest_speed)

@@ -5,8 +5,11 @@ Integrators of Stormer's kind keep a velocity half a substep old: it is kicked f
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from pyverlet.compile.bundle import bundle
 from pyverlet.compile.jit import kernel, parallel_kernel, prange, variant
 from pyverlet.kernels.forces import attract, drag
 from pyverlet.kernels.motion import BLOCK, add_scaled, any_strayed, kick_drift, newton_block, set_out
@@ -17,6 +20,20 @@ centre, (strength, softening)."""
 
 NUMBERS = 2
 """Each has, of which some need fewer."""
+
+
+@bundle
+class Forces:
+    """kind: (k,) of the constants above; vector: (k, 2), number: (k, NUMBERS), in the dtype of the world. total: (n, 2) N,
+    becomes their sum. mass: (n,) kg.
+    """
+
+    kind: Any
+    vector: Any
+    number: Any
+    total: Any
+    mass: Any
+
 
 CALLS = False
 """Whether there are functions of the user's own."""
@@ -54,24 +71,21 @@ def _add_up(force, position, velocity, inverse_mass, h, kind, vector, number, pe
             attract(force, position, inverse_mass, x, y, first, second, period_x, period_y)
 
 
-def _some(
-    position, velocity, acceleration, inverse_mass, mass, kind, vector, number, force, period_x, period_y, gx, gy, h, ahead,
-    function, t, a, b,
-):  # fmt: skip
+def _some(circles, forces, period_x, period_y, gx, gy, h, ahead, function, t, a, b):
     """Of the particles from a up to b; the square of the largest acceleration.
 
     Where the user's function fails the first of them is nowhere: the frame is then gone through again by who can say why.
     """
-    x, v, felt, pushed, light = position[a:b], velocity[a:b], acceleration[a:b], force[a:b], inverse_mass[a:b]
-    wrong = 0
-    if kind.shape[0] == 0 and not CALLS:  # gravity alone: links have pulled, and that is not felt again
-        pushed = force[:0]
+    x, v, felt, light = circles.position[a:b], circles.velocity[a:b], circles.acceleration[a:b], circles.inverse_mass[a:b]
+    pushed, wrong = forces.total[a:b], 0
+    if forces.kind.shape[0] == 0 and not CALLS:  # gravity alone: links have pulled, and that is not felt again
+        pushed = pushed[:0]
     else:
         if ahead != 0:
             add_scaled(v, felt, ahead)
-        _add_up(pushed, x, v, light, h, kind, vector, number, period_x, period_y)
+        _add_up(pushed, x, v, light, h, forces.kind, forces.vector, forces.number, period_x, period_y)
         if CALLS:
-            wrong = function(pushed, x, v, mass[a:b], t)
+            wrong = function(pushed, x, v, forces.mass[a:b], t)
         if ahead != 0:
             add_scaled(v, felt, -ahead)
     largest = newton_block(felt, pushed, light, gx, gy)
@@ -81,29 +95,20 @@ def _some(
     return largest
 
 
-def _drive(
-    position, velocity, acceleration, inverse_mass, mass, kind, vector, number, force, period_x, period_y, gx, gy, h, ahead,
-    reference, square, origin, moved, function, t,
-):  # fmt: skip
+def _drive(circles, forces, period_x, period_y, gx, gy, h, ahead, reference, square, function, t):
     """What `motion.leap` does after all forces have been asked: v += h a, x += h v, moved = x - origin.
 
-    kind: (k,) of the constants above; vector: (k, 2), number: (k, NUMBERS), in the dtype of the world. force: (n, 2) N, becomes
-    their sum. ahead: s, by which velocities are kicked for forces to see. reference, square: as for `motion.leap`. mass: kg.
+    ahead: s, by which velocities are kicked for forces to see. reference, square: as for `motion.leap`.
     function: what `compile.native` makes of the user's functions, for the time t, s; nothing if there are none.
 
     Returns the largest acceleration, m/s^2, and whether anyone has strayed.
     """
+    position, origin, moved = circles.position, circles.origin, circles.moved
     where, start = position.reshape(-1), reference.reshape(-1)
     largest, found = gx - gx, 0
-    for block in prange((inverse_mass.shape[0] + BLOCK - 1) // BLOCK):
-        a, b = block * BLOCK, min((block + 1) * BLOCK, inverse_mass.shape[0])
-        largest = max(
-            largest,
-            some(
-                position, velocity, acceleration, inverse_mass, mass, kind, vector, number, force, period_x, period_y, gx, gy, h,
-                ahead, function, t, a, b,
-            ),
-        )  # fmt: skip
+    for block in prange((position.shape[0] + BLOCK - 1) // BLOCK):
+        a, b = block * BLOCK, min((block + 1) * BLOCK, position.shape[0])
+        largest = max(largest, some(circles, forces, period_x, period_y, gx, gy, h, ahead, function, t, a, b))
         found += int(any_strayed(where, start, a, b, square))
         set_out(position[a:b], origin[a:b], moved[a:b])
     return np.sqrt(largest), found > 0

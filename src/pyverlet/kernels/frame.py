@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyverlet.compile.bundle import borrowed, fields
 from pyverlet.compile.clock import note
 from pyverlet.compile.jit import driver, kernel, parallel_kernel, prange, variant
 from pyverlet.compile.lanes import copy_row
@@ -23,8 +22,6 @@ from pyverlet.kernels.cage import hold
 from pyverlet.kernels.drive import drive, drive_called
 from pyverlet.kernels.kinds import for_each_kind
 from pyverlet.kernels.lending import (
-    Hanging,
-    Lending,
     Terms,
     even_up,
     join,
@@ -34,9 +31,7 @@ from pyverlet.kernels.lending import (
     settle,
     tell_weights,
 )
-from pyverlet.kernels.link_rows import Rows
 from pyverlet.kernels.linked import (
-    Linked,
     Linking,
     lay_down,
     lay_down_alone,
@@ -55,16 +50,17 @@ from pyverlet.kernels.measure import mechanical
 from pyverlet.kernels.meetings import collide
 from pyverlet.kernels.motion import first_leap, leap
 from pyverlet.kernels.sweeps import push, relax
-from pyverlet.kernels.tables import Circles, Law, Pairs
+from pyverlet.kernels.tables import Law
 
-CONTACTS, BOUNDS, VELOCITIES, INTEGRATE, OBSTACLES, LEDGER, LINKS = range(1, 8)
+CONTACTS, BOUNDS, VELOCITIES, INTEGRATE, OBSTACLES, LEDGER, LINKS = map(np.int64, range(1, 8))
 STAGES = ("contacts", "bounds", "velocities", "integrate", "obstacles", "ledger", "links")
-"""Names of the numbers above, less one, by which their time is noted."""
+"""Names of the numbers above, less one, by which their time is noted. They are no literals: see
+`compile.jit.kernel`."""
 
 OPEN, SMOOTH_CAGE, CAGE, FOUR_WALLS = range(4)
 """Rooms: without walls; round, without restitution and friction, around circles that have none either; round; a box."""
 
-INTEGRATED, TOUCHED, JOINED, STILLED, PULLED = range(5)
+INTEGRATED, TOUCHED, JOINED, STILLED, PULLED = map(np.int64, range(5))
 LOOKS = 5
 """At the energy in a substep: where a ledger looks. What leads there from the one before is a part of a substep."""
 
@@ -91,9 +87,6 @@ BESIDE: dict[str, dict[str, Any]] = {
 }
 BESIDE |= {f"{name}_called": {**what, "CALLS": True, "drive": drive_called} for name, what in BESIDE.items() if name}
 """Frames are compiled for each of these. Links so few that it does not pay stay on one thread where circles use several."""
-
-NORMAL = fields(Pairs).index("normal")
-"""Where in the tuple of `Pairs` the normals are."""
 
 _CHUNK = 4096
 
@@ -127,9 +120,8 @@ class Start(NamedTuple):
 class Services(NamedTuple):
     """What a world has beside circles, a room and gravity; empty arrays for what it has not.
 
-    h, lag: s, in float64. down: gravity, m/s^2, in float64. forces: what `drive` takes, (kind, vector, number,
-    force, period_x, period_y), and ahead. course: what `meetings.collide` takes, (segments, bodies, cells, walls, along, rest,
-    drop). mass: (n,) kg. energies: (substeps, LOOKS) J, becomes what `measure.mechanical` says after the integration of each
+    h, lag: s, in float64. down: gravity, m/s^2, in float64. forces, period, ahead: what `drive` takes. course, cells, drop: what
+    `meetings.collide` takes. energies: (substeps, LOOKS) J, becomes what `measure.mechanical` says after the integration of each
     substep, but of the one that is handed back, and of the first unless it opens; after its contacts, links and so on; without
     links at its end only. links: what `kernels.linked` takes, its arrays, rows and numbers, where there are any; loans: what
     `kernels.lending` takes; empty where nobody lends. began: when the frame did, s.
@@ -139,9 +131,11 @@ class Services(NamedTuple):
     lag: Any
     down: Any
     forces: Any
+    period: Any
     ahead: Any
     course: Any
-    mass: Any
+    cells: Any
+    drop: Any
     energies: Any
     links: Any
     loans: Any
@@ -176,24 +170,11 @@ def confine(room, circles, law, claims):
     if room.what == OPEN:
         circles.resting[:] = 0
     elif room.what == SMOOTH_CAGE:
-        hold(
-            room.x0, room.y0, room.x1, circles.position, circles.velocity, circles.acceleration, circles.radius,
-            circles.inverse_mass, circles.resting, circles.hits, law.h, law.lag, law.rest_speed, 1 - law.arrives, circles.origin,
-            circles.moved, law.feed, claims,
-        )  # fmt: skip
+        hold(circles, room.x0, room.y0, room.x1, law.h, law.lag, law.rest_speed, 1 - law.arrives, law.feed, claims)
     elif room.what == CAGE:
-        confine_in_cage(
-            room.x0, room.y0, room.x1, circles.position, circles.velocity, circles.acceleration, circles.spin, circles.radius,
-            circles.inverse_mass, circles.restitution, circles.friction, circles.fed, circles.resting, circles.hits,
-            circles.spent, circles.start, circles.turn, circles.lift, law.h, law.lag, room.e, room.mu, law.rest_speed,
-        )  # fmt: skip
+        confine_in_cage(circles, room.x0, room.y0, room.x1, law.h, law.lag, room.e, room.mu, law.rest_speed)
     else:
-        box(
-            room.x0, room.y0, room.x1, room.y1, circles.position, circles.velocity, circles.acceleration, circles.spin,
-            circles.radius, circles.inverse_mass, circles.restitution, circles.friction, circles.fed, circles.resting,
-            circles.hits, circles.spent, circles.start, circles.turn, circles.lift, law.h, law.lag, room.e, room.mu,
-            law.rest_speed,
-        )  # fmt: skip
+        box(circles, room.x0, room.y0, room.x1, room.y1, law.h, law.lag, room.e, room.mu, law.rest_speed)
 
 
 # ---- substeps --------------------------------------------------------------------------------------------------------------
@@ -221,32 +202,29 @@ def _substeps(
     Returns the substep that is next, whether it has been integrated and the list of pairs needs a look, and if so under what
     largest acceleration, m/s^2.
     """
-    circles, pairs, law = Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Law(*law)
-    room, start, strongest, begins = Room(*room), Start(*start), law.h - law.h, law.rubs != 0
+    law, room, start = Law(*law), Room(*room), Start(*start)
+    strongest, begins = law.h - law.h, law.rubs != 0
     first, looks, sets_out, part, whole = substep, start.looks, start.sets_out, start.part, start.part == WHOLE
     if SERVED:
         services = Services(*services)
-        kind, vector, number, force, period_x, period_y = services.forces
-        segments, bodies, cells, walls, along, rest, drop = services.course
-        energies, mass, lag, down = services.energies, services.mass, services.lag, services.down
-        loans, hanging = Lending(*borrowed(services.loans[0])), Hanging(*borrowed(services.loans[1]))
-        terms = Terms(*services.loans[2])
-        lends = services.loans[0][0].shape[0] > 0
-        begins = begins or segments.shape[0] > 0
+        forces, course, (period_x, period_y) = services.forces, services.course, services.period
+        energies, lag, down = services.energies, services.lag, services.down
+        meets, forced = course.segments.shape[0] > 0, forces.kind.shape[0] > 0
+        loans, hanging, terms = services.loans[0], services.loans[1], Terms(*services.loans[2])
+        lends = loans.mass.shape[0] > 0
+        begins = begins or meets
     if LINKED:
-        linked, rows = Linked(*borrowed(services.links[0])), Rows(*borrowed(services.links[1]))
-        linking = Linking(*services.links[2])
+        linked, rows, linking = services.links[0], services.links[1], Linking(*services.links[2])
     integrates = start.opens != 0
     if LINKED and integrates:
         look(linked, linking, circles.position, circles.velocity, circles.inverse_mass)
         note(spent, LINKS, clock[0], clock[1])
     while True:
         if integrates:
-            if LINKED or CALLS or (SERVED and kind.shape[0] > 0):  # what links have pulled is not felt again
+            if LINKED or CALLS or (SERVED and forced):  # what links have pulled is not felt again
                 strongest, strayed = drive(
-                    circles.position, circles.velocity, circles.acceleration, circles.inverse_mass, mass, kind, vector, number,
-                    force, period_x, period_y, start.gx, start.gy, law.h, services.ahead, checked, far, circles.origin,
-                    circles.moved, function, services.began + substep * services.h,
+                    circles, forces, period_x, period_y, start.gx, start.gy, law.h, services.ahead, checked, far, function,
+                    services.began + substep * services.h,
                 )  # fmt: skip
                 law = _felt(law, strongest, services.h, circles.position)
             elif start.opens != 0 and substep == first:
@@ -263,7 +241,7 @@ def _substeps(
             if strayed:
                 return substep, True, strongest
             if SERVED:
-                _look_at_energy(energies, substep, INTEGRATED, circles, mass, lag, down, spent, clock)
+                _look_at_energy(energies, substep, INTEGRATED, circles, forces.mass, lag, down, spent, clock)
         if whole or part == TOUCHED:
             if SERVED and lends:
                 lend(circles, pairs, loans, terms, cut, law.rubs != 0)
@@ -277,10 +255,10 @@ def _substeps(
                 tell_weights(linked.slot, linked.weight, loans.lighter)
             note(spent, CONTACTS, clock[0], clock[1])
         if LINKED and whole:
-            _look_at_energy(energies, substep, TOUCHED, circles, mass, lag, down, spent, clock)
+            _look_at_energy(energies, substep, TOUCHED, circles, forces.mass, lag, down, spent, clock)
             solve(linked, rows, linking, circles.position, circles.velocity)
             note(spent, LINKS, clock[0], clock[1])
-            _look_at_energy(energies, substep, JOINED, circles, mass, lag, down, spent, clock)
+            _look_at_energy(energies, substep, JOINED, circles, forces.mass, lag, down, spent, clock)
             lay_down(linked, linking, circles.velocity)
             note(spent, LINKS, clock[0], clock[1])
         if LINKED and lends and (whole or part == JOINED):
@@ -288,14 +266,9 @@ def _substeps(
         if whole:
             confine(room, circles, law, claims)
             note(spent, BOUNDS, clock[0], clock[1])
-        if SERVED and segments.shape[0] > 0 and whole:
+        if SERVED and meets and whole:
             until = substep * services.h + services.h
-            collide(
-                segments, bodies, until, *cells, walls, along, rest, circles.position, circles.velocity, circles.acceleration,
-                circles.spin, circles.radius, circles.inverse_mass, circles.restitution, circles.friction,
-                circles.fed, circles.resting, circles.hits, circles.spent, circles.start, circles.turn, circles.lift, law.h,
-                law.lag, law.rest_speed, drop,
-            )  # fmt: skip
+            collide(circles, course, until, *services.cells, law.h, law.lag, law.rest_speed, services.drop)
             note(spent, OBSTACLES, clock[0], clock[1])
         if whole or part == STILLED:
             if LINKED and lends:
@@ -309,14 +282,14 @@ def _substeps(
                 even_up(circles, loans, hanging.group if LINKED else hanging.root, law.rubs)
             note(spent, VELOCITIES, clock[0], clock[1])
         if SERVED and whole:
-            _look_at_energy(energies, substep, STILLED, circles, mass, lag, down, spent, clock)
+            _look_at_energy(energies, substep, STILLED, circles, forces.mass, lag, down, spent, clock)
         if LINKED and whole:
             note_pull(linked, linking, circles.acceleration)
         if LINKED and lends and (whole or part == PULLED):
             balance_pull(circles, loans, hanging.group, linked.slot, linked.shift, 1.0 / services.h)
         if LINKED and whole:
             note(spent, LINKS, clock[0], clock[1])
-            _look_at_energy(energies, substep, PULLED, circles, mass, lag, down, spent, clock)
+            _look_at_energy(energies, substep, PULLED, circles, forces.mass, lag, down, spent, clock)
         substep += 1
         if substep == stop:
             return substep, False, strongest

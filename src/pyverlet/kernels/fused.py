@@ -21,13 +21,12 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from pyverlet.compile.bundle import borrowed
 from pyverlet.compile.jit import driver, kernel, parallel_kernel, prange
 from pyverlet.kernels.cage import hold_some
 from pyverlet.kernels.contact import mark_strip, push_strip, refine_strip, relax_strip
 from pyverlet.kernels.kinds import SMOOTH
 from pyverlet.kernels.motion import any_strayed, arrive, kick_drift, set_out
-from pyverlet.kernels.tables import Circles, Law, Pairs
+from pyverlet.kernels.tables import Law
 
 _push_strip, _relax_strip = push_strip[SMOOTH], relax_strip[SMOOTH]
 
@@ -68,10 +67,7 @@ def _settle(s, t, circles, law, room, strips):
     """Of the strips from s up to t."""
     a, b = strips.held[s], strips.held[t]
     arrive(circles.position[a:b], circles.velocity[a:b], circles.origin[a:b], circles.moved[a:b], law.feed)
-    hold_some(
-        room[0], room[1], room[2], circles.position, circles.velocity, circles.acceleration, circles.radius,
-        circles.inverse_mass, circles.resting, circles.hits, law.h, law.lag, law.rest_speed, a, b,
-    )  # fmt: skip
+    hold_some(circles, room[0], room[1], room[2], law.h, law.lag, law.rest_speed, a, b)
 
 
 @kernel
@@ -145,5 +141,5 @@ def _substep(cut, circles, pairs, law, room, strips):
 
 @driver
 def substep(cut, circles, pairs, law, room, strips):
-    """What `_substep` does, called from Python, which has plain tuples."""
-    return _substep(cut, Circles(*borrowed(circles)), Pairs(*borrowed(pairs)), Law(*law), room, Strips(*strips))
+    """What `_substep` does, called from Python, which has plain tuples of numbers."""
+    return _substep(cut, circles, pairs, Law(*law), room, Strips(*strips))

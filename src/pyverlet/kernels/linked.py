@@ -9,13 +9,18 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from pyverlet.compile.bundle import bundle
 from pyverlet.compile.jit import driver, kernel, variant
 from pyverlet.kernels.chain_passes import sweep
 from pyverlet.kernels.chain_rows import prepare_soft
-from pyverlet.kernels.link_rows import Rows, note_rows, prepare_rows, sweep_rows
+from pyverlet.kernels.link_rows import note_rows, prepare_rows, sweep_rows
 from pyverlet.kernels.links import add_pull, hand_back, look_back, set_down, set_out, shoulder, tell_calm
 from pyverlet.kernels.ties import note_ties, tie
+
+_NO, _YES = np.bool_(False), np.bool_(True)
+"""No literals: see `compile.jit.kernel`."""
 
 
 @bundle
@@ -97,11 +102,11 @@ def _passes(linked, rows, linking):
     turns = linking.times if several else 1
     for turn in range(turns):
         last = turn == turns - 1
-        sweep(False, False, turn == 0, last and parts == 0, linked, linking)
-        sweep_rows(False, False, rows, linked, period_x, period_y)
+        sweep(_NO, _NO, turn == 0, last and parts == 0, linked, linking)
+        sweep_rows(_NO, _NO, rows, linked, period_x, period_y)
         if several:  # without what has just been solved
-            sweep_rows(True, True, rows, linked, period_x, period_y)
-            sweep(True, parts == 0, False, last, linked, linking)
+            sweep_rows(_YES, _YES, rows, linked, period_x, period_y)
+            sweep(_YES, parts == 0, _NO, last, linked, linking)
 
 
 @driver
@@ -144,29 +149,3 @@ look_alone, note_calm_alone, solve_alone, lay_down_alone, pick_up_alone, note_pu
     kernel(variant(each.function, "alone")) for each in (look, note_calm, solve, lay_down, pick_up, note_pull)
 )
 """The same, which stay on one thread also where circles use several."""
-
-# ---- called from Python, which has plain tuples ------------------------------------------------------------------------------
-
-
-@driver
-def call_look(linked, _, linking, position, velocity, inverse_mass):
-    """`look`."""
-    look(Linked(*linked), Linking(*linking), position, velocity, inverse_mass)
-
-
-@driver
-def call_solve(linked, rows, linking, position, velocity):
-    """`solve`."""
-    solve(Linked(*linked), Rows(*rows), Linking(*linking), position, velocity)
-
-
-@driver
-def call_lay_down(linked, _, linking, velocity):
-    """`lay_down`."""
-    lay_down(Linked(*linked), Linking(*linking), velocity)
-
-
-@driver
-def call_note_pull(linked, _, linking, acceleration):
-    """`note_pull`."""
-    note_pull(Linked(*linked), Linking(*linking), acceleration)

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pyverlet.compile.bundle import bundle
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.kernels.bounds import look, meet, moved, noted, put, wide
 from pyverlet.kernels.obstacles import search, tolerance
@@ -47,6 +48,23 @@ ROOM, NOBODY = -2, -1
 
 OPEN, ROUND, RECTANGLE = 0.0, 1.0, 2.0
 """What a room is; as numbers: [what, x0, y0, radius or x1, y1, restitution, friction]."""
+
+
+@bundle
+class Course:
+    """Obstacles, as `kernels.obstacles` has them, in their cells: entries of cell c from start[c] to start[c + 1].
+
+    room: its wall, which wins: (7,), see OPEN. along: (n, 2), becomes the acceleration left to those who are held, m/s^2, or 0.
+    rest: (n, 2), what rounding has taken from places in the substep before, and takes in this, m.
+    """
+
+    segments: Any
+    bodies: Any
+    start: Any
+    entries: Any
+    room: Any
+    along: Any
+    rest: Any
 
 
 class Surface(NamedTuple):
@@ -105,7 +123,7 @@ def _touched(b, nx, ny, depth, wx, wy, h, lag, e, mu, rest_speed, which):
     """The circle b meets a surface that moves with (wx, wy): what becomes of it, and the surface; NOBODY's if it bounced."""
     resting, from_x, from_y = b.resting, b.from_x, b.from_y
     # As the surface sees it: how fast it is, and how far it went.
-    b = noted(moved(b, b.x, b.y, b.vx - wx, b.vy - wy, from_x + h * wx, from_y + h * wy), 0)
+    b = noted(moved(b, b.x, b.y, b.vx - wx, b.vy - wy, from_x + h * wx, from_y + h * wy), np.int64(0))
     b = meet(b, nx, ny, depth, h, lag, e, mu, rest_speed)
     held = b.resting != 0
     b = noted(moved(b, b.x, b.y, b.vx + wx, b.vy + wy, from_x, from_y), resting | b.resting)
@@ -309,12 +327,10 @@ def _forget(along, rest):
 
 
 @kernel
-def _collide(
-    first, stop, segments, bodies, until, x0, y0, cell, columns, rows, start, entries, room, along, rest,
-    position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
-    before, turn, lift, h, lag, rest_speed, drop,
-):  # fmt: skip
+def _collide(first, stop, circles, course, until, x0, y0, cell, columns, rows, h, lag, rest_speed, drop):
     """`collide`, of the circles from `first` up to `stop`."""
+    position, before, inverse_mass, along, rest = circles.position, circles.start, circles.inverse_mass, course.along, course.rest
+    segments, bodies, start, entries, room = course.segments, course.bodies, course.start, course.entries, course.room
     high_x, high_y = x0 + (columns + 1) * cell, y0 + (rows + 1) * cell  # one more, for rounding
     if _nobody(position[first:stop], before[first:stop], x0, y0, high_x, high_y, cell):
         _forget(along[first:stop], rest[first:stop])
@@ -326,12 +342,7 @@ def _collide(
         if inverse_mass[i] > 0 and not _alone(
             before[i, 0], before[i, 1], position[i, 0], position[i, 1], x0, y0, cell, columns, rows, start
         ):
-            b = wide(
-                look(
-                    i, position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits,
-                    spent, before, turn, lift,
-                )
-            )  # fmt: skip
+            b = wide(look(i, circles))
             rest_x, rest_y = np.float64(rest[i, 0]), np.float64(rest[i, 1])
             px, py = before[i, 0] + rest_x, before[i, 1] + rest_y
             if np.isfinite(px + py + b.x + b.y):
@@ -344,26 +355,19 @@ def _collide(
                 )  # fmt: skip
                 if met:
                     along[i, 0], along[i, 1] = along_x, along_y
-                    put(i, b, position, velocity, spin, fed, resting, hits, spent, turn)
+                    put(i, b, circles)
                     rest[i, 0], rest[i, 1] = b.x - position[i, 0], b.y - position[i, 1]
         if not met:
             rest[i, 0] = rest[i, 1] = 0.0
 
 
 @parallel_kernel
-def collide(
-    segments, bodies, until, x0, y0, cell, columns, rows, start, entries, room, along, rest,
-    position, velocity, acceleration, spin, radius, inverse_mass, restitution, friction, fed, resting, hits, spent,
-    before, turn, lift, h, lag, rest_speed, drop,
-):  # fmt: skip
-    """All circles, from their places `before` the substep (n, 2) to `position`; `until`: seconds into the frame at its end.
+def collide(circles, course, until, x0, y0, cell, columns, rows, h, lag, rest_speed, drop):
+    """All circles, from where they were at the `start` of the substep to `position`; until: seconds into the frame at its end.
 
-    room: its wall, which wins: (7,), see OPEN. along: (n, 2), becomes the acceleration left to those who are held, m/s^2, or 0.
-    rest: (n, 2), what rounding has taken from places in the substep before, and takes in this, m. drop: of the integrator.
+    (x0, y0) to rows: of the cells, see `kernels.obstacles`. drop: of the integrator.
     """
-    for block in prange((position.shape[0] + _BLOCK - 1) // _BLOCK):
-        _collide(
-            block * _BLOCK, min((block + 1) * _BLOCK, position.shape[0]), segments, bodies, until, x0, y0, cell, columns, rows,
-            start, entries, room, along, rest, position, velocity, acceleration, spin, radius, inverse_mass, restitution,
-            friction, fed, resting, hits, spent, before, turn, lift, h, lag, rest_speed, drop,
-        )  # fmt: skip
+    count = circles.position.shape[0]
+    for block in prange((count + _BLOCK - 1) // _BLOCK):
+        first, stop = block * _BLOCK, min((block + 1) * _BLOCK, count)
+        _collide(first, stop, circles, course, until, x0, y0, cell, columns, rows, h, lag, rest_speed, drop)

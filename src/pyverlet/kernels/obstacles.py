@@ -220,7 +220,7 @@ def _first_meeting(
 @kernel
 def search(segments, x0, y0, cell, columns, rows, start, entries, fresh, px, py, qx, qy, radius):
     """The earliest meeting of the way from p to q with any segment; as `_first_meeting`."""
-    best, gap, depth, nx, ny, k = NEVER, 0.0, 0.0, 0.0, 0.0, -1
+    best, gap, depth, nx, ny, k = NEVER, 0.0, 0.0, 0.0, 0.0, np.int64(-1)
     dx, dy = qx - px, qy - py
     # The part of the way that is over the grid, in pieces no longer than a cell; the middle of a piece stands for it.
     s0, s1 = 0.0, 1.0

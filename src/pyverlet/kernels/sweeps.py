@@ -176,7 +176,7 @@ def _push(circles, pairs, law, cut, looks, sets_out, claims):
         if left == 0:
             break
         if left < _FEW:
-            _refine_some(0, cut[parity, -1], parity, circles, pairs, law)
+            _refine_some(np.int64(0), cut[parity, -1], parity, circles, pairs, law)
         else:
             for part in prange(cut.shape[1] - 1):
                 _refine_some(cut[parity, part], cut[parity, part + 1], parity, circles, pairs, law)

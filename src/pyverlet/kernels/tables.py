@@ -1,6 +1,6 @@
 """What the kernels of contacts are handed: circles, pairs, and the law of a substep, by name.
 
-Python hands over plain tuples, which are quicker to look through; drivers give them these names.
+Of numbers Python hands over plain tuples, which are quicker to look through; drivers give them the names.
 """
 
 from __future__ import annotations

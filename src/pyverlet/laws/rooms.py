@@ -19,7 +19,6 @@ from pyverlet.ground.constants import STANDS_OUT
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import bounds, cage, frame, leaving, meetings
 from pyverlet.laws.turning import surface
-from pyverlet.state.moves import bodies
 from pyverlet.state.seam import NONE, Seam
 from pyverlet.state.slots import Slots
 
@@ -124,7 +123,7 @@ class _Walls(Boundary):
 
     def _confine(self, kernel: Any, shape: Sequence[float], state: Slots, h: float, lag: float, rest_speed: float) -> None:
         shape, laws = self._rounded(shape, state, h, lag, rest_speed)
-        kernel(*shape, *bodies(state), *laws)
+        kernel(state.circles(), *shape, *laws)
 
     def leave(self, state: Slots) -> None:
         # Where there are obstacles it may be one of them that holds. Whom a wall rubs is not left all that drives it.

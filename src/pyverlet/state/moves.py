@@ -77,11 +77,3 @@ def first_non_finite(state: Slots) -> int:
         if slot >= 0:
             return int(state.particle[slot])
     return -1
-
-
-def bodies(state: Slots) -> tuple[Array, ...]:
-    """What walls need of the particles: the arrays that `kernels.bounds.look` takes, in that order."""
-    return (
-        state.position, state.velocity, state.acceleration, state.spin, state.radius, state.inverse_mass, state.restitution,
-        state.friction, state.fed, state.resting, state.hits, state.spent, state.start, state.turn, state.lift,
-    )  # fmt: skip

@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.compile.bundle import hold
+from pyverlet.compile.rows import WIDTH
 from pyverlet.compile.stealing import Claims
 from pyverlet.ground import memory
-from pyverlet.kernels import motion
+from pyverlet.kernels import motion, tables
 from pyverlet.state import seam
 from pyverlet.state.state import COLUMNS, EVERYONE, MARKS, ROWS, SET, State
 from pyverlet.state.unchanged import Unchanged
@@ -66,6 +68,8 @@ class Slots:
         self.drop, self.lean, self.total_mass, self.pins, self.taken, self.worked, self.given = 1.0, 0.0, 0.0, False, 0.0, 0.0, 0
         self.h = 0.0
         self.claims = Claims()
+        self._none = tuple(np.empty(shape, dtype) for shape in (0, (0, 2), (0, WIDTH)))
+        self._circles: Any = None
         self._resize(0)
 
     def __len__(self) -> int:
@@ -266,6 +270,17 @@ class Slots:
         self.gather(state)
         if saved["void"][0]:  # the next frame is to find that out, too
             self._changed = self._grows = True
+
+    def circles(self) -> Any:
+        """What walls and obstacles need of the particles: `kernels.tables.Circles`, of which that for contacts is empty."""
+        none, rows, wide = self._none
+        arrays = (
+            self.position, self.velocity, self.acceleration, self.inverse_mass, rows, rows, self.resting, self.spin, none,
+            self.fed, wide, self.turn, self.lift, none, self.start, self.radius, self.restitution, self.friction, self.hits,
+            self.spent, rows, none, none, none, none, rows,
+        )  # fmt: skip
+        self._circles = hold(tables.Circles, arrays, self._circles)
+        return self._circles
 
     def scratch(self, number: int) -> Array:
         """An (n, 2) array for use within one substep; its contents are left over from whoever used it last."""

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.compile import clock, jit
+from pyverlet.compile.bundle import hold
 from pyverlet.ground.constants import FUSED_FROM
 from pyverlet.kernels import drive, frame, fused
 from pyverlet.laws.contacts.broadphase import Strips
@@ -58,6 +59,7 @@ class Substeps:
         self._books: Page | None = None
         self._rows: Any = None  # forces, as numbers, and the dtype of the table made of them
         self._table: tuple[Array, ...] = ()
+        self._forces: Any = None
 
     def begin(self, contacts: ContactSolver | None) -> Substeps:
         """A frame begins. That before may have been broken off, and the user may have changed everything since."""
@@ -103,7 +105,7 @@ class Substeps:
             forces.fall(state)
         wide = contacts.set_up(state, h, lag, forces.strongest, world.links if links else None)
         walls, shape = room.compiled(state)  # that circles rub is known by now
-        lends, loans = contacts.lending
+        lends = contacts.lends
         if smooth := walls == frame.SMOOTH_CAGE and not (links or lends):
             wide.leave_arriving()
         last = world.substeps - 1
@@ -118,11 +120,11 @@ class Substeps:
             return True
         services: Any = ()
         if beside:
-            services = self._services(world, books, rows, course.compiled(state, room), links, loans, h, lag)
+            services = self._services(world, books, rows, course.compiled(state, room), links, contacts.lent(), h, lag)
         stop, sets_out = world.substeps if leaps else substep + 1, not opens and (lends or out is not wide.moved)
         begin = (wide.takes_looks(), int(sets_out), int(opens), frame.WHOLE, *state.reals(*forces.gravity))
         reached, self.leapt, strongest = frame.frames[beside][wide.kind](
-            substep, stop, last, wide.circles, wide.arrays, wide.law, (walls, *state.reals(*shape)), tuple(services),
+            substep, stop, last, wide.circles, wide.packed, wide.law, (walls, *state.reals(*shape)), tuple(services),
             native or (), wide.cut(), begin, strips.checked, state.real(strips.allowed * strips.allowed),
             state.claims(), world.profile.spent, (clock.address(), clock.tick()),
         )  # fmt: skip
@@ -166,19 +168,19 @@ class Substeps:
         if contacts:
             self._do(frame.PULLED, world, contacts, h, lag)
 
-    def _do(self, part: int, world: Any, contacts: ContactSolver, h: float, lag: float) -> None:
+    def _do(self, part: np.int64, world: Any, contacts: ContactSolver, h: float, lag: float) -> None:
         """What contacts do in one part of a substep, as `kernels.frame` names them."""
-        lends, loans = contacts.lending
+        lends = contacts.lends
         if part in _OF_LENT_AND_LINKED and not lends:
             return
         state, links = world._slots, world.links.compiled(world._slots, h) if world.links else ()
         services: Any = ()
         if beside := _linked(world) if links else "served" * lends:
-            services = tuple(self._services(world, None, (), world._course.nothing(state), links, loans, h, lag))
+            services = tuple(self._services(world, None, (), world._course.nothing(state), links, contacts.lent(), h, lag))
         contacts.wide.do(part, state, beside, services)
 
     def _services(
-        self, world: Any, books: Any, rows: Any, course: Any, links: Any, loans: Any, h: float, lag: float
+        self, world: Any, books: Any, rows: Any, course: tuple[Any, Any], links: Any, loans: Any, h: float, lag: float
     ) -> frame.Services:
         """What the world has beside circles, a room and gravity: `rows` of forces, obstacles, `books`, links, loans."""
         state, gravity = world._slots, world._force_sum.gravity
@@ -189,10 +191,10 @@ class Substeps:
                 np.array(kind, np.int64), np.array(vector, state.dtype).reshape(-1, 2),
                 np.array(number, state.dtype).reshape(-1, drive.NUMBERS),
             )  # fmt: skip
+        self._forces = hold(drive.Forces, (*self._table, state.force, state.mass), self._forces)
         ahead = world.integrator.velocity_lag * h if world._force_sum.velocity_dependent else 0.0
         return frame.Services(
-            h, lag, gravity, (*self._table, state.force, *state.reals(*state.seam.period)),
-            state.real(ahead), course, state.mass,
+            h, lag, gravity, self._forces, state.reals(*state.seam.period), state.real(ahead), *course, state.drop,
             np.empty((world.substeps if books else 0, frame.LOOKS)), links, loans, world.time,
         )  # fmt: skip
 
@@ -212,8 +214,8 @@ class Substeps:
         self._share_out(strips, wide.lanes, state.dtype)
         self.leapt, self.marked = leaps and self.substep < last, self.substep == last
         about = (strips.held, self._place, wide.takes_looks(), int(self.leapt), int(self.marked), strips.checked, far)
-        arrays = (*wide.arrays[: frame.NORMAL], self._normal, *wide.arrays[frame.NORMAL + 1 :])
-        strayed = fused.substep(self._cut, wide.circles, arrays, wide.law, tuple(map(state.real, room[:3])), about)
+        pairs, room = wide.striped(self._normal), tuple(map(state.real, room[:3]))
+        strayed = fused.substep(self._cut, wide.circles, pairs, wide.law, room, about)
         contacts.broad_phase.strayed = bool(strayed) if self.leapt else None
         if self.marked:
             wide.look_anew()

@@ -176,9 +176,13 @@ class ContactSolver:
         return wide
 
     @property
-    def lending(self) -> tuple[bool, tuple[Any, Any, Any]]:
-        """Whether circles lend each other inertia since `set_up`, and what `kernels.lending` takes."""
-        return self._lends, self._loans.compiled if self._lends else self._loans.nobody
+    def lends(self) -> bool:
+        """Whether circles lend each other inertia since `set_up`."""
+        return self._lends
+
+    def lent(self) -> tuple[Any, Any, Any]:
+        """What `kernels.lending` takes, empty if none does."""
+        return self._loans.compiled(self._lends)
 
     def spent(self) -> Any:
         """(2,) J that impacts, and friction, have taken in this frame, negative."""

@@ -7,14 +7,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.compile.bundle import hold
 from pyverlet.compile.lanes import LANES
 from pyverlet.ground.constants import FED, LOAN_S, PUSHED, SUNK
 from pyverlet.kernels import balance, hanging
+from pyverlet.kernels.lending import Hanging, Lending
 from pyverlet.kernels.loans import CHUNK
 from pyverlet.laws.contacts.wide import Wide
 from pyverlet.state.slots import Slots
 
 Array = NDArray[Any]
+
+_NONE: tuple[Any, Any] = None, None
 
 
 class Lent(NamedTuple):
@@ -27,17 +31,15 @@ class Lent(NamedTuple):
 
 
 class Loans:
-    """Who has lent how much to the others, and what that changes for the contacts of a substep. Costs nothing until `begin`.
-
-    Attributes:
-        compiled: what `kernels.lending` takes since `begin`, (arrays, arrays of `kernels.hanging`, terms).
-        nobody: the same, empty, of worlds where nobody lends.
-    """
+    """Who has lent how much to the others, and what that changes for the contacts of a substep. Costs nothing until `begin`."""
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self._dtype = dtype
         self.forget()
-        self.compiled = self.nobody = self._arrays(np.empty(0, dtype)), self._hanging, (dtype.type(0),) * 5
+        self._lending, self._terms = self._arrays(np.empty(0, dtype)), (dtype.type(0),) * 5
+        self._empty = self._lending, self._hanging
+        self._nobody: Any = None
+        self._bundles = _NONE
 
     def forget(self) -> None:
         """Nobody has lent anything."""
@@ -82,9 +84,20 @@ class Loans:
         if linked is not None:
             self._linked[linked] = 1
         # At rest a substep ends with the velocity -(1 - PUSHED / FED) a h: the same for all that way.
-        terms = state.reals(h, (state.drop - 1 + PUSHED / FED) * h * h, min(h / LOAN_S, 1.0), SUNK * strongest * LOAN_S, h)
-        self.compiled = self._arrays(state.mass), self._hanging, terms
+        fall, part, sunk = (state.drop - 1 + PUSHED / FED) * h * h, min(h / LOAN_S, 1.0), SUNK * strongest * LOAN_S
+        self._lending, self._terms = self._arrays(state.mass), state.reals(h, fall, part, sunk, h)
         return self._before, self._spin_before, self._kept.lent, self._kept.busy, self._calm, self._inertia
+
+    def compiled(self, lends: bool) -> tuple[Any, Any, Any]:
+        """What `kernels.lending` takes since `begin`: `Lending`, `Hanging`, and the numbers of `Terms`.
+
+        lends: whether anybody does; else all is empty.
+        """
+        if not lends:
+            self._nobody = self._nobody or _bundled(*self._empty)
+            return *self._nobody, self._terms
+        self._bundles = _bundled(self._lending, self._hanging, self._bundles)
+        return *self._bundles, self._terms
 
     def _arrays(self, mass: Array) -> tuple[Array, ...]:
         _, lent, busy, held = self._kept
@@ -122,3 +135,7 @@ class Loans:
     def restore(self, saved: Lent) -> None:
         """Back to what was saved."""
         self._kept = Lent(*(array.copy() for array in saved))
+
+
+def _bundled(lending: tuple[Array, ...], hanging: tuple[Array, ...], before: tuple[Any, Any] = _NONE) -> tuple[Any, Any]:
+    return hold(Lending, lending, before[0]), hold(Hanging, hanging, before[1])

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.compile import jit
+from pyverlet.compile.bundle import hold
 from pyverlet.compile.lanes import LANES
 from pyverlet.compile.rows import WIDTH
 from pyverlet.ground import memory
@@ -49,6 +50,7 @@ class Wide:
         touched: (room,) bool, whether pairs have in the frame before, as events mark it.
         spent: (strips, 3) J that impacts, and friction, have taken in this frame, negative; and the virial of contacts: sum of
             what pushes each pair apart times their distance, N s m.
+        circles, packed, law: what kernels of contacts take since `set_up`, as `kernels.tables` describes it.
         calm: (n,) m/s, up to which circles that lend inertia, or are linked, meet as contacts at rest do; (0,): none does.
         weighs: whether that is asked for.
         asks: whether any pair may bounce or rub, or the virial is asked for, or who carries weight. rubs: whether any may rub.
@@ -73,6 +75,9 @@ class Wide:
         self.calm = none = np.empty(0, dtype)
         rows = np.empty((0, 2), dtype)
         self._lent, self._nobody = False, (rows, none, none, none)
+        self.circles: Any = None
+        self.packed: Any = None
+        self._striped: Any = None
         self._hold_circles(0)
 
     @property
@@ -214,7 +219,7 @@ class Wide:
         self, state: Slots, h: float, lag: float, strongest: float, rest_speed: float, accounts: bool,
         noted: tuple[Array, ...] | None, *, linked: bool = False,
     ) -> None:  # fmt: skip
-        """Everything that the sweeps of this substep, and of those that follow it alike, need: `circles`, `arrays` and `law`.
+        """Everything that the sweeps of this substep, and of those that follow it alike, need: `circles`, `packed` and `law`.
 
         noted: where circles lend inertia, where impacts note what they do: `Loans.begin`. linked: whether links pull at any.
         """
@@ -232,11 +237,12 @@ class Wide:
         if self.rubs:
             np.multiply(self._rough, state.real((state.drop - PUSHED / FED) * h), out=self._leans)
             state.turn, state.lift = turn, self._lift
-        self.circles = (
+        circles = (
             state.position, state.velocity, state.acceleration, state.inverse_mass, self.origin, self.moved, state.resting,
             state.spin, self._carries, state.fed, self._rows, turn, self._lift, self._leans, state.start,
             state.radius, state.restitution, state.friction, state.hits, state.spent, *noted,
         )  # fmt: skip
+        self.circles = hold(tables.Circles, circles, self.circles)
         carried = CARRIED_WEIGHT * strongest * h if strongest > 0 else np.inf
         deep, grazes = (DEEP_LENT, 0.0) if self._lent else (DEEP, 1.0)
         self.law = (
@@ -244,10 +250,17 @@ class Wide:
             1, *state.reals(h, lag, FED / PUSHED / h, LARGEST_PUSH, deep, rest_speed, grazes), int(strongest > 0),
             state.real(carried),
         )  # fmt: skip
-        self.arrays = (
+        pairs = (
             self.begin, self.lanes, self.apart, self.lane_i, self.lane_j, self.gap, self.reach, self.share, self.reduced,
             self.made_of, self.normal, self.depth, self.slip, self.closing, self._deep, self._deeps, self.spent,
         )  # fmt: skip
+        self.packed = hold(tables.Pairs, pairs, self.packed)
+
+    def striped(self, normal: Array) -> Any:
+        """The same pairs, whose normals are kept elsewhere."""
+        arrays = tuple(normal if array is self.normal else array for array in self.packed.arrays)
+        self._striped = hold(tables.Pairs, arrays, self._striped)
+        return self._striped
 
     def leave_arriving(self) -> None:
         """The room puts circles where pushes have moved them: one pass over the memory less."""
@@ -269,7 +282,7 @@ class Wide:
     def _lanes(self) -> tuple[Array, Array, Array, Array]:
         return self.begin, self.lanes, self.lane_i, self.lane_j
 
-    def do(self, part: int, state: Slots, beside: str = "", services: tuple[Any, ...] = ()) -> None:
+    def do(self, part: np.int64, state: Slots, beside: str = "", services: tuple[Any, ...] = ()) -> None:
         """One part of a substep by itself; beside, services: as for `kernels.frame`.
 
         `TOUCHED`: impacts, overlaps and slips; circles are then where that has moved them. `STILLED`: touching circles neither
@@ -278,7 +291,7 @@ class Wide:
         looks = self.takes_looks() if part == frame.TOUCHED else 0
         nothing = state.reals(0, 0, 0, 0, 0, 0)
         frame.frames[beside][self.kind](
-            0, 1, -1, self.circles, self.arrays, self.law, (frame.OPEN, *nothing), services, (), self.cut(),
+            0, 1, -1, self.circles, self.packed, self.law, (frame.OPEN, *nothing), services, (), self.cut(),
             (looks, 1, 0, part, *nothing[:2]), self.origin, nothing[0], state.claims(), _NO_TIME, (0, 0.0),
         )  # fmt: skip
 

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.compile import jit
+from pyverlet.compile.bundle import hold
 from pyverlet.ground import checks
 from pyverlet.ground.constants import LINKS_ONE_THREAD_BELOW, REST_ACCELERATIONS
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import linked, runs
+from pyverlet.kernels import link_rows, linked, runs
 from pyverlet.laws.contacts.broadphase import PairList
 from pyverlet.laws.links._chains import ChainPool
 from pyverlet.laws.links._link import Array, Link
@@ -53,7 +54,9 @@ class Links:
         self._apart_changed = False
         self.broken = np.empty(0, BROKEN)
         self._packed: dict[type[Pool], Pool] = {}
-        self._linked: tuple[Any, Any] | None = None
+        self._linked: Any = None
+        self._rows: Any = None
+        self._bundled = False  # whether these two are of the arrays of now
 
     # ---- a list --------------------------------------------------------------------------------------------------------
 
@@ -163,7 +166,7 @@ class Links:
         self._work.begin(self._state, self._past)
         for pool in self._kept:
             pool.begin()
-        self._linked = None
+        self._bundled = False
         self._know_apart()
         changed, self._apart_changed = self._apart_changed, False
         return changed
@@ -178,16 +181,17 @@ class Links:
         self._packed = kinds | {type(pool): pool for pool in empty}
 
     def compiled(self, state: Slots, h: float) -> tuple[Any, Any, Any]:
-        """What `kernels.linked` is handed in the substeps of a frame, as plain tuples.
+        """What `kernels.linked` is handed in the substeps of a frame: `Linked`, `Rows`, and the numbers of `Linking`.
 
         Good as long as the order of the slots is.
         """
         self._work.slots(state)
-        if self._linked is None:
+        if not self._bundled:
             chains, rows, pins = (self._packed[kind].arrays() for kind in (ChainPool, RowPool, PinPool))
-            self._linked = (*self._work.arrays(), *chains, *pins), rows
+            self._linked = hold(linked.Linked, (*self._work.arrays(), *chains, *pins), self._linked)
+            self._rows, self._bundled = hold(link_rows.Rows, rows, self._rows), True
         numbers = (h, *self._work.seam.period, len(self._work), self._iterations, REST_ACCELERATIONS * h)
-        return *self._linked, numbers
+        return self._linked, self._rows, numbers
 
     def together(self, state: Slots) -> Array:
         """Slots of those they join, as long as the order of the slots is; from then on kernels know with whom."""
@@ -224,23 +228,27 @@ class Links:
 
     def before(self, state: Slots, h: float) -> None:
         """Before the integrator: remember where the substep starts."""
+        links, _, numbers = self.compiled(state, h)
         with self._threads():
-            linked.call_look(*self.compiled(state, h), state.position, state.velocity, state.inverse_mass)
+            linked.look(links, linked.Linking(*numbers), state.position, state.velocity, state.inverse_mass)
 
     def solve(self, state: Slots, h: float) -> None:
         """Move the linked particles to where their links allow, and break those that pull too hard."""
+        links, rows, numbers = self.compiled(state, h)
         with self._threads():
-            linked.call_solve(*self.compiled(state, h), state.position, state.velocity)
+            linked.solve(links, rows, linked.Linking(*numbers), state.position, state.velocity)
 
     def lay_down(self, state: Slots, h: float) -> None:
         """Before walls, where there are contacts: velocities are without what carries the pull of links."""
+        links, _, numbers = self.compiled(state, h)
         with self._threads():
-            linked.call_lay_down(*self.compiled(state, h), state.velocity)
+            linked.lay_down(links, linked.Linking(*numbers), state.velocity)
 
     def after(self, state: Slots, h: float) -> None:
         """After the contacts: what the links did is part of the acceleration, for integrators that remember it."""
+        links, _, numbers = self.compiled(state, h)
         with self._threads():
-            linked.call_note_pull(*self.compiled(state, h), state.acceleration)
+            linked.note_pull(links, linked.Linking(*numbers), state.acceleration)
 
     def scatter(self) -> None:
         """The frame is good: what it did to the links holds."""

@@ -7,20 +7,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.compile.bundle import hold
 from pyverlet.ground.constants import OBSTACLE_CELLS
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import meetings
 from pyverlet.kernels import obstacles as kernels
 from pyverlet.laws.obstacles._base import Obstacle, Obstacles
 from pyverlet.laws.rooms import Boundary
-from pyverlet.state.moves import bodies
 from pyverlet.state.seam import NONE
 from pyverlet.state.slots import Slots
 
 Array = NDArray[Any]
 
-_NO_CELLS = (0.0, 0.0, 1.0, 0, 0, np.zeros(1, np.int64), np.zeros(0, np.int32))
-_NO_WALLS = np.zeros(7)
+_NO_CELLS = 0.0, 0.0, 1.0, 0, 0
+_NOWHERE = np.zeros(1, np.int64), np.zeros(0, np.int32), np.zeros(7)
 
 
 class Course:
@@ -46,6 +46,9 @@ class Course:
         self._largest = 0.0
         self._cells: tuple[Any, ...] = ()
         self._order: Array | None = None
+        self._walls = np.zeros(7)
+        self._bundle: Any = None
+        self._nothing: Any = None
         self._rest = np.empty((0, 2))  # what rounding has taken from places in the substep before
 
     def __bool__(self) -> bool:
@@ -106,9 +109,8 @@ class Course:
         """
         self.set_up(state, time, h)
         collide: Any = meetings.collide
-        segments, placed, cells, *taken, drop = self.compiled(state, room)
-        numbers = map(state.real, (h, lag, rest_speed))
-        collide(segments, placed, time + h, *cells, *taken, *bodies(state), *numbers, drop)
+        course, cells = self.compiled(state, room)
+        collide(state.circles(), course, time + h, *cells, *state.reals(h, lag, rest_speed), state.drop)
 
     @property
     def still(self) -> bool:
@@ -132,16 +134,22 @@ class Course:
         if time == 0.0 or self._order is not state.particle:  # every new order is a new array
             self._order, self._rest = state.particle, np.zeros_like(state.position)
 
-    def compiled(self, state: Slots, room: Boundary) -> tuple[Any, ...]:
-        """What `kernels.meetings.collide` takes: segments, bodies, cells, walls, along, rest, drop; empty without obstacles."""
+    def compiled(self, state: Slots, room: Boundary) -> tuple[Any, tuple[Any, ...]]:
+        """What `kernels.meetings.collide` takes of them, `Course`, and of their cells; empty without obstacles."""
         if not self:
             return self.nothing(state)
-        walls = np.array(room.walls(), float)
-        return self._segments, self._bodies, self._cells, walls, state.along, self._rest, state.drop
+        self._walls[:] = room.walls()
+        *cells, start, entries = self._cells
+        arrays = self._segments, self._bodies, start, entries, self._walls, state.along, self._rest
+        self._bundle = hold(meetings.Course, arrays, self._bundle)
+        return self._bundle, tuple(cells)
 
-    def nothing(self, state: Slots) -> tuple[Any, ...]:
+    def nothing(self, state: Slots) -> tuple[Any, tuple[Any, ...]]:
         """The same if there were none."""
-        return self._segments[:0], self._bodies[:0], _NO_CELLS, _NO_WALLS, state.along, state.position[:0], state.drop
+        if not self._nothing or self._nothing.arrays[-1].dtype != state.dtype:
+            rows, tables = np.empty((0, 2), state.dtype), (np.zeros(0, kernels.SEGMENT), np.zeros(0, kernels.BODY))
+            self._nothing = hold(meetings.Course, (*tables, *_NOWHERE, rows, rows))
+        return self._nothing, _NO_CELLS
 
     def end(self, dt: float) -> None:
         """At the end of a frame that went well: the obstacles are where they moved to."""
