@@ -111,8 +111,9 @@ def where(page: Page, particle: int) -> dict[str, float]:
 
 def everywhere(page: Page, count: int) -> NDArray[np.float64]:
     """(count, 4) of x, y in metres and left, top in CSS pixels."""
-    script = "(n) => Array.from({length: n}, (_, i) => Object.values(window.pyverlet.where(i)))"
-    return np.array(page.evaluate(script, count), dtype=np.float64)
+    all_of_them = "Array.from({length: n}, (_, i) => Object.values(window.pyverlet.where(i)))"
+    asked = f"(n) => {{ try {{ return {all_of_them}; }} catch {{ return null; }} }}"
+    return np.array(page.wait_for_function(asked, arg=count).json_value(), dtype=np.float64)
 
 
 def pause(page: Page) -> None:

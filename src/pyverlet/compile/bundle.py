@@ -24,12 +24,22 @@ class _Bundle(types.StructRef):  # type: ignore[misc]
         return tuple((name, types.unliteral(kind)) for name, kind in fields)
 
 
+class _Held(structref.StructRefProxy):  # type: ignore[misc]
+    """What Python holds of a bundle: it, and the arrays in it."""
+
+    arrays: tuple[Any, ...]
+
+    def __reduce__(self) -> Any:
+        """A copy is of copies of the arrays."""
+        return hold, (type(self), self.arrays)
+
+
 def bundle(described: type) -> Any:
     """What a class with annotations describes, in that order: made by `hold`, read by compiled code."""
     kind = structref.register(type("Type", (_Bundle,), {"__module__": described.__module__}))
     kind.__qualname__ = f"{described.__qualname__}.Type"  # compiled code is kept on disk under the names of its types
     about = {name: getattr(described, name) for name in ("__module__", "__qualname__", "__doc__")}
-    held: Any = type(described.__name__, (structref.StructRefProxy,), {**about, "Type": kind})
+    held: Any = type(described.__name__, (_Held,), {**about, "Type": kind})
     structref.define_constructor(held, kind, list(described.__annotations__))
     structref.define_boxing(kind, held)
     held.make = kernel(variant(make, described.__name__, Bundle=held))

@@ -74,7 +74,7 @@ class Wide:
         self.spent = np.zeros((1, 3))
         self.calm = none = np.empty(0, dtype)
         rows = np.empty((0, 2), dtype)
-        self._lent, self._nobody = False, (rows, none, none, none)
+        self._lent, self._empty, self._own_calm = False, (rows, none), none
         self.circles: Any = None
         self.packed: Any = None
         self._striped: Any = None
@@ -231,9 +231,13 @@ class Wide:
             if fresh:  # each first sweep finds them as the second one before has left them: there may have been none
                 self._rows[:, :3], self._rows[:, 3] = 0, self._carries
         if not noted:
-            noted = (*self._nobody, np.zeros(len(state) if linked and self.asks else 0, self._dtype), state.position[:0])
+            if len(self._own_calm) != (count := len(state) if linked and self.asks else 0):
+                self._own_calm = np.empty(count, self._dtype)
+            self._own_calm.fill(0)
+            rows, none = self._empty
+            noted = rows, none, none, none, self._own_calm, rows
         self.calm = noted[_CALM]
-        turn = self._turn if self.rubs else self._turn[:0]
+        turn = self._turn if self.rubs else self._empty[1]
         if self.rubs:
             np.multiply(self._rough, state.real((state.drop - PUSHED / FED) * h), out=self._leans)
             state.turn, state.lift = turn, self._lift

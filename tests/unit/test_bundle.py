@@ -1,0 +1,67 @@
+"""Many arrays under one name: what Python holds, and what kernels read in it."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet.compile.bundle import hold
+from pyverlet.kernels import bounds
+from pyverlet.kernels.drive import Forces
+from pyverlet.state.slots import Slots
+
+
+@pytest.fixture
+def slots() -> Slots:
+    world = pv.World()
+    world.add(position=[(1, 2), (3, 4)], radius=0.5, mass=1.0)
+    slots = Slots(np.dtype(np.float32))
+    slots.gather(world._state)
+    return slots
+
+
+def test_a_bundle_is_made_anew_when_an_array_is_another(slots: Slots) -> None:
+    first = slots.circles()
+    assert slots.circles() is first
+    slots.note_start()
+    second = slots.circles()
+    assert second is not first
+    assert second.arrays[0] is first.arrays[0] is slots.position
+
+
+def test_what_is_written_into_an_array_is_read_in_its_bundle(slots: Slots) -> None:
+    circles = slots.circles()
+    slots.position[1] = (7, 8)
+    body = bounds.look(1, circles)
+    assert (body.x, body.y) == (7, 8)
+    bounds.put(0, body, circles)
+    assert tuple(slots.position[0]) == (7, 8)
+
+
+def test_a_bundle_outlives_whoever_made_its_arrays() -> None:
+    def made() -> object:
+        none = np.empty(0, np.float32)
+        return hold(Forces, (np.empty(0, np.int64), none.reshape(0, 2), none.reshape(0, 2), none.reshape(0, 2), none))
+
+    bundles = [made() for _ in range(100)]
+    assert len({id(array) for bundle in bundles for array in bundle.arrays}) == 500  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("way", ["copy", "pickle"])
+def test_a_copy_is_of_copies_of_the_arrays(slots: Slots, way: str) -> None:
+    mine = slots.circles()
+    theirs = copy.deepcopy(mine) if way == "copy" else pickle.loads(pickle.dumps(mine))
+    body = bounds.look(1, mine)
+    bounds.put(0, body, theirs)
+    assert tuple(theirs.arrays[0][0]) == (3, 4)
+    assert tuple(slots.position[0]) == (1, 2)
+
+
+def test_copied_with_its_slots_it_is_still_theirs(slots: Slots) -> None:
+    slots.circles()
+    other = copy.deepcopy(slots)
+    assert other.circles().arrays[0] is other.position
