@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -59,6 +60,45 @@ def test_a_copy_is_of_copies_of_the_arrays(slots: Slots, way: str) -> None:
     bounds.put(0, body, theirs)
     assert tuple(theirs.arrays[0][0]) == (3, 4)
     assert tuple(slots.position[0]) == (1, 2)
+
+
+def drag(world: pv.World) -> None:
+    world.forces.append(pv.Drag(linear=0.01))
+
+
+def segment(world: pv.World) -> None:
+    world.obstacles.append(pv.Segment((-1, 1.5), (1, 1.5)))
+
+
+def stick(world: pv.World) -> None:
+    group = world.add(position=[(-0.5, 1), (0.5, 1)], radius=0.1)
+    world.links.append(pv.Stick(group, 0, 1))
+    world.links.append(pv.Pin(group, 0))
+
+
+@pytest.mark.parametrize("change", [None, drag, segment, stick])
+def test_as_long_as_nothing_changes_a_world_keeps_its_bundles(change: Callable[[pv.World], None] | None) -> None:
+    # A bundle that is made in every frame takes as long as what it spares.
+    world = pv.World(boundary=pv.Circle(radius=2))
+    world.add(position=[(0, -1.9), (0.3, -1.8)], radius=0.1)
+    if change:
+        change(world)
+    world.run(seconds=10)
+    contacts = world._contacts
+    assert contacts
+
+    def bundles() -> list[object]:
+        return [contacts.wide.circles, contacts.wide.packed, world._run._beside]
+
+    assert (world._run._beside is not None) is (change is not None)
+    kept = 0
+    for _ in range(60):
+        before, lists = bundles(), contacts.broad_phase.rebuilds
+        world.step(1 / 60)
+        if contacts.broad_phase.rebuilds == lists:  # else there are other pairs
+            assert all(one is other for one, other in zip(bundles(), before, strict=True))
+            kept += 1
+    assert kept > 10
 
 
 def test_copied_with_its_slots_it_is_still_theirs(slots: Slots) -> None:

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pyverlet.compile.bundle import bundle
 from pyverlet.compile.clock import note
 from pyverlet.compile.jit import driver, kernel, parallel_kernel, prange, variant
 from pyverlet.compile.lanes import copy_row
@@ -117,28 +118,39 @@ class Start(NamedTuple):
     gy: Any
 
 
-class Services(NamedTuple):
-    """What a world has beside circles, a room and gravity; empty arrays for what it has not.
+@bundle
+class Beside:
+    """What there may be beside circles, a room and gravity, empty where it is not there: what `drive`, `meetings.collide`,
+    `kernels.lending` (loans, hanging) and, where there are links, `kernels.linked` (linked, rows) take.
+    """
 
-    h, lag: s, in float64. down: gravity, m/s^2, in float64. forces, period, ahead: what `drive` takes. course, cells, drop: what
-    `meetings.collide` takes. energies: (substeps, LOOKS) J, becomes what `measure.mechanical` says after the integration of each
-    substep, but of the one that is handed back, and of the first unless it opens; after its contacts, links and so on; without
-    links at its end only. links: what `kernels.linked` takes, its arrays, rows and numbers, where there are any; loans: what
-    `kernels.lending` takes; empty where nobody lends. began: when the frame did, s.
+    forces: Any
+    course: Any
+    loans: Any
+    hanging: Any
+    linked: Any
+    rows: Any
+
+
+class Services(NamedTuple):
+    """Numbers that come with that.
+
+    h, lag: s, in float64. down: gravity, m/s^2, in float64. period, ahead: what `drive` takes. cells, drop: what
+    `meetings.collide` takes. terms, linking: what `kernels.lending`, and `kernels.linked`, take. began: when the frame did, s.
+    energies: (substeps, LOOKS) J, becomes what `measure.mechanical` says after the integration of each substep, but of the one
+    that is handed back, and of the first unless it opens; after its contacts, links and so on; without links at its end only.
     """
 
     h: Any
     lag: Any
     down: Any
-    forces: Any
     period: Any
     ahead: Any
-    course: Any
     cells: Any
     drop: Any
+    terms: Any
+    linking: Any
     energies: Any
-    links: Any
-    loans: Any
     began: Any
 
 
@@ -191,12 +203,13 @@ def _look_at_energy(energies, substep, when, circles, mass, lag, down, spent, cl
 
 
 def _substeps(
-    substep, stop, last, circles, pairs, law, room, services, function, cut, start, checked, far, claims, spent, clock
+    substep, stop, last, circles, pairs, law, room, beside, services, function, cut, start, checked, far, claims, spent, clock
 ):  # fmt: skip
     """From `start`, in `substep`, whose list of pairs is good, up to the end of substep `stop` - 1.
 
-    last: the substep whose end is that of the frame. circles, pairs, law: `kernels.tables`. services: `Services`, or nothing.
-    function: what the user's functions of forces have become, by itself, for Numba is slow to tell the type of what holds one.
+    last: the substep whose end is that of the frame. circles, pairs, law: `kernels.tables`. beside, services: `Beside` and
+    `Services`, or nothing. function: what the user's functions of forces have become, by itself, for Numba is slow to tell the
+    type of what holds one.
     start: `Start`. checked, far: as for `leap`. spent, clock: as for `note`, (address, tick).
 
     Returns the substep that is next, whether it has been integrated and the list of pairs needs a look, and if so under what
@@ -207,14 +220,14 @@ def _substeps(
     first, looks, sets_out, part, whole = substep, start.looks, start.sets_out, start.part, start.part == WHOLE
     if SERVED:
         services = Services(*services)
-        forces, course, (period_x, period_y) = services.forces, services.course, services.period
+        forces, course, (period_x, period_y) = beside.forces, beside.course, services.period
         energies, lag, down = services.energies, services.lag, services.down
         meets, forced = course.segments.shape[0] > 0, forces.kind.shape[0] > 0
-        loans, hanging, terms = services.loans[0], services.loans[1], Terms(*services.loans[2])
+        loans, hanging, terms = beside.loans, beside.hanging, Terms(*services.terms)
         lends = loans.mass.shape[0] > 0
         begins = begins or meets
     if LINKED:
-        linked, rows, linking = services.links[0], services.links[1], Linking(*services.links[2])
+        linked, rows, linking = beside.linked, beside.rows, Linking(*services.linking)
     integrates = start.opens != 0
     if LINKED and integrates:
         look(linked, linking, circles.position, circles.velocity, circles.inverse_mass)

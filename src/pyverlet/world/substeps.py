@@ -36,6 +36,10 @@ _OF_LENT_AND_LINKED = frame.JOINED, frame.PULLED
 """Parts in which contacts have nothing to do but for linked circles that borrow inertia."""
 
 
+_UNLINKED = (), (), ()
+"""What kernels are handed in place of `kernels.linked`'s."""
+
+
 def _linked(world: Any) -> str:
     """Which kernels go through a world with links."""
     return "few_linked" if world.links.stand_back else "linked"
@@ -60,6 +64,7 @@ class Substeps:
         self._rows: Any = None  # forces, as numbers, and the dtype of the table made of them
         self._table: tuple[Array, ...] = ()
         self._forces: Any = None
+        self._beside: Any = None
 
     def begin(self, contacts: ContactSolver | None) -> Substeps:
         """A frame begins. That before may have been broken off, and the user may have changed everything since."""
@@ -110,21 +115,23 @@ class Substeps:
             wide.leave_arriving()
         last = world.substeps - 1
         rows, native = known if leaps and known else ((), None)
-        beside = "served" * bool(course or books or lends or rows or native)
+        kind = "served" * bool(course or books or lends or rows or native)
         if links:
-            beside = _linked(world)
+            kind = _linked(world)
         if native:
-            beside += "_called"
-        if smooth and not (beside or wide.asks) and len(state) >= FUSED_FROM and strips.in_order:
+            kind += "_called"
+        if smooth and not (kind or wide.asks) and len(state) >= FUSED_FROM and strips.in_order:
             self._strip_by_strip(world, contacts, wide, strips, shape, leaps=leaps, opens=opens)
             return True
+        beside: Any = ()
         services: Any = ()
-        if beside:
-            services = self._services(world, books, rows, course.compiled(state, room), links, contacts.lent(), h, lag)
+        if kind:
+            about = course.compiled(state, room), contacts.lent(), links
+            beside, services = self._services(world, books, rows, *about, h, lag)
         stop, sets_out = world.substeps if leaps else substep + 1, not opens and (lends or out is not wide.moved)
         begin = (wide.takes_looks(), int(sets_out), int(opens), frame.WHOLE, *state.reals(*forces.gravity))
-        reached, self.leapt, strongest = frame.frames[beside][wide.kind](
-            substep, stop, last, wide.circles, wide.packed, wide.law, (walls, *state.reals(*shape)), tuple(services),
+        reached, self.leapt, strongest = frame.frames[kind][wide.kind](
+            substep, stop, last, wide.circles, wide.packed, wide.law, (walls, *state.reals(*shape)), beside, tuple(services),
             native or (), wide.cut(), begin, strips.checked, state.real(strips.allowed * strips.allowed),
             state.claims(), world.profile.spent, (clock.address(), clock.tick()),
         )  # fmt: skip
@@ -174,15 +181,17 @@ class Substeps:
         if part in _OF_LENT_AND_LINKED and not lends:
             return
         state, links = world._slots, world.links.compiled(world._slots, h) if world.links else ()
+        beside: Any = ()
         services: Any = ()
-        if beside := _linked(world) if links else "served" * lends:
-            services = tuple(self._services(world, None, (), world._course.nothing(state), links, contacts.lent(), h, lag))
-        contacts.wide.do(part, state, beside, services)
+        if kind := _linked(world) if links else "served" * lends:
+            about = world._course.nothing(state), contacts.lent(), links
+            beside, services = self._services(world, None, (), *about, h, lag)
+        contacts.wide.do(part, state, kind, beside, tuple(services))
 
     def _services(
-        self, world: Any, books: Any, rows: Any, course: tuple[Any, Any], links: Any, loans: Any, h: float, lag: float
-    ) -> frame.Services:
-        """What the world has beside circles, a room and gravity: `rows` of forces, obstacles, `books`, links, loans."""
+        self, world: Any, books: Any, rows: Any, obstacles: Any, loans: Any, links: Any, h: float, lag: float
+    ) -> tuple[Any, Any]:
+        """What the world has beside circles, a room and gravity: `books`, `rows` of forces, obstacles, loans, links."""
         state, gravity = world._slots, world._force_sum.gravity
         if self._rows != (rows, state.dtype):
             self._rows = rows, state.dtype
@@ -193,9 +202,11 @@ class Substeps:
             )  # fmt: skip
         self._forces = hold(drive.Forces, (*self._table, state.force, state.mass), self._forces)
         ahead = world.integrator.velocity_lag * h if world._force_sum.velocity_dependent else 0.0
-        return frame.Services(
-            h, lag, gravity, self._forces, state.reals(*state.seam.period), state.real(ahead), *course, state.drop,
-            np.empty((world.substeps if books else 0, frame.LOOKS)), links, loans, world.time,
+        (course, cells), (*lent, terms), (*linked, linking) = obstacles, loans, links or _UNLINKED
+        self._beside = hold(frame.Beside, (self._forces, course, *lent, *linked), self._beside)
+        return self._beside, frame.Services(
+            h, lag, gravity, state.reals(*state.seam.period), state.real(ahead), cells, state.drop, terms, linking,
+            np.empty((world.substeps if books else 0, frame.LOOKS)), world.time,
         )  # fmt: skip
 
     def _strip_by_strip(

@@ -158,7 +158,8 @@ class Wide:
 
     def drop_slips(self) -> None:
         """Nobody rubs any more."""
-        self.slip = self.slip[:0]
+        if len(self.slip):
+            self.slip = self.slip[:0]
 
     def weigh(self, asked: bool) -> None:
         """Whether somebody asks for the virial."""
@@ -286,16 +287,16 @@ class Wide:
     def _lanes(self) -> tuple[Array, Array, Array, Array]:
         return self.begin, self.lanes, self.lane_i, self.lane_j
 
-    def do(self, part: np.int64, state: Slots, beside: str = "", services: tuple[Any, ...] = ()) -> None:
-        """One part of a substep by itself; beside, services: as for `kernels.frame`.
+    def do(self, part: np.int64, state: Slots, kind: str = "", beside: Any = (), services: tuple[Any, ...] = ()) -> None:
+        """One part of a substep by itself, by the `kind` of `kernels.frame.frames`; beside, services: as it takes them.
 
         `TOUCHED`: impacts, overlaps and slips; circles are then where that has moved them. `STILLED`: touching circles neither
         approach nor slip.
         """
         looks = self.takes_looks() if part == frame.TOUCHED else 0
         nothing = state.reals(0, 0, 0, 0, 0, 0)
-        frame.frames[beside][self.kind](
-            0, 1, -1, self.circles, self.packed, self.law, (frame.OPEN, *nothing), services, (), self.cut(),
+        frame.frames[kind][self.kind](
+            0, 1, -1, self.circles, self.packed, self.law, (frame.OPEN, *nothing), beside, services, (), self.cut(),
             (looks, 1, 0, part, *nothing[:2]), self.origin, nothing[0], state.claims(), _NO_TIME, (0, 0.0),
         )  # fmt: skip
 

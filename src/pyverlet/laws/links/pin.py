@@ -89,6 +89,7 @@ class PinPool(Pool):
         self._give, self._lam, self._last, self._force = np.zeros((4, len(self.rows)))
         self._left, self._way, self._kept = np.zeros((3, len(self.rows), 2))
         self._intact = np.zeros(len(self.rows), np.uint8)
+        self._given = tuple(self.rows[name] for name in ("point", "stiffness", "damping", "strength"))
 
     def begin(self) -> None:
         if self.changed:
@@ -98,10 +99,9 @@ class PinPool(Pool):
 
     def arrays(self) -> tuple[Array, ...]:
         """As `kernels.linked.Linked` has them."""
-        rows = self.rows
         return (
-            self._particle, rows["point"], rows["stiffness"], rows["damping"], rows["strength"], self._intact, self._give,
-            self._left, self._way, self._kept, self._lam, self._last, self._force,
+            self._particle, *self._given, self._intact, self._give, self._left, self._way, self._kept, self._lam, self._last,
+            self._force,
         )  # fmt: skip
 
     def broken(self) -> Array:

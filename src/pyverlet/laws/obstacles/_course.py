@@ -49,7 +49,7 @@ class Course:
         self._walls = np.zeros(7)
         self._bundle: Any = None
         self._nothing: Any = None
-        self._rest = np.empty((0, 2))  # what rounding has taken from places in the substep before
+        self._rest = self._along = np.empty((0, 2))  # what rounding has taken from places in the substep before; `Slots.along`
 
     def __bool__(self) -> bool:
         return bool(self._obstacles)
@@ -129,10 +129,12 @@ class Course:
         if self._moving or self._binned_for != self._largest:
             kernels.place(self._segments, self._bodies, time, h)
             self._bin(self._largest)
-        if len(state.along) != len(state):
-            state.along = np.empty_like(state.position)
+        if self._rest.shape != state.position.shape or self._rest.dtype != state.dtype:
+            self._rest, self._along = np.zeros_like(state.position), np.empty_like(state.position)
+        state.along = self._along
         if time == 0.0 or self._order is not state.particle:  # every new order is a new array
-            self._order, self._rest = state.particle, np.zeros_like(state.position)
+            self._order = state.particle
+            self._rest.fill(0)
 
     def compiled(self, state: Slots, room: Boundary) -> tuple[Any, tuple[Any, ...]]:
         """What `kernels.meetings.collide` takes of them, `Course`, and of their cells; empty without obstacles."""
