@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import ast
+import importlib
+import inspect
 import subprocess
 import sys
+import textwrap
 from pathlib import Path
 
 import pytest
 
 import pyverlet
+from pyverlet.compile import jit
+from pyverlet.compile.jit import Kernel
 
 ROOT = Path(pyverlet.__file__).parent
 
@@ -97,6 +102,28 @@ def test_kernels_stand_on_the_compiler_alone(path: Path) -> None:
 @pytest.mark.parametrize("path", MODULES, ids=lambda p: p.relative_to(ROOT).as_posix())
 def test_one_room_compiles(path: Path) -> None:
     assert "import numba" not in path.read_text(encoding="utf-8") or path.parent.name == "compile"
+
+
+def handed_literals(kernel: Kernel) -> list[str]:
+    """What a kernel hands to others, by their names, that is a whole number or a truth written out."""
+    known, found = kernel.function.__globals__, []
+    for call in ast.walk(ast.parse(textwrap.dedent(inspect.getsource(kernel.function)))):
+        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and isinstance(known.get(call.func.id), Kernel):
+            for given in call.args:
+                value = given.operand if isinstance(given, ast.UnaryOp) else given
+                literal = value.value if isinstance(value, ast.Constant) else None
+                if type(known.get(value.id) if isinstance(value, ast.Name) else literal) in (int, bool):
+                    found.append(f"{kernel.function.__qualname__}: {ast.unparse(call)}")
+    return found
+
+
+def test_no_kernel_is_handed_a_literal() -> None:
+    # For each one it would be compiled once more.
+    for path in (ROOT / "kernels").glob("*.py"):
+        importlib.import_module(f"pyverlet.{dotted(path)}")
+    kernels = [kernel for name, kernel in jit.KERNELS.items() if name.startswith("pyverlet.kernels.")]
+    assert len(kernels) > 300
+    assert [call for kernel in kernels for call in handed_literals(kernel)] == []
 
 
 def test_doors_open_only_when_called() -> None:

@@ -139,7 +139,7 @@ def _rest(which, circles, x0, y0, size, h, lag, e, mu, rest_speed):
         own = larger(e, pick(restitution, which, k))
         leaves = which_above(own * hit, rest_speed)
         if leaves != 0:
-            leaves &= ~_bits(fed, which, k, LOADED)
+            leaves &= ~_bits(fed, which, k, np.int64(LOADED))
         if leaves | (which_above(own, zero) & which_above(fast, zero)) != 0:
             for lane in range(LANES):
                 which[left + lane] = which[k + lane]

@@ -13,6 +13,9 @@ import numpy as np
 
 from pyverlet.compile.jit import kernel
 
+RED, GREEN, BLUE = map(np.int64, (0, 8, 16))
+"""By how many bits each is shifted. No literals: see `compile.jit.kernel`."""
+
 
 def _sliver_series():
     """Coefficients of (asin s - s sqrt(1 - s^2)) / s^3 in s^2 up to 1/2, the quarter circle: better than 1e-6 there."""
@@ -117,11 +120,11 @@ def blend(pixel, ground, colour, cover):
         return over_full(pixel, colour, cover)
     excess = covered + cover - np.int32(255)
     if excess <= 0:
-        rgb = beside(pixel, ground, colour, cover, 0) | beside(pixel, ground, colour, cover, 8)
-        return rgb | beside(pixel, ground, colour, cover, 16) | (np.uint32(covered + cover) << np.uint32(24))
+        rgb = beside(pixel, ground, colour, cover, RED) | beside(pixel, ground, colour, cover, GREEN)
+        return rgb | beside(pixel, ground, colour, cover, BLUE) | (np.uint32(covered + cover) << np.uint32(24))
     kept = (covered - excess) / covered
-    rgb = over(pixel, ground, colour, cover, kept, 0) | over(pixel, ground, colour, cover, kept, 8)
-    return rgb | over(pixel, ground, colour, cover, kept, 16) | np.uint32(0xFF000000)
+    rgb = over(pixel, ground, colour, cover, kept, RED) | over(pixel, ground, colour, cover, kept, GREEN)
+    return rgb | over(pixel, ground, colour, cover, kept, BLUE) | np.uint32(0xFF000000)
 
 
 @kernel

@@ -51,4 +51,4 @@ def digest(words):
     parts = np.empty(blocks, np.uint64)
     for block in prange(blocks):
         parts[block] = _digest_block(words, block * _BLOCK, min((block + 1) * _BLOCK, words.shape[0]))
-    return _digest_block(parts, 0, blocks)
+    return _digest_block(parts, np.int64(0), blocks)

@@ -11,7 +11,7 @@ import numpy as np
 
 from pyverlet.compile.jit import kernel
 from pyverlet.ground.constants import LEAST_DRAWN_RADIUS
-from pyverlet.kernels.cover import blend, channel, spread_rows
+from pyverlet.kernels.cover import BLUE, GREEN, RED, blend, channel, spread_rows
 from pyverlet.kernels.stamps import CROWD, FINE, ROOM, SIZES, STAMPED, make_stamp, put_stamp
 
 DUST = 4
@@ -46,9 +46,9 @@ def dust(pixels, ground, position, radius, colour, left, top, scale):
             if covered == 0.0:
                 continue
             share, bare, old = min(1.0 / covered, 1.0 / 255.0), max(1.0 - covered / 255.0, 0.0), ground[row, column]
-            red = np.int32(share * np.float64(np.int64(rg & low)) + bare * channel(old, 0) + 0.5)
-            green = np.int32(share * np.float64(np.int64(rg >> np.uint64(32))) + bare * channel(old, 8) + 0.5)
-            blue = np.int32(share * np.float64(np.int64(ba & low)) + bare * channel(old, 16) + 0.5)
+            red = np.int32(share * np.float64(np.int64(rg & low)) + bare * channel(old, RED) + 0.5)
+            green = np.int32(share * np.float64(np.int64(rg >> np.uint64(32))) + bare * channel(old, GREEN) + 0.5)
+            blue = np.int32(share * np.float64(np.int64(ba & low)) + bare * channel(old, BLUE) + 0.5)
             alpha = np.uint32(min(covered, 255.0))
             rgb = np.uint32(red) | (np.uint32(green) << np.uint32(8)) | (np.uint32(blue) << np.uint32(16))
             pixels[row, column] = rgb | (alpha << np.uint32(24))
