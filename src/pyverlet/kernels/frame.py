@@ -173,7 +173,7 @@ def remember(start, position):
             copy_row(start, i, position, i)
 
 
-# ---- from here on `room`, `law` and `circles` are named tuples -----------------------------------------------------------
+# ---- from here on `room` and `law` are named tuples, `circles` and `pairs` bundles ----------------------------------------
 
 
 @driver
