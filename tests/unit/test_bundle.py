@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import copy
+import gc
 import pickle
+import weakref
 from collections.abc import Callable
+from typing import Any
 
+import numba
 import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.compile.bundle import hold
 from pyverlet.kernels import bounds
-from pyverlet.kernels.drive import Forces
 from pyverlet.state.slots import Slots
 
 
@@ -44,12 +46,26 @@ def test_what_is_written_into_an_array_is_read_in_its_bundle(slots: Slots) -> No
 
 
 def test_a_bundle_outlives_whoever_made_its_arrays() -> None:
-    def made() -> object:
-        none = np.empty(0, np.float32)
-        return hold(Forces, (np.empty(0, np.int64), none.reshape(0, 2), none.reshape(0, 2), none.reshape(0, 2), none))
+    def made() -> tuple[Any, Any]:
+        world = pv.World()
+        world.add(position=[(1, 2), (3, 4)], radius=0.5)
+        slots = Slots(np.dtype(np.float32))
+        slots.gather(world._state)
+        return slots.circles(), weakref.ref(slots)
 
-    bundles = [made() for _ in range(100)]
-    assert len({id(array) for bundle in bundles for array in bundle.arrays}) == 500  # type: ignore[attr-defined]
+    circles, maker = made()
+    gc.collect()
+    assert maker() is None
+    assert bounds.look(1, circles)[:2] == (3, 4)
+
+
+def test_walls_and_contacts_are_handed_the_same_kind() -> None:
+    # Of another kind all that deals with walls would be compiled once more for worlds that go stage by stage.
+    world = pv.World(boundary=pv.Circle(radius=5), collisions=pv.Collisions(friction=0.5))
+    world.add(position=[(0, 0), (0.3, 0)], radius=0.1)
+    world.step(1 / 60)
+    assert world._contacts
+    assert numba.typeof(world._slots.circles()) == numba.typeof(world._contacts.wide.circles)
 
 
 @pytest.mark.parametrize("way", ["copy", "pickle"])

@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+import numpy as np
 from numba.extending import typeof_impl
 
 from pyverlet.compile import pool, watching
@@ -309,6 +310,10 @@ def variant(function: Callable[..., Any], name: str, **names: Any) -> Callable[.
     What a constant rules out is not compiled: one text serves as several kernels.
     """
     return _bound(function, names, f"_{name}")
+
+
+FALSE, TRUE = np.bool_(False), np.bool_(True)
+"""For kernels that are handed one: no literals, see `kernel`."""
 
 
 def kernel(function: Function) -> Function:

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet.compile.bits import lowest_bit, store_bits, which_are
-from pyverlet.compile.jit import kernel, parallel_kernel, prange
+from pyverlet.compile.jit import FALSE, kernel, parallel_kernel, prange
 from pyverlet.compile.lanes import ALL, ANY, LANES, larger, load, load_rows, spread, which_above, which_set
 from pyverlet.kernels.loans import CHUNK
 from pyverlet.kernels.motion import IN_PILE
@@ -29,9 +29,6 @@ _XX, _XY, _YY = 7, 8, 9
 
 # What is so of a cluster: walls push it; what is lacking is given along the wall, or whatever its direction.
 _HELD, _ALONG, _FREE = 1, 2, 4
-
-# No literals: see `compile.jit.kernel`.
-_NONE, _FALSE = np.int64(0), np.bool_(False)
 
 
 @kernel
@@ -193,7 +190,7 @@ def _even(count, circles, lending, root, gains, now, before, rubs):
 @kernel
 def balance(circles, lending, root, rubs):
     """Give to each cluster what its momentum and its angular momentum lack."""
-    among, count = lending.among, _NONE
+    among, count = lending.among, np.int64(0)
     for c in range(lending.found.shape[0]):
         for k in range(c * CHUNK, c * CHUNK + lending.found[c]):
             among[count] = among[k]
@@ -204,7 +201,7 @@ def balance(circles, lending, root, rubs):
 @kernel
 def balance_pull(circles, lending, root, slot, shift, rate):
     """After `balance`: likewise what links have added to accelerations (`kernels.links.add_pull`), for when the frame ends."""
-    count, pull, none = _NONE, lending.unpushed, lending.before  # these two are of use no more in this substep
+    count, pull, none = np.int64(0), lending.unpushed, lending.before  # these two are of use no more in this substep
     for c in range(lending.found.shape[0]):
         count += lending.found[c]
     if count == 0:
@@ -215,7 +212,7 @@ def balance_pull(circles, lending, root, slot, shift, rate):
             pull[i, axis] = none[i, axis] = 0
     for k in range(slot.shape[0]):
         pull[slot[k], 0], pull[slot[k], 1] = rate * rate * shift[k, 0], rate * rate * shift[k, 1]
-    _even(count, circles, lending, root, circles.acceleration, pull, none, _FALSE)
+    _even(count, circles, lending, root, circles.acceleration, pull, none, FALSE)
 
 
 @kernel

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from pyverlet.compile.jit import driver, parallel_kernel, prange
+from pyverlet.compile.jit import FALSE, driver, parallel_kernel, prange
 from pyverlet.compile.stealing import claim_evenly, none_claimed
 from pyverlet.kernels.chain_rows import SOFTS, note_pack, prepare_pack
 from pyverlet.kernels.chains import solve_pack
-
-_HARD = np.bool_(False)
 
 
 @parallel_kernel
@@ -23,7 +19,7 @@ def _solve(
             p = first + k
             if prepares and not holds[p] & SOFTS:
                 bowed[p] = prepare_pack(
-                    _HARD, p, start, node, holds, row, more, begun, predicted, back, weight, shift, period_x, period_y, h
+                    FALSE, p, start, node, holds, row, more, begun, predicted, back, weight, shift, period_x, period_y, h
                 )
             solve_pack(p, start, node, holds, lanes, bowed, row, more, shift, h * h, rooms[part], wide[part])
             if notes:

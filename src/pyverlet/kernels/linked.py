@@ -9,18 +9,13 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from pyverlet.compile.bundle import bundle
-from pyverlet.compile.jit import driver, kernel, variant
+from pyverlet.compile.jit import FALSE, TRUE, driver, kernel, variant
 from pyverlet.kernels.chain_passes import sweep
 from pyverlet.kernels.chain_rows import prepare_soft
 from pyverlet.kernels.link_rows import note_rows, prepare_rows, sweep_rows
 from pyverlet.kernels.links import add_pull, hand_back, look_back, set_down, set_out, shoulder, tell_calm
 from pyverlet.kernels.ties import note_ties, tie
-
-_NO, _YES = np.bool_(False), np.bool_(True)
-"""No literals: see `compile.jit.kernel`."""
 
 
 @bundle
@@ -102,11 +97,11 @@ def _passes(linked, rows, linking):
     turns = linking.times if several else 1
     for turn in range(turns):
         last = turn == turns - 1
-        sweep(_NO, _NO, turn == 0, last and parts == 0, linked, linking)
-        sweep_rows(_NO, _NO, rows, linked, period_x, period_y)
+        sweep(FALSE, FALSE, turn == 0, last and parts == 0, linked, linking)
+        sweep_rows(FALSE, FALSE, rows, linked, period_x, period_y)
         if several:  # without what has just been solved
-            sweep_rows(_YES, _YES, rows, linked, period_x, period_y)
-            sweep(_YES, parts == 0, _NO, last, linked, linking)
+            sweep_rows(TRUE, TRUE, rows, linked, period_x, period_y)
+            sweep(TRUE, parts == 0, FALSE, last, linked, linking)
 
 
 @driver
