@@ -29,7 +29,10 @@ class Actor(ABC):
 
     @abstractmethod
     def act(self, world: World, dt: float) -> None:
-        """Called before a frame of dt seconds."""
+        """Called before a frame of dt seconds. It may change the world, and the list of its actors.
+
+        Those removed before it is their turn do not act; those added act from the next frame on.
+        """
 
     def save(self) -> Any:
         """What `restore` needs to act again as from now; part of `world.save()`."""
@@ -37,6 +40,15 @@ class Actor(ABC):
 
     def restore(self, saved: Any) -> None:
         """Go back to what `save` returned."""
+
+
+def act_once(world: World, dt: float) -> None:
+    """Each actor that is listed now acts once, in order, unless another removes it first; actors added meanwhile wait for a frame."""
+    for place, actor in enumerate(tuple(world.actors)):
+        actors = world.actors
+        # In most frames the list stays as it is, and looking for each actor in it would cost n^2.
+        if (place < len(actors) and actors[place] is actor) or any(listed is actor for listed in actors):
+            actor.act(world, dt)
 
 
 class Emitter(Actor):

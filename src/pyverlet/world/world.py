@@ -27,7 +27,7 @@ from pyverlet.laws.touches import Touches
 from pyverlet.state.moves import first_non_finite
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
-from pyverlet.world.actors import Actor
+from pyverlet.world.actors import Actor, act_once
 from pyverlet.world.convenience import Doors
 from pyverlet.world.measures import Measures
 from pyverlet.world.moments import Moment
@@ -63,7 +63,7 @@ class World(Measures, Queries, Doors):
         forces: list of forces besides gravity; append and remove as you like.
         links: the links between particles, as a list.
         obstacles: what stands in the way, as a list.
-        actors: list of those who act before each frame, such as emitters.
+        actors: list of those that act before each frame, such as emitters; they may add and remove actors, themselves too.
         time: simulated seconds since the world was built.
         frames: calls of `step` since then.
         profile: the time of the last frame: `frame_ms`, and `stages`, ms by name.
@@ -113,8 +113,7 @@ class World(Measures, Queries, Doors):
             NonFiniteError: a particle turned NaN or infinite; the world still holds the frame before.
         """
         h = checks.number("dt", dt, above=0.0) / self.substeps
-        for actor in self.actors:
-            actor.act(self, dt)
+        act_once(self, dt)
         self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
         self.profile.begin()
         books = self._open_books(h)
