@@ -13,6 +13,7 @@ from pyverlet.ground import loading, versions  # noqa: F401  (first: all that fo
 from pyverlet import scenes
 from pyverlet.ground import errors
 from pyverlet.ground.errors import CoarseStepWarning, InputError, NonFiniteError, PyverletError
+from pyverlet.ground.submodules import lazily
 from pyverlet.laws import forces, integrators
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.collisions import Collisions, Overlap
@@ -45,7 +46,7 @@ from pyverlet.world.warmup import warm_up
 from pyverlet.world.world import World
 
 if TYPE_CHECKING:
-    from pyverlet import lab
+    from pyverlet import data, draw, lab, picture, record, viewers
     from pyverlet.data.sweep import sweep
     from pyverlet.data.trajectory import Trajectory, read_trajectory
     from pyverlet.data.worlds import Worlds
@@ -66,20 +67,21 @@ __all__ = [
     "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel", "Panels", "Periodic", "Pin", "PointSpring", "Polygon",
     "PositionVerlet", "ProjectOnly", "PyverletError", "Rope", "Segment", "SemiImplicitEuler", "Sink", "Slider", "Spring", "Stick",
     "TimeCorrectedVerlet", "Trajectory", "VelocityVerlet", "Wind", "World", "Worlds", "Yoshida4", "bridge", "builders",
-    "chain", "cloth", "errors", "fill", "force", "forces", "integrators", "lab", "load", "net", "read_trajectory", "rope", "save",
-    "scenes", "slider", "soft_body", "sweep", "view", "warm_up", "widget",
+    "chain", "cloth", "data", "draw", "errors", "fill", "force", "forces", "integrators", "lab", "load", "net", "picture",
+    "read_trajectory", "record", "rope", "save", "scenes", "slider", "soft_body", "sweep", "view", "viewers", "warm_up", "widget",
 ]  # fmt: skip
+
+
+_submodule, __dir__ = lazily(__name__, lambda: list(_LATER))
 
 
 def __getattr__(name: str) -> Any:
     # What few programs need, loaded when it is first named.
-    if name in _LATER:
-        value = getattr(import_module(_LATER[name]), name)
-        globals()[name] = value
-        return value
-    if name == "lab":
-        return import_module("pyverlet.lab")
-    raise AttributeError(f"module 'pyverlet' has no attribute {name!r}")
+    if name not in _LATER:
+        return _submodule(name)
+    value = getattr(import_module(_LATER[name]), name)
+    globals()[name] = value
+    return value
 
 
 def view(world: World | Panels, **options: Any) -> Any:

@@ -95,15 +95,16 @@ def test_bad_input_gets_one_sentence(case: str) -> None:
 class Calls(pv.Actor):
     """Notes its turns, and then does what it was given."""
 
-    def __init__(self, turns: list[tuple[str, int]], name: str, then: Callable[[Calls, pv.World], object] = lambda *_: None) -> None:
+    def __init__(self, turns: list[tuple[str, int]], name: str, then: Callable[[Calls, pv.World], object] | None = None) -> None:
         self.turns, self.name, self.then = turns, name, then
 
     def act(self, world: pv.World, dt: float) -> None:
         self.turns.append((self.name, world.frames))
-        self.then(self, world)
+        if self.then is not None:
+            self.then(self, world)
 
 
-def acting(**then: Callable[[Calls, pv.World], object]) -> tuple[pv.World, list[tuple[str, int]], dict[str, Calls]]:
+def acting(**then: Callable[[Calls, pv.World], object] | None) -> tuple[pv.World, list[tuple[str, int]], dict[str, Calls]]:
     """A world after three frames with an actor for each name, the turns they had, and the actors."""
     world, turns = pv.World(), list[tuple[str, int]]()
     named = {name: Calls(turns, name, what) for name, what in then.items()}
@@ -112,12 +113,8 @@ def acting(**then: Callable[[Calls, pv.World], object]) -> tuple[pv.World, list[
     return world, turns, named
 
 
-def idle(*_: Any) -> None:
-    pass
-
-
 def test_an_actor_that_removes_itself_leaves_the_others_their_turns() -> None:
-    world, turns, named = acting(a=idle, b=lambda self, world: world.actors.remove(self), c=idle, d=idle)
+    world, turns, named = acting(a=None, b=lambda self, world: world.actors.remove(self), c=None, d=None)
     assert turns == [("a", 0), ("b", 0), ("c", 0), ("d", 0), ("a", 1), ("c", 1), ("d", 1), ("a", 2), ("c", 2), ("d", 2)]
     assert world.actors == [named["a"], named["c"], named["d"]]
 

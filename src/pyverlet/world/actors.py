@@ -43,7 +43,7 @@ class Actor(ABC):
 
 
 def act_once(world: World, dt: float) -> None:
-    """Each actor that is listed now acts once, in order, unless another removes it first; actors added meanwhile wait for a frame."""
+    """Each actor that is listed now acts once, in order, unless another removes it first; those added meanwhile wait."""
     for place, actor in enumerate(tuple(world.actors)):
         actors = world.actors
         # In most frames the list stays as it is, and looking for each actor in it would cost n^2.
