@@ -16,7 +16,10 @@ Array = NDArray[Any]
 
 
 class Column:
-    """A property of a group, or of the whole world: a view on its part of one of the state's arrays. Setting it copies."""
+    """A property of a group, or of the whole world: a view on its part of one of the state's arrays. Setting it copies.
+
+    While another thread makes a frame it is a copy, not to be written, of what that frame comes to.
+    """
 
     def __init__(self, doc: str) -> None:
         self.__doc__ = doc
@@ -25,10 +28,21 @@ class Column:
         self._name = name
 
     def __get__(self, group: Any, owner: type) -> Array:
-        return getattr(group._state, self._name)[group._where]  # type: ignore[no-any-return]
+        state: State = group._state
+        version = state.version
+        array: Array = getattr(state, self._name)[group._where]
+        if state.version == version and not state.turn.taken:  # nothing has changed meanwhile, and no lock was needed
+            return array
+        with state.turn as stepped:
+            array = getattr(state, self._name)[group._where]
+            if stepped:
+                array = array.copy()
+                array.flags.writeable = False
+            return array
 
     def __set__(self, group: Any, value: Any) -> None:
-        getattr(group._state, self._name)[group._where] = value
+        with group._state.turn.held():
+            getattr(group._state, self._name)[group._where] = value
 
 
 class Group:
@@ -68,7 +82,8 @@ class Group:
     def _span(self) -> slice:
         """Where they are among the world's now; numbers stay in order, so that those added together stay together."""
         if self._version != self._state.version:
-            self._found, self._version = self._state.find(self._first, self._stop), self._state.version
+            with self._state.turn:
+                self._found, self._version = self._state.find(self._first, self._stop), self._state.version
         return self._found
 
     @property

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import memory
+from pyverlet.ground.turns import Turn
 from pyverlet.state import seam
 
 Array = NDArray[Any]
@@ -41,6 +42,7 @@ class State:
         number: (n,) of each particle, in ascending order; no two particles of a world ever have the same.
         begun: the number of the first particle of each `append`, ascending. numbers: how many particles there have ever been.
         version: how often particles were added or removed.
+        turn: whose turn it is to step, change or read them, where several threads do.
     """
 
     seam = seam.NONE
@@ -59,7 +61,7 @@ class State:
     angle: NDArray[np.float64]
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
-        self.dtype = dtype
+        self.dtype, self.turn = dtype, Turn()
         self._store: dict[str, Array] = {name: np.empty((0, 2), dtype) for name in ROWS}
         self._store |= {name: np.empty(0, dtype) for name in COLUMNS}
         for names, kind in ((MARKS, np.uint32), (("number",), np.int64), (("angle",), np.float64)):

@@ -12,6 +12,7 @@ from pyverlet.compile import jit
 from pyverlet.ground import checks
 from pyverlet.ground.constants import ALL_THREADS_FROM, MOST_SUBSTEPS, ONE_THREAD_BELOW, REST_ACCELERATIONS, STANDARD_GRAVITY
 from pyverlet.ground.errors import InputError, NonFiniteError
+from pyverlet.ground.turns import in_turn
 from pyverlet.laws.coarse import Coarse
 from pyverlet.laws.contacts.collisions import Collisions, ContactSolver
 from pyverlet.laws.events import Events
@@ -36,7 +37,6 @@ from pyverlet.world.queries import Queries
 from pyverlet.world.saved import Saved
 from pyverlet.world.substeps import Substeps
 from pyverlet.world.team import Team
-from pyverlet.world.turns import in_turn
 
 Array = NDArray[Any]
 
@@ -109,18 +109,19 @@ class World(Measures, Queries, Doors):
         """Advance by one frame of dt seconds, in `substeps` steps of h = dt / substeps.
 
         Raises:
-            InputError: dt is not a number greater than 0.
+            InputError: dt is not a number greater than 0, or it is called in the middle of a frame of this world.
             NonFiniteError: a particle turned NaN or infinite; the world still holds the frame before.
         """
         h = checks.number("dt", dt, above=0.0) / self.substeps
         act_once(self, dt)
-        self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
-        self.profile.begin()
-        books = self._open_books(h)
-        if not self._frame(h, self._listen(h, books or self.profile.mark)):
-            self._refuse_non_finite(h)
-        self._accept(dt, h, books)
-        self.profile.end()
+        with self._state.turn.frame():
+            self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
+            self.profile.begin()
+            books = self._open_books(h)
+            if not self._frame(h, self._listen(h, books or self.profile.mark)):
+                self._refuse_non_finite(h)
+            self._accept(dt, h, books)
+            self.profile.end()
 
     def _frame(self, h: float, done: Callable[[str], None]) -> bool:
         """The table of contents of the engine; `done` hears which stage has ended. True if all is known to be finite."""
@@ -283,6 +284,7 @@ class World(Measures, Queries, Doors):
         return self._substeps
 
     @substeps.setter
+    @in_turn
     def substeps(self, value: int) -> None:
         self._substeps = checks.whole("substeps", value, most=MOST_SUBSTEPS, most_is=" (finer steps take a smaller dt)")
         self._h_last = None
@@ -293,6 +295,7 @@ class World(Measures, Queries, Doors):
         return self._integrator
 
     @integrator.setter
+    @in_turn
     def integrator(self, value: Integrator) -> None:
         if not isinstance(value, Integrator):
             raise InputError(f"integrator is {value!r}; allowed is an object such as pyverlet.PositionVerlet()")
@@ -306,6 +309,7 @@ class World(Measures, Queries, Doors):
         return self._boundary
 
     @boundary.setter
+    @in_turn
     def boundary(self, value: Boundary) -> None:
         if not isinstance(value, Boundary):
             raise InputError(f"boundary is {value!r}; allowed is an object such as pyverlet.Circle(radius=10) or pyverlet.Open()")
@@ -321,6 +325,7 @@ class World(Measures, Queries, Doors):
         return self._collisions
 
     @collisions.setter
+    @in_turn
     def collisions(self, value: Collisions | None) -> None:
         if value is not None and not isinstance(value, Collisions):
             raise InputError(f"collisions is {value!r}; allowed are pyverlet.Collisions(...) and None")

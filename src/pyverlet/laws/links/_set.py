@@ -14,6 +14,7 @@ from pyverlet.compile.bundle import hold
 from pyverlet.ground import checks
 from pyverlet.ground.constants import LINKS_ONE_THREAD_BELOW, REST_ACCELERATIONS
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.turns import Shared, in_turn, of_one_frame
 from pyverlet.kernels import link_rows, linked, runs
 from pyverlet.laws.contacts.broadphase import PairList
 from pyverlet.laws.links._chains import ChainPool
@@ -32,7 +33,7 @@ BROKEN = np.dtype([("link", np.int64), ("row", np.int64), ("i", np.int64), ("j",
 """Number of the link in `world.links`, row of it, its first and last particle, and what it pulled with when it broke, N."""
 
 
-class Links:
+class Links(Shared):
     """Sticks, ropes, springs, pins and so on, in the order they were appended: `world.links`.
 
     Attributes:
@@ -60,6 +61,7 @@ class Links:
 
     # ---- a list --------------------------------------------------------------------------------------------------------
 
+    @in_turn
     def append(self, link: AnyLink) -> AnyLink:
         """Add a link, or the many that one object holds; returns it.
 
@@ -95,6 +97,7 @@ class Links:
         for link in self:
             link._check(seam)
 
+    @in_turn
     def remove(self, link: Link) -> None:
         """Take a link out.
 
@@ -300,6 +303,7 @@ class Links:
             position = self._work.where(state)
             return sum(pool.stored(position, state.seam) for pool in self._kept if pool.gives)
 
+    @of_one_frame
     def segments(self) -> tuple[Array, Array]:
         """Links as lines, without the broken: ends (m, 2, 2) in m, and what each pulls with (m,) in N, negative if it pushes.
 
