@@ -94,6 +94,11 @@ class Group:
             raise InputError(f"group is one of {self._added} particles that were all removed; allowed is one with particles left")
         return where
 
+    @property
+    def world(self) -> Any:
+        """The world they are in."""
+        return self._remove.__self__  # type: ignore[attr-defined]
+
     def remove(self, which: ArrayLike | None = None) -> None:
         """Remove particles of this group from the world; other groups stay as they are.
 

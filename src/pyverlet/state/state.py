@@ -5,6 +5,7 @@ They are the truth between frames. A frame begins by gathering them into `Slots`
 
 from __future__ import annotations
 
+import uuid
 from collections.abc import Iterator
 from typing import Any
 
@@ -46,6 +47,7 @@ class State:
     """
 
     seam = seam.NONE
+    _key: str | None = None
     position: Array
     velocity: Array
     acceleration: Array
@@ -73,6 +75,21 @@ class State:
 
     def __len__(self) -> int:
         return len(self.radius)
+
+    @property
+    def key(self) -> str:
+        """The same for this and its copies, and for no other."""
+        self._key = self._key or uuid.uuid4().hex
+        return self._key
+
+    def __getstate__(self) -> dict[str, Any]:
+        kept = {"dtype": self.dtype, "_key": self.key, "seam": self.seam, "begun": self.begun, "version": self.version}
+        return kept | {"numbers": self.numbers, "_store": dict(self.arrays())}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self.turn = Turn()
+        self._show(len(self._store["number"]))
 
     def arrays(self) -> Iterator[tuple[str, Array]]:
         """Names and arrays, always in the same order."""

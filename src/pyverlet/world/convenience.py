@@ -22,6 +22,26 @@ class Doors(Watched):
         for _ in range(round(seconds / checks.number("dt", dt, above=0.0))):
             self.step(dt)
 
+    def __getstate__(self: World) -> dict[str, Any]:  # type: ignore[misc]
+        from pyverlet.world import copies
+
+        with self.held():
+            copies.check(self)
+            return copies.contents(self)
+
+    def __setstate__(self: World, state: dict[str, Any]) -> None:  # type: ignore[misc]
+        from pyverlet.world import copies
+
+        copies.take_up(self, state)
+
+    def __deepcopy__(self: World, memo: dict[Any, Any]) -> World:  # type: ignore[misc]
+        from pyverlet.world import copies
+
+        return copies.copied(self, memo)
+
+    def __copy__(self: World) -> World:  # type: ignore[misc]
+        return self.__deepcopy__({})
+
     def to_image(self: World, path: Any = None, **options: Any) -> NDArray[Any]:  # type: ignore[misc]
         """A picture of the world now, (height, width, 3) bytes R, G, B; see `pyverlet.record.to_image` for path and options."""
         from pyverlet.record import to_image

@@ -373,8 +373,7 @@ class World(Measures, Queries, Doors):
         Raises:
             InputError: it is another world's.
         """
-        if saved.world is not self._state:
-            raise InputError("saved is the state of another world; allowed is what save() of this one returned")
+        saved = saved.of(self)
         numbers = self._state.number.copy()
         self._state.restore(saved.arrays)
         if not np.array_equal(numbers, self._state.number):

@@ -82,6 +82,8 @@ class Links(Shared):
         link._pool = self._pools[family]
         link._id = self._next_owner
         link._pool.append(link._id, link.particles, link._columns())
+        if link._moving:
+            link._recall()
         self._next_owner += 1
         self._apart_stale = True
         self._links[link._id], self._listed = link, None
@@ -138,7 +140,10 @@ class Links(Shared):
             pool.keep(np.minimum.reduceat(particle, pool.first[:-1]) >= 0 if len(particle) else np.zeros(0, bool))
         for link in self:
             moved = new[link.particles]
-            link.particles = moved[(moved >= 0).all(axis=1)]
+            kept = np.asarray((moved >= 0).all(axis=1))
+            link.particles = moved
+            if not kept.all():
+                link._keep(kept)
         self._links, self._listed = {number: link for number, link in self._links.items() if len(link)}, None
         self._apart_stale = True
 
@@ -344,9 +349,17 @@ class Links(Shared):
 
     # ---- save and restore ----------------------------------------------------------------------------------------------
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {"state": self._state, "links": list(self), "iterations": self._iterations}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(state["state"])  # type: ignore[misc]
+        self.extend(state["links"])
+        self._iterations = state["iterations"]
+
     def save(self) -> Any:
         """A copy of all there is about links."""
-        pools = [(pool, pool.rows.copy(), pool.entries.copy()) for pool in self._kept]
+        pools = [(family, pool.rows.copy(), pool.entries.copy()) for family, pool in zip(self._pools, self._kept, strict=True)]
         links = [(owner, link, link.particles) for owner, link in self._links.items()]
         past = self._past and Past(*(array.copy() for array in self._past))
         return links, pools, self.broken, self._apart_changed, past
@@ -358,7 +371,11 @@ class Links(Shared):
             link._pool = None
         for pool in self._kept:
             pool.keep(np.zeros(len(pool.rows), bool))
-        for pool, rows, entries in pools:
+        new = {link._family: link._new_pool for _, link, _ in links}
+        for family, rows, entries in pools:
+            if family not in self._pools:
+                self._pools[family] = new[family]()
+            pool = self._pools[family]
             pool.rows, pool.entries, pool.stale = rows.copy(), entries.copy(), True
         self._links, self._listed = {owner: link for owner, link, _ in links}, None
         for owner, link, particles in links:
