@@ -36,7 +36,7 @@ from pyverlet.laws.naive import ClampAndFlip, ProjectOnly
 from pyverlet.laws.obstacles import Capsule, Chain, Disc, Obstacle, Polygon, Segment
 from pyverlet.laws.rooms import Boundary, Box, Circle, Open, Periodic
 from pyverlet.scenes.sliders import Slider, slider
-from pyverlet.state.group import Group
+from pyverlet.state.group import Group, Particle
 from pyverlet.world import builders
 from pyverlet.world.actors import Actor, Emitter, Sink
 from pyverlet.world.builders import bridge, chain, cloth, fill, net, rope, soft_body
@@ -64,11 +64,11 @@ __all__ = [
     "RK4", "Actor", "Angle", "Area", "Attractor", "Boundary", "Box", "BruteForce", "Capsule", "Chain", "Circle",
     "ClampAndFlip", "Clock", "CoarseStepWarning", "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy",
     "Events", "ExplicitEuler", "Fast", "FrameBudget", "Gravitation", "Group", "InputError", "Integrator", "Ledger",
-    "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel", "Panels", "Periodic", "Pin", "PointSpring", "Polygon",
+    "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel", "Panels", "Particle", "Periodic", "Pin", "PointSpring", "Polygon",
     "PositionVerlet", "ProjectOnly", "PyverletError", "Rope", "Segment", "SemiImplicitEuler", "Sink", "Slider", "Spring", "Stick",
     "TimeCorrectedVerlet", "Trajectory", "VelocityVerlet", "Wind", "World", "Worlds", "Yoshida4", "bridge", "builders",
-    "chain", "cloth", "data", "draw", "errors", "fill", "force", "forces", "integrators", "lab", "load", "net", "picture",
-    "read_trajectory", "record", "rope", "save", "scenes", "slider", "soft_body", "sweep", "view", "viewers", "warm_up", "widget",
+    "chain", "cloth", "draw", "errors", "fill", "force", "forces", "integrators", "lab", "load", "net", "picture",
+    "read_trajectory", "rope", "save", "scenes", "slider", "soft_body", "sweep", "view", "viewers", "warm_up", "widget",
 ]  # fmt: skip
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import Shown
 from pyverlet.kernels import placing
 from pyverlet.laws.rooms import Boundary, Box, Circle
 
@@ -24,7 +25,7 @@ _TRIES = 4
 """Places an emitter looks at for each particle that is due."""
 
 
-class Actor(ABC):
+class Actor(Shown, ABC):
     """Something that acts on a world once a frame; append it to `world.actors`."""
 
     @abstractmethod
@@ -67,6 +68,8 @@ class Emitter(Actor):
     Attributes:
         emitted: particles so far.
     """
+
+    _shows = ("region", "rate", "emitted")
 
     def __init__(
         self,
@@ -153,6 +156,8 @@ class Sink(Actor):
     Attributes:
         removed: particles so far.
     """
+
+    _shows = ("region", "outside", "removed")
 
     def __init__(self, region: Boundary, *, outside: bool = False) -> None:
         if not isinstance(region, Boundary):

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import Records
 from pyverlet.ground.turns import of_one_frame
 from pyverlet.kernels import measure
 from pyverlet.laws.contacts.collisions import Collisions, ContactSolver, Overlap, measure_overlap
@@ -108,7 +109,7 @@ class Measures(Particles):
         Raises:
             InputError: the world notes none.
         """
-        return self._noting().array(self._state)
+        return self._noting().array(self._state).view(Records)
 
     @of_one_frame
     def force_on(self, what: Obstacle | Boundary) -> Array:

@@ -17,7 +17,7 @@ from pyverlet.laws.forces import ForceList, Numbered
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.rooms import Boundary
-from pyverlet.state.group import Column, Group
+from pyverlet.state.group import Column, Group, Particle
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import EVERYONE, State
 
@@ -143,16 +143,16 @@ class Particles(Shared):
             )
 
     @in_turn
-    def remove(self, which: Group | ArrayLike) -> None:
+    def remove(self, which: Group | Particle | ArrayLike) -> None:
         """Remove particles. Groups keep the others, whose indices close ranks.
 
         Args:
-            which: a group, an index, several, or (n,) bool. Many at once cost as much as one.
+            which: a group, a particle of one, an index, several, or (n,) bool. Many at once cost as much as one.
 
         Raises:
             InputError: there is no such particle; nothing is removed.
         """
-        if isinstance(which, Group):
+        if isinstance(which, Group | Particle):
             which = which.index
         gone = checks.indices("which", which, len(self))
         if not len(gone):

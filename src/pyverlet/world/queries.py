@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import count
 from pyverlet.ground.turns import Shared, of_one_frame
 from pyverlet.kernels import grid, motion, queries
 from pyverlet.state.seam import Seam
@@ -36,6 +37,9 @@ class RayHits(NamedTuple):
     normal: Floats
     """(q, 2) of length 1, out of the particle where it is hit; 0 for none."""
 
+    def __repr__(self) -> str:
+        return f"RayHits of {count(len(self.particle), 'ray')}, {np.count_nonzero(self.particle >= 0)} of which hit"
+
 
 class Nearest(NamedTuple):
     """The nearest centres, nearest first."""
@@ -44,6 +48,10 @@ class Nearest(NamedTuple):
     """(q, k) indices; -1 where the world has fewer than k."""
     distance: Floats
     """(q, k) from the point to the centre, m; infinity where there is none."""
+
+    def __repr__(self) -> str:
+        points, most = self.particle.shape
+        return f"Nearest of {count(points, 'point')}, {count(most, 'particle')} each"
 
 
 class Queries(Shared):

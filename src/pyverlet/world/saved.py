@@ -21,7 +21,7 @@ INTO = "the world that a saved state is taken up by"
 """Key of the memo of `copy.deepcopy`."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Saved:
     """What `World.save` keeps: enough to continue with the same bits. Opaque."""
 
@@ -38,6 +38,9 @@ class Saved:
     obstacles: Any
     actors: list[tuple[Actor, Any]]
     links: Any
+
+    def __repr__(self) -> str:
+        return f"Saved(particles={len(self.arrays['mass'])}, time={self.time:g}, frames={self.frames})"
 
     def of(self, world: Any) -> Saved:
         """This, as a state of that world: of one that was copied or pickled, with copies of the objects it had then.

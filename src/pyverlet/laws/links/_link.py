@@ -42,7 +42,8 @@ class Link(ABC):
         return len(self.particles)
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__} x {len(self)}"
+        broken = len(self) - int(self.intact.sum())
+        return f"{type(self).__name__} x {len(self)}" + f", {broken} broken" * bool(broken)
 
     def __getstate__(self) -> dict[str, Any]:
         kept = {name: value for name, value in vars(self).items() if name not in ("_pool", "_id", "_moving")}

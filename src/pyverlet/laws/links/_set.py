@@ -14,6 +14,7 @@ from pyverlet.compile.bundle import hold
 from pyverlet.ground import checks
 from pyverlet.ground.constants import LINKS_ONE_THREAD_BELOW, REST_ACCELERATIONS
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import listed
 from pyverlet.ground.turns import Shared, in_turn, of_one_frame
 from pyverlet.kernels import link_rows, linked, runs
 from pyverlet.laws.contacts.broadphase import PairList
@@ -123,6 +124,9 @@ class Links(Shared):
 
     def __len__(self) -> int:
         return len(self._links)
+
+    def __repr__(self) -> str:
+        return listed("link", self)
 
     def __iter__(self) -> Iterator[Link]:
         return iter(self._links.values())

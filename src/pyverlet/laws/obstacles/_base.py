@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import listed
 
 Value = TypeVar("Value")
 Points = NDArray[np.float64]
@@ -162,6 +163,9 @@ class Obstacles(list[Obstacle]):
         super().__init__(obstacles)
         self._drawn: list[list[Outline]] = []
         self._outlines: list[Outline] = []
+
+    def __repr__(self) -> str:
+        return listed("obstacle", self)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (), None, iter(self)
