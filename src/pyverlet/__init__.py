@@ -46,7 +46,9 @@ from pyverlet.world.warmup import warm_up
 from pyverlet.world.world import World
 
 if TYPE_CHECKING:
-    from pyverlet import data, draw, lab, picture, record, viewers
+    from pyverlet import data as data
+    from pyverlet import draw, lab, picture, viewers
+    from pyverlet import record as record
     from pyverlet.data.sweep import sweep
     from pyverlet.data.trajectory import Trajectory, read_trajectory
     from pyverlet.data.worlds import Worlds
