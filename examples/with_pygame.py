@@ -3,7 +3,7 @@
     pip install "pyverlet[window]"
     python examples/with_pygame.py
 
-Those who know pymunk will know the shape of it: make a space, add bodies, step, draw. See docs/from-pymunk.md.
+Those who know pymunk will know the shape of it: make a space, add bodies, step, draw. See docs/coming-from.md.
 """
 
 from __future__ import annotations

@@ -13,6 +13,7 @@ from pyverlet.ground import loading, versions  # noqa: F401  (first: all that fo
 from pyverlet import scenes
 from pyverlet.ground import errors
 from pyverlet.ground.errors import CoarseStepWarning, InputError, NonFiniteError, PyverletError
+from pyverlet.ground.submodules import lazily
 from pyverlet.laws import forces, integrators
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.collisions import Collisions, Overlap
@@ -35,7 +36,7 @@ from pyverlet.laws.naive import ClampAndFlip, ProjectOnly
 from pyverlet.laws.obstacles import Capsule, Chain, Disc, Obstacle, Polygon, Segment
 from pyverlet.laws.rooms import Boundary, Box, Circle, Open, Periodic
 from pyverlet.scenes.sliders import Slider, slider
-from pyverlet.state.group import Group
+from pyverlet.state.group import Group, Particle
 from pyverlet.world import builders
 from pyverlet.world.actors import Actor, Emitter, Sink
 from pyverlet.world.builders import bridge, chain, cloth, fill, net, rope, soft_body
@@ -45,7 +46,9 @@ from pyverlet.world.warmup import warm_up
 from pyverlet.world.world import World
 
 if TYPE_CHECKING:
-    from pyverlet import lab
+    from pyverlet import data as data
+    from pyverlet import draw, lab, picture, viewers
+    from pyverlet import record as record
     from pyverlet.data.sweep import sweep
     from pyverlet.data.trajectory import Trajectory, read_trajectory
     from pyverlet.data.worlds import Worlds
@@ -63,23 +66,24 @@ __all__ = [
     "RK4", "Actor", "Angle", "Area", "Attractor", "Boundary", "Box", "BruteForce", "Capsule", "Chain", "Circle",
     "ClampAndFlip", "Clock", "CoarseStepWarning", "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy",
     "Events", "ExplicitEuler", "Fast", "FrameBudget", "Gravitation", "Group", "InputError", "Integrator", "Ledger",
-    "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel", "Panels", "Periodic", "Pin", "PointSpring", "Polygon",
+    "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel", "Panels", "Particle", "Periodic", "Pin", "PointSpring", "Polygon",
     "PositionVerlet", "ProjectOnly", "PyverletError", "Rope", "Segment", "SemiImplicitEuler", "Sink", "Slider", "Spring", "Stick",
     "TimeCorrectedVerlet", "Trajectory", "VelocityVerlet", "Wind", "World", "Worlds", "Yoshida4", "bridge", "builders",
-    "chain", "cloth", "errors", "fill", "force", "forces", "integrators", "lab", "load", "net", "read_trajectory", "rope", "save",
-    "scenes", "slider", "soft_body", "sweep", "view", "warm_up", "widget",
+    "chain", "cloth", "draw", "errors", "fill", "force", "forces", "integrators", "lab", "load", "net", "picture",
+    "read_trajectory", "rope", "save", "scenes", "slider", "soft_body", "sweep", "view", "viewers", "warm_up", "widget",
 ]  # fmt: skip
+
+
+_submodule, __dir__ = lazily(__name__, lambda: list(_LATER))
 
 
 def __getattr__(name: str) -> Any:
     # What few programs need, loaded when it is first named.
-    if name in _LATER:
-        value = getattr(import_module(_LATER[name]), name)
-        globals()[name] = value
-        return value
-    if name == "lab":
-        return import_module("pyverlet.lab")
-    raise AttributeError(f"module 'pyverlet' has no attribute {name!r}")
+    if name not in _LATER:
+        return _submodule(name)
+    value = getattr(import_module(_LATER[name]), name)
+    globals()[name] = value
+    return value
 
 
 def view(world: World | Panels, **options: Any) -> Any:

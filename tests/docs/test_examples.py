@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 import pyverlet
+import pyverlet as pv
 import pyverlet.viewers
 import pyverlet.viewers.window
 from pyverlet.cli import main
@@ -91,3 +92,18 @@ def test_links_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text(encoding="utf-8")):
         if not target.startswith(("http://", "https://")):
             assert (page.parent / target).exists(), target
+
+
+@pytest.mark.parametrize("page", ["coming-from.md", "names.md"])
+def test_tables_name_what_there_is(page: str) -> None:
+    world = pv.World(events=True, contacts=True)
+    group = world.add(position=(0, 0))
+    found: dict[str, Any] = {"pv": pv, "world": world, "group": group, "link": pv.Pin(group, 0), "pen": pv.picture.Pen()}
+    row = re.compile(r"^\|([^|]*)\|(.*)\|$", re.M)
+    for theirs, ours in row.findall((ROOT / "docs" / page).read_text(encoding="utf-8")):
+        for said in re.findall(r"`([^`]*)`", theirs if page == "names.md" else ours.split(" | ")[0]):
+            for kind, names in re.findall(r"\b(pv|world|group|link|pen)((?:\.\w+)+)", said):
+                thing = found[kind]
+                for name in names[1:].split("."):
+                    assert hasattr(thing, name), f"{page}: {kind}{names}"
+                    thing = getattr(thing, name)

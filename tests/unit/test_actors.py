@@ -90,3 +90,56 @@ def test_bad_input_gets_one_sentence(case: str) -> None:
     act, says = BAD[case]
     with pytest.raises(pv.InputError, match=says):
         act()
+
+
+class Calls(pv.Actor):
+    """Notes its turns, and then does what it was given."""
+
+    def __init__(self, turns: list[tuple[str, int]], name: str, then: Callable[[Calls, pv.World], object] | None = None) -> None:
+        self.turns, self.name, self.then = turns, name, then
+
+    def act(self, world: pv.World, dt: float) -> None:
+        self.turns.append((self.name, world.frames))
+        if self.then is not None:
+            self.then(self, world)
+
+
+def acting(**then: Callable[[Calls, pv.World], object] | None) -> tuple[pv.World, list[tuple[str, int]], dict[str, Calls]]:
+    """A world after three frames with an actor for each name, the turns they had, and the actors."""
+    world, turns = pv.World(), list[tuple[str, int]]()
+    named = {name: Calls(turns, name, what) for name, what in then.items()}
+    world.actors.extend(named.values())
+    world.run(seconds=3 / 60)
+    return world, turns, named
+
+
+def test_an_actor_that_removes_itself_leaves_the_others_their_turns() -> None:
+    world, turns, named = acting(a=None, b=lambda self, world: world.actors.remove(self), c=None, d=None)
+    assert turns == [("a", 0), ("b", 0), ("c", 0), ("d", 0), ("a", 1), ("c", 1), ("d", 1), ("a", 2), ("c", 2), ("d", 2)]
+    assert world.actors == [named["a"], named["c"], named["d"]]
+
+
+@pytest.mark.parametrize(
+    ("then", "first"),
+    [
+        (lambda _, world: world.actors.clear(), "a"),
+        (lambda _, world: world.actors.pop(1), "acd"),
+        (lambda _, world: world.actors.reverse(), "abcd"),
+        (lambda self, world: world.actors.insert(0, Calls(self.turns, "new")), "abcd"),
+        (lambda self, world: setattr(world, "actors", [Calls(self.turns, "new")]), "a"),
+    ],
+)
+def test_actors_that_are_there_when_a_frame_begins_act_once_in_it(then: Any, first: str) -> None:
+    world, turns = pv.World(), list[tuple[str, int]]()
+    world.actors += [Calls(turns, "a", then), *(Calls(turns, name) for name in "bcd")]
+    world.step(1 / 60)
+    assert [name for name, _ in turns] == [*first]
+    world.step(1 / 60)
+    assert all(frame == 1 for _, frame in turns[len(first) :])
+
+
+def test_an_actor_that_is_listed_twice_acts_twice() -> None:
+    world, turns = pv.World(), list[tuple[str, int]]()
+    world.actors += [Calls(turns, "a")] * 2
+    world.step(1 / 60)
+    assert turns == [("a", 0)] * 2

@@ -156,3 +156,33 @@ def test_world_step_fits_on_a_screen() -> None:
     first, last = functions["step"].lineno, functions["_frame"].end_lineno
     assert last is not None
     assert last - first < 60
+
+
+SUBMODULES = ("data", "draw", "lab", "picture", "record", "viewers")
+
+
+def test_submodules_load_when_they_are_named() -> None:
+    code = f"""
+import sys
+import pyverlet as pv
+names = {SUBMODULES}
+assert not [name for name in names if f"pyverlet.{{name}}" in sys.modules], "import pyverlet loads them"
+assert {{*names}} < {{*dir(pv)}}
+assert not [name for name in names if f"pyverlet.{{name}}" in sys.modules], "dir loads them"
+assert not hasattr(pv, "drawing") and not hasattr(pv.draw, "pigame")
+assert [getattr(pv, name).__name__ for name in names] == [f"pyverlet.{{name}}" for name in names]
+assert callable(pv.data.snapshot.save) and callable(pv.lab.order.measure) and pv.viewers.session.Session
+assert {{"pygame", "pyglet", "arcade", "fit"}} <= {{*dir(pv.draw)}}
+sys.modules["pygame"] = None  # as if it were not installed
+try:
+    pv.draw.pygame
+except AttributeError as error:
+    assert "pyverlet.draw.pygame needs 'pygame'" in str(error)
+else:
+    raise AssertionError("no library, and no error")
+del sys.modules["pygame"]
+from pyverlet import draw
+assert callable(draw.pygame.draw) and draw is pv.draw
+"""
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr

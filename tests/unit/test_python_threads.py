@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import subprocess
 import sys
+import threading
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -97,3 +100,215 @@ def test_a_pool_of_threads_steps_a_hundred_worlds() -> None:
     expected = [run(seed) for seed in range(100)]
     with ThreadPoolExecutor(4) as pool:
         assert [*pool.map(run, range(100))] == expected
+
+
+# ---- one world, several threads ------------------------------------------------------------------------------------------
+
+
+def drifting(count: int = 1000) -> pv.World:
+    """Circles that all drift alike: a frame's positions and velocities are known from any one of them."""
+    world = pv.World(gravity=(0, 0), dtype=np.float64, contacts=True)
+    side = int(np.ceil(np.sqrt(count)))
+    world.add(position=2.0 * np.stack(np.divmod(np.arange(count), side), axis=-1), velocity=(3.0, 0.0), radius=0.5)
+    return world
+
+
+def together(*tasks: Callable[[], object]) -> None:
+    """Run each in a thread; what one of them raises is raised here."""
+    with ThreadPoolExecutor(len(tasks)) as pool:
+        for done in [pool.submit(task) for task in tasks]:
+            done.result()
+
+
+def test_threads_that_step_one_world_take_turns() -> None:
+    world, alone = small(7), small(7)
+    together(*[lambda: world.run(seconds=0.5)] * 6)
+    alone.run(seconds=3)
+    assert (world.frames, world.time) == (180, alone.time)
+    assert world.state_hash() == alone.state_hash()
+
+
+def test_what_is_read_while_another_thread_steps_is_of_one_frame() -> None:
+    world = drifting()
+    start = world.position.copy()
+    running = threading.Event()
+    running.set()
+    looks: dict[str, Callable[[], bool]] = {
+        "position": lambda: float(np.ptp((world.position - start)[:, 0])) < 1e-9,
+        "group": lambda: float(np.ptp((world.groups[0].position - start)[:, 0])) < 1e-9,
+        "velocity": lambda: bool((world.velocity == (3.0, 0.0)).all()),
+        "energy": lambda: world.energy().total == pytest.approx(4500.0),
+        "momentum": lambda: world.momentum()[0] == pytest.approx(3000.0),
+        "contacts": lambda: len(world.contacts) == 0,
+        "overlap": lambda: world.overlap().contacts == 0,
+        "query": lambda: len(world.in_circle(start[500] + (3.0 * world.time, 0), 20)) > 10,
+        "hash": lambda: len(world.state_hash()) == 16,
+        "save": lambda: len(world.save().arrays["mass"]) == 1000,
+    }
+
+    def step() -> None:
+        try:
+            for _ in range(60):
+                world.step(1 / 240)
+        finally:
+            running.clear()
+
+    seen = dict.fromkeys(looks, 0)
+
+    def look() -> None:
+        while running.is_set():
+            for name, same in looks.items():
+                assert same(), name
+                seen[name] += 1
+
+    together(step, look)
+    assert min(seen.values()) > 0
+
+
+def test_two_looks_are_of_one_frame_while_the_world_is_held() -> None:
+    world, done = small(1), threading.Event()
+
+    def step() -> None:
+        try:
+            world.run(seconds=1)
+        finally:
+            done.set()
+
+    def look() -> None:
+        while not done.is_set():
+            with world.held():
+                before = world.time, world.state_hash()
+                assert world.position.flags.writeable
+                world.velocity[:] = world.velocity
+                assert (world.time, world.state_hash()) == before
+
+    together(step, look)
+    assert world.frames == 60
+
+
+def test_threads_may_add_and_remove_while_another_steps() -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (40, 40)), events=True, contacts=True)
+    done = threading.Event()
+
+    def step() -> None:
+        try:
+            world.run(seconds=0.5)
+        finally:
+            done.set()
+
+    def come_and_go(column: int) -> Callable[[], None]:
+        def change() -> None:
+            while not done.is_set():
+                group = world.add(position=[(4.0 * column + 2, y) for y in (2, 4, 6)], velocity=(0, 1))
+                link = world.links.append(pv.Stick(group, 0, 1))
+                assert len(group) == len(group.position) == 3
+                group.velocity = (0, 0)
+                world.links.remove(link)
+                world.remove(group)
+
+        return change
+
+    together(step, *map(come_and_go, range(3)))
+    assert (world.frames, len(world), len(world.links)) == (30, 0, 0)
+
+
+def test_a_frame_is_not_to_be_changed_from_within() -> None:
+    world = small(3)
+    said: list[str] = []
+
+    def meddle(_: object) -> None:
+        for change in (lambda: world.step(0.1), lambda: world.add(position=(1, 1)), lambda: world.remove(0), world.save):
+            with pytest.raises(pv.InputError, match="in the middle of a frame") as refused:
+                change()
+            said.append(str(refused.value))
+
+    world.onlooker = meddle
+    world.step(1 / 60)
+    assert {text.split()[0] for text in said} == {"step", "add", "remove", "save"}
+    assert (world.frames, len(world)) == (1, 16)
+
+
+def test_an_executor_of_asyncio_steps_a_world() -> None:
+    world, expected = small(5), small(5)
+
+    async def main() -> None:
+        loop = asyncio.get_running_loop()
+        stepping = [loop.run_in_executor(None, world.step, 1 / 60) for _ in range(20)]
+        while not all(done.done() for done in stepping):
+            assert np.isfinite(world.position).all()
+            await asyncio.sleep(0)
+        world.velocity[0] = (0, 0)  # nobody steps it now
+
+    asyncio.run(main())
+    expected.run(seconds=20 / 60)
+    expected.velocity[0] = (0, 0)
+    assert world.state_hash() == expected.state_hash()
+
+
+# A fork while two other threads step a world and wait for it: in the child both are gone, and the world is whole.
+FORK = """
+import os, threading
+import numpy as np
+import pyverlet as pv
+
+world = pv.World(boundary=pv.Box((0, 0), (20, 20)))
+world.add(position=np.random.default_rng(0).uniform(1, 19, (200, 2)), radius=0.3)
+world.run(seconds=0.2)
+threads = [threading.Thread(target=world.run, kwargs={"seconds": 3}, daemon=True) for _ in range(2)]
+for thread in threads:
+    thread.start()
+for _ in range(3):
+    child = os.fork()
+    if child == 0:
+        frames, time = world.frames, world.time
+        world.run(seconds=0.1)
+        good = world.frames == frames + 6 and abs(world.time - time - 0.1) < 1e-6 and np.isfinite(world.position).all()
+        os._exit(0 if good else 3)
+    _, status = os.waitpid(child, 0)
+    assert os.waitstatus_to_exitcode(status) == 0, os.waitstatus_to_exitcode(status)
+for thread in threads:
+    thread.join()
+assert world.frames == 12 + 360
+"""
+
+# Ctrl-C, again and again: the world stands between two frames, and goes on with the bits of one that was left alone. While
+# something compiles Ctrl-C does not wait for the end of a frame, so that all is compiled before.
+CTRL_C = """
+import os, signal, threading, time
+import numpy as np
+import pyverlet as pv
+
+def built():
+    world = pv.World(boundary=pv.Box((0, 0), (12, 12)), collisions=pv.Collisions(friction=0.3), events=True, ledger=True)
+    world.add(position=np.random.default_rng(0).uniform(1, 11, (60, 2)), radius=0.3)
+    world.actors.append(pv.Emitter(pv.Box((1, 8), (11, 11)), rate=60, radius=0.1, most=50))
+    return world
+
+built().run(seconds=4)
+world, alone = built(), built()
+caught = 0
+for pause in np.linspace(0.01, 0.03, 12):
+    timer = threading.Timer(pause, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    try:
+        world.run(seconds=1000)
+    except KeyboardInterrupt:
+        caught += 1
+    timer.join()
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+assert caught == 12
+assert abs(world.time - world.frames / 60) < 1e-6
+for _ in range(world.frames):
+    alone.step(1 / 60)
+assert world.state_hash() == alone.state_hash()
+assert world.ledger == alone.ledger
+world.run(seconds=0.2), alone.run(seconds=0.2)
+assert world.state_hash() == alone.state_hash()
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks here")
+@pytest.mark.parametrize("program", [FORK, CTRL_C], ids=["fork", "ctrl-c"])
+def test_a_world_is_whole(program: str) -> None:
+    run = subprocess.run([sys.executable, "-W", "ignore", "-c", program], capture_output=True, text=True, timeout=300)
+    assert run.returncode == 0, run.stderr

@@ -13,6 +13,7 @@ import pytest
 import pyverlet as pv
 from pyverlet import scenes
 from pyverlet.compile import jit
+from pyverlet.state.slots import Slots
 from pyverlet.viewers import levers
 from pyverlet.viewers.commands import (
     Build,
@@ -296,7 +297,9 @@ class Compiles(pv.Actor):
                 pass
 
 
-def test_a_frame_that_waits_for_a_compiler_says_so(wait_until: WaitUntil, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def another_compiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another process is about what `Compiles` needs."""
     turn = jit.turn
 
     @contextlib.contextmanager
@@ -305,6 +308,10 @@ def test_a_frame_that_waits_for_a_compiler_says_so(wait_until: WaitUntil, monkey
             yield mine and (name != "a kernel" or patience > 0)
 
     monkeypatch.setattr(jit, "turn", taken)
+
+
+@pytest.mark.usefixtures("another_compiles")
+def test_a_frame_that_waits_for_a_compiler_says_so(wait_until: WaitUntil) -> None:
     world, seen = pv.World(), list[str | None]()
     world.add(position=(0, 0))
     world.actors.append(Compiles())
@@ -313,6 +320,42 @@ def test_a_frame_that_waits_for_a_compiler_says_so(wait_until: WaitUntil, monkey
         wait_until(lambda: session.latest.status.frames > 8)
         assert session.latest.status.busy is None
     assert [text for text in seen if text] == ["compiling what this needs, once"]
+
+
+class Slow:
+    """A force of nothing by which every frame is late: on screens there are pictures between its substeps."""
+
+    velocity_dependent = False
+
+    def apply(self, state: Slots, t: float) -> None:
+        time.sleep(0.012)
+
+
+@pytest.mark.usefixtures("another_compiles")
+@pytest.mark.parametrize("long", [False, True])
+def test_a_slow_frame_that_waits_for_a_compiler_publishes_no_moment_twice_unless_it_takes_long(
+    wait_until: WaitUntil, monkeypatch: pytest.MonkeyPatch, long: bool
+) -> None:
+    monkeypatch.setattr("pyverlet.viewers.session._LONG_S", -1.0 if long else 1e9)
+    world, seen = pv.World(collisions=None), list[tuple[float, str | None]]()
+    world.add(position=(0, 0))
+    world.forces.append(Slow())
+    world.step(1 / 60)
+    world.step(1 / 60)  # all is compiled
+    world.actors.append(Compiles())
+    session = Session(world)
+
+    def take() -> None:
+        seen.append((session.latest.status.time, session.latest.status.busy))
+        session.take(session.latest, velocity=True)
+
+    session.subscribe(take)
+    with session:
+        wait_until(lambda: world.frames > 6)
+    times = [moment for moment, _ in seen]
+    told = [moment for moment, busy in seen if busy]
+    assert len(times) - len(set(times)) == (1 if long else 0)
+    assert bool(told) == long
 
 
 def test_a_session_that_stops_does_not_wait_for_a_scene(wait_until: WaitUntil) -> None:

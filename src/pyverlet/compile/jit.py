@@ -30,7 +30,7 @@ import numpy as np
 from numba.extending import typeof_impl
 
 from pyverlet.compile import pool, watching
-from pyverlet.ground import file_lock
+from pyverlet.ground import file_lock, interrupts
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -254,7 +254,8 @@ class Kernel:
     def _first(self, variant: str, *arguments: Any) -> Any:
         """The first call: no two processes compile a kernel at a time, and whoever comes second finds it on disk."""
         dispatcher = getattr(self, variant)
-        with _compiling, _turn_or_wait(f"{variant} {self.function.__module__}.{self.function.__qualname__}"), _litter():
+        name = f"{variant} {self.function.__module__}.{self.function.__qualname__}"
+        with interrupts.whole.long(), _compiling, _turn_or_wait(name), _litter():
             try:
                 result = dispatcher(*arguments)
             except numba.core.errors.NumbaError:

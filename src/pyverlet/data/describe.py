@@ -14,13 +14,16 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from pyverlet.data import memory
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.fields import Field
 from pyverlet.laws import forces, integrators, naive, obstacles, rooms
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.collisions import Collisions
-from pyverlet.state.group import Group
+from pyverlet.state.group import Group, Picked
 from pyverlet.world.actors import Actor, Emitter, Sink
 from pyverlet.world.world import World
 
@@ -208,6 +211,8 @@ def describe(thing: Any) -> Description:
 
 
 def _value(value: Any) -> Any:
+    if isinstance(value, Picked):
+        return {"numbers": value._numbers}
     if isinstance(value, Group):
         return {"first": value._first, "count": value._added}
     if type(value).__name__ in KINDS:
@@ -287,6 +292,10 @@ class Builder:
             return value
         if self.world is None:
             raise InputError(f"{name} is {_brief(value)}; allowed is none where there is no world")
+        if "numbers" in value:
+            numbers = np.asarray(memory.unpack(value["numbers"]))
+            Field(np.int64, "numbers", least=0, most=2**31).check(f"{name}: numbers", numbers, self.world.dtype, {})
+            return Picked(self.world._state, numbers, self.world.remove)
         first, count = checks.whole("first", value["first"], least=0), checks.whole("count", value["count"], least=0)
         return Group.of(self.world._state, first, count, self.world.remove)
 

@@ -25,6 +25,7 @@ from pyverlet.laws.contacts.collisions import Collisions
 from pyverlet.laws.integrators import Integrator
 from pyverlet.laws.obstacles import Obstacle
 from pyverlet.laws.rooms import Boundary
+from pyverlet.world import copies
 from pyverlet.world import parts as apart
 from pyverlet.world.actors import Actor
 from pyverlet.world.measures import hash_of
@@ -114,13 +115,7 @@ def _made_by() -> dict[str, str]:
 def _settings(world: World) -> dict[str, Any]:
     """How the world was built, and what acts in it."""
     return {
-        "dtype": world.dtype.name,
-        "gravity": list(world.gravity),
-        "substeps": world.substeps,
-        "threads": world._threads,
-        "ledger": world.keeps_ledger,
-        "events": world.tells_events,
-        "sleep": world._sleep is not None,
+        **copies.settings(world),
         "boundary": describe(world.boundary),
         "collisions": world.collisions and describe(world.collisions),
         "integrator": describe(world.integrator),
@@ -226,6 +221,7 @@ def _world(settings: dict[str, Any], moving: Parts, objects: list[Any]) -> World
         threads=None if threads is None else min(checks.whole("threads", threads), jit.max_threads()),
         ledger=settings["ledger"],
         events=settings["events"],
+        contacts=settings.get("contacts", False),
         sleep=settings["sleep"],
     )
     builder.world = world

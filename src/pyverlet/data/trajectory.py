@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pyverlet.data.frames import Array, Frame, Reader, Writer
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, PyverletError
+from pyverlet.ground.shown import Shown
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
@@ -25,7 +26,7 @@ FORMATS = {".gsd": "gsd.Gsd", ".xyz": "xyz.Xyz", ".extxyz": "xyz.Xyz", ".vtkhdf"
 """By suffix the module here and what its Writer and Reader begin with. A new format is a module and an entry."""
 
 
-class Trajectory:
+class Trajectory(Shown):
     """Keeps moments of a world in a file; use it in a with statement.
 
         with pv.Trajectory("silo.gsd", every=10) as film:
@@ -45,6 +46,8 @@ class Trajectory:
     Raises:
         InputError: the suffix is unknown, a library is missing, or the file cannot be written.
     """
+
+    _shows = ("path", "every", "frames")
 
     def __init__(self, path: str | Path, *, every: int = 1) -> None:
         self.path = Path(path)

@@ -21,6 +21,7 @@ from pyverlet.data import archive, snapshot
 from pyverlet.data.crew import Crew, Keeper, Plan
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import Shown
 from pyverlet.scenes import Scene, get
 from pyverlet.world.world import World
 
@@ -42,7 +43,7 @@ class Start:
     token: int
 
 
-class Worlds:
+class Worlds(Shown):
     """Worlds of one scene that differ in their seeds, stepped together on all cores.
 
     The arrays are those of the worlds themselves: reading copies nothing, and what is written there is what the next frame begins
@@ -59,6 +60,8 @@ class Worlds:
     Raises:
         InputError: there is no such scene or setting, or the scene cannot be sent to another process.
     """
+
+    _shows = ("scene", "seed")
 
     def __init__(self, scene: str | Scene, n: int, *, seed: int = 0, processes: int | None = None, **settings: Any) -> None:
         self.scene = get(scene) if isinstance(scene, str) else scene

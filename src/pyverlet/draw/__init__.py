@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from pyverlet.ground.submodules import lazily
 from pyverlet.picture import View
 from pyverlet.viewers.frames import Camera
 
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
     from pyverlet.world.world import World
 
 __all__ = ["View", "fit"]
+
+__getattr__, __dir__ = lazily(__name__)
 
 
 def fit(world: World, size: tuple[int, int], *, y_up: bool = False) -> View:

@@ -11,6 +11,10 @@ class InputError(PyverletError, ValueError):
     """An argument is outside what is allowed; nothing was changed."""
 
 
+class IndexInputError(InputError, IndexError):
+    """There is no such particle in a group."""
+
+
 class Interrupted(PyverletError):  # noqa: N818  (like KeyboardInterrupt, it is no error)
     """A person ended long work early (Ctrl-C); the message says what is kept of it."""
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from pyverlet.ground.submodules import lazily
 from pyverlet.lab.problems import Equation
 from pyverlet.lab.solver import Solution, solve
 
 __all__ = ["Equation", "Solution", "solve"]
+
+__getattr__, __dir__ = lazily(__name__)

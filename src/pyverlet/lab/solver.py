@@ -36,6 +36,10 @@ class Solution(NamedTuple):
     positions: Floats
     velocities: Floats
 
+    def __repr__(self) -> str:
+        times = self.times
+        return f"Solution of {len(times)} times from {times[0]:g} to {times[-1]:g} s, of positions {self.positions.shape[1:]}"
+
 
 def solve(
     F: Acceleration,  # noqa: N803  (as in x'' = F(t, x, x'))

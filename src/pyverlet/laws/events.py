@@ -60,6 +60,9 @@ class Events:
         self._keys: list[Array] = []
         self._speeds: list[Array] = []
 
+    def __repr__(self) -> str:
+        return f"Events of the last frame: {len(self.begin)} begin, {len(self.end)} end, {len(self.hit)} hit"
+
     @property
     def hit_speed(self) -> float:
         """Slower contacts begin without being hits, m/s; 1 unless set."""

@@ -121,6 +121,9 @@ class _Walls(Boundary):
         self._shape: list[Any] = []
         self._laws: list[Any] = []
 
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"_given": (), "_shape": [], "_laws": []}
+
     def _confine(self, kernel: Any, shape: Sequence[float], state: Slots, h: float, lag: float, rest_speed: float) -> None:
         shape, laws = self._rounded(shape, state, h, lag, rest_speed)
         kernel(state.circles(), *shape, *laws)

@@ -5,6 +5,7 @@ Loads nothing but NumPy and the engine.
 
 from __future__ import annotations
 
+from pyverlet.ground.submodules import lazily
 from pyverlet.picture.colour import ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Fixed, Groups
 from pyverlet.picture.palette import DARK, LIGHT, Theme
 from pyverlet.picture.pen import Pen
@@ -15,3 +16,5 @@ __all__ = [
     "DARK", "LIGHT", "ByEnergy", "ByMass", "ByOrigin", "BySpeed", "Colouring", "Fixed", "Groups", "Pen", "Raster", "Theme",
     "View", "nearest",
 ]  # fmt: skip
+
+__getattr__, __dir__ = lazily(__name__)

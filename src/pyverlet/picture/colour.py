@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import Shown
 from pyverlet.picture.palette import STEPS, TONES, Packed, Theme, heat, hues, packed, shade
 from pyverlet.state.group import Group
 
@@ -47,7 +48,7 @@ class Circles(Protocol):
         """How many."""
 
 
-class Colouring(ABC):
+class Colouring(Shown, ABC):
     """Gives every circle of a world a colour, picture after picture."""
 
     @abstractmethod

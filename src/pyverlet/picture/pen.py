@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import Shown
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
@@ -60,7 +61,7 @@ Draw = Callable[["World", "Pen"], None]
 """A user's function that draws over a picture of a world."""
 
 
-class Pen:
+class Pen(Shown):
     """Draws over a picture: given to `draw(world, pen)`, anew for each. Points in metres; widths and sizes in pixels.
 
     A `colour` is "#rrggbb", (R, G, B) from 0 to 255, or None for one that can be read on the ground.

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import Shown
 from pyverlet.kernels import lines, raster
 from pyverlet.laws.obstacles import Outline
 from pyverlet.picture import across, ink, marks
@@ -46,7 +47,7 @@ MOST_PIXELS = 1 << 26
 """8,192 x 8,192: more is almost surely a typing error, and 256 MB."""
 
 
-class Raster:
+class Raster(Shown):
     """Draws worlds into one buffer of pixels, over and over.
 
     Args:

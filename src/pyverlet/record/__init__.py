@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, Interrupted, PyverletError
+from pyverlet.ground.submodules import lazily
 from pyverlet.picture import DARK, Colouring, Theme
 from pyverlet.picture.pen import Draw
 from pyverlet.record import _films
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     from pyverlet.world.world import World
 
 __all__ = ["FilmPlan", "Recorded", "plan", "to_image", "to_video"]
+
+__getattr__, __dir__ = lazily(__name__)
 
 LONGEST_DT = 1 / 60
 """s: pictures further apart than this have several frames of physics between them."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import Shown
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.collisions import Collisions
 from pyverlet.laws.integrators import Integrator, PositionVerlet
@@ -91,8 +92,8 @@ class Settings:
         )
 
 
-@dataclass(frozen=True)
-class Show:
+@dataclass(frozen=True, repr=False)
+class Show(Shown):
     """How a scene asks to be shown where that is not as usual. Viewers that cannot, show it as usual.
 
     Attributes:
@@ -103,14 +104,16 @@ class Show:
         graph: of (settings): what measures the world as it runs, for a graph beside it.
     """
 
+    _shows = ("colours", "view", "seconds", "graph")
+
     colours: Callable[[Settings, float, Callable[[int, int], None] | None], NDArray[np.uint8]] | None = None
     view: Callable[[Settings], tuple[float, float, float, float]] | None = None
     seconds: Callable[[Settings], float] | None = None
     graph: Callable[[Settings], Gauge] | None = None
 
 
-@dataclass(frozen=True)
-class Variant:
+@dataclass(frozen=True, repr=False)
+class Variant(Shown):
     """One of the worlds that a scene shows side by side.
 
     Attributes:
@@ -120,14 +123,16 @@ class Variant:
         pace: how it follows the frames of the screen.
     """
 
+    _shows = ("name", "changes")
+
     name: str
     changes: Mapping[str, Any] = field(default_factory=dict)
     build: Callable[[Settings], World] | None = None
     pace: Pace = every_frame
 
 
-@dataclass(frozen=True)
-class Scene:
+@dataclass(frozen=True, repr=False)
+class Scene(Shown):
     """A world to run by name: demonstration, test, benchmark and recording are all made from it.
 
     Attributes:
@@ -143,6 +148,8 @@ class Scene:
         document: what the file says that the scene was read from; None for scenes with a name.
         sketch: the Python file it was read from; None for all others.
     """
+
+    _shows = ("name", "summary")
 
     name: str
     summary: str

@@ -24,6 +24,7 @@ from typing import Any
 
 from pyverlet.ground.errors import InputError, Interrupted
 from pyverlet.ground.patience import Patience, TooLong
+from pyverlet.ground.shown import Shown
 from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.scenes.sliders import Board, board
 from pyverlet.world.actors import Actor
@@ -48,7 +49,7 @@ class SketchError(InputError):
     """Something in a sketch is wrong; the message says where."""
 
 
-class Sketch:
+class Sketch(Shown):
     """The code of a file, run when it is first needed.
 
     Args:
@@ -61,6 +62,8 @@ class Sketch:
         files: of the sketch and of the modules beside it that it has imported.
         settings: with which it was last built.
     """
+
+    _shows = ("name",)
 
     def __init__(self, path: Path, source: bytes, before: Sketch | None = None) -> None:
         self.path, self.source, self.name = Path(path), source, Path(path).name

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
+from pyverlet.ground.errors import IndexInputError, InputError
 from pyverlet.state.state import State
 
 Array = NDArray[Any]
 
 
 class Column:
-    """A property of a group, or of the whole world: a view on its part of one of the state's arrays. Setting it copies."""
+    """A property of a group, or of the whole world: a view on its part of one of the state's arrays. Setting it copies.
+
+    Of particles that were picked out it is a copy, not to be written. So it is while another thread makes a frame: of what that
+    frame comes to.
+    """
 
     def __init__(self, doc: str) -> None:
         self.__doc__ = doc
@@ -25,10 +29,21 @@ class Column:
         self._name = name
 
     def __get__(self, group: Any, owner: type) -> Array:
-        return getattr(group._state, self._name)[group._where]  # type: ignore[no-any-return]
+        state: State = group._state
+        version = state.version
+        array: Array = getattr(state, self._name)[where := group._where]
+        if state.version == version and not state.turn.taken and not isinstance(where, np.ndarray):
+            return array  # nothing has changed meanwhile, and no lock was needed
+        with state.turn as stepped:
+            array = getattr(state, self._name)[where := group._where]
+            if (stepped or isinstance(where, np.ndarray)) and isinstance(array, np.ndarray):
+                array = array.copy()
+                array.flags.writeable = False
+            return array
 
     def __set__(self, group: Any, value: Any) -> None:
-        getattr(group._state, self._name)[group._where] = value
+        with group._state.turn.held():
+            getattr(group._state, self._name)[group._where] = value
 
 
 class Group:
@@ -37,6 +52,10 @@ class Group:
     Its arrays are views on the world's, in the order the particles were added: reading copies nothing, and writing into them
     (`group.velocity[0] = 1, 0`) changes the world. Fetch them anew after adding or removing particles: the world may have moved
     its arrays. Who was removed is no longer among them; with nobody left, asking for them raises InputError.
+
+    Indexing is NumPy's, among those that are left: `group[2]` and `group[-1]` are a `Particle`, `group[1:5]` is a group whose
+    arrays are views, and so is `for particle in group` a loop over each. `group[::2]`, `group[[0, 3]]` and `group[mask]` pick
+    particles out: a group whose arrays are copies, which can be set as a whole (`group[[0, 3]].velocity = 0`).
     """
 
     def __init__(self, state: State, where: slice, remove: Callable[[Array], None]) -> None:
@@ -60,6 +79,31 @@ class Group:
         where = self._span()
         return int(where.stop - where.start)
 
+    def __getitem__(self, which: Any) -> Any:
+        with self._state.turn:
+            numbers = self._state.number[self._where]
+            try:
+                picked = np.array(numbers[which])
+            except (IndexError, TypeError, ValueError) as error:
+                raise IndexInputError(f"index is {which!r} in a group of {len(self)} particles; {error}") from None
+            if picked.ndim == 0:
+                return Particle(self._state, int(picked), self._remove)
+            if picked.ndim > 1:
+                raise IndexInputError(
+                    f"index is {which!r}; allowed are an index, several in a list, a slice, or {len(self)} bools"
+                )
+            if isinstance(which, slice) and which.step in (None, 1) and len(picked):
+                found = Group.of(self._state, int(picked[0]), len(picked), self._remove)
+                found._stop = int(picked[-1]) + 1
+                return found
+            return Picked(self._state, picked, self._remove)
+
+    def __iter__(self) -> Iterator[Particle]:
+        """Each particle that is left when it is its turn; they may be removed on the way."""
+        for number in self._state.number[self._span()].tolist():
+            if (particle := Particle(self._state, number, self._remove)).is_there:
+                yield particle
+
     def __repr__(self) -> str:
         if not len(self):
             return f"Group of {self._added} particles, all removed" if self._added else "Group of 0 particles"
@@ -68,16 +112,22 @@ class Group:
     def _span(self) -> slice:
         """Where they are among the world's now; numbers stay in order, so that those added together stay together."""
         if self._version != self._state.version:
-            self._found, self._version = self._state.find(self._first, self._stop), self._state.version
+            with self._state.turn:
+                self._found, self._version = self._state.find(self._first, self._stop), self._state.version
         return self._found
 
     @property
-    def _where(self) -> slice:
+    def _where(self) -> Any:
         """As `_span`; refused if there is nobody left."""
         where = self._span()
         if where.start == where.stop and self._added:
             raise InputError(f"group is one of {self._added} particles that were all removed; allowed is one with particles left")
         return where
+
+    @property
+    def world(self) -> Any:
+        """The world they are in."""
+        return self._remove.__self__  # type: ignore[attr-defined]
 
     def remove(self, which: ArrayLike | None = None) -> None:
         """Remove particles of this group from the world; other groups stay as they are.
@@ -117,7 +167,120 @@ class Group:
         Raises:
             InputError: there is no such particle.
         """
-        try:
-            self.mass[index], self.velocity[index], self.spin[index] = np.inf, 0.0, 0.0
-        except IndexError:
-            raise InputError(f"index is {index!r}; allowed are indices of this group's {len(self)} particles") from None
+        state = self._state
+        with state.turn.held():
+            try:
+                pinned = self.index[index]
+            except IndexError:
+                raise InputError(f"index is {index!r}; allowed are indices of this group's {len(self)} particles") from None
+            state.mass[pinned], state.velocity[pinned], state.spin[pinned] = np.inf, 0.0, 0.0
+
+
+class Picked(Group):
+    """Particles that were picked out of a group, in the order they were picked. Its arrays are copies; set them as a whole."""
+
+    def __init__(self, state: State, numbers: NDArray[np.int64], remove: Callable[[Array], None]) -> None:
+        super().__init__(state, slice(0, 0), remove)
+        self._numbers, self._added, self._version = numbers, len(numbers), -1
+        self._index = np.empty(0, np.int64)
+
+    def _left(self) -> NDArray[np.int64]:
+        """Where those are among the world's now that are left."""
+        if self._version != self._state.version:
+            with self._state.turn:
+                where, there = _places(self._state, self._numbers)
+                self._index, self._version = where[there], self._state.version
+        return self._index
+
+    def __len__(self) -> int:
+        return len(self._left())
+
+    def __iter__(self) -> Iterator[Particle]:
+        for number in self._numbers.tolist():
+            if (particle := Particle(self._state, number, self._remove)).is_there:
+                yield particle
+
+    def __repr__(self) -> str:
+        gone = self._added - len(self)
+        return f"Group of {len(self)} particles, picked out{f', {gone} removed' if gone else ''}"
+
+    @property
+    def _where(self) -> Any:
+        if not len(where := self._left()) and self._added:
+            raise InputError(f"group is one of {self._added} particles that were all removed; allowed is one with particles left")
+        return where
+
+    @property
+    def index(self) -> NDArray[np.int64]:
+        return np.array(self._where)
+
+
+class Particle:
+    """A handle on one particle: `group[2]`. What it has is written as of a group: `ball.velocity = (1, 0)`, `ball.mass = 2`."""
+
+    def __init__(self, state: State, number: int, remove: Callable[[Array], None]) -> None:
+        self._state, self._remove = state, remove
+        self.number = number
+        """Its number, which no other particle of the world ever has."""
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Particle) and other.number == self.number and other._state is self._state
+
+    def __hash__(self) -> int:
+        return hash((self.number, id(self._state)))
+
+    def __repr__(self) -> str:
+        if not self.is_there:
+            return f"Particle {self.number}, removed"
+        x, y = self.position
+        return f"Particle {self.index} at ({x:g}, {y:g}) m"
+
+    @property
+    def is_there(self) -> bool:
+        """Whether it was not removed."""
+        return bool(_places(self._state, np.array([self.number]))[1][0])
+
+    @property
+    def index(self) -> int:
+        """Its index among all of the world's particles now; InputError if it was removed."""
+        with self._state.turn:
+            (where,), (there,) = _places(self._state, np.array([self.number]))
+        if not there:
+            raise InputError(f"particle {self.number} was removed; allowed is one that is there")
+        return int(where)
+
+    @property
+    def _where(self) -> int:
+        return self.index
+
+    @property
+    def world(self) -> Any:
+        """The world it is in."""
+        return self._remove.__self__  # type: ignore[attr-defined]
+
+    def remove(self) -> None:
+        """Remove it from its world."""
+        self._remove(np.array([self.index]))
+
+    def pin(self) -> None:
+        """Make it immovable where it is."""
+        self.mass, self.velocity, self.spin = np.inf, 0.0, 0.0
+
+    position = Column("(2,) its centre, m; a view.")
+    velocity = Column("(2,) m/s; a view.")
+    spin = Column("Angular velocity, rad/s, counter-clockwise.")
+    angle = Column("rad it has turned, counter-clockwise.")
+    radius = Column("m.")
+    mass = Column("kg; infinity pins it.")
+    restitution = Column("e of its own; negative: as the world's `Collisions` and bounds say.")
+    friction = Column("mu of its own; negative: as the world's `Collisions` and bounds say.")
+    category = Column("The bits of what it is.")
+    mask = Column("The bits of the categories it collides with.")
+
+
+def _places(state: State, numbers: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Where the particles of these numbers are, and which of them are there."""
+    where = np.searchsorted(state.number, numbers)
+    there = where < len(state.number)
+    there[there] = state.number[where[there]] == numbers[there]
+    return where, there

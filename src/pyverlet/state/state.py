@@ -5,6 +5,7 @@ They are the truth between frames. A frame begins by gathering them into `Slots`
 
 from __future__ import annotations
 
+import uuid
 from collections.abc import Iterator
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import memory
+from pyverlet.ground.turns import Turn
 from pyverlet.state import seam
 
 Array = NDArray[Any]
@@ -41,9 +43,11 @@ class State:
         number: (n,) of each particle, in ascending order; no two particles of a world ever have the same.
         begun: the number of the first particle of each `append`, ascending. numbers: how many particles there have ever been.
         version: how often particles were added or removed.
+        turn: whose turn it is to step, change or read them, where several threads do.
     """
 
     seam = seam.NONE
+    _key: str | None = None
     position: Array
     velocity: Array
     acceleration: Array
@@ -59,7 +63,7 @@ class State:
     angle: NDArray[np.float64]
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
-        self.dtype = dtype
+        self.dtype, self.turn = dtype, Turn()
         self._store: dict[str, Array] = {name: np.empty((0, 2), dtype) for name in ROWS}
         self._store |= {name: np.empty(0, dtype) for name in COLUMNS}
         for names, kind in ((MARKS, np.uint32), (("number",), np.int64), (("angle",), np.float64)):
@@ -71,6 +75,21 @@ class State:
 
     def __len__(self) -> int:
         return len(self.radius)
+
+    @property
+    def key(self) -> str:
+        """The same for this and its copies, and for no other."""
+        self._key = self._key or uuid.uuid4().hex
+        return self._key
+
+    def __getstate__(self) -> dict[str, Any]:
+        kept = {"dtype": self.dtype, "_key": self.key, "seam": self.seam, "begun": self.begun, "version": self.version}
+        return kept | {"numbers": self.numbers, "_store": dict(self.arrays())}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self.turn = Turn()
+        self._show(len(self._store["number"]))
 
     def arrays(self) -> Iterator[tuple[str, Array]]:
         """Names and arrays, always in the same order."""

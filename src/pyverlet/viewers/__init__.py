@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal, overload
 
+from pyverlet.ground.submodules import lazily
+
 if TYPE_CHECKING:
     from pyverlet.viewers.exhibit import Exhibit, Repertoire
     from pyverlet.viewers.handle import Page
@@ -13,6 +15,8 @@ if TYPE_CHECKING:
     from pyverlet.world.world import World
 
 __all__ = ["serve", "view", "widget"]
+
+__getattr__, __dir__ = lazily(__name__)
 
 DEFAULT_PORT = 8000
 

@@ -33,7 +33,7 @@ class Page:
             opening.enter_context(launch.on_air(self._session, listener, only_loopback=host in LOOPBACK_NAMES))
             self.url = launch.address(host, listener)
             for world in self._worlds:
-                world.turns = self._session.held
+                world.held_by(self._session.held)
             self._session.start()
             self._stack = opening.pop_all()
         self._stack.callback(self._session.stop)
@@ -44,7 +44,7 @@ class Page:
     @property
     def open(self) -> bool:
         """Whether it is still served."""
-        return any(world.turns is not None for world in self._worlds)
+        return any(world.has_page for world in self._worlds)
 
     def close(self) -> None:
         """End it; the world is the program's alone again. Twice is once."""
@@ -52,7 +52,7 @@ class Page:
             return
         self._session.stop()
         for world in self._worlds:
-            world.turns = None
+            world.held_by(None)
         self._stack.close()
 
     def __enter__(self) -> Page:

@@ -31,7 +31,7 @@ from pyverlet.viewers.gauges import Gauges
 from pyverlet.viewers.rhythm import PICTURE_S, Rhythm
 from pyverlet.viewers.stage import Stage
 from pyverlet.world.clock import Clock, FrameBudget
-from pyverlet.world.moments import Moment
+from pyverlet.world.moments import Moment, rehearse_looking
 from pyverlet.world.warmup import warm_up_to_show
 
 if TYPE_CHECKING:
@@ -44,6 +44,9 @@ MAX_CATCH_UP = 4
 """Late frames made up for at once; more are dropped and counted. A world that is too slow runs slow, smoothly."""
 
 _COMPILING = "compiling what this needs, once"
+
+_LONG_S = 5.0
+"""Seconds after which those that wait for a picture between two substeps are told what keeps it."""
 
 IDLE_S = 0.1
 """Longest nap while nothing moves: on some systems Ctrl-C waits for it to end."""
@@ -88,7 +91,7 @@ class Session(Door):
         self._complaint: str | None = None
         self._before: list[NDArray[np.float32]] | None = None
         self._shape: Shape
-        self._seq = self._begun = 0
+        self._seq, self._begun, self._began = 0, 0, 0.0
         self._rhythm, self._last = Rhythm(), time.perf_counter()
         self._enter(Exhibit.of(world, title))
         self.latest: Frame = self._picture()
@@ -148,8 +151,13 @@ class Session(Door):
         return now + (1.0 - self._clock.alpha) * self._dt - time.perf_counter()
 
     def _wait_for_compiling(self) -> None:
-        """In the middle of a frame, after a setting was changed: for seconds nothing moves."""
-        if self._errands.here and self._busy is None:
+        """In the middle of a frame, after a setting was changed: for seconds nothing moves.
+
+        It is said with the picture that viewers have. Those of a slow world, who expect the next one in the middle of this frame,
+        are told only if that takes long: a moment is not published twice for a kernel of a second.
+        """
+        waits_long = time.perf_counter() - self._began > _LONG_S
+        if self._errands.here and self._busy is None and (waits_long or not self._wanted()):
             self._say_busy(_COMPILING)
 
     def _held(self) -> bool:
@@ -158,6 +166,7 @@ class Session(Door):
     def _advance(self) -> None:
         """One frame. An error stops the stepping, not the session: the page stays readable and Reset works."""
         began, self._begun = time.perf_counter(), self._seq
+        self._began = began
         # With the frame before in mind: what is late by more than a picture is shown on its way.
         self._late = self._gauges.budget.last_ms * self._speed > 1000.0 * max(self._dt, PICTURE_S)
         self._before = self._stage.look()[0] if self._speed < 1.0 and not self._late else None
@@ -233,6 +242,8 @@ class Session(Door):
 
     def _enter(self, exhibit: Exhibit) -> None:
         self._stage = self._staged(exhibit)
+        for world in self._stage.worlds:
+            rehearse_looking(world.dtype, world.threads)
         self._fresh_start()
 
     def _put_on(self, exhibit: Exhibit) -> None:
@@ -315,7 +326,7 @@ class Session(Door):
 
     def _wanted(self) -> bool:
         """Whether the world is slow, and somebody has the last picture and waits for more."""
-        return self._late and self._audience.has(self._seq)
+        return self._late and self._audience.has(self.latest.seq)
 
     def _due(self) -> bool:
         return self._rhythm.due(time.perf_counter())

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import Shown
 from pyverlet.kernels import placing
 from pyverlet.laws.rooms import Boundary, Box, Circle
 
@@ -24,12 +25,15 @@ _TRIES = 4
 """Places an emitter looks at for each particle that is due."""
 
 
-class Actor(ABC):
+class Actor(Shown, ABC):
     """Something that acts on a world once a frame; append it to `world.actors`."""
 
     @abstractmethod
     def act(self, world: World, dt: float) -> None:
-        """Called before a frame of dt seconds."""
+        """Called before a frame of dt seconds. It may change the world, and the list of its actors.
+
+        Those removed before it is their turn do not act; those added act from the next frame on.
+        """
 
     def save(self) -> Any:
         """What `restore` needs to act again as from now; part of `world.save()`."""
@@ -37,6 +41,15 @@ class Actor(ABC):
 
     def restore(self, saved: Any) -> None:
         """Go back to what `save` returned."""
+
+
+def act_once(world: World, dt: float) -> None:
+    """Each actor that is listed now acts once, in order, unless another removes it first; those added meanwhile wait."""
+    for place, actor in enumerate(tuple(world.actors)):
+        actors = world.actors
+        # In most frames the list stays as it is, and looking for each actor in it would cost n^2.
+        if (place < len(actors) and actors[place] is actor) or any(listed is actor for listed in actors):
+            actor.act(world, dt)
 
 
 class Emitter(Actor):
@@ -55,6 +68,8 @@ class Emitter(Actor):
     Attributes:
         emitted: particles so far.
     """
+
+    _shows = ("region", "rate", "emitted")
 
     def __init__(
         self,
@@ -141,6 +156,8 @@ class Sink(Actor):
     Attributes:
         removed: particles so far.
     """
+
+    _shows = ("region", "outside", "removed")
 
     def __init__(self, region: Boundary, *, outside: bool = False) -> None:
         if not isinstance(region, Boundary):

@@ -7,9 +7,10 @@ from statistics import median, quantiles
 
 from pyverlet.ground import checks
 from pyverlet.ground.constants import FRAME_BUDGET_MS
+from pyverlet.ground.shown import Shown
 
 
-class Clock:
+class Clock(Shown):
     """Turns elapsed wall time into a whole number of frames of length dt (a fixed-step accumulator).
 
     The world then moves at the same speed, along the same trajectory, however often it is drawn. What is left over after the
@@ -21,6 +22,8 @@ class Clock:
         dt: length of a frame, s.
         max_catch_up: most frames `advance` asks for at once.
     """
+
+    _shows = ("dt", "max_catch_up", "dropped")
 
     def __init__(self, *, dt: float = 1 / 60, max_catch_up: int = 4) -> None:
         self.dt = checks.number("dt", dt, above=0.0)
@@ -44,13 +47,15 @@ class Clock:
         return min(self._left / self.dt, 1.0 - 1e-9)
 
 
-class FrameBudget:
+class FrameBudget(Shown):
     """How long the physics of each frame took, against the time it may take.
 
     Args:
         limit_ms: the budget of one frame, ms.
         window: how many of the last frames the statistics cover.
     """
+
+    _shows = ("limit_ms", "frames", "over")
 
     def __init__(self, *, limit_ms: float = FRAME_BUDGET_MS, window: int = 120) -> None:
         self.limit_ms = checks.number("limit_ms", limit_ms, above=0.0)

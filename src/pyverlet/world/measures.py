@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import Records
+from pyverlet.ground.turns import of_one_frame
 from pyverlet.kernels import measure
 from pyverlet.laws.contacts.collisions import Collisions, ContactSolver, Overlap, measure_overlap
 from pyverlet.laws.energy import Energy, energy
@@ -45,6 +47,7 @@ class Measures(Particles):
     collisions: Collisions | None
     _contacts: ContactSolver | None
 
+    @of_one_frame
     def energy(self) -> Energy:
         """Kinetic (motion and spin), potential, links and total energy, J."""
         return energy(self._state, self.gravity, self.forces, self.links.energy())
@@ -55,6 +58,7 @@ class Measures(Particles):
         return self._books is not None
 
     @property
+    @of_one_frame
     def ledger(self) -> Ledger:
         """Where the energy has gone since the world was built, as of the last frame.
 
@@ -66,6 +70,7 @@ class Measures(Particles):
         return self._books.ledger
 
     @property
+    @of_one_frame
     def asleep(self) -> Array:
         """(n,) bool, which particles sleep; nobody does unless the world was built with World(sleep=True). A copy."""
         asleep = np.zeros(len(self), bool)
@@ -78,6 +83,7 @@ class Measures(Particles):
         return self._events is not None
 
     @property
+    @of_one_frame
     def events(self) -> Events:
         """Contacts that began or ended in the last frame, and hits.
 
@@ -91,6 +97,7 @@ class Measures(Particles):
     # ---- who touches -----------------------------------------------------------------------------------------------------
 
     @property
+    @of_one_frame
     def contacts(self) -> Array:
         """Contacts of the last frame, a structured array sorted by `a`, then `b`; an impact that is over is one, too.
 
@@ -102,8 +109,9 @@ class Measures(Particles):
         Raises:
             InputError: the world notes none.
         """
-        return self._noting().array(self._state)
+        return self._noting().array(self._state).view(Records)
 
+    @of_one_frame
     def force_on(self, what: Obstacle | Boundary) -> Array:
         """(2,) N, the force of all circles on an obstacle or on all walls of the room, averaged over the last frame.
 
@@ -115,6 +123,7 @@ class Measures(Particles):
             raise InputError(f"what is {what!r}; allowed is an obstacle of this world, or its boundary")
         return touches.force_on(what, self.boundary)
 
+    @of_one_frame
     def pressure(self) -> float:
         """N/m, what circles push the walls of the room with along their normals, over their length; of the last frame.
 
@@ -181,18 +190,22 @@ class Measures(Particles):
         """Sum of m (x v_y - y v_x) + I spin about the origin, kg m^2/s."""
         return float(self._momenta()[2])
 
+    @of_one_frame
     def _momenta(self) -> tuple[float, float, float]:
         s = self._state
         return measure.momenta(s.position, s.velocity, s.spin, s.radius, s.mass)  # type: ignore[no-any-return]
 
+    @of_one_frame
     def overlap(self) -> Overlap:
         """Mean and largest overlap of the touching pairs, as fractions of their contact distance, and how many there are."""
         return measure_overlap(self._state, self.links.unlist)
 
+    @of_one_frame
     def escaped(self) -> int:
         """Particles whose centre is outside the boundary."""
         return int(np.count_nonzero(self.boundary.outside(self.position)))
 
+    @of_one_frame
     def state_hash(self) -> str:
         """16 hex digits of time and every particle's position, velocity, spin, angle, radius and mass: equal bits, equal hash."""
         return hash_of(self.time, (self.position, self.velocity, self.spin, self.angle, self.radius, self.mass))

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.compile import jit
 from pyverlet.kernels import wire
 from pyverlet.state.slots import Slots
 
@@ -45,3 +46,10 @@ class Moment:
         if slots.seam:
             slots.seam.wrap(position)
         return position, velocity, slots.particle  # reordering makes a new one, and leaves this as it is
+
+
+def rehearse_looking(dtype: np.dtype[Any], threads: int) -> None:
+    """Compile what `Moment.look` needs in a world that uses so many threads: no picture waits for it in the middle of a frame."""
+    with jit.one_thread():
+        jit.use_threads(1, threads)
+        Moment(Slots(dtype), 0.0, 0.0).look()

@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Callable, Iterator, Sequence
 
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import Shown, listed
 from pyverlet.world.saved import Saved
 from pyverlet.world.world import World
 
@@ -18,7 +19,7 @@ def every_frame(world: World, frame: int, dt: float) -> None:
     world.step(dt)
 
 
-class Panel:
+class Panel(Shown):
     """A world with a name.
 
     Args:
@@ -26,6 +27,8 @@ class Panel:
         world: what it shows.
         pace: how the world follows the frames of the screen.
     """
+
+    _shows = ("name", "world")
 
     def __init__(self, name: str, world: World, pace: Pace = every_frame) -> None:
         self.name = name
@@ -63,6 +66,9 @@ class Panels:
 
     def __iter__(self) -> Iterator[Panel]:
         return iter(self._panels)
+
+    def __repr__(self) -> str:
+        return listed("panel", (panel.name or panel.world for panel in self))
 
     @property
     def worlds(self) -> list[World]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import Any
 
 import numpy as np
@@ -9,15 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.turns import Shared, in_turn, of_one_frame
 from pyverlet.laws.contacts.collisions import ContactSolver
 from pyverlet.laws.forces import ForceList, Numbered
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.rooms import Boundary
-from pyverlet.state.group import Column, Group
+from pyverlet.state.group import Column, Group, Particle
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import EVERYONE, State
-from pyverlet.world.turns import Shared, in_turn
 
 Array = NDArray[Any]
 
@@ -34,6 +36,19 @@ class Particles(Shared):
     boundary: Boundary
     obstacles: Obstacles
     _course: Course
+
+    def held(self) -> AbstractContextManager[None]:
+        """Meanwhile no other thread steps or changes this world: `with world.held():` what is read belongs to one frame."""
+        return self._state.turn.held()
+
+    def held_by(self, page: Callable[[], AbstractContextManager[None]] | None) -> None:
+        """A page steps this world, and pauses between two frames while the context that it makes is entered; None: no longer."""
+        self._state.turn.page = page
+
+    @property
+    def has_page(self) -> bool:
+        """Whether a page steps this world beside the program."""
+        return self._state.turn.page is not None
 
     @in_turn
     def add(
@@ -109,6 +124,7 @@ class Particles(Shared):
             values["position"] = np.where(free[:, None], self.boundary.put_in(where, values["radius"]), where)
         return Group(self._state, self._state.append(values), self.remove)
 
+    @of_one_frame
     def is_free(self, position: ArrayLike) -> NDArray[np.bool_]:
         """(n,) whether these places, (n, 2) or (2,), m, are inside the room and in no obstacle. Circles do not count."""
         where = checks.rows("position", position, np.dtype(np.float64))
@@ -127,16 +143,16 @@ class Particles(Shared):
             )
 
     @in_turn
-    def remove(self, which: Group | ArrayLike) -> None:
+    def remove(self, which: Group | Particle | ArrayLike) -> None:
         """Remove particles. Groups keep the others, whose indices close ranks.
 
         Args:
-            which: a group, an index, several, or (n,) bool. Many at once cost as much as one.
+            which: a group, a particle of one, an index, several, or (n,) bool. Many at once cost as much as one.
 
         Raises:
             InputError: there is no such particle; nothing is removed.
         """
-        if isinstance(which, Group):
+        if isinstance(which, Group | Particle):
             which = which.index
         gone = checks.indices("which", which, len(self))
         if not len(gone):
@@ -170,16 +186,19 @@ class Particles(Shared):
     mask = Column("(n,) uint32, the bits of the categories it collides with; a view.")
 
     @property
+    @of_one_frame
     def number(self) -> Array:
         """(n,) a number for each particle, ascending, that it keeps while others come and go; a view, not to be written."""
         return self._state.number
 
     @property
+    @of_one_frame
     def group_number(self) -> NDArray[np.int64]:
         """(n,) which call of `add` brought each particle, ascending from 0; it keeps that while others come and go."""
         return np.searchsorted(self._state.begun, self.number, side="right") - 1
 
     @property
+    @of_one_frame
     def groups(self) -> list[Group]:
         """A handle on each group, in the order they were added; of those that were removed, too, with nobody in them."""
         state = self._state

@@ -31,6 +31,10 @@ class Profile:
         self._complete = np.zeros(_ROOM)  # of the last complete frame
         self._total = np.zeros(_ROOM)  # of all of them
 
+    def __repr__(self) -> str:
+        stages = sorted(self.stages.items(), key=lambda stage: -stage[1])[:4]
+        return f"Profile of {self.frames} frames, the last {self.frame_ms:.3g} ms" + "".join(f", {n} {t:.2g}" for n, t in stages)
+
     def begin(self) -> None:
         """A frame begins."""
         if self._broken_off:

@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import count
+from pyverlet.ground.turns import Shared, of_one_frame
 from pyverlet.kernels import grid, motion, queries
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import State
@@ -35,6 +37,9 @@ class RayHits(NamedTuple):
     normal: Floats
     """(q, 2) of length 1, out of the particle where it is hit; 0 for none."""
 
+    def __repr__(self) -> str:
+        return f"RayHits of {count(len(self.particle), 'ray')}, {np.count_nonzero(self.particle >= 0)} of which hit"
+
 
 class Nearest(NamedTuple):
     """The nearest centres, nearest first."""
@@ -44,12 +49,17 @@ class Nearest(NamedTuple):
     distance: Floats
     """(q, k) from the point to the centre, m; infinity where there is none."""
 
+    def __repr__(self) -> str:
+        points, most = self.particle.shape
+        return f"Nearest of {count(points, 'point')}, {count(most, 'particle')} each"
 
-class Queries:
+
+class Queries(Shared):
     """What a world answers. Indices are those of its arrays; equally near ones come in their order."""
 
     _state: State
 
+    @of_one_frame
     def at_point(self, points: ArrayLike) -> Indices:
         """(q,) the particle whose disc covers each point (q, 2) or (2,), m; of several the one of nearest centre, -1 for none."""
         where = checks.rows("points", points, np.dtype(float))
@@ -63,6 +73,7 @@ class Queries:
             found = seen.named(found)
         return found
 
+    @of_one_frame
     def in_box(self, lower: ArrayLike, upper: ArrayLike) -> Indices:
         """The particles whose centre is in the box from `lower` to `upper`, rim included, ascending.
 
@@ -82,6 +93,7 @@ class Queries:
             )
         return self._in(low, high, low, np.full(len(low), np.inf), many=np.ndim(lower) > 1 or np.ndim(upper) > 1)
 
+    @of_one_frame
     def in_circle(self, center: ArrayLike, radius: ArrayLike) -> Indices:
         """The particles whose centre is no farther than `radius` from `center`, ascending.
 
@@ -102,6 +114,7 @@ class Queries:
         box = size[:, None]
         return self._in(middle - box, middle + box, middle, size, many=np.ndim(center) > 1 or np.ndim(radius) > 0)
 
+    @of_one_frame
     def ray(self, origin: ArrayLike, direction: ArrayLike, length: ArrayLike = np.inf) -> RayHits:
         """What rays hit first.
 
@@ -137,6 +150,7 @@ class Queries:
                 far[rays[hit]] = -1.0  # no further
         return RayHits(index, distance, normal)
 
+    @of_one_frame
     def nearest(self, points: ArrayLike, k: int = 1) -> Nearest:
         """The k particles whose centres are nearest to each point (q, 2) or (2,), m."""
         where = checks.rows("points", points, np.dtype(float))

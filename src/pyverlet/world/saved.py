@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 from typing import Any
 
 from numpy.typing import NDArray
 
+from pyverlet.ground.errors import InputError
 from pyverlet.laws.events import Events
 from pyverlet.laws.ledger import Bookkeeper
 from pyverlet.laws.sleep import Sleep
@@ -15,8 +17,11 @@ from pyverlet.world.actors import Actor
 
 Array = NDArray[Any]
 
+INTO = "the world that a saved state is taken up by"
+"""Key of the memo of `copy.deepcopy`."""
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Saved:
     """What `World.save` keeps: enough to continue with the same bits. Opaque."""
 
@@ -33,3 +38,20 @@ class Saved:
     obstacles: Any
     actors: list[tuple[Actor, Any]]
     links: Any
+
+    def __repr__(self) -> str:
+        return f"Saved(particles={len(self.arrays['mass'])}, time={self.time:g}, frames={self.frames})"
+
+    def of(self, world: Any) -> Saved:
+        """This, as a state of that world: of one that was copied or pickled, with copies of the objects it had then.
+
+        Raises:
+            InputError: it is another world's.
+        """
+        state: State = world._state
+        if self.world is state:
+            return self
+        if self.world.key != state.key:
+            raise InputError("saved is the state of another world; allowed is what save() of this one returned")
+        memo: dict[Any, Any] = {id(self.world): state, INTO: world}
+        return copy.deepcopy(self, memo)

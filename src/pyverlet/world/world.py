@@ -12,6 +12,7 @@ from pyverlet.compile import jit
 from pyverlet.ground import checks
 from pyverlet.ground.constants import ALL_THREADS_FROM, MOST_SUBSTEPS, ONE_THREAD_BELOW, REST_ACCELERATIONS, STANDARD_GRAVITY
 from pyverlet.ground.errors import InputError, NonFiniteError
+from pyverlet.ground.turns import in_turn
 from pyverlet.laws.coarse import Coarse
 from pyverlet.laws.contacts.collisions import Collisions, ContactSolver
 from pyverlet.laws.events import Events
@@ -27,7 +28,7 @@ from pyverlet.laws.touches import Touches
 from pyverlet.state.moves import first_non_finite
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
-from pyverlet.world.actors import Actor
+from pyverlet.world.actors import Actor, act_once
 from pyverlet.world.convenience import Doors
 from pyverlet.world.measures import Measures
 from pyverlet.world.moments import Moment
@@ -36,7 +37,6 @@ from pyverlet.world.queries import Queries
 from pyverlet.world.saved import Saved
 from pyverlet.world.substeps import Substeps
 from pyverlet.world.team import Team
-from pyverlet.world.turns import in_turn
 
 Array = NDArray[Any]
 
@@ -63,7 +63,7 @@ class World(Measures, Queries, Doors):
         forces: list of forces besides gravity; append and remove as you like.
         links: the links between particles, as a list.
         obstacles: what stands in the way, as a list.
-        actors: list of those who act before each frame, such as emitters.
+        actors: list of those that act before each frame, such as emitters; they may add and remove actors, themselves too.
         time: simulated seconds since the world was built.
         frames: calls of `step` since then.
         profile: the time of the last frame: `frame_ms`, and `stages`, ms by name.
@@ -109,19 +109,19 @@ class World(Measures, Queries, Doors):
         """Advance by one frame of dt seconds, in `substeps` steps of h = dt / substeps.
 
         Raises:
-            InputError: dt is not a number greater than 0.
+            InputError: dt is not a number greater than 0, or it is called in the middle of a frame of this world.
             NonFiniteError: a particle turned NaN or infinite; the world still holds the frame before.
         """
         h = checks.number("dt", dt, above=0.0) / self.substeps
-        for actor in self.actors:
-            actor.act(self, dt)
-        self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
-        self.profile.begin()
-        books = self._open_books(h)
-        if not self._frame(h, self._listen(h, books or self.profile.mark)):
-            self._refuse_non_finite(h)
-        self._accept(dt, h, books)
-        self.profile.end()
+        act_once(self, dt)
+        with self._state.turn.frame():
+            self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
+            self.profile.begin()
+            books = self._open_books(h)
+            if not self._frame(h, self._listen(h, books or self.profile.mark)):
+                self._refuse_non_finite(h)
+            self._accept(dt, h, books)
+            self.profile.end()
 
     def _frame(self, h: float, done: Callable[[str], None]) -> bool:
         """The table of contents of the engine; `done` hears which stage has ended. True if all is known to be finite."""
@@ -284,6 +284,7 @@ class World(Measures, Queries, Doors):
         return self._substeps
 
     @substeps.setter
+    @in_turn
     def substeps(self, value: int) -> None:
         self._substeps = checks.whole("substeps", value, most=MOST_SUBSTEPS, most_is=" (finer steps take a smaller dt)")
         self._h_last = None
@@ -294,6 +295,7 @@ class World(Measures, Queries, Doors):
         return self._integrator
 
     @integrator.setter
+    @in_turn
     def integrator(self, value: Integrator) -> None:
         if not isinstance(value, Integrator):
             raise InputError(f"integrator is {value!r}; allowed is an object such as pyverlet.PositionVerlet()")
@@ -307,6 +309,7 @@ class World(Measures, Queries, Doors):
         return self._boundary
 
     @boundary.setter
+    @in_turn
     def boundary(self, value: Boundary) -> None:
         if not isinstance(value, Boundary):
             raise InputError(f"boundary is {value!r}; allowed is an object such as pyverlet.Circle(radius=10) or pyverlet.Open()")
@@ -322,6 +325,7 @@ class World(Measures, Queries, Doors):
         return self._collisions
 
     @collisions.setter
+    @in_turn
     def collisions(self, value: Collisions | None) -> None:
         if value is not None and not isinstance(value, Collisions):
             raise InputError(f"collisions is {value!r}; allowed are pyverlet.Collisions(...) and None")
@@ -369,8 +373,7 @@ class World(Measures, Queries, Doors):
         Raises:
             InputError: it is another world's.
         """
-        if saved.world is not self._state:
-            raise InputError("saved is the state of another world; allowed is what save() of this one returned")
+        saved = saved.of(self)
         numbers = self._state.number.copy()
         self._state.restore(saved.arrays)
         if not np.array_equal(numbers, self._state.number):

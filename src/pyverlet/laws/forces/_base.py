@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pyverlet.compile.native import both
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import listed
 from pyverlet.state.moves import newton, newton_kick_drift
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
@@ -63,6 +64,9 @@ AnyForce = TypeVar("AnyForce", bound=Force)
 
 class ForceList(list[Force]):
     """The forces of a world: a list."""
+
+    def __repr__(self) -> str:
+        return listed("force", self)
 
     def append(self, force: AnyForce) -> AnyForce:  # type: ignore[override]
         """Add a force; returns it.

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pyverlet.ground import checks
+from pyverlet.ground.shown import Shown
 from pyverlet.kernels import forces
 from pyverlet.kernels.drive import ATTRACTION
 from pyverlet.laws.forces._base import Row
@@ -15,7 +16,7 @@ from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
 
-class Attractor:
+class Attractor(Shown):
     """A fixed mass that attracts every particle: F = m strength d / (|d|^2 + softening^2)^(3/2), d from particle to centre.
 
     Its potential is -m strength / sqrt(|d|^2 + softening^2). Without softening a particle at the very centre feels nothing.
@@ -25,6 +26,8 @@ class Attractor:
         strength: G M, m^3/s^2; negative repels.
         softening: distance within which the pull stops growing, m.
     """
+
+    _shows = ("center", "strength", "softening")
 
     velocity_dependent = False
 
@@ -48,7 +51,7 @@ class Attractor:
         return -self.strength * float(np.sum(state.mass[felt] / apart[felt]))
 
 
-class Gravitation:
+class Gravitation(Shown):
     """Particles that attract each other: F = strength m_i m_j d / (|d|^2 + softening^2)^(3/2) for every pair, and its potential.
 
     All pairs are summed, so that the cost grows with the square of their number. Pinned particles take no part.
@@ -58,6 +61,8 @@ class Gravitation:
         strength: G, N m^2/kg^2; negative repels.
         softening: distance within which the pull stops growing, m.
     """
+
+    _shows = ("group", "strength", "softening")
 
     velocity_dependent = False
 

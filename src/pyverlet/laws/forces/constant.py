@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pyverlet.ground import checks
+from pyverlet.ground.shown import Shown
 from pyverlet.kernels.drive import UNIFORM
 from pyverlet.laws.forces._base import Row
 from pyverlet.state.group import Group
@@ -14,13 +15,15 @@ from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
 
-class ConstantForce:
+class ConstantForce(Shown):
     """The same force on every particle, or on each of a group; its potential is -F x, 0 at the origin.
 
     Args:
         newtons: (x, y), N.
         group: whom it acts on; None is all.
     """
+
+    _shows = ("newtons", "group")
 
     velocity_dependent = False
 

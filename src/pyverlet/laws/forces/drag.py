@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import Shown
 from pyverlet.kernels import forces
 from pyverlet.kernels.drive import DRAG
 from pyverlet.laws.forces._base import Row
@@ -18,7 +19,7 @@ from pyverlet.state.slots import Slots
 Field = Callable[[NDArray[Any], NDArray[Any], float], Any]
 
 
-class Drag:
+class Drag(Shown):
     """Resistance of a medium at rest: F = -(linear + quadratic |v|) v, and no more than takes half of v in a substep.
 
     A fall ends at m g / linear or at sqrt(m g / quadratic), m/s.
@@ -27,6 +28,8 @@ class Drag:
         linear: N s/m (Stokes).
         quadratic: N s^2/m^2 (Newton).
     """
+
+    _shows: ClassVar[tuple[str, ...]] = ("linear", "quadratic")
 
     velocity_dependent = True
     account = "drag"
@@ -56,6 +59,8 @@ class Wind(Drag):
         linear: N s/m.
         quadratic: N s^2/m^2.
     """
+
+    _shows = ("velocity", "linear", "quadratic")
 
     def __init__(self, velocity: Sequence[float] | Field, *, linear: float = 0.0, quadratic: float = 0.0) -> None:
         super().__init__(linear=linear, quadratic=quadratic)

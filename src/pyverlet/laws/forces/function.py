@@ -11,6 +11,7 @@ from typing import Any, NoReturn, overload
 import numpy as np
 
 from pyverlet.compile.native import Native, NotCompiled
+from pyverlet.ground import pickling
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.kernels import forces
 from pyverlet.state.slots import Slots
@@ -33,6 +34,19 @@ class FunctionForce:
 
     def __repr__(self) -> str:
         return self._code.name
+
+    def __reduce__(self) -> Any:
+        if pickling.by_name(self) and not pickling.is_by_value():
+            return vars(self)["__qualname__"]  # the decorator has put it in the place of its function
+        functions = [code.function for code in (self._code, getattr(self, "_potential", None)) if isinstance(code, _Code)]
+        pickling.check(self._code.name, *functions)
+        return _again, (self.velocity_dependent, *functions)
+
+    def __deepcopy__(self, memo: Any) -> FunctionForce:
+        return self  # it remembers nothing
+
+    def __copy__(self) -> FunctionForce:
+        return self
 
     def apply(self, state: Slots, t: float) -> None:
         """Add the function's value for every free particle.
@@ -81,6 +95,11 @@ class ConservativeFunctionForce(FunctionForce):
     def potential(self, state: State) -> float:
         """Sum of the potential over all free particles, J."""
         return float(forces.call_potential(self._potential.native().potential, state.position, state.mass))
+
+
+def _again(velocity_dependent: bool, function: Function, potential: Potential | None = None) -> FunctionForce:
+    """One that was pickled."""
+    return _make(potential, velocity_dependent, function)
 
 
 class _Code:

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.shown import Shown
 from pyverlet.state.slots import Slots
 
 
-class Grip:
+class Grip(Shown):
     """The mouse: a spring that pulls one particle to a target, F = m (s w^2 (target - x) - 2 w v); critically damped for s = 1.
 
     Args:
@@ -21,6 +22,8 @@ class Grip:
         frequency: w / (2 pi) in Hz; higher pulls harder.
         strength: s, how much harder than for a particle alone: one that is linked to others moves them too.
     """
+
+    _shows = ("particle", "target", "frequency", "strength")
 
     velocity_dependent = True
 
@@ -48,7 +51,7 @@ class Grip:
             self.particle = int(now[self.particle])
 
 
-class Push:
+class Push(Shown):
     """A poke: everything nearer than `radius` is accelerated away from `center`, most at the centre and not at all at the rim.
 
     Args:
@@ -56,6 +59,8 @@ class Push:
         radius: m.
         acceleration: m/s^2 at the centre.
     """
+
+    _shows = ("center", "radius", "acceleration")
 
     velocity_dependent = False
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pyverlet.ground import checks
+from pyverlet.ground.shown import Shown
 from pyverlet.kernels.drive import SPRING
 from pyverlet.laws.forces._base import Row
 from pyverlet.state.group import Group
@@ -14,7 +15,7 @@ from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
 
-class PointSpring:
+class PointSpring(Shown):
     """A spring of zero length from every particle, or each of a group, to one point.
 
     F = -stiffness (x - center), with the potential stiffness |x - center|^2 / 2. Pinned particles take no part.
@@ -24,6 +25,8 @@ class PointSpring:
         center: (x, y), m.
         stiffness: N/m.
     """
+
+    _shows = ("center", "stiffness")
 
     velocity_dependent = False
 

@@ -11,8 +11,8 @@ from pyverlet.compile.lanes import LANES
 from pyverlet.compile.stealing import Claims
 from pyverlet.ground.constants import LINK_COLOURS, LINKS_ONE_THREAD_BELOW
 from pyverlet.kernels import chain_rows, chains, runs
-from pyverlet.laws.links._link import Array
-from pyverlet.laws.links._pool import MOVING, Pool, held
+from pyverlet.laws.links._link import MOVING, Array
+from pyverlet.laws.links._pool import Pool, held
 from pyverlet.laws.links._work import Work
 from pyverlet.state.seam import Seam
 

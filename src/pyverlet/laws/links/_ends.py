@@ -71,9 +71,10 @@ def _column(kind: str, name: str, group: Any, index: Any) -> Indices:
     if not isinstance(group, Group):
         raise InputError(f"{kind}: the group of {name} is {_brief(group)}; allowed is what world.add returns")
     where = group._where  # raises for a group whose particles were all removed
-    count = where.stop - where.start
-    if type(index) is int and -count <= index < count:  # links may come one by one by the thousand
-        return np.array([where.start + index % count])
+    among = where if isinstance(where, np.ndarray) else None  # of particles that were picked out, all indices
+    start, count = (0, len(where)) if among is not None else (where.start, where.stop - where.start)
+    if among is None and type(index) is int and -count <= index < count:  # links may come one by one by the thousand
+        return np.array([start + index % count])
     array = np.atleast_1d(np.asarray(index))
     if array.ndim != 1 or array.dtype.kind not in "iu":
         raise InputError(f"{kind}: {name} is {_brief(index)}; allowed is an index in the group, or a (k,) array of them")
@@ -82,5 +83,5 @@ def _column(kind: str, name: str, group: Any, index: Any) -> Indices:
         first = int(np.flatnonzero(wrong)[0])
         which = f"{name}[{first}]" if np.ndim(index) else name
         raise InputError(f"{kind}: {which} is {array[first]}; allowed is 0 to {count - 1} for a group of {count} particles")
-    numbers: Indices = where.start + np.where(array < 0, array + count, array).astype(np.int64)
-    return numbers
+    numbers: Indices = start + np.where(array < 0, array + count, array).astype(np.int64)
+    return numbers if among is None else among[numbers]

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 Array = NDArray[Any]
 Floats = NDArray[np.float64]
 
+MOVING = ("intact", "force", "last")
+"""Columns that a frame changes."""
+
 
 class Link(ABC):
     """One or more links of a kind, added to a world by `world.links.append`.
@@ -32,13 +35,37 @@ class Link(ABC):
         self.particles = particles
         self._pool: Pool | None = None  # where its numbers are once it is in a world
         self._id, self._version = -1, state.version
+        self._moving: dict[str, Array] = {}  # of a copy, the columns `MOVING`
         self._number = state.number[particles]  # indices change when others are removed, numbers never do
 
     def __len__(self) -> int:
         return len(self.particles)
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__} x {len(self)}"
+        broken = len(self) - int(self.intact.sum())
+        return f"{type(self).__name__} x {len(self)}" + f", {broken} broken" * bool(broken)
+
+    def __getstate__(self) -> dict[str, Any]:
+        kept = {name: value for name, value in vars(self).items() if name not in ("_pool", "_id", "_moving")}
+        if self._pool is not None:
+            kept["_moving"] = {name: self._pool.rows[name][self._where].copy() for name in MOVING}
+        return kept
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, _pool=None, _id=-1)
+
+    def _recall(self) -> None:
+        """Write what frames had changed when it was copied, into the pool that it has just come to."""
+        if self._pool is not None:
+            for name, column in self._moving.items():
+                self._pool.rows[name][self._where] = column
+        self._moving = {}
+
+    def _keep(self, mask: NDArray[np.bool_]) -> None:
+        """Keep these rows."""
+        for name, column in vars(self).items():
+            if isinstance(column, np.ndarray) and len(column) == len(mask):
+                setattr(self, name, column[mask])
 
     @abstractmethod
     def _new_pool(self) -> Pool:

@@ -12,9 +12,6 @@ from pyverlet.laws.links._table import Table
 from pyverlet.laws.links._work import Work
 from pyverlet.state.seam import Seam
 
-MOVING = ("intact", "force", "last")
-"""Columns that a frame changes."""
-
 
 class Pool(ABC):
     """The links of one family. The tables hold the truth between frames, as `State` does for particles.

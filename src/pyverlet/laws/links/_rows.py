@@ -8,8 +8,8 @@ import numpy as np
 
 from pyverlet.ground.constants import LINK_COLOURS
 from pyverlet.kernels import link_rows, runs
-from pyverlet.laws.links._link import Array
-from pyverlet.laws.links._pool import MOVING, Pool, held
+from pyverlet.laws.links._link import MOVING, Array
+from pyverlet.laws.links._pool import Pool, held
 from pyverlet.laws.links._work import Work
 from pyverlet.state.seam import Seam
 

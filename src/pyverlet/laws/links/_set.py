@@ -14,6 +14,8 @@ from pyverlet.compile.bundle import hold
 from pyverlet.ground import checks
 from pyverlet.ground.constants import LINKS_ONE_THREAD_BELOW, REST_ACCELERATIONS
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import listed
+from pyverlet.ground.turns import Shared, in_turn, of_one_frame
 from pyverlet.kernels import link_rows, linked, runs
 from pyverlet.laws.contacts.broadphase import PairList
 from pyverlet.laws.links._chains import ChainPool
@@ -32,7 +34,7 @@ BROKEN = np.dtype([("link", np.int64), ("row", np.int64), ("i", np.int64), ("j",
 """Number of the link in `world.links`, row of it, its first and last particle, and what it pulled with when it broke, N."""
 
 
-class Links:
+class Links(Shared):
     """Sticks, ropes, springs, pins and so on, in the order they were appended: `world.links`.
 
     Attributes:
@@ -60,6 +62,7 @@ class Links:
 
     # ---- a list --------------------------------------------------------------------------------------------------------
 
+    @in_turn
     def append(self, link: AnyLink) -> AnyLink:
         """Add a link, or the many that one object holds; returns it.
 
@@ -80,6 +83,8 @@ class Links:
         link._pool = self._pools[family]
         link._id = self._next_owner
         link._pool.append(link._id, link.particles, link._columns())
+        if link._moving:
+            link._recall()
         self._next_owner += 1
         self._apart_stale = True
         self._links[link._id], self._listed = link, None
@@ -95,6 +100,7 @@ class Links:
         for link in self:
             link._check(seam)
 
+    @in_turn
     def remove(self, link: Link) -> None:
         """Take a link out.
 
@@ -119,6 +125,9 @@ class Links:
     def __len__(self) -> int:
         return len(self._links)
 
+    def __repr__(self) -> str:
+        return listed("link", self)
+
     def __iter__(self) -> Iterator[Link]:
         return iter(self._links.values())
 
@@ -135,7 +144,10 @@ class Links:
             pool.keep(np.minimum.reduceat(particle, pool.first[:-1]) >= 0 if len(particle) else np.zeros(0, bool))
         for link in self:
             moved = new[link.particles]
-            link.particles = moved[(moved >= 0).all(axis=1)]
+            kept = np.asarray((moved >= 0).all(axis=1))
+            link.particles = moved
+            if not kept.all():
+                link._keep(kept)
         self._links, self._listed = {number: link for number, link in self._links.items() if len(link)}, None
         self._apart_stale = True
 
@@ -300,6 +312,7 @@ class Links:
             position = self._work.where(state)
             return sum(pool.stored(position, state.seam) for pool in self._kept if pool.gives)
 
+    @of_one_frame
     def segments(self) -> tuple[Array, Array]:
         """Links as lines, without the broken: ends (m, 2, 2) in m, and what each pulls with (m,) in N, negative if it pushes.
 
@@ -340,9 +353,17 @@ class Links:
 
     # ---- save and restore ----------------------------------------------------------------------------------------------
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {"state": self._state, "links": list(self), "iterations": self._iterations}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(state["state"])  # type: ignore[misc]
+        self.extend(state["links"])
+        self._iterations = state["iterations"]
+
     def save(self) -> Any:
         """A copy of all there is about links."""
-        pools = [(pool, pool.rows.copy(), pool.entries.copy()) for pool in self._kept]
+        pools = [(family, pool.rows.copy(), pool.entries.copy()) for family, pool in zip(self._pools, self._kept, strict=True)]
         links = [(owner, link, link.particles) for owner, link in self._links.items()]
         past = self._past and Past(*(array.copy() for array in self._past))
         return links, pools, self.broken, self._apart_changed, past
@@ -354,7 +375,11 @@ class Links:
             link._pool = None
         for pool in self._kept:
             pool.keep(np.zeros(len(pool.rows), bool))
-        for pool, rows, entries in pools:
+        new = {link._family: link._new_pool for _, link, _ in links}
+        for family, rows, entries in pools:
+            if family not in self._pools:
+                self._pools[family] = new[family]()
+            pool = self._pools[family]
             pool.rows, pool.entries, pool.stale = rows.copy(), entries.copy(), True
         self._links, self._listed = {owner: link for owner, link, _ in links}, None
         for owner, link, particles in links:

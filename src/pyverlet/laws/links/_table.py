@@ -56,6 +56,14 @@ class Table:
         self._length = where.stop
         return where
 
+    def __getstate__(self) -> dict[str, Array]:
+        return {name: self[name] for name in self._store}
+
+    def __setstate__(self, columns: dict[str, Array]) -> None:
+        self.__init__()  # type: ignore[misc]
+        self._store = columns
+        self._length = len(next(iter(columns.values()), ()))
+
     def copy(self) -> Table:
         """Another one with the same rows."""
         other = Table()

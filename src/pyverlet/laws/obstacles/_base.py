@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import listed
 
 Value = TypeVar("Value")
 Points = NDArray[np.float64]
@@ -110,6 +111,13 @@ class Obstacle(ABC):
         self._drawn_at: Any = None
         self._drawn: list[Outline] = []
 
+    def __getstate__(self) -> dict[str, Any]:
+        left = ("table", "revision", "_drawn_at", "_drawn")  # what is made of it, by this process
+        return {name: value for name, value in vars(self).items() if name not in left}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, revision=next(_revisions), _drawn_at=None, _drawn=[])
+
     @property
     def points(self) -> Points:
         """(n, 2) where its corners are now, m; a copy."""
@@ -155,6 +163,12 @@ class Obstacles(list[Obstacle]):
         super().__init__(obstacles)
         self._drawn: list[list[Outline]] = []
         self._outlines: list[Outline] = []
+
+    def __repr__(self) -> str:
+        return listed("obstacle", self)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (), None, iter(self)
 
     def append(self, obstacle: AnyObstacle) -> AnyObstacle:  # type: ignore[override]
         """Add an obstacle; returns it.

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.constants import STANDARD_GRAVITY
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import Shown
 from pyverlet.laws.links import Link
 from pyverlet.state.group import Group
 
@@ -24,8 +25,8 @@ RIM = 0.49
 """Radius of linked particles in terms of their spacing: neighbours all but touch, nothing slips through."""
 
 
-@dataclass(frozen=True)
-class Built:
+@dataclass(frozen=True, repr=False)
+class Built(Shown):
     """Particles and links.
 
     Attributes:
@@ -33,11 +34,13 @@ class Built:
         links: what was appended to `world.links`.
     """
 
+    _shows = ("group", "links")
+
     group: Group
     links: tuple[Link, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Sheet(Built):
     """Particles in rows.
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import count
 from pyverlet.laws.obstacles import Obstacle
 from pyverlet.world.builders.ink import Ink
 from pyverlet.world.builders.region import Floats, Region, overlapping
@@ -49,6 +50,9 @@ class Filling(NamedTuple):
     """(n,) m."""
     colour: NDArray[np.uint8] | None
     """(n, 3) bytes R, G, B of the picture there, for pattern="picture"; None otherwise."""
+
+    def __repr__(self) -> str:
+        return f"Filling of {count(len(self.radius), 'circle')}" + ", in colour" * (self.colour is not None)
 
 
 def fill(

@@ -1,0 +1,41 @@
+"""What pickle cannot take by name gets a sentence: functions and classes that no other process can import."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from pyverlet.ground.errors import InputError
+
+_BY_VALUE = {"cloudpickle", "dill"}
+"""Packages whose picklers write functions down, in place of their names."""
+
+
+def by_name(thing: Any) -> bool:
+    """Whether another process finds this function, class or object under its module and name."""
+    found: Any = sys.modules.get(getattr(thing, "__module__", None) or "")
+    for part in str(getattr(thing, "__qualname__", "")).split("."):
+        found = getattr(found, part, None)
+    return found is thing
+
+
+def is_by_value() -> bool:
+    """Whether it is one of the picklers that write functions down that asks."""
+    frame = sys._getframe()
+    while frame.f_back:
+        frame = frame.f_back
+        if str(frame.f_globals.get("__name__")).split(".")[0] in _BY_VALUE:
+            return True
+    return False
+
+
+def check(what: str, *things: Callable[..., Any]) -> None:
+    """Raise InputError for the first of these functions and classes that cannot be pickled; `what` they are, or belong to."""
+    for thing in things:
+        if not by_name(thing) and not is_by_value():
+            name = f"{getattr(thing, '__module__', '?')}.{getattr(thing, '__qualname__', '?')}"
+            raise InputError(
+                f"{what} cannot be pickled, for no other process can import {name}; allowed are functions and classes defined at "
+                "the top level of a module, and for others copy.deepcopy, pyverlet.save, or cloudpickle in place of pickle"
+            )

@@ -1,0 +1,62 @@
+"""One line for each object, `Drag(linear=0.1, quadratic=0)`: its class and what is essential about it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, ClassVar
+
+import numpy as np
+
+_WIDEST = 80
+"""Letters of a value at most."""
+
+_FIRST = 3
+"""Entries of a list that are shown."""
+
+
+def text(value: Any) -> str:
+    """A value in few letters and one line."""
+    if isinstance(value, float | np.floating):
+        return f"{value:g}"
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype} {value.shape}"
+    if isinstance(value, tuple):
+        return f"({', '.join(map(text, value))}{',' * (len(value) == 1)})"
+    name = getattr(value, "__qualname__", None)
+    said = " ".join((name if isinstance(name, str) else repr(value)).split())
+    return said if len(said) <= _WIDEST else f"{said[: _WIDEST - 3]}..."
+
+
+def line(kind: str, **values: Any) -> str:
+    """`Kind(name=value, ...)`, without those that are None."""
+    return f"{kind}({', '.join(f'{name}={text(value)}' for name, value in values.items() if value is not None)})"
+
+
+def count(number: int, one: str) -> str:
+    """`1 link`, `2 links`."""
+    return f"{number} {one}{'s' * (number != 1)}"
+
+
+def listed(name: str, things: Iterable[Any]) -> str:
+    """`2 obstacles: Disc at (0, 0) m, Disc at (1, 0) m`, and no more than the first few."""
+    entries = list(things)
+    first = ", ".join(map(text, entries[:_FIRST])) + (", ..." if len(entries) > _FIRST else "")
+    return count(len(entries), name) + (f": {first}" if entries else "")
+
+
+class Shown:
+    """Something that shows the attributes of these names."""
+
+    _shows: ClassVar[tuple[str, ...]] = ()
+
+    def __repr__(self) -> str:
+        return line(type(self).__name__, **{name: getattr(self, name) for name in self._shows})
+
+
+class Records(np.ndarray[Any, Any]):
+    """A structured array whose `repr` is one line; in all else as any other."""
+
+    def __repr__(self) -> str:
+        if self.ndim != 1 or self.dtype.names is None:
+            return repr(self.view(np.ndarray))
+        return f"{count(len(self), 'record')} of ({', '.join(self.dtype.names)})"

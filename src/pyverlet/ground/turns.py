@@ -1,0 +1,173 @@
+"""Threads that share a world take turns: a frame is a turn, and so is a change or a look between two frames."""
+
+from __future__ import annotations
+
+import functools
+import os
+import threading
+import weakref
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from threading import get_ident
+from typing import Any, Concatenate, ParamSpec, TypeVar
+
+from pyverlet.ground.errors import InputError
+from pyverlet.ground.interrupts import whole
+
+P = ParamSpec("P")
+R = TypeVar("R")
+S = TypeVar("S", bound="Shared")
+
+_FORK_S = 10.0
+"""Seconds that a fork waits for the frames under way to end."""
+
+
+class Turn:
+    """A lock that its holder may take again. Those that wait come before those that have just had it: no loop starves others.
+
+    Attributes:
+        holder: the thread that has it now.
+        in_frame: a frame is under way; true only while the lock is held.
+        page: asks a live page that steps the world to pause between two frames; None where there is none.
+    """
+
+    def __init__(self) -> None:
+        self.in_frame = False
+        self.page: Callable[[], AbstractContextManager[None]] | None = None
+        self.holder: int | None = None
+        self._depth = 0
+        self._renew()
+        with _all_lock:
+            _all.add(self)
+
+    def _renew(self) -> None:
+        self._door, self._room = threading.Lock(), threading.RLock()
+
+    @property
+    def mine(self) -> bool:
+        """Whether this thread holds it."""
+        return self.holder == get_ident()
+
+    @property
+    def taken(self) -> bool:
+        """Whether another thread holds it."""
+        return self.holder is not None and self.holder != get_ident()
+
+    def __enter__(self) -> bool:
+        """Wait for it. Returns whether another thread was in the middle of a frame."""
+        me, stepped = get_ident(), False
+        if self.holder != me:
+            stepped = self.in_frame
+            with self._door:  # held while waiting, so that the holder cannot come back before
+                self._room.acquire()
+            self.holder = me
+        self._depth += 1
+        return stepped
+
+    def __exit__(self, *_: object) -> None:
+        self._depth -= 1
+        if not self._depth:
+            self.holder = None
+            self._room.release()
+
+    def frame(self) -> _Frame:
+        """The context in which its holder makes a frame; functions of the user's that this calls may not change the world."""
+        return _Frame(self)
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Hold it, with the page that steps the world, if any, between two of its frames."""
+        with self.page() if self.page else nullcontext(), self:
+            yield
+
+
+class _Frame:
+    """The context of a frame."""
+
+    __slots__ = ("_turn",)
+
+    def __init__(self, turn: Turn) -> None:
+        self._turn = turn
+
+    def __enter__(self) -> None:
+        self._turn.in_frame = True
+
+    def __exit__(self, *_: object) -> None:
+        self._turn.in_frame = False
+
+
+class Shared:
+    """What several threads may share: it belongs to a state, which has the turn."""
+
+    _state: Any
+
+
+def in_turn(method: Callable[Concatenate[S, P], R]) -> Callable[Concatenate[S, P], R]:
+    """A method that changes a world: it waits for its turn, and for a page that steps the world; Ctrl-C waits for its end.
+
+    Raises:
+        InputError: it is called from within a frame of the same world, by a force or an onlooker.
+    """
+
+    @functools.wraps(method)
+    def waiting(self: S, /, *arguments: P.args, **options: P.kwargs) -> R:
+        turn: Turn = self._state.turn
+        if turn.in_frame and turn.mine:
+            raise InputError(
+                f"{method.__name__} is called in the middle of a frame of this world; allowed is between two frames, as actors do"
+            )
+        with whole, turn if turn.page is None else turn.held():
+            return method(self, *arguments, **options)
+
+    return waiting
+
+
+def of_one_frame(method: Callable[Concatenate[S, P], R]) -> Callable[Concatenate[S, P], R]:
+    """A method that reads a world: it waits for the end of a frame that another thread makes."""
+
+    @functools.wraps(method)
+    def reading(self: S, /, *arguments: P.args, **options: P.kwargs) -> R:
+        with self._state.turn:
+            return method(self, *arguments, **options)
+
+    return reading
+
+
+# ---- forks -------------------------------------------------------------------------------------------------------------
+
+_all: weakref.WeakSet[Turn] = weakref.WeakSet()
+_all_lock = threading.Lock()
+_taken: list[Turn] = []
+
+
+def _before_fork() -> None:
+    """The child has only the thread that forks: worlds are to stand between two frames, and locks to be free."""
+    _all_lock.acquire()
+    for turn in _all:
+        if turn.mine:
+            continue
+        if turn._door.acquire(timeout=_FORK_S):
+            if turn._room.acquire(timeout=_FORK_S):
+                _taken.append(turn)
+            turn._door.release()
+
+
+def _after_fork(*, child: bool) -> None:
+    while _taken:
+        _taken.pop()._room.release()
+    if child:
+        for turn in _all:
+            if not turn.mine:
+                turn.holder, turn._depth, turn.in_frame = None, 0, False
+                turn._renew()
+            turn._door = threading.Lock()
+            turn.page = None
+    _all_lock.release()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(
+        before=_before_fork,
+        after_in_parent=functools.partial(_after_fork, child=False),
+        after_in_child=functools.partial(_after_fork, child=True),
+    )

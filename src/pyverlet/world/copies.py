@@ -1,0 +1,90 @@
+"""Pickles and copies of worlds: what moves as `parts` takes it apart, and the objects in the world as they are.
+
+The particles' `State` and the lists of a world are pickled as themselves, so that groups and links that travel with a world go on
+naming its particles. Compiled code, the profile and the onlooker stay behind.
+"""
+
+from __future__ import annotations
+
+import copy
+import inspect
+from functools import cache
+from typing import Any
+
+from pyverlet.compile import jit
+from pyverlet.ground import pickling
+from pyverlet.laws.obstacles import Course
+from pyverlet.world import parts as apart
+from pyverlet.world.saved import INTO
+from pyverlet.world.world import World
+
+_OBJECTS = ("boundary", "collisions", "integrator", "forces", "obstacles", "actors", "links")
+
+
+def settings(world: World) -> dict[str, Any]:
+    """What `World` is called with besides objects, in numbers and text."""
+    return {
+        "dtype": world.dtype.name, "gravity": list(world.gravity), "substeps": world.substeps, "threads": world._threads,
+        "ledger": world.keeps_ledger, "events": world.tells_events, "contacts": world._touches is not None,
+        "sleep": world._sleep is not None,
+    }  # fmt: skip
+
+
+def contents(world: World) -> dict[str, Any]:
+    """All there is in a world, of which the arrays of the particles are its own."""
+    moving = apart.take_apart(world)
+    return {
+        "settings": settings(world),
+        "particles": world._state,
+        "facts": moving.facts,
+        "arrays": {name: array for name, array in moving.arrays.items() if not name.startswith("particles.")},
+        "objects": {name: getattr(world, name) for name in _OBJECTS},
+        "users": {name: value for name, value in vars(world).items() if name not in _own()},
+    }
+
+
+@cache
+def _own() -> frozenset[str]:
+    """Attributes that every world has; others are the user's."""
+    return frozenset(vars(World()))
+
+
+def check(world: World) -> None:
+    """Raise InputError if something in the world cannot be pickled."""
+    for name in _OBJECTS:
+        held = getattr(world, name)
+        for number, thing in enumerate(held) if name in ("forces", "obstacles", "actors", "links") else ((None, held),):
+            what = name if number is None else f"{name}[{number}]"
+            if not pickling.by_name(thing):  # such as a function made a force by a decorator
+                pickling.check(what, type(thing))
+                pickling.check(what, *filter(inspect.isfunction, getattr(thing, "__dict__", {}).values()))
+    for label, function in world.watched.items():
+        pickling.check(f"what is watched as {label!r}", *filter(inspect.isfunction, (function,)))
+
+
+def take_up(world: World, given: dict[str, Any]) -> None:
+    """Make of an object that has nothing yet the world of these `contents`, whose objects are its own from now on."""
+    options, objects = given["settings"], given["objects"]
+    most = jit.max_threads()
+    World.__init__(world, **options | {"threads": options["threads"] and min(options["threads"], most)})
+    world._state = state = given["particles"]
+    arrays = {f"particles.{name}": array.copy() for name, array in state.arrays()}
+    world.links, world.forces, world.obstacles = objects["links"], objects["forces"], objects["obstacles"]
+    world._force_sum.forces, world._course = world.forces, Course(world.obstacles)
+    for name in ("boundary", "collisions", "integrator"):
+        setattr(world, name, objects[name])
+    world.restore(apart.put_together(world, apart.Parts(given["facts"], arrays | given["arrays"])))
+    world.actors = objects["actors"]  # they remember by themselves
+    vars(world).update(given["users"])
+
+
+def copied(world: World, memo: dict[Any, Any]) -> World:
+    """An independent copy of a world, as `copy.deepcopy` makes them."""
+    into: World | None = memo.get(INTO)
+    if into is not None and memo.get(id(world._state)) is into._state:  # what belonged to that world belongs to this one now
+        return into
+    again = memo[id(world)] = type(world).__new__(type(world))
+    with world.held():
+        given = contents(world)
+        take_up(again, copy.deepcopy(given, memo))
+    return again

@@ -1,0 +1,262 @@
+"""Pickles and copies of worlds, groups, saved states and what is in worlds: independent, and with the same bits afterwards."""
+
+from __future__ import annotations
+
+import copy
+import multiprocessing
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+
+from .test_snapshot import FEATURES
+
+FRAME = 1 / 60
+
+
+def pickled(thing: Any) -> Any:
+    return pickle.loads(pickle.dumps(thing))
+
+
+WAYS = (pickled, copy.deepcopy, copy.copy)
+
+
+def crossing() -> pv.World:
+    """Obstacles that move, links that break, in a periodic room, with contacts noted."""
+    world = pv.World(boundary=pv.Periodic((0, 0), (12, 12), axes="x"), contacts=True, dtype=np.float64, events=True)
+    world.add(position=pv.fill(pv.Box((1, 5), (11, 11)), radius=0.4, count=60).position, radius=0.4)
+    world.obstacles += [pv.Capsule((3, 1), (9, 1), radius=0.3, angular_velocity=1.0), pv.Disc((6, 3), 0.5, velocity=(0.5, 0))]
+    pair = world.add(position=[(0.5, 2.0), (11.5, 2.0)], radius=0.1, allow_overlap=True)
+    world.links.append(pv.Rope(pair, 0, 1, length=1.0, breaking_force=3.0))
+    world.forces.append(pv.ConstantForce((0, 2), group=pair))
+    return world
+
+
+def step(world: pv.World, frames: int) -> str:
+    for _ in range(frames):
+        world.step(FRAME)
+    return world.state_hash()
+
+
+def told(world: pv.World) -> dict[str, Any]:
+    """What a world says besides positions and velocities."""
+    found: dict[str, Any] = {"frames": world.frames, "groups": [group.index.tolist() for group in world.groups if len(group)]}
+    found |= {
+        "links": [(repr(link), link.force.tolist(), link.intact.tolist()) for link in world.links],
+        "energy": world.energy(),
+    }
+    found |= {"obstacles": [(obstacle.pivot, obstacle.angle) for obstacle in world.obstacles], "asleep": world.asleep.tolist()}
+    found |= {"actors": [vars(actor).get("emitted", vars(actor).get("removed")) for actor in world.actors]}
+    if world.keeps_ledger:
+        found["ledger"] = world.ledger
+    if world.tells_events:
+        found["begin"], found["end"] = world.events.begin.tobytes(), world.events.end.tobytes()
+    return found
+
+
+def shared(world: pv.World, other: pv.World) -> list[Any]:
+    """Objects that are in both."""
+    here, there = ([*w.actors, *w.obstacles, *w.links] for w in (world, other))
+    return [thing for thing in here if any(thing is each for each in there)]
+
+
+def after(world: pv.World) -> tuple[str, dict[str, Any]]:
+    return step(world, 25), told(world)
+
+
+@pytest.mark.parametrize("make", [*FEATURES, crossing], ids=lambda make: make.__name__)
+def test_a_copy_goes_on_with_the_same_bits_and_by_itself(make: Callable[[], pv.World]) -> None:
+    world = make()
+    step(world, 71)
+    before = world.state_hash(), told(world)
+    copies = [way(world) for way in WAYS]
+    for way, again in zip(WAYS, copies, strict=True):
+        assert (again.state_hash(), told(again)) == before, way.__name__
+        assert not np.shares_memory(again.position, world.position)
+        assert shared(again, world) == []
+    expected = after(world)
+    for way, again in zip(WAYS, copies, strict=True):
+        assert after(again) == expected, way.__name__
+    if world.tells_events:
+        assert pickled(world).events.hit_speed == world.events.hit_speed
+
+
+def test_worlds_travel_to_a_spawned_process() -> None:
+    worlds = [make() for make in (FEATURES[0], FEATURES[5], crossing)]
+    for world in worlds:
+        step(world, 40)
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        there = pool.map(after, worlds)
+    assert there == [after(world) for world in worlds]
+
+
+def heap() -> pv.World:
+    world = pv.World(boundary=pv.Box((0, 0), (6, 20)), collisions=pv.Collisions(friction=0.3), sleep=False)
+    world.add(position=pv.fill(pv.Box((0, 0), (6, 8)), radius=0.3, count=80).position, radius=0.3)
+    pv.chain(world, (1, 12), (5, 12), links=8)
+    world.obstacles.append(pv.Disc((3, 2), 0.5, velocity=(0.1, 0)))
+    world.actors.append(pv.Emitter(pv.Box((1, 15), (5, 18)), rate=30, radius=0.2))
+    step(world, 40)
+    return world
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_saved_state_may_be_copied_and_taken_up_by_a_copy_of_its_world(way: Callable[[Any], Any]) -> None:
+    world = heap()
+    saved = world.save()
+    again, kept = copy.deepcopy(world), way(saved)
+    expected = after(world)
+    for each in (world, again):
+        for state in (kept, saved):
+            each.restore(state)
+            assert after(each) == expected
+    assert shared(again, world) == []
+    with pytest.raises(pv.InputError, match="saved is the state of another world"):
+        heap().restore(kept)
+
+
+@pytest.mark.parametrize("way", [pickled, copy.deepcopy])
+def test_what_is_copied_together_stays_together(way: Callable[[Any], Any]) -> None:
+    world = pv.World()
+    balls, others = world.add(position=[(0, 5), (2, 5), (4, 5)]), world.add(position=(8, 5))
+    balls.remove(1)
+    link = world.links.append(pv.Stick(balls, 0, 1))
+    force = world.forces.append(pv.ConstantForce((1, 0), group=others))
+    saved = world.save()
+    world_, balls_, link_, force_, saved_ = way((world, balls, link, force, saved))
+    assert balls_.world is world_ is not world
+    assert (world_.links[0], world_.forces[0]) == (link_, force_)
+    assert force_.group.world is world_
+    balls_.position[:] += 1
+    assert world_.position[0, 0] == world.position[0, 0] + 1
+    balls_.remove(0)
+    assert (len(world_), len(world_.links), len(world)) == (2, 0, 3)
+    world_.restore(saved_)
+    assert (len(world_), world_.state_hash()) == (3, world.state_hash())
+    # A group that is copied alone takes its world along; a second handle by copy.copy is on the same particles.
+    alone = way(balls)
+    assert (len(alone), len(alone.world)) == (2, 3)
+    assert not np.shares_memory(alone.position, balls.position)
+    assert np.shares_memory(copy.copy(balls).position, balls.position)
+
+
+# ---- what is in worlds ---------------------------------------------------------------------------------------------------
+
+
+@pv.force
+def swirl(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tuple[float, float]:
+    return -y * mass, x * mass
+
+
+def pull(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tuple[float, float]:
+    return -x * mass, -y * mass
+
+
+def well(x: float, y: float, mass: float) -> float:
+    return 0.5 * mass * (x * x + y * y)
+
+
+def breeze(x: Any, y: Any, t: float) -> tuple[Any, float]:
+    return 0.1 * y, 0.0
+
+
+class Counter(pv.Actor):
+    """Has a friend in the world, and the world."""
+
+    def __init__(self, group: pv.Group) -> None:
+        self.group, self.seen = group, 0
+
+    def act(self, world: pv.World, dt: float) -> None:
+        self.seen += len(self.group)
+
+
+class Own(pv.World):
+    """A world of a user's own, whose constructor takes something else."""
+
+    def __init__(self, count: int) -> None:
+        super().__init__(gravity=(0, 0), events=True)
+        self.score, self.balls = 7, self.add(position=np.random.default_rng(0).uniform(-4, 4, (count, 2)))
+        self.actors.append(Counter(self.balls))
+        self.forces += [swirl, pv.force(pull), pv.force(potential=well)(pull), pv.Wind(breeze, linear=0.1)]
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_world_of_a_users_own_with_functions_and_references(way: Callable[[Any], Any]) -> None:
+    world = Own(12)
+    world.watch("score", len)
+    step(world, 3)
+    again = way(world)
+    assert (type(again), again.score, again.read_watched()) == (Own, 7, {"score": 12.0})
+    assert again.balls.world is again
+    assert again.actors[0].group is again.balls
+    assert again.energy() == world.energy()
+    assert step(again, 5) == step(world, 5)
+    assert again.actors[0].seen == world.actors[0].seen == 8 * 12  # type: ignore[attr-defined]
+
+
+def test_functions_that_no_other_process_can_import_get_a_sentence() -> None:
+    class Inner(pv.Actor):
+        def act(self, world: pv.World, dt: float) -> None: ...
+
+    def heavy(world: pv.World) -> float:
+        return 1.0
+
+    cases: dict[str, Callable[[pv.World], object]] = {
+        r"forces\[0\]": lambda w: w.forces.append(pv.force(lambda x, y, vx, vy, mass, t: (0.0, 1.0))),
+        r"forces\[0\]\b|forces\[0\]": lambda w: w.forces.append(pv.Wind(lambda x, y, t: (x, y), linear=1)),
+        r"actors\[0\]": lambda w: w.actors.append(Inner()),
+        "what is watched as 'heavy'": lambda w: w.watch("heavy", heavy),
+    }
+    for what, use in cases.items():
+        world = pv.World()
+        world.add(position=(0, 5))
+        use(world)
+        with pytest.raises(
+            pv.InputError, match=f"^{what} cannot be pickled, for no other process can import .*<l.*; allowed are"
+        ):
+            pickle.dumps(world)
+        assert step(copy.deepcopy(world), 2) == step(world, 2)
+
+
+def things() -> dict[str, Any]:
+    world = pv.World(events=True, contacts=True, boundary=pv.Box((-9, -9), (9, 9)))
+    balls = world.add(position=[(0, 0), (0, 2), (2, 2), (2, 0)])
+    found = [
+        pv.PositionVerlet(), pv.VelocityVerlet(), pv.RK4(), pv.ExplicitEuler(), pv.SemiImplicitEuler(), pv.TimeCorrectedVerlet(),
+        pv.Yoshida4(), pv.Open(), pv.Circle(radius=2, angular_velocity=1), pv.Box((0, 0), (1, 1)), pv.Periodic((0, 0), (4, 4)),
+        pv.ClampAndFlip(pv.Box((0, 0), (1, 1))), pv.ProjectOnly(pv.Circle(radius=3)), pv.Collisions(friction=0.1),
+        pv.BruteForce(), pv.Fast(), pv.Drag(linear=1), pv.Wind((1, 0), linear=1), pv.Gravitation(strength=1),
+        pv.Attractor(strength=1),
+        pv.ConstantForce((1, 0), group=balls), pv.PointSpring(stiffness=1), pv.forces.Grip(0, target=(1, 1)), pv.forces.Push(
+            center=(0, 0), radius=1, acceleration=1), swirl, pv.Chain([(0, 0), (1, 1)]), pv.Segment((0, 0), (1, 0)),
+        pv.Capsule((0, 0), (1, 0), radius=0.1), pv.Disc((0, 0), 1), pv.Polygon([(0, 0), (1, 0), (0, 1)]), pv.Stick(balls, 0, 1),
+        pv.Rope(balls, 0, 1), pv.Spring(balls, 0, 1, stiffness=1), pv.Pin(balls, 0), pv.Angle(balls, 0, 1, 2), pv.Area(balls),
+        pv.Emitter(pv.Box((0, 0), (1, 1)), rate=1), pv.Sink(pv.Box((0, 0), (1, 1))), pv.Clock(dt=0.1), pv.FrameBudget(),
+        pv.slider("test of copies", 0, 1, 0.5), pv.Panels.of(world), world.events, world.profile, world.energy(),
+        world.overlap(), world.obstacles, world.forces, world.links, world.ray((0, 5), (0, -1)), world.nearest((0, 0), 2),
+    ]  # fmt: skip
+    return {f"{number}-{type(thing).__name__}": thing for number, thing in enumerate(found)}
+
+
+def test_objects_can_be_copied() -> None:
+    for name, thing in things().items():
+        for way in WAYS:
+            again = way(thing)
+            assert type(again) is type(thing), name
+            assert repr(again).split(" object at ")[0] == repr(thing).split(" object at ")[0], (name, way.__name__)
+
+
+def test_a_copied_link_may_join_the_same_world() -> None:
+    world = pv.World()
+    balls = world.add(position=[(0, 0), (0, 2), (2, 2), (2, 0)])
+    link = world.links.append(pv.Stick(balls, [0, 1, 2], [1, 2, 3], length=[1, 2, 3]))
+    balls.remove(0)
+    assert link.length.tolist() == [2, 3]
+    other = world.links.append(copy.copy(link))
+    assert other.particles.tolist() == [[0, 1], [1, 2]]
+    world.links.remove(link)
+    assert world.links.append(link).length.tolist() == [2, 3]  # was told to have three, and refused

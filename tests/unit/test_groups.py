@@ -1,0 +1,132 @@
+"""Groups are indexed and gone through as NumPy's arrays are."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+
+
+def six() -> tuple[pv.World, pv.Group]:
+    """A world of eight, and a group of six of them."""
+    world = pv.World(gravity=(0, 0))
+    world.add(position=[(-3, 0), (-1, 0)])
+    group = world.add(position=[(2.0 * k, 5) for k in range(6)], mass=np.arange(1.0, 7.0))
+    return world, group
+
+
+def test_one_particle() -> None:
+    world, group = six()
+    ball = group[2]
+    assert (ball.index, ball.mass, ball.position.tolist()) == (4, 3.0, [4, 5])
+    ball.velocity = (1, 0)
+    ball.position[0] = 4.5
+    ball.mass *= 2
+    ball.spin += 1
+    assert world.velocity[4].tolist() == [1, 0]
+    assert (world.position[4, 0], world.mass[4], world.spin[4]) == (4.5, 6.0, 1.0)
+    assert ball == group[2] == group[-4]
+    assert ball in group
+    assert len({ball, group[2], group[3]}) == 2
+    ball.pin()
+    assert np.isinf(world.mass[4])
+    world.step(1 / 60)
+    assert ball.position.tolist() == [4.5, 5]
+
+
+def test_particles_are_followed_while_others_go() -> None:
+    world, group = six()
+    last, second = group[-1], group[1]
+    world.remove([0, 3])
+    assert (last.index, last.position[0]) == (5, 10)
+    assert not second.is_there
+    assert repr(second) == "Particle 3, removed"
+    with pytest.raises(pv.InputError, match="particle 3 was removed"):
+        _ = second.position
+    assert group[1].index == 2
+    world.remove(last)
+    assert len(group) == 4
+    last_now = group[len(group) - 1]
+    last_now.remove()
+    assert len(group) == 3
+
+
+@pytest.mark.parametrize("which", [slice(1, 5), slice(None), slice(-2, None), slice(3, 1), slice(2, 3)])
+def test_a_slice_is_a_group_of_views(which: slice) -> None:
+    world, group = six()
+    world.remove(4)  # within
+    part = group[which]
+    assert part.index.tolist() == group.index[which].tolist()
+    assert part.mass.tolist() == group.mass[which].tolist()
+    assert len(part) == len(group.mass[which])
+    if len(part):
+        assert np.shares_memory(part.mass, world.mass)
+        part.mass[0] = 9
+        assert group.mass[which][0] == 9
+        world.remove(part)
+    assert len(group) == 5 - len(range(5)[which])
+
+
+@pytest.mark.parametrize("which", [slice(None, None, 2), slice(None, None, -1), [0, 3], [3, -1, 0], np.array([False, True] * 3)])
+def test_particles_picked_out(which: Any) -> None:
+    world, group = six()
+    part = group[which]
+    assert part.index.tolist() == group.index[which].tolist()
+    assert part.mass.tolist() == group.mass[which].tolist()
+    assert [ball.index for ball in part] == part.index.tolist()
+    with pytest.raises(ValueError, match="read-only"):
+        part.mass[0] = 9
+    part.mass = 9
+    part.velocity = (0, 1)
+    assert (group.mass[which] == 9).all()
+    assert world.mass.sum() == group.mass.sum() + 2
+    part.pin(0)
+    assert np.isinf(world.mass[part.index[0]])
+    force = world.forces.append(pv.ConstantForce((1, 0), group=part))
+    link = world.links.append(pv.Stick(part, 0, 1))
+    assert link.particles.tolist() == [part.index[:2].tolist()]
+    world.step(1 / 60)
+    assert force.potential(world._state) == pytest.approx(-part.position[1:, 0].sum(), rel=1e-5)
+    part.remove(0)
+    assert len(part) == len(np.arange(6)[which]) - 1
+    part.remove()
+    assert len(part) == 0
+    with pytest.raises(pv.InputError, match="all removed"):
+        _ = part.mass
+
+
+def test_going_through_a_group() -> None:
+    world, group = six()
+    assert [ball.mass for ball in group] == [1, 2, 3, 4, 5, 6]
+    for ball in group:
+        ball.radius = 0.1 * ball.mass
+    assert np.allclose(group.radius, 0.1 * np.arange(1, 7))
+    for ball in group:  # even ones go, each with the one behind it
+        if ball.mass % 2 == 0:
+            group[[int(np.searchsorted(group.mass, ball.mass)) + k for k in (0, 1) if ball.mass + k <= 6]].remove()
+    assert group.mass.tolist() == [1]
+    assert len(world) == 3
+    assert list(world.add(position=np.empty((0, 2)))) == []
+
+
+@pytest.mark.parametrize("which", [6, -7, "a", 1.5, [[0, 1]], [9], np.ones(5, bool), None, (0, 1)])
+def test_what_is_not_there_gets_a_sentence(which: Any) -> None:
+    _, group = six()
+    with pytest.raises(pv.InputError, match=r"index is .*"):
+        group[which]
+    with pytest.raises(IndexError):
+        group[which]
+
+
+def test_picked_ones_are_kept_in_files(tmp_path: Any) -> None:
+    world, group = six()
+    world.forces.append(pv.ConstantForce((1, 0), group=group[[3, 1]]))
+    pv.save(world, tmp_path / "picked.pvsnap")
+    again = pv.load(tmp_path / "picked.pvsnap")
+    assert again.forces[0].group.index.tolist() == [5, 3]  # type: ignore[attr-defined]
+    again.step(1 / 60)
+    world.step(1 / 60)
+    assert again.state_hash() == world.state_hash()
