@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.laws.events import WALL
-from pyverlet.laws.obstacles import Course, facing_of
+from pyverlet.laws.obstacles import Course, Facing
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
@@ -179,7 +179,9 @@ class _End:
         order = state.particle
         self._position[order], self._velocity[order], self._radius[order] = state.position, state.velocity, state.size
         self._free[order] = state.inverse_mass > 0
-        self._surfaces, self._obstacles = course.surfaces(), course.seen()
+        self._obstacles = course.seen()
+        who = np.flatnonzero(given[2].any(axis=1))
+        self._beside = course.facing(self._position[who], _NEAR * self._radius[who])
 
     def number_of(self, obstacle: Any) -> int:
         """Among the obstacles of then; -2 if it was none."""
@@ -211,21 +213,13 @@ class _End:
         if not len(who):
             return np.zeros(0, TOUCH)
         x, r, push = self._position[who], self._radius[who], given[who]
-        facing = self._room.facing(x) if whose == 1 else facing_of(x, self._surfaces, len(self._obstacles))
-        if facing is None:  # a room of the user's own: all that is known is where it pushes to
-            size = np.hypot(*push.T)
-            facing = r[:, None], (push / size[:, None])[:, None, :]
-        gap, into = facing
-        gap = gap - r[:, None]
-        near = gap <= gap.min(axis=1, keepdims=True) + _NEAR * r[:, None]
-        circle, wall = np.nonzero(near)
-        share = _shared(push, near, into)
-        found = np.zeros(len(circle), TOUCH)
-        found["a"], found["b"] = who[circle], WALL
+        row, wall, gap, into = self._beside if whose == 2 else _nearest_walls(self._room, x, r, push)
+        share = _shared(push, row, into)
+        found = np.zeros(len(row), TOUCH)
+        found["a"], found["b"] = who[row], WALL
         found["wall"], found["obstacle"] = (wall, NOBODY) if whose == 1 else (NOBODY, wall)
-        out = -into[circle, wall]
-        found["normal"] = out
-        found["point"] = self._room.seam.wrapped(x[circle] + (r[circle] + gap[circle, wall])[:, None] * out)
+        found["normal"] = -into
+        found["point"] = self._room.seam.wrapped(x[row] - gap[:, None] * into)
         _write(found, share)
         return np.asarray(found[(found["impulse"] != 0) | (found["rub"] != 0)])
 
@@ -296,17 +290,30 @@ def _write(found: Array, got: Floats) -> None:
     found["rub"] = got[:, 1] * n[:, 0] - got[:, 0] * n[:, 1]
 
 
-def _shared(push: Floats, near: Array, into: Floats) -> Floats:
-    """(k, 2) of each circle and wall in `near`, in its order: what it has got from that one, all together `push`."""
-    circle, wall = np.nonzero(near)
-    share = push[circle]
-    for i in np.flatnonzero(near.sum(axis=1) > 1):  # in a corner
-        mine = circle == i
-        normal = into[i, wall[mine]]
-        part = np.linalg.lstsq(normal.T, push[i], rcond=None)[0].clip(min=0)
-        rest = push[i] - part @ normal
-        weight = part / part.sum() if part.sum() > 0 else np.full(len(part), 1 / len(part))
-        share[mine] = part[:, None] * normal + weight[:, None] * rest
+def _nearest_walls(room: Boundary, x: Floats, r: Floats, push: Floats) -> Facing:
+    """The walls of a room at which circles are that have got `push` (k, 2) from it."""
+    facing = room.facing(x)
+    if facing is None:  # a room of the user's own: all that is known is where it pushes to
+        return Facing(np.arange(len(x)), np.zeros(len(x), np.int64), r, push / np.hypot(*push.T)[:, None])
+    gap, into = facing
+    row, wall = np.nonzero(gap <= gap.min(axis=1, keepdims=True) + _NEAR * r[:, None])
+    return Facing(row, wall, gap[row, wall], into[row, wall])
+
+
+def _shared(push: Floats, row: Array, into: Floats) -> Floats:
+    """(k, 2) what a circle, its row of `push`, has got from each wall or obstacle at which it is, whose normal is `into`.
+
+    Of several, as in a corner, each has given a part along its normal (least squares), and of the rest as much as of that.
+    """
+    share, several = push[row], np.bincount(row, minlength=len(push))
+    for number in np.unique(several[several > 1]):
+        mine = np.flatnonzero(several[row] == number).reshape(-1, number)  # rows are sorted
+        normal, got = into[mine], push[row[mine[:, 0]]]
+        part = (np.linalg.pinv(normal.transpose(0, 2, 1)) @ got[:, :, None])[:, :, 0].clip(min=0)
+        along = part[:, :, None] * normal
+        total = part.sum(axis=1, keepdims=True)
+        weight = np.divide(part, total, out=np.full_like(part, 1 / number), where=total > 0)
+        share[mine] = along + weight[:, :, None] * (got - along.sum(axis=1))[:, None]
     return share
 
 

@@ -1,0 +1,176 @@
+"""What does not matter to a frame costs it nothing. Calls are counted, not milliseconds: those depend on the machine."""
+
+from __future__ import annotations
+
+import copy
+import sys
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+
+DT = 1 / 60
+
+
+def grid(columns: int, rows: int, apart: float) -> Any:
+    x, y = np.meshgrid(apart * np.arange(columns), apart * np.arange(rows))
+    return np.column_stack((x.ravel(), y.ravel()))
+
+
+def calls(act: Callable[[], object]) -> int:
+    """How many functions Python calls, its own and those of C, in `act`."""
+    count = 0
+
+    def note(frame: Any, event: str, about: Any) -> None:
+        nonlocal count
+        count += event in ("call", "c_call")
+
+    before = sys.getprofile()
+    sys.setprofile(note)
+    try:
+        act()
+    finally:
+        sys.setprofile(before)
+    return count
+
+
+def frames(world: pv.World, count: int = 6, act: Callable[[int], object] = lambda k: None) -> int:
+    """Calls in a frame: the fewest of several, for lists are made anew now and then."""
+
+    def frame(k: int) -> None:
+        act(k)
+        world.step(DT)
+
+    return min(calls(lambda k=k: frame(k)) for k in range(count))  # type: ignore[misc]
+
+
+def far(count: int) -> Any:
+    return np.random.default_rng(0).uniform(100, 900, (count, 2))
+
+
+OBSTACLES: dict[str, Callable[[int], list[pv.Obstacle]]] = {
+    "pegs": lambda n: [pv.Disc(at, 0.3, restitution=0.5, friction=0.1) for at in far(n)],
+    "tiles": lambda n: [pv.Segment(at, (at[0] + 1, at[1])) for at in far(n)],
+    "boxes": lambda n: [pv.Polygon(at + np.array([(0, 0), (1, 0), (1, 1)])) for at in far(n)],
+    "chain": lambda n: [pv.Chain(np.column_stack((np.arange(n + 1.0), 500 + np.sin(np.arange(n + 1)))))],
+}
+
+
+def world_of_discs(obstacles: list[pv.Obstacle], **options: Any) -> pv.World:
+    world = pv.World(threads=1, **options)
+    world.add(position=grid(5, 5, 1.0), radius=0.4)
+    world.obstacles.extend([pv.Segment((-9, -50), (9, -50)), *obstacles])  # one there is in any case
+    for _ in range(3):
+        world.step(DT)
+    return world
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"sleep": True}, {"events": True}, {"contacts": True}, {"boundary": pv.Periodic((0, 0), (999, 999))}]
+)
+@pytest.mark.parametrize("kind", OBSTACLES)
+def test_obstacles_that_stand_still_cost_nothing(kind: str, options: dict[str, Any]) -> None:
+    few, many = (world_of_discs(OBSTACLES[kind](count), **options) for count in (4, 1000))
+    assert abs(frames(many) - frames(few)) <= 20
+
+
+def test_moving_or_adding_one_obstacle_costs_the_same_among_many() -> None:
+    acts: dict[str, Callable[[pv.World, int], object]] = {
+        "moved": lambda world, k: setattr(world.obstacles[k], "pivot", (10.0 + k, 70.0)),
+        "added": lambda world, k: world.obstacles.append(pv.Disc((10.0 + k, 70.0), 0.3)),
+        "changed": lambda world, k: setattr(world.obstacles[k], "friction", 0.2),
+        "spun": lambda world, k: setattr(world.obstacles[3], "angular_velocity", 1.0 + k),
+    }
+    for name, act in acts.items():
+        few, many = (world_of_discs(OBSTACLES["pegs"](count)) for count in (20, 1000))
+        assert abs(frames(many, act=partial(act, many)) - frames(few, act=partial(act, few))) <= 20, name
+
+
+# ---- and yet they are met ----------------------------------------------------------------------------------------------
+
+
+def edits(world: pv.World, k: int) -> None:
+    """All that can happen to a list of obstacles, one after the other."""
+    o = world.obstacles
+    if k == 2:
+        o.append(pv.Disc((2.0, -2.0), 0.8))
+    elif k == 4:
+        o.pop(0)
+    elif k == 6:
+        o.insert(1, pv.Segment((-3, -3), (9, -4), restitution=0.5))
+    elif k == 8:
+        o[2].pivot = (3.2, -1.6)
+    elif k == 10:
+        o.reverse()
+    elif k == 12:
+        o[0].velocity, o[1].angular_velocity = (0.4, 0.3), 2.0
+    elif k == 16:
+        del o[1:3]
+        o.extend([pv.Polygon([(0, -5), (3, -5), (1, -3.5)]), o[0]])
+    elif k == 20:
+        o[0].velocity = (0, 0)
+    elif k == 24:
+        world.radius[:3] = 0.9
+
+
+@pytest.mark.parametrize("room", [pv.Open(), pv.Periodic((-6, -9), (8, 9))], ids=repr)
+def test_a_grid_that_follows_gives_the_bits_of_one_made_anew(room: pv.Boundary) -> None:
+    world = pv.World(boundary=room, events=True, dtype=np.float64)
+    world.add(position=grid(5, 5, 1.0), radius=np.resize([0.2, 0.3, 0.4], 25), restitution=0.3)
+    world.obstacles.extend([pv.Disc((x, -1.5), 0.3) for x in range(6)])
+    for k in range(40):
+        edits(world, k)
+        world._course.begin()
+        before = world.save()
+        world.step(DT)
+        after = world.position.copy()
+        world.restore(before)
+        world._course._renumbered = True  # as if the list had just been made
+        world.step(DT)
+        assert np.array_equal(world.position, after), k
+
+
+def test_far_and_long_obstacles_leave_the_others_to_their_cells() -> None:
+    # A ground of 2000 km and a peg at the end of the world: a table of cells over all of that would have one for the pegs.
+    world = world_of_discs(OBSTACLES["pegs"](200))
+    world.obstacles.extend([pv.Segment((-1e6, -60), (1e6, -60)), pv.Disc((1e12, 1e12), 1.0)])
+    ball = world.add(position=(0.0, -58.0), radius=0.4)
+    world.step(DT)
+    assert world._course._cell < 200
+    for _ in range(120):
+        world.step(DT)
+    assert ball.position[0, 1] == pytest.approx(-59.6, abs=1e-3)
+
+
+def test_who_crosses_a_thousand_cells_in_a_substep_is_stopped() -> None:
+    world = pv.World(gravity=(0, 0), dtype=np.float64)
+    world.obstacles.extend([pv.Segment((5000, -1), (5000, 1)), pv.Disc((-3, 0), 1), pv.Disc((4, 9), 1)])
+    ball = world.add(position=(0, 0), velocity=(3e6, 0), radius=0.1)
+    world.step(DT)
+    assert ball.position[0, 0] == pytest.approx(4999.9)
+
+
+def test_points_are_covered_by_the_first_of_several() -> None:
+    world = world_of_discs([pv.Disc((0, 0), 5), pv.Disc((1, 0), 5), pv.Polygon([(90, 90), (99, 90), (90, 99)], radius=1)])
+    points = np.array([(0, 0), (5.5, 0), (92, 92), (89.2, 95), (80, 80), (1e300, 0)])
+    assert world._course.covering(points).tolist() == [1, 2, 3, 3, -1, -1]
+    world.obstacles.reverse()
+    assert world._course.covering(points).tolist() == [1, 1, 0, 0, -1, -1]
+
+
+def test_an_obstacle_listed_twice_moves_twice_and_a_copy_of_a_world_has_its_own() -> None:
+    world = world_of_discs([])
+    peg = pv.Disc((0, -8), 1.0)
+    world.obstacles.extend([peg, peg])
+    world.step(DT)
+    peg.pivot = (50, 0)
+    world.step(DT)
+    assert world._course.covering(np.array([(50.0, 0.0), (0.0, -8.0)])).tolist() == [1, -1]
+    other = copy.deepcopy(world._course)
+    peg.pivot = (60, 0)
+    assert world._course.covering(np.array([(60.0, 0.0)])).tolist() == [1]
+    assert other.covering(np.array([(60.0, 0.0), (50.0, 0.0)])).tolist() == [-1, 1]
