@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import sys
+import time
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -12,6 +13,9 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
+from pyverlet.laws.contacts.broadphase import BruteForce
+from pyverlet.laws.contacts.collisions import find_contacts
+from pyverlet.world import queries
 
 DT = 1 / 60
 
@@ -174,3 +178,95 @@ def test_an_obstacle_listed_twice_moves_twice_and_a_copy_of_a_world_has_its_own(
     peg.pivot = (60, 0)
     assert world._course.covering(np.array([(60.0, 0.0)])).tolist() == [1]
     assert other.covering(np.array([(60.0, 0.0), (50.0, 0.0)])).tolist() == [-1, 1]
+
+
+# ---- reading -----------------------------------------------------------------------------------------------------------
+
+
+def fastest(act: Callable[[], object], count: int = 15) -> float:
+    """Seconds, the least of several: what others do on the machine only adds to it."""
+    took = []
+    for _ in range(count):
+        begun = time.perf_counter()
+        act()
+        took.append(time.perf_counter() - begun)
+    return min(took)
+
+
+def test_reading_a_heap_costs_about_as_much_as_a_step_at_most() -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (4, 40)), contacts=True, threads=1)
+    world.obstacles.extend(OBSTACLES["pegs"](2000))
+    world.add(position=grid(9, 39, 0.41) + np.array((0.3, 0.25)), radius=np.resize([0.16, 0.18, 0.2], 351))
+    peg = world.obstacles.append(pv.Disc((2.0, 0.0), 0.3))
+    world.run(seconds=2)
+    step = fastest(lambda: world.step(DT))
+    assert len(world.contacts) > 400
+
+    def read() -> None:
+        world._touches._end._found.clear()  # type: ignore[union-attr]
+        world._touches._found = None  # type: ignore[union-attr]
+        assert len(world.contacts) > 400
+        assert world.force_on(peg)[1] < 0
+        assert world.pressure() > 0
+
+    # It was 40 times a step; a margin of three is for machines that are busy with something else.
+    assert fastest(read) < 3 * step
+    assert fastest(lambda: (world.energy(), world.overlap(), world.momentum())) < step
+
+
+def test_a_heap_of_hundreds_is_explained_to_a_percent() -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (4, 40)), contacts=True, threads=1, dtype=np.float64)
+    world.add(position=grid(9, 39, 0.41) + np.array((0.3, 0.25)), radius=np.resize([0.16, 0.18, 0.2], 351))
+    world.run(seconds=6)
+    found = world.contacts
+    pushed, pairs = found["impulse"][:, None] * found["normal"], found["b"] >= 0
+    got = np.zeros((351, 2))
+    np.subtract.at(got, found["a"], pushed)
+    np.add.at(got, found["b"][pairs], pushed[pairs])
+    assert np.abs(got / DT - world.mass[:, None] * (0, 9.81)).max() < 0.02 * found["impulse"].max() / DT
+
+
+ROOMS = [pv.Open(), pv.Periodic((-3, -3), (5, 4))]
+
+
+@pytest.mark.parametrize("room", ROOMS, ids=repr)
+@pytest.mark.parametrize("scale", [1.0, 1e-6])
+@pytest.mark.parametrize("spread", [1, 30])
+def test_overlaps_are_those_that_all_pairs_have(room: pv.Boundary, scale: float, spread: float) -> None:
+    if scale < 1 and room.seam:
+        pytest.skip("one room is enough")
+    rng = np.random.default_rng(2)
+    world = pv.World(boundary=room, dtype=np.float64)
+    radius = rng.uniform(0.3 / spread, 0.3, 300) * scale
+    group = world.add(position=rng.uniform((-3, -3), (5, 4), (300, 2)) * scale, radius=radius, allow_overlap=True)
+    group.mass[:20] = np.inf
+    group.category[30:60], group.mask[60:90] = 2, 1
+    world.links.append(pv.Stick(group, 0, 100, length=scale, collide=False))
+    pairs = find_contacts(world._state, BruteForce())
+    pairs = pairs[~((pairs == (0, 100)).all(axis=1))]
+    way = world.boundary.seam.nearest(world.position[pairs[:, 1]] - world.position[pairs[:, 0]])
+    depth = 1 - np.hypot(*way.T) / world.radius[pairs].sum(axis=1)
+    overlap = world.overlap()
+    assert overlap.contacts == len(pairs) > 20
+    assert (overlap.mean, overlap.max) == pytest.approx((depth.mean(), depth.max()), rel=1e-12)
+
+
+def test_questions_sort_particles_once_and_again_when_they_have_moved(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (50, 50)))
+    world.add(position=grid(20, 20, 1.0) + 0.5, radius=0.4)
+    made = []
+    real = queries._sorted
+    monkeypatch.setattr(queries, "_sorted", lambda *about: made.append(1) or real(*about))
+    before, points = world.rebuilds, world.position[:100] + 0.1
+    for _ in range(3):
+        assert world.at_point(points).tolist() == list(range(100))
+        world.nearest(points, 3)
+        world.in_box(points, points + 1)
+        world.ray(points, (1, 0))
+        assert world.at_point(points[5]).tolist() == [5]
+    assert len(made) == 1
+    assert world.rebuilds == before
+    world.position[7] = (40.0, 40.0)
+    assert world.at_point(points)[7] == -1
+    assert world.at_point((40.1, 40.0)).tolist() == [7]
+    assert len(made) == 2
