@@ -209,7 +209,10 @@ class World(Measures, Queries, Doors):
     def _finish(self, contacts: ContactSolver | None, watch: Watch | None, h: float, done: Any, *, marked: bool) -> bool:
         """The substeps are done: who rests, the velocities of now, and no more energy than there may be."""
         if contacts:
-            lag = self.integrator.velocity_lag * h
+        lag = self.integrator.velocity_lag * h
+        # The pull of links is part of accelerations; and a function that has failed is asked again by who can say where.
+        if lag and self._force_sum.functions and not self.links and first_non_finite(self._slots) < 0:
+            self._force_sum.look_again(self._slots, self.time + self.substeps * h, lag)
             contacts.end(self._slots, self._state, lag, self.substeps * h, self.gravity, marked=marked)
         self.boundary.leave(self._slots)
         self.integrator.end(self._slots, h)
