@@ -12,7 +12,7 @@ from pyverlet.ground import loading, versions  # noqa: F401  (first: all that fo
 # isort: split
 from pyverlet import scenes
 from pyverlet.ground import errors
-from pyverlet.ground.errors import CoarseStepWarning, InputError, NonFiniteError, PyverletError
+from pyverlet.ground.errors import CoarseCoordinatesWarning, CoarseStepWarning, InputError, NonFiniteError, PyverletError
 from pyverlet.ground.submodules import lazily
 from pyverlet.laws import forces, integrators
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast
@@ -64,7 +64,8 @@ _LATER = {
 
 __all__ = [
     "RK4", "Actor", "Angle", "Area", "Attractor", "Boundary", "Box", "BruteForce", "Capsule", "Chain", "Circle",
-    "ClampAndFlip", "Clock", "CoarseStepWarning", "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy",
+    "ClampAndFlip", "Clock", "CoarseCoordinatesWarning", "CoarseStepWarning",
+    "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy",
     "Events", "ExplicitEuler", "Fast", "FrameBudget", "Gravitation", "Group", "InputError", "Integrator", "Ledger",
     "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel", "Panels", "Particle", "Periodic", "Pin", "PointSpring", "Polygon",
     "PositionVerlet", "ProjectOnly", "PyverletError", "Rope", "Segment", "SemiImplicitEuler", "Sink", "Slider", "Spring", "Stick",

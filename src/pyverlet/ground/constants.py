@@ -225,5 +225,5 @@ FRAME_BUDGET_MS: Final = 5.0
 LEAST_DRAWN_RADIUS: Final = 0.35
 """Pixels: smaller circles are drawn as large, four tenths of a pixel, or a few of them on a large picture could not be seen."""
 
-OBSTACLE_CELLS: Final = 16_384
-"""Cells the obstacles' grid has at most, more or less: 130 kB. It is filled anew in every substep if an obstacle moves."""
+OBSTACLE_LINKS: Final = 65_536
+"""Links the obstacles' grid has at most for a few large obstacles, 0.8 MB with its cells; each obstacle adds 64."""

@@ -23,6 +23,10 @@ class CoarseStepWarning(UserWarning):
     """The step is too coarse for what moves; the message names a particle and the substeps that would do."""
 
 
+class CoarseCoordinatesWarning(UserWarning):
+    """Coordinates of float32 are too coarse so far from the origin; the message says up to where they are not."""
+
+
 class NonFiniteError(PyverletError, ArithmeticError):
     """The state turned NaN or infinite; the world keeps the last good frame readable.
 

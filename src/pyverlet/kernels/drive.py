@@ -11,7 +11,7 @@ import numpy as np
 
 from pyverlet.compile.bundle import bundle
 from pyverlet.compile.jit import kernel, parallel_kernel, prange, variant
-from pyverlet.kernels.forces import attract, drag
+from pyverlet.kernels.forces import attract, drag, soften
 from pyverlet.kernels.motion import BLOCK, add_scaled, any_strayed, kick_drift, newton_block, set_out
 
 DRAG, UNIFORM, SPRING, ATTRACTION = range(4)
@@ -25,7 +25,7 @@ NUMBERS = 2
 @bundle
 class Forces:
     """kind: (k,) of the constants above; vector: (k, 2), number: (k, NUMBERS), in the dtype of the world. total: (n, 2) N,
-    becomes their sum. mass: (n,) kg.
+    becomes their sum. mass: (n,) kg. resistance: (n,) of `drag`, 0 in between.
     """
 
     kind: Any
@@ -33,7 +33,12 @@ class Forces:
     number: Any
     total: Any
     mass: Any
+    resistance: Any
 
+
+PASSES = 4
+"""Evaluations of functions that look at the velocity: each brings the one that they see nearer to that of the middle of the kick,
+(before + after) / 2, by h / 2 times what they change by with it. With that a force across the velocity does no work (Boris)."""
 
 CALLS = False
 """Whether there are functions of the user's own."""
@@ -54,21 +59,24 @@ def _pull(force, position, x, y, stiffness):
 
 
 @kernel
-def _add_up(force, position, velocity, inverse_mass, h, kind, vector, number, period_x, period_y):
-    """force = the sum of all, in their order."""
-    f, zero = force.reshape(-1), h - h
+def _add_up(force, position, velocity, inverse_mass, resistance, kind, vector, number, period_x, period_y):
+    """force = the sum of all, in their order; whether any is drag."""
+    f, zero = force.reshape(-1), force.dtype.type(0.0)
     for k in range(f.shape[0]):
         f[k] = zero
+    slowed = False
     for row in range(kind.shape[0]):
         x, y, first, second = vector[row, 0], vector[row, 1], number[row, 0], number[row, 1]
         if kind[row] == DRAG:
-            drag(force, velocity, vector[row : row + 1], inverse_mass, first, second, h)
+            drag(force, velocity, vector[row : row + 1], resistance, first, second)
+            slowed = True
         elif kind[row] == UNIFORM:
             _push(force, x, y)
         elif kind[row] == SPRING:
             _pull(force, position, x, y, first)
         else:
             attract(force, position, inverse_mass, x, y, first, second, period_x, period_y)
+    return slowed
 
 
 def _some(circles, forces, period_x, period_y, gx, gy, h, ahead, function, t, a, b):
@@ -77,18 +85,21 @@ def _some(circles, forces, period_x, period_y, gx, gy, h, ahead, function, t, a,
     Where the user's function fails the first of them is nowhere: the frame is then gone through again by who can say why.
     """
     x, v, felt, light = circles.position[a:b], circles.velocity[a:b], circles.acceleration[a:b], circles.inverse_mass[a:b]
-    pushed, wrong = forces.total[a:b], 0
+    pushed, resistance, wrong, largest = forces.total[a:b], forces.resistance[a:b], 0, gx - gx
     if forces.kind.shape[0] == 0 and not CALLS:  # gravity alone: links have pulled, and that is not felt again
         pushed = pushed[:0]
-    else:
-        if ahead != 0:
-            add_scaled(v, felt, ahead)
-        _add_up(pushed, x, v, light, h, forces.kind, forces.vector, forces.number, period_x, period_y)
-        if CALLS:
-            wrong = function(pushed, x, v, forces.mass[a:b], t)
-        if ahead != 0:
-            add_scaled(v, felt, -ahead)
-    largest = newton_block(felt, pushed, light, gx, gy)
+    for _ in range(PASSES if CALLS and ahead != 0 else 1):
+        if pushed.shape[0]:
+            if ahead != 0:
+                add_scaled(v, felt, ahead)
+            slowed = _add_up(pushed, x, v, light, resistance, forces.kind, forces.vector, forces.number, period_x, period_y)
+            if CALLS:
+                wrong = function(pushed, x, v, forces.mass[a:b], t)
+            if slowed:
+                soften(pushed, resistance, light, gx, gy, h)
+            if ahead != 0:
+                add_scaled(v, felt, -ahead)
+        largest = newton_block(felt, pushed, light, gx, gy)
     kick_drift(x, v, felt, h)
     if wrong > 0:
         x[0, 0] = np.nan

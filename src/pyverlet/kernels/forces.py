@@ -17,34 +17,47 @@ _BLOCK = 4096
 
 
 @kernel
-def _resistance(ux, uy, w, linear, quadratic, h, half):
-    """Times -u it is the force on one. All is computed, whether it counts or not: so it is done for eight at a time."""
-    c, whole = linear + quadratic * np.sqrt(ux * ux + uy * uy), w * h
-    most = half / whole
-    return most if c * whole > half else c
+def drag(force, velocity, wind, resistance, linear, quadratic):
+    """F = -(linear + quadratic |u|) u with u = v - wind; `wind` has a row for each particle, or one for all.
+
+    resistance (n,): N s/m, grows by what the force changes by with the speed; `soften` needs to know.
+    """
+    f, v, air, two = force.reshape(-1), velocity.reshape(-1), wind.reshape(-1), force.dtype.type(2.0)
+    if wind.shape[0] > 1:
+        for k in range(resistance.shape[0]):
+            i = np.uint64(2 * k)
+            ux, uy = v[i] - air[i], v[i + _ONE] - air[i + _ONE]
+            more = quadratic * np.sqrt(ux * ux + uy * uy)
+            resistance[k] += linear + two * more
+            f[i], f[i + _ONE] = f[i] - (linear + more) * ux, f[i + _ONE] - (linear + more) * uy
+        return
+    x, y = air[0], air[1]
+    for k in range(resistance.shape[0]):
+        i = np.uint64(2 * k)
+        ux, uy = v[i] - x, v[i + _ONE] - y
+        more = quadratic * np.sqrt(ux * ux + uy * uy)
+        resistance[k] += linear + two * more
+        f[i], f[i + _ONE] = f[i] - (linear + more) * ux, f[i + _ONE] - (linear + more) * uy
 
 
 @kernel
-def drag(force, velocity, wind, inverse_mass, linear, quadratic, h):
-    """F = -(linear + quadratic |u|) u with u = v - wind; `wind` has a row for each particle, or one for all.
+def soften(force, resistance, inverse_mass, gx, gy, h):
+    """Scale all that accelerates a particle, gravity (gx, gy) included, where drag would stop it within a substep of h seconds.
 
-    No more than m u / 2 h, which takes half of u in a substep of h seconds: resistance turns nobody round. With m u / h
-    integrators of Stormer's kind, which reckon with the acceleration of the substep before, swing for ever.
+    With z = c h / m beyond 1/2 the velocity goes by k = 3/4 - 1 / 8 z of the way to where all forces balance, instead of by z: it
+    gets there without swinging, however strong the drag is, and terminal speeds are exact. With k = 1 integrators of Stormer's
+    kind, which reckon with the acceleration of the substep before, would swing for ever.
     """
-    f, v, air, half = force.reshape(-1), velocity.reshape(-1), wind.reshape(-1), force.dtype.type(0.5)
-    if wind.shape[0] > 1:
-        for k in range(inverse_mass.shape[0]):
-            i = np.uint64(2 * k)
-            ux, uy = v[i] - air[i], v[i + _ONE] - air[i + _ONE]
-            c = _resistance(ux, uy, inverse_mass[np.uint64(k)], linear, quadratic, h, half)
-            f[i], f[i + _ONE] = f[i] - c * ux, f[i + _ONE] - c * uy
-        return
-    x, y = air[0], air[1]
-    for k in range(inverse_mass.shape[0]):
-        i = np.uint64(2 * k)
-        ux, uy = v[i] - x, v[i + _ONE] - y
-        c = _resistance(ux, uy, inverse_mass[np.uint64(k)], linear, quadratic, h, half)
-        f[i], f[i + _ONE] = f[i] - c * ux, f[i + _ONE] - c * uy
+    f, zero, one = force.reshape(-1), force.dtype.type(0.0), force.dtype.type(1.0)
+    half, most, eighth = force.dtype.type(0.5), force.dtype.type(0.75), force.dtype.type(0.125)
+    for k in range(resistance.shape[0]):
+        i, w = np.uint64(2 * k), inverse_mass[np.uint64(k)]
+        z = resistance[k] * w * h
+        if z > half:
+            part = (most - eighth / z) / z
+            m = (one - part) / w
+            f[i], f[i + _ONE] = part * f[i] - m * gx, part * f[i + _ONE] - m * gy
+        resistance[k] = zero
 
 
 @kernel

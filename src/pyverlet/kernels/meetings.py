@@ -23,7 +23,7 @@ import numpy as np
 from pyverlet.compile.bundle import bundle
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.kernels.bounds import look, meet, moved, noted, put, wide
-from pyverlet.kernels.obstacles import search, tolerance
+from pyverlet.kernels.obstacles import first_link, search, tolerance
 
 MEETINGS, BOUNCES = 256, 8
 """Times one circle may meet anything in a substep, and bounce off it; who has still not come through waits where it last met
@@ -52,16 +52,17 @@ OPEN, ROUND, RECTANGLE = 0.0, 1.0, 2.0
 
 @bundle
 class Course:
-    """Obstacles, as `kernels.obstacles` has them, in their cells: entries of cell c from start[c] to start[c + 1].
+    """Obstacles, as `kernels.obstacles` has them, and their grid: `links`, rows of a segment and of the next link of its cell.
 
+    heads: of each cell the first link.
     room: its wall, which wins: (7,), see OPEN. along: (n, 2), becomes the acceleration left to those who are held, m/s^2, or 0.
     rest: (n, 2), what rounding has taken from places in the substep before, and takes in this, m.
     """
 
     segments: Any
     bodies: Any
-    start: Any
-    entries: Any
+    heads: Any
+    links: Any
     room: Any
     along: Any
     rest: Any
@@ -226,7 +227,7 @@ def _carried(segment, time, px, py, qx, qy):
 
 
 @kernel
-def _travel(b, px, py, segments, bodies, until, x0, y0, cell, columns, rows, start, entries, room, h, lag, rest_speed):
+def _travel(b, px, py, segments, bodies, until, x0, y0, x1, y1, cell, heads, links, room, h, lag, rest_speed):
     """The circle b comes from p: (what becomes of it, whether it has met anything, the acceleration left to it if it is held)."""
     size, along_x, along_y, bounces = b.radius, 0.0, 0.0, 0
     x_then, y_then, vx_then, vy_then = b.x, b.y, b.vx, b.vy
@@ -234,9 +235,7 @@ def _travel(b, px, py, segments, bodies, until, x0, y0, cell, columns, rows, sta
     last = older = Surface(0.0, 0.0, 0.0, 0.0, NOBODY)
     for number in range(MEETINGS + 1):
         qx, qy = b.x, b.y
-        time, gap, depth, nx, ny, k = search(
-            segments, x0, y0, cell, columns, rows, start, entries, number == 0, px, py, qx, qy, size
-        )
+        time, gap, depth, nx, ny, k = search(segments, x0, y0, x1, y1, cell, heads, links, number == 0, px, py, qx, qy, size)
         least = tolerance(qx, qy, b.radius)
         if k >= 0:
             segment, body = segments[k], bodies[segments[k].body]
@@ -290,16 +289,14 @@ def _travel(b, px, py, segments, bodies, until, x0, y0, cell, columns, rows, sta
 
 
 @kernel
-def _alone(px, py, qx, qy, x0, y0, cell, columns, rows, start):
+def _alone(px, py, qx, qy, x0, y0, x1, y1, cell, heads):
     """Whether the way is short and there is nothing near its middle: true for most circles, most of the time."""
     if not abs(qx - px) + abs(qy - py) < cell:
         return False
-    column = (0.5 * (px + qx) - x0) / cell
-    row = (0.5 * (py + qy) - y0) / cell
-    if not (0.0 <= column < columns and 0.0 <= row < rows):
+    x, y = 0.5 * (px + qx), 0.5 * (py + qy)
+    if not (x0 <= x <= x1 and y0 <= y <= y1):
         return True
-    c = int(row) * columns + int(column)
-    return start[c] == start[c + 1]
+    return first_link(x, y, cell, heads) < 0
 
 
 @kernel
@@ -327,12 +324,12 @@ def _forget(along, rest):
 
 
 @kernel
-def _collide(first, stop, circles, course, until, x0, y0, cell, columns, rows, h, lag, rest_speed, drop):
+def _collide(first, stop, circles, course, until, x0, y0, x1, y1, cell, h, lag, rest_speed, drop):
     """`collide`, of the circles from `first` up to `stop`."""
     position, before, inverse_mass, along, rest = circles.position, circles.start, circles.inverse_mass, course.along, course.rest
-    segments, bodies, start, entries, room = course.segments, course.bodies, course.start, course.entries, course.room
-    high_x, high_y = x0 + (columns + 1) * cell, y0 + (rows + 1) * cell  # one more, for rounding
-    if _nobody(position[first:stop], before[first:stop], x0, y0, high_x, high_y, cell):
+    segments, bodies, heads, links, room = course.segments, course.bodies, course.heads, course.links, course.room
+    x0, y0, x1, y1 = x0 - cell, y0 - cell, x1 + cell, y1 + cell  # for rounding
+    if _nobody(position[first:stop], before[first:stop], x0, y0, x1, y1, cell):
         _forget(along[first:stop], rest[first:stop])
         return
     step = 0.5 * np.finfo(position.dtype).eps
@@ -340,7 +337,7 @@ def _collide(first, stop, circles, course, until, x0, y0, cell, columns, rows, h
         along[i, 0] = along[i, 1] = 0.0
         met = False
         if inverse_mass[i] > 0 and not _alone(
-            before[i, 0], before[i, 1], position[i, 0], position[i, 1], x0, y0, cell, columns, rows, start
+            before[i, 0], before[i, 1], position[i, 0], position[i, 1], x0, y0, x1, y1, cell, heads
         ):
             b = wide(look(i, circles))
             rest_x, rest_y = np.float64(rest[i, 0]), np.float64(rest[i, 1])
@@ -350,8 +347,8 @@ def _collide(first, stop, circles, course, until, x0, y0, cell, columns, rows, h
                 x = _unrounded(b.x + rest_x, px, b.vx, b.ax, long, drop, step)
                 y = _unrounded(b.y + rest_y, py, b.vy, b.ay, long, drop, step)
                 b, met, along_x, along_y = _travel(
-                    moved(b, x, y, b.vx, b.vy, b.from_x, b.from_y), px, py, segments, bodies, until, x0, y0, cell, columns, rows,
-                    start, entries, room, long, np.float64(lag), np.float64(rest_speed),
+                    moved(b, x, y, b.vx, b.vy, b.from_x, b.from_y), px, py, segments, bodies, until, x0, y0, x1, y1, cell,
+                    heads, links, room, long, np.float64(lag), np.float64(rest_speed),
                 )  # fmt: skip
                 if met:
                     along[i, 0], along[i, 1] = along_x, along_y
@@ -362,12 +359,12 @@ def _collide(first, stop, circles, course, until, x0, y0, cell, columns, rows, h
 
 
 @parallel_kernel
-def collide(circles, course, until, x0, y0, cell, columns, rows, h, lag, rest_speed, drop):
+def collide(circles, course, until, x0, y0, x1, y1, cell, h, lag, rest_speed, drop):
     """All circles, from where they were at the `start` of the substep to `position`; until: seconds into the frame at its end.
 
-    (x0, y0) to rows: of the cells, see `kernels.obstacles`. drop: of the integrator.
+    x0, y0, x1, y1: box around the obstacles, m; cell: of their grid, see `kernels.obstacles`. drop: of the integrator.
     """
     count = circles.position.shape[0]
     for block in prange((count + _BLOCK - 1) // _BLOCK):
         first, stop = block * _BLOCK, min((block + 1) * _BLOCK, count)
-        _collide(first, stop, circles, course, until, x0, y0, cell, columns, rows, h, lag, rest_speed, drop)
+        _collide(first, stop, circles, course, until, x0, y0, x1, y1, cell, h, lag, rest_speed, drop)

@@ -31,6 +31,9 @@ SEGMENT = np.dtype(
         ("ax", np.float64), ("ay", np.float64), ("c", np.float64), ("s", np.float64),  # start and direction, beginning of substep
         ("bx", np.float64), ("by", np.float64), ("bc", np.float64), ("bs", np.float64),  # the same at its end
         ("sweep", np.float64),  # what any of its points travels in the substep at most, m
+        ("kept_x", np.float64), ("kept_y", np.float64),  # its start when it was listed in the grid; NaN: it is not
+        ("kept_to_x", np.float64), ("kept_to_y", np.float64), ("kept_sweep", np.float64),  # its end, and its sweep
+        ("slack", np.float64),  # by how much it may move until it must be listed again, m
     ]
 )  # fmt: skip
 """A rounded segment of an obstacle. Metres."""
@@ -51,60 +54,110 @@ def tolerance(x, y, radius):
     return SETTLED * radius + _ROUNDED * (abs(x) + abs(y))
 
 
+FARTHEST = 2.0**50
+"""Cells from the origin to where an obstacle can still be listed."""
+
+NO_ROOM = -1
+"""`update` has not listed all: the grid must be made anew, with more room or larger cells."""
+
+
+@kernel
+def _place(segment, body, time, h):
+    """Where a segment stands `time` seconds into the frame, and h later."""
+    for late in range(2):
+        t = time + h * late
+        turned = body.angle + body.spin * t
+        c, s = np.cos(turned), np.sin(turned)
+        x = body.x + body.vx * t + c * segment.lx - s * segment.ly
+        y = body.y + body.vy * t + s * segment.lx + c * segment.ly
+        along, across = c * segment.lc - s * segment.ls, s * segment.lc + c * segment.ls
+        if late == 0:
+            segment.ax, segment.ay, segment.c, segment.s = x, y, along, across
+        else:
+            segment.bx, segment.by, segment.bc, segment.bs = x, y, along, across
+    arm = np.hypot(segment.lx, segment.ly) + segment.length
+    segment.sweep = h * (np.hypot(body.vx, body.vy) + abs(body.spin) * arm)
+
+
 @kernel
 def place(segments, bodies, time, h):
-    """Where the segments stand `time` seconds into the frame, and h later."""
+    """Place all segments; `update` places some."""
     for k in range(segments.shape[0]):
-        segment, body = segments[k], bodies[segments[k].body]
-        for late in range(2):
-            t = time + h * late
-            turned = body.angle + body.spin * t
-            c, s = np.cos(turned), np.sin(turned)
-            x = body.x + body.vx * t + c * segment.lx - s * segment.ly
-            y = body.y + body.vy * t + s * segment.lx + c * segment.ly
-            along, across = c * segment.lc - s * segment.ls, s * segment.lc + c * segment.ls
-            if late == 0:
-                segment.ax, segment.ay, segment.c, segment.s = x, y, along, across
-            else:
-                segment.bx, segment.by, segment.bc, segment.bs = x, y, along, across
-        arm = np.hypot(segment.lx, segment.ly) + segment.length
-        segment.sweep = h * (np.hypot(body.vx, body.vy) + abs(body.spin) * arm)
+        _place(segments[k], bodies[segments[k].body], time, h)
 
 
 @kernel
-def bin_segments(segments, reach, x0, y0, cell, columns, rows, start, entries):
-    """List in every cell the segments that may be met from it; returns how many entries there are, also beyond the room."""
-    start[:] = 0
-    for fill in range(2):
-        for k in range(segments.shape[0]):
-            segment = segments[k]
-            far = reach + segment.rounding + segment.inner + segment.sweep
-            x, y = segment.bx, segment.by
-            dx, dy = segment.bc * segment.length, segment.bs * segment.length
-            low = max(int(np.floor((min(y, y + dy) - far - y0) / cell)), 0)
-            high = min(int(np.floor((max(y, y + dy) + far - y0) / cell)), rows - 1)
-            for row in range(low, high + 1):
-                # The part of the segment that is within reach of the row.
-                s0, s1 = 0.0, 1.0
-                if dy != 0.0:
-                    a, b = (y0 + row * cell - far - y) / dy, (y0 + (row + 1) * cell + far - y) / dy
-                    s0, s1 = max(min(a, b), 0.0), min(max(a, b), 1.0)
-                xa, xb = x + s0 * dx, x + s1 * dx
-                left = max(int(np.floor((min(xa, xb) - far - x0) / cell)), 0)
-                right = min(int(np.floor((max(xa, xb) + far - x0) / cell)), columns - 1)
-                for column in range(left, right + 1):
-                    c = row * columns + column
-                    if fill:
-                        start[c] -= 1
-                        entries[start[c]] = k
-                    else:
-                        start[c] += 1
-        if fill == 0:
-            for c in range(columns * rows):
-                start[c + 1] += start[c]
-            if start[columns * rows] > entries.shape[0]:
-                return start[columns * rows]
-    return start[columns * rows]
+def _head_of(column, row, size):
+    """Index of a cell in a table of `size` heads, a power of two: a hash, so that the table need not cover the plane."""
+    mixed = column * 73856093 ^ row * 19349663
+    return (mixed ^ (mixed >> 15)) & (size - 1)
+
+
+@kernel
+def _list(k, segments, reach, cell, box, heads, links, used):
+    """List segment k in the cells from which it may be met; returns how many links are used, or NO_ROOM."""
+    segment = segments[k]
+    far = reach + segment.rounding + segment.inner + segment.sweep + segment.slack
+    x, y = segment.bx, segment.by
+    dx, dy = segment.bc * segment.length, segment.bs * segment.length
+    left, right, low, high = min(x, x + dx) - far, max(x, x + dx) + far, min(y, y + dy) - far, max(y, y + dy) + far
+    if not max(abs(left), abs(right), abs(low), abs(high)) < FARTHEST * cell:
+        return NO_ROOM
+    box[0], box[1], box[2], box[3] = min(box[0], left), min(box[1], low), max(box[2], right), max(box[3], high)
+    for row in range(int(np.floor(low / cell)), int(np.floor(high / cell)) + 1):
+        # The part of the segment that is within reach of the row.
+        s0, s1 = 0.0, 1.0
+        if dy != 0.0:
+            a, b = (row * cell - far - y) / dy, ((row + 1) * cell + far - y) / dy
+            s0, s1 = max(min(a, b), 0.0), min(max(a, b), 1.0)
+        xa, xb = x + s0 * dx, x + s1 * dx
+        for column in range(int(np.floor((min(xa, xb) - far) / cell)), int(np.floor((max(xa, xb) + far) / cell)) + 1):
+            if used == links.shape[0]:
+                return NO_ROOM
+            head = _head_of(column, row, heads.shape[0])
+            links[used, 0], links[used, 1] = k, heads[head]
+            heads[head] = used
+            used += 1
+    segment.kept_x, segment.kept_y, segment.kept_to_x, segment.kept_to_y = x, y, x + dx, y + dy
+    segment.kept_sweep = segment.sweep
+    return used
+
+
+@kernel
+def update(segments, bodies, first, which, images, time, h, reach, cell, box, heads, links, used):
+    """Place the segments of the bodies `which`, and list those that have left the cells they are listed in.
+
+    Links of where a segment was stay in the grid: they say only what is to be looked at. What moves is listed with half a cell to
+    spare, so that most substeps list nothing.
+
+    first: of each body its first segment, and one more. images: of the periodic room, whose segments lie behind one another.
+    box: x0, y0, x1, y1 around all that is listed, m; grows. heads, links: of the grid. used: links in use.
+    Returns how many are used now, or NO_ROOM.
+    """
+    sides = segments.shape[0] // images
+    for image in range(images):
+        for b in which:
+            for k in range(image * sides + first[b], image * sides + first[b + 1]):
+                segment, body = segments[k], bodies[segments[k].body]
+                _place(segment, body, time, h)
+                to_x, to_y = segment.bx + segment.bc * segment.length, segment.by + segment.bs * segment.length
+                moved = max(
+                    np.hypot(segment.bx - segment.kept_x, segment.by - segment.kept_y),
+                    np.hypot(to_x - segment.kept_to_x, to_y - segment.kept_to_y),
+                )
+                if moved + max(segment.sweep - segment.kept_sweep, 0.0) <= segment.slack:
+                    continue
+                segment.slack = 0.5 * cell if segment.sweep > 0.0 else 0.0
+                used = _list(k, segments, reach, cell, box, heads, links, used)
+                if used == NO_ROOM:
+                    return NO_ROOM
+    return used
+
+
+@kernel
+def first_link(x, y, cell, heads):
+    """The first link of the cell at (x, y), or -1."""
+    return heads[_head_of(int(np.floor(x / cell)), int(np.floor(y / cell)), heads.shape[0])]
 
 
 @kernel
@@ -180,86 +233,151 @@ def _inside(segments, segment, x, y):
 
 
 @kernel
-def _first_meeting(
-    segments, entries, low, high, fresh, px, py, qx, qy, radius, best, best_gap, best_depth, best_nx, best_ny, best_k
-):
-    """The earliest meeting of the way from p to q with the segments of one cell, or what was the best before.
+def _may_meet(segment, qx, qy, reach):
+    """Whether a circle that ends the substep at q could have met this segment; reach: its radius and how far it went, m."""
+    ox, oy = qx - segment.bx, qy - segment.by
+    along, across = segment.bc * ox + segment.bs * oy, segment.bc * oy - segment.bs * ox
+    past = along - min(max(along, 0.0), segment.length)
+    far = reach + segment.rounding + segment.sweep + segment.inner
+    return past * past + across * across <= far * far
+
+
+@kernel
+def _earlier(segments, k, fresh, px, py, qx, qy, radius, best, best_gap, best_depth, best_nx, best_ny, best_k):
+    """The meeting of the way from p to q with segment k if it is the earliest, or what was the best before.
 
     `fresh`: p belongs to the beginning of the substep; otherwise to its end, as after a first meeting.
     Returns (time, distance, depth, world normal x, y, segment). A time below 0 says that p is inside a polygon.
     """
-    travel = np.hypot(qx - px, qy - py)
-    for entry in range(low, high):
-        k = entries[entry]
-        segment = segments[k]
-        ox, oy = qx - segment.bx, qy - segment.by
-        x1, y1 = segment.bc * ox + segment.bs * oy, segment.bc * oy - segment.bs * ox
-        reach = segment.rounding + radius
-        past = x1 - min(max(x1, 0.0), segment.length)
-        far = reach + travel + segment.sweep + segment.inner
-        if past * past + y1 * y1 > far * far:
-            continue
-        c, s = (segment.c, segment.s) if fresh else (segment.bc, segment.bs)
-        ox, oy = (px - segment.ax, py - segment.ay) if fresh else (px - segment.bx, py - segment.by)
-        x0, y0 = c * ox + s * oy, c * oy - s * ox
-        if fresh and segment.faces > 0 and y0 > 0.0 and _inside(segments, segment, px, py):
-            # The nearest face lets it out.
-            time, nx, ny, gap = -1.0, 0.0, -1.0, y0
-            depth = reach + y1
-        else:
-            time, nx, ny, point = _on_the_way(segment, x0, y0, x1, y1, reach)
-            depth = reach - (x1 - point) * nx - y1 * ny
-            gap = np.hypot(x0 - point, y0)
-        least = 0.0 if fresh else tolerance(qx, qy, radius)
-        if time < NEVER and depth > least and (time < best or (time == best and gap < best_gap)):
-            best, best_gap, best_depth, best_k = time, gap, depth, k
-            best_nx, best_ny = segment.bc * nx - segment.bs * ny, segment.bs * nx + segment.bc * ny
+    segment = segments[k]
+    ox, oy = qx - segment.bx, qy - segment.by
+    x1, y1 = segment.bc * ox + segment.bs * oy, segment.bc * oy - segment.bs * ox
+    reach = segment.rounding + radius
+    c, s = (segment.c, segment.s) if fresh else (segment.bc, segment.bs)
+    ox, oy = (px - segment.ax, py - segment.ay) if fresh else (px - segment.bx, py - segment.by)
+    x0, y0 = c * ox + s * oy, c * oy - s * ox
+    if fresh and segment.faces > 0 and y0 > 0.0 and _inside(segments, segment, px, py):
+        # The nearest face lets it out.
+        time, nx, ny, gap = -1.0, 0.0, -1.0, y0
+        depth = reach + y1
+    else:
+        time, nx, ny, point = _on_the_way(segment, x0, y0, x1, y1, reach)
+        depth = reach - (x1 - point) * nx - y1 * ny
+        gap = np.hypot(x0 - point, y0)
+    least = 0.0 if fresh else tolerance(qx, qy, radius)
+    # Of equal ones the last: the order of links does not matter.
+    first = time < best or (time == best and (gap < best_gap or (gap == best_gap and k > best_k)))
+    if first and time < NEVER and depth > least:
+        nx, ny = segment.bc * nx - segment.bs * ny, segment.bs * nx + segment.bc * ny
+        return time, gap, depth, nx, ny, np.int64(k)
     return best, best_gap, best_depth, best_nx, best_ny, best_k
 
 
 @kernel
-def search(segments, x0, y0, cell, columns, rows, start, entries, fresh, px, py, qx, qy, radius):
-    """The earliest meeting of the way from p to q with any segment; as `_first_meeting`."""
+def search(segments, x0, y0, x1, y1, cell, heads, links, fresh, px, py, qx, qy, radius):
+    """The earliest meeting of the way from p to q with any segment; as `_earlier`."""
     best, gap, depth, nx, ny, k = NEVER, 0.0, 0.0, 0.0, 0.0, np.int64(-1)
     dx, dy = qx - px, qy - py
-    # The part of the way that is over the grid, in pieces no longer than a cell; the middle of a piece stands for it.
+    # The part of the way in the box around the obstacles, in pieces no longer than a cell; the middle of a piece stands for it.
     s0, s1 = 0.0, 1.0
     for axis in range(2):
-        p, d = (px - x0, dx) if axis == 0 else (py - y0, dy)
-        size = cell * (columns if axis == 0 else rows)
+        p, d = (px, dx) if axis == 0 else (py, dy)
+        low, high = (x0, x1) if axis == 0 else (y0, y1)
         if d != 0.0:
-            a, b = -p / d, (size - p) / d
+            a, b = (low - p) / d, (high - p) / d
             s0, s1 = max(s0, min(a, b)), min(s1, max(a, b))
-        elif not 0.0 <= p <= size:
+        elif not low <= p <= high:
             return best, gap, depth, nx, ny, k
     if not s0 <= s1:
         return best, gap, depth, nx, ny, k
-    pieces = int((s1 - s0) * np.hypot(dx, dy) / cell) + 1
+    travel = np.hypot(dx, dy)
+    length, far = (s1 - s0) * travel / cell, radius + travel
+    if length > segments.shape[0]:  # so far in one substep that looking at all segments takes less
+        for each in range(segments.shape[0]):
+            if _may_meet(segments[each], qx, qy, far):
+                best, gap, depth, nx, ny, k = _earlier(segments, each, fresh, px, py, qx, qy, radius, best, gap, depth, nx, ny, k)
+        return best, gap, depth, nx, ny, k
+    pieces = int(length) + 1
     for piece in range(pieces):
         s = s0 + (piece + 0.5) / pieces * (s1 - s0)
-        column = min(max(int((px + s * dx - x0) / cell), 0), columns - 1)
-        row = min(max(int((py + s * dy - y0) / cell), 0), rows - 1)
-        c = row * columns + column
-        best, gap, depth, nx, ny, k = _first_meeting(
-            segments, entries, start[c], start[c + 1], fresh, px, py, qx, qy, radius, best, gap, depth, nx, ny, k
-        )
+        link = first_link(px + s * dx, py + s * dy, cell, heads)
+        while link >= 0:
+            each, link = links[link, 0], links[link, 1]
+            if _may_meet(segments[each], qx, qy, far):
+                best, gap, depth, nx, ny, k = _earlier(segments, each, fresh, px, py, qx, qy, radius, best, gap, depth, nx, ny, k)
     return best, gap, depth, nx, ny, k
 
 
 @kernel
-def covered(segments, position, by):
-    """Which obstacle has each of the (n, 2) points in it, -1 for none; lines have no inside."""
+def _covers(segments, k, x, y):
+    """Whether (x, y), at the beginning of the substep, is in segment k, or in the polygon of which it is a face."""
+    segment = segments[k]
+    if segment.rounding > 0.0:
+        ox, oy = x - segment.ax, y - segment.ay
+        along, across = segment.c * ox + segment.s * oy, segment.c * oy - segment.s * ox
+        if np.hypot(along - min(max(along, 0.0), segment.length), across) < segment.rounding:
+            return True
+    return segment.faces > 0 and _inside(segments, segment, x, y)
+
+
+@kernel
+def covered(segments, cell, heads, links, position, by):
+    """Which body has each of the (n, 2) points in it, -1 for none; lines have no inside. Of several the first."""
     for i in range(position.shape[0]):
         x, y = position[i, 0], position[i, 1]
         by[i] = -1
-        for k in range(segments.shape[0]):
-            segment = segments[k]
-            if segment.rounding > 0.0:
-                ox, oy = x - segment.ax, y - segment.ay
-                along, across = segment.c * ox + segment.s * oy, segment.c * oy - segment.s * ox
-                if np.hypot(along - min(max(along, 0.0), segment.length), across) < segment.rounding:
-                    by[i] = segment.body
-                    break
-            if segment.faces > 0 and segment.first == k and _inside(segments, segment, x, y):
-                by[i] = segment.body
+        if not abs(x) + abs(y) < FARTHEST * cell:
+            continue
+        link = first_link(x, y, cell, heads)
+        while link >= 0:
+            k, link = links[link, 0], links[link, 1]
+            if (by[i] < 0 or segments[k].body < by[i]) and _covers(segments, k, x, y):
+                by[i] = segments[k].body
+
+
+@kernel
+def _gap(segment, x, y):
+    """(distance of (x, y) from the surface of a segment, unit normal x, y out of it), at the end of the substep."""
+    ox, oy = x - segment.bx, y - segment.by
+    t = min(max(segment.bc * ox + segment.bs * oy, 0.0), segment.length)
+    ox, oy = ox - t * segment.bc, oy - t * segment.bs
+    far = np.hypot(ox, oy)
+    return far - segment.rounding, ox / max(far, 1e-300), oy / max(far, 1e-300)
+
+
+@kernel
+def facing(segments, count, reach, cell, heads, links, position, beyond, row, body, gap, normal):
+    """The bodies nearest to each of the points (n, 2), and those at most `beyond` (n,) m farther away.
+
+    count: of bodies, without images. reach: m, up to which a cell knows all segments near it; who is farther from all is compared
+    with each. Fills row, body, gap and normal, and returns how many there are, also beyond their room.
+    """
+    found, total = 0, segments.shape[0]
+    for i in range(position.shape[0]):
+        x, y = position[i, 0], position[i, 1]
+        least, every = np.inf, not abs(x) + abs(y) < FARTHEST * cell
+        for attempt in range(2):
+            every |= attempt == 1 and least + beyond[i] > reach
+            if attempt == 1 and not every:
                 break
+            link = 0 if every else first_link(x, y, cell, heads)
+            while link >= 0:
+                k = link if every else links[link, 0]
+                least = min(least, _gap(segments[k], x, y)[0])
+                link = (link + 1 if link + 1 < total else -1) if every else links[link, 1]
+        begun = found
+        link = 0 if every else first_link(x, y, cell, heads)
+        while link >= 0:
+            k = link if every else links[link, 0]
+            link = (link + 1 if link + 1 < total else -1) if every else links[link, 1]
+            far, nx, ny = _gap(segments[k], x, y)
+            if not far <= least + beyond[i]:
+                continue
+            which = segments[k].body % count
+            at = begun
+            while at < found and (at >= row.shape[0] or body[at] != which):
+                at += 1
+            if at < row.shape[0] and (at == found or far < gap[at]):
+                row[at], body[at], gap[at], normal[at, 0], normal[at, 1] = i, which, far, nx, ny
+            found += at == found
+    return found

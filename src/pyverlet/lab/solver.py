@@ -154,7 +154,7 @@ def _slots(x: Floats, v: Floats) -> Slots:
 class _Accelerations:
     """What integrators call, as `laws.forces.ForceSum` is for a world."""
 
-    velocity_dependent = True
+    velocity_dependent, functions = True, False
 
     def __init__(self, F: Acceleration, shape: tuple[int, ...]) -> None:  # noqa: N803
         self._function, self._shape, self._size = F, shape, int(np.prod(shape))

@@ -202,15 +202,14 @@ class Place(NamedTuple):
             surface[:] = getattr(self.room, "restitution", 0.0)
         elif self.room.extent() is not None:  # of the user's own: it may have been its wall
             found["wall"][rows] = 0
+        row, which, far, normal = self.course.facing(x)
+        nearer = np.diff(row, prepend=-1) > 0  # of equally near ones the first
+        nearer[nearer] = far[nearer] < gap[row[nearer]]
+        row, which = row[nearer], which[nearer]
+        found["obstacle"][rows[row]], found["wall"][rows[row]] = which, -1
+        gap[row], into[row] = far[nearer], normal[nearer]
         obstacles = self.course.seen()
-        if obstacles:
-            far, normal = self.course.facing(x)
-            which, row = np.argmin(far, axis=1), np.arange(len(x))
-            nearer = far[row, which] < gap
-            found["obstacle"][rows] = np.where(nearer, which, -1)
-            found["wall"][rows] = np.where(nearer, -1, found["wall"][rows])
-            gap, into = np.where(nearer, far[row, which], gap), np.where(nearer[:, None], normal[row, which], into)
-            surface = np.where(nearer, np.array([obstacle.restitution for obstacle in obstacles])[which], surface)
+        surface[row] = [obstacles[k].restitution for k in which]
         return np.where(np.isfinite(gap), gap, np.nan), into, surface
 
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pyverlet.kernels import measure
-from pyverlet.laws.forces import ForceSum, has_potential
+from pyverlet.laws.forces import ForceSum, has_potential, soften
 from pyverlet.laws.links import Links
 from pyverlet.state.slots import Slots
 
@@ -225,6 +225,7 @@ class Page:
         for force in self._working:
             s.force[:] = 0
             force.apply(s, self._t)
+            soften(s, self._gravity)
             account = getattr(force, "account", "forces")
             work = np.einsum("ij,ij", s.force[free].astype(np.float64), s.velocity[free].astype(np.float64))
             power[account] = power.get(account, 0.0) + float(work)

@@ -273,7 +273,7 @@ def undriven(world: Any, h: float, h_last: float | None) -> bool:
         return False  # who falls for ever gains for ever
     if world.forces and not all(type(force) is Drag or has_potential(force) for force in world.forces):
         return False
-    return not world.obstacles or not any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
+    return not world._course.drives
 
 
 def pinned_move(state: State | Slots) -> bool:

@@ -122,8 +122,8 @@ def laws(world: Any) -> Any:
 
     That is so with links, with obstacles that move, and with forces that may change with time: all but gravity and drag.
     """
-    moving = world.boundary.moves or any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
+    world._course.begin()
+    moving = world.boundary.moves or world._course.drives
     if world.links or moving or not all(type(force) is Drag for force in world.forces):
         return None
-    obstacles = tuple((id(obstacle), obstacle.revision) for obstacle in world.obstacles)
-    return (world.gravity, repr(world.boundary), world.boundary.extent(), world.collisions, obstacles)
+    return (world.gravity, repr(world.boundary), world.boundary.extent(), world.collisions, world._course.version)

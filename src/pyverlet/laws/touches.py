@@ -14,8 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.kernels.impulses import least
 from pyverlet.laws.events import WALL
-from pyverlet.laws.obstacles import Course, facing_of
+from pyverlet.laws.obstacles import Course, Facing
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
@@ -37,11 +38,20 @@ m; the unit normal out of a; what pushes them apart along it and what rubs a alo
 _NEAR = 0.02
 """Of its radius: walls that are farther than the nearest by more were not touched."""
 
+_PARALLEL = 1e-10
+"""Added to the squares of normals, so that walls that face each other are told apart."""
+
 _FEW = 1e-7
 """Of the largest impulse: less is none."""
 
-_SWEEPS = 300
-"""Steps of conjugate gradients at most."""
+_STEPS, _PAIR_STEPS = 60, 250_000
+"""Of conjugate gradients, all together: so many, and so many more divided by the number of contacts: less than a step takes."""
+
+_LEFT = 1e-4
+"""Part of the gradient that may be left."""
+
+_FEW_PAIRS, _EXACT = 200, 1e-10
+"""The same for so few pairs, where it costs next to nothing."""
 
 _STAGES = {"contacts": 0, "velocities": 0, "bounds": 1, "obstacles": 2}
 """Whose doing it is when a stage has changed velocities: circles', the room's, obstacles'."""
@@ -70,6 +80,8 @@ class Touches:
     """The contacts of the last frame. Indices are those of its end."""
 
     def __init__(self) -> None:
+        none, nobody = np.zeros(0), np.zeros((0, 2))
+        least(np.zeros(0, np.int64), np.zeros(0, np.int64), nobody, nobody, none, none, 0, 0.0)  # compiled before it is asked
         self._given = np.zeros((3, 0, 2))
         self._heard: list[tuple[Array, Array, Floats]] = []
         self._found: Array | None = None
@@ -134,7 +146,7 @@ class Touches:
             return np.zeros(2)
         if what is room:
             return np.asarray(-self._end.given[1].sum(axis=0) / self._end.dt)
-        found = self.array_of_then()
+        found = self._end.at(2)
         mine = found[found["obstacle"] == self._end.number_of(what)]
         return np.asarray(vectors(mine).sum(axis=0) / self._end.dt)
 
@@ -145,19 +157,11 @@ class Touches:
             return None
         return Noted(end._numbers, end._position, end._radius, end._free, end.given, end._pairs, end.dt)
 
-    def array_of_then(self) -> Array:
-        """TOUCH by the indices of then."""
-        assert self._end is not None
-        if self._found is None:
-            self._found = self._end.contacts()
-        return self._found
-
     def pushed(self) -> float:
         """N, the sum of what walls of the room were pushed with along their normals, averaged over the frame."""
         if self._end is None:
             return 0.0
-        found = self.array_of_then()
-        return float(found["impulse"][found["wall"] >= 0].sum() / self._end.dt)
+        return float(self._end.at(1)["impulse"].sum() / self._end.dt)
 
     def virial(self) -> float:
         """J, sum over contacts between circles of force times distance, averaged over the frame."""
@@ -179,11 +183,13 @@ class _End:
         order = state.particle
         self._position[order], self._velocity[order], self._radius[order] = state.position, state.velocity, state.size
         self._free[order] = state.inverse_mass > 0
-        self._surfaces, self._obstacles = course.surfaces(), course.seen()
+        self._obstacles, self._found = course.seen(), dict[int, Array]()
+        who = np.flatnonzero(given[2].any(axis=1))
+        self._beside = course.facing(self._position[who], _NEAR * self._radius[who])
 
     def number_of(self, obstacle: Any) -> int:
         """Among the obstacles of then; -2 if it was none."""
-        return next((k for k, other in enumerate(self._obstacles) if other is obstacle), -2)
+        return self._obstacles.index(obstacle) if obstacle in self._obstacles else -2
 
     def renumbered(self, found: Array, state: State) -> Array:
         """With the indices of now; `state` is as it was, but for removed particles and new ones at its end."""
@@ -199,11 +205,17 @@ class _End:
 
     def contacts(self) -> Array:
         """TOUCH, by the indices of then."""
-        rows = [self._between_circles(), self._at(1), self._at(2)]
+        rows = [self._between_circles(), self.at(1), self.at(2)]
         both = np.concatenate(rows)
         return both[np.lexsort((both["obstacle"], both["wall"], both["b"], both["a"]))]
 
     # ---- walls and obstacles -------------------------------------------------------------------------------------------
+
+    def at(self, whose: int) -> Array:
+        """TOUCH, of walls (1) or obstacles (2)."""
+        if whose not in self._found:
+            self._found[whose] = self._at(whose)
+        return self._found[whose]
 
     def _at(self, whose: int) -> Array:
         given = self.given[whose]
@@ -211,21 +223,13 @@ class _End:
         if not len(who):
             return np.zeros(0, TOUCH)
         x, r, push = self._position[who], self._radius[who], given[who]
-        facing = self._room.facing(x) if whose == 1 else facing_of(x, self._surfaces, len(self._obstacles))
-        if facing is None:  # a room of the user's own: all that is known is where it pushes to
-            size = np.hypot(*push.T)
-            facing = r[:, None], (push / size[:, None])[:, None, :]
-        gap, into = facing
-        gap = gap - r[:, None]
-        near = gap <= gap.min(axis=1, keepdims=True) + _NEAR * r[:, None]
-        circle, wall = np.nonzero(near)
-        share = _shared(push, near, into)
-        found = np.zeros(len(circle), TOUCH)
-        found["a"], found["b"] = who[circle], WALL
+        row, wall, gap, into = self._beside if whose == 2 else _nearest_walls(self._room, x, r, push)
+        share = _shared(push, row, into)
+        found = np.zeros(len(row), TOUCH)
+        found["a"], found["b"] = who[row], WALL
         found["wall"], found["obstacle"] = (wall, NOBODY) if whose == 1 else (NOBODY, wall)
-        out = -into[circle, wall]
-        found["normal"] = out
-        found["point"] = self._room.seam.wrapped(x[circle] + (r[circle] + gap[circle, wall])[:, None] * out)
+        found["normal"] = -into
+        found["point"] = self._room.seam.wrapped(x[row] - gap[:, None] * into)
         _write(found, share)
         return np.asarray(found[(found["impulse"] != 0) | (found["rub"] != 0)])
 
@@ -236,21 +240,18 @@ class _End:
         found = np.zeros(len(pairs), TOUCH)
         if len(pairs):
             a, b = pairs.T
-            normal = self._normals(pairs)
-            found["a"], found["b"], found["wall"], found["obstacle"] = a, b, NOBODY, NOBODY
-            gap = np.hypot(*self._way(pairs).T) - self._radius[a] - self._radius[b]
-            found["normal"] = normal
-            found["point"] = self._room.seam.wrapped(self._position[a] + (self._radius[a] + 0.5 * gap)[:, None] * normal)
+            way = self._way(a, b)
+            far = np.hypot(way[:, 0], way[:, 1])
+            normal = way / np.maximum(far, 1e-300)[:, None]
+            found["a"], found["b"], found["wall"], found["obstacle"], found["normal"] = a, b, NOBODY, NOBODY, normal
+            half = self._radius[a] + 0.5 * (far - self._radius[a] - self._radius[b])
+            found["point"] = self._room.seam.wrapped(self._position[a] + half[:, None] * normal)
             _write(found, -impulse)
         return found
 
-    def _way(self, pairs: Array) -> Floats:
+    def _way(self, a: Array, b: Array) -> Floats:
         """(k, 2) from a to b, m."""
-        return np.asarray(self._room.seam.nearest(self._position[pairs[:, 1]] - self._position[pairs[:, 0]]))
-
-    def _normals(self, pairs: Array) -> Floats:
-        way = self._way(pairs)
-        return np.asarray(way / np.maximum(np.hypot(*way.T), 1e-300)[:, None])
+        return np.asarray(self._room.seam.nearest(self._position[b] - self._position[a]))
 
     def _told(self) -> tuple[Array, Floats]:
         """(k, 2) a < b, and (k, 2) what a has given b, as the solver says."""
@@ -264,23 +265,29 @@ class _End:
 
     def _solved(self) -> tuple[Array, Floats]:
         """The same from what each circle has got: pushes along the normals, the smallest that explain it."""
-        got, pairs = self.given[0], self._pairs
-        touched = got.any(axis=1) | ~self._free
-        pairs = pairs[touched[pairs].all(axis=1) & self._free[pairs].any(axis=1)]
-        if len(pairs):
-            a, b = pairs.T
-            gap = np.hypot(*self._way(pairs).T) - self._radius[a] - self._radius[b]
-            speed = np.hypot(*(self._velocity[b] - self._velocity[a]).T)
-            pairs = pairs[gap <= self.dt * speed + 0.01 * (self._radius[a] + self._radius[b])]
-        push = np.zeros(0)
-        while len(pairs):
-            normal = self._normals(pairs)
-            push = _least(pairs, normal, np.where(self._free[:, None], got, 0.0), self._free)
-            if not (pulls := push < 0).any():
-                kept = push > _FEW * push.max()
-                return pairs[kept], push[kept, None] * normal[kept]
-            pairs = pairs[~pulls]
-        return pairs, np.zeros((0, 2))
+        got, free, (a, b) = self.given[0], self._free, np.ascontiguousarray(self._pairs.T)
+        touched = (got[:, 0] != 0) | (got[:, 1] != 0) | ~free
+        may = touched[a] & touched[b] & (free[a] | free[b])
+        a, b = a[may], b[may]
+        way, speed, reach = self._way(a, b), self._velocity[b] - self._velocity[a], self._radius[a] + self._radius[b]
+        far = np.hypot(way[:, 0], way[:, 1])
+        which = np.flatnonzero(far - reach <= self.dt * np.hypot(speed[:, 0], speed[:, 1]) + 0.01 * reach)
+        which = which[np.argsort(a[which] % 7, kind="stable")]  # neighbours in the list have no circle in common
+        a, b, normal = a[which], b[which], way[which] / np.maximum(far[which], 1e-300)[:, None]
+        push, steps = np.zeros(len(a)), _STEPS + _PAIR_STEPS // max(len(a), 1)
+        last, hold = _EXACT if len(a) <= _FEW_PAIRS else _LEFT, free.astype(float)
+        tolerance = last if last == _EXACT else 10 * _LEFT  # good enough to see who would pull
+        while len(a) and steps > 0:
+            steps -= int(least(a, b, normal, got, hold, push, steps, tolerance))
+            kept = push >= 0
+            if kept.all():
+                if tolerance == last:
+                    break
+                tolerance = last
+            a, b, normal, push = a[kept], b[kept], normal[kept], push[kept]
+        kept = push > _FEW * push.max(initial=0.0)
+        a, b, normal, push = a[kept], b[kept], normal[kept], push[kept]
+        return np.column_stack((a, b)), push[:, None] * normal
 
 
 def vectors(found: Array) -> Floats:
@@ -292,21 +299,35 @@ def vectors(found: Array) -> Floats:
 def _write(found: Array, got: Floats) -> None:
     """Split what a has got (k, 2) into what pushes and what rubs."""
     n = found["normal"]
-    found["impulse"] = -(got * n).sum(axis=1)
+    found["impulse"] = -got[:, 0] * n[:, 0] - got[:, 1] * n[:, 1]
     found["rub"] = got[:, 1] * n[:, 0] - got[:, 0] * n[:, 1]
 
 
-def _shared(push: Floats, near: Array, into: Floats) -> Floats:
-    """(k, 2) of each circle and wall in `near`, in its order: what it has got from that one, all together `push`."""
-    circle, wall = np.nonzero(near)
-    share = push[circle]
-    for i in np.flatnonzero(near.sum(axis=1) > 1):  # in a corner
-        mine = circle == i
-        normal = into[i, wall[mine]]
-        part = np.linalg.lstsq(normal.T, push[i], rcond=None)[0].clip(min=0)
-        rest = push[i] - part @ normal
-        weight = part / part.sum() if part.sum() > 0 else np.full(len(part), 1 / len(part))
-        share[mine] = part[:, None] * normal + weight[:, None] * rest
+def _nearest_walls(room: Boundary, x: Floats, r: Floats, push: Floats) -> Facing:
+    """The walls of a room at which circles are that have got `push` (k, 2) from it."""
+    facing = room.facing(x)
+    if facing is None:  # a room of the user's own: all that is known is where it pushes to
+        return Facing(np.arange(len(x)), np.zeros(len(x), np.int64), r, push / np.hypot(*push.T)[:, None])
+    gap, into = facing
+    row, wall = np.nonzero(gap <= gap.min(axis=1, keepdims=True) + _NEAR * r[:, None])
+    return Facing(row, wall, gap[row, wall], into[row, wall])
+
+
+def _shared(push: Floats, row: Array, into: Floats) -> Floats:
+    """(k, 2) what a circle, its row of `push`, has got from each wall or obstacle at which it is, whose normal is `into`.
+
+    Of several, as in a corner, each has given a part along its normal (least squares), and of the rest as much as of that.
+    """
+    share, several = push[row], np.bincount(row, minlength=len(push))
+    for number in np.unique(several[several > 1]):
+        mine = np.flatnonzero(several[row] == number).reshape(-1, number)  # rows are sorted
+        normal, got = into[mine], push[row[mine[:, 0]]]
+        gram = normal @ normal.transpose(0, 2, 1) + _PARALLEL * np.eye(number)
+        part = np.linalg.solve(gram, normal @ got[:, :, None])[:, :, 0].clip(min=0)
+        along = part[:, :, None] * normal
+        total = part.sum(axis=1, keepdims=True)
+        weight = np.divide(part, total, out=np.full_like(part, 1 / number), where=total > 0)
+        share[mine] = along + weight[:, :, None] * (got - along.sum(axis=1))[:, None]
     return share
 
 
@@ -318,32 +339,3 @@ def _rows(first: Array, count: Array, pair_i: Array, pair_j: Array, order: Array
     once = np.ones(len(keys), bool)
     np.not_equal(keys[1:], keys[:-1], out=once[1:])
     return np.column_stack(np.divmod(keys[once], max(len(order), 1)))
-
-
-def _least(pairs: Array, normal: Floats, got: Floats, free: Array) -> Floats:
-    """(k,) the smallest p with sum of p (n on b, -n on a) as near to `got` as can be: conjugate gradients (Hestenes, Stiefel)."""
-    a, b = pairs.T
-    held = free.astype(float)[:, None]
-
-    def spread(p: Floats) -> Floats:
-        out, along = np.zeros_like(got), p[:, None] * normal
-        np.add.at(out, b, along)
-        np.subtract.at(out, a, along)
-        return np.asarray(out * held)
-
-    def gather(g: Floats) -> Floats:
-        return np.asarray(((g[b] - g[a]) * normal).sum(axis=1))
-
-    p, left = np.zeros(len(pairs)), got.copy()
-    slope = way = gather(left)
-    size = start = float(slope @ slope)
-    for _ in range(_SWEEPS):
-        if size <= 1e-20 * start:
-            break
-        ahead = spread(way)
-        step = size / float((ahead * ahead).sum())
-        p, left = p + step * way, left - step * ahead
-        slope = gather(left)
-        size, before = float(slope @ slope), size
-        way = slope + (size / before) * way
-    return p

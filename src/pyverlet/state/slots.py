@@ -122,6 +122,11 @@ class Slots:
         """(n, 2) N; made when it is first asked for."""
         return np.zeros_like(self.position)
 
+    @cached_property
+    def resistance(self) -> Array:
+        """(n,) N s/m, what drag changes by with the speed, summed in an evaluation and 0 in between."""
+        return np.zeros_like(self.radius)
+
     @property
     def asleep(self) -> Array:
         """Slots of the particles that sleep."""

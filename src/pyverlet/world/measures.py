@@ -104,7 +104,8 @@ class Measures(Particles):
         Fields: circles `a` < `b`, or b = -1 and the number of a `wall` of the room (of a Box: left, right, floor, ceiling) or
         of an `obstacle`, else -1; `point` (2), m; `normal` (2) out of a; `impulse` along it, N s, summed over the frame, and
         `rub`, what a got along (-n_y, n_x): of walls and obstacles. Of circles the impulses are the smallest that explain what
-        each has got; friction between them is left out.
+        each has got; friction between them is left out. They are found in a number of steps that costs less than a frame: good to
+        0.1 % for heaps of some hundred circles, while deep in heaps of thousands they are evened out.
 
         Raises:
             InputError: the world notes none.
@@ -119,7 +120,7 @@ class Measures(Particles):
             InputError: it is not in this world, or the world notes no contacts.
         """
         touches = self._noting()
-        if what is not self.boundary and not any(what is obstacle for obstacle in self.obstacles):
+        if what is not self.boundary and what not in self.obstacles:
             raise InputError(f"what is {what!r}; allowed is an obstacle of this world, or its boundary")
         return touches.force_on(what, self.boundary)
 

@@ -58,6 +58,8 @@ class Queries(Shared):
     """What a world answers. Indices are those of its arrays; equally near ones come in their order."""
 
     _state: State
+    _kept: tuple[NDArray[Any], tuple[Any, ...]] | None = None
+    """Of the last questions: where particles were, and their cells."""
 
     @of_one_frame
     def at_point(self, points: ArrayLike) -> Indices:
@@ -68,7 +70,7 @@ class Queries(Shared):
             reach = float(self._state.radius.max())
             seen = Images.of(self._state, reach)
             _ask.at_points(
-                self._state.seam.wrapped(where), reach, *_cells(seen.position, len(where)), seen.position, seen.radius, found
+                self._state.seam.wrapped(where), reach, *self._cells(seen.position, len(where)), seen.position, seen.radius, found
             )
             found = seen.named(found)
         return found
@@ -137,7 +139,7 @@ class Queries(Shared):
             s = self._state
             reach = float(s.radius.max())
             seen = Images.of(s, reach)
-            cells = _cells(seen.position, len(start))
+            cells = self._cells(seen.position, len(start))
             for rays, at, gone, left in _pieces(start, heading, far, s.seam):
                 piece, way = np.full(len(rays), -1, np.int64), np.full(len(rays), np.inf)
                 _ask.rays(at, heading[rays], left, reach, *cells, seen.position, seen.radius, piece, way)
@@ -158,12 +160,21 @@ class Queries(Shared):
         index, square = np.full((len(where), count), -1, np.int64), np.full((len(where), count), np.inf)
         if len(self._state):
             position, seam = self._state.seam.wrapped(self._state.position), self._state.seam
-            cells, inside = _cells(position, len(where)), seam.wrapped(where)
+            cells, inside = self._cells(position, len(where)), seam.wrapped(where)
             for shift in seam.images():
                 seen, far = np.full_like(index, -1), np.full_like(square, np.inf)
                 _ask.nearest(inside - shift, *cells, position, seen, far)
                 index, square = _nearer(index, square, seen, far)
         return Nearest(index, np.sqrt(square))
+
+    def _cells(self, position: NDArray[Any], questions: int) -> tuple[Any, ...]:
+        """What `_sorted` returns: those of the questions before, as long as nothing has moved."""
+        if self._kept is not None and np.array_equal(self._kept[0], position):
+            return self._kept[1]
+        cells = _sorted(position, questions)
+        if questions > FEW:
+            self._kept = position.copy(), cells
+        return cells
 
     def _in(self, low: Floats, high: Floats, middle: Floats, size: Floats, *, many: bool) -> Indices:
         pairs, seam = np.zeros((0, 2), np.int64), self._state.seam
@@ -172,7 +183,7 @@ class Queries(Shared):
             if seam:
                 position = seam.wrapped(position)
                 low, high, middle = _in_first_room(low, high, middle, size, seam)
-            cells = _cells(position, len(low))
+            cells = self._cells(position, len(low))
             rows = [_regions(low - shift, high - shift, middle - shift, size, cells, position) for shift in seam.images()]
             pairs = np.concatenate(rows)
             pairs = np.unique(pairs, axis=0) if seam else pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
@@ -234,7 +245,7 @@ def _pieces(start: Floats, heading: Floats, far: Floats, seam: Seam) -> Iterator
         gone[rays] += ahead
 
 
-def _cells(position: NDArray[Any], questions: int) -> tuple[Any, ...]:
+def _sorted(position: NDArray[Any], questions: int) -> tuple[Any, ...]:
     """Cells over all centres with about one particle in each, as the kernels take them; one for all where that is cheaper."""
     member = np.arange(len(position))
     if motion.first_non_finite(position) >= 0:

@@ -200,7 +200,7 @@ class Substeps:
                 np.array(kind, np.int64), np.array(vector, state.dtype).reshape(-1, 2),
                 np.array(number, state.dtype).reshape(-1, drive.NUMBERS),
             )  # fmt: skip
-        self._forces = hold(drive.Forces, (*self._table, state.force, state.mass), self._forces)
+        self._forces = hold(drive.Forces, (*self._table, state.force, state.mass, state.resistance), self._forces)
         ahead = world.integrator.velocity_lag * h if world._force_sum.velocity_dependent else 0.0
         (course, cells), (*lent, terms), (*linked, linking) = obstacles, loans, links or _UNLINKED
         self._beside = hold(frame.Beside, (self._forces, course, *lent, *linked), self._beside)

@@ -269,7 +269,8 @@ def _in_obstacles(world: World) -> bool:
     """Whether anybody is, if only with its rim."""
     course = world._course
     course.covering(world.position)  # obstacles are placed for that
-    return len(course.seen()) > 0 and bool((course.facing(world.position)[0] < world.radius[:, None]).any())
+    near = course.facing(world.position)
+    return bool((near.gap < world.radius[near.row]).any())
 
 
 def _finite(world: World) -> bool:

@@ -265,10 +265,20 @@ def measure_overlap(state: State, unlist: Unlist) -> Overlap:
     """Overlap of all touching pairs of a state, but for those that `unlist` takes from a list; leaves the state alone."""
     if len(state) < 2:
         return Overlap(0.0, 0.0, 0)
-    slots, phase = _listed(state, Fast(skin=0.0))
-    pairs = phase.list
-    unlist(pairs, slots.particle)
-    number, total, largest = overlap.overlaps(slots.position, slots.radius, *map(float, slots.seam.period), *pairs.listed())
+    pairs, position, count = PairList(), state.seam.wrapped(state.position), len(state)
+    shift = state.seam.images() if state.seam else np.zeros((1, 2))
+    heads, following = np.empty(2 << count.bit_length(), np.int32), np.empty(count, np.int32)
+    about = np.isinf(state.mass), state.category, state.mask, shift, heads, following
+    found, room = 4 * count, 0
+    pairs.set_strips(1)
+    while found > room:
+        room = found
+        pairs.make_room(room)
+        found = int(overlap.touching(position, state.radius, *about, pairs.pair_i, pairs.pair_j))
+    pairs.count[0] = found
+    unlist(pairs, np.arange(count, dtype=np.int32))
+    period_x, period_y = map(float, state.seam.period)
+    number, total, largest = overlap.overlaps(position, state.radius, period_x, period_y, *pairs.listed())
     return Overlap(total / number if number else 0.0, largest, number)
 
 

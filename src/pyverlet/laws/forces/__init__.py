@@ -10,7 +10,7 @@ To add one: a class with `apply`, and a test against its closed form. Or no clas
 
 from __future__ import annotations
 
-from pyverlet.laws.forces._base import Conservative, Force, ForceList, ForceSum, Numbered, has_potential
+from pyverlet.laws.forces._base import Conservative, Force, ForceList, ForceSum, Numbered, has_potential, soften
 from pyverlet.laws.forces.attraction import Attractor, Gravitation
 from pyverlet.laws.forces.constant import ConstantForce
 from pyverlet.laws.forces.drag import Drag, Wind
@@ -20,5 +20,5 @@ from pyverlet.laws.forces.spring import PointSpring
 
 __all__ = [
     "Attractor", "Conservative", "ConstantForce", "Drag", "Force", "ForceList", "ForceSum", "FunctionForce", "Gravitation",
-    "Grip", "Numbered", "PointSpring", "Push", "Wind", "force", "has_potential",
+    "Grip", "Numbered", "PointSpring", "Push", "Wind", "force", "has_potential", "soften",
 ]  # fmt: skip

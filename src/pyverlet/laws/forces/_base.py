@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from pyverlet.compile.native import both
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import listed
-from pyverlet.state.moves import newton, newton_kick_drift
+from pyverlet.kernels import forces as kernels
+from pyverlet.kernels.drive import PASSES
+from pyverlet.state.moves import advance, newton, newton_kick_drift
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
@@ -103,6 +105,20 @@ class ForceSum:
         """Whether any of the forces may look at the velocity."""
         return bool(self.forces) and any(getattr(force, "velocity_dependent", True) for force in self.forces)
 
+    @property
+    def functions(self) -> bool:
+        """Whether there are functions among those that look at the velocity, or others that say that they do."""
+        return self.velocity_dependent and any(
+            hasattr(force, "native") or (not hasattr(force, "compiled") and getattr(force, "velocity_dependent", False))
+            for force in self.forces
+        )
+
+    def look_again(self, state: Slots, t: float, ahead: float) -> None:
+        """Accelerations become those of now, of the velocity `ahead` seconds later that they lead to."""
+        for _ in range(PASSES):
+            advance(state.velocity, state.velocity, state.acceleration, ahead)
+            self.kick_drift(state, t, 0.0, ahead)
+
     def fall(self, state: Slots) -> None:
         """Gravity alone is to act in the next evaluation, which somebody else makes."""
         pull = state.reals(*self.gravity)
@@ -141,7 +157,14 @@ class ForceSum:
         state.force.fill(0)
         for force in sorted(self.forces, key=_is_function) if len(self.forces) > 1 else self.forces:
             force.apply(state, t)
+        soften(state, self.gravity)
         return state.force
+
+
+def soften(state: Slots, gravity: tuple[float, float]) -> None:
+    """Once all have been applied: where drag is stronger than substeps are short, see `kernels.forces.soften`."""
+    if "resistance" in vars(state):
+        kernels.soften(state.force, state.resistance, state.inverse_mass, *state.reals(*gravity, state.h))
 
 
 def _is_function(force: Any) -> bool:

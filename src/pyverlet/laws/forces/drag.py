@@ -20,9 +20,10 @@ Field = Callable[[NDArray[Any], NDArray[Any], float], Any]
 
 
 class Drag(Shown):
-    """Resistance of a medium at rest: F = -(linear + quadratic |v|) v, and no more than takes half of v in a substep.
+    """Resistance of a medium at rest: F = -(linear + quadratic |v|) v.
 
-    A fall ends at m g / linear or at sqrt(m g / quadratic), m/s.
+    A fall ends at m g / linear or at sqrt(m g / quadratic), m/s, with any integrator and however strong it is. Where c h / m,
+    with c the derivative of F by v, is beyond 1/2, that takes some substeps instead of the time m / c.
 
     Args:
         linear: N s/m (Stokes).
@@ -40,7 +41,7 @@ class Drag(Shown):
 
     def apply(self, state: Slots, t: float) -> None:
         wind = self._wind(state, t)
-        forces.drag(state.force, state.velocity, wind, state.inverse_mass, *state.reals(self.linear, self.quadratic, state.h))
+        forces.drag(state.force, state.velocity, wind, state.resistance, *state.reals(self.linear, self.quadratic))
 
     def compiled(self, state: Slots) -> Row | None:
         """What `kernels.drive` needs to know of it; None: it has to be asked."""

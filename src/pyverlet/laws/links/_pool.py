@@ -95,6 +95,23 @@ class Pool(ABC):
     def energies(self, position: Array, seam: Seam) -> Array:
         """(k,) the same, row by row."""
 
+    def energy_by_pull(self, position: Array, seam: Seam) -> float:
+        """As `energy`, but F^2 / 2 k of rows whose value rounding changes by more than 1 %."""
+        rows = self.rows
+        if not np.isfinite(rows["stiffness"]).any():
+            return 0.0
+        energies = self.energies(position, seam)
+        stiffness = np.where(np.isfinite(rows["stiffness"]) & (rows["stiffness"] > 0), rows["stiffness"], np.inf)
+        size = np.abs(position[self.entries["particle"]]).max(axis=1, initial=0.0).astype(float)
+        coarse = float(np.finfo(position.dtype).eps) * np.maximum.reduceat(size, self.first[:-1])
+        coarse *= np.sqrt(self.slope(position, seam))
+        hidden = (rows["intact"] != 0) & (energies < 0.5 * stiffness * (UNSURE * coarse) ** 2) & np.isfinite(stiffness)
+        return float(np.where(hidden, 0.5 * rows["force"] ** 2 / stiffness, energies).sum())
+
+    def slope(self, position: Array, seam: Seam) -> Array:
+        """(k,) the largest |grad C|^2 of the particles of each row; 1 for distances."""
+        return np.ones(len(self.rows))
+
     def share_gain(self, before: Array, now: Array, seam: Seam, mass: Array, share: Array) -> None:
         """Add what each row holds at the positions of `now` beyond that `before` to the (n,) share of its first free particle."""
         if len(particle := self.entries["particle"]):
@@ -109,6 +126,10 @@ class Pool(ABC):
     @abstractmethod
     def stored(self, position: Array, seam: Seam) -> float:
         """The same in the middle of a frame, of the rows that are intact then, at (m, 2) positions in the order of `Work`."""
+
+
+UNSURE = 100.0
+"""Times the rounding of coordinates: a smaller value of a row is not known to 1 %."""
 
 
 def held(stiffness: Array, upper: Array | float, intact: Array, value: Array) -> Array:

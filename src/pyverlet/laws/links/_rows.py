@@ -87,6 +87,10 @@ class RowPool(Pool):
         rows, (value, _) = self.rows, self._measured(position, seam)
         return held(rows["stiffness"], rows["upper"], rows["intact"], value)
 
+    def slope(self, position: Array, seam: Seam) -> Array:
+        _, gradient = self._measured(position, seam)
+        return np.asarray(np.maximum.reduceat((gradient**2).sum(axis=1), self.first[:-1]))
+
     def mobility(self, position: Array, inverse_mass: Array, seam: Seam) -> Array:
         _, gradient = self._measured(position, seam)
         moved = inverse_mass[self.entries["particle"]] * (gradient**2).sum(axis=1)

@@ -286,9 +286,13 @@ class Links(Shared):
     # ---- to look at ----------------------------------------------------------------------------------------------------
 
     def energy(self, where: Array | None = None) -> float:
-        """Energy stored in links that give, J, with the particles where they are, or at (n, 2) other places, m."""
-        position = self._state.position if where is None else where
-        return sum(pool.energy(position, self._state.seam) for pool in self._kept)
+        """Energy stored in links that give, J, with the particles where they are, or at (n, 2) other places, m.
+
+        Where they are, that of links so stiff that coordinates are too coarse for their stretch is F^2 / 2 k, from their pull.
+        """
+        if where is None:
+            return sum(pool.energy_by_pull(self._state.position, self._state.seam) for pool in self._kept)
+        return sum(pool.energy(where, self._state.seam) for pool in self._kept)
 
     def gains(self, before: Array, now: Array) -> Array:
         """(n,) J that links hold `now` beyond what they held `before`, (n, 2) positions in the user's order: what each does, at

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
+import threading
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -17,7 +20,37 @@ from pyverlet.ground.shown import listed
 Value = TypeVar("Value")
 Points = NDArray[np.float64]
 
-_revisions = itertools.count(1)
+
+class _Journal:
+    """Which obstacles have been changed lately: a world does not look at each of thousands in each frame.
+
+    Attributes:
+        latest: number of the last change.
+    """
+
+    def __init__(self) -> None:
+        self.latest = 0
+        self._entries: deque[tuple[int, int]] = deque(maxlen=4096)
+        self._lock = threading.Lock()
+
+    def note(self, obstacle: object) -> int:
+        """An obstacle has changed; returns the number of the change."""
+        with self._lock:
+            self.latest += 1
+            self._entries.append((self.latest, id(obstacle)))
+            return self.latest
+
+    def since(self, number: int) -> tuple[int, set[int] | None]:
+        """The latest change, and the ids of what has changed after that number; None: more than is remembered."""
+        with self._lock:
+            if self.latest - number > len(self._entries):
+                return self.latest, None
+            later = itertools.takewhile(lambda entry: entry[0] > number, reversed(self._entries))
+            return self.latest, {which for _, which in later}
+
+
+journal = _Journal()
+"""Of all obstacles of this process."""
 
 
 class Outline(NamedTuple):
@@ -58,7 +91,7 @@ class _Checked(Generic[Value]):
 
     def __set__(self, obstacle: Obstacle, value: Any) -> None:
         obstacle.__dict__[self._name] = self._check(self._name, value)
-        obstacle.revision = next(_revisions)
+        obstacle.revision = journal.note(obstacle)
 
 
 class Obstacle(ABC):
@@ -156,11 +189,21 @@ class Obstacle(ABC):
 AnyObstacle = TypeVar("AnyObstacle", bound=Obstacle)
 
 
+_versions = itertools.count(1)
+
+
 class Obstacles(list[Obstacle]):
-    """The obstacles of a world: a list."""
+    """The obstacles of a world: a list.
+
+    Attributes:
+        version: another number whenever the list has changed.
+    """
+
+    version = 0
 
     def __init__(self, obstacles: Iterable[Obstacle] = ()) -> None:
         super().__init__(obstacles)
+        self.version = next(_versions)
         self._drawn: list[list[Outline]] = []
         self._outlines: list[Outline] = []
 
@@ -187,6 +230,7 @@ class Obstacles(list[Obstacle]):
                 allowed = "allowed is an object such as pyverlet.Disc((0, 0), 1) or pyverlet.Segment((0, 0), (1, 0))"
                 raise InputError(f"obstacle is a {type(obstacle).__name__}; {allowed}")
         super().extend(given)
+        self.version = next(_versions)
 
     def __iadd__(self, obstacles: Iterable[Obstacle]) -> Obstacles:  # type: ignore[override,misc]
         self.extend(obstacles)
@@ -209,3 +253,20 @@ class Obstacles(list[Obstacle]):
         self[:] = [obstacle for obstacle, _, _ in saved]
         for obstacle, pivot, angle in saved:
             obstacle.pivot, obstacle.angle = pivot, angle
+
+
+def _changing(method: Any) -> Any:
+    """A method of lists that changes them."""
+
+    @functools.wraps(method)
+    def changed(self: Obstacles, *args: Any, **options: Any) -> Any:
+        try:
+            return method(self, *args, **options)
+        finally:
+            self.version = next(_versions)
+
+    return changed
+
+
+for _name in ("insert", "pop", "remove", "clear", "sort", "reverse", "__setitem__", "__delitem__", "__imul__"):
+    setattr(Obstacles, _name, _changing(getattr(list, _name)))

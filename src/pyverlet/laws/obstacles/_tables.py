@@ -1,0 +1,257 @@
+"""The obstacles of one world as arrays that follow the world's list: only what has changed is written anew."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.kernels import obstacles as kernels
+from pyverlet.laws.obstacles._base import Obstacle, Obstacles, journal
+from pyverlet.state.seam import NONE, Seam
+
+Array = NDArray[Any]
+
+_HERE = ((0.0, 0.0),)
+
+
+class _Rows:
+    """Records of an array with room for more: adding some to many costs little."""
+
+    def __init__(self, dtype: np.dtype[Any]) -> None:
+        self._dtype, self._room = dtype, np.zeros((0, dtype.itemsize), np.uint8)
+        self.rows = np.zeros(0, dtype)
+
+    def extend(self, fresh: Array) -> None:
+        """Add these. As bytes: records are copied field by field."""
+        before, count = len(self.rows), len(self.rows) + len(fresh)
+        if count > len(self._room):
+            room = np.empty((2 * count, self._dtype.itemsize), np.uint8)
+            room[:before] = self._room[:before]
+            self._room = room
+        self._room[before:count] = np.ascontiguousarray(fresh).view(np.uint8).reshape(len(fresh), self._dtype.itemsize)
+        self.rows = self._room[:count].reshape(-1).view(self._dtype)
+
+    def take(self, index: Array) -> None:
+        """Rows become those of these numbers."""
+        self._room = self._room[index]
+        self.rows = self._room.reshape(-1).view(self._dtype)
+
+
+class Tables:
+    """Bodies and segments of all obstacles, `kernels.obstacles.BODY` and `SEGMENT`.
+
+    Args:
+        obstacles: the world's list; what has changed in it is looked for at the beginning of each frame.
+        seam: of the room.
+
+    Attributes:
+        seam: of the room. In a periodic one there are images of all obstacles beside it: circles run on beyond it within a frame.
+        version: another number whenever an obstacle has come, gone or been changed by others than its own motion.
+    """
+
+    def __init__(self, obstacles: Obstacles, seam: Seam = NONE) -> None:
+        self._obstacles, self.seam, self.version = obstacles, seam, 0
+        self._seen: list[Obstacle] = []
+        self._listed = self._revision = -1
+        self._imaged = seam
+        self._own_bodies, self._own_segments = _Rows(kernels.BODY), _Rows(kernels.SEGMENT)
+        self._bodies, self._segments = self._own_bodies.rows, self._own_segments.rows
+        self._first = np.zeros(1, np.int64)  # of each its first segment, and one more
+        self._number: dict[int, int] | None = {}  # of each by its id
+        self._moves, self._drives, self._throws = set[int](), set[int](), set[int]()
+        self._moving = np.zeros(0, np.int64)
+        self._changed: set[int] = set()  # to be placed before the next substep
+        self._renumbered = True  # numbers are others: whatever keeps them is to be made anew
+
+    def __reduce__(self) -> Any:
+        """A copy finds out by itself."""
+        return type(self), (self._obstacles, self.seam)
+
+    def __bool__(self) -> bool:
+        return bool(self._obstacles)
+
+    @property
+    def still(self) -> bool:
+        """Whether obstacles stay where they are, so that a substep is like the one before."""
+        return not self._moves
+
+    @property
+    def drives(self) -> bool:
+        """Whether any moves, or has a surface that does."""
+        return bool(self._drives)
+
+    @property
+    def bounces(self) -> bool:
+        """Whether any throws circles back."""
+        return bool(self._throws)
+
+    def seen(self) -> list[Obstacle]:
+        """The obstacles of the last frame."""
+        return self._seen
+
+    def begin(self) -> None:
+        """At the beginning of a frame: look what has changed."""
+        fresh: list[Obstacle] = []
+        if self._listed != self._obstacles.version or self._imaged != self.seam:
+            fresh = self._take()
+        if self._revision == journal.latest:
+            return
+        self._revision, changed = journal.since(self._revision)
+        if changed is None:
+            which: Iterable[int] = range(len(self._seen))
+        elif changed := changed - set(map(id, fresh)):
+            number = self._numbers()
+            if len(number) < len(self._seen):  # some are listed twice
+                which = [k for k, obstacle in enumerate(self._seen) if id(obstacle) in changed]
+            else:
+                which = [number[each] for each in changed if each in number]
+        else:
+            return
+        for k in which:
+            self._refresh(k)
+
+    def _numbers(self) -> dict[int, int]:
+        """The index of each obstacle by its id."""
+        if self._number is None:
+            self._number = {id(obstacle): k for k, obstacle in enumerate(self._seen)}
+        return self._number
+
+    def _take(self) -> list[Obstacle]:
+        """The list has changed: returns those that are new."""
+        now, seen, before = list(self._obstacles), self._seen, len(self._seen)
+        if self._revision < 0:
+            self._revision = journal.latest  # before any is read
+        self._listed, order = self._obstacles.version, None
+        fresh = now[before:]
+        if now[:before] != seen:  # the same objects: they are equal to themselves alone
+            number = self._numbers()
+            order = np.array([number.get(id(obstacle), -1) for obstacle in now], np.int64)
+            new = np.flatnonzero(order < 0)
+            order[new], fresh = before + np.arange(len(new)), [now[k] for k in new]
+        if order is None and not fresh and self._imaged == self.seam:
+            return fresh
+        self._seen, self.version = now, self.version + 1
+        self._append(fresh, before)
+        if order is not None:
+            self._put_in_order(order)
+        self._imagine()
+        if order is not None or self.seam:
+            self._start_anew()
+        else:
+            for k in range(before, len(now)):
+                self._sort_in(k)
+                self._changed.add(k)
+                if self._number is not None:
+                    self._number[id(now[k])] = k
+        return fresh
+
+    def _append(self, fresh: list[Obstacle], before: int) -> None:
+        """Add these to the tables, in which there are so many."""
+        for obstacle in fresh:
+            if obstacle.table is None:  # shapes do not change: adding one to many costs little
+                obstacle.table = _lowered(obstacle)
+        count = [len(obstacle.table) for obstacle in fresh]
+        # As bytes: putting hundreds of arrays of records together takes milliseconds.
+        parts = [np.zeros(0, np.uint8), *(obstacle.table.view(np.uint8) for obstacle in fresh)]
+        rows = np.concatenate(parts).view(kernels.SEGMENT)
+        first = self._first[-1] + np.cumsum([0, *count])
+        rows["body"], rows["first"] = np.repeat(before + np.arange(len(fresh)), count), np.repeat(first[:-1], count)
+        surfaces = [(obstacle.restitution, obstacle.friction, obstacle.surface_speed) for obstacle in fresh]
+        for name, column in zip(("restitution", "friction", "belt"), zip(*surfaces, strict=True), strict=bool(surfaces)):
+            rows[name] = np.repeat(column, count)
+        self._own_segments.extend(rows)
+        self._own_bodies.extend(np.array([_body(obstacle) for obstacle in fresh], kernels.BODY))
+        self._first = np.concatenate((self._first, first[1:]))
+
+    def _put_in_order(self, order: Array) -> None:
+        """The bodies become those of these numbers."""
+        count, start = np.diff(self._first)[order], self._first[:-1][order]
+        self._first = np.concatenate(([0], np.cumsum(count)))
+        body = np.repeat(np.arange(len(order)), count)
+        self._own_bodies.take(order)
+        self._own_segments.take(start[body] + np.arange(len(body)) - self._first[:-1][body])
+        rows = self._own_segments.rows
+        rows["body"], rows["first"] = body, self._first[:-1][body]
+
+    def _refresh(self, k: int) -> None:
+        """An obstacle has been changed."""
+        obstacle, count, sides = self._seen[k], len(self._own_bodies.rows), len(self._own_segments.rows)
+        body = _body(obstacle)
+        for image, (x, y) in enumerate(self.seam.images() if self.seam else _HERE):
+            self._bodies[image * count + k] = (body[0] + x, body[1] + y, *body[2:])
+            part = self._segments[image * sides + self._first[k] : image * sides + self._first[k + 1]]
+            part["restitution"] = obstacle.restitution
+            part["friction"] = obstacle.friction
+            part["belt"] = obstacle.surface_speed
+        self._own_bodies.rows[k] = body
+        self._changed.add(k)
+        self._sort_in(k)
+        self.version += 1
+
+    def _sort_in(self, k: int) -> None:
+        """Note what an obstacle does that only few do."""
+        obstacle, moves = self._seen[k], self._seen[k].moves
+        for some, does in (
+            (self._drives, moves or obstacle.surface_speed != 0.0), (self._throws, obstacle.restitution > 0.0),
+        ):  # fmt: skip
+            (some.add if does else some.discard)(k)
+        if moves != (k in self._moves):
+            (self._moves.add if moves else self._moves.discard)(k)
+            self._moving = np.array(sorted(self._moves), np.int64)
+
+    def _start_anew(self) -> None:
+        """Numbers are others: the grid, and who does what, are to be found anew."""
+        self._renumbered, self._number, self._changed = True, None, set()
+        s, b = self._own_segments.rows, self._own_bodies.rows
+        self._moving = np.flatnonzero((b["vx"] != 0.0) | (b["vy"] != 0.0) | (b["spin"] != 0.0))
+        self._moves = set(self._moving.tolist())
+        self._drives = self._moves | set(s["body"][s["belt"] != 0.0].tolist())
+        self._throws = set(s["body"][s["restitution"] > 0.0].tolist())
+
+    def _imagine(self) -> None:
+        """The obstacles and, in a periodic room, their images beside it."""
+        self._bodies, self._segments, self._imaged = self._own_bodies.rows, self._own_segments.rows, self.seam
+        if not self.seam:
+            return
+        shift, count, sides = self.seam.images(), len(self._bodies), len(self._segments)
+        self._bodies, self._segments = np.tile(self._bodies, len(shift)), np.tile(self._segments, len(shift))
+        self._bodies["x"] += np.repeat(shift[:, 0], count)
+        self._bodies["y"] += np.repeat(shift[:, 1], count)
+        number = np.repeat(np.arange(len(shift)), sides)
+        self._segments["body"] += count * number
+        self._segments["first"] += sides * number
+
+
+def _body(obstacle: Obstacle) -> tuple[float, ...]:
+    return (*obstacle.pivot, obstacle.angle, *obstacle.velocity, obstacle.angular_velocity)
+
+
+def _lowered(obstacle: Obstacle) -> Array:
+    """The segments of an obstacle, without its surface and place."""
+    points, closed, rounding, convex, around = obstacle._parts()
+    ends = np.roll(points, -1, axis=0) if closed else points[1:]
+    starts = points if closed else points[:-1]
+    if len(points) == 1:
+        starts = ends = points
+    table = np.zeros(len(starts), kernels.SEGMENT)
+    table["kept_x"] = np.nan
+    side = ends - starts
+    length = np.hypot(*side.T)
+    along = np.divide(side, length[:, None], out=np.tile((1.0, 0.0), (len(side), 1)), where=length[:, None] > 0)
+    table["lx"], table["ly"] = starts.T
+    table["lc"], table["ls"] = along.T
+    table["length"], table["rounding"], table["around"] = length, rounding, around
+    table["faces"] = len(starts) if convex else 0
+    if convex:
+        # Twice the area over the perimeter is at least the largest distance of anything inside from its nearest face.
+        area = 0.5 * abs(np.sum(starts[:, 0] * ends[:, 1] - starts[:, 1] * ends[:, 0]))
+        table["inner"] = 2 * area / length.sum()
+    for name, to in (("before", -np.roll(side, 1, axis=0)), ("after", np.roll(side, -1, axis=0))):
+        table[f"{name}_x"] = (to * along).sum(axis=1)
+        table[f"{name}_y"] = along[:, 0] * to[:, 1] - along[:, 1] * to[:, 0]
+    if not closed:
+        table["before_x"][0] = table["before_y"][0] = table["after_x"][-1] = table["after_y"][-1] = 0.0
+    return table

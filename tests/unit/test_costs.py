@@ -1,0 +1,276 @@
+"""What does not matter to a frame costs it nothing. Calls are counted, not milliseconds: those depend on the machine."""
+
+from __future__ import annotations
+
+import copy
+import sys
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet.laws.contacts.broadphase import BruteForce
+from pyverlet.laws.contacts.collisions import find_contacts
+from pyverlet.world import queries
+
+DT = 1 / 60
+
+
+def grid(columns: int, rows: int, apart: float) -> Any:
+    x, y = np.meshgrid(apart * np.arange(columns), apart * np.arange(rows))
+    return np.column_stack((x.ravel(), y.ravel()))
+
+
+def calls(act: Callable[[], object]) -> int:
+    """How many functions Python calls, its own and those of C, in `act`."""
+    count = 0
+
+    def note(frame: Any, event: str, about: Any) -> None:
+        nonlocal count
+        count += event in ("call", "c_call")
+
+    before = sys.getprofile()
+    sys.setprofile(note)
+    try:
+        act()
+    finally:
+        sys.setprofile(before)
+    return count
+
+
+def frames(world: pv.World, count: int = 6, act: Callable[[int], object] = lambda k: None) -> int:
+    """Calls in a frame: the fewest of several, for lists are made anew now and then."""
+
+    def frame(k: int) -> None:
+        act(k)
+        world.step(DT)
+
+    return min(calls(lambda k=k: frame(k)) for k in range(count))  # type: ignore[misc]
+
+
+def far(count: int) -> Any:
+    return np.random.default_rng(0).uniform(100, 900, (count, 2))
+
+
+OBSTACLES: dict[str, Callable[[int], list[pv.Obstacle]]] = {
+    "pegs": lambda n: [pv.Disc(at, 0.3, restitution=0.5, friction=0.1) for at in far(n)],
+    "tiles": lambda n: [pv.Segment(at, (at[0] + 1, at[1])) for at in far(n)],
+    "boxes": lambda n: [pv.Polygon(at + np.array([(0, 0), (1, 0), (1, 1)])) for at in far(n)],
+    "chain": lambda n: [pv.Chain(np.column_stack((np.arange(n + 1.0), 500 + np.sin(np.arange(n + 1)))))],
+}
+
+
+def world_of_discs(obstacles: list[pv.Obstacle], **options: Any) -> pv.World:
+    world = pv.World(threads=1, **options)
+    world.add(position=grid(5, 5, 1.0), radius=0.4)
+    world.obstacles.extend([pv.Segment((-9, -50), (9, -50)), *obstacles])  # one there is in any case
+    for _ in range(3):
+        world.step(DT)
+    return world
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"sleep": True}, {"events": True}, {"contacts": True}, {"boundary": pv.Periodic((0, 0), (999, 999))}]
+)
+@pytest.mark.parametrize("kind", OBSTACLES)
+def test_obstacles_that_stand_still_cost_nothing(kind: str, options: dict[str, Any]) -> None:
+    few, many = (world_of_discs(OBSTACLES[kind](count), **options) for count in (4, 1000))
+    assert abs(frames(many) - frames(few)) <= 20
+
+
+def test_moving_or_adding_one_obstacle_costs_the_same_among_many() -> None:
+    acts: dict[str, Callable[[pv.World, int], object]] = {
+        "moved": lambda world, k: setattr(world.obstacles[k], "pivot", (10.0 + k, 70.0)),
+        "added": lambda world, k: world.obstacles.append(pv.Disc((10.0 + k, 70.0), 0.3)),
+        "changed": lambda world, k: setattr(world.obstacles[k], "friction", 0.2),
+        "spun": lambda world, k: setattr(world.obstacles[3], "angular_velocity", 1.0 + k),
+    }
+    for name, act in acts.items():
+        few, many = (world_of_discs(OBSTACLES["pegs"](count)) for count in (20, 1000))
+        assert abs(frames(many, act=partial(act, many)) - frames(few, act=partial(act, few))) <= 20, name
+
+
+# ---- and yet they are met ----------------------------------------------------------------------------------------------
+
+
+def edits(world: pv.World, k: int) -> None:
+    """All that can happen to a list of obstacles, one after the other."""
+    o = world.obstacles
+    if k == 2:
+        o.append(pv.Disc((2.0, -2.0), 0.8))
+    elif k == 4:
+        o.pop(0)
+    elif k == 6:
+        o.insert(1, pv.Segment((-3, -3), (9, -4), restitution=0.5))
+    elif k == 8:
+        o[2].pivot = (3.2, -1.6)
+    elif k == 10:
+        o.reverse()
+    elif k == 12:
+        o[0].velocity, o[1].angular_velocity = (0.4, 0.3), 2.0
+    elif k == 16:
+        del o[1:3]
+        o.extend([pv.Polygon([(0, -5), (3, -5), (1, -3.5)]), o[0]])
+    elif k == 20:
+        o[0].velocity = (0, 0)
+    elif k == 24:
+        world.radius[:3] = 0.9
+
+
+@pytest.mark.parametrize("room", [pv.Open(), pv.Periodic((-6, -9), (8, 9))], ids=repr)
+def test_a_grid_that_follows_gives_the_bits_of_one_made_anew(room: pv.Boundary) -> None:
+    world = pv.World(boundary=room, events=True, dtype=np.float64)
+    world.add(position=grid(5, 5, 1.0), radius=np.resize([0.2, 0.3, 0.4], 25), restitution=0.3)
+    world.obstacles.extend([pv.Disc((x, -1.5), 0.3) for x in range(6)])
+    for k in range(40):
+        edits(world, k)
+        world._course.begin()
+        before = world.save()
+        world.step(DT)
+        after = world.position.copy()
+        world.restore(before)
+        world._course._renumbered = True  # as if the list had just been made
+        world.step(DT)
+        assert np.array_equal(world.position, after), k
+
+
+def test_far_and_long_obstacles_leave_the_others_to_their_cells() -> None:
+    # A ground of 2000 km and a peg at the end of the world: a table of cells over all of that would have one for the pegs.
+    world = world_of_discs(OBSTACLES["pegs"](200))
+    world.obstacles.extend([pv.Segment((-1e6, -60), (1e6, -60)), pv.Disc((1e12, 1e12), 1.0)])
+    ball = world.add(position=(0.0, -58.0), radius=0.4)
+    world.step(DT)
+    assert world._course._cell < 200
+    for _ in range(120):
+        world.step(DT)
+    assert ball.position[0, 1] == pytest.approx(-59.6, abs=1e-3)
+
+
+def test_who_crosses_a_thousand_cells_in_a_substep_is_stopped() -> None:
+    world = pv.World(gravity=(0, 0), dtype=np.float64)
+    world.obstacles.extend([pv.Segment((5000, -1), (5000, 1)), pv.Disc((-3, 0), 1), pv.Disc((4, 9), 1)])
+    ball = world.add(position=(0, 0), velocity=(3e6, 0), radius=0.1)
+    world.step(DT)
+    assert ball.position[0, 0] == pytest.approx(4999.9)
+
+
+def test_points_are_covered_by_the_first_of_several() -> None:
+    world = world_of_discs([pv.Disc((0, 0), 5), pv.Disc((1, 0), 5), pv.Polygon([(90, 90), (99, 90), (90, 99)], radius=1)])
+    points = np.array([(0, 0), (5.5, 0), (92, 92), (89.2, 95), (80, 80), (1e300, 0)])
+    assert world._course.covering(points).tolist() == [1, 2, 3, 3, -1, -1]
+    world.obstacles.reverse()
+    assert world._course.covering(points).tolist() == [1, 1, 0, 0, -1, -1]
+
+
+def test_an_obstacle_listed_twice_moves_twice_and_a_copy_of_a_world_has_its_own() -> None:
+    world = world_of_discs([])
+    peg = pv.Disc((0, -8), 1.0)
+    world.obstacles.extend([peg, peg])
+    world.step(DT)
+    peg.pivot = (50, 0)
+    world.step(DT)
+    assert world._course.covering(np.array([(50.0, 0.0), (0.0, -8.0)])).tolist() == [1, -1]
+    other = copy.deepcopy(world._course)
+    peg.pivot = (60, 0)
+    assert world._course.covering(np.array([(60.0, 0.0)])).tolist() == [1]
+    assert other.covering(np.array([(60.0, 0.0), (50.0, 0.0)])).tolist() == [-1, 1]
+
+
+# ---- reading -----------------------------------------------------------------------------------------------------------
+
+
+def fastest(act: Callable[[], object], count: int = 15) -> float:
+    """Seconds, the least of several: what others do on the machine only adds to it."""
+    took = []
+    for _ in range(count):
+        begun = time.perf_counter()
+        act()
+        took.append(time.perf_counter() - begun)
+    return min(took)
+
+
+def test_reading_a_heap_costs_about_as_much_as_a_step_at_most() -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (4, 40)), contacts=True, threads=1)
+    world.obstacles.extend(OBSTACLES["pegs"](2000))
+    world.add(position=grid(9, 39, 0.41) + np.array((0.3, 0.25)), radius=np.resize([0.16, 0.18, 0.2], 351))
+    peg = world.obstacles.append(pv.Disc((2.0, 0.0), 0.3))
+    world.run(seconds=2)
+    step = fastest(lambda: world.step(DT))
+    assert len(world.contacts) > 400
+
+    def read() -> None:
+        world._touches._end._found.clear()  # type: ignore[union-attr]
+        world._touches._found = None  # type: ignore[union-attr]
+        assert len(world.contacts) > 400
+        assert world.force_on(peg)[1] < 0
+        assert world.pressure() > 0
+
+    # It was 40 times a step; a margin of three is for machines that are busy with something else.
+    assert fastest(read) < 3 * step
+    assert fastest(lambda: (world.energy(), world.overlap(), world.momentum())) < step
+
+
+def test_a_heap_of_hundreds_is_explained_to_a_percent() -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (4, 40)), contacts=True, threads=1, dtype=np.float64)
+    world.add(position=grid(9, 39, 0.41) + np.array((0.3, 0.25)), radius=np.resize([0.16, 0.18, 0.2], 351))
+    world.run(seconds=6)
+    found = world.contacts
+    pushed, pairs = found["impulse"][:, None] * found["normal"], found["b"] >= 0
+    got = np.zeros((351, 2))
+    np.subtract.at(got, found["a"], pushed)
+    np.add.at(got, found["b"][pairs], pushed[pairs])
+    assert np.abs(got / DT - world.mass[:, None] * (0, 9.81)).max() < 0.02 * found["impulse"].max() / DT
+
+
+ROOMS = [pv.Open(), pv.Periodic((-3, -3), (5, 4))]
+
+
+@pytest.mark.parametrize("room", ROOMS, ids=repr)
+@pytest.mark.parametrize("scale", [1.0, 1e-6])
+@pytest.mark.parametrize("spread", [1, 30])
+def test_overlaps_are_those_that_all_pairs_have(room: pv.Boundary, scale: float, spread: float) -> None:
+    if scale < 1 and room.seam:
+        pytest.skip("one room is enough")
+    rng = np.random.default_rng(2)
+    world = pv.World(boundary=room, dtype=np.float64)
+    radius = rng.uniform(0.3 / spread, 0.3, 300) * scale
+    group = world.add(position=rng.uniform((-3, -3), (5, 4), (300, 2)) * scale, radius=radius, allow_overlap=True)
+    group.mass[:20] = np.inf
+    group.category[30:60], group.mask[60:90] = 2, 1
+    world.links.append(pv.Stick(group, 0, 100, length=scale, collide=False))
+    pairs = find_contacts(world._state, BruteForce())
+    pairs = pairs[~((pairs == (0, 100)).all(axis=1))]
+    way = world.boundary.seam.nearest(world.position[pairs[:, 1]] - world.position[pairs[:, 0]])
+    depth = 1 - np.hypot(*way.T) / world.radius[pairs].sum(axis=1)
+    overlap = world.overlap()
+    assert overlap.contacts == len(pairs) > 20
+    assert (overlap.mean, overlap.max) == pytest.approx((depth.mean(), depth.max()), rel=1e-12)
+
+
+def test_questions_sort_particles_once_and_again_when_they_have_moved(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (50, 50)))
+    world.add(position=grid(20, 20, 1.0) + 0.5, radius=0.4)
+    made, real = [], queries._sorted
+
+    def sort(*about: Any) -> Any:
+        made.append(about)
+        return real(*about)
+
+    monkeypatch.setattr(queries, "_sorted", sort)
+    before, points = world.rebuilds, world.position[:100] + 0.1
+    for _ in range(3):
+        assert world.at_point(points).tolist() == list(range(100))
+        world.nearest(points, 3)
+        world.in_box(points, points + 1)
+        world.ray(points, (1, 0))
+        assert world.at_point(points[5]).tolist() == [5]
+    assert len(made) == 1
+    assert world.rebuilds == before
+    world.position[7] = (40.0, 40.0)
+    assert world.at_point(points)[7] == -1
+    assert world.at_point((40.1, 40.0)).tolist() == [7]
+    assert len(made) == 2
