@@ -29,6 +29,7 @@ from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 from pyverlet.world.actors import Actor
 from pyverlet.world.convenience import Doors
+from pyverlet.world.core_frames import CoreFrames
 from pyverlet.world.measures import Measures
 from pyverlet.world.moments import Moment
 from pyverlet.world.profile import Profile
@@ -98,6 +99,7 @@ class World(Measures, Queries, Doors):
         self.boundary = Open() if boundary is None else boundary
         self.collisions, self.substeps, self.threads = collisions, substeps, threads
         self.time, self.frames, self.profile, self.actors = 0.0, 0, Profile(), list[Actor]()
+        self._core: Any = None
         self._run, self._coarse, self._team = Substeps(), Coarse(), Team()
         self.onlooker: Callable[[Moment], None] | None = None
         """Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins."""
@@ -118,7 +120,15 @@ class World(Measures, Queries, Doors):
         self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
         self.profile.begin()
         books = self._open_books(h)
-        if not self._frame(h, self._listen(h, books or self.profile.mark)):
+        if self._core is None:
+            self._core = CoreFrames(self.dtype)
+        if self._core.serves(self):
+            self._state.grown[:] = 1
+            self._clear_notes()
+            self._gather()
+            self._core.frame(self, h, self.profile.mark)
+            self._refuse_non_finite(h)
+        elif not self._frame(h, self._listen(h, books or self.profile.mark)):
             self._refuse_non_finite(h)
         self._accept(dt, h, books)
         self.profile.end()
