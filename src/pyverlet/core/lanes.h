@@ -1,0 +1,130 @@
+/* Eight lanes: eight numbers that are computed at once, by the vector types of GCC and Clang.
+
+   Each lane is rounded by itself and nothing is contracted, so the bits are the same on every processor. Compiled with
+   -DREAL64 a number is a double, otherwise a float. Arrays of points are interleaved: x and y of particle i at 2 i. */
+#pragma once
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+#ifdef REAL64
+typedef double real;
+typedef int64_t lane_int;
+#else
+typedef float real;
+typedef int32_t lane_int;
+#endif
+enum { LANES = 8 };
+typedef real lanes __attribute__((vector_size(LANES * sizeof(real)), aligned(sizeof(real))));
+typedef lane_int mask __attribute__((vector_size(LANES * sizeof(real)), aligned(sizeof(real))));
+typedef struct {
+    lanes x, y;
+} lanes2;
+typedef struct {
+    lanes x, y, z, w;
+} lanes4;
+#define LANES_INLINE static inline __attribute__((always_inline))
+
+LANES_INLINE lanes spread(real a) { return (lanes){a, a, a, a, a, a, a, a}; }
+LANES_INLINE lanes load(const real *array, int64_t k) { return *(const lanes *)(array + k); }
+LANES_INLINE void store(real *array, int64_t k, lanes a) { *(lanes *)(array + k) = a; }
+
+/* A mask has all bits of a lane set where a comparison holds. */
+LANES_INLINE mask above(lanes a, lanes b) { return a > b; }
+LANES_INLINE mask equal(lanes a, lanes b) { return a == b; }
+LANES_INLINE mask both(mask a, mask b) { return a & b; }
+LANES_INLINE mask either(mask a, mask b) { return a | b; }
+LANES_INLINE mask outside(mask a) { return ~a; }
+LANES_INLINE lanes choose(mask m, lanes a, lanes b) { return (lanes)(((mask)a & m) | ((mask)b & ~m)); }
+LANES_INLINE int any_lane(mask m) {
+    int64_t words[sizeof(mask) / 8], any = 0;
+    memcpy(words, &m, sizeof m);
+    for (unsigned k = 0; k < sizeof(mask) / 8; k++)
+        any |= words[k];
+    return any != 0;
+}
+LANES_INLINE int any_above(lanes a, lanes b) { return any_lane(a > b); }
+/* Of equal numbers, and where one is not a number, the second: (a > b ? a : b) and (a < b ? a : b), as C and SSE have it. */
+LANES_INLINE lanes larger(lanes a, lanes b) { return choose(a > b, a, b); }
+LANES_INLINE lanes smaller(lanes a, lanes b) { return choose(a < b, a, b); }
+LANES_INLINE lanes where_zero(lanes test, lanes a, lanes b) { return choose(test == spread(0), a, b); }
+LANES_INLINE lanes magnitude(lanes a) { return choose(a < spread(0), -a, a); }
+LANES_INLINE lanes square_root(lanes a) {
+    lanes r;
+    for (int l = 0; l < LANES; l++)
+        r[l] = sizeof(real) == 4 ? sqrtf(a[l]) : sqrt(a[l]);
+    return r;
+}
+
+/* Numbers of the particles index[k] to index[k + 7]: one each (gather, scatter), two (take, put) or four (take4, put4). */
+LANES_INLINE lanes gather(const real *array, const uint32_t *index, int64_t k) {
+    lanes r;
+    for (int l = 0; l < LANES; l++)
+        r[l] = array[index[k + l]];
+    return r;
+}
+LANES_INLINE void scatter(real *array, const uint32_t *index, int64_t k, lanes a) {
+    for (int l = 0; l < LANES; l++)
+        array[index[k + l]] = a[l];
+}
+LANES_INLINE lanes4 take4(const real *array, const uint32_t *index, int64_t k) {
+    lanes4 r;
+    for (int l = 0; l < LANES; l++) {
+        const real *from = array + 4 * (size_t)index[k + l];
+        r.x[l] = from[0];
+        r.y[l] = from[1];
+        r.z[l] = from[2];
+        r.w[l] = from[3];
+    }
+    return r;
+}
+LANES_INLINE void put4(real *array, const uint32_t *index, int64_t k, lanes x, lanes y, lanes z, lanes w) {
+    for (int l = 0; l < LANES; l++) {
+        real *to = array + 4 * (size_t)index[k + l];
+        to[0] = x[l];
+        to[1] = y[l];
+        to[2] = z[l];
+        to[3] = w[l];
+    }
+}
+#ifdef REAL64
+LANES_INLINE lanes2 take(const real *array, const uint32_t *index, int64_t k) {
+    lanes2 r;
+    for (int l = 0; l < LANES; l++) {
+        r.x[l] = array[2 * (size_t)index[k + l]];
+        r.y[l] = array[2 * (size_t)index[k + l] + 1];
+    }
+    return r;
+}
+LANES_INLINE void put(real *array, const uint32_t *index, int64_t k, lanes x, lanes y) {
+    for (int l = 0; l < LANES; l++) {
+        array[2 * (size_t)index[k + l]] = x[l];
+        array[2 * (size_t)index[k + l] + 1] = y[l];
+    }
+}
+#else
+/* Two floats at once, as one double that is only copied. */
+typedef double two_floats __attribute__((aligned(4), may_alias));
+typedef double four_doubles __attribute__((vector_size(32)));
+LANES_INLINE lanes2 take(const real *array, const uint32_t *index, int64_t k) {
+    const two_floats *a = (const two_floats *)array;
+    const uint32_t *i = index + k;
+    lanes p = (lanes)(four_doubles){a[i[0]], a[i[1]], a[i[2]], a[i[3]]},
+          q = (lanes)(four_doubles){a[i[4]], a[i[5]], a[i[6]], a[i[7]]};
+    return (lanes2){__builtin_shufflevector(p, q, 0, 2, 4, 6, 8, 10, 12, 14),
+                    __builtin_shufflevector(p, q, 1, 3, 5, 7, 9, 11, 13, 15)};
+}
+LANES_INLINE void put(real *array, const uint32_t *index, int64_t k, lanes x, lanes y) {
+    two_floats *a = (two_floats *)array;
+    const uint32_t *i = index + k;
+    four_doubles p = (four_doubles)__builtin_shufflevector(x, y, 0, 8, 1, 9, 2, 10, 3, 11),
+                 q = (four_doubles)__builtin_shufflevector(x, y, 4, 12, 5, 13, 6, 14, 7, 15);
+    a[i[0]] = p[0];
+    a[i[1]] = p[1];
+    a[i[2]] = p[2];
+    a[i[3]] = p[3];
+    a[i[4]] = q[0];
+    a[i[5]] = q[1];
+    a[i[6]] = q[2];
+    a[i[7]] = q[3];
+}
+#endif
