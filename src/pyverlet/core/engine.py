@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from pyverlet.core.engine_object import Engine
 from pyverlet.core.measure import energies
 
-__all__ = ["energies"]
+__all__ = ["Engine", "energies"]

@@ -42,6 +42,13 @@ LANES_INLINE int any_lane(mask m) {
         any |= words[k];
     return any != 0;
 }
+/* Bit l is set where the mask is in lane l. */
+LANES_INLINE int bits_of(mask m) {
+    int bits = 0;
+    for (int l = 0; l < LANES; l++)
+        bits |= (m[l] & 1) << l;
+    return bits;
+}
 LANES_INLINE int any_above(lanes a, lanes b) { return any_lane(a > b); }
 /* Of equal numbers, and where one is not a number, the second: (a > b ? a : b) and (a < b ? a : b), as C and SSE have it. */
 LANES_INLINE lanes larger(lanes a, lanes b) { return choose(a > b, a, b); }
@@ -66,25 +73,37 @@ LANES_INLINE void scatter(real *array, const uint32_t *index, int64_t k, lanes a
     for (int l = 0; l < LANES; l++)
         array[index[k + l]] = a[l];
 }
+/* Four numbers of a particle are one load; eight of those become four lanes by two rounds of shuffles. */
+typedef real four_reals __attribute__((vector_size(4 * sizeof(real)), aligned(sizeof(real))));
+#define LANES_SHUFFLE(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
+#define LANES_LOW(a, b) LANES_SHUFFLE(a, b, 0, 8, 1, 9, 4, 12, 5, 13)
+#define LANES_HIGH(a, b) LANES_SHUFFLE(a, b, 2, 10, 3, 11, 6, 14, 7, 15)
+#define LANES_EVEN(a, b) LANES_SHUFFLE(a, b, 0, 1, 8, 9, 4, 5, 12, 13)
+#define LANES_ODD(a, b) LANES_SHUFFLE(a, b, 2, 3, 10, 11, 6, 7, 14, 15)
 LANES_INLINE lanes4 take4(const real *array, const uint32_t *index, int64_t k) {
-    lanes4 r;
-    for (int l = 0; l < LANES; l++) {
-        const real *from = array + 4 * (size_t)index[k + l];
-        r.x[l] = from[0];
-        r.y[l] = from[1];
-        r.z[l] = from[2];
-        r.w[l] = from[3];
-    }
-    return r;
+    const uint32_t *i = index + k;
+#define FOUR(l) (*(const four_reals *)(array + 4 * (size_t)i[l]))
+#define EIGHT(l) LANES_SHUFFLE(FOUR(l), FOUR(l + 4), 0, 1, 2, 3, 4, 5, 6, 7)
+    lanes p = EIGHT(0), q = EIGHT(1), r = EIGHT(2), s = EIGHT(3);
+#undef EIGHT
+#undef FOUR
+    lanes a = LANES_LOW(p, q), b = LANES_HIGH(p, q), c = LANES_LOW(r, s), d = LANES_HIGH(r, s);
+    return (lanes4){LANES_EVEN(a, c), LANES_ODD(a, c), LANES_EVEN(b, d), LANES_ODD(b, d)};
 }
 LANES_INLINE void put4(real *array, const uint32_t *index, int64_t k, lanes x, lanes y, lanes z, lanes w) {
-    for (int l = 0; l < LANES; l++) {
-        real *to = array + 4 * (size_t)index[k + l];
-        to[0] = x[l];
-        to[1] = y[l];
-        to[2] = z[l];
-        to[3] = w[l];
-    }
+    const uint32_t *i = index + k;
+    lanes a = LANES_LOW(x, y), b = LANES_HIGH(x, y), c = LANES_LOW(z, w), d = LANES_HIGH(z, w);
+    lanes p = LANES_EVEN(a, c), q = LANES_ODD(a, c), r = LANES_EVEN(b, d), s = LANES_ODD(b, d);
+#define FOUR(l) (*(four_reals *)(array + 4 * (size_t)i[l]))
+    FOUR(0) = LANES_SHUFFLE(p, p, 0, 1, 2, 3);
+    FOUR(1) = LANES_SHUFFLE(q, q, 0, 1, 2, 3);
+    FOUR(2) = LANES_SHUFFLE(r, r, 0, 1, 2, 3);
+    FOUR(3) = LANES_SHUFFLE(s, s, 0, 1, 2, 3);
+    FOUR(4) = LANES_SHUFFLE(p, p, 4, 5, 6, 7);
+    FOUR(5) = LANES_SHUFFLE(q, q, 4, 5, 6, 7);
+    FOUR(6) = LANES_SHUFFLE(r, r, 4, 5, 6, 7);
+    FOUR(7) = LANES_SHUFFLE(s, s, 4, 5, 6, 7);
+#undef FOUR
 }
 #ifdef REAL64
 LANES_INLINE lanes2 take(const real *array, const uint32_t *index, int64_t k) {

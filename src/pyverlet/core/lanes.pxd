@@ -25,6 +25,7 @@ cdef extern from "lanes.h" nogil:
     mask outside(mask a)
     lanes choose(mask m, lanes a, lanes b)
     bint any_lane(mask m)
+    int bits_of(mask m)
     bint any_above(lanes a, lanes b)
     lanes larger(lanes a, lanes b)
     lanes smaller(lanes a, lanes b)

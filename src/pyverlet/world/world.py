@@ -29,7 +29,7 @@ from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 from pyverlet.world.actors import Actor
 from pyverlet.world.convenience import Doors
-from pyverlet.world.core_frames import CoreFrames
+from pyverlet.world.impulse_frames import ImpulseFrames
 from pyverlet.world.measures import Measures
 from pyverlet.world.moments import Moment
 from pyverlet.world.profile import Profile
@@ -99,7 +99,7 @@ class World(Measures, Queries, Doors):
         self.boundary = Open() if boundary is None else boundary
         self.collisions, self.substeps, self.threads = collisions, substeps, threads
         self.time, self.frames, self.profile, self.actors = 0.0, 0, Profile(), list[Actor]()
-        self._core: Any = None
+        self._impulses = ImpulseFrames(self._state.dtype)
         self._run, self._coarse, self._team = Substeps(), Coarse(), Team()
         self.onlooker: Callable[[Moment], None] | None = None
         """Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins."""
@@ -120,14 +120,8 @@ class World(Measures, Queries, Doors):
         self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
         self.profile.begin()
         books = self._open_books(h)
-        if self._core is None:
-            self._core = CoreFrames(self.dtype)
-        if self._core.serves(self):
-            self._state.grown[:] = 1
-            self._clear_notes()
-            self._gather()
-            self._core.frame(self, h, self.profile.mark)
-            self._refuse_non_finite(h)
+        if self.collisions and self.collisions.impulses:
+            self._impulse_frame(dt)
         elif not self._frame(h, self._listen(h, books or self.profile.mark)):
             self._refuse_non_finite(h)
         self._accept(dt, h, books)
@@ -174,6 +168,14 @@ class World(Measures, Queries, Doors):
                 done("links")
             run.substep += 1
         return self._finish(contacts, watch, h, done, marked=run.marked)
+
+    def _impulse_frame(self, dt: float) -> None:
+        """The same under the law of impulses, in the compiled core."""
+        self._impulses.check(self)
+        self._clear_notes()
+        self._gather()
+        self.profile.mark("gather")
+        self._impulses.run(self, dt, self.profile.mark)
 
     def _watch(self, h: float) -> Watch | None:
         """Who looks after the energy of this frame, if nothing but contacts, links and obstacles could raise it."""
