@@ -123,6 +123,7 @@ LANES_INLINE void put(real *array, const uint32_t *index, int64_t k, lanes x, la
 #else
 /* Two floats at once, as one double that is only copied. */
 typedef double two_floats __attribute__((aligned(4), may_alias));
+#if defined(__AVX2__) || defined(__clang__)
 typedef double four_doubles __attribute__((vector_size(32)));
 LANES_INLINE lanes2 take(const real *array, const uint32_t *index, int64_t k) {
     const two_floats *a = (const two_floats *)array;
@@ -146,4 +147,37 @@ LANES_INLINE void put(real *array, const uint32_t *index, int64_t k, lanes x, la
     a[i[6]] = q[2];
     a[i[7]] = q[3];
 }
+#else
+/* By halves of four lanes: gcc splits wider shuffles into single floats where registers have 16 bytes, 8 times as slow. */
+typedef double two_doubles __attribute__((vector_size(16)));
+typedef float half_lanes __attribute__((vector_size(16)));
+typedef union {
+    lanes all;
+    half_lanes half[2];
+} lane_halves;
+LANES_INLINE lanes2 take(const real *array, const uint32_t *index, int64_t k) {
+    const two_floats *a = (const two_floats *)array;
+    lane_halves x, y;
+    for (int h = 0; h < 2; h++) {
+        const uint32_t *i = index + k + 4 * h;
+        half_lanes p = (half_lanes)(two_doubles){a[i[0]], a[i[1]]}, q = (half_lanes)(two_doubles){a[i[2]], a[i[3]]};
+        x.half[h] = __builtin_shufflevector(p, q, 0, 2, 4, 6);
+        y.half[h] = __builtin_shufflevector(p, q, 1, 3, 5, 7);
+    }
+    return (lanes2){x.all, y.all};
+}
+LANES_INLINE void put(real *array, const uint32_t *index, int64_t k, lanes x, lanes y) {
+    two_floats *a = (two_floats *)array;
+    lane_halves u = {x}, v = {y};
+    for (int h = 0; h < 2; h++) {
+        const uint32_t *i = index + k + 4 * h;
+        two_doubles p = (two_doubles)__builtin_shufflevector(u.half[h], v.half[h], 0, 4, 1, 5),
+                    q = (two_doubles)__builtin_shufflevector(u.half[h], v.half[h], 2, 6, 3, 7);
+        a[i[0]] = p[0];
+        a[i[1]] = p[1];
+        a[i[2]] = q[0];
+        a[i[3]] = q[1];
+    }
+}
+#endif
 #endif

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Callable
+from functools import partial
 from types import ModuleType, SimpleNamespace
 from typing import Any, Final
 
@@ -132,15 +133,18 @@ def _team() -> dict[str, Any]:
     }
 
 
-def _math(real: Any) -> dict[str, Any]:
+def _math() -> dict[str, Any]:
     """What kernels take from `libc.math`: functions of float64, and those of float32 whose name ends in f."""
-    names = ("sqrt", "floor", "ceil", "hypot", "sin", "cos", "atan2", "log", "exp", "pow")
-    single = {
-        f"{name}f": lambda *values, of=getattr(np, name if name != "atan2" else "arctan2"): of(*map(np.float32, values))
-        for name in names
-    }
-    double = {name: lambda *values, of=getattr(math, name): np.float64(of(*map(float, values))) for name in names}
-    return single | double | {"fabs": abs, "INFINITY": np.inf, "NAN": np.nan, "isfinite": math.isfinite, "isnan": math.isnan}
+    made: dict[str, Any] = {"fabs": abs, "INFINITY": np.inf, "NAN": np.nan, "isfinite": math.isfinite, "isnan": math.isnan}
+    for name, function in (("sqrt", np.sqrt), ("floor", np.floor), ("ceil", np.ceil)):  # rounded alike everywhere
+        made |= {name: partial(_call, function, np.float64), f"{name}f": partial(_call, function, np.float32)}
+    for name in ("hypot", "sin", "cos", "atan2", "log", "exp", "pow"):
+        made[name] = partial(_call, getattr(math, name), np.float64)
+    return made
+
+
+def _call(function: Callable[..., Any], kind: Any, *values: Any) -> Any:
+    return kind(function(*map(kind, values)))
 
 
 _INTEGERS: Final = {
@@ -148,49 +152,125 @@ _INTEGERS: Final = {
 }
 
 
-def _cython() -> Any:
-    """Cython's own module for uncompiled code, with structs that are objects with attributes, and addresses that are what they are of."""
-    from Cython import Shadow
+def _convert(kind: Any, value: Any) -> Any:
+    """The value as C would keep it in a variable of this type; pointers and structs as they are."""
+    is_number = kind in (int, bool) or kind in _INTEGERS.values() or (isinstance(kind, type) and issubclass(kind, np.generic))
+    return kind(value) if is_number else value
+
+
+class _Typed(ast.NodeTransformer):
+    """Has declared variables keep the type they have in C, and numbers like 0.5 be doubles there."""
+
+    def __init__(self) -> None:
+        self.kinds: dict[str, ast.expr] = {}
+
+    def _as(self, kind: ast.expr, value: ast.expr) -> ast.expr:
+        return ast.Call(ast.Name("_convert", ast.Load()), [kind, value], [])
+
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.FunctionDef:
+        self.kinds = {}
+        for each in ast.walk(node):
+            if isinstance(each, ast.AnnAssign) and isinstance(each.target, ast.Name):
+                self.kinds[each.target.id] = each.annotation
+        taken: list[ast.stmt] = []
+        for argument in [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]:
+            if isinstance(argument.annotation, ast.Name | ast.Attribute):
+                self.kinds[argument.arg] = argument.annotation
+                value = self._as(argument.annotation, ast.Name(argument.arg, ast.Load()))
+                taken.append(ast.Assign([ast.Name(argument.arg, ast.Store())], value))
+        self.kinds = {name: kind for name, kind in self.kinds.items() if isinstance(kind, ast.Name | ast.Attribute)}
+        node.body = taken + [self.visit(statement) for statement in node.body]
+        return node
+
+    def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.stmt:
+        if node.value is None:
+            return node
+        return self.visit_Assign(ast.Assign([node.target], node.value))
+
+    def visit_Assign(self, node: ast.Assign) -> ast.Assign:
+        self.generic_visit(node)
+        target = node.targets[0]
+        if len(node.targets) == 1 and isinstance(target, ast.Name) and target.id in self.kinds:
+            node.value = self._as(self.kinds[target.id], node.value)
+        return node
+
+    def visit_AugAssign(self, node: ast.AugAssign) -> ast.stmt:
+        if not isinstance(node.target, ast.Name) or node.target.id not in self.kinds:
+            self.generic_visit(node)
+            return node
+        return self.visit_Assign(ast.Assign([node.target], ast.BinOp(ast.Name(node.target.id, ast.Load()), node.op, node.value)))
+
+    def visit_Constant(self, node: ast.Constant) -> ast.expr:
+        return self._as(ast.Name("_double", ast.Load()), node) if isinstance(node.value, float) else node
+
+
+def _struct(**kinds: Any) -> type:
+    """A struct: attributes that keep their type, 0 at first."""
+
+    class Struct:
+        def __init__(self) -> None:
+            for name in kinds:
+                setattr(self, name, 0)
+
+        def __setattr__(self, name: str, value: Any) -> None:
+            object.__setattr__(self, name, _convert(kinds[name], value))
+
+    return Struct
+
+
+def _cython(names: dict[str, Any]) -> ModuleType:
+    """Cython's own module for uncompiled code, with types and structs as above, and addresses that are what they are of."""
+    from Cython import Shadow  # only the reference needs it
 
     made = ModuleType("cython")
     vars(made).update(vars(Shadow))
 
-    def struct(**_: Any) -> type:
-        return type("struct", (SimpleNamespace,), {})
-
     def declare(kind: Any = None, value: Any = None, **_: Any) -> Any:
-        return value if value is None or not callable(kind) else kind(value)
+        return _convert(kind, value)
 
-    def cast(kind: Any, value: Any, **_: Any) -> Any:
-        return kind(value) if isinstance(kind, type) and issubclass(kind, np.generic) or kind in _INTEGERS.values() else value
+    def cclass(made: type) -> type:
+        """Gives each instance the structs that its class declares, as C does."""
+        kinds = made.__annotations__
 
-    vars(made).update(struct=struct, declare=declare, cast=cast, address=lambda value: value)
+        def new(cls: type, *_: Any, **__: Any) -> Any:
+            self = object.__new__(cls)
+            for name, kind in kinds.items():
+                if getattr(names.get(kind), "__qualname__", "").startswith("_struct."):
+                    setattr(self, name, names[kind]())
+            return self
+
+        made.__new__ = new  # type: ignore[assignment,method-assign]
+        return made
+
+    types = {"double": np.float64, "float": np.float32, "Py_ssize_t": int, "int": int, "bint": bool}
+    vars(made).update(types, struct=_struct, declare=declare, cclass=cclass, cast=_convert, address=lambda value: value)
     return made
 
 
 def load(unit: str, dtype: Any = np.float32) -> ModuleType:
     """The unit as a module of plain Python functions, for arrays of this precision."""
     real = np.dtype(dtype).type
-    shims = {
+    stand_ins = {
         "lanes": _lanes(real),
         "arrays": _arrays(real),
         "team": _team(),
-        "libc.math": _math(real),
+        "libc.math": _math(),
         "libc.stdint": _INTEGERS,
         "processor": {"has_x86_64_v3": lambda: False},
     }
     module = ModuleType(f"{unit}_reference")
     names = vars(module)
+    names.update(_convert=_convert, _double=np.float64)
     for part in joining.parts(unit):
-        kept = []
+        kept = ast.parse("from __future__ import annotations").body
         for node in part.tree.body:
             if isinstance(node, ast.Import) and node.names[0].name == "cython":
-                names["cython"] = _cython()
+                names["cython"] = _cython(names)
             elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("cython.cimports."):
-                shim = shims[str(node.module).removeprefix("cython.cimports.")]
-                names.update({alias.asname or alias.name: shim[alias.name] for alias in node.names})
+                stand_in = stand_ins[str(node.module).removeprefix("cython.cimports.")]
+                names.update({alias.asname or alias.name: stand_in[alias.name] for alias in node.names})
             else:
-                kept.append(node)
-        future = ast.parse("from __future__ import annotations").body
-        exec(compile(ast.Module(future + kept, []), str(part.path), "exec"), names)
+                kept.append(_Typed().visit(node))
+        tree = ast.fix_missing_locations(ast.Module(kept, []))
+        exec(compile(tree, str(part.path), "exec"), names)
     return module
