@@ -1,7 +1,7 @@
 """The compiled core: units of kernels, each compiled before the program starts, for two precisions and some processors.
 
-`unit("tools", dtype)` is the extension module of the kernels in `tools.py` and what it imports from here, for arrays of this type,
-loaded on first use in the variant that suits the processor. `PYVERLET_CORE=baseline` has the variant that runs on any.
+`unit("tools", dtype)` is the extension module of the kernels in `tools.py` and what it imports from here, for arrays of this
+type, loaded on first use in the variant that suits the processor. `PYVERLET_CORE=baseline` has the variant that runs on any.
 """
 
 from __future__ import annotations

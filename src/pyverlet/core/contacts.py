@@ -20,7 +20,6 @@ from cython.cimports.lanes import (
     spread,
     store,
 )
-from cython.cimports.libc.stdint import int64_t
 
 from pyverlet.core.impacts import resolve_impacts
 from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, clamped, motion_of, slip_of
@@ -47,17 +46,15 @@ def fast_ones(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: lanes, depth
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def note_hits(
-    w: cython.pointer(Step), k: cython.Py_ssize_t, bits: cython.int, hits: cython.pointer(int64_t)
-) -> cython.Py_ssize_t:
-    """Note those of the eight pairs from k on whose bits are set; returns how many there are."""
+def note_hits(w: cython.pointer(Step), k: cython.Py_ssize_t, bits: cython.int, place: cython.Py_ssize_t) -> cython.Py_ssize_t:
+    """Note in `hit`, from `place` on, those of the eight pairs from k on whose bits are set; returns how many there are."""
     count: cython.Py_ssize_t = 0
     lane: cython.Py_ssize_t
     for lane in range(k, k + 8):
         if (bits >> (lane - k)) & 1:
             if lane > k and w.i[lane] == w.i[lane - 1] and w.j[lane] == w.j[lane - 1]:
                 continue  # a pair that is repeated to fill a batch
-            hits[count] = lane
+            w.hit[place + count] = lane
             count += 1
     return count
 
@@ -80,7 +77,7 @@ def find_hits(w: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint)
             speed: lanes = (m.vx - m.ux) * load(w.normal_x, k) + (m.vy - m.uy) * load(w.normal_y, k)
             fast: mask = fast_ones(w, k, speed, depth)
             if any_lane(fast):
-                count += note_hits(w, k, bits_of(fast), w.hit + (first + count))
+                count += note_hits(w, k, bits_of(fast), first + count)
     return count
 
 
@@ -141,7 +138,7 @@ def solve(w: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint, sof
             after = choose(loaded, after, choose(above(speed, zero), zero, after))  # what parts without load is left alone
             fast: mask = fast_ones(w, k, speed, depth)
             if any_lane(fast):
-                count += note_hits(w, k, bits_of(fast), w.hit + (first + count))
+                count += note_hits(w, k, bits_of(fast), first + count)
                 after = choose(fast, before, after)
         else:
             after = choose(loaded, larger(before - speed, zero), zero)

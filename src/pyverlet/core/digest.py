@@ -13,6 +13,7 @@ OTHER = cython.declare(uint64_t, 0xBB67AE8584CAA73B)
 
 
 def digest(array):
+    """Of an array of uint64."""
     w: cython.pointer[cython.const[uint64_t]] = const_words(array)
     k: cython.Py_ssize_t
     r: uint64_t = 0

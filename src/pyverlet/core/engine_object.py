@@ -26,7 +26,7 @@ class Engine:
     arrays = cython.declare(dict, visibility="public")
     threads = cython.declare(cython.int, visibility="readonly")
 
-    def __cinit__(self, threads: cython.int):
+    def __init__(self, threads: cython.int):
         self.w.team = team_new(threads)
         if self.w.team == cython.NULL:
             raise MemoryError
@@ -79,7 +79,7 @@ class Engine:
         w.sized, w.varied, w.mixed = a["sized"], a["varied"], a["mixed"]
 
     def set_room(self, room, x0, y0, x1, y1, restitution, friction, speed):
-        """Walls: none (0); a cage (1) by its centre and radius; a box (2) by two corners; m. speed: m/s, of the surface of a cage."""
+        """Walls: none (0); a cage (1) by centre and radius; a box (2) by two corners; m. speed: of a cage's surface, m/s."""
         w: cython.pointer(Step) = cython.address(self.w)
         w.room, w.x0, w.y0, w.x1, w.y1 = room, x0, y0, x1, y1
         w.wall_restitution, w.wall_friction, w.wall_speed = restitution, friction, speed
@@ -101,7 +101,7 @@ class Engine:
         return strays(cython.address(self.w)) != 0
 
     def run(self, substep: cython.int, substeps: cython.int, parts: cython.int):
-        """Substeps from `substep` on by `parts` threads; returns how far they came, and whether the list of pairs needs a look."""
+        """Substeps from `substep` on by `parts` threads; returns how far they came, and whether the list needs a look."""
         w: cython.pointer(Step) = cython.address(self.w)
         w.first, w.substep, w.substeps = substep, substep, substeps
         with cython.nogil:
@@ -109,8 +109,10 @@ class Engine:
         return w.substep, bool(self.arrays["stale"][:parts].any())
 
     def take_impulses(self, particle):
-        """(pairs, values): particles low < high (k, 2) of contacts that carry load or overlap, sorted; of each its normal
-        and tangential impulse and the load it began the substep with (k, 3), m/s."""
+        """(pairs, values) of contacts that carry load or overlap: particles low < high (k, 2), sorted, and (k, 3) m/s.
+
+        values: impulses along the normal and the tangent, and the load that the substep began with.
+        """
         w: cython.pointer(Step) = cython.address(self.w)
         who: cython.pointer(int32_t) = small_integers(particle)
         s: cython.Py_ssize_t

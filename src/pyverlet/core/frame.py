@@ -10,9 +10,9 @@ Per substep of length h:
  6. relax: sweeps without the springs.
  7. remember what contacts gave.
 
-Velocities within a frame are those of the middle of a substep (Stormer and Verlet). With v, a and c the velocity, the acceleration
-by forces and that by contacts at the start of a frame, its first substep begins from v + a h / 2 - c h' / 2, h' being the
-substep before, and contacts give c (h + h') / 2; at the end v + (a + c) h / 2 is the velocity that belongs to the positions.
+Velocities within a frame are those of the middle of a substep (Stormer and Verlet). With v, a and c the velocity, the
+acceleration by forces and that by contacts at the start of a frame, its first substep begins from v + a h / 2 - c h' / 2, h'
+being the substep before, and contacts give c (h + h') / 2; at the end v + (a + c) h / 2 is the velocity of the positions of now.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def substep(
     """One substep: the part of one thread."""
     parity: cython.Py_ssize_t
     half: cython.Py_ssize_t
-    sweep: cython.int
+    _: cython.int
     p: cython.int
     i: cython.Py_ssize_t
     kick(w, a, b, part)
@@ -134,7 +134,7 @@ def substep(
     for i in range(a, a + walled):
         hold_walls(w, w.at_wall[i])
     drift(w, a, b, part)
-    for sweep in range(w.relaxes):
+    for _ in range(w.relaxes):
         for i in range(a, a + walled):
             relax_walls(w, w.at_wall[i])
         team_barrier(w.team)

@@ -177,14 +177,14 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
     back: cython.double = t - 0.5 * cython.cast(cython.double, w.h)
     half: cython.double = 0.5 * t * (w.h - t)
     g: cython.int
-    sweep: cython.int
+    _: cython.int
     for g in range(count):
         m[g] = meeting(w, hits[g])
         x: cython.double = m[g].px + m[g].ux * t - m[g].ax * half
         y: cython.double = m[g].py + m[g].uy * t - m[g].ay * half
         distance: cython.double = sqrt(x * x + y * y)
         nx[g], ny[g], given[g] = x / distance, y / distance, 0
-    for sweep in range(JOINT_SWEEPS):
+    for _ in range(JOINT_SWEEPS):
         largest: cython.double = 0
         for g in range(count):
             now: Meeting = meeting(w, hits[g])

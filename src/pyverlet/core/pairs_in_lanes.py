@@ -8,7 +8,7 @@ Along the tangent (n_y, -n_x) the point of contact of two discs has three times 
 from __future__ import annotations
 
 import cython
-from cython.cimports.lanes import lanes, lanes2, lanes4, larger, load, put, put4, real, smaller, spread, take, take4
+from cython.cimports.lanes import lanes, lanes2, lanes4, larger, load, put, put4, smaller, spread, take, take4
 
 from pyverlet.core.step import Step
 

@@ -90,6 +90,7 @@ def _lanes(real: Any) -> dict[str, Any]:
         "outside": np.logical_not,
         "choose": lambda mask, a, b: np.where(mask, a, b),
         "any_lane": np.any,
+        "bits_of": lambda mask: sum(1 << lane for lane in range(_LANES) if mask[lane]),
         "any_above": lambda a, b: bool(np.any(a > b)),
         "larger": lambda a, b: np.where(a > b, a, b),
         "smaller": lambda a, b: np.where(a < b, a, b),
@@ -183,8 +184,13 @@ class _Typed(ast.NodeTransformer):
         return node
 
     def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.stmt:
-        if node.value is None:
-            return node
+        if node.value is None:  # C makes a variable of it
+            kind, count = (
+                (node.annotation.value, node.annotation.slice)
+                if isinstance(node.annotation, ast.Subscript)
+                else (node.annotation, ast.Constant(0))
+            )
+            return ast.Assign([node.target], ast.Call(ast.Name("_variable", ast.Load()), [kind, count], []))
         return self.visit_Assign(ast.Assign([node.target], node.value))
 
     def visit_Assign(self, node: ast.Assign) -> ast.Assign:
@@ -202,6 +208,12 @@ class _Typed(ast.NodeTransformer):
 
     def visit_Constant(self, node: ast.Constant) -> ast.expr:
         return self._as(ast.Name("_double", ast.Load()), node) if isinstance(node.value, float) else node
+
+
+def _variable(kind: Any, count: int) -> Any:
+    """A local variable, or an array of so many: structs with their fields, all else 0."""
+    one = kind if getattr(kind, "__qualname__", "").startswith("_struct.") else partial(_convert, kind, 0)
+    return [one() for _ in range(count)] if count else one()
 
 
 def _struct(**kinds: Any) -> type:
@@ -226,7 +238,7 @@ def _cython(names: dict[str, Any]) -> ModuleType:
     vars(made).update(vars(Shadow))
 
     def declare(kind: Any = None, value: Any = None, **_: Any) -> Any:
-        return _convert(kind, value)
+        return None if value is None else _convert(kind, value)
 
     def cclass(made: type) -> type:
         """Gives each instance the structs that its class declares, as C does."""
@@ -243,7 +255,15 @@ def _cython(names: dict[str, Any]) -> ModuleType:
         return made
 
     types = {"double": np.float64, "float": np.float32, "Py_ssize_t": int, "int": int, "bint": bool}
-    vars(made).update(types, struct=_struct, declare=declare, cclass=cclass, cast=_convert, address=lambda value: value)
+    vars(made).update(
+        types,
+        sizeof=lambda kind: np.dtype(kind).itemsize,
+        struct=_struct,
+        declare=declare,
+        cclass=cclass,
+        cast=_convert,
+        address=lambda value: value,
+    )
     return made
 
 
@@ -260,7 +280,7 @@ def load(unit: str, dtype: Any = np.float32) -> ModuleType:
     }
     module = ModuleType(f"{unit}_reference")
     names = vars(module)
-    names.update(_convert=_convert, _double=np.float64)
+    names.update(_convert=_convert, _double=np.float64, _variable=_variable)
     for part in joining.parts(unit):
         kept = ast.parse("from __future__ import annotations").body
         for node in part.tree.body:

@@ -300,16 +300,18 @@ class ImpulseFrames:
         if fresh := self._listed is None:
             self._lanes = {name: np.zeros(room, real) for name in ("depth", "load", "impulse", "tangent_impulse")}
             self._lanes |= {"hit": np.zeros(room, np.int64), "hit_time": np.zeros(room)}
-        shared = (
-            {"lanes": begin[:0], "i": np.empty(0, np.uint32), "j": np.empty(0, np.uint32), "gap": none, "normal": none,
-             "listed": state.position, "moved": np.zeros_like(state.position), "reach": none[0], "share": none[0], "made_of": none,
-             "sized": 0, "varied": 0, "mixed": 0}
-            if wide is None
-            else {"lanes": wide.lanes, "i": wide.lane_i, "j": wide.lane_j, "gap": wide.gap, "normal": wide.normal,
-                  "listed": wide.origin, "moved": wide.moved, "reach": wide.reach, "share": wide.share, "made_of": wide.made_of,
-                  "sized": wide._sized, "varied": wide._varied, "mixed": wide._mixed}
-        )  # fmt: skip
-        self._engine.set_pairs(begin=begin, **shared, **self._lanes)
+        names = ("sized", "varied", "mixed")
+        if wide is None:
+            unsigned = np.empty(0, np.uint32)
+            arrays = {"lanes": begin[:0], "i": unsigned, "j": unsigned, "gap": none, "normal": none, "made_of": none}
+            arrays |= {"listed": state.position, "moved": np.zeros_like(state.position), "reach": none[0], "share": none[0]}
+            kinds = dict.fromkeys(names, 0)
+        else:
+            arrays = {"lanes": wide.lanes, "i": wide.lane_i, "j": wide.lane_j, "gap": wide.gap, "normal": wide.normal}
+            arrays |= {"listed": wide.origin, "moved": wide.moved, "reach": wide.reach, "share": wide.share}
+            arrays["made_of"] = wide.made_of
+            kinds = {name: getattr(wide, f"_{name}") for name in names}
+        self._engine.set_pairs(begin=begin, **arrays, **kinds, **self._lanes)
         if fresh:
             self._engine.give_impulses(self._particle, *self._kept)
             self._listed = begin
