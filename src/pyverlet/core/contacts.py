@@ -12,6 +12,7 @@ from cython.cimports.lanes import (
     both,
     choose,
     lanes,
+    lanes2,
     larger,
     load,
     mask,
@@ -19,6 +20,7 @@ from cython.cimports.lanes import (
     smaller,
     spread,
     store,
+    take,
 )
 
 from pyverlet.core.impacts import resolve_impacts
@@ -35,11 +37,22 @@ MOST_PASSES = cython.declare(cython.int, 8)
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def fast_ones(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: lanes, depth: lanes) -> mask:
-    """Those of the pairs from k on that meet in this substep, and bounce: faster than at rest, and apart a substep ago."""
-    fast: mask = both(above(spread(-w.rest_speed), speed), above(spread(-w.h) * speed, -depth))
-    if not w.restless and any_lane(fast):
-        fast = both(fast, above(spread(TOUCHED), load(w.load, k)))
+def fast_ones(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: lanes, depth: lanes, nx: lanes, ny: lanes) -> mask:
+    """Those of the pairs from k on that meet in this substep, and bounce.
+
+    They have restitution, meet faster than contacts at rest, and than what their contact has borne lately is worth; were apart a substep ago; and
+    would meet without the impulses of contacts, too: what only these push together carries load.
+    """
+    rest: lanes = spread(-w.rest_speed)
+    fast: mask = both(above(rest, speed), above(spread(-w.h) * speed, -depth))
+    if any_lane(fast):
+        u: lanes2 = take(w.free, w.i, k)
+        v: lanes2 = take(w.free, w.j, k)
+        fast = both(fast, above(rest, (v.x - u.x) * nx + (v.y - u.y) * ny))
+        fast = both(fast, above(load(w.restitution, k * w.mixed), spread(0)))
+        if not w.restless:
+            carried: lanes = load(w.load, k)
+            fast = both(fast, both(above(spread(TOUCHED), carried), above(rest + spread(4) * carried, speed)))
     return fast
 
 
@@ -74,8 +87,9 @@ def find_hits(w: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint)
         depth: lanes = load(w.depth, k)
         if any_above(depth + load(w.reach, k * w.sized), zero):
             m: Motion = motion_of(w, k, rough)
-            speed: lanes = (m.vx - m.ux) * load(w.normal_x, k) + (m.vy - m.uy) * load(w.normal_y, k)
-            fast: mask = fast_ones(w, k, speed, depth)
+            nx: lanes = load(w.normal_x, k)
+            ny: lanes = load(w.normal_y, k)
+            fast: mask = fast_ones(w, k, (m.vx - m.ux) * nx + (m.vy - m.uy) * ny, depth, nx, ny)
             if any_lane(fast):
                 count += note_hits(w, k, bits_of(fast), first + count)
     return count
@@ -136,7 +150,7 @@ def solve(w: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint, sof
             apart: lanes = before - (speed - depth * spread(1 / w.h))
             after = larger(choose(above(depth, zero), inside, apart), zero)
             after = choose(loaded, after, choose(above(speed, zero), zero, after))  # what parts without load is left alone
-            fast: mask = fast_ones(w, k, speed, depth)
+            fast: mask = fast_ones(w, k, speed, depth, nx, ny)
             if any_lane(fast):
                 count += note_hits(w, k, bits_of(fast), first + count)
                 after = choose(fast, before, after)

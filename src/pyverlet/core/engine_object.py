@@ -109,7 +109,7 @@ class Engine:
         return w.substep, bool(self.arrays["stale"][:parts].any())
 
     def take_impulses(self, particle):
-        """(pairs, values) of contacts that carry load or overlap: particles low < high (k, 2), sorted, and (k, 3) m/s.
+        """(pairs, values) of contacts that overlap, carry load or did lately: particles low < high (k, 2), sorted, and (k, 3) m/s.
 
         values: impulses along the normal and the tangent, and the load that the substep began with.
         """
@@ -120,7 +120,7 @@ class Engine:
         count: cython.Py_ssize_t = 0
         for s in range(w.groups):
             for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
-                count += w.impulse[k] > 0 or w.depth[k] > 0
+                count += w.impulse[k] > 0 or w.depth[k] > 0 or w.load[k] < 0
         pairs = np.empty((count, 2), np.int32)
         values = np.empty((count, 3), np.float64 if cython.sizeof(real) == 8 else np.float32)
         pair: cython.pointer(int32_t) = small_integers(pairs)
@@ -129,7 +129,7 @@ class Engine:
         for s in range(w.groups):
             for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
                 again: cython.bint = k > w.begin[s] and w.i[k] == w.i[k - 1] and w.j[k] == w.j[k - 1]
-                if not again and (w.impulse[k] > 0 or w.depth[k] > 0):
+                if not again and (w.impulse[k] > 0 or w.depth[k] > 0 or w.load[k] < 0):
                     p: int32_t = who[w.i[k]]
                     q: int32_t = who[w.j[k]]
                     pair[2 * count], pair[2 * count + 1] = min(p, q), max(p, q)
@@ -161,7 +161,7 @@ class Engine:
                 for n in range(first[min(p, q)], first[min(p, q) + 1]):
                     if pair[2 * n + 1] == max(p, q):
                         w.impulse[k], w.tangent_impulse[k], w.load[k] = value[3 * n], value[3 * n + 1], value[3 * n + 2]
-                        w.depth[k] = 1
+                        w.depth[k] = 1 if value[3 * n] > 0 or value[3 * n + 2] > 0 else -1
 
 
 @cython.cfunc

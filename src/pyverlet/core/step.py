@@ -13,7 +13,10 @@ CAGE = cython.declare(cython.int, 1)
 BOX = cython.declare(cython.int, 2)
 
 TOUCHED = cython.declare(real, 1e-30)
-"""Least load of pairs that overlapped or carried load a substep ago, m/s; pairs that were apart have 0."""
+"""Least load of pairs that overlapped or carried load a substep ago, m/s."""
+
+FADING = cython.declare(real, 0.7)
+"""What is left of the load of a contact after a substep without it."""
 
 MOST_JOINT = cython.declare(cython.int, 16)
 """Impacts that are solved together."""
@@ -46,7 +49,7 @@ Step = cython.struct(
     normal_x=cython.pointer(real),
     normal_y=cython.pointer(real),
     depth=cython.pointer(real),  # overlap, m; negative: a gap
-    load=cython.pointer(real),  # impulse that the substep began with, m/s; 0: they were apart a substep ago
+    load=cython.pointer(real),  # impulse that the substep began with, m/s; 0 or negative: apart a substep ago, and what is left of it
     impulse=cython.pointer(real),  # accumulated, along the normal and the tangent, over the reduced mass, m/s
     tangent_impulse=cython.pointer(real),
     hit=cython.pointer(int64_t),  # pairs of a group that meet fast, from its begin on

@@ -12,6 +12,8 @@ from cython.cimports.lanes import (
     lanes2,
     larger,
     load,
+    magnitude,
+    mask,
     real,
     smaller,
     spread,
@@ -22,7 +24,7 @@ from cython.cimports.lanes import (
 )
 
 from pyverlet.core.pairs_in_lanes import apply_impulses, clamped, motion_of
-from pyverlet.core.step import TOUCHED, Step
+from pyverlet.core.step import FADING, TOUCHED, Step
 
 
 @cython.cfunc
@@ -37,6 +39,8 @@ def measure(w: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint, w
     zero: lanes = spread(0)
     far: lanes = spread(w.far)
     weight: lanes = spread(w.rest_speed)
+    fading: lanes = spread(FADING)
+    least: lanes = spread(w.rest_speed * cython.cast(real, 0.01))
     scale: lanes = spread(w.scale if w.substep == w.first else cython.cast(real, 1))
     first: cython.Py_ssize_t = w.begin[s]
     end: cython.Py_ssize_t = first + w.lanes[s]
@@ -52,10 +56,12 @@ def measure(w: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint, w
         soon: lanes = reach + far
         loaded: cython.bint = any_above(impulse, zero)
         if warm:
-            # Load may double from one substep to the next: a blow is not given again and again.
-            touched: lanes = larger(load(w.depth, k), impulse)
-            impulse = smaller(impulse, load(w.load, k) * spread(2) + weight) * scale
-            store(w.load, k, choose(above(touched, zero), larger(impulse, spread(TOUCHED)), zero))
+            # Load may double from one substep to the next: a blow is not given again and again. What parts forgets it slowly.
+            before: lanes = magnitude(load(w.load, k))
+            touched: mask = above(larger(load(w.depth, k), impulse), zero)
+            impulse = smaller(impulse, before + before + weight) * scale
+            kept: lanes = smaller(least - fading * before, zero)
+            store(w.load, k, choose(touched, larger(impulse, spread(TOUCHED)), kept))
         if not loaded and not any_above(soon * soon, square):
             store(w.depth, k, -soon)
             continue

@@ -366,6 +366,7 @@ class World(Measures, Queries, Doors):
             h_last=self._h_last,
             slots=self._slots.save(self._state),
             contacts=self._contacts.save() if self._contacts else None,
+            impulses=self._impulses.save(),
             books=self._books and self._books.copy(),
             events=self._events and self._events.copy(),
             sleep=self._sleep and self._sleep.copy(),
@@ -402,3 +403,4 @@ class World(Measures, Queries, Doors):
             self._events.take(saved.events)
         if self._contacts:
             self._contacts.restore(saved.contacts, self._slots)
+        self._impulses.restore(saved.impulses)
