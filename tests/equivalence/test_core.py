@@ -28,7 +28,10 @@ def world(dtype: Any, *, friction: float = 0.3, restitution: float = 0.5, gravit
     x, y = np.meshgrid(np.arange(5) * 0.75 - 1.5, np.arange(4) * 0.75 - 1.5)
     place = np.column_stack((x.ravel(), y.ravel())) + chance.normal(0, 0.02, (20, 2))
     made.add(
-        position=place, velocity=chance.normal(0, 2, (20, 2)), radius=chance.uniform(0.2, 0.35, 20), mass=chance.uniform(0.5, 3, 20)
+        position=place,
+        velocity=chance.normal(0, 2, (20, 2)),
+        radius=chance.uniform(0.2, 0.35, 20),
+        mass=chance.uniform(0.5, 3, 20),
     )
     return made
 
@@ -56,7 +59,11 @@ def test_any_number_of_threads_has_the_same_bits(friction: float, monkeypatch: p
             collisions=pv.Collisions(impulses=True, friction=friction, restitution=0.3),
         )
         x, y = np.mgrid[0.5:30, 0.5:30]
-        made.add(position=np.column_stack((x.ravel(), y.ravel())), velocity=chance.normal(0, 3, (900, 2)), radius=chance.uniform(0.2, 0.45, 900))
+        made.add(
+            position=np.column_stack((x.ravel(), y.ravel())),
+            velocity=chance.normal(0, 3, (900, 2)),
+            radius=chance.uniform(0.2, 0.45, 900),
+        )
         made.run(seconds=0.5)
         assert made._impulses._parts == threads
         hashes.add(made.state_hash())

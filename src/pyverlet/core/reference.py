@@ -245,7 +245,7 @@ def _cython(names: dict[str, Any]) -> ModuleType:
         kinds = made.__annotations__
 
         def new(cls: type, *_: Any, **__: Any) -> Any:
-            self = object.__new__(cls)
+            self: Any = object.__new__(cls)
             for name, kind in kinds.items():
                 if getattr(names.get(kind), "__qualname__", "").startswith("_struct."):
                     setattr(self, name, names[kind]())

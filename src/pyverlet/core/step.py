@@ -49,7 +49,9 @@ Step = cython.struct(
     normal_x=cython.pointer(real),
     normal_y=cython.pointer(real),
     depth=cython.pointer(real),  # overlap, m; negative: a gap
-    load=cython.pointer(real),  # impulse that the substep began with, m/s; 0 or negative: apart a substep ago, and what is left of it
+    load=cython.pointer(
+        real
+    ),  # impulse that the substep began with, m/s; 0 or negative: apart a substep ago, and what is left of it
     impulse=cython.pointer(real),  # accumulated, along the normal and the tangent, over the reduced mass, m/s
     tangent_impulse=cython.pointer(real),
     hit=cython.pointer(int64_t),  # pairs of a group that meet fast, from its begin on

@@ -70,6 +70,8 @@ class ImpulseFrames:
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self._dtype = dtype
         self._engine: Any = None
+        self._synced = False  # whether `_motion` holds the velocities of now
+        self._parts = 1
         self.forget()
 
     def forget(self) -> None:
@@ -155,6 +157,8 @@ class ImpulseFrames:
         h, half = dt / substeps, world.integrator.velocity_lag
         first_kick = half * (h + (self._h if self._kick else 0.0)) if half else h
         self._stiffen(h, dt)
+        watch = world._watch(h, None) if contained else None
+        state.h = h
         rough = bool(contacts and contacts._rubs(state)) or getattr(world.boundary, "friction", 0.0) > 0.0
         step, stale = 0, None
         if contacts:
@@ -188,6 +192,8 @@ class ImpulseFrames:
         self._h, self._synced = h, False
         self._given[:, :2], self._given[:, 2] = self._gave, self._gave_spin
         self._end(world, dt, half * h)
+        if watch:
+            watch.close(state, contacts)
         done("finish")
 
     def _evaluate(self, world: Any, since: float, ahead: float) -> None:

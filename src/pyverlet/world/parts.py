@@ -108,7 +108,14 @@ IMPULSES = {
 
 FIELDS = {
     f"{room}.{name}": field
-    for room, fields in (("particles", PARTICLES), ("slots", SLOTS), ("contacts", CONTACTS), ("news", NEWS), ("linked", LINKED), ("impulses", IMPULSES))
+    for room, fields in (
+        ("particles", PARTICLES),
+        ("slots", SLOTS),
+        ("contacts", CONTACTS),
+        ("news", NEWS),
+        ("linked", LINKED),
+        ("impulses", IMPULSES),
+    )
     for name, field in fields.items()
 }
 

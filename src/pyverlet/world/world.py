@@ -136,7 +136,7 @@ class World(Measures, Queries, Doors):
         if not self._open(h, done):
             return False
         compiled = run.tells(done, self.profile.mark)
-        watch = self._watch(h) if contacts or course else None
+        watch = self._watch(h, self._h_last) if contacts or course else None
         while run.substep < self.substeps:
             self._show(run.substep * h, lag)
             if not run.leapt:
@@ -177,10 +177,10 @@ class World(Measures, Queries, Doors):
         self.profile.mark("gather")
         self._impulses.run(self, dt, self.profile.mark)
 
-    def _watch(self, h: float) -> Watch | None:
+    def _watch(self, h: float, h_last: float | None) -> Watch | None:
         """Who looks after the energy of this frame, if nothing but contacts, links and obstacles could raise it."""
         about = self._state, self._force_sum, self.links, self.boundary, self._course
-        return Watch(*about, self.substeps * h) if undriven(self, h, self._h_last) else None
+        return Watch(*about, self.substeps * h) if undriven(self, h, h_last) else None
 
     def _open(self, h: float, done: Callable[[str], None]) -> bool:
         """Take up what users have set, and begin; False if nobody is awake."""
