@@ -120,12 +120,14 @@ def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, hits: cython.Py_
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def solve(w: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint, soft: cython.bint) -> cython.Py_ssize_t:
+def solve(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint, soft: cython.bint) -> cython.Py_ssize_t:
     """One sweep over the contacts of group s; returns how many pairs meet so fast that they bounce, noted in `hit`.
 
     soft: springs push out what overlaps, and what is apart may close the gap and no more. Without, where contacts carry load,
     it takes back the speed of pushing out.
     """
+    own: Step = shared[0]  # which no store to an array can change: its fields stay in registers
+    w: cython.pointer(Step) = cython.address(own)
     zero: lanes = spread(0)
     third: lanes = spread(cython.cast(real, 1.0) / 3)
     near: lanes = spread(-w.near)
@@ -152,7 +154,7 @@ def solve(w: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint, sof
             after = choose(loaded, after, choose(above(speed, zero), zero, after))  # what parts without load is left alone
             fast: mask = fast_ones(w, k, speed, depth, nx, ny)
             if any_lane(fast):
-                count += note_hits(w, k, bits_of(fast), first + count)
+                count += note_hits(shared, k, bits_of(fast), first + count)
                 after = choose(fast, before, after)
         else:
             after = choose(loaded, larger(before - speed, zero), zero)

@@ -14,6 +14,17 @@ from pyverlet.core.frame import run_substeps, strays
 from pyverlet.core.step import Step
 
 
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def remembers(w: cython.pointer(Step), s: cython.Py_ssize_t, k: cython.Py_ssize_t) -> cython.bint:
+    """Whether lane k of group s has something to remember, and is no repeated pair."""
+    if not (w.impulse[k] > 0 or w.depth[k] > 0 or w.load[k] < 0):
+        return False
+    return not (k > w.begin[s] and w.i[k] == w.i[k - 1] and w.j[k] == w.j[k - 1])
+
+
 @cython.cclass
 class Engine:
     """Particles, their pairs and their room, and a team of threads. Arrays are named as in `Step`; the engine keeps them.
@@ -109,36 +120,37 @@ class Engine:
         return w.substep, bool(self.arrays["stale"][:parts].any())
 
     def take_impulses(self, particle):
-        """(pairs, values) of contacts that overlap, carry load or did lately: particles low < high (k, 2), sorted, and (k, 3) m/s.
+        """(pairs, values) of contacts that overlap, carry load or did lately: particles low < high (k, 2), and (k, 3) m/s.
 
-        values: impulses along the normal and the tangent, and the load that the substep began with.
+        Sorted by the lower. values: impulses along the normal and the tangent, and the load that the substep began with.
         """
         w: cython.pointer(Step) = cython.address(self.w)
         who: cython.pointer(int32_t) = small_integers(particle)
+        first = np.zeros(int(particle.max(initial=-1)) + 2, np.int64)
+        begin: cython.pointer(int64_t) = integers(first)
         s: cython.Py_ssize_t
         k: cython.Py_ssize_t
-        count: cython.Py_ssize_t = 0
         for s in range(w.groups):
             for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
-                count += w.impulse[k] > 0 or w.depth[k] > 0 or w.load[k] < 0
-        pairs = np.empty((count, 2), np.int32)
-        values = np.empty((count, 3), np.float64 if cython.sizeof(real) == 8 else np.float32)
+                if remembers(w, s, k):
+                    begin[min(who[w.i[k]], who[w.j[k]]) + 1] += 1
+        np.cumsum(first, out=first)
+        pairs = np.empty((first[-1], 2), np.int32)
+        values = np.empty((first[-1], 3), np.float64 if cython.sizeof(real) == 8 else np.float32)
         pair: cython.pointer(int32_t) = small_integers(pairs)
         value: cython.pointer(real) = reals(values)
-        count = 0
         for s in range(w.groups):
             for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
-                again: cython.bint = k > w.begin[s] and w.i[k] == w.i[k - 1] and w.j[k] == w.j[k - 1]
-                if not again and (w.impulse[k] > 0 or w.depth[k] > 0 or w.load[k] < 0):
+                if remembers(w, s, k):
                     p: int32_t = who[w.i[k]]
                     q: int32_t = who[w.j[k]]
-                    pair[2 * count], pair[2 * count + 1] = min(p, q), max(p, q)
-                    value[3 * count] = w.impulse[k]
-                    value[3 * count + 1] = w.tangent_impulse[k] if w.rough else 0
-                    value[3 * count + 2] = w.load[k]
-                    count += 1
-        order = np.lexsort((pairs[:count, 1], pairs[:count, 0]))
-        return pairs[:count][order], values[:count][order]
+                    n: int64_t = begin[min(p, q)]
+                    begin[min(p, q)] = n + 1
+                    pair[2 * n], pair[2 * n + 1] = min(p, q), max(p, q)
+                    value[3 * n] = w.impulse[k]
+                    value[3 * n + 1] = w.tangent_impulse[k] if w.rough else 0
+                    value[3 * n + 2] = w.load[k]
+        return pairs, values
 
     def give_impulses(self, particle, pairs, values):
         """Find them again for the pairs of another list; all others carry none."""

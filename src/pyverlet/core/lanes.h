@@ -53,6 +53,12 @@ LANES_INLINE int any_above(lanes a, lanes b) { return any_lane(a > b); }
 /* Of equal numbers, and where one is not a number, the second: (a > b ? a : b) and (a < b ? a : b), as C and SSE have it. */
 LANES_INLINE lanes larger(lanes a, lanes b) { return choose(a > b, a, b); }
 LANES_INLINE lanes smaller(lanes a, lanes b) { return choose(a < b, a, b); }
+LANES_INLINE real largest_lane(lanes a) {
+    real most = a[0];
+    for (int l = 1; l < LANES; l++)
+        most = a[l] > most ? a[l] : most;
+    return most;
+}
 LANES_INLINE lanes where_zero(lanes test, lanes a, lanes b) { return choose(test == spread(0), a, b); }
 LANES_INLINE lanes magnitude(lanes a) { return choose(a < spread(0), -a, a); }
 LANES_INLINE lanes square_root(lanes a) {
@@ -61,6 +67,9 @@ LANES_INLINE lanes square_root(lanes a) {
         r[l] = sizeof(real) == 4 ? sqrtf(a[l]) : sqrt(a[l]);
     return r;
 }
+
+/* Of points, x and y one after the other: x + y in both places. */
+LANES_INLINE lanes sum_of_pairs(lanes a) { return a + __builtin_shufflevector(a, a, 1, 0, 3, 2, 5, 4, 7, 6); }
 
 /* Numbers of the particles index[k] to index[k + 7]: one each (gather, scatter), two (take, put) or four (take4, put4). */
 LANES_INLINE lanes gather(const real *array, const uint32_t *index, int64_t k) {

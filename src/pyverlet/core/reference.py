@@ -94,9 +94,11 @@ def _lanes(real: Any) -> dict[str, Any]:
         "any_above": lambda a, b: bool(np.any(a > b)),
         "larger": lambda a, b: np.where(a > b, a, b),
         "smaller": lambda a, b: np.where(a < b, a, b),
+        "largest_lane": np.max,
         "where_zero": lambda test, a, b: np.where(test == 0, a, b),
         "magnitude": lambda a: np.where(a < 0, -a, a),
         "square_root": np.sqrt,
+        "sum_of_pairs": lambda a: a + a.reshape(-1, 2)[:, ::-1].reshape(-1),
         "gather": lambda array, index, k: array[at(index, k)],
         "scatter": scatter,
         "take": take,
@@ -226,6 +228,9 @@ def _struct(**kinds: Any) -> type:
 
         def __setattr__(self, name: str, value: Any) -> None:
             object.__setattr__(self, name, _convert(kinds[name], value))
+
+        def __getitem__(self, index: int) -> Struct:
+            return self
 
     return Struct
 

@@ -31,11 +31,13 @@ from pyverlet.core.step import FADING, TOUCHED, Step
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def measure(w: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint, warm: cython.bint) -> cython.void:
+def measure(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint, warm: cython.bint) -> cython.void:
     """Normals and depths of the pairs of group s. warm: with the impulses of the last substep.
 
     Pairs too far apart to meet in this substep get a depth that says so, and no normal.
     """
+    own: Step = shared[0]  # which no store to an array can change: its fields stay in registers
+    w: cython.pointer(Step) = cython.address(own)
     zero: lanes = spread(0)
     far: lanes = spread(w.far)
     weight: lanes = spread(w.rest_speed)
