@@ -117,6 +117,19 @@ class ImpulseFrames:
 
     # ---- a frame -------------------------------------------------------------------------------------------------------------
 
+    def step(self, world: Any, dt: float) -> None:
+        """Advance the slots of a world by a frame of dt seconds: all of `World.step` but for what its arrays become.
+
+        Raises:
+            InputError: there is something in the world that this law does not know yet.
+            NonFiniteError: a particle turned NaN or infinite.
+        """
+        self.check(world)
+        world._slots.clear_notes()
+        world._gather()
+        world.profile.mark("gather")
+        self.run(world, dt, world.profile.mark)
+
     def check(self, world: Any) -> None:
         """Refuse what this law does not know yet.
 

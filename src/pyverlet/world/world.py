@@ -120,8 +120,8 @@ class World(Measures, Queries, Doors):
         self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
         self.profile.begin()
         books = self._open_books(h)
-        if self.collisions and self.collisions.impulses:
-            self._impulse_frame(dt)
+        if self._by_impulses:
+            self._impulses.step(self, dt)
         elif not self._frame(h, self._listen(h, books or self.profile.mark)):
             self._refuse_non_finite(h)
         self._accept(dt, h, books)
@@ -131,8 +131,7 @@ class World(Measures, Queries, Doors):
         """The table of contents of the engine; `done` hears which stage has ended. True if all is known to be finite."""
         state, forces, integrator = self._slots, self._force_sum, self.integrator
         contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course or None
-        lag, state.drop, state.h, run = integrator.velocity_lag * h, integrator.drop, h, self._run.begin(contacts)
-        parts: list[Any] = [part for part in (contacts, course) if part]
+        lag, state.drop, state.h, run = integrator.velocity_lag * h, integrator.drop, h, self._run.begin(contacts, course)
         if not self._open(h, done):
             return False
         compiled = run.tells(done, self.profile.mark)
@@ -140,7 +139,7 @@ class World(Measures, Queries, Doors):
         while run.substep < self.substeps:
             self._show(run.substep * h, lag)
             if not run.leapt:
-                for part in parts:
+                for part in run.parts:
                     part.before(state, h)
                 if run.open(self, contacts if compiled else None, h, lag):
                     continue
@@ -168,14 +167,6 @@ class World(Measures, Queries, Doors):
                 done("links")
             run.substep += 1
         return self._finish(contacts, watch, h, done, marked=run.marked)
-
-    def _impulse_frame(self, dt: float) -> None:
-        """The same under the law of impulses, in the compiled core."""
-        self._impulses.check(self)
-        self._clear_notes()
-        self._gather()
-        self.profile.mark("gather")
-        self._impulses.run(self, dt, self.profile.mark)
 
     def _watch(self, h: float, h_last: float | None) -> Watch | None:
         """Who looks after the energy of this frame, if nothing but contacts, links and obstacles could raise it."""
@@ -337,7 +328,7 @@ class World(Measures, Queries, Doors):
     def collisions(self, value: Collisions | None) -> None:
         if value is not None and not isinstance(value, Collisions):
             raise InputError(f"collisions is {value!r}; allowed are pyverlet.Collisions(...) and None")
-        self._collisions = value
+        self._collisions, self._by_impulses = value, value is not None and value.impulses
         about = self._state.dtype, self.links.unlist, self._events, self._sleep
         self._contacts = None if value is None else ContactSolver(value, *about)
 
