@@ -21,6 +21,7 @@ ROOT = Path(pyverlet.__file__).parent
 # From the ground up. A room may use those below it; within a room, nothing goes in a circle.
 LAYERS = (
     "ground",
+    "core",
     "compile",
     "kernels",
     "state",

@@ -94,7 +94,7 @@ _kind(naive.ProjectOnly, "room")
 
 _kind(Fast, "skin")
 _kind(BruteForce)
-_kind(Collisions, "restitution", "friction", "method")
+_kind(Collisions, "restitution", "friction", "method", "impulses")
 
 for _integrator in integrators.BY_NAME.values():
     _kind(_integrator, *inspect.signature(_integrator).parameters)

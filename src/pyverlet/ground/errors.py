@@ -47,3 +47,7 @@ class NonFiniteError(PyverletError, ArithmeticError):
     def __reduce__(self) -> tuple[type[PyverletError], tuple[str]]:
         # An exception with a computed message does not pickle by itself; sweeps send errors between processes.
         return (PyverletError, (str(self),))
+
+
+class CoreError(PyverletError, ImportError):
+    """The compiled core cannot be loaded: damaged, missing, or made for another Python or processor."""

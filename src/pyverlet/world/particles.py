@@ -30,6 +30,7 @@ class Particles(Shared):
     _state: State
     _slots: Slots
     _contacts: ContactSolver | None
+    _impulses: Any
     forces: ForceList
     links: Links
     _where = slice(None)
@@ -167,7 +168,7 @@ class Particles(Shared):
 
     def _renumber(self, now: Array) -> None:
         """Tell those who hold a particle by its index where it is now, or that it is no more (-1)."""
-        for holder in (self.links, self._contacts, *self.forces):
+        for holder in (self.links, self._contacts, self._impulses, *self.forces):
             if isinstance(holder, Numbered):
                 holder.renumber(now)
 

@@ -25,6 +25,7 @@ from pyverlet.laws.ledger import Bookkeeper, Ledger
 from pyverlet.laws.links._set import BROKEN
 from pyverlet.laws.links._work import Past
 from pyverlet.laws.sleep import Sleep, laws
+from pyverlet.world.impulse_frames import ImpulseFrames, Memory
 from pyverlet.world.saved import Saved
 from pyverlet.world.world import World
 
@@ -97,9 +98,24 @@ LINKED = {
 }
 """What links remember of the particles they join."""
 
+IMPULSES = {
+    "pairs": Field(np.int32, "impulses", 2, least=0, below="particles"),
+    "values": Field(None, "impulses", 3),
+    "wall": Field(None, "remembered", 8),
+    "given": Field(None, "remembered", 3),
+}
+"""What contacts gave in the last substep: `world.impulse_frames.Memory`, of walls by particle."""
+
 FIELDS = {
     f"{room}.{name}": field
-    for room, fields in (("particles", PARTICLES), ("slots", SLOTS), ("contacts", CONTACTS), ("news", NEWS), ("linked", LINKED))
+    for room, fields in (
+        ("particles", PARTICLES),
+        ("slots", SLOTS),
+        ("contacts", CONTACTS),
+        ("news", NEWS),
+        ("linked", LINKED),
+        ("impulses", IMPULSES),
+    )
     for name, field in fields.items()
 }
 
@@ -122,6 +138,11 @@ def take_apart(world: World) -> Parts:
     arrays["particles.begun"] = np.array(world._state.begun, np.int64)
     arrays |= {f"slots.{name}": column for name, column in saved.slots.items()}
     facts["contacts"] = None if saved.contacts is None else _contacts_apart(saved.contacts, arrays)
+    memory = saved.impulses
+    facts["impulses"] = {"kick": memory.kick, "h": memory.h, "hertz": memory.hertz, "finer": memory.finer}
+    if memory.kick:
+        arrays |= {f"impulses.{name}": getattr(memory, name) for name in ("pairs", "values", "given")}
+        arrays["impulses.wall"] = np.ascontiguousarray(memory.wall.T)
     if saved.books:
         facts["books"] = {
             "energy": saved.books._energy, "resting": saved.books._resting, "ledger": saved.books.ledger.as_dict(),
@@ -191,6 +212,7 @@ def put_together(world: World, parts: Parts) -> Saved:
         h_last=None if h_last is None else checks.number("h_last", h_last, above=0.0),
         slots=_slots(world, parts.arrays),
         contacts=_contacts(world, facts.get("contacts"), parts.arrays),
+        impulses=_impulses(world, facts.get("impulses") or {}, parts.arrays),
         books=_books(facts["books"]) if world.keeps_ledger else None,
         events=_events(facts, parts.arrays) if world.tells_events else None,
         sleep=_sleep(world, facts["sleep"], parts.arrays) if world._sleep else None,
@@ -265,6 +287,21 @@ def _list(world: World, facts: Facts | None, arrays: dict[str, Array]) -> Any:
             raise InputError(f"mean_radius is {mean:g}; allowed is that of the particles, {float(world.radius.mean()):g}")
         kept = arrays["contacts.built"], arrays["contacts.checked"], allowed
     return kept, skin, age, hold, mean
+
+
+def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
+    numbers = {name: checks.number(name, facts.get(name, 0.0), least=0.0) for name in ("kick", "h", "hertz", "finer")}
+    if not numbers["kick"]:
+        return ImpulseFrames(world.dtype).save()
+    try:
+        pairs, values, wall, given = (arrays[f"impulses.{name}"] for name in ("pairs", "values", "wall", "given"))
+    except KeyError as error:
+        raise InputError(f"the array {error} is missing; allowed are files that have all") from None
+    if not (pairs[:, 0] < pairs[:, 1]).all() or not (np.diff(pairs[:, 0]) >= 0).all():
+        raise InputError("impulses.pairs are not sorted; allowed are pairs low < high, by the lower")
+    if len(given) > len(world):
+        raise InputError(f"impulses.given has {len(given)} rows; allowed are at most {len(world)}, one for each particle")
+    return Memory(pairs.copy(), values.copy(), np.ascontiguousarray(wall.T), given.copy(), **numbers)
 
 
 # ---- books, events and sleep -------------------------------------------------------------------------------------------

@@ -187,7 +187,7 @@ def _lattice(
 # ---- what circles may need, in parts -----------------------------------------------------------------------------------
 
 
-def _small(dtype: np.dtype[Any], threads: int, boundary: type[Boundary], elastic: float = 0.0, **collisions: float) -> World:
+def _small(dtype: np.dtype[Any], threads: int, boundary: type[Boundary], elastic: float = 0.0, **collisions: Any) -> World:
     """A world whose pairs are listed in the simple way, which is soon compiled. elastic: restitution of its walls."""
     how = Collisions(method=BruteForce(), **collisions)
     return _lattice(_enough(threads), dtype, boundary, elastic, how, threads=threads)

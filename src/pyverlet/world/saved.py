@@ -32,6 +32,7 @@ class Saved:
     h_last: float | None
     slots: dict[str, Array]
     contacts: Any
+    impulses: Any
     books: Bookkeeper | None
     events: Events | None
     sleep: Sleep | None

@@ -63,12 +63,14 @@ class Substeps:
         self._books: Page | None = None
         self._rows: Any = None  # forces, as numbers, and the dtype of the table made of them
         self._table: tuple[Array, ...] = ()
+        self.parts: list[Any] = []  # what looks at particles before each substep
         self._forces: Any = None
         self._beside: Any = None
 
-    def begin(self, contacts: ContactSolver | None) -> Substeps:
+    def begin(self, contacts: ContactSolver | None, course: Any) -> Substeps:
         """A frame begins. That before may have been broken off, and the user may have changed everything since."""
         self.substep, self.leapt, self.marked, self._out = 0, False, False, None
+        self.parts = [part for part in (contacts, course) if part]
         if contacts:
             contacts.broad_phase.strayed = None
         return self

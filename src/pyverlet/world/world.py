@@ -31,6 +31,7 @@ from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 from pyverlet.world.actors import Actor, act_once
 from pyverlet.world.convenience import Doors
+from pyverlet.world.impulse_frames import ImpulseFrames
 from pyverlet.world.measures import Measures
 from pyverlet.world.moments import Moment
 from pyverlet.world.profile import Profile
@@ -100,6 +101,7 @@ class World(Measures, Queries, Doors):
         self.boundary = Open() if boundary is None else boundary
         self.collisions, self.substeps, self.threads = collisions, substeps, threads
         self.time, self.frames, self.profile, self.actors = 0.0, 0, Profile(), list[Actor]()
+        self._impulses = ImpulseFrames(self._state.dtype)
         self._run, self._team, self._looks = Substeps(), Team(), (Coarse(), Precision())
         self.onlooker: Callable[[Moment], None] | None = None
         """Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins."""
@@ -120,7 +122,9 @@ class World(Measures, Queries, Doors):
             self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
             self.profile.begin()
             books = self._open_books(h)
-            if not self._frame(h, self._listen(h, books or self.profile.mark)):
+            if self._by_impulses:
+                self._impulses.step(self, dt)
+            elif not self._frame(h, self._listen(h, books or self.profile.mark)):
                 self._refuse_non_finite(h)
             self._accept(dt, h, books)
             self.profile.end()
@@ -129,16 +133,15 @@ class World(Measures, Queries, Doors):
         """The table of contents of the engine; `done` hears which stage has ended. True if all is known to be finite."""
         state, forces, integrator = self._slots, self._force_sum, self.integrator
         contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course or None
-        lag, state.drop, state.h, run = integrator.velocity_lag * h, integrator.drop, h, self._run.begin(contacts)
-        parts: list[Any] = [part for part in (contacts, course) if part]
+        lag, state.drop, state.h, run = integrator.velocity_lag * h, integrator.drop, h, self._run.begin(contacts, course)
         if not self._open(h, done):
             return False
         compiled = run.tells(done, self.profile.mark)
-        watch = self._watch(h) if contacts or course else None
+        watch = self._watch(h, self._h_last) if contacts or course else None
         while run.substep < self.substeps:
             self._show(run.substep * h, lag)
             if not run.leapt:
-                for part in parts:
+                for part in run.parts:
                     part.before(state, h)
                 if run.open(self, contacts if compiled else None, h, lag):
                     continue
@@ -167,10 +170,10 @@ class World(Measures, Queries, Doors):
             run.substep += 1
         return self._finish(contacts, watch, h, done, marked=run.marked)
 
-    def _watch(self, h: float) -> Watch | None:
+    def _watch(self, h: float, h_last: float | None) -> Watch | None:
         """Who looks after the energy of this frame, if nothing but contacts, links and obstacles could raise it."""
         about = self._state, self._force_sum, self.links, self.boundary, self._course
-        return Watch(*about, self.substeps * h) if undriven(self, h, self._h_last) else None
+        return Watch(*about, self.substeps * h) if undriven(self, h, h_last) else None
 
     def _open(self, h: float, done: Callable[[str], None]) -> bool:
         """Take up what users have set, and begin; False if nobody is awake."""
@@ -335,7 +338,7 @@ class World(Measures, Queries, Doors):
     def collisions(self, value: Collisions | None) -> None:
         if value is not None and not isinstance(value, Collisions):
             raise InputError(f"collisions is {value!r}; allowed are pyverlet.Collisions(...) and None")
-        self._collisions = value
+        self._collisions, self._by_impulses = value, value is not None and value.impulses
         about = self._state.dtype, self.links.unlist, self._events, self._sleep
         self._contacts = None if value is None else ContactSolver(value, *about)
 
@@ -364,6 +367,7 @@ class World(Measures, Queries, Doors):
             h_last=self._h_last,
             slots=self._slots.save(self._state),
             contacts=self._contacts.save() if self._contacts else None,
+            impulses=self._impulses.save(),
             books=self._books and self._books.copy(),
             events=self._events and self._events.copy(),
             sleep=self._sleep and self._sleep.copy(),
@@ -399,3 +403,4 @@ class World(Measures, Queries, Doors):
             self._events.take(saved.events)
         if self._contacts:
             self._contacts.restore(saved.contacts, self._slots)
+        self._impulses.restore(saved.impulses)

@@ -42,11 +42,15 @@ class Collisions:
         restitution: e, 0 to 1. An impact leaves with e times the normal speed it came with; contact at rest never bounces.
         friction: mu of Coulomb, 0 or more. 0 leaves spin alone.
         method: how pairs are found, Fast() or the O(n^2) reference BruteForce(). Both find the same contacts.
+        impulses: contacts remember impulses (docs/design/impulses.md): heaps stay at rest when the length of frames or the number
+            of substeps changes, in the room or on unequal masses. So far in worlds of circles, forces and a room, without
+            links, obstacles, events, a ledger or sleep.
     """
 
     restitution: float = 0.0
     friction: float = 0.0
     method: Fast | BruteForce = field(default_factory=Fast)
+    impulses: bool = False
 
     def __post_init__(self) -> None:
         checks.fraction("restitution", self.restitution)

@@ -1,0 +1,94 @@
+"""All units of the core for both precisions and all processors, as far as they have changed since the last time."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import sysconfig
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+from build_core.compiler import VARIANTS, compile_extension, signature
+from build_core.translate import CORE, ROOT, declarations, headers, joined_source, translate
+
+UNITS = ("engine", "tools")
+"""Units that are compiled for each precision and variant; the processor's own is compiled once."""
+
+WORK = ROOT / "build" / "core"
+
+
+@dataclass(frozen=True)
+class Target:
+    """One extension module."""
+
+    unit: str
+    name: str
+    variant: str
+    real64: bool
+
+    @property
+    def module(self) -> str:
+        return f"pyverlet.core.{self.variant}.{self.name}"
+
+    def path(self, root: Path) -> Path:
+        """Where it goes in a folder with packages."""
+        return root.joinpath(*self.module.split(".")).with_name(self.name + str(sysconfig.get_config_var("EXT_SUFFIX")))
+
+
+def targets(units: tuple[str, ...] = UNITS, variants: tuple[str, ...] = tuple(VARIANTS)) -> list[Target]:
+    """What is made of these units, for these variants."""
+    made = [Target("processor", "processor", "baseline", False)]
+    for unit in units:
+        for real64 in (False, True):
+            made += [Target(unit, f"{unit}_f{64 if real64 else 32}", variant, real64) for variant in variants]
+    return made
+
+
+def _translated(target: Target) -> tuple[Path, str]:
+    """The C of a target and a hash of it and its headers; Cython is called only if what it read has changed."""
+    folder = WORK / target.name
+    read = [joined_source(target.unit), *declarations(target.real64).values(), metadata.version("cython")]
+    stamp, state = folder / "translated", hashlib.sha256("\0".join(read).encode()).hexdigest()
+    source = folder / f"{target.name}.c"
+    if not (source.exists() and stamp.exists() and stamp.read_text() == state):
+        stamp.unlink(missing_ok=True)  # a failed translation leaves a file, too
+        translate(target.unit, target.name, target.real64, folder)
+        stamp.write_text(state)
+    return source, hashlib.sha256("\0".join([state, *headers().values(), signature()]).encode()).hexdigest()
+
+
+def _compiled(target: Target, source: Path, state: str) -> Path:
+    """The extension of a target in the work folder."""
+    made = target.path(WORK / "made")
+    stamp = WORK / target.name / f"compiled-{target.variant}{sysconfig.get_config_var('EXT_SUFFIX')}"
+    if not (made.exists() and stamp.exists() and stamp.read_text() == state):
+        compile_extension(source, made, target.variant, [CORE], ["REAL64"] if target.real64 else [])
+        stamp.write_text(state)
+    return made
+
+
+def build(root: Path, wanted: list[Target] | None = None) -> list[Path]:
+    """Compile what has changed, and put it all into a folder with packages. Returns the files.
+
+    Raises:
+        TranslationError: Cython does not take a source.
+        CompilerError: there is no C compiler, or it fails.
+    """
+    wanted = targets() if wanted is None else wanted
+    signature()  # finds a compiler, or says that there is none
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        sources = {name: pool.submit(_translated, target) for name, target in {each.name: each for each in wanted}.items()}
+        made = list(pool.map(lambda each: _compiled(each, *sources[each.name].result()), wanted))
+    placed = []
+    for target, path in zip(wanted, made, strict=True):
+        to = target.path(root)
+        to.parent.mkdir(parents=True, exist_ok=True)
+        if not (to.exists() and to.read_bytes() == path.read_bytes()):
+            part = to.with_name(f"{to.name}.tmp")
+            shutil.copy2(path, part)
+            part.replace(to)  # a process that has the old one loaded keeps it
+        placed.append(to)
+    return placed

@@ -1,0 +1,149 @@
+"""Find a C compiler, and call it."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from functools import cache
+from pathlib import Path
+
+FLAGS = [
+    "-O3",
+    "-ffp-contract=off",
+    "-fno-math-errno",
+    "-fno-trapping-math",
+    "-fno-strict-aliasing",
+    "-std=gnu11",
+    "-g0",
+    "-DNDEBUG",
+]
+"""Equal bits everywhere: nothing is contracted or reordered, so never -ffast-math."""
+
+QUIET = ["-w", "-DCYTHON_INLINE=inline __attribute__((always_inline))"]
+
+X86 = platform.machine().lower() in ("x86_64", "amd64")
+VARIANTS = {"baseline": "x86-64", "x86_64_v3": "x86-64-v3"} if X86 else {"baseline": ""}
+"""Sub-folder of the core -> processor it is compiled for."""
+
+
+class CompilerError(RuntimeError):
+    """No compiler, or one that fails, in one sentence."""
+
+
+def _candidates() -> list[list[str]]:
+    """Commands that may be a C compiler, the best first: clang's code is faster than gcc's."""
+    if given := os.environ.get("CC"):
+        return [shlex.split(given)]
+    found = [[path] for name in ("clang", "gcc", "cc") if (path := shutil.which(name))]
+    if importlib.util.find_spec("ziglang"):
+        found.append([sys.executable, "-m", "ziglang", "cc"])
+    return found
+
+
+def is_zig(command: list[str]) -> bool:
+    return "zig" in " ".join(command[-3:])
+
+
+def _works(command: list[str]) -> str:
+    """What is wrong with this compiler; empty if it makes a shared library of code like ours."""
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder, "try.c")
+        source.write_text("#include <math.h>\ntypedef float v __attribute__((vector_size(32)));\nv f(v a) { return a * a; }\n")
+        if sys.platform == "win32":
+            source.write_text("typedef float v __attribute__((vector_size(32)));\nv f(v a) { return a * a; }\n")
+        try:
+            _run([*command, "-shared", "-fPIC", str(source), "-o", str(Path(folder, "try.so"))])
+        except (OSError, CompilerError) as error:
+            return str(error)
+    return ""
+
+
+@cache
+def compiler() -> list[str]:
+    """The command of the C compiler that is used.
+
+    Raises:
+        CompilerError: there is none that works.
+    """
+    tried = []
+    for command in _candidates():
+        wrong = _works(command)
+        if not wrong:
+            return command
+        tried.append(f"{shlex.join(command)} fails ({wrong.strip().splitlines()[-1]})")
+    found = "; ".join(tried) or "none was found"
+    raise CompilerError(
+        f"pyverlet needs a C compiler to be built: {found}; install clang, gcc or `pip install ziglang`, or set CC to one"
+    )
+
+
+def has_compiler() -> bool:
+    """Whether there is one that works."""
+    try:
+        return bool(compiler())
+    except CompilerError:
+        return False
+
+
+def _run(command: list[str]) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        told = (done.stdout + done.stderr).splitlines()[:40]
+        raise CompilerError("\n".join([shlex.join(command), *told]))
+
+
+def _architecture(command: list[str], name: str) -> list[str]:
+    if not name:
+        return []
+    return [f"-march={name.replace('-', '_') if is_zig(command) else name}"]  # zig spells it with underscores
+
+
+def _linking() -> list[str]:
+    """How to make an extension module on this system."""
+    if sys.platform == "darwin":
+        machines = shlex.split(os.environ.get("ARCHFLAGS", ""))
+        return ["-bundle", "-undefined", "dynamic_lookup", *machines]
+    if sys.platform == "win32":
+        name = (
+            f"python{sys.version_info.major}{sys.version_info.minor}{'t' if sysconfig.get_config_var('Py_GIL_DISABLED') else ''}"
+        )
+        return ["-shared", f"-L{Path(sys.base_prefix, 'libs')}", f"-l{name}"]
+    return ["-shared", "-fPIC", "-pthread", "-Wl,--strip-all"]
+
+
+def compile_extension(source: Path, target: Path, variant: str, include: list[Path], defines: list[str]) -> None:
+    """Compile one C file to an extension module for the processors of a variant."""
+    command = compiler()
+    target.parent.mkdir(parents=True, exist_ok=True)
+    paths = [*include, Path(sysconfig.get_path("include")), Path(sysconfig.get_path("platinclude"))]
+    made = target.with_name(f"{target.name}.{os.getpid()}.tmp")  # whole or not at all
+    _run(
+        [
+            *command,
+            *FLAGS,
+            *QUIET,
+            *_architecture(command, VARIANTS[variant]),
+            *(f"-D{define}" for define in defines),
+            *(f"-I{path}" for path in dict.fromkeys(paths)),
+            str(source),
+            *_linking(),
+            "-o",
+            str(made),
+            *([] if sys.platform == "win32" else ["-lm"]),
+        ]
+    )
+    made.replace(target)
+    target.chmod(0o755)
+
+
+def signature() -> str:
+    """What a compiled file depends on beside its source."""
+    version = subprocess.run([*compiler(), "--version"], capture_output=True, text=True, check=False).stdout
+    return "\n".join([shlex.join(compiler()), version, *FLAGS, *QUIET, *_linking(), sys.version])

@@ -1,0 +1,88 @@
+"""Have Cython write the C of a unit for one precision."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+ROOT = Path(__file__).resolve().parent.parent
+CORE = ROOT / "src" / "pyverlet" / "core"
+DIRECTIVES = {
+    "language_level": 3,
+    "boundscheck": False,
+    "wraparound": False,
+    "cdivision": True,
+    "initializedcheck": False,
+    "freethreading_compatible": True,
+    "embedsignature": True,
+}
+
+
+class TranslationError(RuntimeError):
+    """What Cython does not take, by file and line."""
+
+
+def _load_joining() -> ModuleType:
+    """`pyverlet.core.joining`, without the package around it, which needs NumPy."""
+    spec = importlib.util.spec_from_file_location("pyverlet_joining", CORE / "joining.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = sys.modules["pyverlet_joining"] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+joining = _load_joining()
+
+
+def joined_source(unit: str) -> str:
+    """The joined modules of a unit, with the directives of Cython."""
+    header = "# cython: " + ", ".join(f"{name}={value}" for name, value in DIRECTIVES.items())
+    return f"{header}\n{joining.joined(unit)[0]}"
+
+
+def declarations(real64: bool) -> dict[str, str]:
+    """The .pxd files by name, with `real` of this precision."""
+    texts = {path.name: path.read_text(encoding="utf-8") for path in sorted(CORE.glob("*.pxd"))}
+    if real64:
+        texts["lanes.pxd"] = re.sub(r"\bfloat\b", "double", texts["lanes.pxd"])
+    return texts
+
+
+def headers() -> dict[str, str]:
+    """The C headers by name."""
+    return {path.name: path.read_text(encoding="utf-8") for path in sorted(CORE.glob("*.h"))}
+
+
+def _where(text: str, unit: str, name: str) -> str:
+    """Cython's messages with the files and lines of the modules instead of those of the joined source."""
+    begins = joining.joined(unit)[1]
+
+    def module_line(match: re.Match[str]) -> str:
+        line = int(match[1]) - 1  # the directives
+        path, before = [entry for entry in begins if entry[1] < line][-1]
+        return f"{path.relative_to(ROOT)}:{line - before}:"
+
+    return re.sub(rf"\S*{re.escape(name)}\.py:(\d+):", module_line, text)
+
+
+def translate(unit: str, name: str, real64: bool, folder: Path) -> Path:
+    """Write `name`.c into the folder, and return its path.
+
+    Raises:
+        TranslationError: Cython does not take the source; its messages name our files.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    source = folder / f"{name}.py"
+    source.write_text(joined_source(unit), encoding="utf-8")
+    for file, text in declarations(real64).items():
+        (folder / file).write_text(text, encoding="utf-8")
+    command = [sys.executable, "-m", "cython", "-3", "-I", str(folder), "-o", f"{name}.c", source.name]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise TranslationError(_where(done.stdout + done.stderr, unit, name))
+    return folder / f"{name}.c"

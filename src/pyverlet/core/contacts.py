@@ -1,0 +1,190 @@
+# mypy: ignore-errors
+"""Contacts of discs: soft constraints with accumulated impulses (TGS-soft: Catto, Solver2D, 2024), eight pairs at a time."""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import (
+    above,
+    any_above,
+    any_lane,
+    bits_of,
+    both,
+    choose,
+    lanes,
+    lanes2,
+    larger,
+    load,
+    mask,
+    real,
+    smaller,
+    spread,
+    store,
+    take,
+)
+
+from pyverlet.core.impacts import resolve_impacts
+from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, clamped, motion_of, slip_of
+from pyverlet.core.step import OPEN, TOUCHED, Step
+from pyverlet.core.walls import bounce_walls
+from pyverlet.core.warm_start import measure_pairs
+
+MOST_PASSES = cython.declare(cython.int, 8)
+"""Over a group of cell rows, until no pair in it bounces any more."""
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def fast_ones(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: lanes, depth: lanes, nx: lanes, ny: lanes) -> mask:
+    """Those of the pairs from k on that meet in this substep, and bounce.
+
+    They have restitution, meet faster than contacts at rest, and than what their contact has borne lately is worth; were apart a substep ago; and
+    would meet without the impulses of contacts, too: what only these push together carries load.
+    """
+    rest: lanes = spread(-w.rest_speed)
+    fast: mask = both(above(rest, speed), above(spread(-w.h) * speed, -depth))
+    if any_lane(fast):
+        u: lanes2 = take(w.free, w.i, k)
+        v: lanes2 = take(w.free, w.j, k)
+        fast = both(fast, above(rest, (v.x - u.x) * nx + (v.y - u.y) * ny))
+        fast = both(fast, above(load(w.restitution, k * w.mixed), spread(0)))
+        if not w.restless:
+            carried: lanes = load(w.load, k)
+            fast = both(fast, both(above(spread(TOUCHED), carried), above(rest + spread(4) * carried, speed)))
+    return fast
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def note_hits(w: cython.pointer(Step), k: cython.Py_ssize_t, bits: cython.int, place: cython.Py_ssize_t) -> cython.Py_ssize_t:
+    """Note in `hit`, from `place` on, those of the eight pairs from k on whose bits are set; returns how many there are."""
+    count: cython.Py_ssize_t = 0
+    lane: cython.Py_ssize_t
+    for lane in range(k, k + 8):
+        if (bits >> (lane - k)) & 1:
+            if lane > k and w.i[lane] == w.i[lane - 1] and w.j[lane] == w.j[lane - 1]:
+                continue  # a pair that is repeated to fill a batch
+            w.hit[place + count] = lane
+            count += 1
+    return count
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def find_hits(w: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint) -> cython.Py_ssize_t:
+    """Note in `hit` which pairs of group s meet so fast that they bounce; returns how many do."""
+    zero: lanes = spread(0)
+    first: cython.Py_ssize_t = w.begin[s]
+    end: cython.Py_ssize_t = first + w.lanes[s]
+    count: cython.Py_ssize_t = 0
+    k: cython.Py_ssize_t
+    for k in range(first, end, 8):
+        depth: lanes = load(w.depth, k)
+        if any_above(depth + load(w.reach, k * w.sized), zero):
+            m: Motion = motion_of(w, k, rough)
+            nx: lanes = load(w.normal_x, k)
+            ny: lanes = load(w.normal_y, k)
+            fast: mask = fast_ones(w, k, (m.vx - m.ux) * nx + (m.vy - m.uy) * ny, depth, nx, ny)
+            if any_lane(fast):
+                count += note_hits(w, k, bits_of(fast), first + count)
+    return count
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, hits: cython.Py_ssize_t) -> cython.void:
+    """Let pairs of group s that meet fast bounce, until none does; walls that they are thrown at throw them back."""
+    first: cython.Py_ssize_t = w.begin[s]
+    a: cython.Py_ssize_t
+    _: cython.int
+    for _ in range(MOST_PASSES):
+        left: cython.Py_ssize_t = resolve_impacts(w, first, hits) if hits else 0
+        if left == 0:
+            return
+        if w.room != OPEN:
+            for a in range(first, first + left):
+                k: cython.Py_ssize_t = w.hit[a] if w.hit[a] >= 0 else -1 - w.hit[a]
+                bounce_walls(w, w.i[k])
+                bounce_walls(w, w.j[k])
+        measure_pairs(w, s)
+        hits = find_hits(w, s, True) if w.rough else find_hits(w, s, False)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def solve(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint, soft: cython.bint) -> cython.Py_ssize_t:
+    """One sweep over the contacts of group s; returns how many pairs meet so fast that they bounce, noted in `hit`.
+
+    soft: springs push out what overlaps, and what is apart may close the gap and no more. Without, where contacts carry load,
+    it takes back the speed of pushing out.
+    """
+    own: Step = shared[0]  # which no store to an array can change: its fields stay in registers
+    w: cython.pointer(Step) = cython.address(own)
+    zero: lanes = spread(0)
+    third: lanes = spread(cython.cast(real, 1.0) / 3)
+    near: lanes = spread(-w.near)
+    first: cython.Py_ssize_t = w.begin[s]
+    end: cython.Py_ssize_t = first + w.lanes[s]
+    count: cython.Py_ssize_t = 0
+    k: cython.Py_ssize_t
+    for k in range(first, end, 8):
+        before: lanes = load(w.impulse, k)
+        loaded: mask = above(before, zero)
+        depth: lanes = load(w.depth, k) if soft else zero
+        if not any_lane(loaded) and not (soft and any_above(depth, near)):
+            continue
+        nx: lanes = load(w.normal_x, k)
+        ny: lanes = load(w.normal_y, k)
+        m: Motion = motion_of(w, k, rough)
+        speed: lanes = (m.vx - m.ux) * nx + (m.vy - m.uy) * ny
+        after: lanes
+        if soft:
+            bias: lanes = -smaller(spread(w.rate) * depth, spread(w.push))
+            inside: lanes = before - spread(w.stiff) * (speed + bias) - spread(w.leak) * before
+            apart: lanes = before - (speed - depth * spread(1 / w.h))
+            after = larger(choose(above(depth, zero), inside, apart), zero)
+            after = choose(loaded, after, choose(above(speed, zero), zero, after))  # what parts without load is left alone
+            fast: mask = fast_ones(w, k, speed, depth, nx, ny)
+            if any_lane(fast):
+                count += note_hits(shared, k, bits_of(fast), first + count)
+                after = choose(fast, before, after)
+        else:
+            after = choose(loaded, larger(before - speed, zero), zero)
+        store(w.impulse, k, after)
+        tangent: lanes = zero
+        if rough:
+            old: lanes = load(w.tangent_impulse, k)
+            new: lanes = clamped(old - third * slip_of(w, k, m, nx, ny), load(w.friction, k * w.mixed) * after)
+            store(w.tangent_impulse, k, new)
+            tangent = new - old
+        apply_impulses(w, k, rough, m, nx, ny, after - before, tangent)
+    return count
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def solve_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
+    """Soft contacts of group s; then pairs that meet fast bounce."""
+    hits: cython.Py_ssize_t = solve(w, s, True, True) if w.rough else solve(w, s, False, True)
+    if hits:
+        bounce_pairs(w, s, hits)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def relax_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
+    """Contacts of group s without their springs."""
+    if w.rough:
+        solve(w, s, True, False)
+    else:
+        solve(w, s, False, False)

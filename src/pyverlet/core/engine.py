@@ -1,0 +1,9 @@
+# mypy: ignore-errors
+"""The unit of the engine: what steps a world, and what is measured of it."""
+
+from __future__ import annotations
+
+from pyverlet.core.engine_object import Engine
+from pyverlet.core.measure import energies
+
+__all__ = ["Engine", "energies"]

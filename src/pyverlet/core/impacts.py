@@ -1,0 +1,266 @@
+# mypy: ignore-errors
+"""Impacts: pairs that meet faster than contacts at rest bounce in closed form, at their time within the substep.
+
+The path of a particle in a substep of length h is x(t) = x + u t - a t (h - t) / 2, with u its velocity in the middle of the
+substep (Stormer and Verlet). At the time of impact its velocity is u + a (t - h / 2). An impulse there changes u by d, and the
+position at the end by d (h - t): so it is stored as u + d and x - d t. Restitution is Newton's for single impacts, friction is
+Coulomb's (Walton and Braun 1986); pairs that share a particle and meet at the same time are solved together, by Poisson's
+hypothesis: the impulses that stop them, times 1 + e. Scalar code in double precision: impacts are rare.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import fabs, sqrt
+from cython.cimports.libc.stdint import int64_t
+
+from pyverlet.core.step import MOST_JOINT, Step
+
+NEVER = cython.declare(cython.double, 1e300)
+SAME_TIME = cython.declare(cython.double, 1e-3)  # of h
+JOINT_SWEEPS = cython.declare(cython.int, 200)
+
+Meeting = cython.struct(
+    i=cython.Py_ssize_t,
+    j=cython.Py_ssize_t,
+    part=cython.double,  # of i in the inverse mass of the pair
+    px=cython.double,  # from i to j at the start of the substep, m
+    py=cython.double,
+    ux=cython.double,  # velocity of j relative to i in the middle of the substep, m/s
+    uy=cython.double,
+    ax=cython.double,
+    ay=cython.double,
+)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def meeting(w: cython.pointer(Step), k: cython.Py_ssize_t) -> Meeting:
+    """Pair k as it is now."""
+    m: Meeting
+    m.i, m.j = w.i[k], w.j[k]
+    m.part = w.share[k * w.varied]
+    m.px = w.gap_x[k] + (w.moved[2 * m.j] - w.moved[2 * m.i])
+    m.py = w.gap_y[k] + (w.moved[2 * m.j + 1] - w.moved[2 * m.i + 1])
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    m.ux = v[width * m.j] - v[width * m.i]
+    m.uy = v[width * m.j + 1] - v[width * m.i + 1]
+    m.ax = w.acceleration[2 * m.j] - w.acceleration[2 * m.i]
+    m.ay = w.acceleration[2 * m.j + 1] - w.acceleration[2 * m.i + 1]
+    return m
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def time_of_impact(m: cython.pointer(Meeting), reach: cython.double, h: cython.double) -> cython.double:
+    """When the two are `reach` apart, s into the substep; 0 if they are nearer already, NEVER if not in this substep."""
+    near: cython.double = m.px * m.px + m.py * m.py - reach * reach
+    if near <= 0:
+        return 0.0
+    along: cython.double = m.px * m.ux + m.py * m.uy
+    square: cython.double = m.ux * m.ux + m.uy * m.uy
+    root: cython.double = along * along - square * near
+    if along >= 0 or root <= 0:
+        return NEVER
+    t: cython.double = near / (sqrt(root) - along)
+    _: cython.int
+    if m.ax != 0 or m.ay != 0:  # two of Newton's steps for the bend of the path
+        for _ in range(2):
+            half: cython.double = 0.5 * t * (h - t)
+            x: cython.double = m.px + m.ux * t - m.ax * half
+            y: cython.double = m.py + m.uy * t - m.ay * half
+            slope: cython.double = 2 * (x * (m.ux + m.ax * (t - 0.5 * h)) + y * (m.uy + m.ay * (t - 0.5 * h)))
+            if slope >= 0:
+                return NEVER
+            t -= (x * x + y * y - reach * reach) / slope
+    return max(t, 0.0) if t < h else NEVER
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def strike(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.double, dy: cython.double, turn: cython.double, t: cython.double
+) -> cython.void:
+    """Change the velocity of a particle by an impulse at time t; contacts do not remember it."""
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    v[width * i] += cython.cast(real, dx)
+    v[width * i + 1] += cython.cast(real, dy)
+    w.free[2 * i] += cython.cast(real, dx)
+    w.free[2 * i + 1] += cython.cast(real, dy)
+    if w.rough:
+        v[4 * i + 2] += cython.cast(real, turn)
+        w.free_spin[i] += cython.cast(real, turn)
+    w.position[2 * i] -= cython.cast(real, dx * t)
+    w.position[2 * i + 1] -= cython.cast(real, dy * t)
+    w.moved[2 * i] -= cython.cast(real, dx * t)
+    w.moved[2 * i + 1] -= cython.cast(real, dy * t)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def strike_pair(
+    w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(Meeting), jx: cython.double, jy: cython.double,
+    jt: cython.double, t: cython.double,
+) -> cython.void:  # fmt: skip
+    """Push j by (jx, jy) and i the other way, over the reduced mass; jt of it along the tangent turns them."""
+    at: cython.Py_ssize_t = k * w.mixed
+    rest: cython.double = 1 - m.part
+    strike(w, m.i, -jx * m.part, -jy * m.part, jt * m.part * w.turn_i[at], t)
+    strike(w, m.j, jx * rest, jy * rest, jt * rest * w.turn_j[at], t)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def rub(
+    w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(Meeting), nx: cython.double, ny: cython.double,
+    pushed: cython.double, t: cython.double,
+) -> cython.void:  # fmt: skip
+    """Friction of an impact that has pushed by `pushed` along n: the point of contact has the inverse mass 3 W along t."""
+    at: cython.Py_ssize_t = k * w.mixed
+    mu: cython.double = w.friction[at]
+    if not w.rough or mu == 0:
+        return
+    back: cython.double = t - 0.5 * cython.cast(cython.double, w.h)
+    ux: cython.double = w.motion[4 * m.j] - w.motion[4 * m.i] + m.ax * back
+    uy: cython.double = w.motion[4 * m.j + 1] - w.motion[4 * m.i + 1] + m.ay * back
+    slip: cython.double = ux * ny - uy * nx + w.motion[4 * m.i + 2] * w.radius_i[at] + w.motion[4 * m.j + 2] * w.radius_j[at]
+    most: cython.double = mu * pushed
+    jt: cython.double = min(max(-slip / 3, -most), most)
+    strike_pair(w, k, m, jt * ny, -jt * nx, jt, t)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def impact(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
+    """Let pair k bounce if it meets in this substep, and faster than contacts at rest do; whether it did."""
+    m: Meeting = meeting(w, k)
+    t: cython.double = time_of_impact(cython.address(m), w.reach[k * w.sized], w.h)
+    if t == NEVER:
+        return False
+    half: cython.double = 0.5 * t * (w.h - t)
+    back: cython.double = t - 0.5 * cython.cast(cython.double, w.h)
+    x: cython.double = m.px + m.ux * t - m.ax * half
+    y: cython.double = m.py + m.uy * t - m.ay * half
+    distance: cython.double = sqrt(x * x + y * y)
+    if distance == 0:
+        return False
+    x /= distance
+    y /= distance
+    speed: cython.double = (m.ux + m.ax * back) * x + (m.uy + m.ay * back) * y
+    if speed >= -w.rest_speed:
+        return False
+    push: cython.double = -(1 + w.restitution[k * w.mixed]) * speed
+    strike_pair(w, k, cython.address(m), push * x, push * y, 0, t)
+    rub(w, k, cython.address(m), x, y, push, t)
+    return True
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: cython.int, t: cython.double) -> cython.void:
+    """Pairs that share particles and meet at the same time: what stops them all, and e times as much again."""
+    m: Meeting[16]
+    nx: cython.double[16]
+    ny: cython.double[16]
+    given: cython.double[16]
+    back: cython.double = t - 0.5 * cython.cast(cython.double, w.h)
+    half: cython.double = 0.5 * t * (w.h - t)
+    g: cython.int
+    _: cython.int
+    for g in range(count):
+        m[g] = meeting(w, hits[g])
+        x: cython.double = m[g].px + m[g].ux * t - m[g].ax * half
+        y: cython.double = m[g].py + m[g].uy * t - m[g].ay * half
+        distance: cython.double = sqrt(x * x + y * y)
+        nx[g], ny[g], given[g] = x / distance, y / distance, 0
+    for _ in range(JOINT_SWEEPS):
+        largest: cython.double = 0
+        for g in range(count):
+            now: Meeting = meeting(w, hits[g])
+            speed: cython.double = (now.ux + now.ax * back) * nx[g] + (now.uy + now.ay * back) * ny[g]
+            after: cython.double = max(given[g] - speed, 0.0)
+            change: cython.double = after - given[g]
+            strike_pair(w, hits[g], cython.address(now), change * nx[g], change * ny[g], 0, t)
+            given[g] = after
+            largest = max(largest, fabs(change) / max(after, 1e-30) if after > 0 else 0.0)
+        if largest < (1e-14 if cython.sizeof(real) == 8 else 1e-7):
+            break
+    for g in range(count):
+        more: cython.double = w.restitution[hits[g] * w.mixed] * given[g]
+        strike_pair(w, hits[g], cython.address(m[g]), more * nx[g], more * ny[g], 0, t)
+    for g in range(count):
+        rub(w, hits[g], cython.address(m[g]), nx[g], ny[g], (1 + w.restitution[hits[g] * w.mixed]) * given[g], t)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def touches(w: cython.pointer(Step), k: cython.Py_ssize_t, hits: cython.pointer(int64_t), count: cython.int) -> cython.bint:
+    """Whether pair k shares a particle with one of these, and is none of them."""
+    g: cython.int
+    found: cython.bint = False
+    for g in range(count):
+        other: cython.Py_ssize_t = hits[g]
+        if w.i[other] == w.i[k] and w.j[other] == w.j[k]:
+            return False
+        found |= w.i[other] == w.i[k] or w.i[other] == w.j[k] or w.j[other] == w.i[k] or w.j[other] == w.j[k]
+    return found
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def resolve_impacts(w: cython.pointer(Step), first: cython.Py_ssize_t, count: cython.Py_ssize_t) -> cython.Py_ssize_t:
+    """The pairs in w.hit from `first` on, in the order of their times; 0 if none bounced, else how many are left in it."""
+    h: cython.double = w.h
+    a: cython.Py_ssize_t
+    b: cython.Py_ssize_t
+    kept: cython.Py_ssize_t = first
+    for a in range(first, first + count):
+        k: cython.Py_ssize_t = w.hit[a]
+        m: Meeting = meeting(w, k)
+        t: cython.double = time_of_impact(cython.address(m), w.reach[k * w.sized], h)
+        if t == NEVER:
+            continue
+        b = kept
+        while b > first and w.hit_time[b - 1] > t:
+            w.hit[b], w.hit_time[b] = w.hit[b - 1], w.hit_time[b - 1]
+            b -= 1
+        w.hit[b], w.hit_time[b] = k, t
+        kept += 1
+    bounced: cython.bint = False
+    group: int64_t[16]
+    a = first
+    while a < kept:
+        if w.hit[a] >= 0:
+            group[0] = w.hit[a]
+            size: cython.int = 1
+            again: cython.bint = True
+            while again and size < MOST_JOINT:
+                again = False
+                b = a + 1
+                while b < kept and w.hit_time[b] - w.hit_time[a] <= SAME_TIME * h and size < MOST_JOINT:
+                    if w.hit[b] >= 0 and touches(w, w.hit[b], group, size):
+                        group[size] = w.hit[b]
+                        w.hit[b] = -1 - w.hit[b]
+                        size += 1
+                        again = True
+                    b += 1
+            if size == 1:
+                bounced |= impact(w, group[0])
+            else:
+                joint_impact(w, group, size, w.hit_time[a])
+                bounced = True
+        a += 1
+    return kept - first if bounced else 0

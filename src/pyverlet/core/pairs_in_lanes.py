@@ -1,0 +1,86 @@
+# mypy: ignore-errors
+"""Eight pairs at a time: their velocities, and what impulses change of them.
+
+Impulses are kept over the reduced mass, in m/s, so that no formula knows the masses: w_i / (w_i + w_j) of an impulse moves i.
+Along the tangent (n_y, -n_x) the point of contact of two discs has three times the inverse mass (I = m r^2 / 2).
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import lanes, lanes2, lanes4, larger, load, put, put4, smaller, spread, take, take4
+
+from pyverlet.core.step import Step
+
+Motion = cython.struct(ux=lanes, uy=lanes, us=lanes, vx=lanes, vy=lanes, vs=lanes)
+"""Velocities u of i and v of j, m/s, and their spins, rad/s: 0 without friction."""
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def motion_of(w: cython.pointer(Step), k: cython.Py_ssize_t, rough: cython.bint) -> Motion:
+    """Of the pairs from k on."""
+    m: Motion
+    if rough:
+        a: lanes4 = take4(w.motion, w.i, k)
+        b: lanes4 = take4(w.motion, w.j, k)
+        m.ux, m.uy, m.us, m.vx, m.vy, m.vs = a.x, a.y, a.z, b.x, b.y, b.z
+    else:
+        u: lanes2 = take(w.velocity, w.i, k)
+        v: lanes2 = take(w.velocity, w.j, k)
+        m.ux, m.uy, m.us, m.vx, m.vy, m.vs = u.x, u.y, spread(0), v.x, v.y, spread(0)
+    return m
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def apply_impulses(
+    w: cython.pointer(Step),
+    k: cython.Py_ssize_t,
+    rough: cython.bint,
+    m: Motion,
+    nx: lanes,
+    ny: lanes,
+    normal: lanes,
+    tangent: lanes,
+) -> cython.void:
+    """Push the pairs from k on apart by `normal` along n, and by `tangent` across it, which turns them; m: as they move."""
+    part: lanes = load(w.share, k * w.varied)
+    other: lanes = spread(1) - part
+    x: lanes = normal * nx
+    y: lanes = normal * ny
+    if rough:
+        at: cython.Py_ssize_t = k * w.mixed
+        x = x + tangent * ny
+        y = y - tangent * nx
+        turned_i: lanes = m.us + tangent * part * load(w.turn_i, at)
+        turned_j: lanes = m.vs + tangent * other * load(w.turn_j, at)
+        put4(w.motion, w.i, k, m.ux - x * part, m.uy - y * part, turned_i, spread(0))
+        put4(w.motion, w.j, k, m.vx + x * other, m.vy + y * other, turned_j, spread(0))
+    else:
+        put(w.velocity, w.i, k, m.ux - x * part, m.uy - y * part)
+        put(w.velocity, w.j, k, m.vx + x * other, m.vy + y * other)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def slip_of(w: cython.pointer(Step), k: cython.Py_ssize_t, m: Motion, nx: lanes, ny: lanes) -> lanes:
+    """How fast the points of contact of the pairs from k on slip along the tangent, m/s."""
+    at: cython.Py_ssize_t = k * w.mixed
+    turns: lanes = m.us * load(w.radius_i, at) + m.vs * load(w.radius_j, at)
+    return (m.vx - m.ux) * ny - (m.vy - m.uy) * nx + turns
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def clamped(a: lanes, most: lanes) -> lanes:
+    """The number between -most and most that is nearest to a."""
+    return smaller(larger(a, -most), most)

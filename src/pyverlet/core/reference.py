@@ -1,0 +1,301 @@
+"""The kernels of a unit as plain Python: the readable reference, slow, with the bits of the compiled ones.
+
+`load("engine", np.float32)` runs the same files. What they take from C stands here in NumPy: a lane vector is an array of eight,
+the address of an array is the array, flat, and a struct is an object with attributes. Needs Cython, for its `cython` module.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Callable
+from functools import partial
+from types import ModuleType, SimpleNamespace
+from typing import Any, Final
+
+import numpy as np
+
+from pyverlet.core import joining
+
+_LANES: Final = 8
+
+
+def _integer(dtype: type[np.integer[Any]]) -> Callable[..., Any]:
+    """A C integer type: wraps around, truncates."""
+    bits = 8 * np.dtype(dtype).itemsize
+
+    def cast(value: Any = 0) -> Any:
+        whole = int(value) & ((1 << bits) - 1)
+        return dtype(whole - (1 << bits) if np.issubdtype(dtype, np.signedinteger) and whole >> (bits - 1) else whole)
+
+    return cast
+
+
+def _address(dtype: Any, *, writable: bool) -> Callable[[Any], Any]:
+    """What gives the address of an array: here the array as one row, which must be of the type and contiguous."""
+
+    def address(array: Any) -> Any:
+        wrong = array.dtype != dtype and not (dtype == np.uint8 and array.dtype == np.bool_)
+        if wrong:
+            raise TypeError(f"the array has items {array.dtype}; allowed is {np.dtype(dtype).name}")
+        if not array.flags.c_contiguous or (writable and not array.flags.writeable):
+            raise ValueError("the array is not C-contiguous and writable")
+        return array.reshape(-1)
+
+    return address
+
+
+def _lanes(real: Any) -> dict[str, Any]:
+    """`lanes.h` in NumPy."""
+
+    def at(index: Any, k: int, width: int = 1) -> Any:
+        return width * index[k : k + _LANES].astype(np.int64)
+
+    def store(array: Any, k: int, a: Any) -> None:
+        array[k : k + _LANES] = a
+
+    def scatter(array: Any, index: Any, k: int, a: Any) -> None:
+        array[at(index, k)] = a
+
+    def take(array: Any, index: Any, k: int) -> Any:
+        i = at(index, k, 2)
+        return SimpleNamespace(x=array[i], y=array[i + 1])
+
+    def take4(array: Any, index: Any, k: int) -> Any:
+        i = at(index, k, 4)
+        return SimpleNamespace(x=array[i], y=array[i + 1], z=array[i + 2], w=array[i + 3])
+
+    def put(array: Any, index: Any, k: int, *values: Any) -> None:
+        i = at(index, k, len(values))
+        for offset, value in enumerate(values):
+            array[i + offset] = value
+
+    def spread(a: Any) -> Any:
+        return np.full(_LANES, a, real)
+
+    return {
+        "LANES": _LANES,
+        "real": real,
+        "lanes": real,
+        "mask": np.bool_,
+        "lanes2": SimpleNamespace,
+        "lanes4": SimpleNamespace,
+        "spread": spread,
+        "load": lambda array, k: array[k : k + _LANES].copy(),
+        "store": store,
+        "above": np.greater,
+        "equal": np.equal,
+        "both": np.logical_and,
+        "either": np.logical_or,
+        "outside": np.logical_not,
+        "choose": lambda mask, a, b: np.where(mask, a, b),
+        "any_lane": np.any,
+        "bits_of": lambda mask: sum(1 << lane for lane in range(_LANES) if mask[lane]),
+        "any_above": lambda a, b: bool(np.any(a > b)),
+        "larger": lambda a, b: np.where(a > b, a, b),
+        "smaller": lambda a, b: np.where(a < b, a, b),
+        "largest_lane": np.max,
+        "where_zero": lambda test, a, b: np.where(test == 0, a, b),
+        "magnitude": lambda a: np.where(a < 0, -a, a),
+        "square_root": np.sqrt,
+        "sum_of_pairs": lambda a: a + a.reshape(-1, 2)[:, ::-1].reshape(-1),
+        "gather": lambda array, index, k: array[at(index, k)],
+        "scatter": scatter,
+        "take": take,
+        "put": put,
+        "take4": take4,
+        "put4": put,
+    }
+
+
+def _arrays(real: Any) -> dict[str, Any]:
+    """`arrays.h` in NumPy."""
+    types = {
+        "reals": real,
+        "doubles": np.float64,
+        "integers": np.int64,
+        "small_integers": np.int32,
+        "indices": np.uint32,
+        "words": np.uint64,
+        "shorts": np.uint16,
+        "octets": np.uint8,
+    }
+    made = {name: _address(dtype, writable=True) for name, dtype in types.items()}
+    return made | {f"const_{name}": _address(dtype, writable=False) for name, dtype in types.items()}
+
+
+def _team() -> dict[str, Any]:
+    """`team.h` with one thread."""
+    return {
+        "thread_team": SimpleNamespace,
+        "team_function": None,
+        "team_new": lambda threads: SimpleNamespace(threads=1, parts=1),
+        "team_run": lambda team, function, argument, parts: function(argument, 0, 1),
+        "team_barrier": lambda team: None,
+        "team_free": lambda team: None,
+    }
+
+
+def _math() -> dict[str, Any]:
+    """What kernels take from `libc.math`: functions of float64, and those of float32 whose name ends in f."""
+    made: dict[str, Any] = {"fabs": abs, "INFINITY": np.inf, "NAN": np.nan, "isfinite": math.isfinite, "isnan": math.isnan}
+    for name, function in (("sqrt", np.sqrt), ("floor", np.floor), ("ceil", np.ceil)):  # rounded alike everywhere
+        made |= {name: partial(_call, function, np.float64), f"{name}f": partial(_call, function, np.float32)}
+    for name in ("hypot", "sin", "cos", "atan2", "log", "exp", "pow"):
+        made[name] = partial(_call, getattr(math, name), np.float64)
+    return made
+
+
+def _call(function: Callable[..., Any], kind: Any, *values: Any) -> Any:
+    return kind(function(*map(kind, values)))
+
+
+_INTEGERS: Final = {
+    f"{sign}int{bits}_t": _integer(np.dtype(f"{sign}int{bits}").type) for sign in ("", "u") for bits in (8, 16, 32, 64)
+}
+
+
+def _convert(kind: Any, value: Any) -> Any:
+    """The value as C would keep it in a variable of this type; pointers and structs as they are."""
+    is_number = kind in (int, bool) or kind in _INTEGERS.values() or (isinstance(kind, type) and issubclass(kind, np.generic))
+    return kind(value) if is_number else value
+
+
+class _Typed(ast.NodeTransformer):
+    """Has declared variables keep the type they have in C, and numbers like 0.5 be doubles there."""
+
+    def __init__(self) -> None:
+        self.kinds: dict[str, ast.expr] = {}
+
+    def _as(self, kind: ast.expr, value: ast.expr) -> ast.expr:
+        return ast.Call(ast.Name("_convert", ast.Load()), [kind, value], [])
+
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.FunctionDef:
+        self.kinds = {}
+        for each in ast.walk(node):
+            if isinstance(each, ast.AnnAssign) and isinstance(each.target, ast.Name):
+                self.kinds[each.target.id] = each.annotation
+        taken: list[ast.stmt] = []
+        for argument in [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]:
+            if isinstance(argument.annotation, ast.Name | ast.Attribute):
+                self.kinds[argument.arg] = argument.annotation
+                value = self._as(argument.annotation, ast.Name(argument.arg, ast.Load()))
+                taken.append(ast.Assign([ast.Name(argument.arg, ast.Store())], value))
+        self.kinds = {name: kind for name, kind in self.kinds.items() if isinstance(kind, ast.Name | ast.Attribute)}
+        node.body = taken + [self.visit(statement) for statement in node.body]
+        return node
+
+    def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.stmt:
+        if node.value is None:  # C makes a variable of it
+            kind, count = (
+                (node.annotation.value, node.annotation.slice)
+                if isinstance(node.annotation, ast.Subscript)
+                else (node.annotation, ast.Constant(0))
+            )
+            return ast.Assign([node.target], ast.Call(ast.Name("_variable", ast.Load()), [kind, count], []))
+        return self.visit_Assign(ast.Assign([node.target], node.value))
+
+    def visit_Assign(self, node: ast.Assign) -> ast.Assign:
+        self.generic_visit(node)
+        target = node.targets[0]
+        if len(node.targets) == 1 and isinstance(target, ast.Name) and target.id in self.kinds:
+            node.value = self._as(self.kinds[target.id], node.value)
+        return node
+
+    def visit_AugAssign(self, node: ast.AugAssign) -> ast.stmt:
+        if not isinstance(node.target, ast.Name) or node.target.id not in self.kinds:
+            self.generic_visit(node)
+            return node
+        return self.visit_Assign(ast.Assign([node.target], ast.BinOp(ast.Name(node.target.id, ast.Load()), node.op, node.value)))
+
+    def visit_Constant(self, node: ast.Constant) -> ast.expr:
+        return self._as(ast.Name("_double", ast.Load()), node) if isinstance(node.value, float) else node
+
+
+def _variable(kind: Any, count: int) -> Any:
+    """A local variable, or an array of so many: structs with their fields, all else 0."""
+    one = kind if getattr(kind, "__qualname__", "").startswith("_struct.") else partial(_convert, kind, 0)
+    return [one() for _ in range(count)] if count else one()
+
+
+def _struct(**kinds: Any) -> type:
+    """A struct: attributes that keep their type, 0 at first."""
+
+    class Struct:
+        def __init__(self) -> None:
+            for name in kinds:
+                setattr(self, name, 0)
+
+        def __setattr__(self, name: str, value: Any) -> None:
+            object.__setattr__(self, name, _convert(kinds[name], value))
+
+        def __getitem__(self, index: int) -> Struct:
+            return self
+
+    return Struct
+
+
+def _cython(names: dict[str, Any]) -> ModuleType:
+    """Cython's own module for uncompiled code, with types and structs as above, and addresses that are what they are of."""
+    from Cython import Shadow  # only the reference needs it
+
+    made = ModuleType("cython")
+    vars(made).update(vars(Shadow))
+
+    def declare(kind: Any = None, value: Any = None, **_: Any) -> Any:
+        return None if value is None else _convert(kind, value)
+
+    def cclass(made: type) -> type:
+        """Gives each instance the structs that its class declares, as C does."""
+        kinds = made.__annotations__
+
+        def new(cls: type, *_: Any, **__: Any) -> Any:
+            self: Any = object.__new__(cls)
+            for name, kind in kinds.items():
+                if getattr(names.get(kind), "__qualname__", "").startswith("_struct."):
+                    setattr(self, name, names[kind]())
+            return self
+
+        made.__new__ = new  # type: ignore[assignment,method-assign]
+        return made
+
+    types = {"double": np.float64, "float": np.float32, "Py_ssize_t": int, "int": int, "bint": bool}
+    vars(made).update(
+        types,
+        sizeof=lambda kind: np.dtype(kind).itemsize,
+        struct=_struct,
+        declare=declare,
+        cclass=cclass,
+        cast=_convert,
+        address=lambda value: value,
+    )
+    return made
+
+
+def load(unit: str, dtype: Any = np.float32) -> ModuleType:
+    """The unit as a module of plain Python functions, for arrays of this precision."""
+    real = np.dtype(dtype).type
+    stand_ins = {
+        "lanes": _lanes(real),
+        "arrays": _arrays(real),
+        "team": _team(),
+        "libc.math": _math(),
+        "libc.stdint": _INTEGERS,
+        "processor": {"has_x86_64_v3": lambda: False},
+    }
+    module = ModuleType(f"{unit}_reference")
+    names = vars(module)
+    names.update(_convert=_convert, _double=np.float64, _variable=_variable)
+    for part in joining.parts(unit):
+        kept = ast.parse("from __future__ import annotations").body
+        for node in part.tree.body:
+            if isinstance(node, ast.Import) and node.names[0].name == "cython":
+                names["cython"] = _cython(names)
+            elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("cython.cimports."):
+                stand_in = stand_ins[str(node.module).removeprefix("cython.cimports.")]
+                names.update({alias.asname or alias.name: stand_in[alias.name] for alias in node.names})
+            else:
+                kept.append(_Typed().visit(node))
+        tree = ast.fix_missing_locations(ast.Module(kept, []))
+        exec(compile(tree, str(part.path), "exec"), names)
+    return module

@@ -1,0 +1,108 @@
+# mypy: ignore-errors
+"""The struct that all stages of a frame share: arrays of particles and pairs, and the numbers of a substep. SI units."""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
+from cython.cimports.team import thread_team
+
+OPEN = cython.declare(cython.int, 0)
+CAGE = cython.declare(cython.int, 1)
+BOX = cython.declare(cython.int, 2)
+
+TOUCHED = cython.declare(real, 1e-30)
+"""Least load of pairs that overlapped or carried load a substep ago, m/s."""
+
+FADING = cython.declare(real, 0.7)
+"""What is left of the load of a contact after a substep without it."""
+
+MOST_JOINT = cython.declare(cython.int, 16)
+"""Impacts that are solved together."""
+
+Step = cython.struct(
+    # ---- particles, in cell order
+    count=cython.Py_ssize_t,
+    position=cython.pointer(real),  # (count, 2) m
+    velocity=cython.pointer(real),  # (count, 2) m/s, of the middle of the substep
+    acceleration=cython.pointer(real),  # (count, 2) m/s^2 by gravity and forces
+    inverse_mass=cython.pointer(real),  # (count,) 1/kg, 0: pinned
+    radius=cython.pointer(real),  # (count,) m
+    motion=cython.pointer(real),  # (count, 4) velocity, spin and a spare, side by side; with friction
+    free=cython.pointer(real),  # (count, 2) velocity before any contact, m/s
+    free_spin=cython.pointer(real),  # (count,)
+    given=cython.pointer(real),  # (count, 2) what contacts gave in the last substep, m/s
+    given_spin=cython.pointer(real),  # (count,)
+    listed=cython.pointer(real),  # (count, 2) positions when the list of pairs was made
+    moved=cython.pointer(real),  # (count, 2) since then, m
+    checked=cython.pointer(real),  # (count, 2) positions when the list was last found to be good
+    # ---- candidate pairs, in batches of eight that share no particle, by groups of cell rows
+    groups=cython.Py_ssize_t,
+    begin=cython.pointer(int64_t),  # (groups + 1,) of its lanes
+    lanes=cython.pointer(int64_t),  # (groups,) how many there are
+    cut=cython.pointer(int64_t),  # (2, parts + 1) even and odd groups of each thread
+    i=cython.pointer(uint32_t),
+    j=cython.pointer(uint32_t),
+    gap_x=cython.pointer(real),  # from i to j when the list was made, m
+    gap_y=cython.pointer(real),
+    normal_x=cython.pointer(real),
+    normal_y=cython.pointer(real),
+    depth=cython.pointer(real),  # overlap, m; negative: a gap
+    load=cython.pointer(
+        real
+    ),  # impulse that the substep began with, m/s; 0 or negative: apart a substep ago, and what is left of it
+    impulse=cython.pointer(real),  # accumulated, along the normal and the tangent, over the reduced mass, m/s
+    tangent_impulse=cython.pointer(real),
+    hit=cython.pointer(int64_t),  # pairs of a group that meet fast, from its begin on
+    hit_time=cython.pointer(cython.double),  # s into the substep
+    # ---- what pairs are made of; one for all, or one a lane
+    reach=cython.pointer(real),  # r_i + r_j, m
+    share=cython.pointer(real),  # of i in the inverse mass of the pair
+    restitution=cython.pointer(real),
+    friction=cython.pointer(real),
+    radius_i=cython.pointer(real),
+    radius_j=cython.pointer(real),
+    turn_i=cython.pointer(real),  # 2 / r: how much an impulse along the tangent turns a disc
+    turn_j=cython.pointer(real),
+    sized=cython.Py_ssize_t,  # 1: one a lane, 0: one for all
+    varied=cython.Py_ssize_t,
+    mixed=cython.Py_ssize_t,
+    rough=cython.bint,  # whether any contact has friction
+    # ---- the room
+    room=cython.int,
+    x0=cython.double,  # of a box, and centre of a cage, m
+    y0=cython.double,
+    x1=cython.double,  # the other corner of a box; radius of a cage
+    y1=cython.double,
+    wall_restitution=cython.double,
+    wall_friction=cython.double,
+    wall_speed=cython.double,  # of the surface, counter-clockwise around a cage, m/s
+    wall_impulse=cython.pointer(real),  # (4, count) m/s, accumulated
+    wall_tangent=cython.pointer(real),
+    at_wall=cython.pointer(int32_t),  # (count,) particles that may reach a wall, from the first of each thread on
+    own_restitution=cython.pointer(real),  # (count,) negative: the wall's
+    own_friction=cython.pointer(real),
+    # ---- numbers of a substep
+    h=real,  # s
+    kick=real,  # s of acceleration that come first in a substep
+    opening=real,  # s, the same in the first substep of a call
+    taken_back=real,  # share of `given` that the velocity at the start of a frame already holds, else 0
+    scale=real,  # by which impulses are worth more in the first substep of a call than in the last one
+    rest_speed=real,  # contacts that meet more slowly rest, m/s
+    restless=cython.bint,  # nothing accelerates: nothing rests
+    rate=real,  # of the springs, 1/s
+    stiff=real,  # share of a violation that a sweep corrects
+    leak=real,  # share of the accumulated impulse that it lets go
+    push=real,  # fastest pushing out, m/s
+    near=real,  # gaps beyond are no contacts, m
+    far=real,  # pairs with larger gaps cannot meet in this substep, m
+    allowed=real,  # square of how far particles may move before the list needs a look, m^2
+    fastest=cython.pointer(real),  # (parts,) square of the largest speed
+    stale=cython.pointer(int32_t),  # (parts,) whether one has moved too far
+    first=cython.int,  # substep of this call
+    substep=cython.int,
+    substeps=cython.int,
+    relaxes=cython.int,
+    team=cython.pointer(thread_team),
+)

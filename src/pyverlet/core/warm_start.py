@@ -1,0 +1,107 @@
+# mypy: ignore-errors
+"""What a substep begins with: where pairs touch, and the impulses of the last substep, along the normals of now."""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import (
+    above,
+    any_above,
+    choose,
+    lanes,
+    lanes2,
+    larger,
+    load,
+    magnitude,
+    mask,
+    real,
+    smaller,
+    spread,
+    square_root,
+    store,
+    take,
+    where_zero,
+)
+
+from pyverlet.core.pairs_in_lanes import apply_impulses, clamped, motion_of
+from pyverlet.core.step import FADING, TOUCHED, Step
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def measure(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint, warm: cython.bint) -> cython.void:
+    """Normals and depths of the pairs of group s. warm: with the impulses of the last substep.
+
+    Pairs too far apart to meet in this substep get a depth that says so, and no normal.
+    """
+    own: Step = shared[0]  # which no store to an array can change: its fields stay in registers
+    w: cython.pointer(Step) = cython.address(own)
+    zero: lanes = spread(0)
+    far: lanes = spread(w.far)
+    weight: lanes = spread(w.rest_speed)
+    fading: lanes = spread(FADING)
+    least: lanes = spread(w.rest_speed * cython.cast(real, 0.01))
+    scale: lanes = spread(w.scale if w.substep == w.first else cython.cast(real, 1))
+    first: cython.Py_ssize_t = w.begin[s]
+    end: cython.Py_ssize_t = first + w.lanes[s]
+    k: cython.Py_ssize_t
+    for k in range(first, end, 8):
+        p: lanes2 = take(w.moved, w.i, k)
+        q: lanes2 = take(w.moved, w.j, k)
+        dx: lanes = load(w.gap_x, k) + (q.x - p.x)
+        dy: lanes = load(w.gap_y, k) + (q.y - p.y)
+        square: lanes = dx * dx + dy * dy
+        reach: lanes = load(w.reach, k * w.sized)
+        impulse: lanes = load(w.impulse, k)
+        soon: lanes = reach + far
+        loaded: cython.bint = any_above(impulse, zero)
+        if warm:
+            # Load may double from one substep to the next: a blow is not given again and again. What parts forgets it slowly.
+            before: lanes = magnitude(load(w.load, k))
+            touched: mask = above(larger(load(w.depth, k), impulse), zero)
+            impulse = smaller(impulse, before + before + weight) * scale
+            kept: lanes = smaller(least - fading * before, zero)
+            store(w.load, k, choose(touched, larger(impulse, spread(TOUCHED)), kept))
+        if not loaded and not any_above(soon * soon, square):
+            store(w.depth, k, -soon)
+            continue
+        distance: lanes = square_root(square)
+        dx = where_zero(distance, reach, dx)
+        distance = where_zero(distance, reach, distance)
+        per_metre: lanes = spread(1) / distance
+        nx: lanes = dx * per_metre
+        ny: lanes = dy * per_metre
+        store(w.normal_x, k, nx)
+        store(w.normal_y, k, ny)
+        store(w.depth, k, reach - distance)
+        if warm and loaded:
+            tangent: lanes = zero
+            if rough:
+                tangent = clamped(load(w.tangent_impulse, k) * scale, load(w.friction, k * w.mixed) * impulse)
+                store(w.tangent_impulse, k, tangent)
+            store(w.impulse, k, impulse)
+            apply_impulses(w, k, rough, motion_of(w, k, rough), nx, ny, impulse, tangent)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def measure_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
+    """Normals and depths of the pairs of group s."""
+    if w.rough:
+        measure(w, s, True, False)
+    else:
+        measure(w, s, False, False)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def warm_start(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
+    """The same, and what contacts gave in the last substep."""
+    if w.rough:
+        measure(w, s, True, True)
+    else:
+        measure(w, s, False, True)
