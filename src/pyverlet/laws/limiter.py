@@ -276,6 +276,12 @@ def undriven(world: Any, h: float, h_last: float | None) -> bool:
     return not world._course.drives
 
 
+def watched(world: Any, h: float, h_last: float | None) -> Watch | None:
+    """What looks after the energy of a frame, if nothing but contacts, links and obstacles could raise it."""
+    about = world._state, world._force_sum, world.links, world.boundary, world._course
+    return Watch(*about, world.substeps * h) if undriven(world, h, h_last) else None
+
+
 def pinned_move(state: State | Slots) -> bool:
     """Whether somebody pinned pushes others about: with infinite mass one goes on at its velocity, and nothing stops it."""
     return bool(measure.pinned_move(state.mass, state.velocity, state.spin))

@@ -16,6 +16,7 @@ from pyverlet.ground.constants import REST_ACCELERATIONS
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.laws.contacts.broadphase import Fast
 from pyverlet.laws.integrators import PositionVerlet, SemiImplicitEuler, TimeCorrectedVerlet
+from pyverlet.laws.limiter import watched
 from pyverlet.laws.rooms import Box, Circle, Open, Periodic
 from pyverlet.state.moves import first_non_finite
 from pyverlet.state.slots import Slots
@@ -170,7 +171,7 @@ class ImpulseFrames:
         h, half = dt / substeps, world.integrator.velocity_lag
         first_kick = half * (h + (self._h if self._kick else 0.0)) if half else h
         self._stiffen(h, dt)
-        watch = world._watch(h, None) if contained else None
+        watch = watched(world, dt / world.substeps, None) if contained else None
         state.h = h
         rough = bool(contacts and contacts._rubs(state)) or getattr(world.boundary, "friction", 0.0) > 0.0
         step, stale = 0, None

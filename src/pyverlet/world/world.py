@@ -19,7 +19,7 @@ from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceList, ForceSum
 from pyverlet.laws.integrators import Integrator, PositionVerlet
 from pyverlet.laws.ledger import Bookkeeper
-from pyverlet.laws.limiter import Watch, undriven
+from pyverlet.laws.limiter import Watch, watched
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.precision import Precision
@@ -67,8 +67,7 @@ class World(Measures, Queries, Doors):
         links: the links between particles, as a list.
         obstacles: what stands in the way, as a list.
         actors: list of those that act before each frame, such as emitters; they may add and remove actors, themselves too.
-        time: simulated seconds since the world was built.
-        frames: calls of `step` since then.
+        time, frames: simulated seconds, and calls of `step`, since the world was built.
         profile: the time of the last frame: `frame_ms`, and `stages`, ms by name.
 
     Raises:
@@ -101,8 +100,8 @@ class World(Measures, Queries, Doors):
         self.boundary = Open() if boundary is None else boundary
         self.collisions, self.substeps, self.threads = collisions, substeps, threads
         self.time, self.frames, self.profile, self.actors = 0.0, 0, Profile(), list[Actor]()
-        self._impulses = ImpulseFrames(self._state.dtype)
-        self._run, self._team, self._looks = Substeps(), Team(), (Coarse(), Precision())
+        self._run, self._impulses = Substeps(), ImpulseFrames(self._state.dtype)
+        self._team, self._looks = Team(), (Coarse(), Precision())
         self.onlooker: Callable[[Moment], None] | None = None
         """Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins."""
 
@@ -137,7 +136,7 @@ class World(Measures, Queries, Doors):
         if not self._open(h, done):
             return False
         compiled = run.tells(done, self.profile.mark)
-        watch = self._watch(h, self._h_last) if contacts or course else None
+        watch = watched(self, h, self._h_last) if contacts or course else None
         while run.substep < self.substeps:
             self._show(run.substep * h, lag)
             if not run.leapt:
@@ -169,11 +168,6 @@ class World(Measures, Queries, Doors):
                 done("links")
             run.substep += 1
         return self._finish(contacts, watch, h, done, marked=run.marked)
-
-    def _watch(self, h: float, h_last: float | None) -> Watch | None:
-        """Who looks after the energy of this frame, if nothing but contacts, links and obstacles could raise it."""
-        about = self._state, self._force_sum, self.links, self.boundary, self._course
-        return Watch(*about, self.substeps * h) if undriven(self, h, h_last) else None
 
     def _open(self, h: float, done: Callable[[str], None]) -> bool:
         """Take up what users have set, and begin; False if nobody is awake."""

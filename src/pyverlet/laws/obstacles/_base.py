@@ -149,7 +149,8 @@ class Obstacle(ABC):
         return {name: value for name, value in vars(self).items() if name not in left}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state, revision=next(_revisions), _drawn_at=None, _drawn=[])
+        vars(self).update(state, _drawn_at=None, _drawn=[])
+        self.revision = journal.note(self)
 
     @property
     def points(self) -> Points:
