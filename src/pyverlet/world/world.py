@@ -17,7 +17,7 @@ from pyverlet.laws.coarse import Coarse
 from pyverlet.laws.contacts.collisions import Collisions, ContactSolver
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceList, ForceSum
-from pyverlet.laws.integrators import Integrator, PositionVerlet
+from pyverlet.laws.integrators import Integrator, TimeCorrectedVerlet
 from pyverlet.laws.ledger import Bookkeeper
 from pyverlet.laws.limiter import Watch, watched
 from pyverlet.laws.links import Links
@@ -50,7 +50,7 @@ class World(Measures, Queries, Doors):
 
     Args:
         gravity: (x, y), m/s^2.
-        integrator: how positions and velocities advance over a substep.
+        integrator: how positions and velocities advance over a substep; TimeCorrectedVerlet if None.
         boundary: Circle, Box, Periodic or Open.
         collisions: how particles collide; None lets them pass through each other.
         substeps: steps of length h = dt / substeps in one call of `step`.
@@ -96,7 +96,7 @@ class World(Measures, Queries, Doors):
         self._events, self._touches = Events() if events else None, Touches() if contacts else None
         self._sleep, self._books = Sleep() if sleep else None, Bookkeeper() if ledger else None
         self._force_sum, self._course = ForceSum(checks.vector("gravity", gravity), self.forces), Course(self.obstacles)
-        self.integrator = PositionVerlet() if integrator is None else integrator
+        self.integrator = TimeCorrectedVerlet() if integrator is None else integrator
         self.boundary = Open() if boundary is None else boundary
         self.collisions, self.substeps, self.threads = collisions, substeps, threads
         self.time, self.frames, self.profile, self.actors = 0.0, 0, Profile(), list[Actor]()
@@ -279,7 +279,7 @@ class World(Measures, Queries, Doors):
 
     @gravity.setter
     def gravity(self, value: Sequence[float]) -> None:
-        self._force_sum.gravity = checks.vector("gravity", value)
+        self._force_sum.turn(checks.vector("gravity", value), self._state)
 
     @property
     def substeps(self) -> int:

@@ -119,6 +119,18 @@ class ForceSum:
             advance(state.velocity, state.velocity, state.acceleration, ahead)
             self.kick_drift(state, t, 0.0, ahead)
 
+    def turn(self, gravity: tuple[float, float], state: State) -> None:
+        """Gravity is another from now on.
+
+        Of particles in flight half of the last kick is taken back when a frame begins, for their velocity belongs to the end of
+        the frame before: it is to be that of the new gravity. Those at rest, or new, have no acceleration to take back.
+        """
+        change = np.subtract(gravity, self.gravity)
+        self.gravity = gravity
+        if change.any():
+            flies = state.acceleration.any(axis=1) & np.isfinite(state.mass)
+            state.acceleration[flies] += change.astype(state.dtype)
+
     def fall(self, state: Slots) -> None:
         """Gravity alone is to act in the next evaluation, which somebody else makes."""
         pull = state.reals(*self.gravity)
