@@ -6,6 +6,7 @@ import copy
 import multiprocessing
 import pickle
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -260,3 +261,25 @@ def test_a_copied_link_may_join_the_same_world() -> None:
     assert other.particles.tolist() == [[0, 1], [1, 2]]
     world.links.remove(link)
     assert world.links.append(link).length.tolist() == [2, 3]  # was told to have three, and refused
+
+
+def test_a_world_is_copied_between_two_frames_of_another_thread() -> None:
+    world = pv.World(gravity=(0, 0), dtype=np.float64, collisions=None)
+    world.add(position=np.zeros((500, 2)), velocity=(3.0, 0.0))
+    with ThreadPoolExecutor(1) as pool:
+        stepping = pool.submit(world.run, seconds=1)
+        copies = list[pv.World]()
+        while not stepping.done() or len(copies) < 3:
+            copies += [way(world) for way in WAYS]
+        stepping.result()
+    for again in copies:
+        assert again.time == pytest.approx(again.frames / 60)
+        assert np.allclose(again.position[:, 0], 3.0 * again.time, atol=1e-9)
+
+
+@pytest.mark.parametrize("protocol", range(pickle.HIGHEST_PROTOCOL + 1))
+def test_each_protocol_of_pickle_will_do(protocol: int) -> None:
+    world = heap()
+    balls, again = pickle.loads(pickle.dumps((world.groups[0], world), protocol))
+    assert balls.world is again
+    assert step(again, 3) == step(world, 3)

@@ -84,7 +84,8 @@ class State:
 
     def __getstate__(self) -> dict[str, Any]:
         kept = {"dtype": self.dtype, "_key": self.key, "seam": self.seam, "begun": self.begun, "version": self.version}
-        return kept | {"numbers": self.numbers, "_store": dict(self.arrays())}
+        with self.turn:
+            return kept | {"numbers": self.numbers, "_store": {name: array.copy() for name, array in self.arrays()}}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)

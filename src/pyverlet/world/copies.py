@@ -31,13 +31,13 @@ def settings(world: World) -> dict[str, Any]:
 
 
 def contents(world: World) -> dict[str, Any]:
-    """All there is in a world, of which the arrays of the particles are its own."""
+    """All there is in a world. Arrays are copies: the state itself is pickled later, when there may have been another frame."""
     moving = apart.take_apart(world)
     return {
         "settings": settings(world),
         "particles": world._state,
         "facts": moving.facts,
-        "arrays": {name: array for name, array in moving.arrays.items() if not name.startswith("particles.")},
+        "arrays": moving.arrays,
         "objects": {name: getattr(world, name) for name in _OBJECTS},
         "users": {name: value for name, value in vars(world).items() if name not in _own()},
     }
@@ -67,13 +67,13 @@ def take_up(world: World, given: dict[str, Any]) -> None:
     options, objects = given["settings"], given["objects"]
     most = jit.max_threads()
     World.__init__(world, **options | {"threads": options["threads"] and min(options["threads"], most)})
-    world._state = state = given["particles"]
-    arrays = {f"particles.{name}": array.copy() for name, array in state.arrays()}
+    world._state = given["particles"]
     world.links, world.forces, world.obstacles = objects["links"], objects["forces"], objects["obstacles"]
     world._force_sum.forces, world._course = world.forces, Course(world.obstacles)
     for name in ("boundary", "collisions", "integrator"):
         setattr(world, name, objects[name])
-    world.restore(apart.put_together(world, apart.Parts(given["facts"], arrays | given["arrays"])))
+    apart.fill(world, moving := apart.Parts(given["facts"], given["arrays"]))  # last: an integrator begins without accelerations
+    world.restore(apart.put_together(world, moving))
     world.actors = objects["actors"]  # they remember by themselves
     vars(world).update(given["users"])
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import ABCMeta, abstractmethod
+from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.state.group import Group
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import State
 
@@ -23,7 +25,17 @@ MOVING = ("intact", "force", "last")
 """Columns that a frame changes."""
 
 
-class Link(ABC):
+class _InTurn(ABCMeta):
+    """Links are made in one turn: no other thread removes particles between looking them up and noting their numbers."""
+
+    def __call__(cls, *ends: Any, **options: Any) -> Any:
+        groups = (part for end in ends for part in (end if isinstance(end, tuple) else (end,)) if isinstance(part, Group))
+        group = next(groups, None)
+        with group._state.turn if group is not None else nullcontext():
+            return super().__call__(*ends, **options)
+
+
+class Link(metaclass=_InTurn):
     """One or more links of a kind, added to a world by `world.links.append`.
 
     Attributes:
