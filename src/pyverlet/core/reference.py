@@ -109,6 +109,7 @@ def _arrays(real: Any) -> dict[str, Any]:
     """`arrays.h` in NumPy."""
     types = {
         "reals": real,
+        "singles": np.float32,
         "doubles": np.float64,
         "integers": np.int64,
         "small_integers": np.int32,
@@ -136,7 +137,12 @@ def _team() -> dict[str, Any]:
 def _math() -> dict[str, Any]:
     """What kernels take from `libc.math`: functions of float64, and those of float32 whose name ends in f."""
     made: dict[str, Any] = {"fabs": abs, "INFINITY": np.inf, "NAN": np.nan, "isfinite": math.isfinite, "isnan": math.isnan}
-    for name, function in (("sqrt", np.sqrt), ("floor", np.floor), ("ceil", np.ceil)):  # rounded alike everywhere
+    for name, function in (
+        ("sqrt", np.sqrt),
+        ("rint", np.rint),
+        ("floor", np.floor),
+        ("ceil", np.ceil),
+    ):  # rounded alike everywhere
         made |= {name: partial(_call, function, np.float64), f"{name}f": partial(_call, function, np.float32)}
     for name in ("hypot", "sin", "cos", "atan2", "log", "exp", "pow"):
         made[name] = partial(_call, getattr(math, name), np.float64)
@@ -161,8 +167,9 @@ def _convert(kind: Any, value: Any) -> Any:
 class _Typed(ast.NodeTransformer):
     """Has declared variables keep the type they have in C, and numbers like 0.5 be doubles there."""
 
-    def __init__(self) -> None:
+    def __init__(self, structs: set[str]) -> None:
         self.kinds: dict[str, ast.expr] = {}
+        self.structs = structs
 
     def _as(self, kind: ast.expr, value: ast.expr) -> ast.expr:
         return ast.Call(ast.Name("_convert", ast.Load()), [kind, value], [])
@@ -183,6 +190,8 @@ class _Typed(ast.NodeTransformer):
         return node
 
     def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.stmt:
+        if node.value is None and isinstance(node.annotation, ast.Name) and node.annotation.id in self.structs and self.kinds:
+            return ast.Assign([node.target], ast.Call(node.annotation, [], []))
         if node.value is None:
             return node
         return self.visit_Assign(ast.Assign([node.target], node.value))
@@ -202,6 +211,12 @@ class _Typed(ast.NodeTransformer):
 
     def visit_Constant(self, node: ast.Constant) -> ast.expr:
         return self._as(ast.Name("_double", ast.Load()), node) if isinstance(node.value, float) else node
+
+
+def _structs(tree: ast.Module) -> set[str]:
+    """The names that a module gives to structs."""
+    made = (node for node in tree.body if isinstance(node, ast.Assign) and isinstance(node.value, ast.Call))
+    return {ast.unparse(node.targets[0]) for node in made if ast.unparse(node.value).startswith("cython.struct(")}
 
 
 def _struct(**kinds: Any) -> type:
@@ -233,7 +248,7 @@ def _cython(names: dict[str, Any]) -> ModuleType:
         kinds = made.__annotations__
 
         def new(cls: type, *_: Any, **__: Any) -> Any:
-            self = object.__new__(cls)
+            self: Any = object.__new__(cls)
             for name, kind in kinds.items():
                 if getattr(names.get(kind), "__qualname__", "").startswith("_struct."):
                     setattr(self, name, names[kind]())
@@ -256,12 +271,14 @@ def load(unit: str, dtype: Any = np.float32) -> ModuleType:
         "team": _team(),
         "libc.math": _math(),
         "libc.stdint": _INTEGERS,
-        "processor": {"has_x86_64_v3": lambda: False},
+        "processor": {"has_x86_64_v3": lambda: False, "compiler_name": lambda: b"none"},
     }
     module = ModuleType(f"{unit}_reference")
     names = vars(module)
     names.update(_convert=_convert, _double=np.float64)
-    for part in joining.parts(unit):
+    parts = joining.parts(unit)
+    structs = {name for part in parts for name in _structs(part.tree)}
+    for part in parts:
         kept = ast.parse("from __future__ import annotations").body
         for node in part.tree.body:
             if isinstance(node, ast.Import) and node.names[0].name == "cython":
@@ -270,7 +287,7 @@ def load(unit: str, dtype: Any = np.float32) -> ModuleType:
                 stand_in = stand_ins[str(node.module).removeprefix("cython.cimports.")]
                 names.update({alias.asname or alias.name: stand_in[alias.name] for alias in node.names})
             else:
-                kept.append(_Typed().visit(node))
+                kept.append(_Typed(structs).visit(node))
         tree = ast.fix_missing_locations(ast.Module(kept, []))
         exec(compile(tree, str(part.path), "exec"), names)
     return module

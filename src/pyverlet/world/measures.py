@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.core import unit
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import measure
 from pyverlet.laws.contacts.collisions import Collisions, ContactSolver, Overlap, measure_overlap
 from pyverlet.laws.energy import Energy, energy
 from pyverlet.laws.events import Events, Place
@@ -183,7 +183,10 @@ class Measures(Particles):
 
     def _momenta(self) -> tuple[float, float, float]:
         s = self._state
-        return measure.momenta(s.position, s.velocity, s.spin, s.radius, s.mass)  # type: ignore[no-any-return]
+        found: tuple[float, float, float] = unit("engine", s.position.dtype).momenta(
+            s.position, s.velocity, s.spin, s.radius, s.mass
+        )
+        return found
 
     def overlap(self) -> Overlap:
         """Mean and largest overlap of the touching pairs, as fractions of their contact distance, and how many there are."""

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.core import unit
 from pyverlet.ground import checks
 from pyverlet.ground.constants import FED, PUSHED, REST_ACCELERATIONS, UNEVEN
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import overlap
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast, PairList, Strips
 from pyverlet.laws.contacts.growth import Growth
 from pyverlet.laws.contacts.loans import Lent, Loans
@@ -268,7 +268,8 @@ def measure_overlap(state: State, unlist: Unlist) -> Overlap:
     slots, phase = _listed(state, Fast(skin=0.0))
     pairs = phase.list
     unlist(pairs, slots.particle)
-    number, total, largest = overlap.overlaps(slots.position, slots.radius, *map(float, slots.seam.period), *pairs.listed())
+    overlaps = unit("engine", slots.position.dtype).overlaps
+    number, total, largest = overlaps(slots.position, slots.radius, *slots.seam.period, pairs.listed())
     return Overlap(total / number if number else 0.0, largest, number)
 
 
