@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from build_core.build import build, targets
+from build_core.compiler import CompilerError
 from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
 
-from build_core.build import build, targets
-from build_core.compiler import CompilerError
 
-
-class BuildCore(build_ext):
+class BuildCore(build_ext):  # type: ignore[misc]
     """Compile with `build_core` instead of the compiler that Python was built with."""
 
     def run(self) -> None:

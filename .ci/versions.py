@@ -23,9 +23,9 @@ ROOT = Path(__file__).resolve().parent.parent
 TESTED = ["unit", "equivalence", "physics", "data", "cli", "scenes", "picture", "record"]
 """Folders of tests that need no browser."""
 
-NEEDED = ["pytest>=8.3", "hypothesis>=6.100", "scipy>=1.13", "pytest-xdist>=3.6", "httpx>=0.27", "ase>=3.23"]
+NEEDED = ["pytest>=8.3", "hypothesis>=6.100", "scipy>=1.13", "pytest-xdist>=3.6", "httpx>=0.27", "ase>=3.23", "cython>=3.1"]
 
-GENERIC = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
+GENERIC = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "PYVERLET_CORE": "baseline"}
 
 HASHES = """
 import numpy as np, pyverlet as pv

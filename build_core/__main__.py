@@ -1,4 +1,4 @@
-"""`python -m build_core [--native] [unit ...]`: compile the core in place, into src/; only what has changed."""
+"""`python -m build_core [--native] [--precision 32] [unit ...]`: compile the core in place, into src/; only what has changed."""
 
 from __future__ import annotations
 
@@ -18,13 +18,17 @@ def main() -> None:
         "units", nargs="*", default=UNITS, metavar="unit", help=f"which to build, of {', '.join(UNITS)}; all by default"
     )
     parser.add_argument("--native", action="store_true", help="only for processors like this one; removes those for others")
+    parser.add_argument(
+        "--precision", type=int, choices=(32, 64), help="only this one, of 32 and 64 bits; leaves the other as it is"
+    )
     options = parser.parse_args()
     if unknown := set(options.units) - set(UNITS):
         parser.error(f"unit is {', '.join(sorted(unknown))}; allowed is {' or '.join(UNITS)}")
     start = time.monotonic()
     variants = tuple(VARIANTS)[-1:] if options.native else tuple(VARIANTS)
     try:
-        made = build(ROOT / "src", targets(tuple(options.units), variants))
+        wanted = targets(tuple(options.units), variants)
+        made = build(ROOT / "src", [each for each in wanted if options.precision in (None, 64 if each.real64 else 32)])
     except (TranslationError, CompilerError) as error:
         sys.exit(str(error))
     for unit in options.units if options.native else ():

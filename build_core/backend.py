@@ -37,12 +37,12 @@ def _compiler() -> list[str]:
 
 def get_requires_for_build_wheel(config_settings: Settings = None) -> list[str]:
     """What pip installs before it builds a wheel."""
-    return build_meta.get_requires_for_build_wheel(config_settings) + _compiler()
+    return [*build_meta.get_requires_for_build_wheel(config_settings), *_compiler()]
 
 
 def get_requires_for_build_editable(config_settings: Settings = None) -> list[str]:
     """What pip installs before it builds an editable install."""
-    return build_meta.get_requires_for_build_editable(config_settings) + _compiler()
+    return [*build_meta.get_requires_for_build_editable(config_settings), *_compiler()]
 
 
 def build_wheel(wheel_directory: str, config_settings: Settings = None, metadata_directory: str | None = None) -> str:

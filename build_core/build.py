@@ -49,15 +49,25 @@ def targets(units: tuple[str, ...] = UNITS, variants: tuple[str, ...] = tuple(VA
 
 def _translated(target: Target) -> tuple[Path, str]:
     """The C of a target and a hash of it and its headers; Cython is called only if what it read has changed."""
-    folder = WORK / target.name
-    read = [joined_source(target.unit), *declarations(target.real64).values(), metadata.version("cython")]
+    folder, text = WORK / target.name, joined_source(target.unit)
+
+    def used(file: str) -> bool:
+        return file.startswith("lanes") or f"cimports.{file.partition('.')[0]} " in text
+
+    read = [
+        text,
+        *(each for file, each in declarations(target.real64).items() if used(file)),
+        metadata.version("cython"),
+        target.name,
+    ]
     stamp, state = folder / "translated", hashlib.sha256("\0".join(read).encode()).hexdigest()
     source = folder / f"{target.name}.c"
     if not (source.exists() and stamp.exists() and stamp.read_text() == state):
         stamp.unlink(missing_ok=True)  # a failed translation leaves a file, too
         translate(target.unit, target.name, target.real64, folder)
         stamp.write_text(state)
-    return source, hashlib.sha256("\0".join([state, *headers().values(), signature()]).encode()).hexdigest()
+    included = (each for file, each in headers().items() if used(file))
+    return source, hashlib.sha256("\0".join([state, *included, signature()]).encode()).hexdigest()
 
 
 def _compiled(target: Target, source: Path, state: str) -> Path:

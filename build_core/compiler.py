@@ -19,7 +19,6 @@ FLAGS = [
     "-ffp-contract=off",
     "-fno-math-errno",
     "-fno-trapping-math",
-    "-fno-strict-aliasing",
     "-std=gnu11",
     "-g0",
     "-DNDEBUG",
@@ -39,15 +38,17 @@ class CompilerError(RuntimeError):
 
 def _candidates() -> list[list[str]]:
     """Commands that may be a C compiler, the best first: clang's code is faster than gcc's."""
+    zig = [sys.executable, "-m", "ziglang", "cc"]
     if given := os.environ.get("CC"):
-        return [shlex.split(given)]
+        return [zig if given == "ziglang" else shlex.split(given)]
     found = [[path] for name in ("clang", "gcc", "cc") if (path := shutil.which(name))]
     if importlib.util.find_spec("ziglang"):
-        found.append([sys.executable, "-m", "ziglang", "cc"])
+        found.append(zig)
     return found
 
 
 def is_zig(command: list[str]) -> bool:
+    """Whether this is the C compiler of ziglang, which spells some options in its own way."""
     return "zig" in " ".join(command[-3:])
 
 
@@ -80,7 +81,7 @@ def compiler() -> list[str]:
         tried.append(f"{shlex.join(command)} fails ({wrong.strip().splitlines()[-1]})")
     found = "; ".join(tried) or "none was found"
     raise CompilerError(
-        f"pyverlet needs a C compiler to be built: {found}; install clang, gcc or `pip install ziglang`, or set CC to one"
+        f"pyverlet needs a C compiler to be built: {found}; install clang or gcc, or set CC to one, or to `ziglang`"
     )
 
 
@@ -100,9 +101,12 @@ def _run(command: list[str]) -> None:
 
 
 def _architecture(command: list[str], name: str) -> list[str]:
-    if not name:
-        return []
-    return [f"-march={name.replace('-', '_') if is_zig(command) else name}"]  # zig spells it with underscores
+    """The options for a processor, and with zig for a C library so old that every Linux has one as new."""
+    options = [f"-march={name.replace('-', '_') if is_zig(command) else name}"] if name else []  # zig has underscores
+    system = str(sysconfig.get_config_var("MULTIARCH"))
+    if is_zig(command) and system in ("x86_64-linux-gnu", "aarch64-linux-gnu"):
+        options += ["-target", f"{system}.2.17"]
+    return options
 
 
 def _linking() -> list[str]:
@@ -143,6 +147,7 @@ def compile_extension(source: Path, target: Path, variant: str, include: list[Pa
     target.chmod(0o755)
 
 
+@cache
 def signature() -> str:
     """What a compiled file depends on beside its source."""
     version = subprocess.run([*compiler(), "--version"], capture_output=True, text=True, check=False).stdout

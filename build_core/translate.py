@@ -82,6 +82,7 @@ def translate(unit: str, name: str, real64: bool, folder: Path) -> Path:
     for file, text in declarations(real64).items():
         (folder / file).write_text(text, encoding="utf-8")
     command = [sys.executable, "-m", "cython", "-3", "-I", str(folder), "-o", f"{name}.c", source.name]
+    command += ["--module-name", f"pyverlet.core.{name}"]  # it puts itself among the modules by that name
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode:
         raise TranslationError(_where(done.stdout + done.stderr, unit, name))

@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Any
 from pyverlet.ground import loading, versions  # noqa: F401  (first: all that follows takes a second)
 
 # isort: split
+from pyverlet import core  # noqa: F401  (next: it may be missing, or made for another Python)
+
+# isort: split
 from pyverlet import scenes
 from pyverlet.ground import errors
 from pyverlet.ground.errors import CoarseCoordinatesWarning, CoarseStepWarning, InputError, NonFiniteError, PyverletError

@@ -10,12 +10,22 @@ import pytest
 from numpy.typing import NDArray
 
 import pyverlet as pv
-from pyverlet.kernels import lines, raster, stamps
+from pyverlet.core import reference, unit
 from pyverlet.picture import DARK, LIGHT, ByOrigin, BySpeed, Raster, View
 from pyverlet.picture.palette import swapped
 from pyverlet.viewers.frames import outline
 
 WHITE = 0xFFFFFF
+CACHE = reference.load("tools")
+CROWD, FINE, SIZES = CACHE.CROWD, CACHE.FINE, float(CACHE.SIZES)
+
+
+def draw_discs(pixels: NDArray[Any], ground: NDArray[Any], position: NDArray[Any], *others: Any) -> None:
+    unit("tools", position.dtype).draw_discs(pixels, ground, position, *others)
+
+
+def draw_lines(pixels: NDArray[Any], ends: NDArray[Any], *others: Any) -> None:
+    unit("tools", ends.dtype).draw_lines(pixels, ends, *others)
 
 
 def covered(
@@ -30,7 +40,7 @@ def covered(
     ground = np.zeros_like(pixels)
     for k in range(0, len(radius), at_a_time or len(radius)):
         some = slice(k, k + (at_a_time or len(radius)))
-        raster.circles(pixels, ground, position[some], radius[some], colour[some], 0.0, float(height), 1.0)
+        draw_discs(pixels, ground, position[some], radius[some], colour[some], 0.0, float(height), 1.0)
     return np.asarray((pixels >> 24) / 255)
 
 
@@ -77,7 +87,7 @@ def test_rims_that_meet_add_up_in_any_order() -> None:
 def test_a_disc_over_another_hides_it() -> None:
     pixels = np.zeros((20, 20), dtype=np.uint32)
     colour = np.array([0x0000FF, 0x00FF00], dtype=np.uint32)  # red below, green above
-    raster.circles(pixels, np.zeros_like(pixels), np.full((2, 2), 10.0), np.array([8.0, 5.0]), colour, 0.0, 20.0, 1.0)
+    draw_discs(pixels, np.zeros_like(pixels), np.full((2, 2), 10.0), np.array([8.0, 5.0]), colour, 0.0, 20.0, 1.0)
     rgba = pixels.view(np.uint8).reshape(20, 20, 4).astype(int)
     red, green, alpha = rgba[..., 0], rgba[..., 1], rgba[..., 3]
     assert red[10, 10] == 0
@@ -197,11 +207,11 @@ def test_lines_cover_their_width() -> None:
         [(50, 50), (50, 50)],
     ):
         pixels = np.zeros((80, 100), dtype=np.uint32)
-        lines.lines(pixels, np.array([ends], dtype=np.float32), np.full(1, WHITE, dtype=np.uint32), 0.0, 80.0, 1.0, 1.0)
+        draw_lines(pixels, np.array([ends], dtype=np.float32), np.full(1, WHITE, dtype=np.uint32), 0.0, 80.0, 1.0, 1.0)
         length = float(np.hypot(*np.subtract(*np.array(ends))))
         assert (pixels & 0xFF).sum() / 255 == pytest.approx(2 * length + np.pi, abs=0.02 * length + 0.3)
         assert not (pixels >> 24).any()
-    lines.lines(pixels, np.full((1, 2, 2), np.nan), np.full(1, WHITE, dtype=np.uint32), 0.0, 80.0, 1.0, 1.0)
+    draw_lines(pixels, np.full((1, 2, 2), np.nan), np.full(1, WHITE, dtype=np.uint32), 0.0, 80.0, 1.0, 1.0)
 
 
 def test_links_are_drawn_in_the_colour_of_their_pull() -> None:
@@ -260,7 +270,7 @@ def test_a_crowd_narrower_than_pixels_covers_their_sum_and_has_their_mean_colour
     pictures = []
     for order in (np.arange(count), rng.permutation(count)):
         pixels = ground.copy()
-        raster.circles(pixels, ground, place[order], np.full(count, r), colour[order], 0.0, float(size), 1.0)
+        draw_discs(pixels, ground, place[order], np.full(count, r), colour[order], 0.0, float(size), 1.0)
         pictures.append(pixels)
     assert (pictures[0] == pictures[1]).all()
     column, row = place[:, 0].astype(int), (size - place[:, 1]).astype(int)
@@ -283,10 +293,10 @@ def test_a_few_narrow_discs_cover_what_a_crowd_would() -> None:
     place, colour = np.column_stack((np.arange(10) + 0.5, np.full(10, 0.5))), np.full(10, 0x3060C0, dtype=np.uint32)
     ground = np.full((20, 20), 0x202020, dtype=np.uint32)
     alone, crowd = ground.copy(), ground.copy()
-    raster.circles(alone, ground, place, np.full(10, 0.3), colour, 0.0, 20.0, 1.0)
+    draw_discs(alone, ground, place, np.full(10, 0.3), colour, 0.0, 20.0, 1.0)
     others = rng.uniform((0, 10), (20, 20), (500, 2))
     all_of_them, colours = np.concatenate((place, others)), np.concatenate((colour, np.zeros(500, np.uint32)))
-    raster.circles(crowd, ground, all_of_them, np.full(510, 0.3), colours, 0.0, 20.0, 1.0)
+    draw_discs(crowd, ground, all_of_them, np.full(510, 0.3), colours, 0.0, 20.0, 1.0)
     few = [picture.view(np.uint8).reshape(20, 20, 4)[-1].astype(int) for picture in (alone, crowd)]
     assert (few[0][:10, 3] > 0).all()
     assert np.abs(few[0] - few[1]).max() <= 1
@@ -294,7 +304,7 @@ def test_a_few_narrow_discs_cover_what_a_crowd_would() -> None:
 
 def one_by_one(position: Any, radius: Any, size: tuple[int, int]) -> NDArray[np.float64]:
     """`covered`, in parts too small to be a crowd."""
-    return covered(position, radius, size, at_a_time=stamps.CROWD // 2)
+    return covered(position, radius, size, at_a_time=CROWD // 2)
 
 
 def on_a_lattice(radius: Any, apart: float, rng: Any) -> tuple[NDArray[np.float64], tuple[int, int]]:
@@ -310,44 +320,44 @@ def test_discs_of_a_crowd_are_as_large_as_others_and_nearly_where_they_are(radiu
     # A stamp is aside by 1 / 2 FINE at most along each axis, so that the rim within a pixel, no longer than 2, shifts by no more
     # than its diagonal: sqrt(2) / 32 * 2, and rounding on both sides.
     rng = np.random.default_rng(5)
-    radii = np.full(4 * stamps.CROWD, radius)
+    radii = np.full(4 * CROWD, radius)
     place, size = on_a_lattice(radii, 2 * radius + 4, rng)
     crowd, others = covered(place, radii, size), one_by_one(place, radii, size)
     assert (crowd != others).any()
-    assert np.abs(crowd - others).max() <= np.sqrt(2) / stamps.FINE + 1 / 255
+    assert np.abs(crowd - others).max() <= np.sqrt(2) / FINE + 1 / 255
     # Of those that are on the picture as a whole: the mean error of their areas is that of the rounding, as for single discs, but
     # of the FINE x FINE places eight at a time are mirror images with the same errors.
     whole = np.all((place > radius) & (place < np.array(size) - radius), axis=1)
     area = covered(place[whole], radii[whole], size).sum() / whole.sum()
     deviation = np.sqrt((8 * radius + 8) / 12) / 255
-    assert abs(area - np.pi * radius**2) < 4 * deviation / np.sqrt(stamps.FINE**2 / 8) + 2e-6 * (8 * radius + 8)
+    assert abs(area - np.pi * radius**2) < 4 * deviation / np.sqrt(FINE**2 / 8) + 2e-6 * (8 * radius + 8)
 
 
 @pytest.mark.slow
 def test_discs_of_a_crowd_of_many_sizes_are_nearly_as_large_as_others() -> None:
     # One stamp serves radii within a factor exp(1 / 128), more stamps than there is room for: areas are within two of these.
     rng = np.random.default_rng(6)
-    radii = rng.uniform(0.4, 9.0, 30 * stamps.CROWD)
+    radii = rng.uniform(0.4, 9.0, 30 * CROWD)
     place, size = on_a_lattice(radii, 22, rng)
     crowd, others = covered(place, radii, size), one_by_one(place, radii, size)
     corner = (22 * np.arange(int(np.ceil(np.sqrt(len(radii))))) - 10).clip(0)
     sums = [np.add.reduceat(np.add.reduceat(picture[::-1], corner, 0), corner, 1) for picture in (crowd, others)]
     assert np.abs(sums[0] - sums[1]).max() > 0
-    assert (np.abs(sums[0] - sums[1]) <= 2 / stamps.SIZES * sums[1] + rounding(9.0)).all()
+    assert (np.abs(sums[0] - sums[1]) <= 2 / SIZES * sums[1] + rounding(9.0)).all()
 
 
 def test_a_crowd_has_the_colours_of_others() -> None:
     # Centres are where stamps have them, so that each pixel is covered alike: A is one level off at most, R, G, B one more.
     rng = np.random.default_rng(7)
-    count, size, radius = 3 * stamps.CROWD, 200, 2.3
-    place = rng.integers(8, size - 8, (count, 2)) + (rng.integers(0, stamps.FINE, (count, 2)) + 0.5) / stamps.FINE
+    count, size, radius = 3 * CROWD, 200, 2.3
+    place = rng.integers(8, size - 8, (count, 2)) + (rng.integers(0, FINE, (count, 2)) + 0.5) / FINE
     colour, ground = rng.integers(0, 1 << 24, count).astype(np.uint32), np.full((size, size), 0x405060, dtype=np.uint32)
     crowd, others = ground.copy(), ground.copy()
-    for pixels, part in ((crowd, count), (others, stamps.CROWD - 1)):
+    for pixels, part in ((crowd, count), (others, CROWD - 1)):
         for k in range(0, count, part):
             some = slice(k, k + part)
             radii = np.full(len(place[some]), radius)
-            raster.circles(pixels, ground, place[some], radii, colour[some], 0.0, float(size), 1.0)
+            draw_discs(pixels, ground, place[some], radii, colour[some], 0.0, float(size), 1.0)
     rgba = [pixels.view(np.uint8).reshape(size, size, 4).astype(int) for pixels in (crowd, others)]
     assert np.abs(rgba[0] - rgba[1]).max() <= 2
     assert (crowd != ground).mean() > 0.5

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pyverlet import core
 from pyverlet.kernels import measure
 
 
@@ -20,6 +21,7 @@ def test_mechanical_energy_is_the_sum_of_all_three(dtype: Any, count: int, lag: 
     mass[rng.random(count) < 0.1] = np.inf
     total = measure.mechanical(position, velocity, acceleration, lag, spin, radius, mass, 1.0, -9.81)
     moved = velocity.astype(float) + lag * acceleration.astype(float)
-    parts = measure.energies(position.astype(float), moved, spin, radius, mass, 1.0, -9.81)
+    arrays = (array.astype(float) for array in (position, moved, spin, radius, mass))
+    parts = core.unit("engine", float).energies(*arrays, 1.0, -9.81)
     # 10,000 terms of up to some 1e3 J, which cancel in part, each rounded in float64.
     assert total == pytest.approx(sum(parts), rel=1e-12, abs=1e-9)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import typer
 
-from pyverlet.cli import _lab, _new, _record, _replay, _scene, _tables  # noqa: F401  (they register their commands)
+from pyverlet.cli import _lab, _new, _record, _replay, _scene, _tables, _versions  # noqa: F401  (they register their commands)
 from pyverlet.cli._app import app
 from pyverlet.ground import loading
 from pyverlet.ground.errors import InputError, Interrupted, PyverletError

@@ -10,6 +10,7 @@ import functools
 import importlib.util
 import os
 import platform
+import struct
 import sys
 from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader
 from pathlib import Path
@@ -18,6 +19,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from pyverlet.ground import loading
 from pyverlet.ground.errors import CoreError
 
 VARIANTS: Final = ("x86_64_v3", "baseline")
@@ -34,6 +36,16 @@ def _extension(variant: str, name: str) -> Path | None:
     return next((path for path in paths if path.exists()), None)
 
 
+def _is_truncated(path: Path) -> bool:
+    """Whether the end of an ELF file is missing: the system would end the process when it gets there."""
+    with path.open("rb") as file:
+        header = file.read(64)
+    if header[:6] != b"\x7fELF\x02\x01" or len(header) < 64:
+        return path.stat().st_size < 64
+    sections, size, count = struct.unpack_from("<Q", header, 40)[0], *struct.unpack_from("<HH", header, 58)
+    return bool(path.stat().st_size < sections + size * count)
+
+
 def _load(variant: str, name: str) -> ModuleType:
     """Load a compiled unit."""
     path = _extension(variant, name)
@@ -42,7 +54,9 @@ def _load(variant: str, name: str) -> ModuleType:
         others = sorted(path.name for path in (_FOLDER / variant).glob(f"{name}.*"))
         has = f"only {', '.join(others)}" if others else "none"
         raise CoreError(f"pyverlet has no compiled core for {here} ({name} of {variant}: there is {has}); {_REBUILD}")
-    full = f"{__name__}.{variant}.{name}"
+    if _is_truncated(path):
+        raise CoreError(f"the compiled core {path} is damaged: its end is missing; {_REBUILD}")
+    full = f"{__name__}.{name}"
     spec = importlib.util.spec_from_file_location(full, path, loader=ExtensionFileLoader(full, str(path)))
     assert spec is not None
     assert spec.loader is not None
@@ -51,25 +65,44 @@ def _load(variant: str, name: str) -> ModuleType:
         spec.loader.exec_module(module)
     except Exception as error:
         raise CoreError(f"the compiled core {path} cannot be loaded by {here} ({error}); {_REBUILD}") from error
-    sys.modules[full] = module
     return module
 
 
 @functools.cache
-def variant() -> str:
-    """Which variant of the core this process uses: one of `VARIANTS`, the fastest that the processor runs.
+def _processor() -> Any:
+    """The unit that knows the processor, compiled for any."""
+    return _load("baseline", "processor")
+
+
+@functools.cache
+def variants() -> tuple[str, ...]:
+    """The variants of the core that this processor runs, the fastest first.
 
     Raises:
-        CoreError: `PYVERLET_CORE` names none, or one that the processor cannot run; the compiled core is damaged or missing.
+        CoreError: the compiled core is damaged, missing, or made for another Python or processor.
     """
-    runs = ["baseline"]
-    if _load("baseline", "processor").supports_x86_64_v3():
-        runs.insert(0, "x86_64_v3")
-    present = [name for name in runs if (_FOLDER / name).is_dir()]
-    wanted = os.environ.get("PYVERLET_CORE", "")
-    if wanted and wanted not in present:
-        raise CoreError(f"PYVERLET_CORE is {wanted!r}; allowed on this processor is {' or '.join(present)}")
-    return wanted or present[0]
+    runs = VARIANTS if _processor().supports_x86_64_v3() else VARIANTS[1:]
+    return tuple(name for name in runs if _extension(name, "engine_f32"))
+
+
+@functools.cache
+def variant() -> str:
+    """The variant that this process uses: the fastest that the processor runs, or what `PYVERLET_CORE` names.
+
+    Raises:
+        CoreError: `PYVERLET_CORE` names none of `variants()`; there is none.
+    """
+    wanted, allowed = os.environ.get("PYVERLET_CORE", ""), variants()
+    if not allowed:
+        raise CoreError(f"pyverlet has no compiled core in {_FOLDER}; {_REBUILD}")
+    if wanted and wanted not in allowed:
+        raise CoreError(f"PYVERLET_CORE is {wanted!r}; allowed on this processor is {' or '.join(allowed)}")
+    return wanted or allowed[0]
+
+
+def compiler() -> str:
+    """What the core was compiled by, such as `Clang 21.1.0` or `GCC 14.2.0`."""
+    return str(_processor().compiled_by())
 
 
 @functools.cache
@@ -80,3 +113,17 @@ def unit(name: str, dtype: Any = np.float32) -> Any:
         CoreError: it is damaged, missing, or made for another Python or processor.
     """
     return _load(variant(), f"{name}_f{8 * np.dtype(dtype).itemsize}")
+
+
+def _check() -> None:
+    """Choose a variant now, so that an installation for another Python or processor is told of at once."""
+    try:
+        variant()
+    except CoreError as error:
+        if loading.is_the_command():  # its users get sentences, no tracebacks
+            sys.stderr.write(f"pyverlet: {error}\n")
+            sys.exit(1)
+        raise
+
+
+_check()

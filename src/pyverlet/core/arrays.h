@@ -32,6 +32,7 @@ static void *array_data(PyObject *array, const char *kinds, Py_ssize_t size, int
         return (const type *)array_data(array, kinds, sizeof(type), 0, wanted);                                         \
     }
 ARRAY_DATA(reals, real, "fd", REAL_NAME)
+ARRAY_DATA(singles, float, "f", "float32")
 ARRAY_DATA(doubles, double, "d", "float64")
 ARRAY_DATA(integers, int64_t, "lq", "int64")
 ARRAY_DATA(small_integers, int32_t, "il", "int32")

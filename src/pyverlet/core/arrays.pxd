@@ -6,6 +6,8 @@ from lanes cimport real
 cdef extern from "arrays.h":
     real *reals(object array) except NULL
     const real *const_reals(object array) except NULL
+    float *singles(object array) except NULL
+    const float *const_singles(object array) except NULL
     double *doubles(object array) except NULL
     const double *const_doubles(object array) except NULL
     int64_t *integers(object array) except NULL

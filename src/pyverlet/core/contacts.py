@@ -40,8 +40,8 @@ MOST_PASSES = cython.declare(cython.int, 8)
 def fast_ones(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: lanes, depth: lanes, nx: lanes, ny: lanes) -> mask:
     """Those of the pairs from k on that meet in this substep, and bounce.
 
-    They have restitution, meet faster than contacts at rest, and than what their contact has borne lately is worth; were apart a substep ago; and
-    would meet without the impulses of contacts, too: what only these push together carries load.
+    They have restitution; meet faster than contacts at rest, and than what their contact has borne lately is worth; were apart a
+    substep ago; and would meet without the impulses of contacts, too: what only these push together carries load.
     """
     rest: lanes = spread(-w.rest_speed)
     fast: mask = both(above(rest, speed), above(spread(-w.h) * speed, -depth))

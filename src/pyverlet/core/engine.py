@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from pyverlet.core.engine_object import Engine
-from pyverlet.core.measure import energies
+from pyverlet.core.measure import energies, momenta, pinned_move
+from pyverlet.core.overlap import overlaps, shrink_to_fit
 
-__all__ = ["Engine", "energies"]
+__all__ = ["Engine", "energies", "momenta", "overlaps", "pinned_move", "shrink_to_fit"]

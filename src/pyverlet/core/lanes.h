@@ -16,6 +16,7 @@ typedef int32_t lane_int;
 enum { LANES = 8 };
 typedef real lanes __attribute__((vector_size(LANES * sizeof(real)), aligned(sizeof(real))));
 typedef lane_int mask __attribute__((vector_size(LANES * sizeof(real)), aligned(sizeof(real))));
+typedef lanes lanes_in_memory __attribute__((may_alias)); /* of an array whose items are also read one by one */
 typedef struct {
     lanes x, y;
 } lanes2;
@@ -25,8 +26,8 @@ typedef struct {
 #define LANES_INLINE static inline __attribute__((always_inline))
 
 LANES_INLINE lanes spread(real a) { return (lanes){a, a, a, a, a, a, a, a}; }
-LANES_INLINE lanes load(const real *array, int64_t k) { return *(const lanes *)(array + k); }
-LANES_INLINE void store(real *array, int64_t k, lanes a) { *(lanes *)(array + k) = a; }
+LANES_INLINE lanes load(const real *array, int64_t k) { return *(const lanes_in_memory *)(array + k); }
+LANES_INLINE void store(real *array, int64_t k, lanes a) { *(lanes_in_memory *)(array + k) = a; }
 
 /* A mask has all bits of a lane set where a comparison holds. */
 LANES_INLINE mask above(lanes a, lanes b) { return a > b; }

@@ -19,3 +19,13 @@ static int has_x86_64_v3(void) {
 #else
 static int has_x86_64_v3(void) { return 0; }
 #endif
+
+#define PROCESSOR_TEXT_(x) #x
+#define PROCESSOR_TEXT(x) PROCESSOR_TEXT_(x)
+static const char *compiler_name(void) {
+#if defined(__clang__)
+    return "Clang " PROCESSOR_TEXT(__clang_major__) "." PROCESSOR_TEXT(__clang_minor__) "." PROCESSOR_TEXT(__clang_patchlevel__);
+#else
+    return "GCC " __VERSION__;
+#endif
+}

@@ -112,6 +112,7 @@ def _arrays(real: Any) -> dict[str, Any]:
     """`arrays.h` in NumPy."""
     types = {
         "reals": real,
+        "singles": np.float32,
         "doubles": np.float64,
         "integers": np.int64,
         "small_integers": np.int32,
@@ -139,7 +140,12 @@ def _team() -> dict[str, Any]:
 def _math() -> dict[str, Any]:
     """What kernels take from `libc.math`: functions of float64, and those of float32 whose name ends in f."""
     made: dict[str, Any] = {"fabs": abs, "INFINITY": np.inf, "NAN": np.nan, "isfinite": math.isfinite, "isnan": math.isnan}
-    for name, function in (("sqrt", np.sqrt), ("floor", np.floor), ("ceil", np.ceil)):  # rounded alike everywhere
+    for name, function in (
+        ("sqrt", np.sqrt),
+        ("rint", np.rint),
+        ("floor", np.floor),
+        ("ceil", np.ceil),
+    ):  # rounded alike everywhere
         made |= {name: partial(_call, function, np.float64), f"{name}f": partial(_call, function, np.float32)}
     for name in ("hypot", "sin", "cos", "atan2", "log", "exp", "pow"):
         made[name] = partial(_call, getattr(math, name), np.float64)
@@ -281,7 +287,7 @@ def load(unit: str, dtype: Any = np.float32) -> ModuleType:
         "team": _team(),
         "libc.math": _math(),
         "libc.stdint": _INTEGERS,
-        "processor": {"has_x86_64_v3": lambda: False},
+        "processor": {"has_x86_64_v3": lambda: False, "compiler_name": lambda: b"none"},
     }
     module = ModuleType(f"{unit}_reference")
     names = vars(module)

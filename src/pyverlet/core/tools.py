@@ -3,6 +3,26 @@
 
 from __future__ import annotations
 
-from pyverlet.core.digest import digest
+from pyverlet.core.area_drawing import draw_convex, fill, stroke, tint
+from pyverlet.core.checksum import checksum
+from pyverlet.core.disc_drawing import draw_discs
+from pyverlet.core.line_drawing import draw_lines
+from pyverlet.core.page_arrays import copy_moving, put_rows, quantize
+from pyverlet.core.queries import at_points, first_on_rays, in_regions, nearest_to
 
-__all__ = ["digest"]
+__all__ = [
+    "at_points",
+    "checksum",
+    "copy_moving",
+    "draw_convex",
+    "draw_discs",
+    "draw_lines",
+    "fill",
+    "first_on_rays",
+    "in_regions",
+    "nearest_to",
+    "put_rows",
+    "quantize",
+    "stroke",
+    "tint",
+]

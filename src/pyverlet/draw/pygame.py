@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pygame
 
+from pyverlet.core import unit
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import lines, raster
 from pyverlet.picture import DARK, ByOrigin, Colouring, Theme, View, across, marks
 from pyverlet.picture.colour import by_force
 from pyverlet.picture.palette import Packed
@@ -68,7 +68,7 @@ def draw(
         owner, place = across.copies(position, radius, seam)
         position, colours = np.concatenate((position, place)), np.concatenate((colours, colours[owner]))
         radius, angle = np.concatenate((radius, radius[owner])), np.concatenate((angle, angle[owner]))
-    raster.circles(pixels, ground, position, radius, colours, view.left, view.top, view.scale)
+    unit("tools", position.dtype).draw_discs(pixels, ground, position, radius, colours, view.left, view.top, view.scale)
     marks.draw(pixels, position, radius, angle, colours, view)
     if len(world.links):
         ends, force = world.links.segments()
@@ -76,7 +76,7 @@ def draw(
             ends, force = across.lines(world.position[world.links.pulls()[0]], force, seam)
         pulls = by_force(force, theme)
         pulls = _red_and_blue_swapped(pulls) if shifts[:3] == (16, 8, 0) else pulls
-        lines.lines(pixels, ends, pulls, view.left, view.top, view.scale, LINK_PX / 2)
+        unit("tools", ends.dtype).draw_lines(pixels, ends, pulls, view.left, view.top, view.scale, LINK_PX / 2)
     if surface.get_masks()[3]:
         np.maximum(pixels, alpha | (pixels & np.uint32(0x00FFFFFF)), out=pixels)
     own[:] = pixels

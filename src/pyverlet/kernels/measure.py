@@ -10,21 +10,6 @@ from pyverlet.kernels.motion import BLOCK
 
 
 @kernel
-def energies(position, velocity, spin, radius, mass, gx, gy):
-    """(kinetic energy of motion, of spin, potential energy of gravity, 0 at the origin), J. Pinned particles have none."""
-    motion = turning = height = 0.0
-    for i in range(mass.shape[0]):
-        m = np.float64(mass[i])
-        if m < np.inf:
-            vx, vy = np.float64(velocity[i, 0]), np.float64(velocity[i, 1])
-            w, r = np.float64(spin[i]), np.float64(radius[i])
-            motion += 0.5 * m * (vx * vx + vy * vy)
-            turning += 0.25 * m * r * r * w * w
-            height -= m * (gx * np.float64(position[i, 0]) + gy * np.float64(position[i, 1]))
-    return motion, turning, height
-
-
-@kernel
 def _mechanical(position, velocity, acceleration, lag, spin, radius, mass, gx, gy, first, stop):
     """`mechanical` of the particles from `first` up to `stop`: eight sums at once, for one waits for every addition."""
     zero, half, quarter, inf = spread(0.0), spread(0.5), spread(0.25), spread(np.inf)
@@ -82,28 +67,3 @@ def gained(position, velocity, spin, radius, mass, now_position, now_velocity, n
     """How much larger `mechanical` is now, J."""
     before = mechanical(position, velocity, velocity, 0.0, spin, radius, mass, gx, gy)
     return mechanical(now_position, now_velocity, now_velocity, 0.0, now_spin, now_radius, now_mass, gx, gy) - before
-
-
-@kernel
-def momenta(position, velocity, spin, radius, mass):
-    """(momentum x, momentum y, angular momentum about the origin, spin included); kg m/s and kg m^2/s."""
-    px = py = turning = 0.0
-    for i in range(mass.shape[0]):
-        m = np.float64(mass[i])
-        if m < np.inf:
-            vx, vy = m * np.float64(velocity[i, 0]), m * np.float64(velocity[i, 1])
-            r = np.float64(radius[i])
-            px += vx
-            py += vy
-            turning += np.float64(position[i, 0]) * vy - np.float64(position[i, 1]) * vx
-            turning += 0.5 * m * r * r * np.float64(spin[i])
-    return px, py, turning
-
-
-@kernel
-def pinned_move(mass, velocity, spin):
-    """Whether anybody of infinite mass moves or turns."""
-    found = False
-    for i in range(mass.shape[0]):
-        found |= mass[i] == np.inf and (velocity[i, 0] != 0 or velocity[i, 1] != 0 or spin[i] != 0)
-    return found

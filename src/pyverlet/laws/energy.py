@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from pyverlet.kernels import measure
+from pyverlet.core import unit
 from pyverlet.laws.forces import has_potential
 from pyverlet.state.state import State
 
@@ -25,6 +25,7 @@ class Energy(NamedTuple):
 
 def energy(state: State, gravity: tuple[float, float], forces: list[Any], links: float) -> Energy:
     """Energy of a state under gravity and those forces that have a potential."""
-    motion, spin, potential = measure.energies(state.position, state.velocity, state.spin, state.radius, state.mass, *gravity)
+    energies = unit("engine", state.position.dtype).energies
+    motion, spin, potential = energies(state.position, state.velocity, state.spin, state.radius, state.mass, *gravity)
     potential += sum(force.potential(state) for force in forces if has_potential(force))
     return Energy(kinetic=motion + spin, spin=spin, potential=potential, links=links)

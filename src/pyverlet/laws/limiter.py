@@ -30,6 +30,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.core import unit
 from pyverlet.ground.constants import ONE_THREAD_BELOW, SLEEP_NEAR, SURPLUS
 from pyverlet.kernels import clusters, measure, taking
 from pyverlet.laws.contacts.collisions import ContactSolver
@@ -284,4 +285,4 @@ def watched(world: Any, h: float, h_last: float | None) -> Watch | None:
 
 def pinned_move(state: State | Slots) -> bool:
     """Whether somebody pinned pushes others about: with infinite mass one goes on at its velocity, and nothing stops it."""
-    return bool(measure.pinned_move(state.mass, state.velocity, state.spin))
+    return bool(unit("engine", state.mass.dtype).pinned_move(state.mass, state.velocity, state.spin))

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.core import unit
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import lines, raster
 from pyverlet.picture.palette import Packed, Theme, swapped
 from pyverlet.picture.pen import Drawing, Lettering, Stroke
 from pyverlet.picture.view import View
@@ -40,14 +40,15 @@ def _line(pixels: Packed, mark: Stroke, view: View, colour: int) -> None:
     if mark.closed:
         points = np.concatenate((points, points[:1]))
     ends = np.stack((points[:-1], points[1:]), axis=1)
-    lines.lines(pixels, ends, np.full(len(ends), colour, np.uint32), view.left, view.top, view.scale, mark.width / 2)
+    colours = np.full(len(ends), colour, np.uint32)
+    unit("tools", ends.dtype).draw_lines(pixels, ends, colours, view.left, view.top, view.scale, mark.width / 2)
 
 
 def _fill(pixels: Packed, mark: Stroke, view: View, colour: int) -> None:
     points = (np.array(mark.points) - (view.left, view.top)) * (view.scale, -view.scale)
     cover = np.zeros(pixels.shape, dtype=np.float32)
-    raster.fill(cover, np.column_stack((points, np.roll(points, -1, axis=0))), SLICES)
-    raster.tint(pixels, cover, np.uint32(colour))
+    unit("tools").fill(cover, np.column_stack((points, np.roll(points, -1, axis=0))), SLICES)
+    unit("tools").tint(pixels, cover, np.uint32(colour))
 
 
 def _write(pixels: Packed, mark: Lettering, view: View, colour: int) -> None:
@@ -59,7 +60,7 @@ def _write(pixels: Packed, mark: Lettering, view: View, colour: int) -> None:
     if x0 >= x1 or y0 >= y1:
         return
     part = np.ascontiguousarray(pixels[y0:y1, x0:x1])
-    raster.tint(part, np.ascontiguousarray(letters[y0 - top : y1 - top, x0 - left : x1 - left]), np.uint32(colour))
+    unit("tools").tint(part, np.ascontiguousarray(letters[y0 - top : y1 - top, x0 - left : x1 - left]), np.uint32(colour))
     pixels[y0:y1, x0:x1] = part
 
 

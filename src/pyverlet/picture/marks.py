@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.kernels import lines
+from pyverlet.core import unit
 from pyverlet.picture.palette import Packed
 from pyverlet.picture.view import View
 
@@ -38,4 +38,5 @@ def draw(
     reach = radius[shown].astype(np.float64)[:, None]
     rim = centre + reach * np.column_stack((np.cos(turned), np.sin(turned)))
     half = np.asarray((colours[shown] >> np.uint32(1)) & np.uint32(0x7F7F7F), dtype=np.uint32)
-    lines.lines(pixels, np.stack((centre, rim), axis=1), half, view.left, view.top, view.scale, MARK_PX / 2)
+    ends = np.stack((centre, rim), axis=1)
+    unit("tools", np.float64).draw_lines(pixels, ends, half, view.left, view.top, view.scale, MARK_PX / 2)

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.core import unit
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
-from pyverlet.kernels import lines, raster
 from pyverlet.laws.obstacles import Outline
 from pyverlet.picture import across, ink, marks
 from pyverlet.picture.colour import by_force
@@ -118,12 +118,14 @@ class Raster(Shown):
             self._obstacles = obstacles
         np.copyto(self._pixels, self._ground)
         colours = np.ascontiguousarray(colours, dtype=np.uint32)
-        raster.circles(self._pixels, self._ground, position, radius, colours, view.left, view.top, view.scale)
+        draw = unit("tools", position.dtype).draw_discs
+        draw(self._pixels, self._ground, position, radius, colours, view.left, view.top, view.scale)
         if angle is not None:
             marks.draw(self._pixels, position, radius, angle, colours, view)
         if links is not None:
             ends, force = links
-            lines.lines(self._pixels, ends, by_force(force, self.theme), view.left, view.top, view.scale, LINK_PX / 2)
+            pulls = by_force(force, self.theme)
+            unit("tools", ends.dtype).draw_lines(self._pixels, ends, pulls, view.left, view.top, view.scale, LINK_PX / 2)
         return self._pixels.view(np.uint8).reshape(*self._pixels.shape, 4)
 
     def _lay_floor(self, view: View, outlines: Lines) -> None:
@@ -135,13 +137,13 @@ class Raster(Shown):
         lines = [np.asarray(outline, dtype=np.float64) for outline in outlines]
         pixels = [np.column_stack(((x - view.left), (view.top - y))) * view.scale for x, y in (line.T for line in lines)]
         edges = np.concatenate([np.column_stack((line, np.roll(line, -1, axis=0))) for line in pixels])
-        cover = np.zeros(self._floor.shape, dtype=np.float32)
+        cover, tools = np.zeros(self._floor.shape, dtype=np.float32), unit("tools")
         for x0, y0, x1, y1 in edges:
-            raster.stroke(cover, x0, y0, x1, y1, WALL_PX)
-        raster.tint(self._floor, cover, np.uint32(swapped(self.theme.wall)))
+            tools.stroke(cover, x0, y0, x1, y1, WALL_PX)
+        tools.tint(self._floor, cover, np.uint32(swapped(self.theme.wall)))
         cover[:] = 0.0
-        raster.fill(cover, edges, SLICES)
-        raster.tint(self._floor, cover, np.uint32(swapped(self.theme.inside)))
+        tools.fill(cover, edges, SLICES)
+        tools.tint(self._floor, cover, np.uint32(swapped(self.theme.inside)))
 
     def _rule(self, view: View) -> None:
         """Without walls: lines at round distances, so that motion can be seen."""
@@ -161,7 +163,7 @@ class Raster(Shown):
         if shapes:
             points = (np.concatenate(shapes) - (view.left, view.top)) * (view.scale, -view.scale)
             first = np.concatenate(([0], np.cumsum([len(shape) for shape in shapes])))
-            raster.convex(self._ground, points, first, np.uint32(swapped(self.theme.obstacle)))
+            unit("tools").draw_convex(self._ground, points, first, np.uint32(swapped(self.theme.obstacle)))
 
 
 def _convex(outline: Outline, half: float) -> list[NDArray[np.float64]]:

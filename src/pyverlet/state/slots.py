@@ -88,7 +88,8 @@ class Slots:
             setattr(self, name, memory.zeros((count, 2), self.dtype))
         for name in (*COLUMNS, "inverse_mass"):
             setattr(self, name, memory.zeros(count, self.dtype))
-        self.__dict__.pop("force", None)
+        for scratch in ("force", "resistance"):
+            self.__dict__.pop(scratch, None)
         self.start = self.along = np.empty((0, 2), self.dtype)
         self.turn = self.lift = np.empty(0, self.dtype)
         self.size = self.radius

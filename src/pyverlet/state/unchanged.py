@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.core import unit
 from pyverlet.ground.constants import KNOWN_FROM
-from pyverlet.kernels.digest import digest
 
 Array = NDArray[Any]
 
@@ -34,4 +34,4 @@ class Unchanged:
 
 
 def _digest(array: Array) -> int:
-    return int(digest(array.reshape(-1).view(np.uint64 if array.nbytes % 8 == 0 else np.uint32)))
+    return int(unit("tools").checksum(array.reshape(-1).view(np.uint64 if array.nbytes % 8 == 0 else np.uint32)))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.kernels import wire
+from pyverlet.core import unit
 from pyverlet.laws.rooms import Circle
 from pyverlet.picture import across
 from pyverlet.picture.colour import USUAL_MULTIPLE
@@ -275,7 +275,7 @@ class Frame:
 def _sorted(rows: NDArray[np.float32], whose: NDArray[np.int32] | None) -> NDArray[np.float32]:
     if whose is not None:
         result = np.empty_like(rows)
-        wire.put_rows(result, rows, whose)
+        unit("tools").put_rows(result, rows, whose)
         rows = result
     rows.flags.writeable = False
     return rows
@@ -287,10 +287,8 @@ def quantise(position: NDArray[np.float32], view: Rect) -> NDArray[np.uint16]:
     0 and 65535 mean outside the view.
     """
     x0, y0, x1, y1 = view
-    origin = np.array([x0, y0], dtype=np.float32)
-    scale = np.array([GRID_MAX / (x1 - x0), GRID_MAX / (y1 - y0)], dtype=np.float32)
     grid = np.empty(position.shape, dtype=np.uint16)
-    wire.quantise(position, origin, scale, np.float32(GRID_MAX), grid)
+    unit("tools").quantize(position, x0, y0, GRID_MAX / (x1 - x0), GRID_MAX / (y1 - y0), GRID_MAX, grid)
     return grid
 
 

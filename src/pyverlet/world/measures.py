@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.core import unit
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Records
 from pyverlet.ground.turns import of_one_frame
-from pyverlet.kernels import measure
 from pyverlet.laws.contacts.collisions import Collisions, ContactSolver, Overlap, measure_overlap
 from pyverlet.laws.energy import Energy, energy
 from pyverlet.laws.events import Events, Place
@@ -194,7 +194,10 @@ class Measures(Particles):
     @of_one_frame
     def _momenta(self) -> tuple[float, float, float]:
         s = self._state
-        return measure.momenta(s.position, s.velocity, s.spin, s.radius, s.mass)  # type: ignore[no-any-return]
+        found: tuple[float, float, float] = unit("engine", s.position.dtype).momenta(
+            s.position, s.velocity, s.spin, s.radius, s.mass
+        )
+        return found
 
     @of_one_frame
     def overlap(self) -> Overlap:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.compile import jit
-from pyverlet.kernels import wire
+from pyverlet.core import unit
 from pyverlet.state.slots import Slots
 
 
@@ -42,7 +42,8 @@ class Moment:
         slots: Any = self._slots
         position, velocity = np.empty((2, len(slots), 2), np.float32)
         lag = slots.real(self._lag)
-        wire.copy_moving(slots.position, slots.velocity, slots.acceleration, slots.resting, lag, position, velocity)
+        copy = unit("tools", slots.position.dtype).copy_moving
+        copy(slots.position, slots.velocity, slots.acceleration, slots.resting, lag, position, velocity)
         if slots.seam:
             slots.seam.wrap(position)
         return position, velocity, slots.particle  # reordering makes a new one, and leaves this as it is

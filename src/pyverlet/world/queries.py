@@ -8,16 +8,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pyverlet.core import unit
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import count
 from pyverlet.ground.turns import Shared, of_one_frame
-from pyverlet.kernels import grid, motion, queries
+from pyverlet.kernels import grid, motion
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import State
 from pyverlet.world.images import PERIODS, Images, left_in_room
 
-_ask: Any = queries
 _grid: Any = grid
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -69,9 +69,8 @@ class Queries(Shared):
         if len(self._state):
             reach = float(self._state.radius.max())
             seen = Images.of(self._state, reach)
-            _ask.at_points(
-                self._state.seam.wrapped(where), reach, *self._cells(seen.position, len(where)), seen.position, seen.radius, found
-            )
+            inside, cells = self._state.seam.wrapped(where), self._cells(seen.position, len(where))
+            unit("tools", seen.position.dtype).at_points(inside, reach, cells, seen.position, seen.radius, found)
             found = seen.named(found)
         return found
 
@@ -142,7 +141,8 @@ class Queries(Shared):
             cells = self._cells(seen.position, len(start))
             for rays, at, gone, left in _pieces(start, heading, far, s.seam):
                 piece, way = np.full(len(rays), -1, np.int64), np.full(len(rays), np.inf)
-                _ask.rays(at, heading[rays], left, reach, *cells, seen.position, seen.radius, piece, way)
+                tools = unit("tools", seen.position.dtype)
+                tools.first_on_rays(at, heading[rays], left, reach, cells, seen.position, seen.radius, piece, way)
                 hit = piece >= 0
                 index[rays[hit]], distance[rays[hit]] = seen.named(piece[hit]), gone[hit] + way[hit]
                 rim = at[hit] + way[hit, None] * heading[rays[hit]] - seen.position[piece[hit]]
@@ -163,7 +163,7 @@ class Queries(Shared):
             cells, inside = self._cells(position, len(where)), seam.wrapped(where)
             for shift in seam.images():
                 seen, far = np.full_like(index, -1), np.full_like(square, np.inf)
-                _ask.nearest(inside - shift, *cells, position, seen, far)
+                unit("tools", position.dtype).nearest_to(inside - shift, cells, position, seen, far)
                 index, square = _nearer(index, square, seen, far)
         return Nearest(index, np.sqrt(square))
 
@@ -192,11 +192,11 @@ class Queries(Shared):
 
 def _regions(low: Floats, high: Floats, middle: Floats, size: Floats, cells: tuple[Any, ...], position: NDArray[Any]) -> Indices:
     """(k, 2) rows of region and particle, in no order."""
-    found, room = 0, 64
+    found, room, size = 0, 64, np.ascontiguousarray(size)
     query, particle = (np.zeros(0, np.int64) for _ in range(2))
     while room > len(query):
         query, particle = (np.empty(room, np.int64) for _ in range(2))
-        found = int(_ask.in_regions(low, high, middle, size, *cells, position, query, particle))
+        found = unit("tools", position.dtype).in_regions(low, high, middle, size, cells, position, query, particle)
         room = max(room, found)
     return np.column_stack((query[:found], particle[:found]))
 

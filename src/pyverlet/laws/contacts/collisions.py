@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.core import unit
 from pyverlet.ground import checks
 from pyverlet.ground.constants import FED, PUSHED, REST_ACCELERATIONS, UNEVEN
 from pyverlet.ground.errors import InputError
@@ -281,8 +282,8 @@ def measure_overlap(state: State, unlist: Unlist) -> Overlap:
         found = int(overlap.touching(position, state.radius, *about, pairs.pair_i, pairs.pair_j))
     pairs.count[0] = found
     unlist(pairs, np.arange(count, dtype=np.int32))
-    period_x, period_y = map(float, state.seam.period)
-    number, total, largest = overlap.overlaps(position, state.radius, period_x, period_y, *pairs.listed())
+    overlaps = unit("engine", position.dtype).overlaps
+    number, total, largest = overlaps(position, state.radius, *state.seam.period, pairs.listed())
     return Overlap(total / number if number else 0.0, largest, number)
 
 

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from pyverlet.core import unit
 from pyverlet.ground.constants import GROWTH, PACE_FRAMES, SMALLEST, SURPLUS_SOUGHT
-from pyverlet.kernels import overlap
 from pyverlet.laws.contacts.broadphase import PairList
 from pyverlet.state.slots import Slots
 
@@ -24,8 +24,8 @@ class Growth:
 
     def fit(self, state: Slots, pairs: PairList, fresh: np.ndarray) -> None:
         """Shrink those marked in `fresh` (n,), and whom they overlap, until they just touch."""
-        (period_x, period_y), which = state.reals(*state.seam.period), pairs.listed()
-        overlap.fit(state.position, state.radius, period_x, period_y, *which, fresh, state.real(SMALLEST), state.grown)
+        shrink_to_fit = unit("engine", state.position.dtype).shrink_to_fit
+        shrink_to_fit(state.position, state.radius, *state.seam.period, pairs.listed(), fresh, SMALLEST, state.grown)
         state.resize()
 
     def grow(self, state: Slots, h: float) -> None:

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pyverlet.core import unit
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import grid, queries
+from pyverlet.kernels import grid
 from pyverlet.laws.links.area import signed_area
 from pyverlet.laws.obstacles import Obstacle, Polygon
 from pyverlet.laws.rooms import Boundary
@@ -20,7 +21,6 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _grid: Any = grid
-_ask: Any = queries
 
 ROUNDING = 1e-9
 """Of what is touched: a circle that just fits is not refused for the last digit."""
@@ -81,16 +81,12 @@ def overlapping(points: Floats, radius: Floats, position: Floats, size: Floats) 
     order = np.empty(len(position), np.int32)
     _grid.count_cells(position, x0, y0, 1 / cell, columns, rows, number, start)
     _grid.sort_by_cell(number, start, order)
-    member, room, found = order.astype(np.int64), 8 * len(points), np.inf
+    cells, room, found = (x0, y0, cell, columns, rows, start, order.astype(np.int64)), 8 * len(points), np.inf
     far = reach[:, None]
     while found > room:
         room = room if found == np.inf else int(found)
         query, particle = np.empty(room, np.int64), np.empty(room, np.int64)
-        found = int(
-            _ask.in_regions(
-                points - far, points + far, points, reach, x0, y0, cell, columns, rows, start, member, position, query, particle
-            )
-        )
+        found = unit("tools", np.float64).in_regions(points - far, points + far, points, reach, cells, position, query, particle)
     pairs = np.column_stack((query[: int(found)], particle[: int(found)]))
     between = np.hypot(*(points[pairs[:, 0]] - position[pairs[:, 1]]).T)
     return np.asarray(pairs[between < (radius[pairs[:, 0]] + size[pairs[:, 1]]) * (1 - ROUNDING)])

@@ -1,0 +1,270 @@
+# mypy: ignore-errors
+"""Discs to pixels, each covering exactly the area it has. One thread: drawing may run beside the physics."""
+
+from __future__ import annotations
+
+import cython
+import numpy as np
+from cython.cimports.arrays import const_indices, const_reals, doubles, indices, integers, octets, small_integers, words
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import INFINITY, ceil, floor, log
+from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t, uint32_t, uint64_t
+
+from pyverlet.core.disc_cache import CACHED, CROWD, FINE, ROOM, SIZES, SPARE, cache_disc, draw_cached
+from pyverlet.core.disc_coverage import cover_row
+from pyverlet.core.pixel_blending import OPAQUE, blend, channel
+from pyverlet.ground.constants import LEAST_DRAWN_RADIUS
+
+DUST = cython.declare(cython.Py_ssize_t, 4)  # discs narrower than a pixel are drawn together if there is one to so many pixels
+LEAST = cython.declare(cython.double, LEAST_DRAWN_RADIUS)
+PI = cython.declare(cython.double, 3.141592653589793)
+
+Picture = cython.struct(
+    pixels=cython.pointer[uint32_t],  # (height, width)
+    ground=cython.pointer[cython.const[uint32_t]],  # what they were before the first disc
+    height=int64_t,
+    width=int64_t,
+    position=cython.pointer[cython.const[real]],  # (count, 2) m
+    radius=cython.pointer[cython.const[real]],  # (count,) m
+    colour=cython.pointer[cython.const[uint32_t]],
+    count=int64_t,
+    left=cython.double,  # m at the upper left corner
+    top=cython.double,
+    scale=cython.double,  # pixels a metre
+    small=int64_t,  # discs that may be drawn from the cache
+    narrow=int64_t,  # discs narrower than a pixel
+    columns=int64_t,  # of the widest that is on the picture
+)
+Cache = cython.struct(
+    entry=cython.pointer[int64_t],  # (sizes, FINE, FINE) where the entry is; 0 for none yet
+    size=cython.pointer[cython.double],  # (sizes,) radius that the entries of a size have, in pixels; 0 for none yet
+    where=cython.pointer[int32_t],
+    amount=cython.pointer[uint8_t],
+    cover=cython.pointer[cython.double],
+    free=int64_t,  # where the next entry begins
+)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def drawn_radius(p: cython.pointer(Picture), i: int64_t) -> cython.double:
+    """The radius of a disc in pixels."""
+    r: cython.double = p.radius[i] * p.scale
+    return max(r, LEAST)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def is_seen(p: cython.pointer(Picture), x: cython.double, y: cython.double, r: cython.double) -> cython.bint:
+    """Whether any of a disc is on the picture; not if it is NaN or infinite."""
+    return x + r > 0.0 and y + r > 0.0 and x - r < p.width and y - r < p.height and r < INFINITY
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def survey(p: cython.pointer(Picture)) -> cython.void:
+    """Count the discs that are narrow, and small, and measure the widest."""
+    i: int64_t
+    small: int64_t = 0
+    narrow: int64_t = 0
+    p.columns = 0
+    for i in range(p.count):
+        r: cython.double = drawn_radius(p, i)
+        narrow += r < 0.5
+        small += r >= 0.5 and r <= CACHED
+        if 2.0 * r + 2.0 > p.columns:  # it may be the widest
+            x: cython.double = (p.position[2 * i] - p.left) * p.scale
+            y: cython.double = (p.top - p.position[2 * i + 1]) * p.scale
+            if is_seen(p, x, y, r):
+                p.columns = max(p.columns, cython.cast(int64_t, floor(x + r)) + 1 - cython.cast(int64_t, floor(x - r)))
+    p.small = small
+    p.narrow = narrow
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def add_dust(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cython.void:
+    """Sum what covers each pixel: R and G, B and cover, of 32 bits each."""
+    left: real = p.left
+    top: real = p.top
+    scale: real = p.scale
+    wide: real = p.width
+    high: real = p.height
+    half: real = 0.5
+    least: real = LEAST
+    whole: real = 255.0 * PI
+    one: uint64_t = cython.cast(uint64_t, 1) << 32  # disc's cover, above its blue
+    width: int64_t = p.width
+    i: int64_t
+    for i in range(p.count):
+        x: real = (p.position[2 * i] - left) * scale
+        y: real = (top - p.position[2 * i + 1]) * scale
+        r: real = p.radius[i] * scale
+        r = max(r, least)
+        if x >= 0 and x < wide and y >= 0 and y < high and r < half:
+            at: uint64_t = cython.cast(int32_t, y) * width + cython.cast(int32_t, x)
+            area: real = whole * r * r + half
+            cover: uint64_t = cython.cast(uint64_t, cython.cast(int32_t, area))
+            c: uint64_t = p.colour[i]
+            sums[2 * at] += cover * ((c & 0xFF) | ((c & 0xFF00) << 24))
+            sums[2 * at + 1] += cover * (((c >> 16) & 0xFF) | one)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def dust_channel(total: uint64_t, share: cython.double, bare: cython.double, ground: uint32_t, shift: cython.int) -> uint32_t:
+    """A channel of the mean colour, on what is left of the ground."""
+    value: int32_t = cython.cast(int32_t, share * cython.cast(int64_t, total) + bare * channel(ground, shift) + 0.5)
+    return cython.cast(uint32_t, value) << shift
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def put_dust(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cython.void:
+    """Show the sums: what covers a pixel is the sum of the areas, its colour their mean, in whatever order they come."""
+    k: int64_t
+    for k in range(p.height * p.width):
+        rg: uint64_t = sums[2 * k]
+        ba: uint64_t = sums[2 * k + 1]
+        covered: cython.double = cython.cast(int64_t, ba >> 32)
+        if covered == 0.0:
+            continue
+        share: cython.double = min(1.0 / covered, 1.0 / 255.0)
+        bare: cython.double = max(1.0 - covered / 255.0, 0.0)
+        old: uint32_t = p.ground[k]
+        rgb: uint32_t = dust_channel(cython.cast(uint32_t, rg), share, bare, old, 0)
+        rgb |= dust_channel(rg >> 32, share, bare, old, 8) | dust_channel(cython.cast(uint32_t, ba), share, bare, old, 16)
+        p.pixels[k] = rgb | (cython.cast(uint32_t, min(covered, 255.0)) << 24)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def put_disc(
+    p: cython.pointer(Picture), colour: uint32_t, x: cython.double, y: cython.double, r: cython.double, cover: cython.p_double
+) -> cython.void:
+    """Draw one disc, row by row; cover: of 0, as many as it has columns, or more."""
+    first: int64_t = cython.cast(int64_t, floor(x - r))
+    columns: int64_t = cython.cast(int64_t, floor(x + r)) + 1 - first
+    row: int64_t
+    k: int64_t
+    for row in range(cython.cast(int64_t, max(floor(y - r), 0.0)), cython.cast(int64_t, min(ceil(y + r), p.height))):
+        cover_row(cover, 0, x, y, r, row)
+        for k in range(columns):
+            amount: int32_t = cython.cast(int32_t, 255.0 * cover[k] + 0.5)
+            cover[k] = 0.0
+            column: int64_t = first + k
+            if column >= 0 and column < p.width:
+                at: int64_t = row * p.width + column
+                if amount >= 255:
+                    p.pixels[at] = colour
+                elif amount > 0:
+                    p.pixels[at] = blend(p.pixels[at], p.ground[at], colour, amount)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def entry_of(
+    p: cython.pointer(Picture), c: cython.pointer(Cache), x: cython.double, y: cython.double, size: int64_t, r: cython.double
+) -> int64_t:
+    """Where the cache has this disc, made if it is not there; 0 if there is no room for it."""
+    fine_x: int64_t = cython.cast(int64_t, FINE * (x - cython.cast(int64_t, x)))
+    fine_y: int64_t = cython.cast(int64_t, FINE * (y - cython.cast(int64_t, y)))
+    k: int64_t = (size * FINE + fine_y) * FINE + fine_x
+    if c.entry[k] == 0 and c.free + SPARE * SPARE + 2 <= ROOM:
+        if c.size[size] == 0.0:
+            c.size[size] = r
+        c.entry[k] = c.free
+        u: cython.double = (fine_x + 0.5) / FINE
+        v: cython.double = (fine_y + 0.5) / FINE
+        c.free = cache_disc(c.where, c.amount, c.free, p.width, u, v, c.size[size], c.cover)
+    return c.entry[k]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def put_discs(
+    p: cython.pointer(Picture), c: cython.pointer(Cache), dusty: cython.bint, crowd: cython.bint, cover: cython.p_double
+) -> cython.void:
+    """Draw the discs in their order, but for narrow ones where it is dusty."""
+    same: cython.double = 0.0
+    size: int64_t = 0
+    i: int64_t
+    at: int64_t
+    for i in range(p.count):
+        x: cython.double = (p.position[2 * i] - p.left) * p.scale
+        y: cython.double = (p.top - p.position[2 * i + 1]) * p.scale
+        r: cython.double = drawn_radius(p, i)
+        if not is_seen(p, x, y, r):
+            continue
+        colour: uint32_t = p.colour[i] | OPAQUE
+        if r < 0.5:  # all of it in the pixel of its centre: a million of them are a cloud, not discs
+            if not dusty and x >= 0.0 and x < p.width and y >= 0.0 and y < p.height:
+                at = cython.cast(int64_t, y) * p.width + cython.cast(int64_t, x)
+                area: int32_t = cython.cast(int32_t, 255.0 * PI * r * r + 0.5)
+                p.pixels[at] = blend(p.pixels[at], p.ground[at], colour, area)
+            continue
+        reach: cython.double = r + 2.0
+        if crowd and r <= CACHED and x > reach and y > reach and x < p.width - reach and y < p.height - reach:
+            if r != same:
+                same = r
+                size = cython.cast(int64_t, log(2.0 * r) * SIZES + 0.5)
+            at = entry_of(p, c, x, y, size, r)
+            if at > 0:
+                centre: int64_t = cython.cast(int64_t, y) * p.width + cython.cast(int64_t, x)
+                draw_cached(p.pixels, p.ground, colour, centre, c.where, c.amount, at)
+                continue
+        put_disc(p, colour, x, y, r, cover)
+
+
+def draw_discs(pixels, ground, position, radius, colour, left: cython.double, top: cython.double, scale: cython.double):
+    """Draw discs on `pixels`, (h, w) uint32, in the order given; where a crowd of them is narrower than a pixel, those first.
+
+    Small ones of a crowd are drawn from a cache, filled when first asked for: at the next of FINE x FINE places within a pixel,
+    all those as large as the first of nearly their size. Each has its area, and is a sixteenth of a pixel aside at most.
+
+    `ground`: what the pixels were before the first. `position` (n, 2), `radius` (n,): metres. `colour`: (n,) uint32.
+    `left`, `top`: metres at the upper left corner of the picture; `scale`: pixels a metre.
+    """
+    p: Picture
+    c: Cache
+    p.pixels, p.ground, p.colour = indices(pixels), const_indices(ground), const_indices(colour)
+    p.position, p.radius = const_reals(position), const_reals(radius)
+    p.height, p.width, p.count = pixels.shape[0], pixels.shape[1], len(radius)
+    p.left, p.top, p.scale = left, top, scale
+    picture: cython.pointer(Picture) = cython.address(p)
+    cache: cython.pointer(Cache) = cython.address(c)
+    with cython.nogil:
+        survey(picture)
+    dusty: cython.bint = DUST * p.narrow >= p.height * p.width
+    if dusty:
+        sums = np.zeros(2 * p.height * p.width, np.uint64)
+        total: cython.pointer[uint64_t] = words(sums)
+        with cython.nogil:
+            add_dust(picture, total)
+            put_dust(picture, total)
+        if p.narrow == p.count:
+            return
+    crowd: cython.bint = p.small >= CROWD
+    sizes: cython.Py_ssize_t = cython.cast(int64_t, log(2.0 * CACHED) * SIZES) + 2 if crowd else 0
+    room: cython.Py_ssize_t = ROOM if crowd else 0
+    entry, size = np.zeros(sizes * FINE * FINE, np.int64), np.zeros(sizes)
+    where, amount, spare = np.empty(room, np.int32), np.empty(room, np.uint8), np.empty(SPARE * SPARE)
+    c.entry, c.size, c.cover = integers(entry), doubles(size), doubles(spare)
+    c.where, c.amount = small_integers(where), octets(amount)
+    c.free = 1
+    cover = np.zeros(p.columns + 1)
+    row: cython.p_double = doubles(cover)
+    with cython.nogil:
+        put_discs(picture, cache, dusty, crowd, row)

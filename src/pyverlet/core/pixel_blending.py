@@ -1,0 +1,120 @@
+# mypy: ignore-errors
+"""What a pixel becomes that a shape covers in part.
+
+A pixel is 32 bits, R + G << 8 + B << 16 + A << 24: in memory the bytes R, G, B, A. A tells how much of the pixel discs cover.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.libc.stdint import int32_t, uint32_t, uint64_t
+
+OPAQUE = cython.declare(uint32_t, 0xFF000000)  # the A of a pixel that is covered whole
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def channel(pixel: uint32_t, shift: cython.int) -> int32_t:
+    """One of R, G, B (shift 0, 8, 16) as a signed number."""
+    return cython.cast(int32_t, (pixel >> shift) & 255)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def placed(value: int32_t, shift: cython.int) -> uint32_t:
+    """A channel's value, kept from 0 to 255, at its place in a pixel."""
+    kept: uint32_t = cython.cast(uint32_t, min(max(value, 0), 255))
+    return kept << shift
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def beside(pixel: uint32_t, ground: uint32_t, colour: uint32_t, cover: int32_t, shift: cython.int) -> uint32_t:
+    """A channel once `cover` / 255 of the pixel's ground has turned into `colour`. (257 x + 2^15) >> 16 is x / 255, rounded."""
+    c: int32_t = cover * (channel(colour, shift) - channel(ground, shift))
+    return placed(channel(pixel, shift) + ((c * 257 + 32768) >> 16), shift)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def over(pixel: uint32_t, ground: uint32_t, colour: uint32_t, cover: int32_t, kept: cython.double, shift: cython.int) -> uint32_t:
+    """A channel of a pixel without ground left: the fraction `kept` of what covered it, and `cover` / 255 of `colour`."""
+    covered: int32_t = cython.cast(int32_t, pixel >> 24)
+    old: int32_t = 255 * channel(pixel, shift) - (255 - covered) * channel(ground, shift)
+    return placed(cython.cast(int32_t, (old * kept + cover * channel(colour, shift)) / 255.0 + 0.5), shift)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def apart(pixel: uint32_t) -> uint64_t:
+    """R, G and B with 20 bits each, so that one multiplication serves all three."""
+    p: uint64_t = pixel
+    return (p & 0xFF) | ((p & 0xFF00) << 12) | ((p & 0xFF0000) << 24)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def over_full(pixel: uint32_t, colour: uint32_t, cover: int32_t) -> uint32_t:
+    """`over` where no ground is left to see: (255 - cover) / 255 of the pixel and the rest of `colour`, in whole numbers.
+
+    x / 255, rounded, is y + 1 + (y >> 8) >> 8 with y = x + 127 for x up to 255^2, and never half way between two.
+    """
+    c: uint64_t = cython.cast(uint64_t, cover)
+    ones: uint64_t = 0x10000100001
+    channels: uint64_t = 0xFF000FF000FF
+    y: uint64_t = apart(pixel) * (255 - c) + apart(colour) * c + 127 * ones
+    y += ones + ((y >> 8) & channels)
+    y = (y >> 8) & channels
+    rgb: uint64_t = (y & 0xFF) | ((y >> 12) & 0xFF00) | ((y >> 24) & 0xFF0000)
+    return cython.cast(uint32_t, rgb) | OPAQUE
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def blend(pixel: uint32_t, ground: uint32_t, colour: uint32_t, cover: int32_t) -> uint32_t:
+    """The pixel once `cover` / 255 of it shows `colour`: on bare ground as long as there is some, then over what is there.
+
+    Rims that meet in a pixel add up in any order, as the discs do; the last one hides only what there is no room beside.
+    """
+    covered: int32_t = cython.cast(int32_t, pixel >> 24)
+    if covered == 255:
+        return over_full(pixel, colour, cover)
+    excess: int32_t = covered + cover - 255
+    rgb: uint32_t
+    if excess <= 0:
+        rgb = beside(pixel, ground, colour, cover, 0) | beside(pixel, ground, colour, cover, 8)
+        return rgb | beside(pixel, ground, colour, cover, 16) | (cython.cast(uint32_t, covered + cover) << 24)
+    kept: cython.double = cython.cast(cython.double, covered - excess) / covered
+    rgb = over(pixel, ground, colour, cover, kept, 0) | over(pixel, ground, colour, cover, kept, 8)
+    return rgb | over(pixel, ground, colour, cover, kept, 16) | OPAQUE
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def mixed(pixel: uint32_t, colour: uint32_t, amount: cython.double) -> uint32_t:
+    """The pixel with `colour` mixed in by `amount`, from 0 to 1; its A stays."""
+    result: uint32_t = pixel & OPAQUE
+    k: cython.int
+    for k in range(3):
+        shift: cython.int = 8 * k
+        old: cython.double = channel(pixel, shift)
+        new: cython.double = channel(colour, shift)
+        value: int32_t = cython.cast(int32_t, old + min(amount, 1.0) * (new - old) + 0.5)
+        result |= cython.cast(uint32_t, value) << shift
+    return result

@@ -1,0 +1,296 @@
+# mypy: ignore-errors
+"""Questions about particles in cells: which covers a point, is in a region, is hit by a ray, is nearest.
+
+Of the cells: `x0`, `y0` their lower left corner, `cell` their size, m; `columns`, `rows`; `start` (columns rows + 1,) where each
+begins in `member`, whose indices are those of the particles. A particle is in the cell of its centre; the cells cover all
+centres, so that nothing is clamped. Cells are found by a product with 1 / cell, as when the particles were sorted: rounded
+alike, none is missed at the edge of one. All answers are float64.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.arrays import const_doubles, const_integers, const_reals, doubles, integers
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import INFINITY, sqrt
+from cython.cimports.libc.stdint import int64_t
+
+Cells = cython.struct(
+    x0=cython.double, y0=cython.double, cell=cython.double, per=cython.double, columns=int64_t, rows=int64_t,
+    start=cython.pointer[cython.const[int64_t]], member=cython.pointer[cython.const[int64_t]],
+)  # fmt: skip
+
+
+@cython.cfunc
+def cells_of(cells) -> Cells:
+    """The cells as a struct, from a tuple (x0, y0, cell, columns, rows, start, member)."""
+    c: Cells
+    c.x0, c.y0, c.cell, c.columns, c.rows = cells[0], cells[1], cells[2], cells[3], cells[4]
+    c.start, c.member = const_integers(cells[5]), const_integers(cells[6])
+    c.per = 1.0 / c.cell
+    return c
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def clamped(value: cython.double, cells: int64_t) -> int64_t:
+    """The cell along one axis, the first or last if it is beyond."""
+    if value >= cells - 1:
+        return cells - 1
+    return cython.cast(int64_t, value) if value > 0 else 0
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def column_of(c: cython.pointer(Cells), x: cython.double) -> int64_t:
+    """The column of cells that x is in, m."""
+    return clamped((x - c.x0) * c.per, c.columns)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def row_of(c: cython.pointer(Cells), y: cython.double) -> int64_t:
+    """The row of cells that y is in, m."""
+    return clamped((y - c.y0) * c.per, c.rows)
+
+
+def at_points(points, reach: cython.double, cells, position, radius, found):
+    """For each point (q, 2) the particle that covers it, the one of nearest centre; -1 for none. `reach`: the largest radius."""
+    grid: Cells = cells_of(cells)
+    c: cython.pointer(Cells) = cython.address(grid)
+    at: cython.pointer[cython.const[cython.double]] = const_doubles(points)
+    p: cython.pointer[cython.const[real]] = const_reals(position)
+    r: cython.pointer[cython.const[real]] = const_reals(radius)
+    out: cython.pointer[int64_t] = integers(found)
+    count: int64_t = len(points)
+    q: int64_t
+    k: int64_t
+    row: int64_t
+    with cython.nogil:
+        for q in range(count):
+            x: cython.double = at[2 * q]
+            y: cython.double = at[2 * q + 1]
+            out[q] = -1
+            best: cython.double = INFINITY
+            left: int64_t = column_of(c, x - reach)
+            right: int64_t = column_of(c, x + reach)
+            for row in range(row_of(c, y - reach), row_of(c, y + reach) + 1):
+                for k in range(c.start[row * c.columns + left], c.start[row * c.columns + right + 1]):
+                    i: int64_t = c.member[k]
+                    dx: cython.double = p[2 * i] - x
+                    dy: cython.double = p[2 * i + 1] - y
+                    square: cython.double = dx * dx + dy * dy
+                    size: cython.double = r[i]
+                    if square <= size * size and (square < best or (square == best and i < out[q])):
+                        best = square
+                        out[q] = i
+
+
+def in_regions(lower, upper, center, size, cells, position, query, particle):
+    """Centres in boxes lower to upper (q, 2) and, where `size` (q,) is finite, within that distance of `center` (q, 2).
+
+    Writes pairs (query, particle); returns how many there are, also beyond the room.
+    """
+    grid: Cells = cells_of(cells)
+    c: cython.pointer(Cells) = cython.address(grid)
+    low: cython.pointer[cython.const[cython.double]] = const_doubles(lower)
+    high: cython.pointer[cython.const[cython.double]] = const_doubles(upper)
+    middle: cython.pointer[cython.const[cython.double]] = const_doubles(center)
+    far: cython.pointer[cython.const[cython.double]] = const_doubles(size)
+    p: cython.pointer[cython.const[real]] = const_reals(position)
+    of: cython.pointer[int64_t] = integers(query)
+    which: cython.pointer[int64_t] = integers(particle)
+    count: int64_t = len(lower)
+    room: int64_t = len(query)
+    found: int64_t = 0
+    q: int64_t
+    k: int64_t
+    row: int64_t
+    with cython.nogil:
+        for q in range(count):
+            left: int64_t = column_of(c, low[2 * q])
+            right: int64_t = column_of(c, high[2 * q])
+            for row in range(row_of(c, low[2 * q + 1]), row_of(c, high[2 * q + 1]) + 1):
+                for k in range(c.start[row * c.columns + left], c.start[row * c.columns + right + 1]):
+                    i: int64_t = c.member[k]
+                    x: cython.double = p[2 * i]
+                    y: cython.double = p[2 * i + 1]
+                    if not (low[2 * q] <= x and x <= high[2 * q] and low[2 * q + 1] <= y and y <= high[2 * q + 1]):
+                        continue
+                    dx: cython.double = x - middle[2 * q]
+                    dy: cython.double = y - middle[2 * q + 1]
+                    if far[q] == INFINITY or dx * dx + dy * dy <= far[q] * far[q]:
+                        if found < room:
+                            of[found] = q
+                            which[found] = i
+                        found += 1
+    return found
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def distance_along(
+    x: cython.double,
+    y: cython.double,
+    dx: cython.double,
+    dy: cython.double,
+    px: cython.double,
+    py: cython.double,
+    r: cython.double,
+) -> cython.double:
+    """Distance along a ray from (x, y) in the unit direction (dx, dy) to a disc; 0 from inside, infinity for a miss."""
+    ox: cython.double = px - x
+    oy: cython.double = py - y
+    along: cython.double = ox * dx + oy * dy
+    across: cython.double = ox * dy - oy * dx
+    if ox * ox + oy * oy <= r * r:
+        return 0.0
+    if along < 0.0 or across * across > r * r:
+        return INFINITY
+    return along - sqrt(r * r - across * across)
+
+
+Part = cython.struct(begin=cython.double, end=cython.double)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def within_reach(part: Part, p: cython.double, d: cython.double, size: cython.double, reach: cython.double) -> Part:
+    """The part of a ray that is within reach of the cells along one axis: p from their edge, at d for each metre, size wide."""
+    if d != 0.0:
+        a: cython.double = (-reach - p) / d
+        b: cython.double = (size + reach - p) / d
+        part.begin = max(part.begin, min(a, b))
+        part.end = min(part.end, max(a, b))
+    elif not (-reach <= p and p <= size + reach):
+        part.end = -1.0
+    return part
+
+
+def first_on_rays(origin, direction, length, reach: cython.double, cells, position, radius, index, distance):
+    """The first particle on each ray, and how far away; -1 and infinity for none. `direction` (q, 2): of length 1.
+
+    The ray is walked in steps of a cell. At each the cells within `reach`, the largest radius, of the piece are searched, until
+    no later one can be nearer.
+    """
+    grid: Cells = cells_of(cells)
+    c: cython.pointer(Cells) = cython.address(grid)
+    start: cython.pointer[cython.const[cython.double]] = const_doubles(origin)
+    heading: cython.pointer[cython.const[cython.double]] = const_doubles(direction)
+    far: cython.pointer[cython.const[cython.double]] = const_doubles(length)
+    p: cython.pointer[cython.const[real]] = const_reals(position)
+    r: cython.pointer[cython.const[real]] = const_reals(radius)
+    which: cython.pointer[int64_t] = integers(index)
+    way: cython.p_double = doubles(distance)
+    count: int64_t = len(origin)
+    q: int64_t
+    k: int64_t
+    row: int64_t
+    with cython.nogil:
+        for q in range(count):
+            x: cython.double = start[2 * q]
+            y: cython.double = start[2 * q + 1]
+            dx: cython.double = heading[2 * q]
+            dy: cython.double = heading[2 * q + 1]
+            which[q] = -1
+            way[q] = INFINITY
+            part: Part
+            part.begin = 0.0
+            part.end = far[q]
+            part = within_reach(part, x - c.x0, dx, c.cell * c.columns, reach)
+            part = within_reach(part, y - c.y0, dy, c.cell * c.rows, reach)
+            s: cython.double = part.begin
+            while s <= part.end and s <= way[q]:
+                ax: cython.double = x + s * dx
+                ay: cython.double = y + s * dy
+                bx: cython.double = x + (s + c.cell) * dx
+                by: cython.double = y + (s + c.cell) * dy
+                left: int64_t = column_of(c, min(ax, bx) - reach)
+                right: int64_t = column_of(c, max(ax, bx) + reach)
+                for row in range(row_of(c, min(ay, by) - reach), row_of(c, max(ay, by) + reach) + 1):
+                    for k in range(c.start[row * c.columns + left], c.start[row * c.columns + right + 1]):
+                        i: int64_t = c.member[k]
+                        d: cython.double = distance_along(x, y, dx, dy, p[2 * i], p[2 * i + 1], r[i])
+                        if d <= far[q] and (d < way[q] or (d == way[q] and i < which[q])):
+                            which[q] = i
+                            way[q] = d
+                s += c.cell
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def offer(
+    index: cython.pointer[int64_t],
+    square: cython.p_double,
+    at: int64_t,
+    room: int64_t,
+    count: int64_t,
+    i: int64_t,
+    value: cython.double,
+) -> int64_t:
+    """Insert particle i into the nearest so far, ascending in square distance, then index; returns how many there are."""
+    last: int64_t = at + room - 1
+    if count == room and (value > square[last] or (value == square[last] and i > index[last])):
+        return count
+    k: int64_t = at + min(count, room - 1)
+    while k > at and (square[k - 1] > value or (square[k - 1] == value and index[k - 1] > i)):
+        square[k] = square[k - 1]
+        index[k] = index[k - 1]
+        k -= 1
+    square[k] = value
+    index[k] = i
+    return min(count + 1, room)
+
+
+def nearest_to(points, cells, position, index, square):
+    """The centres nearest to each point (q, 2), in rows of `index` and `square` (q, k); what is left over stays as it was.
+
+    Cells are searched in square rings about the point's own, until the ring is farther away than what was found.
+    """
+    grid: Cells = cells_of(cells)
+    c: cython.pointer(Cells) = cython.address(grid)
+    at: cython.pointer[cython.const[cython.double]] = const_doubles(points)
+    p: cython.pointer[cython.const[real]] = const_reals(position)
+    which: cython.pointer[int64_t] = integers(index)
+    far: cython.p_double = doubles(square)
+    room: int64_t = index.shape[1]
+    questions: int64_t = len(points)
+    q: int64_t
+    k: int64_t
+    ring: int64_t
+    row: int64_t
+    with cython.nogil:
+        for q in range(questions):
+            x: cython.double = at[2 * q]
+            y: cython.double = at[2 * q + 1]
+            # Outside of the grid the rings begin at the nearest cell, and all distances only grow by that.
+            middle_column: int64_t = column_of(c, x)
+            middle_row: int64_t = row_of(c, y)
+            count: int64_t = 0
+            for ring in range(max(c.columns, c.rows)):
+                gap: cython.double = c.cell * (ring - 1) * (1.0 - 1e-12)  # the ring is at least this far from the point
+                if ring > 0 and count == room and gap > 0.0 and gap * gap > far[q * room + count - 1]:
+                    break
+                for row in range(max(middle_row - ring, 0), min(middle_row + ring, c.rows - 1) + 1):
+                    outer: cython.bint = row == middle_row - ring or row == middle_row + ring
+                    step: int64_t = 1 if outer else max(2 * ring, 1)
+                    column: int64_t = middle_column - ring
+                    while column <= middle_column + ring:
+                        if column >= 0 and column < c.columns:
+                            for k in range(c.start[row * c.columns + column], c.start[row * c.columns + column + 1]):
+                                i: int64_t = c.member[k]
+                                dx: cython.double = p[2 * i] - x
+                                dy: cython.double = p[2 * i + 1] - y
+                                count = offer(which, far, q * room, room, count, i, dx * dx + dy * dy)
+                        column += step
