@@ -94,9 +94,8 @@ def built(version: str, python: Path) -> tuple[Path, Path]:
     if wheel.stat().st_size > MOST_BYTES:
         sys.exit(f"{wheel.name} has {wheel.stat().st_size} bytes; allowed are at most {MOST_BYTES}")
     with tarfile.open(sdist) as content:
-        lacks = {"README.md", "LICENSE", "tests", "docs", ".ci", "build_core"} - {
-            Path(name).parts[1] for name in content.getnames()
-        }
+        inside = {part for name in content.getnames() for part in Path(name).parts[1:2]}
+    lacks = {"README.md", "LICENSE", "tests", "docs", ".ci", "build_core"} - inside
     if lacks:
         sys.exit(f"{sdist.name} lacks {', '.join(sorted(lacks))}")
     run(python, "-m", "twine", "check", "--strict", sdist, wheel)

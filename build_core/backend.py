@@ -15,7 +15,7 @@ from setuptools.build_meta import (
     prepare_metadata_for_build_wheel,
 )
 
-from build_core.compiler import has_compiler
+from build_core.compiler import requirements
 
 __all__ = [
     "build_editable",
@@ -31,18 +31,17 @@ __all__ = [
 Settings = dict[str, Any] | None
 
 
-def _compiler() -> list[str]:
-    return ["cython>=3.1"] + ([] if has_compiler() else ["ziglang>=0.13"])
+CYTHON = "cython>=3.1"
 
 
 def get_requires_for_build_wheel(config_settings: Settings = None) -> list[str]:
     """What pip installs before it builds a wheel."""
-    return [*build_meta.get_requires_for_build_wheel(config_settings), *_compiler()]
+    return [*build_meta.get_requires_for_build_wheel(config_settings), CYTHON, *requirements()]
 
 
 def get_requires_for_build_editable(config_settings: Settings = None) -> list[str]:
     """What pip installs before it builds an editable install."""
-    return [*build_meta.get_requires_for_build_editable(config_settings), *_compiler()]
+    return [*build_meta.get_requires_for_build_editable(config_settings), CYTHON, *requirements()]
 
 
 def build_wheel(wheel_directory: str, config_settings: Settings = None, metadata_directory: str | None = None) -> str:

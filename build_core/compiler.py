@@ -78,26 +78,27 @@ def compiler() -> list[str]:
         wrong = _works(command)
         if not wrong:
             return command
-        tried.append(f"{shlex.join(command)} fails ({wrong.strip().splitlines()[-1]})")
+        tried.append(f"{shlex.join(command)} fails" + "".join(f" ({line})" for line in wrong.strip().splitlines()[-1:]))
     found = "; ".join(tried) or "none was found"
     raise CompilerError(
         f"pyverlet needs a C compiler to be built: {found}; install clang or gcc, or set CC to one, or to `ziglang`"
     )
 
 
-def has_compiler() -> bool:
-    """Whether there is one that works."""
+def requirements() -> list[str]:
+    """What a build needs from PyPI for want of a compiler: zig's, unless `CC` names another."""
     try:
-        return bool(compiler())
+        compiler()
     except CompilerError:
-        return False
+        return ["ziglang>=0.13"] if os.environ.get("CC", "ziglang") == "ziglang" else []
+    return []
 
 
 def _run(command: list[str]) -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         told = (done.stdout + done.stderr).splitlines()[:40]
-        raise CompilerError("\n".join([shlex.join(command), *told]))
+        raise CompilerError("\n".join([shlex.join(command), *told] if told else [f"exit code {done.returncode}"]))
 
 
 def _architecture(command: list[str], name: str) -> list[str]:

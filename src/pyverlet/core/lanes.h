@@ -158,7 +158,7 @@ LANES_INLINE void put(real *array, const uint32_t *index, int64_t k, lanes x, la
     a[i[7]] = q[3];
 }
 #else
-/* By halves of four lanes: gcc splits wider shuffles into single floats where registers have 16 bytes, 8 times as slow. */
+/* By halves of four lanes: gcc splits wider shuffles into single floats where registers have 16 bytes, 3 times as slow. */
 typedef double two_doubles __attribute__((vector_size(16)));
 typedef float half_lanes __attribute__((vector_size(16)));
 typedef union {
