@@ -136,7 +136,7 @@ def test_who_is_covered_by_an_obstacle_is_out_after_a_frame(place: str) -> None:
 
 
 def test_without_it_energy_rises_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pyverlet.world.world.undriven", lambda *_: False)
+    monkeypatch.setattr("pyverlet.laws.limiter.undriven", lambda *_: False)
     assert rows.worst_rise(crowd(), 2.0)[0] > 5 * rows.MOST
 
 

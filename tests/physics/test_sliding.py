@@ -10,6 +10,8 @@ from scipy.integrate import solve_ivp
 
 import pyverlet as pv
 
+pytestmark = pytest.mark.filterwarnings("ignore::pyverlet.CoarseCoordinatesWarning")  # so far away on purpose
+
 G, DT = 9.81, 1 / 60
 PLACES = [(100, 0.1), (100, 0.01), (100, 0.001)]
 """|coordinate| and radius, m: up to 1e5 radii."""

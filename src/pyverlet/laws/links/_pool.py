@@ -96,7 +96,7 @@ class Pool(ABC):
         """(k,) the same, row by row."""
 
     def energy_by_pull(self, position: Array, seam: Seam) -> float:
-        """As `energy`, but F^2 / 2 k of rows whose value rounding changes by more than 1 %."""
+        """As `energy`, but F^2 / 2 k of rows whose value is mostly rounding."""
         rows = self.rows
         if not np.isfinite(rows["stiffness"]).any():
             return 0.0
@@ -128,8 +128,8 @@ class Pool(ABC):
         """The same in the middle of a frame, of the rows that are intact then, at (m, 2) positions in the order of `Work`."""
 
 
-UNSURE = 100.0
-"""Times the rounding of coordinates: a smaller value of a row is not known to 1 %."""
+UNSURE = 8.0
+"""Times the rounding of coordinates: a smaller value of a row is mostly rounding."""
 
 
 def held(stiffness: Array, upper: Array | float, intact: Array, value: Array) -> Array:
