@@ -10,10 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.contacts.collisions import ContactSolver
+from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceList, Numbered
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.rooms import Boundary
+from pyverlet.laws.touches import Touches
 from pyverlet.state.group import Column, Group
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import EVERYONE, State
@@ -28,6 +30,8 @@ class Particles(Shared):
     _state: State
     _slots: Slots
     _contacts: ContactSolver | None
+    _events: Events | None
+    _touches: Touches | None
     forces: ForceList
     links: Links
     _where = slice(None)
@@ -130,6 +134,9 @@ class Particles(Shared):
     def remove(self, which: Group | ArrayLike) -> None:
         """Remove particles. Groups keep the others, whose indices close ranks.
 
+        A loop over `contacts` or over the records of `events` may remove particles: the records are renumbered in place. A removed
+        particle is -1 in them, which is refused here.
+
         Args:
             which: a group, an index, several, or (n,) bool. Many at once cost as much as one.
 
@@ -151,7 +158,7 @@ class Particles(Shared):
 
     def _renumber(self, now: Array) -> None:
         """Tell those who hold a particle by its index where it is now, or that it is no more (-1)."""
-        for holder in (self.links, self._contacts, *self.forces):
+        for holder in (self.links, self._contacts, self._events, self._touches, *self.forces):
             if isinstance(holder, Numbered):
                 holder.renumber(now)
 
