@@ -134,8 +134,8 @@ class Particles(Shared):
     def remove(self, which: Group | ArrayLike) -> None:
         """Remove particles. Groups keep the others, whose indices close ranks.
 
-        A loop over `contacts` or over the records of `events` may remove particles: the records are renumbered in place. A removed
-        particle is -1 in them, which is refused here.
+        A loop over `contacts` or over the records of `events` may remove particles: the records are renumbered in place. There
+        a removed particle is -1, which is refused here.
 
         Args:
             which: a group, an index, several, or (n,) bool. Many at once cost as much as one.
