@@ -92,32 +92,95 @@ def test_a_blow_is_what_it_would_be_without_sleep() -> None:
     assert results[0][1] == pytest.approx(results[1][1], abs=0.1)
 
 
-@pytest.mark.parametrize("change", ["velocity", "position", "radius", "gravity", "boundary", "wall", "force", "spin"])
-def test_what_the_user_does_wakes(change: str) -> None:
+@pytest.fixture(scope="module")
+def sleepers() -> tuple[pv.World, pv.Group, Any]:
+    """Two islands of six asleep, the first group, and the state to go back to; a pinned circle high above."""
     world = troughs()
     a, _ = fill(world, 10, 45)
+    world.add(position=(30, 50), mass=np.inf)
     settle(world)
-    assert world.asleep.all()
-    everybody = change in ("gravity", "boundary", "wall", "force")
+    assert world.asleep[:12].all()
+    return world, a, world.save()
+
+
+OWN = {"restitution": 0.5, "friction": 0.5, "mass": 2.0, "category": 2, "mask": 2, "radius": 0.4}
+WORLDWIDE = ("gravity", "boundary", "wall", "size", "force", "collisions", "link", "add obstacle", "pinned")
+
+
+@pytest.mark.parametrize("removes", [False, True])
+@pytest.mark.parametrize("change", ["velocity", "position", "spin", *OWN, *WORLDWIDE, "remove obstacle", "move obstacle"])
+def test_what_the_user_does_wakes(sleepers: tuple[pv.World, pv.Group, Any], change: str, removes: bool) -> None:
+    # With and without a removal before the same frame: columns of the sleepers must survive it.
+    world, a, saved = sleepers
+    world.gravity, world.boundary, world.collisions = (0, -G), pv.Box((0, 0), (60, 60)), pv.Collisions()
+    world.forces.clear()
+    world.restore(saved)
+    extra = world.add(position=(55, 55))
+    world.step(1 / 60)
+    assert world.asleep[:12].all()
+    if removes:
+        extra.remove()
+    everybody = change in WORLDWIDE or "obstacle" in change
     if change == "velocity":
         a.velocity[5] = (0, 3)
     elif change == "position":
         a.position[5, 1] += 0.5
     elif change == "spin":
         a.spin[5] = 5
-    elif change == "radius":
-        a.radius[5] = 0.4
+    elif change in OWN:
+        getattr(a, change)[5] = OWN[change]
     elif change == "gravity":
         world.gravity = (1, -9)
     elif change == "wall":
         world.boundary.friction = 0.3  # type: ignore[attr-defined]
     elif change == "boundary":
-        world.boundary = pv.Box((-10, -10), (60, 60), friction=0.5)
+        world.boundary = pv.Circle(center=(30, 30), radius=50)
+    elif change == "size":
+        world.boundary = pv.Box((0, 0), (60, 60.0000001))
+    elif change == "collisions":
+        world.collisions = pv.Collisions(friction=0.5)
+    elif change == "link":
+        world.links.append(pv.Stick(a, 0, 1))
+    elif change == "pinned":
+        world.position[12, 1] -= 0.1
+    elif change == "add obstacle":
+        world.obstacles.append(pv.Disc((30, 30), 1))
+    elif change == "remove obstacle":
+        del world.obstacles[1]
+    elif change == "move obstacle":
+        world.obstacles[1].pivot = (45, 4)
     else:
         world.forces.append(pv.Wind(velocity=(5, 0), linear=1.0))
     world.step(1 / 60)
     assert not world.asleep[:6].any()
-    assert world.asleep[6:].all() != everybody
+    assert world.asleep[6:12].all() != everybody
+
+
+@pytest.mark.parametrize("change", ["mask", "category", "unpin", "remove", "move"])
+def test_sleepers_fall_when_what_bore_them_goes(change: str) -> None:
+    # Ten in a row on ten, on the floor; or one pinned under a column.
+    world = pv.World(boundary=pv.Box((0, 0), (20, 20)), sleep=True)
+    pinned = world.add(position=(2, 5), mass=np.inf)
+    world.add(position=[(2, 6)])
+    row = world.add(position=[(4.5 + k, 0.5 + j) for j in range(2) for k in range(10)])
+    world.boundary = pv.Box((0, 0), (14.5, 20))
+    world.run(seconds=2)
+    assert world.asleep[1:].all()
+    if change == "mask":
+        row.mask[10:] = 0
+    elif change == "category":
+        row.category[10:] = 0
+    elif change == "unpin":
+        pinned.mass[0] = 1.0
+    elif change == "remove":
+        pinned.remove()
+    else:
+        pinned.position[0] = (1, 15)
+    world.run(seconds=2)
+    if change in ("mask", "category"):
+        assert row.position[:, 1].max() < 0.6
+    else:
+        assert world.position[-21, 1] < 2.6
 
 
 def test_removing_one_wakes_its_island_alone() -> None:

@@ -39,18 +39,70 @@ def test_keys_are_replaced_in_order(gone: int, new: int) -> None:
     assert kernels.replaced(keys, left, come).tolist() == np.union1d(np.setdiff1d(keys, left), come).tolist()
 
 
-@pytest.mark.parametrize("last", [False, True])
-def test_who_is_gone_is_not_told_of(last: bool) -> None:
-    # Three in a row touch; one of them goes. What was between it and others is told to nobody, the rest goes on.
+ENDED = [([0], [(-1, 0)]), ([1], [(0, -1), (-1, 1)]), ([2], [(1, -1)]), ([0, 1], [(-1, -1), (-1, 0)])]
+
+
+@pytest.mark.parametrize(("which", "ended"), ENDED)
+def test_removal_ends_contacts(which: list[int], ended: list[tuple[int, int]]) -> None:
+    # Three in a row touch; some are removed: one end for each of their contacts, in the next frame, with -1 for the removed.
     world = pv.World(gravity=(0, 0), collisions=pv.Collisions(), events=True)
     group = world.add(position=[(0, 0), (0.999, 0), (1.998, 0)], radius=0.5)
     world.step(1 / 60)
     assert world.events.begin[["a", "b"]].tolist() == [(0, 1), (1, 2)]
-    group.remove([False, False, True] if last else [True, False, False])
+    world.position[:, 0] = (0, 0.999, 1.998)  # touching still
+    group.remove(which)
     world.step(1 / 60)
     assert len(world.events.begin) == 0
-    assert (world.events.end["a"] < 2).all()
-    assert (world.events.end["b"] < 2).all()
+    assert sorted(world.events.end[["a", "b"]].tolist()) == sorted(ended)
+    world.step(1 / 60)
+    assert (world.events.end["a"] >= 0).all()
+
+
+ROOMS: dict[str, Any] = {"open": pv.Open(), "periodic": pv.Periodic((-5, -20), (25, 20)), "cage": pv.Circle(radius=40)}
+
+
+@pytest.mark.parametrize("room", ROOMS)
+@pytest.mark.parametrize("what", ["begin", "hit", "contacts", "end"])
+def test_records_stay_valid_while_a_loop_removes_particles(room: str, what: str) -> None:
+    # Four pairs and a disc at a post; of each the first is removed, in a loop over records of the last frame.
+    world = pv.World(gravity=(0, 0), boundary=ROOMS[room], events=True, contacts=True)
+    world.obstacles.append(pv.Segment((-3, 3), (-1, 3)))
+    places = [(5.0 * k + dx, -4.0) for k in range(4) for dx in (0, 0.98)]
+    world.add(position=[*places, (-2, 2.51)], velocity=[(2, 0), (-2, 0)] * 4 + [(0, 2)], mass=np.arange(1, 10))
+    world.add(position=(0, 0), mass=10)
+    world.step(1 / 60)
+    assert len(world.events.hit) == len(world.contacts) == 5
+    if what == "end":
+        world.position[1:8:2, 1] = 4
+        world.position[8, 1] = 0
+        world.step(1 / 60)
+    records = world.contacts if what == "contacts" else getattr(world.events, what)
+    assert len(records) == 5
+    kept = list(records)
+    for k, record in enumerate(records):
+        if k == 1:
+            world.add(position=(0, 8), mass=11)
+        world.remove(int(record["a"]))
+    assert world.mass.tolist() == [2, 4, 6, 8, 10, 11]
+    assert records[["a", "b"]].tolist() == [(-1, 0), (-1, 1), (-1, 2), (-1, 3), (-1, -1)]
+    assert [int(record["b"]) for record in kept] == [0, 1, 2, 3, -1]
+    world.remove([int(kept[1]["b"]), int(kept[3]["b"])])
+    assert records["b"].tolist() == [0, -1, 1, -1, -1]
+    assert len(world.contacts) == 0  # of those that are left none has touched another
+    with pytest.raises(pv.InputError, match="which has -1; allowed are whole numbers from 0 to 3"):
+        world.remove(int(kept[0]["a"]))
+    world.step(1 / 60)
+    assert len(world.events.end) == (0 if what == "end" else 5)
+
+
+def test_saved_records_are_those_of_then() -> None:
+    world = pv.World(gravity=(0, 0), events=True)
+    world.add(position=[(0, 0), (0.99, 0), (5, 0), (5.99, 0)], velocity=[(2, 0), (-2, 0)] * 2)
+    world.step(1 / 60)
+    saved, told = world.save(), world.events.begin[["a", "b"]].tolist()
+    world.remove([0, 3])
+    world.restore(saved)
+    assert world.events.begin[["a", "b"]].tolist() == told == [(0, 1), (2, 3)]
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -113,11 +165,15 @@ def test_begun_and_not_ended_are_those_that_touch(method: Any, restitution: floa
     for frame in range(240):
         if frame == 100:
             world.remove([3, 50])
-            alive = {(a - (a > 3) - (a > 50), b if b < 0 else b - (b > 3) - (b > 50)) for a, b in alive if not {a, b} & {3, 50}}
+            left = {(a - (a > 3) - (a > 50), b if b < 0 else b - (b > 3) - (b > 50)) for a, b in alive if not {a, b} & {3, 50}}
+            removed, alive = len(alive) - len(left), left
             world.add(position=(0, 11), radius=0.4)
         world.step(1 / 60)
         told = (world.events.begin[["a", "b"]], world.events.end)
         begun, ended = ({(int(a), int(b)) for a, b in pairs.tolist()} for pairs in told)
+        if frame == 100:
+            assert len(ended - alive) == removed
+            ended &= alive
         assert not begun & alive
         assert ended <= alive
         alive = (alive | begun) - ended
@@ -204,13 +260,15 @@ def test_a_hit_says_where_how_and_on_what() -> None:
 
 
 @pytest.mark.parametrize("left", [0, 1])
-def test_who_is_left_alone_has_parted_from_nobody(left: int) -> None:
+def test_contacts_end_where_one_or_none_is_left(left: int) -> None:
     # A world of one looks at no pairs, and those of the frame before are about circles that are no more.
     world = pv.World(boundary=pv.Circle(radius=3), events=True)
     world.add(position=[(0, 0), (0.9, 0), (1.8, 0)], radius=0.5)
     world.step(1 / 60)
     assert len(world.events.begin) == 2
     world.remove(np.arange(3) >= left)
+    world.step(1 / 60)
+    assert world.events.end[["a", "b"]].tolist() == [(0 if left else -1, -1), (-1, -1)]
     for _ in range(60):
         world.step(1 / 60)
         assert len(world.events.end) == 0
@@ -259,3 +317,16 @@ def test_marked_in_the_list_or_by_key_the_same_events(options: dict[str, Any], d
         begun += len(marked.events.begin)
     assert begun > 500
     assert by_marks > 60 or "sleep" in options
+
+
+def test_a_loop_over_broken_links_may_remove_particles() -> None:
+    world = pv.World(gravity=(0, 0))
+    group = world.add(position=[(0, 0), (2, 0), (9, 0), (11, 0)], velocity=[(-9, 0), (9, 0)] * 2, mass=[1, 2, 3, 4])
+    world.links.append(pv.Stick(group, [0, 2], [1, 3], breaking_force=1.0))
+    world.step(1 / 60)
+    records = world.links.broken
+    assert len(records) == 2
+    for record in records:
+        world.remove(int(record["i"]))
+    assert world.mass.tolist() == [2, 4]
+    assert records[["i", "j"]].tolist() == [(-1, 0), (-1, 1)]

@@ -73,18 +73,25 @@ def touch(position, size, period_x, period_y, island, first, count, pair_i, pair
 
 
 @kernel
-def find_edited(position, velocity, spin, radius, mass, slot_position, slot_radius, slot_mass, particle, island, edited):
-    """Set edited[k] = 1 for sleepers whose user has written to them; returns how many there are.
+def find_edited(given, held, particle, island, edited):
+    """Set edited[k] = 1 for sleepers that the user has written to; returns how many there are.
 
-    First what the user has, in the user's order; then what the slots hold.
+    given: what the user has, in the user's order: position, velocity, spin, radius, mass, restitution, friction, category, mask.
+    held: what the slots hold of it, without velocity and spin, which are 0; categories and masks are empty where all are default.
     """
-    found = 0
+    position, velocity, spin, radius, mass, restitution, friction, category, mask = given
+    was_at, was_radius, was_mass, was_restitution, was_friction, was_category, was_mask = held
+    one, every, found = np.uint32(1), np.uint32(0xFFFFFFFF), 0
     for k in range(island.shape[0]):
         if island[k] >= 0:
             i = particle[k]
-            moved = (position[i, 0] != slot_position[k, 0]) | (position[i, 1] != slot_position[k, 1])
-            moved |= (velocity[i, 0] != 0) | (velocity[i, 1] != 0) | (spin[i] != 0)
-            if moved | (radius[i] != slot_radius[k]) | (mass[i] != slot_mass[k]):
+            differs = (position[i, 0] != was_at[k, 0]) | (position[i, 1] != was_at[k, 1])
+            differs |= (velocity[i, 0] != 0) | (velocity[i, 1] != 0) | (spin[i] != 0)
+            differs |= (radius[i] != was_radius[k]) | (mass[i] != was_mass[k])
+            differs |= (restitution[i] != was_restitution[k]) | (friction[i] != was_friction[k])
+            differs |= category[i] != (was_category[k] if was_category.shape[0] > 0 else one)
+            differs |= mask[i] != (was_mask[k] if was_mask.shape[0] > 0 else every)
+            if differs:
                 edited[k] = 1
                 found += 1
     return found

@@ -42,11 +42,12 @@ speed, N s. NaN where a room of the user's own does not say."""
 class Events:
     """Contacts of the last frame, as structured arrays sorted by a, then b. Those who touch in any substep touch in the frame.
 
-    In a pile that comes to rest, contacts without weight may end and begin again.
+    In a pile that comes to rest, contacts without weight may end and begin again. Indices stay valid until the next frame: when
+    particles are removed, these arrays are renumbered in place, and a removed particle is -1 in them. Copies are not.
 
     Attributes:
         begin: HIT, those who touch now and did not in the frame before.
-        end: CONTACT, those who did and do not now; without those of removed particles.
+        end: CONTACT, those who did and do not now; a particle that has been removed is -1.
         hit: HIT, those of `begin` who met with at least `hit_speed`.
     """
 
@@ -81,7 +82,12 @@ class Events:
     def take(self, other: Events) -> None:
         """Remember what the other does."""
         self._hit_speed, self._touching, self._known = other._hit_speed, other._touching, None
-        self.begin, self.end, self.hit = other.begin, other.end, other.hit
+        self.begin, self.end, self.hit = other.begin.copy(), other.end.copy(), other.hit.copy()
+
+    def renumber(self, now: Array) -> None:
+        """Particles are now at `now` (n,), or removed (-1)."""
+        for records in (self.begin, self.end, self.hit):
+            renumber(records, now)
 
     # ---- what the engine tells ---------------------------------------------------------------------------------------
 
@@ -213,6 +219,13 @@ class Place(NamedTuple):
         return np.where(np.isfinite(gap), gap, np.nan), into, surface
 
 
+def renumber(records: Array, now: Array) -> None:
+    """Particles are now at `now` (n,), or removed (-1): what `records` say of them, in place, so that loops over it see it."""
+    for name in ("a", "b"):
+        before = records[name]
+        records[name] = np.where(before >= 0, now[before], -1) if len(now) else -1
+
+
 def _as_indices(state: State) -> bool:
     """Whether numbers are indices, for nobody has gone but the last that came."""
     return not len(state) or bool(state.number[-1] == len(state) - 1)
@@ -235,22 +248,17 @@ def _among(keys: Array, others: Array) -> Array:
 
 
 def _contacts(keys: Array, split: int, state: State) -> tuple[Array, Array]:
-    """CONTACT from the first `split` keys, and from the others, by the indices of now; without particles that are no more."""
-    lower = keys & _LOWER
-    a, alive = _index(keys >> 32, state)
-    b, other = _index(lower - 1, state)
-    wall = lower == 0
-    kept = alive & (other | wall)
+    """CONTACT from the first `split` keys, and from the others, by the indices of now; removed particles are -1."""
     found = np.empty(len(keys), CONTACT)
-    found["a"], found["b"] = a, np.where(wall, WALL, b)
-    return found[:split][kept[:split]], found[split:][kept[split:]]
+    found["a"], found["b"] = _index(keys >> 32, state), _index((keys & _LOWER) - 1, state)
+    return found[:split], found[split:]
 
 
-def _index(number: Array, state: State) -> tuple[Array, Array]:
-    """(index, whether there is one) of the particles with these numbers."""
+def _index(number: Array, state: State) -> Array:
+    """Indices of the particles with these numbers; -1 where there is none."""
     if not len(state):
-        return np.zeros(len(number), np.int64), np.zeros(len(number), bool)
+        return np.full(len(number), -1)
     if _as_indices(state):
-        return number, (number >= 0) & (number < len(state))
+        return np.where(number < len(state), number, -1)
     where = np.searchsorted(state.number, number).clip(max=len(state) - 1)
-    return where, np.asarray(state.number[where] == number)
+    return np.where(state.number[where] == number, where, -1)

@@ -2,7 +2,8 @@
 
 Circles that hang together are an island. One that has been calm for a while falls asleep as a whole: its circles stop, and count
 as pinned, so that pairs among them are not even listed. It wakes as a whole, in the very substep, when somebody awake touches one
-of them; and before a frame in which the user has moved or removed one of them, or changed a law of the world.
+of them; and before a frame in which the user has moved, changed or removed one of them. All wake when the user has changed a law
+of the world, an obstacle or a pinned particle.
 """
 
 from __future__ import annotations
@@ -16,8 +17,9 @@ from pyverlet.ground.constants import SLEEP_AFTER_S, SLEEP_NEAR, SLEEP_SPEED
 from pyverlet.kernels import sleep as kernels
 from pyverlet.laws.contacts.broadphase import PairList
 from pyverlet.laws.forces import Drag
+from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
-from pyverlet.state.state import State
+from pyverlet.state.state import MARKS, ROWS, SET, State
 
 Array = NDArray[Any]
 
@@ -28,38 +30,40 @@ class Sleep:
     def __init__(self) -> None:
         self._next = 0  # number of the next island
         self._laws: Any = None
+        self._pinned: Any = None  # what pinned particles were like when the last frame began; None: not known
         self._members: dict[int, int] = {}  # of each island, when it fell asleep
 
     def copy(self) -> Sleep:
         """Another one that remembers the same."""
         other = Sleep()
-        other._next, other._laws, other._members = self._next, self._laws, dict(self._members)
+        other._next, other._laws, other._pinned, other._members = self._next, self._laws, self._pinned, dict(self._members)
         return other
 
     def take(self, other: Sleep, laws: Any) -> None:
         """Remember what the other does; `laws` are those of now, when the obstacles are back where they were."""
-        self._next, self._laws, self._members = other._next, other._laws, dict(other._members)
+        self._next, self._laws, self._pinned, self._members = other._next, other._laws, other._pinned, dict(other._members)
         if laws and other._laws and laws[:-1] == other._laws[:-1]:
             self._laws = laws
 
     def begin(self, slots: Slots, state: State, laws: Any) -> bool:
         """Before the slots gather the state of a new frame. Whether somebody woke."""
-        same, self._laws = laws == self._laws, laws
+        pinned = _pinned(state)
+        same = laws == self._laws and self._pinned in (None, pinned)
+        self._laws, self._pinned = laws, pinned
         if not self._members:
             return False
         if not same:
             return self._wake(slots, slots.island >= 0)
         edited = np.zeros(len(slots), np.uint8)
-        if slots.is_new:  # some have gone, and what the slots hold of the others is not known yet
+        given = tuple(getattr(state, name) for name in (*ROWS[:2], "spin", *SET, *MARKS))
+        held = tuple(getattr(slots, name) for name in (ROWS[0], *SET, *MARKS))
+        found = kernels.find_edited(given, held, slots.particle, slots.island, edited)
+        if slots.is_new:  # some have been removed
             number, left = np.unique(slots.island, return_counts=True)
             fewer = [k for k, n in zip(number.tolist(), left.tolist(), strict=True) if n != self._members.get(k, n)]
             edited[np.isin(slots.island, fewer)] = 1
-            edited |= (state.velocity[slots.particle] != 0).any(axis=1)
-        else:
-            now = (state.position, state.velocity, state.spin, state.radius, state.mass)
-            before = (slots.position, slots.radius, slots.mass)
-            if not kernels.find_edited(*now, *before, slots.particle, slots.island, edited):
-                return False
+        elif not found:
+            return False
         return self._wake(slots, np.isin(slots.island, slots.island[(edited == 1) & (slots.island >= 0)]))
 
     @property
@@ -126,4 +130,15 @@ def laws(world: Any) -> Any:
     moving = world.boundary.moves or world._course.drives
     if world.links or moving or not all(type(force) is Drag for force in world.forces):
         return None
-    return (world.gravity, repr(world.boundary), world.boundary.extent(), world.collisions, world._course.version)
+    return (world.gravity, _facts(world.boundary), world.boundary.extent(), world.collisions, world._course.version)
+
+
+def _facts(boundary: Boundary) -> tuple[type, str]:
+    """What is known of a room, to the last digit: its public attributes."""
+    return type(boundary), repr(sorted((name, value) for name, value in vars(boundary).items() if not name.startswith("_")))
+
+
+def _pinned(state: State) -> tuple[bytes, ...]:
+    """What sleepers may rely on of pinned particles, to the last bit."""
+    which = np.flatnonzero(np.isinf(state.mass))
+    return tuple(getattr(state, name)[which].tobytes() for name in ("number", *ROWS[:2], *SET, *MARKS))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.kernels.impulses import least
-from pyverlet.laws.events import WALL
+from pyverlet.laws.events import WALL, renumber
 from pyverlet.laws.obstacles import Course, Facing
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
@@ -86,6 +86,8 @@ class Touches:
         self._heard: list[tuple[Array, Array, Floats]] = []
         self._found: Array | None = None
         self._end: _End | None = None
+        self._shown: list[Array] = []  # what `array` has returned of this frame; the last is that of now, if `_is_shown`
+        self._is_shown = False
         self._virial = 0.0
 
     def frame(
@@ -117,7 +119,8 @@ class Touches:
             elif stage == "finish":
                 pairs = np.empty((0, 2), np.int64) if listed is None else _rows(*listed(), state.particle)
                 self._end = _End(state, users.number.copy(), self._given, self._heard, room, course, pairs, steps * h)
-                self._found, self._virial = None, virial() if virial else 0.0
+                self._found, self._shown, self._is_shown = None, [], False
+                self._virial = virial() if virial else 0.0
             before = state.velocity.copy()
 
         return told
@@ -133,12 +136,19 @@ class Touches:
         self._heard.append((state.particle[i].astype(np.int64), state.particle[j].astype(np.int64), np.array(impulse, float)))
 
     def array(self, state: State) -> Array:
-        """TOUCH, sorted by a, then b; without removed particles."""
+        """TOUCH, sorted by a, then b; without removed particles. It is renumbered when particles are removed later."""
         if self._end is None:
             return np.zeros(0, TOUCH)
-        if self._found is None:
-            self._found = self._end.contacts()
-        return self._end.renumbered(self._found, state)
+        if not self._is_shown:
+            self._shown.append(self._end.renumbered(self.array_of_then(), state))
+            self._is_shown = True
+        return self._shown[-1]
+
+    def renumber(self, now: Array) -> None:
+        """Particles are now at `now` (n,), or removed (-1): arrays of this frame that were returned say so."""
+        for shown in self._shown:
+            renumber(shown, now)
+        self._is_shown = False
 
     def force_on(self, what: Any, room: Boundary) -> Floats:
         """(2,) N, by all circles, averaged over the frame."""
@@ -194,7 +204,7 @@ class _End:
     def renumbered(self, found: Array, state: State) -> Array:
         """With the indices of now; `state` is as it was, but for removed particles and new ones at its end."""
         if np.array_equal(self._numbers, state.number[: len(self._numbers)]):
-            return found
+            return found.copy()
         where = np.searchsorted(state.number, self._numbers)
         lives = where < len(state)
         lives[lives] = state.number[where[lives]] == self._numbers[lives]

@@ -212,9 +212,14 @@ class Slots:
         """The user's particles are now at `now` (n,), or no more (-1): let those go, keep the order of the others."""
         order = now[self.particle].astype(np.int32)
         kept = order >= 0
+        names = ("position", *SET, *MARKS) if self._sleeps else ()  # what sleepers were put to sleep under
+        held = {name: column[kept] for name in names if len(column := getattr(self, name))}
         self._keep(kept)
         self._kept["particle"] = order[kept]
         self._resize(int(np.count_nonzero(kept)))
+        for name, column in held.items():
+            setattr(self, name, column)
+        self.size = self.radius
 
     def resize(self) -> None:
         """Bring `size` up to date with `grown`."""

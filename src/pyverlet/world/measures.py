@@ -40,8 +40,6 @@ class Measures(Particles):
     time: float
     gravity: tuple[float, float]
     _books: Bookkeeper | None
-    _events: Events | None
-    _touches: Touches | None
     _course: Course
     obstacles: Obstacles
     collisions: Collisions | None

@@ -13,10 +13,12 @@ from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.turns import Shared, in_turn, of_one_frame
 from pyverlet.laws.contacts.collisions import ContactSolver
+from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceList, Numbered
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.rooms import Boundary
+from pyverlet.laws.touches import Touches
 from pyverlet.state.group import Column, Group, Particle
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import EVERYONE, State
@@ -31,6 +33,8 @@ class Particles(Shared):
     _slots: Slots
     _contacts: ContactSolver | None
     _impulses: Any
+    _events: Events | None
+    _touches: Touches | None
     forces: ForceList
     links: Links
     _where = slice(None)
@@ -147,6 +151,9 @@ class Particles(Shared):
     def remove(self, which: Group | Particle | ArrayLike) -> None:
         """Remove particles. Groups keep the others, whose indices close ranks.
 
+        A loop over `contacts` or over the records of `events` may remove particles: the records are renumbered in place. There
+        a removed particle is -1, which is refused here.
+
         Args:
             which: a group, a particle of one, an index, several, or (n,) bool. Many at once cost as much as one.
 
@@ -168,7 +175,7 @@ class Particles(Shared):
 
     def _renumber(self, now: Array) -> None:
         """Tell those who hold a particle by its index where it is now, or that it is no more (-1)."""
-        for holder in (self.links, self._contacts, self._impulses, *self.forces):
+        for holder in (self.links, self._contacts, self._impulses, self._events, self._touches, *self.forces):
             if isinstance(holder, Numbered):
                 holder.renumber(now)
 

@@ -38,7 +38,7 @@ class Links(Shared):
     """Sticks, ropes, springs, pins and so on, in the order they were appended: `world.links`.
 
     Attributes:
-        broken: a structured array of BROKEN, the links that broke in the last frame.
+        broken: a structured array of BROKEN, the links that broke in the last frame; a particle removed since is -1.
     """
 
     def __init__(self, state: State) -> None:
@@ -148,6 +148,8 @@ class Links(Shared):
             link.particles = moved
             if not kept.all():
                 link._keep(kept)
+        for name in ("i", "j"):  # in place: a loop over it may remove particles
+            self.broken[name] = np.where(self.broken[name] >= 0, new[self.broken[name]], -1)
         self._links, self._listed = {number: link for number, link in self._links.items() if len(link)}, None
         self._apart_stale = True
 
@@ -370,11 +372,12 @@ class Links(Shared):
         pools = [(family, pool.rows.copy(), pool.entries.copy()) for family, pool in zip(self._pools, self._kept, strict=True)]
         links = [(owner, link, link.particles) for owner, link in self._links.items()]
         past = self._past and Past(*(array.copy() for array in self._past))
-        return links, pools, self.broken, self._apart_changed, past
+        return links, pools, self.broken.copy(), self._apart_changed, past
 
     def restore(self, saved: Any) -> None:
         """Go back to what `save` returned, with the links of then."""
-        links, pools, self.broken, apart_changed, self._past = saved
+        links, pools, broken, apart_changed, self._past = saved
+        self.broken = broken.copy()
         for link in self:
             link._pool = None
         for pool in self._kept:
