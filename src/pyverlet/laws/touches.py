@@ -140,7 +140,9 @@ class Touches:
         if self._end is None:
             return np.zeros(0, TOUCH)
         if not self._is_shown:
-            self._shown.append(self._end.renumbered(self.array_of_then(), state))
+            if self._found is None:
+                self._found = self._end.contacts()
+            self._shown.append(self._end.renumbered(self._found, state))
             self._is_shown = True
         return self._shown[-1]
 
