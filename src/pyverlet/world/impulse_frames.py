@@ -29,8 +29,11 @@ LONGEST_FRAME = 1 / 30
 STIFFNESS = 0.3125
 """Frequency of the springs of contacts times the length of a substep. Above 0.375 columns of unequal masses become unstable."""
 
-STIFFENING = 0.4
-"""Octaves a second by which that frequency may rise: at once, it would throw up what lies on soft contacts."""
+STIFFEST = 1.3
+"""The same for a while after substeps have become longer."""
+
+STIFFENING, SOFTENING = 0.4, 1.0
+"""Octaves a second by which that frequency may rise and fall: at once, what lies on soft contacts would be thrown up, or drop."""
 
 DAMPING = 15.0
 """Damping ratio of the springs."""
@@ -233,10 +236,14 @@ class ImpulseFrames:
             raise NonFiniteError(particle, "contacts", world.time)
 
     def _stiffen(self, h: float, dt: float) -> None:
-        possible = STIFFNESS / h
-        self._finer = self._finer + dt if possible > self._hertz else 0.0
-        risen = self._hertz * 2.0 ** (STIFFENING * dt) if self._finer > 0.5 else self._hertz
-        self._hertz = min(possible, risen) if self._hertz else possible
+        best = STIFFNESS / h
+        self._finer = self._finer + dt if best > self._hertz else 0.0
+        if not self._hertz:
+            self._hertz = best
+        elif best < self._hertz:
+            self._hertz = min(max(best, self._hertz * 2.0 ** (-SOFTENING * dt)), STIFFEST / h)
+        elif self._finer > 0.5:
+            self._hertz = min(best, self._hertz * 2.0 ** (STIFFENING * dt))
 
     def _set_law(
         self, strongest: float, h: float, kick: float, scale: float, *, opening: bool, half: float, rough: bool, state: Slots
