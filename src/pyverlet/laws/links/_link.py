@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from abc import ABCMeta, abstractmethod
 from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
@@ -27,6 +28,12 @@ MOVING = ("intact", "force", "last")
 
 class _InTurn(ABCMeta):
     """Links are made in one turn: no other thread removes particles between looking them up and noting their numbers."""
+
+    @property
+    def __signature__(cls) -> inspect.Signature:
+        """What `inspect` and scene files see: the arguments of `__init__`."""
+        whole = inspect.signature(cls.__init__)  # type: ignore[misc]
+        return whole.replace(parameters=list(whole.parameters.values())[1:])
 
     def __call__(cls, *ends: Any, **options: Any) -> Any:
         groups = (part for end in ends for part in (end if isinstance(end, tuple) else (end,)) if isinstance(part, Group))
