@@ -132,7 +132,7 @@ def test_what_the_user_does_wakes(sleepers: tuple[pv.World, pv.Group, Any], chan
     elif change == "gravity":
         world.gravity = (1, -9)
     elif change == "wall":
-        world.boundary.friction = 0.3  # type: ignore[attr-defined]
+        world.boundary.friction = 0.3
     elif change == "boundary":
         world.boundary = pv.Circle(center=(30, 30), radius=50)
     elif change == "size":
