@@ -121,6 +121,9 @@ class World(Measures, Queries, Doors):
         if not self._frame(h, self._listen(h, books or self.profile.mark)):
             self._refuse_non_finite(h)
         self._accept(dt, h, books)
+        for actor in tuple(self.actors):
+            if isinstance(actor, Actor):
+                actor.after(self, dt)
         self.profile.end()
 
     def _frame(self, h: float, done: Callable[[str], None]) -> bool:
