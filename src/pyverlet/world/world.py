@@ -121,9 +121,6 @@ class World(Measures, Queries, Doors):
         if not self._frame(h, self._listen(h, books or self.profile.mark)):
             self._refuse_non_finite(h)
         self._accept(dt, h, books)
-        for actor in tuple(self.actors):
-            if isinstance(actor, Actor):
-                actor.after(self, dt)
         self.profile.end()
 
     def _frame(self, h: float, done: Callable[[str], None]) -> bool:
@@ -234,6 +231,9 @@ class World(Measures, Queries, Doors):
         self.profile.mark("scatter")
         self.time, self.frames, self._h_last = self.time + dt, self.frames + 1, h
         self._coarse.look(self, h)
+        for actor in tuple(self.actors):
+            if isinstance(actor, Actor):
+                actor.after(self, dt)
 
     def _show(self, since: float, lag: float) -> None:
         if self.onlooker and since:
