@@ -98,7 +98,7 @@ class Engine:
     def set_law(self, **n):
         """Numbers of the substeps that come."""
         w: cython.pointer(Step) = cython.address(self.w)
-        w.h, w.kick, w.opening, w.taken_back, w.scale = n["h"], n["h"], n["opening"], n["taken_back"], n["scale"]
+        w.h, w.opening, w.taken_back, w.scale = n["h"], n["opening"], n["taken_back"], n["scale"]
         w.rest_speed, w.restless, w.rate, w.stiff, w.leak = n["rest_speed"], n["restless"], n["rate"], n["stiff"], n["leak"]
         w.push, w.near, w.relaxes, w.rough = n["push"], n["near"], n["relaxes"], n["rough"]
 

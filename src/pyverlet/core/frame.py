@@ -36,7 +36,7 @@ def kick(shared: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_
     own: Step = shared[0]
     w: cython.pointer(Step) = cython.address(own)
     begins: cython.bint = w.substep == w.first
-    kicked: real = w.opening if begins else w.kick
+    kicked: real = w.opening if begins else w.h
     back: real = w.taken_back if begins else cython.cast(real, 0)
     most: real = 0
     i: cython.Py_ssize_t

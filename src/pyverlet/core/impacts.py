@@ -206,7 +206,9 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def touches(w: cython.pointer(Step), k: cython.Py_ssize_t, hits: cython.pointer(int64_t), count: cython.int) -> cython.bint:
+def shares_particle(
+    w: cython.pointer(Step), k: cython.Py_ssize_t, hits: cython.pointer(int64_t), count: cython.int
+) -> cython.bint:
     """Whether pair k shares a particle with one of these, and is none of them."""
     g: cython.int
     found: cython.bint = False
@@ -251,7 +253,7 @@ def resolve_impacts(w: cython.pointer(Step), first: cython.Py_ssize_t, count: cy
                 again = False
                 b = a + 1
                 while b < kept and w.hit_time[b] - w.hit_time[a] <= SAME_TIME * h and size < MOST_JOINT:
-                    if w.hit[b] >= 0 and touches(w, w.hit[b], group, size):
+                    if w.hit[b] >= 0 and shares_particle(w, w.hit[b], group, size):
                         group[size] = w.hit[b]
                         w.hit[b] = -1 - w.hit[b]
                         size += 1

@@ -85,8 +85,7 @@ Step = cython.struct(
     own_friction=cython.pointer(real),
     # ---- numbers of a substep
     h=real,  # s
-    kick=real,  # s of acceleration that come first in a substep
-    opening=real,  # s, the same in the first substep of a call
+    opening=real,  # s of acceleration that come first in the first substep of a call, instead of h
     taken_back=real,  # share of `given` that the velocity at the start of a frame already holds, else 0
     scale=real,  # by which impulses are worth more in the first substep of a call than in the last one
     rest_speed=real,  # contacts that meet more slowly rest, m/s

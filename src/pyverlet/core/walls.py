@@ -10,9 +10,6 @@ from cython.cimports.libc.math import sqrt
 from pyverlet.core.impacts import NEVER, strike
 from pyverlet.core.step import CAGE, OPEN, Step
 
-MEET = cython.declare(cython.int, 0)  # bounce, or take what stops it at the wall within this substep
-RELAX = cython.declare(cython.int, 1)  # no speed into a wall that carries load
-
 Wall = cython.struct(
     nx=cython.double,  # unit normal out of the room
     ny=cython.double,
