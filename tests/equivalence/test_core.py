@@ -10,7 +10,7 @@ import pytest
 
 import pyverlet as pv
 from pyverlet import core
-from pyverlet.compile import jit
+from pyverlet.world.team import Team
 from pyverlet.core import reference
 from pyverlet.data import snapshot
 
@@ -52,7 +52,7 @@ def test_uncompiled_it_has_the_same_bits(dtype: Any, more: dict[str, float], mon
 def test_any_number_of_threads_has_the_same_bits(friction: float, monkeypatch: pytest.MonkeyPatch) -> None:
     hashes = set()
     for threads in (1, 2, 3):
-        monkeypatch.setattr(jit, "threads_in_use", lambda threads=threads: threads)
+        monkeypatch.setattr(Team, "size", lambda team, most, frame_ms, threads=threads: threads)
         chance = np.random.default_rng(5)
         made = pv.World(
             boundary=pv.Box((0, 0), (30, 40), friction=friction, restitution=0.5),

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""A frame: its substeps, stage by stage, as every thread of the team goes through them.
+"""A frame: its substeps, stage by stage; the threads of the team share out the items of each stage.
 
 Per substep of length h:
  1. kick: velocities gain the acceleration; walls give what they gave in the last substep.
@@ -20,10 +20,13 @@ from __future__ import annotations
 import cython
 from cython.cimports.lanes import above, any_lane, lanes, larger, largest_lane, load, outside, real, spread, store, sum_of_pairs
 from cython.cimports.libc.math import sqrt
-from cython.cimports.team import team_barrier
+from cython.cimports.libc.stdint import int32_t
+from cython.cimports.team import team_stage
 
+from pyverlet.core.cells import BLOCK
 from pyverlet.core.contacts import relax_contacts, solve_contacts
-from pyverlet.core.step import Step
+from pyverlet.core.relisting import each_group
+from pyverlet.core.step import OPEN, Step
 from pyverlet.core.walls import bounce_walls, hold_walls, list_walls, relax_walls, warm_walls
 from pyverlet.core.warm_start import warm_start
 
@@ -125,83 +128,126 @@ def remember(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def substep(
-    w: cython.pointer(Step), part: cython.int, parts: cython.int, a: cython.Py_ssize_t, b: cython.Py_ssize_t
-) -> cython.void:
-    """One substep: the part of one thread."""
-    parity: cython.Py_ssize_t
-    half: cython.Py_ssize_t
-    _: cython.int
-    p: cython.int
+def kick_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """Forces on a block of particles."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    kick(w, block * BLOCK, min((block + 1) * BLOCK, w.count), block)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def warm_walls_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """Which particles of a block may meet a wall, and what walls gave them in the last substep."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    a: cython.Py_ssize_t = block * BLOCK
+    walled: cython.Py_ssize_t = list_walls(w, a, min(a + BLOCK, w.count))
+    w.walled[block] = cython.cast(int32_t, walled)
     i: cython.Py_ssize_t
-    kick(w, a, b, part)
-    team_barrier(w.team)
-    if part == 0:
-        fastest: real = 0
-        for p in range(parts):
-            fastest = max(fastest, w.fastest[p])
-        w.far = 2 * w.h * cython.cast(real, sqrt(fastest)) + w.near
-    team_barrier(w.team)
-    walled: cython.Py_ssize_t = list_walls(w, a, b)
     for i in range(a, a + walled):
         warm_walls(w, w.at_wall[i])
-    team_barrier(w.team)
-    for parity in range(2):
-        for half in range(w.cut[parity * (parts + 1) + part], w.cut[parity * (parts + 1) + part + 1]):
-            warm_start(w, 2 * half + parity)
-        team_barrier(w.team)
-    for i in range(a, a + walled):
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def hold_walls_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """Particles of a block that come fast bounce from walls, others are held."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    a: cython.Py_ssize_t = block * BLOCK
+    i: cython.Py_ssize_t
+    for i in range(a, a + w.walled[block]):
         bounce_walls(w, w.at_wall[i])
         hold_walls(w, w.at_wall[i])
-    team_barrier(w.team)
-    for parity in range(2):
-        for half in range(w.cut[parity * (parts + 1) + part], w.cut[parity * (parts + 1) + part + 1]):
-            solve_contacts(w, 2 * half + parity)
-        team_barrier(w.team)
-    for i in range(a, a + walled):
-        hold_walls(w, w.at_wall[i])
-    drift(w, a, b, part)
-    for _ in range(w.relaxes):
-        for i in range(a, a + walled):
-            relax_walls(w, w.at_wall[i])
-        team_barrier(w.team)
-        for parity in range(2):
-            for half in range(w.cut[parity * (parts + 1) + part], w.cut[parity * (parts + 1) + part + 1]):
-                relax_contacts(w, 2 * half + parity)
-            team_barrier(w.team)
-    remember(w, a, b)
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def run_substeps(what: cython.p_void, part: cython.int, parts: cython.int) -> cython.void:
-    """Substeps of a frame until all are done or the list of pairs needs a look: the part of one thread of the team."""
+def relax_walls_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """Walls that carry particles of a block."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    blocks: cython.Py_ssize_t = (w.count + 63) // 64
-    a: cython.Py_ssize_t = 64 * (blocks * part // parts)
-    b: cython.Py_ssize_t = min(64 * (blocks * (part + 1) // parts), w.count)
-    p: cython.int
-    stale: cython.bint = False
-    while w.substep < w.substeps and not stale:
-        substep(w, part, parts, a, b)
-        for p in range(parts):
-            stale |= w.stale[p] != 0
-        team_barrier(w.team)
-        if part == 0:
-            w.substep += 1
-        team_barrier(w.team)
+    a: cython.Py_ssize_t = block * BLOCK
+    i: cython.Py_ssize_t
+    for i in range(a, a + w.walled[block]):
+        relax_walls(w, w.at_wall[i])
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def strays(w: cython.pointer(Step)) -> cython.bint:
-    """Whether a particle may leave where the list of pairs is good in the first substep."""
+def drift_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """Walls once more, then a block of particles moves."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    a: cython.Py_ssize_t = block * BLOCK
     i: cython.Py_ssize_t
-    found: cython.bint = False
-    for i in range(w.count):
-        dx: real = w.position[2 * i] + w.h * w.velocity[2 * i] - w.checked[2 * i]
-        dy: real = w.position[2 * i + 1] + w.h * w.velocity[2 * i + 1] - w.checked[2 * i + 1]
-        found |= not (dx * dx + dy * dy <= w.allowed)
-    return found
+    for i in range(a, a + w.walled[block]):
+        hold_walls(w, w.at_wall[i])
+    drift(w, a, min(a + BLOCK, w.count), block)
+    if w.relaxes > 0:
+        relax_walls_stage(what, block)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def remember_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """What contacts gave a block of particles."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    remember(w, block * BLOCK, min((block + 1) * BLOCK, w.count))
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def warm_start_stage(what: cython.p_void, item: cython.int) -> cython.void:
+    """What the contacts of a group gave in the last substep."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    warm_start(w, 2 * item + w.parity)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def solve_stage(what: cython.p_void, item: cython.int) -> cython.void:
+    """The contacts of a group, and its impacts."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    solve_contacts(w, 2 * item + w.parity)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def relax_stage(what: cython.p_void, item: cython.int) -> cython.void:
+    """The contacts of a group without their springs."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    relax_contacts(w, 2 * item + w.parity)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
+    """One substep; returns whether particles may leave where the list of pairs is good in the next one."""
+    b: cython.Py_ssize_t
+    sweep: cython.int
+    fastest: real = 0
+    stale: cython.bint = False
+    team_stage(w.team, kick_stage, w, blocks)
+    for b in range(blocks):
+        fastest = max(fastest, w.fastest[b])
+    w.far = 2 * w.h * cython.cast(real, sqrt(fastest)) + w.near
+    team_stage(w.team, warm_walls_stage, w, blocks)
+    each_group(w, warm_start_stage)
+    if w.room != OPEN:
+        team_stage(w.team, hold_walls_stage, w, blocks)
+    each_group(w, solve_stage)
+    team_stage(w.team, drift_stage, w, blocks)
+    for sweep in range(w.relaxes):
+        if sweep > 0 and w.room != OPEN:
+            team_stage(w.team, relax_walls_stage, w, blocks)
+        each_group(w, relax_stage)
+    team_stage(w.team, remember_stage, w, blocks)
+    for b in range(blocks):
+        stale |= w.stale[b] != 0
+    return stale

@@ -131,8 +131,8 @@ def _team() -> dict[str, Any]:
         "thread_team": SimpleNamespace,
         "team_function": None,
         "team_new": lambda threads: SimpleNamespace(threads=1, parts=1),
-        "team_run": lambda team, function, argument, parts: function(argument, 0, 1),
-        "team_barrier": lambda team: None,
+        "team_run": lambda team, function, argument, parts: function(argument, 0),
+        "team_stage": lambda team, function, argument, items: [function(argument, item) for item in range(items)],
         "team_free": lambda team: None,
     }
 

@@ -8,6 +8,9 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 from cython.cimports.team import thread_team
 
+from pyverlet.core.cells import Cells
+from pyverlet.core.pair_lists import Lists
+
 OPEN = cython.declare(cython.int, 0)
 CAGE = cython.declare(cython.int, 1)
 BOX = cython.declare(cython.int, 2)
@@ -41,7 +44,6 @@ Step = cython.struct(
     groups=cython.Py_ssize_t,
     begin=cython.pointer(int64_t),  # (groups + 1,) of its lanes
     lanes=cython.pointer(int64_t),  # (groups,) how many there are
-    cut=cython.pointer(int64_t),  # (2, parts + 1) even and odd groups of each thread
     i=cython.pointer(uint32_t),
     j=cython.pointer(uint32_t),
     gap_x=cython.pointer(real),  # from i to j when the list was made, m
@@ -80,7 +82,8 @@ Step = cython.struct(
     wall_speed=cython.double,  # of the surface, counter-clockwise around a cage, m/s
     wall_impulse=cython.pointer(real),  # (4, count) m/s, accumulated
     wall_tangent=cython.pointer(real),
-    at_wall=cython.pointer(int32_t),  # (count,) particles that may reach a wall, from the first of each thread on
+    at_wall=cython.pointer(int32_t),  # (count,) particles that may reach a wall, from the first of each block on
+    walled=cython.pointer(int32_t),  # (blocks,) how many of each block
     own_restitution=cython.pointer(real),  # (count,) negative: the wall's
     own_friction=cython.pointer(real),
     # ---- numbers of a substep
@@ -97,11 +100,14 @@ Step = cython.struct(
     near=real,  # gaps beyond are no contacts, m
     far=real,  # pairs with larger gaps cannot meet in this substep, m
     allowed=real,  # square of how far particles may move before the list needs a look, m^2
-    fastest=cython.pointer(real),  # (parts,) square of the largest speed
-    stale=cython.pointer(int32_t),  # (parts,) whether one has moved too far
+    fastest=cython.pointer(real),  # (blocks,) square of the largest speed
+    stale=cython.pointer(int32_t),  # (blocks,) whether one has moved too far
     first=cython.int,  # substep of this call
     substep=cython.int,
     substeps=cython.int,
     relaxes=cython.int,
     team=cython.pointer(thread_team),
+    parity=cython.Py_ssize_t,  # of the groups that are gone through now: see `each_group`
+    cells=cython.pointer(Cells),
+    lists=cython.pointer(Lists),
 )

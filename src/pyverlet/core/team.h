@@ -1,4 +1,4 @@
-/* A team of threads that run through one function together, each with its number, and wait for each other at barriers.
+/* A team of threads: one runs a frame and opens its stages, the items of which all of them share out among themselves.
 
    Made once; between two runs its threads sleep. A process that was forked has none of them: there a run has one part. */
 #pragma once
@@ -57,22 +57,39 @@ static inline void team_join(team_thread t) { pthread_join(t, 0); }
 #endif
 
 enum {
-    TEAM_POLLS = 4000,       /* looks at a barrier before a thread yields its processor */
-    TEAM_SLEEP_POLLS = 20000 /* looks for the next run before a thread sleeps */
+    TEAM_POLLS = 4000,        /* looks for the end of a stage before a thread yields its processor */
+    TEAM_SLEEP_POLLS = 20000, /* looks for the next run before a thread sleeps */
+    TEAM_MOST = 256,          /* threads */
+    TEAM_BITS = 22,           /* of the number of an item */
+    TEAM_ITEMS = (1 << TEAM_BITS) - 1,
+    TEAM_NEXT = 1 << TEAM_BITS
 };
-typedef void (*team_function)(void *argument, int part, int parts);
+typedef void (*team_function)(void *argument, int item);
+/* Items of a stage that one thread claims first: the number of the stage (20 bits), the next item and the end (22), in one word, so that a
+   claim succeeds only while the stage is open. On a cache line of its own. */
+typedef struct {
+    atomic_ullong claims;
+    char apart[120];
+} team_share;
 typedef struct {
     int threads; /* that there are, with the caller's */
     int parts;   /* that the present run has, at most so many */
     int quit;
+    long long runs;
     int64_t process;
     team_function function;
     void *argument;
-    atomic_int arrived, phase, working;
-    atomic_llong run; /* its number << 16 | its parts, in one so that a thread that wakes late reads both of one run */
+    char apart[128];
+    atomic_uint stage; /* number of the stage that is open, or was last */
+    atomic_llong run;  /* its number << 16 | its parts while it lasts, else 0: in one so that a thread that wakes late reads both
+                          of one run */
+    char from[128];
+    atomic_int left; /* items of the stage that are not done */
+    char others[128];
     team_lock lock;
     team_signal signal;
     team_thread *ids;
+    team_share share[TEAM_MOST];
 } thread_team;
 typedef struct {
     thread_team *team;
@@ -93,17 +110,44 @@ static inline void team_poll(int k) {
         team_yield();
 }
 
-/* Wait until all parts of this run are here. What they wrote before is seen by all after it. */
-static inline void team_barrier(thread_team *t) {
-    if (t->parts == 1)
-        return;
-    int phase = atomic_load_explicit(&t->phase, memory_order_relaxed);
-    if (atomic_fetch_add_explicit(&t->arrived, 1, memory_order_acq_rel) == t->parts - 1) {
-        atomic_store_explicit(&t->arrived, 0, memory_order_relaxed);
-        atomic_store_explicit(&t->phase, phase + 1, memory_order_release);
+/* Do items of the open stage, those of one's own share first, then what others have not begun. */
+static inline void team_work(thread_team *t, int part, int parts) {
+    int done = 0;
+    for (int k = 0; k < parts; k++) {
+        team_share *s = &t->share[part + k < parts ? part + k : part + k - parts];
+        unsigned long long c = atomic_load_explicit(&s->claims, memory_order_acquire);
+        while ((c >> TEAM_BITS & TEAM_ITEMS) < (c & TEAM_ITEMS)) {
+            if (atomic_compare_exchange_weak_explicit(&s->claims, &c, c + TEAM_NEXT, memory_order_acq_rel, memory_order_acquire)) {
+                t->function(t->argument, c >> TEAM_BITS & TEAM_ITEMS);
+                done++;
+                c += TEAM_NEXT;
+            }
+        }
+    }
+    if (done)
+        atomic_fetch_sub_explicit(&t->left, done, memory_order_release);
+}
+
+/* Called by the thread that runs the frame: have function(argument, item) called for each item up to `items`, at most TEAM_ITEMS, by
+   whoever of the team is there. Returns when all are done, even if a thread is late: the others take its items. */
+static inline void team_stage(thread_team *t, team_function function, void *argument, int items) {
+    int parts = items < t->parts ? items : t->parts;
+    if (parts < 2) {
+        for (int item = 0; item < items; item++)
+            function(argument, item);
         return;
     }
-    for (int k = 0; atomic_load_explicit(&t->phase, memory_order_acquire) == phase; k++)
+    unsigned stage = atomic_load_explicit(&t->stage, memory_order_relaxed) + 1;
+    t->function = function; /* all shares of the last stage are claimed: nobody reads these now */
+    t->argument = argument;
+    atomic_store_explicit(&t->left, items, memory_order_relaxed);
+    for (int part = 0; part < t->parts; part++) {
+        unsigned long long first = (long long)items * part / t->parts, end = (long long)items * (part + 1) / t->parts;
+        atomic_store_explicit(&t->share[part].claims, (unsigned long long)stage << 2 * TEAM_BITS | first << TEAM_BITS | end, memory_order_release);
+    }
+    atomic_store_explicit(&t->stage, stage, memory_order_release);
+    team_work(t, 0, t->parts);
+    for (int k = 0; atomic_load_explicit(&t->left, memory_order_acquire) > 0; k++)
         team_poll(k);
 }
 
@@ -111,29 +155,36 @@ static TEAM_ENTRY team_member_main(void *argument) {
     team_member me = *(team_member *)argument;
     free(argument);
     thread_team *t = me.team;
-    long long seen = 0;
+    long long run = 0;
     for (;;) {
-        for (int k = 0; atomic_load_explicit(&t->run, memory_order_acquire) == seen && k < TEAM_SLEEP_POLLS; k++)
+        for (int k = 0; (run = atomic_load_explicit(&t->run, memory_order_acquire)) == 0 && k < TEAM_SLEEP_POLLS; k++)
             team_pause();
-        if (atomic_load(&t->run) == seen) {
+        if (run == 0) {
             team_acquire(&t->lock);
-            while (atomic_load(&t->run) == seen)
+            while ((run = atomic_load(&t->run)) == 0)
                 team_wait(&t->signal, &t->lock);
             team_release(&t->lock);
         }
-        seen = atomic_load(&t->run);
         if (t->quit)
             return 0;
-        int parts = seen & 0xffff;
-        if (me.part < parts) {
-            t->function(t->argument, me.part, parts);
-            atomic_fetch_sub_explicit(&t->working, 1, memory_order_release);
+        int parts = run & 0xffff;
+        unsigned stage = 0;
+        for (int k = 0; atomic_load_explicit(&t->run, memory_order_acquire) == run; k++) {
+            unsigned now = atomic_load_explicit(&t->stage, memory_order_acquire);
+            if (me.part < parts && now != stage) {
+                stage = now;
+                team_work(t, me.part, parts);
+                k = 0;
+            } else
+                team_poll(k);
         }
     }
 }
 
 /* A team of at most this many threads, the caller's among them; fewer if the system gives no more. NULL without memory. */
 static thread_team *team_new(int threads) {
+    if (threads > TEAM_MOST)
+        threads = TEAM_MOST;
     thread_team *t = (thread_team *)calloc(1, sizeof *t);
     if (!t || !(t->ids = (team_thread *)calloc(threads, sizeof *t->ids))) {
         free(t);
@@ -157,31 +208,27 @@ static thread_team *team_new(int threads) {
     return t;
 }
 
-static inline void team_begin(thread_team *t, int parts) {
+static inline void team_begin(thread_team *t, long long run) {
     team_acquire(&t->lock);
-    long long number = atomic_load(&t->run) >> 16;
-    atomic_store_explicit(&t->run, (number + 1) << 16 | parts, memory_order_release);
+    atomic_store_explicit(&t->run, run, memory_order_release);
     team_wake_all(&t->signal);
     team_release(&t->lock);
 }
 
-/* Run the function on `parts` threads (at most all), the caller's being part 0; returns when all are through. */
+/* Call function(argument, 0) while `parts` threads (at most all) wait for the stages that it opens. */
 static void team_run(thread_team *t, team_function function, void *argument, int parts) {
     if (parts > t->threads)
         parts = t->threads;
     if (parts < 2 || t->process != team_process()) {
         t->parts = 1;
-        function(argument, 0, 1);
+        function(argument, 0);
         return;
     }
     t->parts = parts;
-    t->function = function;
-    t->argument = argument;
-    atomic_store(&t->working, parts - 1);
-    team_begin(t, parts);
-    function(argument, 0, parts);
-    for (int k = 0; atomic_load_explicit(&t->working, memory_order_acquire); k++)
-        team_poll(k);
+    t->runs++;
+    team_begin(t, t->runs << 16 | parts);
+    function(argument, 0);
+    atomic_store_explicit(&t->run, 0, memory_order_release);
 }
 
 /* End the threads of this process and free the team. */
@@ -190,7 +237,7 @@ static void team_free(thread_team *t) {
         return;
     if (t->process == team_process()) {
         t->quit = 1;
-        team_begin(t, 0);
+        team_begin(t, -1);
         for (int part = 1; part < t->threads; part++)
             team_join(t->ids[part]);
     }

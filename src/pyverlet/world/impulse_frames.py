@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet import core
-from pyverlet.ground.constants import REST_ACCELERATIONS
+from pyverlet.ground.constants import REST_ACCELERATIONS, SKIN
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.laws.contacts.broadphase import Fast
+from pyverlet.laws.contacts.growth import Growth
 from pyverlet.laws.integrators import PositionVerlet, SemiImplicitEuler, TimeCorrectedVerlet
 from pyverlet.laws.limiter import watched
 from pyverlet.laws.rooms import Box, Circle, Open, Periodic
@@ -43,6 +44,15 @@ PUSH_OUT = 3.0
 
 RELAXING_SWEEPS = 2
 
+SORTED_FROM = 1024
+UNSORTED = 0.2
+"""Slots of so many particles and more are put into the order of the cells when such a part of them is followed by one that
+belongs before."""
+
+ALONE = 256
+MUCH_LARGER = 4.0
+"""Circles so many times as large as all but one in ALONE stand in no cell of the grid."""
+
 NEAR = 0.05
 """Of the largest radius: pairs and walls with larger gaps carry no load."""
 
@@ -55,7 +65,8 @@ class Memory(NamedTuple):
 
     pairs (k, 2) and values (k, 3): see `Engine.take_impulses`. wall: (8, n) impulses along the normals of four sides, and along
     their tangents. given: (n, 3) velocity and spin that contacts gave in the last substep, over `kick` seconds. h: length of the
-    last substep, s. hertz: frequency of the springs; finer: for how long, s, a higher one would have been possible.
+    last substep, s. hertz: frequency of the springs; finer: for how long, s, a higher one would have been possible. listed,
+    checked: (n, 2) of the list of pairs, and skin: its numbers, as of `Engine.save_list`; empty without one.
     """
 
     pairs: Array
@@ -66,6 +77,9 @@ class Memory(NamedTuple):
     h: float
     hertz: float
     finer: float
+    listed: Array
+    checked: Array
+    skin: tuple[float, ...] = ()
 
 
 class ImpulseFrames:
@@ -73,51 +87,56 @@ class ImpulseFrames:
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self._dtype = dtype
-        self._engine: Any = None
-        self._synced = False  # whether `_motion` holds the velocities of now
-        self._parts = 1
+        self._engine: Any = core.unit("engine", dtype).Engine(1)
+        self.growth = Growth()
         self.forget()
 
     def forget(self) -> None:
         """No contact remembers anything."""
-        none = (
-            np.empty((0, 2), np.int32),
-            np.empty((0, 3), self._dtype),
-            np.empty((8, 0), self._dtype),
-            np.empty((0, 3), self._dtype),
-        )
-        self.restore(Memory(*none, 0.0, 0.0, 0.0, 0.0))
+        none, rows = np.empty((0, 3), self._dtype), np.empty((0, 2), self._dtype)
+        self.restore(Memory(np.empty((0, 2), np.int32), none, np.empty((8, 0), self._dtype), none, 0.0, 0.0, 0.0, 0.0, rows, rows))
 
     def save(self) -> Memory:
         """What `restore` needs to go on with the same bits."""
-        self._harvest()
-        count = int(self._particle.max(initial=-1)) + 1
+        particle, count = self._particle, int(self._particle.max(initial=-1)) + 1
         wall, given = np.zeros((8, count), self._dtype), np.zeros((count, 3), self._dtype)
-        wall[:, self._particle] = self._wall
-        given[self._particle] = self._given
-        pairs, values = self._kept
-        return Memory(pairs.copy(), values.copy(), wall, given, self._kick, self._h, self._hertz, self._finer)
+        wall[:, particle], given[particle] = self._wall, self._given
+        pairs, values = (array.copy() for array in self._impulses())
+        rows = [np.empty((0, 2), self._dtype)] * 2
+        skin: tuple[float, ...] = ()
+        if kept := self._kept_list if self._kept is not None else self._engine.save_list():
+            rows = [np.zeros((count, 2), self._dtype) for _ in range(2)]
+            rows[0][particle], rows[1][particle], skin = kept
+        return Memory(pairs, values, wall, given, self._kick, self._h, self._hertz, self._finer, *rows, skin)
 
     def restore(self, memory: Memory) -> None:
         """Back to what `save` returned."""
-        self._kept = memory.pairs, memory.values
+        self._kept: tuple[Array, Array] | None = (memory.pairs, memory.values)  # what the engine is still to be given
+        self._kept_list = (memory.listed, memory.checked, memory.skin) if memory.skin else None
         self._particle = np.arange(len(memory.given), dtype=np.int32)
         self._wall, self._given = memory.wall, memory.given
         self._kick, self._h, self._hertz, self._finer = memory.kick, memory.h, memory.hertz, memory.finer
-        self._held: Any = None
-        self._listed: Any = None  # the lanes that hold the impulses of now
+        self._made = -1  # of `Slots.given`, what the engine holds; -1: nothing
+        self._collisions: Any = None
+        self._skin: float | None = -1.0
+
+    def _impulses(self) -> tuple[Array, Array]:
+        """Pairs and values of `Memory`."""
+        return self._kept if self._kept is not None else self._engine.take_impulses(self._particle)
 
     def renumber(self, now: Array) -> None:
         """The particles are now at `now` (n,), or no more (-1)."""
-        self._harvest()
         memory = self.save()
         count, alive = int(now.max(initial=-1)) + 1, now[: len(memory.given)] >= 0
         wall, given = np.zeros((8, count), self._dtype), np.zeros((count, 3), self._dtype)
-        to = now[: len(memory.given)][alive]
+        to, none = now[: len(memory.given)][alive], memory.listed[:0]
         wall[:, to], given[to] = memory.wall[:, alive], memory.given[alive]
         pairs = now[memory.pairs].astype(np.int32)
         kept = (pairs >= 0).all(axis=1)
-        self.restore(memory._replace(pairs=pairs[kept], values=memory.values[kept], wall=wall, given=given))
+        pairs, values = pairs[kept], memory.values[kept]
+        order = np.argsort(pairs[:, 0], kind="stable")
+        memory = memory._replace(pairs=pairs[order], values=values[order], wall=wall, given=given)
+        self.restore(memory._replace(listed=none, checked=none, skin=()))
 
     # ---- a frame -------------------------------------------------------------------------------------------------------------
 
@@ -130,7 +149,8 @@ class ImpulseFrames:
         """
         self.check(world)
         world._slots.clear_notes()
-        world._gather()
+        if world._gather():
+            self._engine.forget_list()
         world.profile.mark("gather")
         self.run(world, dt, world.profile.mark)
 
@@ -165,52 +185,44 @@ class ImpulseFrames:
         Raises:
             NonFiniteError: a particle turned NaN or infinite.
         """
-        state, forces = world._slots, world._force_sum
+        state, forces, engine, collisions = world._slots, world._force_sum, self._engine, world.collisions
         state.grown.fill(1)
         state.resize()
-        contacts = world._contacts if len(world) > 1 else None
-        contained = contacts is not None or not isinstance(world.boundary, Open)
+        contained = len(world) > 1 or not isinstance(world.boundary, Open)
         substeps = world.substeps * (int(np.ceil(dt / LONGEST_FRAME * (1 - 1e-9))) if contained else 1)
         h, half = dt / substeps, world.integrator.velocity_lag
         first_kick = half * (h + (self._h if self._kick else 0.0)) if half else h
         self._stiffen(h, dt)
         watch = watched(world, dt / world.substeps, None) if contained else None
         state.h = h
-        rough = bool(contacts and contacts._rubs(state)) or getattr(world.boundary, "friction", 0.0) > 0.0
-        step, stale = 0, None
-        if contacts:
-            contacts.broad_phase.replacing = self._harvest
+        self._load(world)
+        rough = max(collisions.friction, state.most_friction, getattr(world.boundary, "friction", 0.0)) > 0.0
+        if rough:
+            self._motion[:, :2], self._motion[:, 2] = state.velocity, state.spin
+        done("broad phase")
+        step = 0
         while step < substeps:
             if step == 0 or forces.forces:
                 self._evaluate(world, step * h, half * h if step else 0.0)
                 done("integrate")
+                if rough and step:
+                    self._motion[:, :2], self._motion[:, 2] = state.velocity, state.spin
             last = 1.0 if not self._kick else self._kick
             kick = first_kick if step == 0 else h
-            self._load(world, contacts, stale)
-            done("broad phase")
-            self._set_law(forces.strongest, h, kick, kick / last, opening=step == 0, half=half, rough=rough, state=state)
-            if step == 0:
-                self._set_room(world.boundary)
-                if contacts and self._engine.strays():
-                    self._load(world, contacts, True)
-            if rough and not self._synced:
-                self._motion[:, :2], self._motion[:, 2] = state.velocity, state.spin
-            # The first substep has a kick of its own; forces of Python are asked in each.
-            stop = step + 1 if forces.forces or kick != h else substeps
-            before = step
-            step, stale = self._engine.run(step, stop, self._parts)
-            self._kick, self._synced = (h if step > 1 else first_kick), not forces.forces
-            if rough:
+            self._set_law(forces.strongest, h, kick, kick / last, opening=step == 0, half=half, rough=rough)
+            # The first substep has a kick of its own; forces of Python are asked in each, and onlookers look in between.
+            stop = step + 1 if forces.forces or kick != h or world.onlooker else substeps
+            engine.run(step, stop, self._parts)
+            self._kick, step = (h if stop > 1 else first_kick), stop
+            if rough and (forces.forces or world.onlooker or step == substeps):
                 state.velocity[:], state.spin[:] = self._motion[:, :2], self._motion[:, 2]
-            if contacts:
-                contacts.broad_phase.aged(step - before - 1)
             done("contacts")
             world._show(step * h, half * h) if step < substeps else None
-        self._h, self._synced = h, False
+        self._h = h
         self._given[:, :2], self._given[:, 2] = self._gave, self._gave_spin
         self._end(world, dt, half * h)
         if watch:
-            watch.close(state, contacts)
+            watch.close(state, self)
         done("finish")
 
     def _evaluate(self, world: Any, since: float, ahead: float) -> None:
@@ -246,7 +258,7 @@ class ImpulseFrames:
             self._hertz = min(best, self._hertz * 2.0 ** (STIFFENING * dt))
 
     def _set_law(
-        self, strongest: float, h: float, kick: float, scale: float, *, opening: bool, half: float, rough: bool, state: Slots
+        self, strongest: float, h: float, kick: float, scale: float, *, opening: bool, half: float, rough: bool
     ) -> None:
         omega = 2.0 * np.pi * self._hertz
         damped = 2.0 * DAMPING + h * omega
@@ -264,7 +276,7 @@ class ImpulseFrames:
             # As in a substep whose kick is as long as itself: the depth at which a contact carries its load stays the same.
             leak=h / kick / (1.0 + hard),
             push=PUSH_OUT,
-            near=NEAR * float(state.radius.max(initial=0.0)) + 2.0 * REST_ACCELERATIONS * strongest * h * h,
+            near=NEAR * self._largest + 2.0 * REST_ACCELERATIONS * strongest * h * h,
             relaxes=RELAXING_SWEEPS,
             rough=rough,
         )
@@ -281,92 +293,105 @@ class ImpulseFrames:
 
     # ---- arrays --------------------------------------------------------------------------------------------------------------
 
-    def _load(self, world: Any, contacts: Any, stale: bool | None) -> None:
-        """Bring the list of pairs up to date, and have the engine see the arrays of now."""
-        state = world._slots
-        wide = None
-        if contacts:
-            contacts.broad_phase.strayed = stale
-            contacts.find(state, 0.0)
-            wide = contacts._pack(state)
-            if not wide.fits(state):
-                wide.bear(True)
-                wide.fit(state)
-        self._follow(state)
-        self._parts = 1 if wide is None else wide.cut().shape[1] - 1
-        if self._engine is None or self._engine.threads < self._parts:
-            self._engine, self._held = core.unit("engine", self._dtype).Engine(self._parts), None
-        seen = (
-            state.position,
-            state.velocity,
-            state.inverse_mass,
-            state.radius,
-            self._motion,
-            wide and (wide.lane_i, wide.made_of),
-        )
-        if self._held is None or self._listed is None or not all(a is b for a, b in zip(self._held, seen, strict=True)):
-            self._held = seen
-            self._engine.set_particles(
-                position=state.position, velocity=state.velocity, acceleration=state.acceleration,
-                inverse_mass=state.inverse_mass, radius=state.radius, own_restitution=state.restitution,
-                own_friction=state.friction, motion=self._motion, free=self._free, free_spin=self._free_spin, given=self._gave,
-                given_spin=self._gave_spin, wall_impulse=self._wall[:4], wall_tangent=self._wall[4:], at_wall=self._at_wall,
-            )  # fmt: skip
-            self._load_pairs(state, wide)
-        if wide is None:
-            self._engine.set_list(np.zeros((2, 2), np.int64), state.position, np.inf)
-        else:
-            strips = contacts.broad_phase.strips()
-            self._engine.set_list(np.ascontiguousarray(wide.cut()), strips.checked, strips.allowed)
-
-    def _load_pairs(self, state: Slots, wide: Any) -> None:
-        real = self._dtype
-        begin = np.zeros(1, np.int64) if wide is None else wide.begin
-        room = 0 if wide is None else len(wide.lane_i)
-        none = np.empty((6, 0), real)
-        if fresh := self._listed is None:
-            self._lanes = {name: np.zeros(room, real) for name in ("depth", "load", "impulse", "tangent_impulse")}
-            self._lanes |= {"hit": np.zeros(room, np.int64), "hit_time": np.zeros(room)}
-        names = ("sized", "varied", "mixed")
-        if wide is None:
-            unsigned = np.empty(0, np.uint32)
-            arrays = {"lanes": begin[:0], "i": unsigned, "j": unsigned, "gap": none, "normal": none, "made_of": none}
-            arrays |= {"listed": state.position, "moved": np.zeros_like(state.position), "reach": none[0], "share": none[0]}
-            kinds = dict.fromkeys(names, 0)
-        else:
-            arrays = {"lanes": wide.lanes, "i": wide.lane_i, "j": wide.lane_j, "gap": wide.gap, "normal": wide.normal}
-            arrays |= {"listed": wide.origin, "moved": wide.moved, "reach": wide.reach, "share": wide.share}
-            arrays["made_of"] = wide.made_of
-            kinds = {name: getattr(wide, f"_{name}") for name in names}
-        self._engine.set_pairs(begin=begin, **arrays, **kinds, **self._lanes)
-        if fresh:
-            self._engine.give_impulses(self._particle, *self._kept)
-            self._listed = begin
+    def _load(self, world: Any) -> None:
+        """Have the engine see the particles of now, and what they are made of."""
+        state, engine, collisions = world._slots, self._engine, world.collisions
+        parts = world._team.now
+        if engine.threads < parts:
+            engine.set_threads(parts)
+        self._parts = parts
+        if self._kept is None and len(state) >= SORTED_FROM:
+            falls, order = engine.order()
+            if falls > UNSORTED * len(state) and len(order) == len(state):
+                engine.renumber(order)
+                self._wall, self._given = np.ascontiguousarray(self._wall[:, order]), self._given[order]
+                state.reorder(order)
+                self._particle = state.particle
+                self._hold(state)
+        if self._particle is not state.particle or self._kept is not None:
+            self._follow(state)
+        if state.given != self._made or collisions is not self._collisions:
+            self._hold(state)
+            self._set_materials(world)
+        if collisions.method.skin != self._skin:
+            self._skin = collisions.method.skin
+            if self._kept_list is None:
+                engine.set_skin(SKIN if self._skin is None else self._skin, self._skin is None)
+        self._set_room(world.boundary)
+        engine.set_seam(*state.seam)
+        if self._kept_list is not None:
+            engine.set_skin(self._kept_list[2][0], self._skin is None)
+            listed, checked = (np.ascontiguousarray(rows[self._particle]) for rows in self._kept_list[:2])
+            engine.restore_list(listed, checked, self._kept_list[2])
+            self._kept_list = None
+        if state.seam:
+            engine.follow_seam()
 
     def _follow(self, state: Slots) -> None:
         """Have what is remembered of particles in the order of the slots of now."""
-        if self._particle is state.particle:
-            return
         count = max(int(state.particle.max(initial=-1)), int(self._particle.max(initial=-1))) + 1
-        if self._listed is not None:  # particles have been added: the list is made anew
-            self._harvest()
+        pairs, values = self._impulses()
         wall, given = np.zeros((8, count), self._dtype), np.zeros((count, 3), self._dtype)
-        wall[:, self._particle], given[self._particle] = self._wall, self._now_given()
-        self._particle = state.particle
+        wall[:, self._particle], given[self._particle] = self._wall, self._given
+        if self._kept_list is not None and len(self._kept_list[0]) != len(state):
+            self._kept_list = None
+        self._particle, place = state.particle, np.zeros(count, np.int32)
+        place[state.particle] = np.arange(len(state), dtype=np.int32)
         self._wall, self._given = np.ascontiguousarray(wall[:, state.particle]), given[state.particle]
+        self._hold(state)
+        self._engine.give_impulses(place[pairs], values)
+        self._kept = None
+
+    def _hold(self, state: Slots) -> None:
+        """Have the engine take the arrays of now."""
+        count, real = len(state), self._dtype
         self._gave, self._gave_spin = np.ascontiguousarray(self._given[:, :2]), np.ascontiguousarray(self._given[:, 2])
-        self._motion, self._free = np.zeros((len(state), 4), self._dtype), np.zeros((len(state), 2), self._dtype)
-        self._free_spin, self._at_wall = np.zeros(len(state), self._dtype), np.zeros(len(state), np.int32)
-        self._held, self._synced = None, False
+        self._motion, self._free = np.zeros((count, 4), real), np.zeros((count, 2), real)
+        self._free_spin, self._at_wall = np.zeros(count, real), np.zeros(count, np.int32)
+        self._engine.set_particles(
+            position=state.position, velocity=state.velocity, acceleration=state.acceleration,
+            inverse_mass=state.inverse_mass, radius=state.radius, own_restitution=state.restitution,
+            own_friction=state.friction, motion=self._motion, free=self._free, free_spin=self._free_spin, given=self._gave,
+            given_spin=self._gave_spin, wall_impulse=self._wall[:4], wall_tangent=self._wall[4:], at_wall=self._at_wall,
+            particle=state.particle, category=state.category, mask=state.mask,
+        )  # fmt: skip
 
-    def _now_given(self) -> Array:
-        """`_given`, or what has become of it within a frame."""
-        if self._held is not None:
-            self._given[:, :2], self._given[:, 2] = self._gave, self._gave_spin
-        return self._given
+    def _set_materials(self, world: Any) -> None:
+        """What circles are made of has changed."""
+        state, collisions, radius = world._slots, world.collisions, world._state.radius
+        self._made, self._collisions = state.given, collisions
+        ordered = np.sort(radius)[::-1] if len(radius) else np.ones(1)
+        # Very few that are much larger than all others stand in no cell.
+        usual = float(ordered[min(len(ordered) // ALONE, len(ordered) - 1)])
+        columns = state.radius, state.restitution, state.friction
+        sized, varied = _differs(state.radius), _differs(state.inverse_mass)
+        self._largest = float(ordered[0])
+        self._engine.set_materials(
+            sized=sized,
+            varied=varied,
+            mixed=any(map(_differs, columns)),
+            bulk=float(ordered[ordered <= MUCH_LARGER * usual][0]),
+            smallest=float(ordered[-1]),
+            largest=self._largest,
+            mean_radius=float(radius.mean(dtype=np.float64)) if len(radius) else 1.0,
+            restitution=collisions.restitution,
+            friction=collisions.friction,
+            picky=bool(len(state.category)) or not bool((state.inverse_mass > 0).all()),
+        )
 
-    def _harvest(self) -> None:
-        """The list of pairs is about to be made anew: keep what its contacts remember."""
-        if self._listed is not None:
-            self._kept = self._engine.take_impulses(self._particle)
-            self._listed = None
+    # ---- what others ask of it -----------------------------------------------------------------------------------------------
+
+    @property
+    def rebuilds(self) -> int:
+        """How often the list of pairs has been made."""
+        return int(self._engine.rebuilds())
+
+    def listed(self) -> tuple[Array, Array, Array, Array]:
+        """first, count, i, j: where the pairs of the list are, by slot. Some come twice."""
+        pairs: tuple[Array, Array, Array, Array] = self._engine.pairs()
+        return pairs
+
+
+def _differs(column: Array) -> bool:
+    """Whether not all are the same."""
+    return bool(len(column) and (column != column[0]).any())

@@ -103,8 +103,10 @@ IMPULSES = {
     "values": Field(None, "impulses", 3),
     "wall": Field(None, "remembered", 8),
     "given": Field(None, "remembered", 3),
+    "listed": Field(None, "neighbours", 2),
+    "checked": Field(None, "neighbours", 2),
 }
-"""What contacts gave in the last substep: `world.impulse_frames.Memory`, of walls by particle."""
+"""What contacts gave in the last substep: `world.impulse_frames.Memory`, of walls by particle; where their list was made."""
 
 FIELDS = {
     f"{room}.{name}": field
@@ -141,7 +143,8 @@ def take_apart(world: World) -> Parts:
     memory = saved.impulses
     facts["impulses"] = {"kick": memory.kick, "h": memory.h, "hertz": memory.hertz, "finer": memory.finer}
     if memory.kick:
-        arrays |= {f"impulses.{name}": getattr(memory, name) for name in ("pairs", "values", "given")}
+        facts["impulses"]["skin"] = list(memory.skin)
+        arrays |= {f"impulses.{name}": getattr(memory, name) for name in ("pairs", "values", "given", "listed", "checked")}
         arrays["impulses.wall"] = np.ascontiguousarray(memory.wall.T)
     if saved.books:
         facts["books"] = {
@@ -301,7 +304,14 @@ def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
         raise InputError("impulses.pairs are not sorted; allowed are pairs low < high, by the lower")
     if len(given) > len(world):
         raise InputError(f"impulses.given has {len(given)} rows; allowed are at most {len(world)}, one for each particle")
-    return Memory(pairs.copy(), values.copy(), np.ascontiguousarray(wall.T), given.copy(), **numbers)
+    none = np.empty((0, 2), world.dtype)
+    listed, checked = (arrays.get(f"impulses.{name}", none).copy() for name in ("listed", "checked"))
+    skin = tuple(checks.number("skin", number, least=0.0) for number in facts.get("skin") or ())
+    if len(skin) not in (0, 6) or bool(skin) != bool(len(listed)) or len(listed) not in (0, len(given)):
+        raise InputError(f"impulses.skin has {len(skin)} numbers and impulses.listed {len(listed)} rows; allowed are 6 and one "
+                         "for each row of impulses.given, or none")
+    return Memory(pairs.copy(), values.copy(), np.ascontiguousarray(wall.T), given.copy(), **numbers, listed=listed,
+                  checked=checked, skin=skin)
 
 
 # ---- books, events and sleep -------------------------------------------------------------------------------------------

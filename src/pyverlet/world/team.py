@@ -53,15 +53,20 @@ def ladder(most: int) -> list[int]:
 
 
 class Team:
-    """The threads of one world, told before each frame how long the last one took."""
+    """The threads of one world, told before each frame how long the last one took.
+
+    Attributes:
+        now: how many the frame under way uses.
+    """
 
     def __init__(self) -> None:
-        self._most = 0
+        self._most, self.now = 0, 1
         self._now = self._other = 0  # places in `_steps`: of the number in use, and of one on trial, if another
 
     def gather(self, most: int, frame_ms: float) -> None:
         """Have the kernels of the next frame use as many as seem best."""
-        jit.use_threads(self.size(most, frame_ms), most)
+        self.now = self.size(most, frame_ms)
+        jit.use_threads(self.now, most)
 
     def size(self, most: int, frame_ms: float) -> int:
         """Threads for the next frame, `most` at most; frame_ms is what the last one took, 0 if there was none, or none

@@ -182,7 +182,8 @@ class World(Measures, Queries, Doors):
         self.integrator.begin(self._slots, self._force_sum, self.time, h, self._h_last)
         return True
 
-    def _gather(self) -> None:
+    def _gather(self) -> bool:
+        """Take up what users have set; whether that makes the list of pairs void."""
         woken = self._sleep.begin(self._slots, self._state, laws(self)) if self._sleep else False
         changed = self._slots.gather(self._state) or woken
         if not self._slots.most_restitution <= 1.0:
@@ -190,9 +191,9 @@ class World(Measures, Queries, Doors):
         if not self._slots.most_friction < np.inf:
             checks.at_most("friction", self._state.friction, float(np.finfo(self.dtype).max))
         if not changed:
-            if self._contacts:
+            if self._contacts and not self._by_impulses:
                 self._contacts.broad_phase.follow(self._slots)
-            return
+            return False
         try:
             checks.positive("radius", self._state.radius)
             checks.positive("mass", self._state.mass, infinite_is="pinned")
@@ -200,10 +201,11 @@ class World(Measures, Queries, Doors):
         except InputError:
             self._slots = Slots(self.dtype, sleeps=self._sleep is not None)  # new to the next frame, which refuses them again
             raise
-        if self._contacts:
+        if self._contacts and not self._by_impulses:
             self._contacts.broad_phase.forget()
             if len(self) > 1:
                 self._contacts.fit(self._slots)
+        return True
 
     def _finish(self, contacts: ContactSolver | None, watch: Watch | None, h: float, done: Any, *, marked: bool) -> bool:
         """The substeps are done: who rests, the velocities of now, and no more energy than there may be."""

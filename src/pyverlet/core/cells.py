@@ -1,0 +1,174 @@
+# mypy: ignore-errors
+"""Particles sorted by cell: nested grids, each with cells half as large as those of the one before.
+
+A circle stands in the smallest cells that its diameter and the skin fit into. Very few that are much larger than all others
+(`bulk` and up) stand in no cell. Rows of cells follow each other along v, columns along u; u and v are x and y, or y and x in
+rooms that are much longer than high. Columns are a third as wide as rows are high, so that the neighbours of a circle, which
+stand together along a row, are cut out more closely. In a periodic room the last row, or column, is followed by the first.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import floor
+from cython.cimports.libc.stdint import int64_t, uint32_t
+
+BLOCK = cython.declare(cython.Py_ssize_t, 512)
+"""Particles that are gone through together by one thread."""
+
+LEVELS = cython.declare(cython.int, 10)
+COLUMNS = cython.declare(cython.int, 3)
+"""Columns in the width of a row's height."""
+
+
+Cells = cython.struct(
+    count=cython.Py_ssize_t,
+    position=cython.pointer(real),
+    radius=cython.pointer(real),
+    low_x=cython.double,  # corner of a periodic room, m, and its periods, 0: none
+    low_y=cython.double,
+    period_x=cython.double,
+    period_y=cython.double,
+    bulk=real,  # largest radius in cells, m
+    smallest=real,
+    skin=real,  # rims that are nearer are listed, m
+    # ---- the grids
+    swapped=cython.int,  # 1: u is y
+    u0=real,
+    v0=real,
+    wraps_u=cython.bint,
+    wraps_v=cython.bint,
+    period_u=real,
+    period_v=real,
+    levels=cython.int,
+    total=int64_t,  # cells
+    shift=cython.pointer(int64_t),  # (LEVELS,) log2 of rows of this grid in a row of the first
+    base=cython.pointer(int64_t),  # number of its first cell
+    width=cython.pointer(int64_t),
+    height=cython.pointer(int64_t),
+    across=cython.pointer(real),  # columns, and rows, a metre
+    along=cython.pointer(real),
+    largest=cython.pointer(real),  # radius that stands in it, m
+    held=cython.pointer(int64_t),
+    # ---- what stands in them
+    extent=cython.pointer(real),  # (blocks, 4) x0, y0, x1, y1
+    cell=cython.pointer(uint32_t),  # (count,)
+    start=cython.pointer(uint32_t),  # (4 count + 66,) particles in all cells before each
+    order=cython.pointer(uint32_t),  # (count,) by cell; those in no cell come last
+    spot_u=cython.pointer(real),  # (count + 8,) in that order, inside a periodic room
+    spot_v=cython.pointer(real),
+    spot_r=cython.pointer(real),
+    celled=cython.Py_ssize_t,  # how many stand in cells
+    falls=cython.Py_ssize_t,  # how often `order` falls
+    # ---- squares of two by two cells of the first grid, to see how differently neighbours move
+    patch=cython.pointer(uint32_t),  # (count,) which, by place in the order
+    patches_u=int64_t,
+    patches_v=int64_t,
+    box=cython.pointer(real),  # (patches, 4) around how far the particles of each have moved, m
+)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def cell_number(value: real, cells: int64_t) -> int64_t:
+    """floor(value), not below 0 and below `cells`: what is outside stands in the rim, which keeps neighbours neighbours."""
+    last: int64_t = cells - 1
+    if value >= last:
+        return last
+    if value > 0:
+        return cython.cast(int64_t, value)
+    return 0
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def whole_below(value: real) -> int64_t:
+    """floor(value)."""
+    whole: int64_t = cython.cast(int64_t, value)
+    return whole - 1 if value < whole else whole
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def level_of(c: cython.pointer(Cells), radius: real) -> cython.int:
+    """The grid that a circle stands in."""
+    level: cython.int = 0
+    while level + 1 < c.levels and radius <= c.largest[level + 1]:
+        level += 1
+    return level
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def wrapped(value: real, low: cython.double, period: cython.double) -> real:
+    """The image of a coordinate inside the room; itself where the period is 0."""
+    if period > 0 and not (value >= low and value < low + period):
+        return cython.cast(real, value - period * floor((value - low) / period))
+    return value
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def find_cells(c: cython.pointer(Cells), block: cython.Py_ssize_t) -> cython.void:
+    """The cell of each particle of a block."""
+    i: cython.Py_ssize_t
+    low_u: cython.double = c.low_y if c.swapped else c.low_x
+    low_v: cython.double = c.low_x if c.swapped else c.low_y
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, c.count)):
+        if c.radius[i] > c.bulk:
+            c.cell[i] = cython.cast(uint32_t, c.total)
+            continue
+        level: cython.int = level_of(c, c.radius[i]) if c.levels > 1 else 0
+        u: real = wrapped(c.position[2 * i + c.swapped], low_u, c.period_u)
+        v: real = wrapped(c.position[2 * i + 1 - c.swapped], low_v, c.period_v)
+        column: int64_t = cell_number((u - c.u0) * c.across[level], c.width[level])
+        row: int64_t = cell_number((v - c.v0) * c.along[level], c.height[level])
+        c.cell[i] = cython.cast(uint32_t, c.base[level] + row * c.width[level] + column)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def sort_by_cell(c: cython.pointer(Cells)) -> cython.void:
+    """Stable counting sort: `order`; in the end start[k] is the number of particles in all cells before k."""
+    k: int64_t
+    i: cython.Py_ssize_t
+    for k in range(c.total + 3):
+        c.start[k] = 0
+    for i in range(c.count):
+        c.start[c.cell[i] + 2] += 1
+    for k in range(1, c.total + 2):
+        c.start[k + 1] += c.start[k]
+    for i in range(c.count):
+        place: uint32_t = c.start[c.cell[i] + 1]
+        c.start[c.cell[i] + 1] = place + 1
+        c.order[place] = cython.cast(uint32_t, i)
+    c.celled = c.start[c.total]
+    c.falls = 0
+    for i in range(1, c.count):
+        c.falls += c.order[i] < c.order[i - 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def copy_spots(c: cython.pointer(Cells), block: cython.Py_ssize_t) -> cython.void:
+    """Places and radii in the order of the cells, of a block of that order."""
+    k: cython.Py_ssize_t
+    low_u: cython.double = c.low_y if c.swapped else c.low_x
+    low_v: cython.double = c.low_x if c.swapped else c.low_y
+    for k in range(block * BLOCK, min((block + 1) * BLOCK, c.count)):
+        i: cython.Py_ssize_t = c.order[k]
+        c.spot_u[k] = wrapped(c.position[2 * i + c.swapped], low_u, c.period_u)
+        c.spot_v[k] = wrapped(c.position[2 * i + 1 - c.swapped], low_v, c.period_v)
+        c.spot_r[k] = c.radius[i]

@@ -1,0 +1,75 @@
+# mypy: ignore-errors
+"""What contacts remember, as arrays for files, and for worlds whose particles have come or gone."""
+
+from __future__ import annotations
+
+import cython
+import numpy as np
+from cython.cimports.arrays import integers, reals, small_integers
+from cython.cimports.lanes import real
+from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
+
+from pyverlet.core.pair_batches import repeats
+from pyverlet.core.pair_lists import Lists
+from pyverlet.core.step import TOUCHED, Step
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def remembers(w: cython.pointer(Step), s: cython.Py_ssize_t, k: int64_t) -> cython.bint:
+    """Whether lane k of group s has something to remember, and is no repeated pair."""
+    return (w.impulse[k] > 0 or w.depth[k] > 0 or w.load[k] != 0) and not repeats(w, s, k)
+
+
+@cython.cfunc
+def read_impulses(w: cython.pointer(Step), who: cython.pointer(int32_t), particle, dtype):
+    """(pairs, values) as of `Engine.take_impulses`; who: the user's index in each slot."""
+    first = np.zeros(int(particle.max(initial=-1)) + 2, np.int64)
+    begin: cython.pointer(int64_t) = integers(first)
+    s: cython.Py_ssize_t
+    k: int64_t
+    groups: cython.Py_ssize_t = w.groups if w.lists.listed else 0
+    for s in range(groups):
+        for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
+            if remembers(w, s, k):
+                begin[min(who[w.i[k]], who[w.j[k]]) + 1] += 1
+    np.cumsum(first, out=first)
+    pairs, values = np.empty((first[-1], 2), np.int32), np.empty((first[-1], 3), dtype)
+    pair: cython.pointer(int32_t) = small_integers(pairs)
+    value: cython.pointer(real) = reals(values)
+    for s in range(groups):
+        for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
+            if remembers(w, s, k):
+                p: int32_t = who[w.i[k]]
+                q: int32_t = who[w.j[k]]
+                n: int64_t = begin[min(p, q)]
+                begin[min(p, q)] = n + 1
+                pair[2 * n], pair[2 * n + 1] = min(p, q), max(p, q)
+                touched: cython.bint = w.impulse[k] > 0 or w.depth[k] > 0
+                load: real = w.load[k] if w.load[k] > 0 else -w.load[k]
+                if touched and load == 0 and not w.impulse[k] > 0:
+                    load = TOUCHED
+                value[3 * n] = w.impulse[k]
+                value[3 * n + 1] = w.tangent_impulse[k] if w.rough else 0
+                value[3 * n + 2] = load if touched else -load
+    return pairs, values
+
+
+@cython.cfunc
+def fill_kept(w: cython.pointer(Step), pairs, values):
+    """Hang these on the chains of their lower slots."""
+    l: cython.pointer(Lists) = w.lists
+    pair: cython.pointer(int32_t) = small_integers(pairs)
+    value: cython.pointer(real) = reals(values)
+    k: int64_t
+    i: int64_t
+    for i in range(w.count):
+        l.head[i] = -1
+    for k in range(len(pairs)):
+        low: int32_t = min(pair[2 * k], pair[2 * k + 1])
+        l.kept_other[k] = cython.cast(uint32_t, max(pair[2 * k], pair[2 * k + 1]))
+        l.kept[3 * k], l.kept[3 * k + 1], l.kept[3 * k + 2] = value[3 * k], value[3 * k + 1], value[3 * k + 2]
+        l.kept_next[k] = l.head[low]
+        l.head[low] = cython.cast(int32_t, k)

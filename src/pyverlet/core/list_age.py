@@ -1,0 +1,219 @@
+# mypy: ignore-errors
+"""How long a list of pairs lasts: whether two circles may have come nearer to each other by the skin, and how thick it should be.
+
+For displacements u, the distance of two circles changes by at most |u_i - u_j|: what counts is how differently neighbours move.
+That is no more than the diagonal of the box around all displacements in the two by two patches that both are in. Circles that
+are not in neighbouring patches have a patch between them.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import INFINITY, sqrt
+from cython.cimports.libc.stdint import int64_t, uint32_t
+
+from pyverlet.core.cells import COLUMNS, Cells, cell_number
+from pyverlet.core.pair_batches import SKIN_STEP
+from pyverlet.core.pair_lists import Lists
+from pyverlet.core.step import Step
+
+SKIN_LEAST = cython.declare(cython.double, 0.02)
+SKIN_MOST = cython.declare(cython.double, 2.0)
+"""Mean diameters between which the skin adapts."""
+
+SKIN_HOLD = cython.declare(cython.int, 16)
+"""Lists before a skin that was too large is tried again: second neighbours in a crystal come all at once."""
+
+REBUILD_PAIRS = cython.declare(cython.double, 20.0)
+"""Pairs a particle that contacts go through in a substep in the time in which the list is made anew."""
+
+REBUILD_CALL = cython.declare(cython.double, 1000.0)
+"""Likewise, in all, however few particles there are."""
+
+WORTH_THINNING = cython.declare(cython.double, 0.3)
+"""Pairs a particle that a step of the skin must spare for a list that is still good to be made anew."""
+
+WORTH_LOOKING = cython.declare(cython.double, 0.3)
+"""With less than this part of half the skin left the list is made anew: looking again and again would cost as much."""
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def worth(w: cython.pointer(Step)) -> cython.double:
+    """Pairs a particle that contacts go through in a substep in the time in which the list is made anew."""
+    return REBUILD_PAIRS + REBUILD_CALL / max(w.count, 1)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def has_paid(w: cython.pointer(Step), l: cython.pointer(Lists)) -> cython.bint:
+    """Whether pairs listed for nothing have cost what a list costs: all have come to rest, say."""
+    return l.adapts and l.excess > WORTH_THINNING and l.excess * l.age > worth(w)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def adapt_skin(w: cython.pointer(Step), l: cython.pointer(Lists)) -> cython.void:
+    """Towards the skin where a substep pays as little as it can for lists and for pairs that are listed for nothing."""
+    if not l.adapts:
+        return
+    # A list lives about as long as its skin is thick: a step up saves this much for each particle and substep.
+    saved: cython.double = worth(w) / max(l.age, 1) * (1.0 - 1.0 / SKIN_STEP)
+    l.hold = max(l.hold - 1, 0)
+    if l.excess > saved * SKIN_STEP:
+        l.diameters = max(l.diameters / SKIN_STEP, SKIN_LEAST)
+        l.hold = SKIN_HOLD
+    elif saved > l.excess * SKIN_STEP and l.hold == 0:
+        l.diameters = min(l.diameters * SKIN_STEP, SKIN_MOST)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def lay_patches(c: cython.pointer(Cells)) -> cython.void:
+    """Cut the first grid into squares of two by two rows; around a periodic room none may be smaller."""
+    c.patches_u = c.width[0] // (2 * COLUMNS) if c.wraps_u else (c.width[0] + 2 * COLUMNS - 1) // (2 * COLUMNS)
+    c.patches_v = c.height[0] // 2 if c.wraps_v else (c.height[0] + 1) // 2
+    c.patches_u, c.patches_v = max(c.patches_u, 1), max(c.patches_v, 1)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def find_patch(c: cython.pointer(Cells), k: cython.Py_ssize_t) -> cython.void:
+    """The patch of place k."""
+    column: int64_t = cell_number((c.spot_u[k] - c.u0) * c.across[0], c.width[0]) // (2 * COLUMNS)
+    row: int64_t = cell_number((c.spot_v[k] - c.v0) * c.along[0], c.height[0]) // 2
+    column, row = min(column, c.patches_u - 1), min(row, c.patches_v - 1)
+    c.patch[k] = cython.cast(uint32_t, row * c.patches_u + column)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def bound_moves(w: cython.pointer(Step), c: cython.pointer(Cells), row: int64_t) -> cython.void:
+    """The boxes of a row of patches: around position - listed."""
+    k: int64_t
+    level: cython.int
+    for k in range(row * c.patches_u, (row + 1) * c.patches_u):
+        c.box[4 * k] = c.box[4 * k + 1] = INFINITY
+        c.box[4 * k + 2] = c.box[4 * k + 3] = -INFINITY
+    for level in range(c.levels):
+        first: int64_t = (2 * row) << c.shift[level]
+        end: int64_t = (2 * row + 2) << c.shift[level]
+        if row == c.patches_v - 1:
+            end = c.height[level]
+        wide: int64_t = c.width[level]
+        for k in range(c.start[c.base[level] + first * wide], c.start[c.base[level] + end * wide]):
+            i: int64_t = c.order[k]
+            x: real = w.position[2 * i] - w.listed[2 * i]
+            y: real = w.position[2 * i + 1] - w.listed[2 * i + 1]
+            b: int64_t = 4 * cython.cast(int64_t, c.patch[k])
+            c.box[b] = x if not x >= c.box[b] else c.box[b]
+            c.box[b + 1] = y if not y >= c.box[b + 1] else c.box[b + 1]
+            c.box[b + 2] = x if not x <= c.box[b + 2] else c.box[b + 2]
+            c.box[b + 3] = y if not y <= c.box[b + 3] else c.box[b + 3]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def spread_of(c: cython.pointer(Cells), row: int64_t, column: int64_t) -> cython.double:
+    """Square of the most that two circles in two by two patches, the first being this, have moved against each other, m^2."""
+    right: int64_t = column + 1 if column + 1 < c.patches_u else 0 if c.wraps_u else column
+    above: int64_t = row + 1 if row + 1 < c.patches_v else 0 if c.wraps_v else row
+    x0: real = INFINITY
+    y0: real = INFINITY
+    x1: real = -INFINITY
+    y1: real = -INFINITY
+    n: cython.int
+    for n in range(4):
+        b: int64_t = 4 * ((above if n & 2 else row) * c.patches_u + (right if n & 1 else column))
+        x0, y0 = min(x0, c.box[b]), min(y0, c.box[b + 1])
+        x1, y1 = max(x1, c.box[b + 2]), max(y1, c.box[b + 3])
+    if not x0 <= x1:
+        return 0.0
+    dx: cython.double = cython.cast(cython.double, x1) - x0
+    dy: cython.double = cython.cast(cython.double, y1) - y0
+    return dx * dx + dy * dy
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def spread_around(w: cython.pointer(Step), c: cython.pointer(Cells), a: int64_t) -> cython.double:
+    """The same for the circle at place a, which stands in no cell, and all in the patches around its rim."""
+    i: int64_t = c.order[a]
+    x: real = w.position[2 * i] - w.listed[2 * i]
+    y: real = w.position[2 * i + 1] - w.listed[2 * i + 1]
+    reach: real = c.spot_r[a] + c.bulk + 2 * c.skin
+    u: real = c.spot_u[a] - c.u0
+    v: real = c.spot_v[a] - c.v0
+    most: cython.double = 0
+    row: int64_t
+    column: int64_t
+    first: int64_t = 0
+    last: int64_t = c.patches_v - 1
+    left: int64_t = 0
+    right: int64_t = c.patches_u - 1
+    if not c.wraps_v:
+        first = cell_number((v - reach) * c.along[0], c.height[0]) // 2
+        last = min(cell_number((v + reach) * c.along[0], c.height[0]) // 2, last)
+    if not c.wraps_u:
+        left = cell_number((u - reach) * c.across[0], c.width[0]) // (2 * COLUMNS)
+        right = min(cell_number((u + reach) * c.across[0], c.width[0]) // (2 * COLUMNS), right)
+    for row in range(first, last + 1):
+        for column in range(left, right + 1):
+            b: int64_t = 4 * (row * c.patches_u + column)
+            if c.box[b] <= c.box[b + 2]:
+                dx: cython.double = max(abs(c.box[b] - x), abs(c.box[b + 2] - x))
+                dy: cython.double = max(abs(c.box[b + 1] - y), abs(c.box[b + 3] - y))
+                most = max(most, dx * dx + dy * dy)
+    for row in range(c.celled, c.count):
+        j: int64_t = c.order[row]
+        dx = (w.position[2 * j] - w.listed[2 * j]) - x
+        dy = (w.position[2 * j + 1] - w.listed[2 * j + 1]) - y
+        most = max(most, dx * dx + dy * dy)
+    return most
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def slack_left(w: cython.pointer(Step), c: cython.pointer(Cells), skin: cython.double) -> cython.double:
+    """How much nearer any pair that was farther apart than the skin may still come before it can touch, m; negative: too near.
+
+    Needs the boxes of all rows of patches.
+    """
+    near: cython.double = 0
+    x0: cython.double = INFINITY
+    y0: cython.double = INFINITY
+    x1: cython.double = -INFINITY
+    y1: cython.double = -INFINITY
+    row: int64_t
+    column: int64_t
+    k: int64_t
+    for row in range(c.patches_v):
+        for column in range(c.patches_u):
+            near = max(near, spread_of(c, row, column))
+            k = 4 * (row * c.patches_u + column)
+            x0, y0 = min(x0, c.box[k]), min(y0, c.box[k + 1])
+            x1, y1 = max(x1, c.box[k + 2]), max(y1, c.box[k + 3])
+    for k in range(c.celled, c.count):
+        near = max(near, spread_around(w, c, k))
+        x: cython.double = w.position[2 * c.order[k]] - w.listed[2 * c.order[k]]
+        y: cython.double = w.position[2 * c.order[k] + 1] - w.listed[2 * c.order[k] + 1]
+        x0, y0, x1, y1 = min(x0, x), min(y0, y), max(x1, x), max(y1, y)
+    if not x0 <= x1:
+        return skin
+    far: cython.double = sqrt((x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0))
+    gap: cython.double = 2.0 / c.along[0] - 2.0 * c.bulk
+    gap = min(gap, 2.0 * COLUMNS / c.across[0] - 2.0 * c.bulk)
+    if c.celled < c.count:
+        gap = min(gap, 2.0 * c.skin)
+    return min(skin - sqrt(near), gap - far)

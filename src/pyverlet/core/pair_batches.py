@@ -1,0 +1,239 @@
+# mypy: ignore-errors
+"""The pairs of a group in batches of eight that share no particle, and what contacts remember of them.
+
+Each pair takes the lowest colour that neither of its circles has; eight of one colour are a batch. What is left over fills
+batches in its order, where one that shares a particle with the batch waits for the next: around a large circle many do. A batch
+that is not full repeats its last pair: both lanes write the same.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import rint
+from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t, uint32_t
+
+from pyverlet.core.cells import Cells
+from pyverlet.core.pair_lists import CLOSE_BIT, PLACE_BITS, Lists
+from pyverlet.core.step import TOUCHED, Step
+
+COLOURS = cython.declare(cython.int, 16)
+NO_COLOUR = cython.declare(cython.int, 15)
+
+WAITING = cython.declare(int64_t, 32)
+"""Pairs that are looked at for each batch of what is left over."""
+
+ASIDE = cython.declare(real, 1e-6)
+"""Of the contact distance: how far apart coincident centres are taken to be, for the direction's sake."""
+
+SKIN_STEP = cython.declare(cython.double, 1.25)
+"""Factor by which the skin adapts at a list."""
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def forget_colours(c: cython.pointer(Cells), l: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
+    """No colours are used in the rows of group s and in the one above."""
+    level: cython.int
+    k: int64_t
+    for level in range(c.levels):
+        this: int64_t = c.base[level]
+        high: int64_t = min((l.row[s + 1] + 1) << c.shift[level], c.height[level])
+        for k in range(c.start[this + (l.row[s] << c.shift[level]) * c.width[level]], c.start[this + high * c.width[level]]):
+            l.used[k] = 0
+        if c.wraps_v and l.row[s + 1] == c.height[0]:
+            for k in range(c.start[this], c.start[this + (cython.cast(int64_t, 1) << c.shift[level]) * c.width[level]]):
+                l.used[k] = 0
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def put_pair(w: cython.pointer(Step), c: cython.pointer(Cells), k: int64_t, a: int64_t, b: int64_t) -> cython.void:
+    """Places a and b, with the way from a to b, in lane k."""
+    w.i[k], w.j[k] = c.order[a], c.order[b]
+    du: real = c.spot_u[b] - c.spot_u[a]
+    dv: real = c.spot_v[b] - c.spot_v[a]
+    if c.wraps_u:
+        du = du - c.period_u * cython.cast(real, rint(du / c.period_u))
+    if c.wraps_v:
+        dv = dv - c.period_v * cython.cast(real, rint(dv / c.period_v))
+    if du == 0 and dv == 0:  # a direction of the pair's own, all around
+        p: int64_t = w.lists.particle[w.i[k]]
+        q: int64_t = w.lists.particle[w.j[k]]
+        chance: int64_t = ((p + q) * 40503 + p * q * 9973) & 1023
+        slope: real = cython.cast(real, chance & 511) / 256 - 1
+        hair: real = ASIDE * (c.spot_r[a] + c.spot_r[b]) / (1 + slope * slope)
+        if chance >= 512:
+            hair = -hair
+        du, dv = hair * (1 - slope * slope), hair * (slope + slope)
+    w.gap_x[k], w.gap_y[k] = (dv, du) if c.swapped else (du, dv)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def put_rest(
+    w: cython.pointer(Step), l: cython.pointer(Lists), c: cython.pointer(Cells), low: int64_t, end: int64_t, k: int64_t, room: int64_t
+) -> int64_t:
+    """Fill batches from lane k on with the pairs rest[low] to rest[end]; returns where lanes end, also beyond the room."""
+    p: int64_t
+    lane: int64_t
+    while low < end:
+        number: uint32_t = cython.cast(uint32_t, k)
+        taken: int64_t = 0
+        waits: int64_t = 0
+        waiting: uint32_t[32]
+        p = low
+        while p < end and taken < 8 and waits < WAITING:
+            pair: uint32_t = l.rest[p]
+            a: uint32_t = l.raw_i[pair]
+            b: uint32_t = l.raw_j[pair] & PLACE_BITS
+            if l.batch[a] != number and l.batch[b] != number:
+                l.batch[a] = l.batch[b] = number
+                if k + taken < room:
+                    put_pair(w, c, k + taken, a, b)
+                taken += 1
+            else:
+                waiting[waits] = pair
+                waits += 1
+            p += 1
+        low = p - waits
+        for lane in range(waits):
+            l.rest[low + lane] = waiting[lane]
+        for lane in range(k + taken, min(k + 8, room)):
+            w.i[lane], w.j[lane], w.gap_x[lane], w.gap_y[lane] = w.i[lane - 1], w.j[lane - 1], w.gap_x[lane - 1], w.gap_y[lane - 1]
+        k += 8
+    return k
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def put_batches(
+    w: cython.pointer(Step), l: cython.pointer(Lists), c: cython.pointer(Cells), s: cython.Py_ssize_t, alone: cython.bint
+) -> int64_t:
+    """The pairs that were found for group s as lanes from its begin on; returns where they end, also beyond the room."""
+    low: int64_t = l.raw_begin[s]
+    end: int64_t = l.found[s] + low
+    room: int64_t = w.begin[s + 1]
+    first: int64_t[33]
+    p: int64_t
+    key: cython.int
+    for key in range(2 * COLOURS + 1):
+        first[key] = 0
+    if not alone:
+        forget_colours(c, l, s)
+    for p in range(low, end):
+        a: uint32_t = l.raw_i[p]
+        b: uint32_t = l.raw_j[p] & PLACE_BITS
+        colour: cython.int = 0 if not alone else NO_COLOUR
+        if not alone:
+            used: uint32_t = l.used[a] | l.used[b]
+            while colour < NO_COLOUR and (used >> colour) & 1:
+                colour += 1
+            bit: uint32_t = cython.cast(uint32_t, 1 << colour)
+            l.used[a] |= bit
+            l.used[b] |= bit
+        key = colour + COLOURS if l.raw_j[p] & CLOSE_BIT else colour
+        l.key[p] = cython.cast(uint8_t, key)
+        first[key + 1] += 1
+    first[0] = low
+    for key in range(2 * COLOURS):
+        first[key + 1] += first[key]
+    for p in range(low, end):
+        key = l.key[p]
+        l.sorted[first[key]] = cython.cast(uint32_t, p)
+        first[key] += 1
+    k: int64_t = w.begin[s]
+    begin: int64_t = low
+    left: int64_t = low
+    for key in range(2 * COLOURS):
+        whole: int64_t = begin
+        if key % COLOURS != NO_COLOUR:
+            whole = begin + (first[key] - begin) // 8 * 8
+        for p in range(begin, whole):
+            pair: uint32_t = l.sorted[p]
+            if k < room:
+                put_pair(w, c, k, l.raw_i[pair], l.raw_j[pair] & PLACE_BITS)
+            k += 1
+        for p in range(whole, first[key]):
+            l.rest[left] = l.sorted[p]
+            left += 1
+        begin = first[key]
+        if key % COLOURS == NO_COLOUR:
+            k = put_rest(w, l, c, low, left, k, room)
+            left = low
+    return k
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def repeats(w: cython.pointer(Step), s: cython.Py_ssize_t, k: int64_t) -> cython.bint:
+    """Whether lane k of group s is the pair before it once more."""
+    return k > w.begin[s] and w.i[k] == w.i[k - 1] and w.j[k] == w.j[k - 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def keep_impulses(w: cython.pointer(Step), l: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
+    """Hang what the contacts of group s remember on the chains of their lower particles.
+
+    Impulses along the normal and the tangent, and the load that the substep began with; negative where they did not touch.
+    """
+    k: int64_t
+    for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
+        touched: cython.bint = w.impulse[k] > 0 or w.depth[k] > 0
+        if (touched or w.load[k] != 0) and not repeats(w, s, k):
+            low: uint32_t = min(w.i[k], w.j[k])
+            l.kept_other[k] = max(w.i[k], w.j[k])
+            l.kept[3 * k] = w.impulse[k]
+            l.kept[3 * k + 1] = w.tangent_impulse[k] if w.rough else 0
+            load: real = w.load[k] if w.load[k] > 0 else -w.load[k]
+            if touched and load == 0 and not w.impulse[k] > 0:
+                load = TOUCHED
+            l.kept[3 * k + 2] = load if touched else -load
+            l.kept_next[k] = l.head[low]
+            l.head[low] = cython.cast(int32_t, k)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def give_impulses(w: cython.pointer(Step), l: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
+    """Find again what contacts remember, for the lanes of group s; all others carry none."""
+    k: int64_t
+    for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
+        low: uint32_t = min(w.i[k], w.j[k])
+        high: uint32_t = max(w.i[k], w.j[k])
+        w.impulse[k] = w.tangent_impulse[k] = w.load[k] = 0
+        w.depth[k] = -1
+        n: int32_t = l.head[low]
+        while n >= 0:
+            if l.kept_other[n] == high:
+                w.impulse[k], w.tangent_impulse[k], w.load[k] = l.kept[3 * n], l.kept[3 * n + 1], l.kept[3 * n + 2]
+                w.depth[k] = 1 if l.kept[3 * n] > 0 or l.kept[3 * n + 2] > 0 else -1
+                n = -1
+            else:
+                n = l.kept_next[n]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def count_far(w: cython.pointer(Step), l: cython.pointer(Lists), c: cython.pointer(Cells), s: cython.Py_ssize_t) -> cython.void:
+    """How many lanes of group s were looked at, and how many of these a skin thinner by a step would not list."""
+    k: int64_t
+    thinner: cython.double = c.skin / SKIN_STEP
+    l.looked[s] = l.beyond[s] = 0
+    for k in range(w.begin[s], w.begin[s] + w.lanes[s], 16):
+        reach: cython.double = c.radius[w.i[k]] + c.radius[w.j[k]] + thinner
+        x: cython.double = w.gap_x[k]
+        y: cython.double = w.gap_y[k]
+        l.looked[s] += 1
+        l.beyond[s] += x * x + y * y > reach * reach

@@ -1,0 +1,299 @@
+# mypy: ignore-errors
+"""Candidate pairs: circles nearer than the sum of their radii and a skin, found in the cells around each.
+
+Rows of the first grid are cut into groups. A pair belongs to the group of its lower circle, so a group writes to its own
+particles and to the lowest row of the next: even groups are gone through at the same time, then odd ones. Pairs with one of the
+few circles that stand in no cell, as they are too large, are the last group, which is gone through alone.
+
+Circles of different grids: the larger looks for the smaller, along the rows of small cells that the circle of its reach
+crosses. Inside of it those rows are empty, so it finds little but its neighbours.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import above, any_lane, bits_of, lanes, load, mask, real, spread
+from cython.cimports.libc.math import sqrt
+from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t, uint32_t
+
+from pyverlet.core.cells import COLUMNS, Cells, cell_number, whole_below
+
+CLOSE = cython.declare(real, 1.05)
+"""Of the contact distance: listed pairs nearer than this come last in their group. Few of the others touch while the list lasts."""
+
+CLOSE_BIT = cython.declare(uint32_t, 1 << 31)
+"""Set in the second place of a pair that is close."""
+
+PLACE_BITS = cython.declare(uint32_t, (1 << 31) - 1)
+
+Lists = cython.struct(
+    listed=cython.bint,  # whether there are lanes, whose impulses are of now
+    good=cython.bint,  # whether they are still about the particles of now
+    harvested=cython.bint,  # whether what contacts remember is in `kept`
+    short=cython.bint,  # whether arrays have turned out to be too small
+    refill=cython.bint,  # whether what pairs are made of has changed
+    rebuilds=int64_t,
+    # ---- how thick the skin is
+    adapts=cython.bint,
+    diameters=cython.double,  # mean diameters
+    mean_radius=cython.double,  # m
+    largest=cython.double,  # radius, m
+    half_skin=cython.double,  # m
+    age=int64_t,  # substeps that the list has lasted
+    hold=int64_t,  # lists before the skin may grow again
+    excess=cython.double,  # pairs a particle that a skin thinner by a step would not list
+    speeds=cython.pointer(real),  # (blocks,) square of the largest
+    # ---- who makes no pairs
+    picky=cython.bint,
+    filtered=cython.bint,
+    category=cython.pointer(uint32_t),
+    mask=cython.pointer(uint32_t),
+    particle=cython.pointer(int32_t),  # the user's index of each
+    linked=cython.bint,  # whether links keep pairs from touching
+    linked_begin=cython.pointer(int64_t),  # by the user's index of the lower
+    linked_to=cython.pointer(int32_t),
+    # ---- groups of rows
+    rows=cython.Py_ssize_t,  # groups of rows of cells; one more if there are circles in no cell
+    row=cython.pointer(int64_t),  # (groups + 1,)
+    groups_room=cython.Py_ssize_t,
+    # ---- pairs as they are found: places in the order of the cells
+    found=cython.pointer(int64_t),  # (groups,)
+    raw_begin=cython.pointer(int64_t),  # (groups + 1,)
+    raw_i=cython.pointer(uint32_t),
+    raw_j=cython.pointer(uint32_t),
+    key=cython.pointer(uint8_t),  # colour of each
+    sorted=cython.pointer(uint32_t),  # pairs by colour
+    rest=cython.pointer(uint32_t),  # pairs that fill no batch of one colour
+    used=cython.pointer(uint32_t),  # (count,) colours of the pairs of each place
+    batch=cython.pointer(uint32_t),  # (count,) the last batch of each place
+    pairs_room=cython.Py_ssize_t,  # how many the arrays hold
+    lanes_room=cython.Py_ssize_t,
+    per_particle=cython.double,  # pairs, for which there is room in each group
+    per_pair=cython.double,  # lanes
+    alone_room=cython.double,  # pairs of the last group
+    looked=cython.pointer(int64_t),  # (groups,) pairs that were looked at to see how many
+    beyond=cython.pointer(int64_t),  # (groups,) a thinner skin would not list
+    # ---- what contacts remember while the list is made anew, a chain for each particle
+    head=cython.pointer(int32_t),  # (count,) -1: none
+    kept_next=cython.pointer(int32_t),
+    kept_other=cython.pointer(uint32_t),
+    kept=cython.pointer(real),  # (room, 3)
+    # ---- what circles without values of their own are made of
+    restitution=cython.double,
+    friction=cython.double,
+)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def may_touch(
+    c: cython.pointer(Cells), l: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, b: int64_t
+) -> cython.bint:
+    """Whether one of two places holds a free circle, each takes the other's category, and no link keeps them apart."""
+    i: int64_t = c.order[a]
+    j: int64_t = c.order[b]
+    if not (inverse_mass[i] > 0 or inverse_mass[j] > 0):
+        return False
+    if l.filtered and ((l.category[i] & l.mask[j]) == 0 or (l.category[j] & l.mask[i]) == 0):
+        return False
+    if l.linked:
+        p: int64_t = l.particle[i]
+        q: int64_t = l.particle[j]
+        k: int64_t
+        for k in range(l.linked_begin[min(p, q)], l.linked_begin[min(p, q) + 1]):
+            if l.linked_to[k] == max(p, q):
+                return False
+    return True
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def test_run(
+    c: cython.pointer(Cells), l: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, u: real, v: real,
+    low: int64_t, end: int64_t, found: int64_t, room: int64_t,
+) -> int64_t:  # fmt: skip
+    """Note which places from `low` up to `end` are near place a, seen at (u, v), as pairs from `found` on; returns where they end."""
+    b: int64_t
+    lane: cython.int
+    for b in range(low, end, 8):
+        du: lanes = load(c.spot_u, b) - spread(u)
+        dv: lanes = load(c.spot_v, b) - spread(v)
+        reach: lanes = load(c.spot_r, b) + spread(c.spot_r[a])
+        square: lanes = du * du + dv * dv
+        wide: lanes = reach + spread(c.skin)
+        near: mask = above(wide * wide, square)
+        if not any_lane(near):
+            continue
+        bits: cython.int = bits_of(near)
+        if end - b < 8:
+            bits &= (1 << cython.cast(cython.int, end - b)) - 1
+        soon: lanes = reach * spread(CLOSE)
+        close: cython.int = bits_of(above(soon * soon, square))
+        for lane in range(8):
+            if (bits >> lane) & 1 and (not l.picky or may_touch(c, l, inverse_mass, a, b + lane)):
+                if found < room:
+                    l.raw_i[found] = cython.cast(uint32_t, a)
+                    l.raw_j[found] = cython.cast(uint32_t, b + lane)
+                    if (close >> lane) & 1:
+                        l.raw_j[found] |= CLOSE_BIT
+                found += 1
+    return found
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def test_row(
+    c: cython.pointer(Cells), l: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, level: cython.int,
+    row: int64_t, left: int64_t, right: int64_t, shift_v: real, found: int64_t, room: int64_t,
+) -> int64_t:  # fmt: skip
+    """The same for columns `left` to `right` of a row, which in a periodic room go on with the images of the first, or last."""
+    wide: int64_t = c.width[level]
+    first: int64_t = c.base[level] + row * wide
+    u: real = c.spot_u[a]
+    v: real = c.spot_v[a] - shift_v
+    low: int64_t = c.start[first + max(left, 0)]
+    end: int64_t = c.start[first + min(right, wide - 1) + 1]
+    if low < end:
+        found = test_run(c, l, inverse_mass, a, u, v, low, end, found, room)
+    if c.wraps_u and left < 0:
+        low, end = c.start[first + max(wide + left, 0)], c.start[first + wide]
+        if low < end:
+            found = test_run(c, l, inverse_mass, a, u + c.period_u, v, low, end, found, room)
+    if c.wraps_u and right >= wide:
+        low, end = c.start[first], c.start[first + min(right - wide, wide - 1) + 1]
+        if low < end:
+            found = test_run(c, l, inverse_mass, a, u - c.period_u, v, low, end, found, room)
+    return found
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def test_smaller(
+    c: cython.pointer(Cells), l: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, other: cython.int,
+    least: int64_t, most: int64_t, ahead: real, found: int64_t, room: int64_t,
+) -> int64_t:  # fmt: skip
+    """The same for the circles of the grid `other`, of smaller ones, in its rows from `least` up to `most`, around place a.
+
+    ahead: how far along v place a is taken to be from where it is, m: a period, or 0.
+    """
+    reach: real = (c.spot_r[a] + c.largest[other] + c.skin) * cython.cast(real, 1.001)
+    x: real = c.spot_u[a] - c.u0
+    y: real = c.spot_v[a] + ahead - c.v0
+    wide: int64_t = c.width[other]
+    high: int64_t = c.height[other]
+    tall: real = 1 / c.along[other]
+    across: real = c.across[other]
+    first: int64_t
+    last: int64_t
+    if c.wraps_v:
+        first, last = whole_below((y - reach) * c.along[other]), whole_below((y + reach) * c.along[other])
+    else:
+        first, last = cell_number((y - reach) * c.along[other], high), cell_number((y + reach) * c.along[other], high)
+    row: int64_t
+    for row in range(max(first, least), min(last + 1, most)):
+        # The chord of the circle of that reach where it is widest within the row; the rim rows have no outer edge.
+        below: real = row * tall - y
+        away: real = 0
+        if below > 0 and (c.wraps_v or row > 0):
+            away = below
+        if -below - tall > 0 and (c.wraps_v or row < high - 1):
+            away = -below - tall
+        half: real = cython.cast(real, sqrt(max(reach * reach - away * away, cython.cast(real, 0))))
+        turns: int64_t = -1 if row < 0 else 1 if row >= high else 0
+        left: int64_t
+        right: int64_t
+        if c.wraps_u:
+            left, right = whole_below((x - half) * across), whole_below((x + half) * across)
+        else:
+            left, right = cell_number((x - half) * across, wide), cell_number((x + half) * across, wide)
+        found = test_row(c, l, inverse_mass, a, other, row - turns * high, left, right, turns * c.period_v - ahead, found, room)
+    return found
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def list_rows(
+    c: cython.pointer(Cells), l: cython.pointer(Lists), inverse_mass: cython.pointer(real), s: cython.Py_ssize_t
+) -> int64_t:
+    """Note the pairs of group s, a group of rows; returns where they end, also beyond the room."""
+    found: int64_t = l.raw_begin[s]
+    room: int64_t = l.raw_begin[s + 1]
+    level: cython.int
+    other: cython.int
+    row: int64_t
+    a: int64_t
+    for level in range(c.levels):
+        shift: int64_t = c.shift[level]
+        wide: int64_t = c.width[level]
+        high: int64_t = c.height[level]
+        for row in range(l.row[s] << shift, l.row[s + 1] << shift):
+            this: int64_t = c.base[level] + row * wide
+            for a in range(c.start[this], c.start[this + wide]):
+                column: int64_t = cell_number((c.spot_u[a] - c.u0) * c.across[level], wide)
+                # The rest of this row; the row above from COLUMNS to the left to COLUMNS to the right.
+                end: int64_t = c.start[this + min(column + COLUMNS, wide - 1) + 1]
+                if a + 1 < end:
+                    found = test_run(c, l, inverse_mass, a, c.spot_u[a], c.spot_v[a], a + 1, end, found, room)
+                if c.wraps_u and column + COLUMNS >= wide:
+                    end = c.start[this + min(column + COLUMNS - wide, wide - 1) + 1]
+                    found = test_run(
+                        c, l, inverse_mass, a, c.spot_u[a] - c.period_u, c.spot_v[a], c.start[this], end, found, room
+                    )
+                left: int64_t = column - COLUMNS
+                if row + 1 < high:
+                    found = test_row(c, l, inverse_mass, a, level, row + 1, left, column + COLUMNS, 0, found, room)
+                elif c.wraps_v:
+                    found = test_row(c, l, inverse_mass, a, level, 0, left, column + COLUMNS, c.period_v, found, room)
+                for other in range(level + 1, c.levels):
+                    least: int64_t = l.row[s] << c.shift[other]
+                    found = test_smaller(c, l, inverse_mass, a, other, least, 2 * c.height[other], 0, found, room)
+    # Pairs of a circle of the first row above and a smaller one below belong to this group, too.
+    over: int64_t = l.row[s + 1]
+    ahead: real = 0
+    if over == c.height[0]:
+        if not c.wraps_v:
+            return found
+        over, ahead = 0, c.period_v
+    for level in range(c.levels - 1):
+        wide = c.width[level]
+        for row in range(over << c.shift[level], (over + 1) << c.shift[level]):
+            this = c.base[level] + row * wide
+            for a in range(c.start[this], c.start[this + wide]):
+                for other in range(level + 1, c.levels):
+                    shift = c.shift[other]
+                    found = test_smaller(
+                        c, l, inverse_mass, a, other, l.row[s] << shift, l.row[s + 1] << shift, ahead, found, room
+                    )
+    return found
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def list_alone(
+    c: cython.pointer(Cells), l: cython.pointer(Lists), inverse_mass: cython.pointer(real), s: cython.Py_ssize_t
+) -> int64_t:
+    """The same for the last group: pairs of circles that stand in no cell."""
+    found: int64_t = l.raw_begin[s]
+    room: int64_t = l.raw_begin[s + 1]
+    a: int64_t
+    level: cython.int
+    across: cython.int
+    along: cython.int
+    for a in range(c.celled, c.count):
+        for level in range(c.levels):
+            high: int64_t = c.height[level]
+            found = test_smaller(c, l, inverse_mass, a, level, -high if c.wraps_v else 0, 2 * high, 0, found, room)
+        for along in range(-1, 2):
+            for across in range(-1, 2):
+                if (along == 0 or c.wraps_v) and (across == 0 or c.wraps_u):
+                    u: real = c.spot_u[a] - across * c.period_u
+                    v: real = c.spot_v[a] - along * c.period_v
+                    found = test_run(c, l, inverse_mass, a, u, v, a + 1, c.count, found, room)
+    return found
