@@ -46,10 +46,30 @@ LANES_INLINE int any_lane(mask m) {
 /* Bit l is set where the mask is in lane l. */
 LANES_INLINE int bits_of(mask m) {
     int bits = 0;
+#if defined(__AVX__) && !defined(REAL64)
+    bits = __builtin_ia32_movmskps256((__attribute__((vector_size(32))) float)m);
+#elif defined(__AVX__)
+    typedef double four __attribute__((vector_size(32)));
+    union {
+        mask all;
+        four half[2];
+    } u = {m};
+    bits = __builtin_ia32_movmskpd256(u.half[0]) | __builtin_ia32_movmskpd256(u.half[1]) << 4;
+#elif defined(__SSE2__) && !defined(REAL64)
+    typedef float four __attribute__((vector_size(16)));
+    union {
+        mask all;
+        four half[2];
+    } u = {m};
+    bits = __builtin_ia32_movmskps(u.half[0]) | __builtin_ia32_movmskps(u.half[1]) << 4;
+#else
     for (int l = 0; l < LANES; l++)
         bits |= (m[l] & 1) << l;
+#endif
     return bits;
 }
+/* The number of the lowest bit that is set, of a number that is not 0. */
+LANES_INLINE int lowest_bit(uint32_t bits) { return __builtin_ctz(bits); }
 LANES_INLINE int any_above(lanes a, lanes b) { return any_lane(a > b); }
 /* Of equal numbers, and where one is not a number, the second: (a > b ? a : b) and (a < b ? a : b), as C and SSE have it. */
 LANES_INLINE lanes larger(lanes a, lanes b) { return choose(a > b, a, b); }

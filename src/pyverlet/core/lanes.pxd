@@ -26,6 +26,7 @@ cdef extern from "lanes.h" nogil:
     lanes choose(mask m, lanes a, lanes b)
     bint any_lane(mask m)
     int bits_of(mask m)
+    int lowest_bit(uint32_t bits)
     bint any_above(lanes a, lanes b)
     lanes larger(lanes a, lanes b)
     lanes smaller(lanes a, lanes b)

@@ -25,7 +25,7 @@ SKIN_MOST = cython.declare(cython.double, 2.0)
 SKIN_HOLD = cython.declare(cython.int, 16)
 """Lists before a skin that was too large is tried again: second neighbours in a crystal come all at once."""
 
-REBUILD_PAIRS = cython.declare(cython.double, 20.0)
+REBUILD_PAIRS = cython.declare(cython.double, 30.0)
 """Pairs a particle that contacts go through in a substep in the time in which the list is made anew."""
 
 REBUILD_CALL = cython.declare(cython.double, 1000.0)

@@ -9,7 +9,7 @@ that is not full repeats its last pair: both lanes write the same.
 from __future__ import annotations
 
 import cython
-from cython.cimports.lanes import real
+from cython.cimports.lanes import lowest_bit, real
 from cython.cimports.libc.math import rint
 from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t, uint32_t
 
@@ -19,6 +19,8 @@ from pyverlet.core.step import TOUCHED, Step
 
 COLOURS = cython.declare(cython.int, 16)
 NO_COLOUR = cython.declare(cython.int, 15)
+LAST_COLOUR = cython.declare(uint32_t, 1 << 15)
+MOST_COLOURS = cython.declare(uint32_t, (1 << 15) - 1)
 
 WAITING = cython.declare(int64_t, 32)
 """Pairs that are looked at for each batch of what is left over."""
@@ -129,14 +131,14 @@ def put_batches(
     for p in range(low, end):
         a: uint32_t = l.raw_i[p]
         b: uint32_t = l.raw_j[p] & PLACE_BITS
-        colour: cython.int = 0 if not alone else NO_COLOUR
+        colour: cython.int = NO_COLOUR
         if not alone:
-            used: uint32_t = l.used[a] | l.used[b]
-            while colour < NO_COLOUR and (used >> colour) & 1:
-                colour += 1
-            bit: uint32_t = cython.cast(uint32_t, 1 << colour)
-            l.used[a] |= bit
-            l.used[b] |= bit
+            # Bit NO_COLOUR is never used up.
+            free: uint32_t = (MOST_COLOURS & ~(l.used[a] | l.used[b])) | LAST_COLOUR
+            colour = lowest_bit(free)
+            free &= ~free + 1
+            l.used[a] |= free
+            l.used[b] |= free
         key = colour + COLOURS if l.raw_j[p] & CLOSE_BIT else colour
         l.key[p] = cython.cast(uint8_t, key)
         first[key + 1] += 1

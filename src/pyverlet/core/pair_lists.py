@@ -12,7 +12,7 @@ crosses. Inside of it those rows are empty, so it finds little but its neighbour
 from __future__ import annotations
 
 import cython
-from cython.cimports.lanes import above, any_lane, bits_of, lanes, load, mask, real, spread
+from cython.cimports.lanes import above, any_lane, bits_of, lanes, load, lowest_bit, mask, real, spread
 from cython.cimports.libc.math import sqrt
 from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t, uint32_t
 
@@ -132,13 +132,13 @@ def test_run(
             bits &= (1 << cython.cast(cython.int, end - b)) - 1
         soon: lanes = reach * spread(CLOSE)
         close: cython.int = bits_of(above(soon * soon, square))
-        for lane in range(8):
-            if (bits >> lane) & 1 and (not l.picky or may_touch(c, l, inverse_mass, a, b + lane)):
+        while bits != 0:
+            lane = lowest_bit(bits)
+            bits &= bits - 1
+            if not l.picky or may_touch(c, l, inverse_mass, a, b + lane):
                 if found < room:
                     l.raw_i[found] = cython.cast(uint32_t, a)
-                    l.raw_j[found] = cython.cast(uint32_t, b + lane)
-                    if (close >> lane) & 1:
-                        l.raw_j[found] |= CLOSE_BIT
+                    l.raw_j[found] = cython.cast(uint32_t, b + lane) | (cython.cast(uint32_t, (close >> lane) & 1) << 31)
                 found += 1
     return found
 

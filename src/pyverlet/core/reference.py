@@ -91,6 +91,7 @@ def _lanes(real: Any) -> dict[str, Any]:
         "choose": lambda mask, a, b: np.where(mask, a, b),
         "any_lane": np.any,
         "bits_of": lambda mask: sum(1 << lane for lane in range(_LANES) if mask[lane]),
+        "lowest_bit": lambda bits: (int(bits) & -int(bits)).bit_length() - 1,
         "any_above": lambda a, b: bool(np.any(a > b)),
         "larger": lambda a, b: np.where(a > b, a, b),
         "smaller": lambda a, b: np.where(a < b, a, b),
