@@ -112,7 +112,11 @@ def level_of(c: cython.pointer(Cells), radius: real) -> cython.int:
 def wrapped(value: real, low: cython.double, period: cython.double) -> real:
     """The image of a coordinate inside the room; itself where the period is 0."""
     if period > 0 and not (value >= low and value < low + period):
-        return cython.cast(real, value - period * floor((value - low) / period))
+        value = cython.cast(real, value - period * floor((value - low) / period))
+        if value >= low + period:  # rounding
+            value = cython.cast(real, value - period)
+        if value < low:
+            value = cython.cast(real, low)
     return value
 
 

@@ -77,6 +77,7 @@ class Engine:
             self.count_particles(len(a["position"]))
         w.position, w.velocity, w.acceleration = reals(a["position"]), reals(a["velocity"]), reals(a["acceleration"])
         w.inverse_mass, w.radius = reals(a["inverse_mass"]), reals(a["radius"])
+        w.spin = reals(a["spin"])
         w.motion, w.free, w.free_spin = reals(a["motion"]), reals(a["free"]), reals(a["free_spin"])
         w.given, w.given_spin = reals(a["given"]), reals(a["given_spin"])
         w.wall_impulse, w.wall_tangent = reals(a["wall_impulse"]), reals(a["wall_tangent"])
@@ -153,12 +154,23 @@ class Engine:
         """How thick the skin is, in mean diameters, or begins with."""
         self.l.diameters, self.l.adapts = diameters, adapts
 
-    def set_law(self, **n):
-        """Numbers of the substeps that come."""
+    def set_law(
+        self, h: real, rate: real, stiff: real, leak: real, push: real, near: real, rest_speed: real, restless: cython.bint,
+        relaxes: cython.int, rough: cython.bint,
+    ):  # fmt: skip
+        """Numbers of the substeps that come: see `Step`."""
         w: cython.pointer(Step) = cython.address(self.w)
-        w.h, w.opening, w.taken_back, w.scale = n["h"], n["opening"], n["taken_back"], n["scale"]
-        w.rest_speed, w.restless, w.rate, w.stiff, w.leak = n["rest_speed"], n["restless"], n["rate"], n["stiff"], n["leak"]
-        w.push, w.near, w.relaxes, w.rough = n["push"], n["near"], n["relaxes"], n["rough"]
+        w.h, w.rate, w.stiff, w.leak, w.push, w.near = h, rate, stiff, leak, push, near
+        w.rest_speed, w.restless, w.relaxes, w.rough = rest_speed, restless, relaxes, rough
+
+    def set_frame(
+        self, opening: real, taken_back: real, scale: real, half: real, by_contacts: real, falls_free: cython.bint,
+        gravity_x: real, gravity_y: real,
+    ):  # fmt: skip
+        """How the next call begins, and ends if gravity is all there is beside contacts: see `Step`."""
+        w: cython.pointer(Step) = cython.address(self.w)
+        w.opening, w.taken_back, w.scale, w.half, w.by_contacts = opening, taken_back, scale, half, by_contacts
+        w.falls_free, w.gravity_x, w.gravity_y = falls_free, gravity_x, gravity_y
 
     # ---- the list of pairs ---------------------------------------------------------------------------------------------------
 
@@ -225,7 +237,10 @@ class Engine:
         w.radius_j, w.turn_i, w.turn_j = map_row(made_of, 3), map_row(made_of, 4), map_row(made_of, 5)
 
     def run(self, substep: cython.int, substeps: cython.int, parts: cython.int):
-        """Substeps from `substep` on by `parts` threads, with lists of pairs that are good in each."""
+        """Substeps from `substep` on by `parts` threads, with lists of pairs that are good in each.
+
+        Returns whether all positions and velocities are finite.
+        """
         w: cython.pointer(Step) = cython.address(self.w)
         w.first, w.substep, w.substeps = substep, substep, substeps
         while True:
@@ -235,6 +250,11 @@ class Engine:
                 break
             self.l.short = False
             self.make_room()
+        finite: cython.bint = True
+        b: cython.Py_ssize_t
+        for b in range((w.count + BLOCK - 1) // BLOCK):
+            finite &= w.stale[b] == 0
+        return finite != 0
 
     def rebuilds(self) -> int:
         """How often the list has been made."""

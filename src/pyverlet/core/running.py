@@ -5,9 +5,11 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
+from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.frame import substep
+from pyverlet.core.frame_ends import begin_stage, end_stage
 from pyverlet.core.list_age import adapt_skin, has_paid
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.pair_materials import fill_alike
@@ -56,6 +58,8 @@ def run_substeps(what: cython.p_void, item: cython.int) -> cython.void:
     """Substeps until all are done, or arrays are too small for a list of pairs."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
+    if w.substep == w.first:
+        team_stage(w.team, begin_stage, w, blocks)
     going: cython.bint = refresh(w)
     while going and w.substep < w.substeps:
         stale: cython.bint = substep(w, blocks)
@@ -63,6 +67,8 @@ def run_substeps(what: cython.p_void, item: cython.int) -> cython.void:
         w.lists.age += 1
         if stale and w.substep < w.substeps:
             going = renew_list(w)
+    if going:
+        team_stage(w.team, end_stage, w, blocks)
 
 
 @cython.cfunc

@@ -29,6 +29,7 @@ Step = cython.struct(
     count=cython.Py_ssize_t,
     position=cython.pointer(real),  # (count, 2) m
     velocity=cython.pointer(real),  # (count, 2) m/s, of the middle of the substep
+    spin=cython.pointer(real),  # (count,) rad/s, before and after the substeps of a call; `motion` has it meanwhile
     acceleration=cython.pointer(real),  # (count, 2) m/s^2 by gravity and forces
     inverse_mass=cython.pointer(real),  # (count,) 1/kg, 0: pinned
     radius=cython.pointer(real),  # (count,) m
@@ -86,6 +87,12 @@ Step = cython.struct(
     walled=cython.pointer(int32_t),  # (blocks,) how many of each block
     own_restitution=cython.pointer(real),  # (count,) negative: the wall's
     own_friction=cython.pointer(real),
+    # ---- what a frame begins and ends with
+    falls_free=cython.bint,  # gravity is all there is beside contacts: a call is a frame
+    gravity_x=real,  # m/s^2
+    gravity_y=real,
+    half=real,  # s from the middle of a substep to its end
+    by_contacts=real,  # 1/s: times what contacts gave in the last substep that is an acceleration
     # ---- numbers of a substep
     h=real,  # s
     opening=real,  # s of acceleration that come first in the first substep of a call, instead of h

@@ -113,6 +113,7 @@ class Slots:
     restitution: Array
     friction: Array
     inverse_mass: Array
+    rows: Any = motion  # who copies rows from and to the user's order: the old kernels or, under the law of impulses, the core
     seam = seam.NONE  # in a periodic room positions run on beyond it within a frame
     fed: Array
     island: Array
@@ -146,10 +147,10 @@ class Slots:
         self.seam = state.seam
         given = (state.position, state.velocity, state.acceleration, state.spin)
         if not self._given_back.recall(given):  # a user who has changed nothing need not wait for it to be copied again
-            motion.take_motion(self.position, self.velocity, self.acceleration, self.spin, *given, self.particle)
+            self.rows.take_motion(self.position, self.velocity, self.acceleration, self.spin, *given, self.particle)
         # What seldom changes is compared in the user's order, where neighbours in memory need no index.
         now = (state.radius, state.mass, state.restitution, state.friction, state.category, state.mask)
-        if self._grows or self.size is not self.radius or motion.any_differs(*(*self._given.values(), *now)):
+        if self._grows or self.size is not self.radius or self.rows.any_differs(*(*self._given.values(), *now)):
             return self._take_given(state)
         return False
 
@@ -159,7 +160,7 @@ class Slots:
         changed = self._changed
         for name in _GIVEN:
             given, now = self._given[name], getattr(state, name)
-            changed |= name in _LISTED and motion.differs(given, now)
+            changed |= name in _LISTED and (self.rows.differs(given, now) if name not in MARKS else not _equal(given, now))
             self._given[name] = (now[:1] if (now == now[:1]).all() else now).copy()
         for name in (*SET, "grown"):
             memory.take(self._given.get(name, state.grown), self.particle, getattr(self, name))  # one number, if that of all
@@ -227,10 +228,10 @@ class Slots:
 
     def scatter(self, state: State, dt: float) -> None:
         """Copy what a frame of dt seconds changes back to the user's arrays."""
-        if self.seam:
+        if self.seam and self.rows is motion:
             self.seam.wrap(self.position)
         given, moved = (state.position, state.velocity, state.acceleration, state.spin), (self.position, self.velocity)
-        motion.put_motion(*moved, self.acceleration, self.spin, *given, state.angle, 0.5 * dt, self.particle)
+        self.rows.put_motion(*moved, self.acceleration, self.spin, *given, state.angle, 0.5 * dt, self.particle)
         self._given_back.remember(given)
         self._grows |= self.size is not self.radius  # some may have been found on top of others since the gathering
         if self._grows:
@@ -257,7 +258,7 @@ class Slots:
         spare = memory.empty(self.position.shape, self.dtype)
         for name in ROWS:
             old = getattr(self, name)
-            motion.take_rows(spare, old, order)
+            np.take(old, order, axis=0, out=spare, mode="clip")
             setattr(self, name, spare)
             spare = old
         alike = {name for name, given in self._given.items() if len(given) == 1}  # for all: any order is as good
@@ -314,3 +315,8 @@ class Slots:
             self._slot_of = np.empty_like(self.particle)
             self._slot_of[self.particle] = np.arange(len(self), dtype=self.particle.dtype)
         return self._slot_of[particles]
+
+
+def _equal(given: Array, now: Array) -> bool:
+    """Whether two columns are the same; one number stands for equal ones."""
+    return len(given) in (1, len(now)) and bool((given == now).all())

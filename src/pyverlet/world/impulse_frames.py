@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet import core
-from pyverlet.ground.constants import REST_ACCELERATIONS, SKIN
+from pyverlet.ground.constants import REST_ACCELERATIONS, SKIN, SURPLUS
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.laws.contacts.broadphase import Fast
 from pyverlet.laws.contacts.growth import Growth
 from pyverlet.laws.integrators import PositionVerlet, SemiImplicitEuler, TimeCorrectedVerlet
-from pyverlet.laws.limiter import watched
+from pyverlet.laws.limiter import fall, watched
 from pyverlet.laws.rooms import Box, Circle, Open, Periodic
 from pyverlet.state.moves import first_non_finite
 from pyverlet.state.slots import Slots
@@ -87,7 +87,11 @@ class ImpulseFrames:
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self._dtype = dtype
-        self._engine: Any = core.unit("engine", dtype).Engine(1)
+        self._core = core.unit("engine", dtype)
+        self._engine: Any = self._core.Engine(1)
+        self._checked: Any = None  # what the world was made of when it was last found to be known
+        self._law: Any = None  # numbers that the engine holds
+        self._room: Any = None
         self.growth = Growth()
         self.forget()
 
@@ -100,7 +104,7 @@ class ImpulseFrames:
         """What `restore` needs to go on with the same bits."""
         particle, count = self._particle, int(self._particle.max(initial=-1)) + 1
         wall, given = np.zeros((8, count), self._dtype), np.zeros((count, 3), self._dtype)
-        wall[:, particle], given[particle] = self._wall, self._given
+        wall[:, particle], given[particle, :2], given[particle, 2] = self._wall, self._gave, self._gave_spin
         pairs, values = (array.copy() for array in self._impulses())
         rows = [np.empty((0, 2), self._dtype)] * 2
         skin: tuple[float, ...] = ()
@@ -114,7 +118,7 @@ class ImpulseFrames:
         self._kept: tuple[Array, Array] | None = (memory.pairs, memory.values)  # what the engine is still to be given
         self._kept_list = (memory.listed, memory.checked, memory.skin) if memory.skin else None
         self._particle = np.arange(len(memory.given), dtype=np.int32)
-        self._wall, self._given = memory.wall, memory.given
+        self._wall, self._gave, self._gave_spin = memory.wall, *_columns(memory.given)
         self._kick, self._h, self._hertz, self._finer = memory.kick, memory.h, memory.hertz, memory.finer
         self._made = -1  # of `Slots.given`, what the engine holds; -1: nothing
         self._collisions: Any = None
@@ -147,11 +151,15 @@ class ImpulseFrames:
             InputError: there is something in the world that this law does not know yet.
             NonFiniteError: a particle turned NaN or infinite.
         """
-        self.check(world)
-        world._slots.clear_notes()
+        known = world.integrator, world.boundary, world.collisions, len(world.links), len(world.obstacles)
+        if known != self._checked:
+            self.check(world)
+            self._checked = known
+        slots = world._slots
+        slots.rows = self._core
+        slots.clear_notes()
         if world._gather():
             self._engine.forget_list()
-        world.profile.mark("gather")
         self.run(world, dt, world.profile.mark)
 
     def check(self, world: Any) -> None:
@@ -186,44 +194,79 @@ class ImpulseFrames:
             NonFiniteError: a particle turned NaN or infinite.
         """
         state, forces, engine, collisions = world._slots, world._force_sum, self._engine, world.collisions
-        state.grown.fill(1)
-        state.resize()
         contained = len(world) > 1 or not isinstance(world.boundary, Open)
-        substeps = world.substeps * (int(np.ceil(dt / LONGEST_FRAME * (1 - 1e-9))) if contained else 1)
+        substeps = world.substeps
+        if contained and dt > LONGEST_FRAME:
+            substeps *= int(np.ceil(dt / LONGEST_FRAME * (1 - 1e-9)))
         h, half = dt / substeps, world.integrator.velocity_lag
         first_kick = half * (h + (self._h if self._kick else 0.0)) if half else h
         self._stiffen(h, dt)
-        watch = watched(world, dt / world.substeps, None) if contained else None
+        alone = not (forces.forces or world.onlooker)
+        watch = watched(world, dt / world.substeps, None) if contained and (forces.forces or world.links) else None
+        gravity = world.gravity
         state.h = h
         self._load(world)
         rough = max(collisions.friction, state.most_friction, getattr(world.boundary, "friction", 0.0)) > 0.0
-        if rough:
-            self._motion[:, :2], self._motion[:, 2] = state.velocity, state.spin
-        done("broad phase")
-        step = 0
+        done("gather")
+        step, finite = 0, True
         while step < substeps:
-            if step == 0 or forces.forces:
+            if not alone:
                 self._evaluate(world, step * h, half * h if step else 0.0)
                 done("integrate")
-                if rough and step:
-                    self._motion[:, :2], self._motion[:, 2] = state.velocity, state.spin
-            last = 1.0 if not self._kick else self._kick
-            kick = first_kick if step == 0 else h
-            self._set_law(forces.strongest, h, kick, kick / last, opening=step == 0, half=half, rough=rough)
-            # The first substep has a kick of its own; forces of Python are asked in each, and onlookers look in between.
-            stop = step + 1 if forces.forces or kick != h or world.onlooker else substeps
-            engine.run(step, stop, self._parts)
-            self._kick, step = (h if stop > 1 else first_kick), stop
-            if rough and (forces.forces or world.onlooker or step == substeps):
-                state.velocity[:], state.spin[:] = self._motion[:, :2], self._motion[:, 2]
+            strongest = self._strongest(gravity) if alone else forces.strongest
+            kick, known = (first_kick if step == 0 else h), self._kick > 0.0
+            # The first substep may have a kick of its own; forces of Python are asked in each, and onlookers look in between.
+            stop = step + 1 if not alone or kick != h else substeps
+            self._set_law(strongest, h, kick, rough=rough)
+            engine.set_frame(
+                (half * h if half else h) if step == 0 else h,
+                half * self._h / self._kick if step == 0 and known else 0.0,
+                kick / self._kick if known else 1.0,
+                half * h if stop == substeps else 0.0,
+                1.0 / (kick if stop == step + 1 else h) if stop == substeps else 0.0,
+                alone,
+                *gravity,
+            )
+            finite = engine.run(step, stop, self._parts)
+            self._kick, step = (kick if stop == step + 1 else h), stop
             done("contacts")
             world._show(step * h, half * h) if step < substeps else None
         self._h = h
-        self._given[:, :2], self._given[:, 2] = self._gave, self._gave_spin
-        self._end(world, dt, half * h)
-        if watch:
-            watch.close(state, self)
+        if not alone:
+            self._end(world, dt, half * h)
+        if not finite or not alone:
+            self._refuse_non_finite(world)
+        if contained and gravity == world.gravity:
+            self._limit(world, watch, dt)
+        if state.seam:
+            engine.wrap_seam()
         done("finish")
+
+    def _strongest(self, gravity: tuple[float, float]) -> float:
+        """The largest acceleration by gravity alone, m/s^2."""
+        if not self._free:
+            return 0.0
+        x, y = map(self._dtype.type, gravity)
+        return float(np.sqrt(x * x + y * y))
+
+    def _limit(self, world: Any, watch: Any, dt: float) -> None:
+        """Take back what energy a frame of dt seconds has gained, if it is too much."""
+        state = world._slots
+        if watch is None and not world.forces and not world.links:
+            start, (gx, gy) = world._state, world.gravity
+            gained = self._core.energy_gained(
+                (start.position, start.velocity, start.spin, start.radius, start.mass),
+                (state.position, state.velocity, state.spin, state.radius, state.mass), gx, gy,
+            )  # fmt: skip
+            if gained > SURPLUS * fall(state.total_mass, world.gravity, world.boundary.extent()):
+                watch = watched(world, dt / world.substeps, None)
+        if watch is not None:
+            watch.close(state, self)
+
+    def _refuse_non_finite(self, world: Any) -> None:
+        if (particle := first_non_finite(world._slots)) >= 0:
+            self.forget()
+            raise NonFiniteError(particle, "contacts", world.time)
 
     def _evaluate(self, world: Any, since: float, ahead: float) -> None:
         """Accelerations by gravity and forces; these see velocities of now, not of half a substep ago."""
@@ -238,14 +281,11 @@ class ImpulseFrames:
 
     def _end(self, world: Any, dt: float, half: float) -> None:
         """Velocities that belong to the positions, and the accelerations of now."""
-        state, by_contacts = world._slots, self._given[:, :2] / self._dtype.type(self._kick)
+        state, by_contacts = world._slots, self._gave / self._dtype.type(self._kick)
         if half:
             self._evaluate(world, dt, half)
             state.velocity += state.real(half) * (state.acceleration + by_contacts)
         state.acceleration += by_contacts
-        if (particle := first_non_finite(state)) >= 0:
-            self.forget()
-            raise NonFiniteError(particle, "contacts", world.time)
 
     def _stiffen(self, h: float, dt: float) -> None:
         best = STIFFNESS / h
@@ -257,29 +297,26 @@ class ImpulseFrames:
         elif self._finer > 0.5:
             self._hertz = min(best, self._hertz * 2.0 ** (STIFFENING * dt))
 
-    def _set_law(
-        self, strongest: float, h: float, kick: float, scale: float, *, opening: bool, half: float, rough: bool
-    ) -> None:
+    def _set_law(self, strongest: float, h: float, kick: float, *, rough: bool) -> None:
         omega = 2.0 * np.pi * self._hertz
         damped = 2.0 * DAMPING + h * omega
         hard = h * omega * damped
-        known = self._kick > 0.0
-        self._engine.set_law(
-            h=h,
-            opening=(half * h if half else h) if opening else h,
-            taken_back=half * self._h / self._kick if opening and known else 0.0,
-            scale=scale if known else 1.0,
-            rest_speed=REST_ACCELERATIONS * strongest * h,
-            restless=strongest == 0.0,
-            rate=omega / damped,
-            stiff=hard / (1.0 + hard),
+        numbers = (
+            h,
+            omega / damped,
+            hard / (1.0 + hard),
             # As in a substep whose kick is as long as itself: the depth at which a contact carries its load stays the same.
-            leak=h / kick / (1.0 + hard),
-            push=PUSH_OUT,
-            near=NEAR * self._largest + 2.0 * REST_ACCELERATIONS * strongest * h * h,
-            relaxes=RELAXING_SWEEPS,
-            rough=rough,
+            h / kick / (1.0 + hard),
+            PUSH_OUT,
+            NEAR * self._largest + 2.0 * REST_ACCELERATIONS * strongest * h * h,
+            REST_ACCELERATIONS * strongest * h,
+            strongest == 0.0,
+            RELAXING_SWEEPS,
+            rough,
         )
+        if numbers != self._law:
+            self._engine.set_law(*numbers)
+            self._law = numbers
 
     def _set_room(self, room: Any) -> None:
         if isinstance(room, Circle):
@@ -304,7 +341,8 @@ class ImpulseFrames:
             falls, order = engine.order()
             if falls > UNSORTED * len(state) and len(order) == len(state):
                 engine.renumber(order)
-                self._wall, self._given = np.ascontiguousarray(self._wall[:, order]), self._given[order]
+                self._wall, self._gave = np.ascontiguousarray(self._wall[:, order]), self._gave[order]
+                self._gave_spin = self._gave_spin[order]
                 state.reorder(order)
                 self._particle = state.particle
                 self._hold(state)
@@ -318,7 +356,9 @@ class ImpulseFrames:
             if self._kept_list is None:
                 engine.set_skin(SKIN if self._skin is None else self._skin, self._skin is None)
         self._set_room(world.boundary)
-        engine.set_seam(*state.seam)
+        if world.boundary is not self._room:
+            engine.set_seam(*state.seam)
+            self._room = world.boundary
         if self._kept_list is not None:
             engine.set_skin(self._kept_list[2][0], self._skin is None)
             listed, checked = (np.ascontiguousarray(rows[self._particle]) for rows in self._kept_list[:2])
@@ -332,12 +372,13 @@ class ImpulseFrames:
         count = max(int(state.particle.max(initial=-1)), int(self._particle.max(initial=-1))) + 1
         pairs, values = self._impulses()
         wall, given = np.zeros((8, count), self._dtype), np.zeros((count, 3), self._dtype)
-        wall[:, self._particle], given[self._particle] = self._wall, self._given
+        wall[:, self._particle] = self._wall
+        given[self._particle, :2], given[self._particle, 2] = self._gave, self._gave_spin
         if self._kept_list is not None and len(self._kept_list[0]) != len(state):
             self._kept_list = None
         self._particle, place = state.particle, np.zeros(count, np.int32)
         place[state.particle] = np.arange(len(state), dtype=np.int32)
-        self._wall, self._given = np.ascontiguousarray(wall[:, state.particle]), given[state.particle]
+        self._wall, self._gave, self._gave_spin = np.ascontiguousarray(wall[:, state.particle]), *_columns(given[state.particle])
         self._hold(state)
         self._engine.give_impulses(place[pairs], values)
         self._kept = None
@@ -345,14 +386,13 @@ class ImpulseFrames:
     def _hold(self, state: Slots) -> None:
         """Have the engine take the arrays of now."""
         count, real = len(state), self._dtype
-        self._gave, self._gave_spin = np.ascontiguousarray(self._given[:, :2]), np.ascontiguousarray(self._given[:, 2])
-        self._motion, self._free = np.zeros((count, 4), real), np.zeros((count, 2), real)
-        self._free_spin, self._at_wall = np.zeros(count, real), np.zeros(count, np.int32)
+        self._motion = np.zeros((count, 4), real)
         self._engine.set_particles(
             position=state.position, velocity=state.velocity, acceleration=state.acceleration,
             inverse_mass=state.inverse_mass, radius=state.radius, own_restitution=state.restitution,
-            own_friction=state.friction, motion=self._motion, free=self._free, free_spin=self._free_spin, given=self._gave,
-            given_spin=self._gave_spin, wall_impulse=self._wall[:4], wall_tangent=self._wall[4:], at_wall=self._at_wall,
+            own_friction=state.friction, spin=state.spin, motion=self._motion, free=np.zeros((count, 2), real),
+            free_spin=np.zeros(count, real), given=self._gave, given_spin=self._gave_spin, wall_impulse=self._wall[:4],
+            wall_tangent=self._wall[4:], at_wall=np.zeros(count, np.int32),
             particle=state.particle, category=state.category, mask=state.mask,
         )  # fmt: skip
 
@@ -360,6 +400,9 @@ class ImpulseFrames:
         """What circles are made of has changed."""
         state, collisions, radius = world._slots, world.collisions, world._state.radius
         self._made, self._collisions = state.given, collisions
+        state.grown.fill(1)
+        state.resize()
+        self._free = bool((state.inverse_mass > 0).any())
         ordered = np.sort(radius)[::-1] if len(radius) else np.ones(1)
         # Very few that are much larger than all others stand in no cell.
         usual = float(ordered[min(len(ordered) // ALONE, len(ordered) - 1)])
@@ -390,6 +433,11 @@ class ImpulseFrames:
         """first, count, i, j: where the pairs of the list are, by slot. Some come twice."""
         pairs: tuple[Array, Array, Array, Array] = self._engine.pairs()
         return pairs
+
+
+def _columns(given: Array) -> tuple[Array, Array]:
+    """(n, 2) velocity and (n,) spin of `Memory.given`."""
+    return np.ascontiguousarray(given[:, :2]), np.ascontiguousarray(given[:, 2])
 
 
 def _differs(column: Array) -> bool:
