@@ -10,9 +10,9 @@ import pytest
 
 import pyverlet as pv
 from pyverlet import core
-from pyverlet.world.team import Team
 from pyverlet.core import reference
 from pyverlet.data import snapshot
+from pyverlet.world.team import Team
 
 
 def world(dtype: Any, *, friction: float = 0.3, restitution: float = 0.5, gravity: float = -9.81) -> pv.World:

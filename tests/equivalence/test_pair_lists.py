@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
+from pyverlet import core
+from pyverlet.core import reference
 from pyverlet.state.slots import Slots
+from pyverlet.world.team import Team
 
 Array = np.ndarray[Any, Any]
 
@@ -67,7 +70,10 @@ def test_the_list_is_that_of_all_pairs_against_all(kind: str, sizes: str, dtype:
         chance = np.random.default_rng(seed)
         size = max(0.12 * np.sqrt(n), 4.5)
         world = pv.World(
-            boundary=room(kind, size), collisions=pv.Collisions(impulses=True, method=pv.Fast(skin=0.3)), gravity=(0, 0), dtype=dtype
+            boundary=room(kind, size),
+            collisions=pv.Collisions(impulses=True, method=pv.Fast(skin=0.3)),
+            gravity=(0, 0),
+            dtype=dtype,
         )
         wide, high = (8 * size, 0.5 * size) if kind in ("channel", "ring") else (size, size)
         place = chance.uniform(-1, 1, (n, 2)) * (wide, high)
@@ -84,3 +90,105 @@ def test_the_list_is_that_of_all_pairs_against_all(kind: str, sizes: str, dtype:
         # Rounding of coordinates, and of periods, decides about pairs at the very rim of the skin.
         slack = 1e-5 if dtype == np.float32 else 1e-12
         assert brute_force(slots, skin - slack) <= found <= brute_force(slots, skin + 30 * slack), (kind, sizes, n)
+
+
+def crowd(kind: str, sizes: str, n: int, dtype: Any = np.float32, skin: float | None = None) -> pv.World:
+    """Discs that are thrown about, and fall."""
+    chance, size = np.random.default_rng(n), 0.2 * np.sqrt(n)
+    size = max(size, 4.5) if sizes == "giants" else size
+    world = pv.World(
+        boundary=room(kind, size),
+        collisions=pv.Collisions(impulses=True, friction=0.25, restitution=0.5, method=pv.Fast(skin=skin)),
+        gravity=(0, -9.81 if kind in ("box", "channel") else 0),
+        dtype=dtype,
+        substeps=4,
+    )
+    place = chance.uniform(-0.9, 0.9, (n, 2)) * ((8 * size, 0.5 * size) if kind in ("channel", "ring") else (size, size))
+    world.add(position=place, velocity=chance.normal(0, 0.4, (n, 2)), radius=radii(sizes, n, chance))
+    return world
+
+
+@pytest.mark.filterwarnings("ignore:invalid value")  # 0 inf, of walls that are not there
+@pytest.mark.parametrize(("kind", "sizes"), [("periodic", "1:50"), ("tube", "giants"), ("channel", "1:5"), ("open", "equal")])
+def test_uncompiled_the_list_has_the_same_lanes(kind: str, sizes: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def run() -> tuple[str, Array, int]:
+        world = crowd(kind, sizes, 40)
+        for _ in range(6):
+            world.step(1 / 60)
+        return world.state_hash(), listed(world)[1], world.rebuilds
+
+    compiled = run()
+    slow = reference.load("engine", np.float32)
+    monkeypatch.setattr(core, "unit", lambda name, dtype: slow)
+    plain = run()
+    assert plain[0] == compiled[0]
+    assert np.array_equal(plain[1], compiled[1])
+    assert plain[2] == compiled[2] > 1
+
+
+@pytest.mark.parametrize(("kind", "sizes"), [("box", "equal"), ("box", "giants"), ("shaft", "1:5"), ("periodic", "1:50")])
+def test_lists_do_not_depend_on_the_number_of_threads(kind: str, sizes: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    ends = set()
+    for threads in (1, 2, 3):
+        monkeypatch.setattr(Team, "size", lambda team, most, frame_ms, threads=threads: threads)
+        world = crowd(kind, sizes, 3000)
+        for _ in range(12):
+            world.step(1 / 60)
+        assert world.rebuilds > 1
+        ends.add((world.state_hash(), listed(world)[1].tobytes(), world.rebuilds))
+    assert len(ends) == 1
+
+
+@pytest.mark.parametrize(("kind", "sizes"), [("box", "equal"), ("box", "giants"), ("ring", "1:5"), ("periodic", "1:50")])
+def test_a_saved_world_makes_the_same_lists(kind: str, sizes: str) -> None:
+    world = crowd(kind, sizes, 1500)
+    for _ in range(5):
+        world.step(1 / 60)
+    saved, ends = world.save(), set()
+    for _ in range(2):
+        for _ in range(8):
+            world.step(1 / 60)
+        ends.add((world.state_hash(), listed(world)[1].tobytes()))
+        world.restore(saved)
+    assert len(ends) == 1
+
+
+def test_looking_at_what_is_saved_changes_nothing() -> None:
+    one, other = crowd("box", "1:5", 300), crowd("box", "1:5", 300)
+    for _ in range(60):
+        one.step(1 / 60)
+        other.step(1 / 60)
+        other.save()
+    assert one.state_hash() == other.state_hash()
+
+
+def test_impulses_survive_new_lists() -> None:
+    # A heap at rest whose list is made anew in every frame stays at rest, with the loads of one that keeps its list. What differs
+    # is the rounding of places, 1e-16 / 1e-9 of depths of that many metres; without its impulses all of it would fall by g h =
+    # 0.04 m/s in a substep.
+    worlds = [crowd("box", "equal", 300, np.float64) for _ in range(2)]
+    for _ in range(480):
+        for world in worlds:
+            world.step(1 / 60)
+    loads = []
+    for anew, world in enumerate(worlds):
+        before = world.rebuilds
+        for _ in range(60):
+            if anew:
+                world._impulses._engine.forget_list()
+            world.step(1 / 60)
+            assert np.hypot(*world.velocity.T).max() < 1e-6
+        assert world.rebuilds - before == (60 if anew else 0)
+        memory = world._impulses.save()
+        loads.append(dict(zip(map(tuple, memory.pairs.tolist()), memory.values[:, 0].tolist(), strict=True)))
+    carried = {pair: load for pair, load in loads[0].items() if load > 0.1}
+    assert len(carried) > 300
+    assert all(loads[1][pair] == pytest.approx(load, rel=1e-5) for pair, load in carried.items())
+
+
+def test_an_empty_world_and_a_lone_disc_have_no_pairs() -> None:
+    world = pv.World(collisions=pv.Collisions(impulses=True))
+    world.step(1 / 60)
+    world.add(position=(0, 0), radius=1.0)
+    world.step(1 / 60)
+    assert listed(world)[0] == set()

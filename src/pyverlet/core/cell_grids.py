@@ -69,9 +69,7 @@ def near_the_mean(c: cython.pointer(Cells), axis: cython.int, low: cython.double
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def lay_rows(
-    c: cython.pointer(Cells), long_u: cython.double, long_v: cython.double, cell: cython.double
-) -> cython.double:
+def lay_rows(c: cython.pointer(Cells), long_u: cython.double, long_v: cython.double, cell: cython.double) -> cython.double:
     """The first grid over so many metres; returns how many cells it has."""
     columns: cython.double
     rows: cython.double

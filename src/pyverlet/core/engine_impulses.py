@@ -60,16 +60,16 @@ def read_impulses(w: cython.pointer(Step), who: cython.pointer(int32_t), particl
 @cython.cfunc
 def fill_kept(w: cython.pointer(Step), pairs, values):
     """Hang these on the chains of their lower slots."""
-    l: cython.pointer(Lists) = w.lists
+    ls: cython.pointer(Lists) = w.lists
     pair: cython.pointer(int32_t) = small_integers(pairs)
     value: cython.pointer(real) = reals(values)
     k: int64_t
     i: int64_t
     for i in range(w.count):
-        l.head[i] = -1
+        ls.head[i] = -1
     for k in range(len(pairs)):
         low: int32_t = min(pair[2 * k], pair[2 * k + 1])
-        l.kept_other[k] = cython.cast(uint32_t, max(pair[2 * k], pair[2 * k + 1]))
-        l.kept[3 * k], l.kept[3 * k + 1], l.kept[3 * k + 2] = value[3 * k], value[3 * k + 1], value[3 * k + 2]
-        l.kept_next[k] = l.head[low]
-        l.head[low] = cython.cast(int32_t, k)
+        ls.kept_other[k] = cython.cast(uint32_t, max(pair[2 * k], pair[2 * k + 1]))
+        ls.kept[3 * k], ls.kept[3 * k + 1], ls.kept[3 * k + 2] = value[3 * k], value[3 * k + 1], value[3 * k + 2]
+        ls.kept_next[k] = ls.head[low]
+        ls.head[low] = cython.cast(int32_t, k)

@@ -5,16 +5,22 @@ from __future__ import annotations
 
 import cython
 import numpy as np
-from cython.cimports.arrays import doubles, indices, integers, octets, reals, small_integers
+from cython.cimports.arrays import indices, integers, reals, small_integers
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import rint
-from cython.cimports.libc.stdint import int32_t, int64_t
 from cython.cimports.team import team_free, team_new, team_run
 
-from pyverlet.core.cells import BLOCK, LEVELS, Cells, wrapped
+from pyverlet.core.cells import BLOCK, Cells, wrapped
+from pyverlet.core.engine_arrays import (
+    make_found_arrays,
+    make_kept_arrays,
+    make_lane_arrays,
+    make_level_arrays,
+    make_material_arrays,
+    make_particle_arrays,
+)
 from pyverlet.core.engine_impulses import fill_kept, read_impulses
 from pyverlet.core.pair_lists import Lists
-from pyverlet.core.relisting import GROUP
 from pyverlet.core.running import remake_list, run_substeps
 from pyverlet.core.step import Step
 
@@ -29,7 +35,7 @@ class Engine:
 
     w: Step
     c: Cells
-    l: Lists
+    ls: Lists
     arrays = cython.declare(dict, visibility="public")
     threads = cython.declare(cython.int, visibility="readonly")
     dtype = cython.declare(object, visibility="readonly")
@@ -37,21 +43,18 @@ class Engine:
     def __init__(self, threads: cython.int):
         w: cython.pointer(Step) = cython.address(self.w)
         c: cython.pointer(Cells) = cython.address(self.c)
-        l: cython.pointer(Lists) = cython.address(self.l)
+        ls: cython.pointer(Lists) = cython.address(self.ls)
         w.team = team_new(threads)
         if w.team == cython.NULL:
             raise MemoryError
         self.threads = threads
         self.dtype = np.dtype(np.float64 if cython.sizeof(real) == 8 else np.float32)
-        w.cells, w.lists = c, l
-        l.per_particle, l.per_pair, l.alone_room = 4.0, 1.25, 64.0
-        l.pairs_room = l.lanes_room = 0
+        w.cells, w.lists = c, ls
+        ls.per_particle, ls.per_pair, ls.alone_room = 4.0, 1.25, 64.0
+        ls.pairs_room = ls.lanes_room = 0
         w.count, w.groups = -1, 0
-        self.arrays = {name: np.zeros(LEVELS, np.int64) for name in ("shift", "base", "width", "height", "held")}
-        self.arrays |= {name: np.zeros(LEVELS, self.dtype) for name in ("across", "along", "level_largest")}
-        a = self.arrays
-        c.shift, c.base, c.width, c.height = map_integers(a, "shift"), map_integers(a, "base"), map_integers(a, "width"), map_integers(a, "height")
-        c.held, c.across, c.along, c.largest = map_integers(a, "held"), reals(a["across"]), reals(a["along"]), reals(a["level_largest"])
+        self.arrays = {}
+        make_level_arrays(c, self.arrays, self.dtype)
 
     def __dealloc__(self):
         team_free(self.w.team)
@@ -74,7 +77,7 @@ class Engine:
         self.arrays.update(a)
         w: cython.pointer(Step) = cython.address(self.w)
         if w.count != len(a["position"]):
-            self.count_particles(len(a["position"]))
+            make_particle_arrays(w, self.arrays, len(a["position"]), self.dtype)
         w.position, w.velocity, w.acceleration = reals(a["position"]), reals(a["velocity"]), reals(a["acceleration"])
         w.inverse_mass, w.radius = reals(a["inverse_mass"]), reals(a["radius"])
         w.spin = reals(a["spin"])
@@ -84,36 +87,8 @@ class Engine:
         w.at_wall = small_integers(a["at_wall"])
         w.own_restitution, w.own_friction = reals(a["own_restitution"]), reals(a["own_friction"])
         self.c.position, self.c.radius = w.position, w.radius
-        self.l.particle, self.l.filtered = small_integers(a["particle"]), len(a["category"]) > 0
-        self.l.category, self.l.mask = indices(a["category"]), indices(a["mask"])
-
-    def count_particles(self, count: cython.Py_ssize_t):
-        """Arrays for so many."""
-        w: cython.pointer(Step) = cython.address(self.w)
-        c: cython.pointer(Cells) = cython.address(self.c)
-        l: cython.pointer(Lists) = cython.address(self.l)
-        w.count = c.count = count
-        blocks, groups, real_type = (count + BLOCK - 1) // BLOCK, count // GROUP + 3, self.dtype
-        a = self.arrays
-        a |= {name: np.zeros((count, 2), real_type) for name in ("listed", "checked", "moved")}
-        a |= {name: np.zeros(count + 8, real_type) for name in ("spot_u", "spot_v", "spot_r")}
-        a |= {name: np.zeros(count, np.uint32) for name in ("cell", "order", "patch", "used", "batch")}
-        a |= {name: np.zeros(blocks, real_type) for name in ("fastest", "speeds")}
-        a |= {name: np.zeros(blocks, np.int32) for name in ("stale", "walled")}
-        a |= {name: np.zeros(groups, np.int64) for name in ("begin", "lanes", "row", "found", "raw_begin", "looked", "beyond")}
-        a |= {"head": np.zeros(count, np.int32), "start": np.zeros(4 * count + 72, np.uint32)}
-        a |= {"extent": np.zeros((blocks, 4), real_type), "box": np.zeros((2 * count + 64, 4), real_type)}
-        w.listed, w.checked, w.moved = reals(a["listed"]), reals(a["checked"]), reals(a["moved"])
-        w.fastest, w.stale, w.walled = reals(a["fastest"]), small_integers(a["stale"]), small_integers(a["walled"])
-        w.begin, w.lanes = integers(a["begin"]), integers(a["lanes"])
-        c.spot_u, c.spot_v, c.spot_r = reals(a["spot_u"]), reals(a["spot_v"]), reals(a["spot_r"])
-        c.cell, c.order, c.start, c.patch = indices(a["cell"]), indices(a["order"]), indices(a["start"]), indices(a["patch"])
-        c.extent, c.box = reals(a["extent"]), reals(a["box"])
-        l.used, l.batch, l.speeds, l.head = indices(a["used"]), indices(a["batch"]), reals(a["speeds"]), small_integers(a["head"])
-        l.row, l.found, l.raw_begin = integers(a["row"]), integers(a["found"]), integers(a["raw_begin"])
-        l.looked, l.beyond = integers(a["looked"]), integers(a["beyond"])
-        l.listed = l.good = l.harvested = False
-        w.groups = l.rows = 0
+        self.ls.particle, self.ls.filtered = small_integers(a["particle"]), len(a["category"]) > 0
+        self.ls.category, self.ls.mask = indices(a["category"]), indices(a["mask"])
 
     def set_materials(self, **n):
         """sized, varied, mixed: whether radii, masses, and any of restitution, friction and radii differ.
@@ -122,20 +97,20 @@ class Engine:
         circles without values of their own. picky: whether some pairs are no pairs: of pinned or filtered ones, or linked ones.
         """
         w: cython.pointer(Step) = cython.address(self.w)
-        l: cython.pointer(Lists) = cython.address(self.l)
+        ls: cython.pointer(Lists) = cython.address(self.ls)
         w.sized, w.varied, w.mixed = n["sized"], n["varied"], n["mixed"]
-        self.c.bulk, self.c.smallest, l.largest, l.mean_radius = n["bulk"], n["smallest"], n["largest"], n["mean_radius"]
-        l.restitution, l.friction, l.picky = n["restitution"], n["friction"], n["picky"] or l.linked
-        l.refill = True
-        self.make_pair_room()
+        self.c.bulk, self.c.smallest, ls.largest, ls.mean_radius = n["bulk"], n["smallest"], n["largest"], n["mean_radius"]
+        ls.restitution, ls.friction, ls.picky = n["restitution"], n["friction"], n["picky"] or ls.linked
+        ls.refill = True
+        make_material_arrays(w, self.arrays, self.dtype)
 
     def set_linked(self, begin, to):
         """Pairs that links keep from touching: of the user's particle p those from begin[p] to begin[p + 1], higher ones."""
         self.arrays["linked_begin"], self.arrays["linked_to"] = begin, to
-        self.l.linked = len(to) > 0
-        self.l.linked_begin, self.l.linked_to = integers(begin), small_integers(to)
-        self.l.picky = self.l.picky or self.l.linked
-        self.l.good = False
+        self.ls.linked = len(to) > 0
+        self.ls.linked_begin, self.ls.linked_to = integers(begin), small_integers(to)
+        self.ls.picky = self.ls.picky or self.ls.linked
+        self.ls.good = False
 
     def set_room(self, room, x0, y0, x1, y1, restitution, friction, speed):
         """Walls: none (0); a cage (1) by centre and radius; a box (2) by two corners; m. speed: of a cage's surface, m/s."""
@@ -148,11 +123,11 @@ class Engine:
         c: cython.pointer(Cells) = cython.address(self.c)
         if (c.low_x, c.low_y, c.period_x, c.period_y) != (low_x, low_y, period_x, period_y):
             c.low_x, c.low_y, c.period_x, c.period_y = low_x, low_y, period_x, period_y
-            self.l.good = False
+            self.ls.good = False
 
     def set_skin(self, diameters: cython.double, adapts: cython.bint):
         """How thick the skin is, in mean diameters, or begins with."""
-        self.l.diameters, self.l.adapts = diameters, adapts
+        self.ls.diameters, self.ls.adapts = diameters, adapts
 
     def set_law(
         self, h: real, rate: real, stiff: real, leak: real, push: real, near: real, rest_speed: real, restless: cython.bint,
@@ -176,65 +151,19 @@ class Engine:
 
     def forget_list(self):
         """It is no longer about the particles of now, whose order is the same."""
-        self.l.good = False
+        self.ls.good = False
 
     def make_room(self):
         """Arrays for as many pairs as the last list would have needed; what contacts remember is kept."""
         w: cython.pointer(Step) = cython.address(self.w)
-        l: cython.pointer(Lists) = cython.address(self.l)
-        pairs, lanes = l.raw_begin[w.groups] * 11 // 10 + 64, w.begin[w.groups] * 11 // 10 + 64
-        real_type, a = self.dtype, self.arrays
-        if pairs > l.pairs_room:
-            l.pairs_room = pairs
-            a |= {name: np.empty(pairs, np.uint32) for name in ("raw_i", "raw_j", "sorted", "rest")}
-            a["key"] = np.empty(pairs, np.uint8)
-            l.raw_i, l.raw_j, l.sorted, l.rest = indices(a["raw_i"]), indices(a["raw_j"]), indices(a["sorted"]), indices(a["rest"])
-            l.key = octets(a["key"])
-        if lanes > l.lanes_room:
-            l.lanes_room = lanes
-            a |= {name: np.zeros(lanes, np.uint32) for name in ("i", "j")}
-            a |= {name: np.zeros((2, lanes), real_type) for name in ("gap", "normal")}
-            a |= {name: np.zeros(lanes, real_type) for name in ("depth", "load", "impulse", "tangent_impulse")}
-            a |= {"hit": np.zeros(lanes, np.int64), "hit_time": np.zeros(lanes)}
-            w.hit, w.hit_time, w.i, w.j = integers(a["hit"]), doubles(a["hit_time"]), indices(a["i"]), indices(a["j"])
-            w.gap_x, w.gap_y = map_row(a["gap"], 0), map_row(a["gap"], 1)
-            w.normal_x, w.normal_y = map_row(a["normal"], 0), map_row(a["normal"], 1)
-            w.depth, w.load, w.impulse, w.tangent_impulse = (
-                reals(a["depth"]),
-                reals(a["load"]),
-                reals(a["impulse"]),
-                reals(a["tangent_impulse"]),
-            )
-            self.make_kept_room(lanes)
-            self.make_pair_room()
-
-    def make_kept_room(self, lanes: cython.Py_ssize_t):
-        """Room for what so many contacts remember, beside what is there."""
-        a, old = self.arrays, self.arrays.get("kept")
-        have = 0 if old is None else len(old)
-        if have < lanes:
-            shapes = (("kept_next", lanes, np.int32), ("kept_other", lanes, np.uint32), ("kept", (lanes, 3), self.dtype))
-            for name, shape, kind in shapes:
-                larger = np.zeros(shape, kind)
-                if have:
-                    larger[:have] = a[name]
-                a[name] = larger
-        l: cython.pointer(Lists) = cython.address(self.l)
-        l.kept_next, l.kept_other, l.kept = small_integers(a["kept_next"]), indices(a["kept_other"]), reals(a["kept"])
-
-    def make_pair_room(self):
-        """Arrays for what pairs are made of: one a lane, or eight."""
-        w: cython.pointer(Step) = cython.address(self.w)
-        a, lanes = self.arrays, max(self.l.lanes_room, 8)
-        shapes = {"reach": (lanes if w.sized else 8,), "share": (lanes if w.varied else 8,), "made_of": (6, lanes if w.mixed else 8)}
-        for name, shape in shapes.items():
-            if name not in a or a[name].shape != shape:
-                a[name] = np.zeros(shape, self.dtype)
-                self.l.refill = True
-        w.reach, w.share = reals(a["reach"]), reals(a["share"])
-        made_of = a["made_of"]
-        w.restitution, w.friction, w.radius_i = map_row(made_of, 0), map_row(made_of, 1), map_row(made_of, 2)
-        w.radius_j, w.turn_i, w.turn_j = map_row(made_of, 3), map_row(made_of, 4), map_row(made_of, 5)
+        ls: cython.pointer(Lists) = cython.address(self.ls)
+        pairs, lanes = ls.raw_begin[w.groups] * 11 // 10 + 64, w.begin[w.groups] * 11 // 10 + 64
+        if pairs > ls.pairs_room:
+            make_found_arrays(ls, self.arrays, pairs)
+        if lanes > ls.lanes_room:
+            make_lane_arrays(w, self.arrays, lanes, self.dtype)
+            make_kept_arrays(ls, self.arrays, lanes, self.dtype)
+            make_material_arrays(w, self.arrays, self.dtype)
 
     def run(self, substep: cython.int, substeps: cython.int, parts: cython.int):
         """Substeps from `substep` on by `parts` threads, with lists of pairs that are good in each.
@@ -246,9 +175,9 @@ class Engine:
         while True:
             with cython.nogil:
                 team_run(w.team, run_substeps, w, parts)
-            if not self.l.short:
+            if not self.ls.short:
                 break
-            self.l.short = False
+            self.ls.short = False
             self.make_room()
         finite: cython.bint = True
         b: cython.Py_ssize_t
@@ -258,19 +187,19 @@ class Engine:
 
     def rebuilds(self) -> int:
         """How often the list has been made."""
-        return self.l.rebuilds
+        return self.ls.rebuilds
 
     def pairs(self):
         """(first, count, i, j): where the pairs of each group are. A pair may come twice, one after the other."""
         w: cython.pointer(Step) = cython.address(self.w)
         groups, a = w.groups, self.arrays
-        if groups == 0 or not self.l.listed:
+        if groups == 0 or not self.ls.listed:
             return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.uint32), np.zeros(0, np.uint32)
         return a["begin"][:groups], a["lanes"][:groups], a["i"], a["j"]
 
     def order(self):
         """(falls, order): slots in the order of the cells, and how often they fall; (0, None) without a list."""
-        return (self.c.falls, self.arrays["order"].astype(np.int32)) if self.l.good else (0, None)
+        return (self.c.falls, self.arrays["order"].astype(np.int32)) if self.ls.good else (0, None)
 
     def renumber(self, order):
         """The particle of slot order[k] will be in slot k, where `order` is that of `order()`; arrays are set afterwards."""
@@ -300,7 +229,7 @@ class Engine:
         for axis in range(2):
             period: cython.double = c.period_y if axis else c.period_x
             low: cython.double = c.low_y if axis else c.low_x
-            if period > 0 and self.l.good:
+            if period > 0 and self.ls.good:
                 for i in range(w.count):
                     away: cython.double = cython.cast(cython.double, w.position[2 * i + axis]) - w.checked[2 * i + axis]
                     turns: cython.double = rint(away / period)
@@ -309,7 +238,7 @@ class Engine:
                     far: cython.double = w.position[2 * i + axis] - low
                     strayed |= far > 1.5 * period or far < -0.5 * period
         if strayed:
-            self.l.good = False
+            self.ls.good = False
             self.wrap_seam()
 
     def wrap_seam(self):
@@ -333,42 +262,30 @@ class Engine:
 
     def give_impulses(self, pairs, values):
         """Find them again in the next list; pairs: slots (k, 2). All others carry none."""
-        self.make_kept_room(max(len(pairs), self.l.lanes_room, 8))
+        make_kept_arrays(cython.address(self.ls), self.arrays, max(len(pairs), self.ls.lanes_room, 8), self.dtype)
         fill_kept(cython.address(self.w), np.ascontiguousarray(pairs, np.int32), np.ascontiguousarray(values, self.dtype))
-        self.l.listed, self.l.good, self.l.harvested = False, False, True
+        self.ls.listed, self.ls.good, self.ls.harvested = False, False, True
 
     def save_list(self):
         """(listed, checked, numbers): what `restore_list` needs to make the same list again; None without one."""
-        l: cython.pointer(Lists) = cython.address(self.l)
-        numbers = (l.diameters, l.half_skin, self.c.skin, self.w.allowed, float(l.age), float(l.hold))
-        return (self.arrays["listed"].copy(), self.arrays["checked"].copy(), numbers) if l.good else None
+        ls: cython.pointer(Lists) = cython.address(self.ls)
+        numbers = (ls.diameters, ls.half_skin, self.c.skin, self.w.allowed, float(ls.age), float(ls.hold))
+        return (self.arrays["listed"].copy(), self.arrays["checked"].copy(), numbers) if ls.good else None
 
     def restore_list(self, listed, checked, numbers):
         """Make the list that `save_list` was about; particles, their order and what they are made of are those of then."""
         w: cython.pointer(Step) = cython.address(self.w)
-        l: cython.pointer(Lists) = cython.address(self.l)
-        l.diameters, l.half_skin, self.c.skin = numbers[:3]
+        ls: cython.pointer(Lists) = cython.address(self.ls)
+        ls.diameters, ls.half_skin, self.c.skin = numbers[:3]
         self.c.position = reals(listed)
         while True:
             with cython.nogil:
                 team_run(w.team, remake_list, w, 1)
-            if not l.short:
+            if not ls.short:
                 break
-            l.short = False
+            ls.short = False
             self.make_room()
         self.c.position = w.position
         self.arrays["checked"][:] = checked
         w.allowed = numbers[3]
-        l.age, l.hold = int(numbers[4]), int(numbers[5])
-
-
-@cython.cfunc
-def map_row(rows, k: cython.int) -> cython.pointer(real):
-    """The address of a row of an array."""
-    return reals(rows[k])
-
-
-@cython.cfunc
-def map_integers(arrays, name) -> cython.pointer(int64_t):
-    """The address of one of these arrays."""
-    return integers(arrays[name])
+        ls.age, ls.hold = int(numbers[4]), int(numbers[5])

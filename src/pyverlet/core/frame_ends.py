@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import cython
-from cython.cimports.lanes import real
 from cython.cimports.libc.math import isfinite
 from cython.cimports.libc.stdint import int32_t
 

@@ -50,26 +50,26 @@ def worth(w: cython.pointer(Step)) -> cython.double:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def has_paid(w: cython.pointer(Step), l: cython.pointer(Lists)) -> cython.bint:
+def has_paid(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.bint:
     """Whether pairs listed for nothing have cost what a list costs: all have come to rest, say."""
-    return l.adapts and l.excess > WORTH_THINNING and l.excess * l.age > worth(w)
+    return ls.adapts and ls.excess > WORTH_THINNING and ls.excess * ls.age > worth(w)
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def adapt_skin(w: cython.pointer(Step), l: cython.pointer(Lists)) -> cython.void:
+def adapt_skin(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.void:
     """Towards the skin where a substep pays as little as it can for lists and for pairs that are listed for nothing."""
-    if not l.adapts:
+    if not ls.adapts:
         return
     # A list lives about as long as its skin is thick: a step up saves this much for each particle and substep.
-    saved: cython.double = worth(w) / max(l.age, 1) * (1.0 - 1.0 / SKIN_STEP)
-    l.hold = max(l.hold - 1, 0)
-    if l.excess > saved * SKIN_STEP:
-        l.diameters = max(l.diameters / SKIN_STEP, SKIN_LEAST)
-        l.hold = SKIN_HOLD
-    elif saved > l.excess * SKIN_STEP and l.hold == 0:
-        l.diameters = min(l.diameters * SKIN_STEP, SKIN_MOST)
+    saved: cython.double = worth(w) / max(ls.age, 1) * (1.0 - 1.0 / SKIN_STEP)
+    ls.hold = max(ls.hold - 1, 0)
+    if ls.excess > saved * SKIN_STEP:
+        ls.diameters = max(ls.diameters / SKIN_STEP, SKIN_LEAST)
+        ls.hold = SKIN_HOLD
+    elif saved > ls.excess * SKIN_STEP and ls.hold == 0:
+        ls.diameters = min(ls.diameters * SKIN_STEP, SKIN_MOST)
 
 
 @cython.cfunc

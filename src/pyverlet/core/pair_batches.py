@@ -35,18 +35,18 @@ SKIN_STEP = cython.declare(cython.double, 1.25)
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def forget_colours(c: cython.pointer(Cells), l: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
+def forget_colours(c: cython.pointer(Cells), ls: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
     """No colours are used in the rows of group s and in the one above."""
     level: cython.int
     k: int64_t
     for level in range(c.levels):
         this: int64_t = c.base[level]
-        high: int64_t = min((l.row[s + 1] + 1) << c.shift[level], c.height[level])
-        for k in range(c.start[this + (l.row[s] << c.shift[level]) * c.width[level]], c.start[this + high * c.width[level]]):
-            l.used[k] = 0
-        if c.wraps_v and l.row[s + 1] == c.height[0]:
+        high: int64_t = min((ls.row[s + 1] + 1) << c.shift[level], c.height[level])
+        for k in range(c.start[this + (ls.row[s] << c.shift[level]) * c.width[level]], c.start[this + high * c.width[level]]):
+            ls.used[k] = 0
+        if c.wraps_v and ls.row[s + 1] == c.height[0]:
             for k in range(c.start[this], c.start[this + (cython.cast(int64_t, 1) << c.shift[level]) * c.width[level]]):
-                l.used[k] = 0
+                ls.used[k] = 0
 
 
 @cython.cfunc
@@ -78,7 +78,13 @@ def put_pair(w: cython.pointer(Step), c: cython.pointer(Cells), k: int64_t, a: i
 @cython.nogil
 @cython.exceptval(check=False)
 def put_rest(
-    w: cython.pointer(Step), l: cython.pointer(Lists), c: cython.pointer(Cells), low: int64_t, end: int64_t, k: int64_t, room: int64_t
+    w: cython.pointer(Step),
+    ls: cython.pointer(Lists),
+    c: cython.pointer(Cells),
+    low: int64_t,
+    end: int64_t,
+    k: int64_t,
+    room: int64_t,
 ) -> int64_t:
     """Fill batches from lane k on with the pairs rest[low] to rest[end]; returns where lanes end, also beyond the room."""
     p: int64_t
@@ -90,11 +96,11 @@ def put_rest(
         waiting: uint32_t[32]
         p = low
         while p < end and taken < 8 and waits < WAITING:
-            pair: uint32_t = l.rest[p]
-            a: uint32_t = l.raw_i[pair]
-            b: uint32_t = l.raw_j[pair] & PLACE_BITS
-            if l.batch[a] != number and l.batch[b] != number:
-                l.batch[a] = l.batch[b] = number
+            pair: uint32_t = ls.rest[p]
+            a: uint32_t = ls.raw_i[pair]
+            b: uint32_t = ls.raw_j[pair] & PLACE_BITS
+            if ls.batch[a] != number and ls.batch[b] != number:
+                ls.batch[a] = ls.batch[b] = number
                 if k + taken < room:
                     put_pair(w, c, k + taken, a, b)
                 taken += 1
@@ -104,9 +110,14 @@ def put_rest(
             p += 1
         low = p - waits
         for lane in range(waits):
-            l.rest[low + lane] = waiting[lane]
+            ls.rest[low + lane] = waiting[lane]
         for lane in range(k + taken, min(k + 8, room)):
-            w.i[lane], w.j[lane], w.gap_x[lane], w.gap_y[lane] = w.i[lane - 1], w.j[lane - 1], w.gap_x[lane - 1], w.gap_y[lane - 1]
+            w.i[lane], w.j[lane], w.gap_x[lane], w.gap_y[lane] = (
+                w.i[lane - 1],
+                w.j[lane - 1],
+                w.gap_x[lane - 1],
+                w.gap_y[lane - 1],
+            )
         k += 8
     return k
 
@@ -115,11 +126,11 @@ def put_rest(
 @cython.nogil
 @cython.exceptval(check=False)
 def put_batches(
-    w: cython.pointer(Step), l: cython.pointer(Lists), c: cython.pointer(Cells), s: cython.Py_ssize_t, alone: cython.bint
+    w: cython.pointer(Step), ls: cython.pointer(Lists), c: cython.pointer(Cells), s: cython.Py_ssize_t, alone: cython.bint
 ) -> int64_t:
     """The pairs that were found for group s as lanes from its begin on; returns where they end, also beyond the room."""
-    low: int64_t = l.raw_begin[s]
-    end: int64_t = l.found[s] + low
+    low: int64_t = ls.raw_begin[s]
+    end: int64_t = ls.found[s] + low
     room: int64_t = w.begin[s + 1]
     first: int64_t[33]
     p: int64_t
@@ -127,27 +138,27 @@ def put_batches(
     for key in range(2 * COLOURS + 1):
         first[key] = 0
     if not alone:
-        forget_colours(c, l, s)
+        forget_colours(c, ls, s)
     for p in range(low, end):
-        a: uint32_t = l.raw_i[p]
-        b: uint32_t = l.raw_j[p] & PLACE_BITS
+        a: uint32_t = ls.raw_i[p]
+        b: uint32_t = ls.raw_j[p] & PLACE_BITS
         colour: cython.int = NO_COLOUR
         if not alone:
             # Bit NO_COLOUR is never used up.
-            free: uint32_t = (MOST_COLOURS & ~(l.used[a] | l.used[b])) | LAST_COLOUR
+            free: uint32_t = (MOST_COLOURS & ~(ls.used[a] | ls.used[b])) | LAST_COLOUR
             colour = lowest_bit(free)
             free &= ~free + 1
-            l.used[a] |= free
-            l.used[b] |= free
-        key = colour + COLOURS if l.raw_j[p] & CLOSE_BIT else colour
-        l.key[p] = cython.cast(uint8_t, key)
+            ls.used[a] |= free
+            ls.used[b] |= free
+        key = colour + COLOURS if ls.raw_j[p] & CLOSE_BIT else colour
+        ls.key[p] = cython.cast(uint8_t, key)
         first[key + 1] += 1
     first[0] = low
     for key in range(2 * COLOURS):
         first[key + 1] += first[key]
     for p in range(low, end):
-        key = l.key[p]
-        l.sorted[first[key]] = cython.cast(uint32_t, p)
+        key = ls.key[p]
+        ls.sorted[first[key]] = cython.cast(uint32_t, p)
         first[key] += 1
     k: int64_t = w.begin[s]
     begin: int64_t = low
@@ -157,16 +168,16 @@ def put_batches(
         if key % COLOURS != NO_COLOUR:
             whole = begin + (first[key] - begin) // 8 * 8
         for p in range(begin, whole):
-            pair: uint32_t = l.sorted[p]
+            pair: uint32_t = ls.sorted[p]
             if k < room:
-                put_pair(w, c, k, l.raw_i[pair], l.raw_j[pair] & PLACE_BITS)
+                put_pair(w, c, k, ls.raw_i[pair], ls.raw_j[pair] & PLACE_BITS)
             k += 1
         for p in range(whole, first[key]):
-            l.rest[left] = l.sorted[p]
+            ls.rest[left] = ls.sorted[p]
             left += 1
         begin = first[key]
         if key % COLOURS == NO_COLOUR:
-            k = put_rest(w, l, c, low, left, k, room)
+            k = put_rest(w, ls, c, low, left, k, room)
             left = low
     return k
 
@@ -183,7 +194,7 @@ def repeats(w: cython.pointer(Step), s: cython.Py_ssize_t, k: int64_t) -> cython
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def keep_impulses(w: cython.pointer(Step), l: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
+def keep_impulses(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
     """Hang what the contacts of group s remember on the chains of their lower particles.
 
     Impulses along the normal and the tangent, and the load that the substep began with; negative where they did not touch.
@@ -193,21 +204,21 @@ def keep_impulses(w: cython.pointer(Step), l: cython.pointer(Lists), s: cython.P
         touched: cython.bint = w.impulse[k] > 0 or w.depth[k] > 0
         if (touched or w.load[k] != 0) and not repeats(w, s, k):
             low: uint32_t = min(w.i[k], w.j[k])
-            l.kept_other[k] = max(w.i[k], w.j[k])
-            l.kept[3 * k] = w.impulse[k]
-            l.kept[3 * k + 1] = w.tangent_impulse[k] if w.rough else 0
+            ls.kept_other[k] = max(w.i[k], w.j[k])
+            ls.kept[3 * k] = w.impulse[k]
+            ls.kept[3 * k + 1] = w.tangent_impulse[k] if w.rough else 0
             load: real = w.load[k] if w.load[k] > 0 else -w.load[k]
             if touched and load == 0 and not w.impulse[k] > 0:
                 load = TOUCHED
-            l.kept[3 * k + 2] = load if touched else -load
-            l.kept_next[k] = l.head[low]
-            l.head[low] = cython.cast(int32_t, k)
+            ls.kept[3 * k + 2] = load if touched else -load
+            ls.kept_next[k] = ls.head[low]
+            ls.head[low] = cython.cast(int32_t, k)
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def give_impulses(w: cython.pointer(Step), l: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
+def give_impulses(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
     """Find again what contacts remember, for the lanes of group s; all others carry none."""
     k: int64_t
     for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
@@ -215,27 +226,27 @@ def give_impulses(w: cython.pointer(Step), l: cython.pointer(Lists), s: cython.P
         high: uint32_t = max(w.i[k], w.j[k])
         w.impulse[k] = w.tangent_impulse[k] = w.load[k] = 0
         w.depth[k] = -1
-        n: int32_t = l.head[low]
+        n: int32_t = ls.head[low]
         while n >= 0:
-            if l.kept_other[n] == high:
-                w.impulse[k], w.tangent_impulse[k], w.load[k] = l.kept[3 * n], l.kept[3 * n + 1], l.kept[3 * n + 2]
-                w.depth[k] = 1 if l.kept[3 * n] > 0 or l.kept[3 * n + 2] > 0 else -1
+            if ls.kept_other[n] == high:
+                w.impulse[k], w.tangent_impulse[k], w.load[k] = ls.kept[3 * n], ls.kept[3 * n + 1], ls.kept[3 * n + 2]
+                w.depth[k] = 1 if ls.kept[3 * n] > 0 or ls.kept[3 * n + 2] > 0 else -1
                 n = -1
             else:
-                n = l.kept_next[n]
+                n = ls.kept_next[n]
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def count_far(w: cython.pointer(Step), l: cython.pointer(Lists), c: cython.pointer(Cells), s: cython.Py_ssize_t) -> cython.void:
+def count_far(w: cython.pointer(Step), ls: cython.pointer(Lists), c: cython.pointer(Cells), s: cython.Py_ssize_t) -> cython.void:
     """How many lanes of group s were looked at, and how many of these a skin thinner by a step would not list."""
     k: int64_t
     thinner: cython.double = c.skin / SKIN_STEP
-    l.looked[s] = l.beyond[s] = 0
+    ls.looked[s] = ls.beyond[s] = 0
     for k in range(w.begin[s], w.begin[s] + w.lanes[s], 16):
         reach: cython.double = c.radius[w.i[k]] + c.radius[w.j[k]] + thinner
         x: cython.double = w.gap_x[k]
         y: cython.double = w.gap_y[k]
-        l.looked[s] += 1
-        l.beyond[s] += x * x + y * y > reach * reach
+        ls.looked[s] += 1
+        ls.beyond[s] += x * x + y * y > reach * reach

@@ -19,7 +19,7 @@ from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t, uint32_t
 from pyverlet.core.cells import COLUMNS, Cells, cell_number, whole_below
 
 CLOSE = cython.declare(real, 1.05)
-"""Of the contact distance: listed pairs nearer than this come last in their group. Few of the others touch while the list lasts."""
+"""Of the contact distance: listed pairs nearer than this come last in their group. Few of the others touch soon."""
 
 CLOSE_BIT = cython.declare(uint32_t, 1 << 31)
 """Set in the second place of a pair that is close."""
@@ -88,21 +88,21 @@ Lists = cython.struct(
 @cython.nogil
 @cython.exceptval(check=False)
 def may_touch(
-    c: cython.pointer(Cells), l: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, b: int64_t
+    c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, b: int64_t
 ) -> cython.bint:
     """Whether one of two places holds a free circle, each takes the other's category, and no link keeps them apart."""
     i: int64_t = c.order[a]
     j: int64_t = c.order[b]
     if not (inverse_mass[i] > 0 or inverse_mass[j] > 0):
         return False
-    if l.filtered and ((l.category[i] & l.mask[j]) == 0 or (l.category[j] & l.mask[i]) == 0):
+    if ls.filtered and ((ls.category[i] & ls.mask[j]) == 0 or (ls.category[j] & ls.mask[i]) == 0):
         return False
-    if l.linked:
-        p: int64_t = l.particle[i]
-        q: int64_t = l.particle[j]
+    if ls.linked:
+        p: int64_t = ls.particle[i]
+        q: int64_t = ls.particle[j]
         k: int64_t
-        for k in range(l.linked_begin[min(p, q)], l.linked_begin[min(p, q) + 1]):
-            if l.linked_to[k] == max(p, q):
+        for k in range(ls.linked_begin[min(p, q)], ls.linked_begin[min(p, q) + 1]):
+            if ls.linked_to[k] == max(p, q):
                 return False
     return True
 
@@ -112,10 +112,10 @@ def may_touch(
 @cython.nogil
 @cython.exceptval(check=False)
 def test_run(
-    c: cython.pointer(Cells), l: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, u: real, v: real,
+    c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, u: real, v: real,
     low: int64_t, end: int64_t, found: int64_t, room: int64_t,
 ) -> int64_t:  # fmt: skip
-    """Note which places from `low` up to `end` are near place a, seen at (u, v), as pairs from `found` on; returns where they end."""
+    """Note which places from `low` up to `end` are near place a, seen at (u, v), from `found` on; returns where pairs end."""
     b: int64_t
     lane: cython.int
     for b in range(low, end, 8):
@@ -135,10 +135,10 @@ def test_run(
         while bits != 0:
             lane = lowest_bit(bits)
             bits &= bits - 1
-            if not l.picky or may_touch(c, l, inverse_mass, a, b + lane):
+            if not ls.picky or may_touch(c, ls, inverse_mass, a, b + lane):
                 if found < room:
-                    l.raw_i[found] = cython.cast(uint32_t, a)
-                    l.raw_j[found] = cython.cast(uint32_t, b + lane) | (cython.cast(uint32_t, (close >> lane) & 1) << 31)
+                    ls.raw_i[found] = cython.cast(uint32_t, a)
+                    ls.raw_j[found] = cython.cast(uint32_t, b + lane) | (cython.cast(uint32_t, (close >> lane) & 1) << 31)
                 found += 1
     return found
 
@@ -147,7 +147,7 @@ def test_run(
 @cython.nogil
 @cython.exceptval(check=False)
 def test_row(
-    c: cython.pointer(Cells), l: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, level: cython.int,
+    c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, level: cython.int,
     row: int64_t, left: int64_t, right: int64_t, shift_v: real, found: int64_t, room: int64_t,
 ) -> int64_t:  # fmt: skip
     """The same for columns `left` to `right` of a row, which in a periodic room go on with the images of the first, or last."""
@@ -158,15 +158,15 @@ def test_row(
     low: int64_t = c.start[first + max(left, 0)]
     end: int64_t = c.start[first + min(right, wide - 1) + 1]
     if low < end:
-        found = test_run(c, l, inverse_mass, a, u, v, low, end, found, room)
+        found = test_run(c, ls, inverse_mass, a, u, v, low, end, found, room)
     if c.wraps_u and left < 0:
         low, end = c.start[first + max(wide + left, 0)], c.start[first + wide]
         if low < end:
-            found = test_run(c, l, inverse_mass, a, u + c.period_u, v, low, end, found, room)
+            found = test_run(c, ls, inverse_mass, a, u + c.period_u, v, low, end, found, room)
     if c.wraps_u and right >= wide:
         low, end = c.start[first], c.start[first + min(right - wide, wide - 1) + 1]
         if low < end:
-            found = test_run(c, l, inverse_mass, a, u - c.period_u, v, low, end, found, room)
+            found = test_run(c, ls, inverse_mass, a, u - c.period_u, v, low, end, found, room)
     return found
 
 
@@ -174,7 +174,7 @@ def test_row(
 @cython.nogil
 @cython.exceptval(check=False)
 def test_smaller(
-    c: cython.pointer(Cells), l: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, other: cython.int,
+    c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, other: cython.int,
     least: int64_t, most: int64_t, ahead: real, found: int64_t, room: int64_t,
 ) -> int64_t:  # fmt: skip
     """The same for the circles of the grid `other`, of smaller ones, in its rows from `least` up to `most`, around place a.
@@ -211,7 +211,7 @@ def test_smaller(
             left, right = whole_below((x - half) * across), whole_below((x + half) * across)
         else:
             left, right = cell_number((x - half) * across, wide), cell_number((x + half) * across, wide)
-        found = test_row(c, l, inverse_mass, a, other, row - turns * high, left, right, turns * c.period_v - ahead, found, room)
+        found = test_row(c, ls, inverse_mass, a, other, row - turns * high, left, right, turns * c.period_v - ahead, found, room)
     return found
 
 
@@ -219,11 +219,11 @@ def test_smaller(
 @cython.nogil
 @cython.exceptval(check=False)
 def list_rows(
-    c: cython.pointer(Cells), l: cython.pointer(Lists), inverse_mass: cython.pointer(real), s: cython.Py_ssize_t
+    c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), s: cython.Py_ssize_t
 ) -> int64_t:
     """Note the pairs of group s, a group of rows; returns where they end, also beyond the room."""
-    found: int64_t = l.raw_begin[s]
-    room: int64_t = l.raw_begin[s + 1]
+    found: int64_t = ls.raw_begin[s]
+    room: int64_t = ls.raw_begin[s + 1]
     level: cython.int
     other: cython.int
     row: int64_t
@@ -232,29 +232,29 @@ def list_rows(
         shift: int64_t = c.shift[level]
         wide: int64_t = c.width[level]
         high: int64_t = c.height[level]
-        for row in range(l.row[s] << shift, l.row[s + 1] << shift):
+        for row in range(ls.row[s] << shift, ls.row[s + 1] << shift):
             this: int64_t = c.base[level] + row * wide
             for a in range(c.start[this], c.start[this + wide]):
                 column: int64_t = cell_number((c.spot_u[a] - c.u0) * c.across[level], wide)
                 # The rest of this row; the row above from COLUMNS to the left to COLUMNS to the right.
                 end: int64_t = c.start[this + min(column + COLUMNS, wide - 1) + 1]
                 if a + 1 < end:
-                    found = test_run(c, l, inverse_mass, a, c.spot_u[a], c.spot_v[a], a + 1, end, found, room)
+                    found = test_run(c, ls, inverse_mass, a, c.spot_u[a], c.spot_v[a], a + 1, end, found, room)
                 if c.wraps_u and column + COLUMNS >= wide:
                     end = c.start[this + min(column + COLUMNS - wide, wide - 1) + 1]
                     found = test_run(
-                        c, l, inverse_mass, a, c.spot_u[a] - c.period_u, c.spot_v[a], c.start[this], end, found, room
+                        c, ls, inverse_mass, a, c.spot_u[a] - c.period_u, c.spot_v[a], c.start[this], end, found, room
                     )
                 left: int64_t = column - COLUMNS
                 if row + 1 < high:
-                    found = test_row(c, l, inverse_mass, a, level, row + 1, left, column + COLUMNS, 0, found, room)
+                    found = test_row(c, ls, inverse_mass, a, level, row + 1, left, column + COLUMNS, 0, found, room)
                 elif c.wraps_v:
-                    found = test_row(c, l, inverse_mass, a, level, 0, left, column + COLUMNS, c.period_v, found, room)
+                    found = test_row(c, ls, inverse_mass, a, level, 0, left, column + COLUMNS, c.period_v, found, room)
                 for other in range(level + 1, c.levels):
-                    least: int64_t = l.row[s] << c.shift[other]
-                    found = test_smaller(c, l, inverse_mass, a, other, least, 2 * c.height[other], 0, found, room)
+                    least: int64_t = ls.row[s] << c.shift[other]
+                    found = test_smaller(c, ls, inverse_mass, a, other, least, 2 * c.height[other], 0, found, room)
     # Pairs of a circle of the first row above and a smaller one below belong to this group, too.
-    over: int64_t = l.row[s + 1]
+    over: int64_t = ls.row[s + 1]
     ahead: real = 0
     if over == c.height[0]:
         if not c.wraps_v:
@@ -268,7 +268,7 @@ def list_rows(
                 for other in range(level + 1, c.levels):
                     shift = c.shift[other]
                     found = test_smaller(
-                        c, l, inverse_mass, a, other, l.row[s] << shift, l.row[s + 1] << shift, ahead, found, room
+                        c, ls, inverse_mass, a, other, ls.row[s] << shift, ls.row[s + 1] << shift, ahead, found, room
                     )
     return found
 
@@ -277,11 +277,11 @@ def list_rows(
 @cython.nogil
 @cython.exceptval(check=False)
 def list_alone(
-    c: cython.pointer(Cells), l: cython.pointer(Lists), inverse_mass: cython.pointer(real), s: cython.Py_ssize_t
+    c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), s: cython.Py_ssize_t
 ) -> int64_t:
     """The same for the last group: pairs of circles that stand in no cell."""
-    found: int64_t = l.raw_begin[s]
-    room: int64_t = l.raw_begin[s + 1]
+    found: int64_t = ls.raw_begin[s]
+    room: int64_t = ls.raw_begin[s + 1]
     a: int64_t
     level: cython.int
     across: cython.int
@@ -289,11 +289,11 @@ def list_alone(
     for a in range(c.celled, c.count):
         for level in range(c.levels):
             high: int64_t = c.height[level]
-            found = test_smaller(c, l, inverse_mass, a, level, -high if c.wraps_v else 0, 2 * high, 0, found, room)
+            found = test_smaller(c, ls, inverse_mass, a, level, -high if c.wraps_v else 0, 2 * high, 0, found, room)
         for along in range(-1, 2):
             for across in range(-1, 2):
                 if (along == 0 or c.wraps_v) and (across == 0 or c.wraps_u):
                     u: real = c.spot_u[a] - across * c.period_u
                     v: real = c.spot_v[a] - along * c.period_v
-                    found = test_run(c, l, inverse_mass, a, u, v, a + 1, c.count, found, room)
+                    found = test_run(c, ls, inverse_mass, a, u, v, a + 1, c.count, found, room)
     return found

@@ -16,13 +16,13 @@ from pyverlet.core.step import Step
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def compose(w: cython.pointer(Step), l: cython.pointer(Lists), k: int64_t, i: int64_t, j: int64_t) -> cython.void:
+def compose(w: cython.pointer(Step), ls: cython.pointer(Lists), k: int64_t, i: int64_t, j: int64_t) -> cython.void:
     """Restitution, friction and radii of particles i and j, in lane k.
 
     Of two discs the larger restitution counts, and the geometric mean of the frictions; those of all stand for negative ones.
     """
-    e: real = cython.cast(real, l.restitution)
-    mu: real = cython.cast(real, l.friction)
+    e: real = cython.cast(real, ls.restitution)
+    mu: real = cython.cast(real, ls.friction)
     of_i: real = w.own_restitution[i] if w.own_restitution[i] >= 0 else e
     of_j: real = w.own_restitution[j] if w.own_restitution[j] >= 0 else e
     w.restitution[k] = max(of_i, of_j)
@@ -38,7 +38,7 @@ def compose(w: cython.pointer(Step), l: cython.pointer(Lists), k: int64_t, i: in
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def fill_lanes(w: cython.pointer(Step), l: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
+def fill_lanes(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
     """What the pairs of group s are made of, as far as they are not all alike."""
     k: int64_t
     if w.sized or w.varied:
@@ -51,13 +51,13 @@ def fill_lanes(w: cython.pointer(Step), l: cython.pointer(Lists), s: cython.Py_s
                 w.share[k] = w.inverse_mass[i] / (w.inverse_mass[i] + w.inverse_mass[j])
     if w.mixed:
         for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
-            compose(w, l, k, w.i[k], w.j[k])
+            compose(w, ls, k, w.i[k], w.j[k])
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def fill_alike(w: cython.pointer(Step), l: cython.pointer(Lists)) -> cython.void:
+def fill_alike(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.void:
     """What is the same for all pairs, in the first eight lanes."""
     k: int64_t
     for k in range(8):
@@ -66,4 +66,4 @@ def fill_alike(w: cython.pointer(Step), l: cython.pointer(Lists)) -> cython.void
         if not w.varied:
             w.share[k] = cython.cast(real, 0.5)
         if not w.mixed:
-            compose(w, l, k, 0, 0)
+            compose(w, ls, k, 0, 0)

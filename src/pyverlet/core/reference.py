@@ -242,7 +242,7 @@ def _struct(**kinds: Any) -> type:
     return Struct
 
 
-def _cython(names: dict[str, Any]) -> ModuleType:
+def _cython() -> ModuleType:
     """Cython's own module for uncompiled code, with types and structs as above, and addresses that are what they are of."""
     from Cython import Shadow  # only the reference needs it
 
@@ -254,13 +254,12 @@ def _cython(names: dict[str, Any]) -> ModuleType:
 
     def cclass(made: type) -> type:
         """Gives each instance the structs that its class declares, as C does."""
-        kinds = made.__annotations__
+        structs = {name: type(value) for name, value in vars(made).items() if type(value).__qualname__.startswith("_struct.")}
 
         def new(cls: type, *_: Any, **__: Any) -> Any:
             self: Any = object.__new__(cls)
-            for name, kind in kinds.items():
-                if getattr(names.get(kind), "__qualname__", "").startswith("_struct."):
-                    setattr(self, name, names[kind]())
+            for name, kind in structs.items():
+                setattr(self, name, kind())
             return self
 
         made.__new__ = new  # type: ignore[assignment,method-assign]
@@ -297,7 +296,7 @@ def load(unit: str, dtype: Any = np.float32) -> ModuleType:
         kept = ast.parse("from __future__ import annotations").body
         for node in part.tree.body:
             if isinstance(node, ast.Import) and node.names[0].name == "cython":
-                names["cython"] = _cython(names)
+                names["cython"] = _cython()
             elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("cython.cimports."):
                 stand_in = stand_ins[str(node.module).removeprefix("cython.cimports.")]
                 names.update({alias.asname or alias.name: stand_in[alias.name] for alias in node.names})

@@ -13,12 +13,10 @@ from pyverlet.core.cell_grids import fit_cells, measure_extent
 from pyverlet.core.cells import BLOCK, Cells, copy_spots, find_cells, sort_by_cell
 from pyverlet.core.list_age import WORTH_LOOKING, adapt_skin, bound_moves, find_patch, lay_patches, slack_left
 from pyverlet.core.pair_batches import count_far, give_impulses, keep_impulses, put_batches
+from pyverlet.core.pair_groups import cut_rows, has_room
 from pyverlet.core.pair_lists import Lists, list_alone, list_rows
 from pyverlet.core.pair_materials import fill_alike, fill_lanes
 from pyverlet.core.step import Step
-
-GROUP = cython.declare(cython.int, 256)
-"""Least particles of a group of rows: below it, a meeting of threads costs more than it saves."""
 
 FAST = cython.declare(cython.double, 2.2)
 MOST_FAST = cython.declare(cython.double, 2.0)
@@ -98,19 +96,19 @@ def spots_stage(what: cython.p_void, item: cython.int) -> cython.void:
 def list_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """The pairs of a group, their batches, what they are made of, and what contacts remember of them."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    l: cython.pointer(Lists) = w.lists
+    ls: cython.pointer(Lists) = w.lists
     s: cython.Py_ssize_t = 2 * item + w.parity
-    alone: cython.bint = s == l.rows
-    found: int64_t = list_alone(w.cells, l, w.inverse_mass, s) if alone else list_rows(w.cells, l, w.inverse_mass, s)
-    l.found[s] = found - l.raw_begin[s]
+    alone: cython.bint = s == ls.rows
+    found: int64_t = list_alone(w.cells, ls, w.inverse_mass, s) if alone else list_rows(w.cells, ls, w.inverse_mass, s)
+    ls.found[s] = found - ls.raw_begin[s]
     w.lanes[s] = 0
-    if found <= l.raw_begin[s + 1]:
-        end: int64_t = put_batches(w, l, w.cells, s, alone)
+    if found <= ls.raw_begin[s + 1]:
+        end: int64_t = put_batches(w, ls, w.cells, s, alone)
         w.lanes[s] = end - w.begin[s]
         if end <= w.begin[s + 1]:
-            fill_lanes(w, l, s)
-            give_impulses(w, l, s)
-            count_far(w, l, w.cells, s)
+            fill_lanes(w, ls, s)
+            give_impulses(w, ls, s)
+            count_far(w, ls, w.cells, s)
 
 
 @cython.cfunc
@@ -156,95 +154,25 @@ def bound_stage(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def choose_skin(w: cython.pointer(Step), c: cython.pointer(Cells), l: cython.pointer(Lists), blocks: cython.int) -> cython.void:
+def choose_skin(w: cython.pointer(Step), c: cython.pointer(Cells), ls: cython.pointer(Lists), blocks: cython.int) -> cython.void:
     """How thick the skin of the next list is: what it has adapted to, or more where particles are fast."""
     b: cython.int
     most: cython.double = 0
-    skin: cython.double = l.diameters * 2 * l.mean_radius
-    if l.adapts:
+    skin: cython.double = ls.diameters * 2 * ls.mean_radius
+    if ls.adapts:
         for b in range(blocks):
-            most = max(most, l.speeds[b])
-        skin = max(skin, min(FAST * w.h * sqrt(most), MOST_FAST * 2 * l.mean_radius))
+            most = max(most, ls.speeds[b])
+        skin = max(skin, min(FAST * w.h * sqrt(most), MOST_FAST * 2 * ls.mean_radius))
     rounding: cython.double = 0
     if c.period_x > 0 or c.period_y > 0:
         # A pair may be near on one side only.
         free: cython.double = min(c.period_x if c.period_x > 0 else c.period_y, c.period_y if c.period_y > 0 else c.period_x)
-        skin = min(skin, max(0.5 * free - 2 * l.largest, 0.0))
+        skin = min(skin, max(0.5 * free - 2 * ls.largest, 0.0))
         x: cython.double = abs(c.low_x) + 2 * c.period_x
         y: cython.double = abs(c.low_y) + 2 * c.period_y
         rounding = ROUNDINGS * (2.3e-16 if cython.sizeof(real) == 8 else 1.2e-7) * max(x, y)
-    l.half_skin = 0.5 * skin
+    ls.half_skin = 0.5 * skin
     c.skin = cython.cast(real, skin + rounding)
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def cut_rows(w: cython.pointer(Step), c: cython.pointer(Cells), l: cython.pointer(Lists)) -> cython.bint:
-    """Cut the rows into groups of at least GROUP particles, with room for their pairs; whether all the room is there.
-
-    Across the seam the last group writes to the first: it is an odd one, or the only.
-    """
-    groups: cython.Py_ssize_t = 0
-    before: int64_t = 0
-    row: int64_t
-    level: cython.int
-    l.row[0] = 0
-    for row in range(1, c.height[0] + 1):
-        held: int64_t = -before
-        for level in range(c.levels):
-            base: int64_t = c.base[level]
-            held += c.start[base + (row << c.shift[level]) * c.width[level]] - c.start[base]
-        if held >= GROUP or row == c.height[0]:
-            l.found[groups] = held
-            groups += 1
-            l.row[groups] = row
-            before += held
-    if c.wraps_v and groups > 1 and groups % 2 == 1:
-        groups -= 1
-        l.row[groups] = c.height[0]
-        l.found[groups - 1] += l.found[groups]
-    pairs: int64_t = 0
-    lanes: int64_t = 0
-    s: cython.Py_ssize_t
-    for s in range(groups):
-        l.raw_begin[s], w.begin[s] = pairs, lanes
-        more: int64_t = cython.cast(int64_t, l.per_particle * l.found[s]) + 64
-        pairs += more
-        lanes += cython.cast(int64_t, l.per_pair * more) // 8 * 8 + 256
-    l.rows = w.groups = groups
-    if c.celled < c.count:
-        l.raw_begin[groups], w.begin[groups] = pairs, lanes
-        pairs += cython.cast(int64_t, l.alone_room)
-        lanes += 8 * cython.cast(int64_t, l.alone_room)
-        w.groups = groups + 1
-    l.raw_begin[w.groups], w.begin[w.groups] = pairs, lanes
-    return pairs <= l.pairs_room and lanes <= l.lanes_room
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def has_room(w: cython.pointer(Step), l: cython.pointer(Lists)) -> cython.bint:
-    """Whether all pairs that were found had room; if not, how much there is to be is noted."""
-    enough: cython.bint = True
-    s: cython.Py_ssize_t
-    factor: cython.double
-    for s in range(w.groups):
-        room: int64_t = l.raw_begin[s + 1] - l.raw_begin[s]
-        if l.found[s] > room:
-            enough = False
-            factor = 1.25 * l.found[s] / room
-            if s == l.rows:
-                l.alone_room *= factor
-            else:
-                l.per_particle = max(l.per_particle, 4.0) * factor
-        elif w.lanes[s] > w.begin[s + 1] - w.begin[s]:
-            enough = False
-            l.per_pair *= 1.25 * w.lanes[s] / (w.begin[s + 1] - w.begin[s])
-        if not enough:
-            return False
-    return True
 
 
 @cython.cfunc
@@ -256,44 +184,44 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
     again: with the skin of before, for a list that was saved.
     """
     c: cython.pointer(Cells) = w.cells
-    l: cython.pointer(Lists) = w.lists
+    ls: cython.pointer(Lists) = w.lists
     blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
     s: cython.Py_ssize_t
     i: cython.Py_ssize_t
-    l.good, l.short = False, False
-    if not l.harvested:
+    ls.good, ls.short = False, False
+    if not ls.harvested:
         for i in range(w.count):
-            l.head[i] = -1
-        if l.listed:
+            ls.head[i] = -1
+        if ls.listed:
             each_group(w, keep_stage)
-        l.harvested, l.listed = True, False
+        ls.harvested, ls.listed = True, False
     team_stage(w.team, extent_stage, w, blocks)
     if not again:
-        choose_skin(w, c, l, blocks)
+        choose_skin(w, c, ls, blocks)
     fit_cells(c, blocks)
     lay_patches(c)
     team_stage(w.team, cells_stage, w, blocks)
     sort_by_cell(c)
     team_stage(w.team, spots_stage, w, blocks)
     while True:
-        if not cut_rows(w, c, l):
-            l.short = True
+        if not cut_rows(w, c, ls):
+            ls.short = True
             return False
         each_group(w, list_stage)
-        if has_room(w, l):
+        if has_room(w, ls):
             break
-    fill_alike(w, l)
+    fill_alike(w, ls)
     team_stage(w.team, listed_stage, w, blocks)
     looked: int64_t = 0
     beyond: int64_t = 0
     pairs: int64_t = 0
     for s in range(w.groups):
-        looked, beyond, pairs = looked + l.looked[s], beyond + l.beyond[s], pairs + l.found[s]
-    l.excess = cython.cast(cython.double, beyond) / max(looked, 1) * pairs / max(w.count, 1)
-    w.allowed = cython.cast(real, l.half_skin * l.half_skin)
-    l.age = 0
-    l.rebuilds += 1
-    l.listed, l.good, l.harvested, l.refill = True, True, False, False
+        looked, beyond, pairs = looked + ls.looked[s], beyond + ls.beyond[s], pairs + ls.found[s]
+    ls.excess = cython.cast(cython.double, beyond) / max(looked, 1) * pairs / max(w.count, 1)
+    w.allowed = cython.cast(real, ls.half_skin * ls.half_skin)
+    ls.age = 0
+    ls.rebuilds += 1
+    ls.listed, ls.good, ls.harvested, ls.refill = True, True, False, False
     return True
 
 
@@ -302,12 +230,12 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
 @cython.exceptval(check=False)
 def renew_list(w: cython.pointer(Step)) -> cython.bint:
     """Particles have moved far: see whether neighbours have moved against each other, and if so, make the list anew."""
-    l: cython.pointer(Lists) = w.lists
+    ls: cython.pointer(Lists) = w.lists
     team_stage(w.team, bound_stage, w, cython.cast(cython.int, w.cells.patches_v))
-    slack: cython.double = slack_left(w, w.cells, 2 * l.half_skin)
-    if slack > WORTH_LOOKING * l.half_skin:
+    slack: cython.double = slack_left(w, w.cells, 2 * ls.half_skin)
+    if slack > WORTH_LOOKING * ls.half_skin:
         team_stage(w.team, checked_stage, w, cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK))
         w.allowed = cython.cast(real, 0.25 * slack * slack)
         return True
-    adapt_skin(w, l)
+    adapt_skin(w, ls)
     return make_list(w, False)

@@ -31,7 +31,17 @@ def take_motion(position, velocity, acceleration, spin, from_position, from_velo
 
 
 def put_motion(
-    position, velocity, acceleration, spin, to_position, to_velocity, to_acceleration, to_spin, angle, half_dt: cython.double, index
+    position,
+    velocity,
+    acceleration,
+    spin,
+    to_position,
+    to_velocity,
+    to_acceleration,
+    to_spin,
+    angle,
+    half_dt: cython.double,
+    index,
 ):
     """The way back. Angles turn by the mean of the spins before and now."""
     x: cython.pointer[cython.const[real]] = const_reals(position)

@@ -38,16 +38,16 @@ def strays(w: cython.pointer(Step)) -> cython.bint:
 @cython.exceptval(check=False)
 def refresh(w: cython.pointer(Step)) -> cython.bint:
     """Have a list of pairs that is good for the first substep. False: arrays are too small for it."""
-    l: cython.pointer(Lists) = w.lists
-    if not l.good:
+    ls: cython.pointer(Lists) = w.lists
+    if not ls.good:
         return make_list(w, False)
-    if w.substep == 0 and has_paid(w, l):
-        adapt_skin(w, l)
+    if w.substep == 0 and has_paid(w, ls):
+        adapt_skin(w, ls)
         return make_list(w, False)
-    if l.refill:
-        fill_alike(w, l)
+    if ls.refill:
+        fill_alike(w, ls)
         each_group(w, fill_stage)
-        l.refill = False
+        ls.refill = False
     return renew_list(w) if strays(w) else True
 
 

@@ -6,7 +6,7 @@ The law, its sources and its measurements: docs/design/impulses.md.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,8 @@ from pyverlet.laws.limiter import fall, watched
 from pyverlet.laws.rooms import Box, Circle, Open, Periodic
 from pyverlet.state.moves import first_non_finite
 from pyverlet.state.slots import Slots
+from pyverlet.world.impulse_materials import materials_of
+from pyverlet.world.impulse_memory import Memory, columns_of
 
 Array = NDArray[Any]
 
@@ -49,37 +51,11 @@ UNSORTED = 0.2
 """Slots of so many particles and more are put into the order of the cells when such a part of them is followed by one that
 belongs before."""
 
-ALONE = 256
-MUCH_LARGER = 4.0
-"""Circles so many times as large as all but one in ALONE stand in no cell of the grid."""
-
 NEAR = 0.05
 """Of the largest radius: pairs and walls with larger gaps carry no load."""
 
 OPEN, CAGE, BOX = range(3)
 """Rooms, as the core numbers them."""
-
-
-class Memory(NamedTuple):
-    """What outlives a frame, by the user's index: contacts between particles and on walls, what they gave each, and the step.
-
-    pairs (k, 2) and values (k, 3): see `Engine.take_impulses`. wall: (8, n) impulses along the normals of four sides, and along
-    their tangents. given: (n, 3) velocity and spin that contacts gave in the last substep, over `kick` seconds. h: length of the
-    last substep, s. hertz: frequency of the springs; finer: for how long, s, a higher one would have been possible. listed,
-    checked: (n, 2) of the list of pairs, and skin: its numbers, as of `Engine.save_list`; empty without one.
-    """
-
-    pairs: Array
-    values: Array
-    wall: Array
-    given: Array
-    kick: float
-    h: float
-    hertz: float
-    finer: float
-    listed: Array
-    checked: Array
-    skin: tuple[float, ...] = ()
 
 
 class ImpulseFrames:
@@ -97,8 +73,7 @@ class ImpulseFrames:
 
     def forget(self) -> None:
         """No contact remembers anything."""
-        none, rows = np.empty((0, 3), self._dtype), np.empty((0, 2), self._dtype)
-        self.restore(Memory(np.empty((0, 2), np.int32), none, np.empty((8, 0), self._dtype), none, 0.0, 0.0, 0.0, 0.0, rows, rows))
+        self.restore(Memory.empty(self._dtype))
 
     def save(self) -> Memory:
         """What `restore` needs to go on with the same bits."""
@@ -118,7 +93,7 @@ class ImpulseFrames:
         self._kept: tuple[Array, Array] | None = (memory.pairs, memory.values)  # what the engine is still to be given
         self._kept_list = (memory.listed, memory.checked, memory.skin) if memory.skin else None
         self._particle = np.arange(len(memory.given), dtype=np.int32)
-        self._wall, self._gave, self._gave_spin = memory.wall, *_columns(memory.given)
+        self._wall, self._gave, self._gave_spin = memory.wall, *columns_of(memory.given)
         self._kick, self._h, self._hertz, self._finer = memory.kick, memory.h, memory.hertz, memory.finer
         self._made = -1  # of `Slots.given`, what the engine holds; -1: nothing
         self._collisions: Any = None
@@ -130,17 +105,7 @@ class ImpulseFrames:
 
     def renumber(self, now: Array) -> None:
         """The particles are now at `now` (n,), or no more (-1)."""
-        memory = self.save()
-        count, alive = int(now.max(initial=-1)) + 1, now[: len(memory.given)] >= 0
-        wall, given = np.zeros((8, count), self._dtype), np.zeros((count, 3), self._dtype)
-        to, none = now[: len(memory.given)][alive], memory.listed[:0]
-        wall[:, to], given[to] = memory.wall[:, alive], memory.given[alive]
-        pairs = now[memory.pairs].astype(np.int32)
-        kept = (pairs >= 0).all(axis=1)
-        pairs, values = pairs[kept], memory.values[kept]
-        order = np.argsort(pairs[:, 0], kind="stable")
-        memory = memory._replace(pairs=pairs[order], values=values[order], wall=wall, given=given)
-        self.restore(memory._replace(listed=none, checked=none, skin=()))
+        self.restore(self.save().renumbered(now))
 
     # ---- a frame -------------------------------------------------------------------------------------------------------------
 
@@ -337,15 +302,6 @@ class ImpulseFrames:
         if engine.threads < parts:
             engine.set_threads(parts)
         self._parts = parts
-        if self._kept is None and len(state) >= SORTED_FROM:
-            falls, order = engine.order()
-            if falls > UNSORTED * len(state) and len(order) == len(state):
-                engine.renumber(order)
-                self._wall, self._gave = np.ascontiguousarray(self._wall[:, order]), self._gave[order]
-                self._gave_spin = self._gave_spin[order]
-                state.reorder(order)
-                self._particle = state.particle
-                self._hold(state)
         if self._particle is not state.particle or self._kept is not None:
             self._follow(state)
         if state.given != self._made or collisions is not self._collisions:
@@ -364,8 +320,21 @@ class ImpulseFrames:
             listed, checked = (np.ascontiguousarray(rows[self._particle]) for rows in self._kept_list[:2])
             engine.restore_list(listed, checked, self._kept_list[2])
             self._kept_list = None
+        if len(state) >= SORTED_FROM:
+            self._sort(state)
         if state.seam:
             engine.follow_seam()
+
+    def _sort(self, state: Slots) -> None:
+        """Put slots in the order of the cells if many are not; the list of pairs stays what it is."""
+        falls, order = self._engine.order()
+        if falls > UNSORTED * len(state):
+            self._engine.renumber(order)
+            self._wall, self._gave = np.ascontiguousarray(self._wall[:, order]), self._gave[order]
+            self._gave_spin = self._gave_spin[order]
+            state.reorder(order)
+            self._particle = state.particle
+            self._hold(state)
 
     def _follow(self, state: Slots) -> None:
         """Have what is remembered of particles in the order of the slots of now."""
@@ -378,7 +347,10 @@ class ImpulseFrames:
             self._kept_list = None
         self._particle, place = state.particle, np.zeros(count, np.int32)
         place[state.particle] = np.arange(len(state), dtype=np.int32)
-        self._wall, self._gave, self._gave_spin = np.ascontiguousarray(wall[:, state.particle]), *_columns(given[state.particle])
+        self._wall, self._gave, self._gave_spin = (
+            np.ascontiguousarray(wall[:, state.particle]),
+            *columns_of(given[state.particle]),
+        )
         self._hold(state)
         self._engine.give_impulses(place[pairs], values)
         self._kept = None
@@ -386,11 +358,10 @@ class ImpulseFrames:
     def _hold(self, state: Slots) -> None:
         """Have the engine take the arrays of now."""
         count, real = len(state), self._dtype
-        self._motion = np.zeros((count, 4), real)
         self._engine.set_particles(
             position=state.position, velocity=state.velocity, acceleration=state.acceleration,
             inverse_mass=state.inverse_mass, radius=state.radius, own_restitution=state.restitution,
-            own_friction=state.friction, spin=state.spin, motion=self._motion, free=np.zeros((count, 2), real),
+            own_friction=state.friction, spin=state.spin, motion=np.zeros((count, 4), real), free=np.zeros((count, 2), real),
             free_spin=np.zeros(count, real), given=self._gave, given_spin=self._gave_spin, wall_impulse=self._wall[:4],
             wall_tangent=self._wall[4:], at_wall=np.zeros(count, np.int32),
             particle=state.particle, category=state.category, mask=state.mask,
@@ -398,29 +369,13 @@ class ImpulseFrames:
 
     def _set_materials(self, world: Any) -> None:
         """What circles are made of has changed."""
-        state, collisions, radius = world._slots, world.collisions, world._state.radius
-        self._made, self._collisions = state.given, collisions
+        state = world._slots
+        self._made, self._collisions = state.given, world.collisions
         state.grown.fill(1)
         state.resize()
         self._free = bool((state.inverse_mass > 0).any())
-        ordered = np.sort(radius)[::-1] if len(radius) else np.ones(1)
-        # Very few that are much larger than all others stand in no cell.
-        usual = float(ordered[min(len(ordered) // ALONE, len(ordered) - 1)])
-        columns = state.radius, state.restitution, state.friction
-        sized, varied = _differs(state.radius), _differs(state.inverse_mass)
-        self._largest = float(ordered[0])
-        self._engine.set_materials(
-            sized=sized,
-            varied=varied,
-            mixed=any(map(_differs, columns)),
-            bulk=float(ordered[ordered <= MUCH_LARGER * usual][0]),
-            smallest=float(ordered[-1]),
-            largest=self._largest,
-            mean_radius=float(radius.mean(dtype=np.float64)) if len(radius) else 1.0,
-            restitution=collisions.restitution,
-            friction=collisions.friction,
-            picky=bool(len(state.category)) or not bool((state.inverse_mass > 0).all()),
-        )
+        self._largest = float(state.radius.max(initial=0.0))
+        self._engine.set_materials(**materials_of(state, world._state.radius, world.collisions))
 
     # ---- what others ask of it -----------------------------------------------------------------------------------------------
 
@@ -433,13 +388,3 @@ class ImpulseFrames:
         """first, count, i, j: where the pairs of the list are, by slot. Some come twice."""
         pairs: tuple[Array, Array, Array, Array] = self._engine.pairs()
         return pairs
-
-
-def _columns(given: Array) -> tuple[Array, Array]:
-    """(n, 2) velocity and (n,) spin of `Memory.given`."""
-    return np.ascontiguousarray(given[:, :2]), np.ascontiguousarray(given[:, 2])
-
-
-def _differs(column: Array) -> bool:
-    """Whether not all are the same."""
-    return bool(len(column) and (column != column[0]).any())

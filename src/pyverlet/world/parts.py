@@ -25,7 +25,7 @@ from pyverlet.laws.ledger import Bookkeeper, Ledger
 from pyverlet.laws.links._set import BROKEN
 from pyverlet.laws.links._work import Past
 from pyverlet.laws.sleep import Sleep, laws
-from pyverlet.world.impulse_frames import ImpulseFrames, Memory
+from pyverlet.world.impulse_memory import Memory
 from pyverlet.world.saved import Saved
 from pyverlet.world.world import World
 
@@ -106,7 +106,7 @@ IMPULSES = {
     "listed": Field(None, "neighbours", 2),
     "checked": Field(None, "neighbours", 2),
 }
-"""What contacts gave in the last substep: `world.impulse_frames.Memory`, of walls by particle; where their list was made."""
+"""What contacts gave in the last substep: `world.impulse_memory.Memory`, of walls by particle; where their list was made."""
 
 FIELDS = {
     f"{room}.{name}": field
@@ -295,7 +295,7 @@ def _list(world: World, facts: Facts | None, arrays: dict[str, Array]) -> Any:
 def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
     numbers = {name: checks.number(name, facts.get(name, 0.0), least=0.0) for name in ("kick", "h", "hertz", "finer")}
     if not numbers["kick"]:
-        return ImpulseFrames(world.dtype).save()
+        return Memory.empty(world.dtype)
     try:
         pairs, values, wall, given = (arrays[f"impulses.{name}"] for name in ("pairs", "values", "wall", "given"))
     except KeyError as error:
@@ -308,10 +308,20 @@ def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
     listed, checked = (arrays.get(f"impulses.{name}", none).copy() for name in ("listed", "checked"))
     skin = tuple(checks.number("skin", number, least=0.0) for number in facts.get("skin") or ())
     if len(skin) not in (0, 6) or bool(skin) != bool(len(listed)) or len(listed) not in (0, len(given)):
-        raise InputError(f"impulses.skin has {len(skin)} numbers and impulses.listed {len(listed)} rows; allowed are 6 and one "
-                         "for each row of impulses.given, or none")
-    return Memory(pairs.copy(), values.copy(), np.ascontiguousarray(wall.T), given.copy(), **numbers, listed=listed,
-                  checked=checked, skin=skin)
+        raise InputError(
+            f"impulses.skin has {len(skin)} numbers and impulses.listed {len(listed)} rows; allowed are 6 and one "
+            "for each row of impulses.given, or none"
+        )
+    return Memory(
+        pairs.copy(),
+        values.copy(),
+        np.ascontiguousarray(wall.T),
+        given.copy(),
+        **numbers,
+        listed=listed,
+        checked=checked,
+        skin=skin,
+    )
 
 
 # ---- books, events and sleep -------------------------------------------------------------------------------------------

@@ -183,29 +183,24 @@ class World(Measures, Queries, Doors):
         return True
 
     def _gather(self) -> bool:
-        """Take up what users have set; whether that makes the list of pairs void."""
+        """Take up what users have set; whether a list of pairs is void."""
         woken = self._sleep.begin(self._slots, self._state, laws(self)) if self._sleep else False
         changed = self._slots.gather(self._state) or woken
         if not self._slots.most_restitution <= 1.0:
             checks.at_most("restitution", self._state.restitution, 1.0)
         if not self._slots.most_friction < np.inf:
             checks.at_most("friction", self._state.friction, float(np.finfo(self.dtype).max))
-        if not changed:
-            if self._contacts and not self._by_impulses:
-                self._contacts.broad_phase.follow(self._slots)
-            return False
-        try:
-            checks.positive("radius", self._state.radius)
-            checks.positive("mass", self._state.mass, infinite_is="pinned")
-            self.boundary.check(self._state.radius)
-        except InputError:
-            self._slots = Slots(self.dtype, sleeps=self._sleep is not None)  # new to the next frame, which refuses them again
-            raise
+        if changed:
+            try:
+                checks.positive("radius", self._state.radius)
+                checks.positive("mass", self._state.mass, infinite_is="pinned")
+                self.boundary.check(self._state.radius)
+            except InputError:
+                self._slots = Slots(self.dtype, sleeps=self._sleep is not None)  # new to the next frame, which refuses them again
+                raise
         if self._contacts and not self._by_impulses:
-            self._contacts.broad_phase.forget()
-            if len(self) > 1:
-                self._contacts.fit(self._slots)
-        return True
+            self._contacts.begin(self._slots, changed=changed)
+        return changed
 
     def _finish(self, contacts: ContactSolver | None, watch: Watch | None, h: float, done: Any, *, marked: bool) -> bool:
         """The substeps are done: who rests, the velocities of now, and no more energy than there may be."""

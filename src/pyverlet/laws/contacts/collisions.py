@@ -106,6 +106,15 @@ class ContactSolver:
         if events is not None:
             self.broad_phase.renewing = lambda state, pairs: self._collect(state, events)
 
+    def begin(self, state: Slots, *, changed: bool) -> None:
+        """A frame begins; changed: with other particles, or other radii or masses, than the last one."""
+        if not changed:
+            self.broad_phase.follow(state)
+            return
+        self.broad_phase.forget()
+        if len(state) > 1:
+            self.fit(state)
+
     def fit(self, state: Slots) -> None:
         """Let particles that were added on top of others start smaller."""
         fresh = np.isnan(state.acceleration[:, 0])

@@ -1,0 +1,113 @@
+# mypy: ignore-errors
+"""Arrays that the engine makes for itself, by their names in `Step`, `Cells` and `Lists`, and their addresses there."""
+
+from __future__ import annotations
+
+import cython
+import numpy as np
+from cython.cimports.arrays import doubles, indices, integers, octets, reals, small_integers
+from cython.cimports.lanes import real
+
+from pyverlet.core.cells import BLOCK, LEVELS, Cells
+from pyverlet.core.pair_groups import GROUP
+from pyverlet.core.pair_lists import Lists
+from pyverlet.core.step import Step
+
+
+@cython.cfunc
+def map_row(rows, k: cython.int) -> cython.pointer(real):
+    """The address of a row of an array."""
+    return reals(rows[k])
+
+
+@cython.cfunc
+def make_level_arrays(c: cython.pointer(Cells), a, dtype):
+    """Of the grids."""
+    a |= {name: np.zeros(LEVELS, np.int64) for name in ("shift", "base", "width", "height", "held")}
+    a |= {name: np.zeros(LEVELS, dtype) for name in ("across", "along", "level_largest")}
+    c.shift, c.base, c.held = integers(a["shift"]), integers(a["base"]), integers(a["held"])
+    c.width, c.height = integers(a["width"]), integers(a["height"])
+    c.across, c.along, c.largest = reals(a["across"]), reals(a["along"]), reals(a["level_largest"])
+
+
+@cython.cfunc
+def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, dtype):
+    """Of so many particles, their cells and groups; there is no list of pairs any more."""
+    c: cython.pointer(Cells) = w.cells
+    ls: cython.pointer(Lists) = w.lists
+    w.count = c.count = count
+    blocks, groups = (count + BLOCK - 1) // BLOCK, count // GROUP + 3
+    a |= {name: np.zeros((count, 2), dtype) for name in ("listed", "checked", "moved")}
+    a |= {name: np.zeros(count + 8, dtype) for name in ("spot_u", "spot_v", "spot_r")}
+    a |= {name: np.zeros(count, np.uint32) for name in ("cell", "order", "patch", "used", "batch")}
+    a |= {name: np.zeros(blocks, dtype) for name in ("fastest", "speeds")}
+    a |= {name: np.zeros(blocks, np.int32) for name in ("stale", "walled")}
+    a |= {name: np.zeros(groups, np.int64) for name in ("begin", "lanes", "row", "found", "raw_begin", "looked", "beyond")}
+    a |= {"head": np.zeros(count, np.int32), "start": np.zeros(4 * count + 72, np.uint32)}
+    a |= {"extent": np.zeros((blocks, 4), dtype), "box": np.zeros((2 * count + 64, 4), dtype)}
+    w.listed, w.checked, w.moved = reals(a["listed"]), reals(a["checked"]), reals(a["moved"])
+    w.fastest, w.stale, w.walled = reals(a["fastest"]), small_integers(a["stale"]), small_integers(a["walled"])
+    w.begin, w.lanes = integers(a["begin"]), integers(a["lanes"])
+    c.spot_u, c.spot_v, c.spot_r = reals(a["spot_u"]), reals(a["spot_v"]), reals(a["spot_r"])
+    c.cell, c.order, c.start, c.patch = indices(a["cell"]), indices(a["order"]), indices(a["start"]), indices(a["patch"])
+    c.extent, c.box = reals(a["extent"]), reals(a["box"])
+    ls.used, ls.batch, ls.speeds, ls.head = indices(a["used"]), indices(a["batch"]), reals(a["speeds"]), small_integers(a["head"])
+    ls.row, ls.found, ls.raw_begin = integers(a["row"]), integers(a["found"]), integers(a["raw_begin"])
+    ls.looked, ls.beyond = integers(a["looked"]), integers(a["beyond"])
+    ls.listed = ls.good = ls.harvested = False
+    w.groups = ls.rows = 0
+
+
+@cython.cfunc
+def make_found_arrays(ls: cython.pointer(Lists), a, pairs: cython.Py_ssize_t):
+    """Of so many pairs, as they are found."""
+    ls.pairs_room = pairs
+    a |= {name: np.empty(pairs, np.uint32) for name in ("raw_i", "raw_j", "sorted", "rest")}
+    a["key"] = np.empty(pairs, np.uint8)
+    ls.raw_i, ls.raw_j, ls.sorted, ls.rest = indices(a["raw_i"]), indices(a["raw_j"]), indices(a["sorted"]), indices(a["rest"])
+    ls.key = octets(a["key"])
+
+
+@cython.cfunc
+def make_lane_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype):
+    """Of so many lanes."""
+    w.lists.lanes_room = lanes
+    a |= {name: np.zeros(lanes, np.uint32) for name in ("i", "j")}
+    a |= {name: np.zeros((2, lanes), dtype) for name in ("gap", "normal")}
+    a |= {name: np.zeros(lanes, dtype) for name in ("depth", "load", "impulse", "tangent_impulse")}
+    a |= {"hit": np.zeros(lanes, np.int64), "hit_time": np.zeros(lanes)}
+    w.hit, w.hit_time, w.i, w.j = integers(a["hit"]), doubles(a["hit_time"]), indices(a["i"]), indices(a["j"])
+    w.gap_x, w.gap_y = map_row(a["gap"], 0), map_row(a["gap"], 1)
+    w.normal_x, w.normal_y = map_row(a["normal"], 0), map_row(a["normal"], 1)
+    w.depth, w.load = reals(a["depth"]), reals(a["load"])
+    w.impulse, w.tangent_impulse = reals(a["impulse"]), reals(a["tangent_impulse"])
+
+
+@cython.cfunc
+def make_kept_arrays(ls: cython.pointer(Lists), a, lanes: cython.Py_ssize_t, dtype):
+    """For what so many contacts remember, beside what is there."""
+    old = a.get("kept")
+    have = 0 if old is None else len(old)
+    if have < lanes:
+        shapes = (("kept_next", lanes, np.int32), ("kept_other", lanes, np.uint32), ("kept", (lanes, 3), dtype))
+        for name, shape, kind in shapes:
+            larger = np.zeros(shape, kind)
+            if have:
+                larger[:have] = a[name]
+            a[name] = larger
+    ls.kept_next, ls.kept_other, ls.kept = small_integers(a["kept_next"]), indices(a["kept_other"]), reals(a["kept"])
+
+
+@cython.cfunc
+def make_material_arrays(w: cython.pointer(Step), a, dtype):
+    """For what pairs are made of: one a lane, or eight."""
+    lanes = max(w.lists.lanes_room, 8)
+    shapes = {"reach": (lanes if w.sized else 8,), "share": (lanes if w.varied else 8,), "made_of": (6, lanes if w.mixed else 8)}
+    for name, shape in shapes.items():
+        if name not in a or a[name].shape != shape:
+            a[name] = np.zeros(shape, dtype)
+            w.lists.refill = True
+    w.reach, w.share = reals(a["reach"]), reals(a["share"])
+    made_of = a["made_of"]
+    w.restitution, w.friction, w.radius_i = map_row(made_of, 0), map_row(made_of, 1), map_row(made_of, 2)
+    w.radius_j, w.turn_i, w.turn_j = map_row(made_of, 3), map_row(made_of, 4), map_row(made_of, 5)

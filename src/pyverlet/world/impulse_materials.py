@@ -1,0 +1,41 @@
+"""What the compiled core is told of the circles of a world: sizes, and whether they are all alike."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.state.slots import Slots
+
+Array = NDArray[Any]
+
+ALONE = 256
+MUCH_LARGER = 4.0
+"""Circles so many times as large as all but one in ALONE stand in no cell of the grid."""
+
+
+def materials_of(state: Slots, radius: Array, collisions: Collisions) -> dict[str, Any]:
+    """The arguments of `Engine.set_materials`; radius: (n,) m, in the user's order, on which the last bit of a mean depends."""
+    ordered = np.sort(radius)[::-1] if len(radius) else np.ones(1)
+    # Very few that are much larger than all others stand in no cell.
+    usual = float(ordered[min(len(ordered) // ALONE, len(ordered) - 1)])
+    return {
+        "sized": _differs(state.radius),
+        "varied": _differs(state.inverse_mass),
+        "mixed": any(map(_differs, (state.radius, state.restitution, state.friction))),
+        "bulk": float(ordered[ordered <= MUCH_LARGER * usual][0]),
+        "smallest": float(ordered[-1]),
+        "largest": float(ordered[0]),
+        "mean_radius": float(radius.mean(dtype=np.float64)) if len(radius) else 1.0,
+        "restitution": collisions.restitution,
+        "friction": collisions.friction,
+        "picky": bool(len(state.category)) or not bool((state.inverse_mass > 0).all()),
+    }
+
+
+def _differs(column: Array) -> bool:
+    """Whether not all are the same."""
+    return bool(len(column) and (column != column[0]).any())

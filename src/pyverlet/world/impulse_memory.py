@@ -1,0 +1,55 @@
+"""What contacts remember from frame to frame under the law of impulses, by the user's index of particles."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+
+class Memory(NamedTuple):
+    """What outlives a frame, by the user's index: contacts between particles and on walls, what they gave each, and the step.
+
+    pairs (k, 2) and values (k, 3): see `Engine.take_impulses`. wall: (8, n) impulses along the normals of four sides, and along
+    their tangents. given: (n, 3) velocity and spin that contacts gave in the last substep, over `kick` seconds. h: length of the
+    last substep, s. hertz: frequency of the springs; finer: for how long, s, a higher one would have been possible. listed,
+    checked: (n, 2) of the list of pairs, and skin: its numbers, as of `Engine.save_list`; empty without one.
+    """
+
+    pairs: Array
+    values: Array
+    wall: Array
+    given: Array
+    kick: float
+    h: float
+    hertz: float
+    finer: float
+    listed: Array
+    checked: Array
+    skin: tuple[float, ...] = ()
+
+    @classmethod
+    def empty(cls, dtype: np.dtype[Any]) -> Memory:
+        """No contact remembers anything."""
+        rows, none = np.empty((0, 2), dtype), np.empty((0, 3), dtype)
+        return cls(np.empty((0, 2), np.int32), none, np.empty((8, 0), dtype), none, 0.0, 0.0, 0.0, 0.0, rows, rows)
+
+    def renumbered(self, now: Array) -> Memory:
+        """Of the particles that are now at `now` (n,), or no more (-1). There is no list of pairs."""
+        count, alive = int(now.max(initial=-1)) + 1, now[: len(self.given)] >= 0
+        wall, given = np.zeros((8, count), self.wall.dtype), np.zeros((count, 3), self.given.dtype)
+        to, none = now[: len(self.given)][alive], self.listed[:0]
+        wall[:, to], given[to] = self.wall[:, alive], self.given[alive]
+        pairs = now[self.pairs].astype(np.int32)
+        kept = (pairs >= 0).all(axis=1)
+        return self._replace(
+            pairs=pairs[kept], values=self.values[kept], wall=wall, given=given, listed=none, checked=none, skin=()
+        )
+
+
+def columns_of(given: Array) -> tuple[Array, Array]:
+    """(n, 2) velocity and (n,) spin of `Memory.given`."""
+    return np.ascontiguousarray(given[:, :2]), np.ascontiguousarray(given[:, 2])
