@@ -140,10 +140,13 @@ def test_lists_do_not_depend_on_the_number_of_threads(kind: str, sizes: str, mon
 
 
 @pytest.mark.parametrize(("kind", "sizes"), [("box", "equal"), ("box", "giants"), ("ring", "1:5"), ("periodic", "1:50")])
-def test_a_saved_world_makes_the_same_lists(kind: str, sizes: str) -> None:
+@pytest.mark.parametrize("removes", [False, True])
+def test_a_saved_world_makes_the_same_lists(kind: str, sizes: str, removes: bool) -> None:
     world = crowd(kind, sizes, 1500)
     for _ in range(5):
         world.step(1 / 60)
+    if removes:
+        world.remove(range(0, 1500, 7))
     saved, ends = world.save(), set()
     for _ in range(2):
         for _ in range(8):

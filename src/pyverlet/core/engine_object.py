@@ -267,16 +267,20 @@ class Engine:
         self.ls.listed, self.ls.good, self.ls.harvested = False, False, True
 
     def save_list(self):
-        """(listed, checked, numbers): what `restore_list` needs to make the same list again; None without one."""
+        """(listed, checked, numbers): what `restore_list` needs to make the same list again; empty arrays without one."""
         ls: cython.pointer(Lists) = cython.address(self.ls)
         numbers = (ls.diameters, ls.half_skin, self.c.skin, self.w.allowed, float(ls.age), float(ls.hold))
-        return (self.arrays["listed"].copy(), self.arrays["checked"].copy(), numbers) if ls.good else None
+        rows = self.w.count if ls.good else 0
+        return self.arrays["listed"][:rows].copy(), self.arrays["checked"][:rows].copy(), tuple(map(float, numbers))
 
     def restore_list(self, listed, checked, numbers):
         """Make the list that `save_list` was about; particles, their order and what they are made of are those of then."""
         w: cython.pointer(Step) = cython.address(self.w)
         ls: cython.pointer(Lists) = cython.address(self.ls)
         ls.diameters, ls.half_skin, self.c.skin = numbers[:3]
+        ls.hold = int(numbers[5])
+        if len(listed) != w.count:
+            return
         self.c.position = reals(listed)
         while True:
             with cython.nogil:
@@ -288,4 +292,5 @@ class Engine:
         self.c.position = w.position
         self.arrays["checked"][:] = checked
         w.allowed = numbers[3]
-        ls.age, ls.hold = int(numbers[4]), int(numbers[5])
+        ls.age = int(numbers[4])
+        ls.hold = int(numbers[5])

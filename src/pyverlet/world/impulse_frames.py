@@ -81,17 +81,20 @@ class ImpulseFrames:
         wall, given = np.zeros((8, count), self._dtype), np.zeros((count, 3), self._dtype)
         wall[:, particle], given[particle, :2], given[particle, 2] = self._wall, self._gave, self._gave_spin
         pairs, values = (array.copy() for array in self._impulses())
-        rows = [np.empty((0, 2), self._dtype)] * 2
-        skin: tuple[float, ...] = ()
-        if kept := self._kept_list if self._kept is not None else self._engine.save_list():
-            rows = [np.zeros((count, 2), self._dtype) for _ in range(2)]
-            rows[0][particle], rows[1][particle], skin = kept
-        return Memory(pairs, values, wall, given, self._kick, self._h, self._hertz, self._finer, *rows, skin)
+        kept = self._kept_list or (self._engine.save_list() if self._kick else None)
+        if kept is None:
+            none = np.empty((0, 2), self._dtype)
+            return Memory(pairs, values, wall, given, self._kick, self._h, self._hertz, self._finer, none, none)
+        listed, checked = (np.zeros((count if len(rows) else 0, 2), self._dtype) for rows in kept[:2])
+        if len(listed):
+            listed[particle], checked[particle] = kept[:2]
+        skin = kept[2]
+        return Memory(pairs, values, wall, given, self._kick, self._h, self._hertz, self._finer, listed, checked, skin)
 
     def restore(self, memory: Memory) -> None:
         """Back to what `save` returned."""
         self._kept: tuple[Array, Array] | None = (memory.pairs, memory.values)  # what the engine is still to be given
-        self._kept_list = (memory.listed, memory.checked, memory.skin) if memory.skin else None
+        self._kept_list: Any = (memory.listed, memory.checked, memory.skin) if memory.skin else None
         self._particle = np.arange(len(memory.given), dtype=np.int32)
         self._wall, self._gave, self._gave_spin = memory.wall, *columns_of(memory.given)
         self._kick, self._h, self._hertz, self._finer = memory.kick, memory.h, memory.hertz, memory.finer
@@ -317,8 +320,7 @@ class ImpulseFrames:
             self._room = world.boundary
         if self._kept_list is not None:
             engine.set_skin(self._kept_list[2][0], self._skin is None)
-            listed, checked = (np.ascontiguousarray(rows[self._particle]) for rows in self._kept_list[:2])
-            engine.restore_list(listed, checked, self._kept_list[2])
+            engine.restore_list(*self._kept_list)
             self._kept_list = None
         if len(state) >= SORTED_FROM:
             self._sort(state)
@@ -343,8 +345,10 @@ class ImpulseFrames:
         wall, given = np.zeros((8, count), self._dtype), np.zeros((count, 3), self._dtype)
         wall[:, self._particle] = self._wall
         given[self._particle, :2], given[self._particle, 2] = self._gave, self._gave_spin
-        if self._kept_list is not None and len(self._kept_list[0]) != len(state):
-            self._kept_list = None
+        if self._kept_list is not None:
+            rows, same = self._kept_list[:2], len(self._kept_list[0]) == len(state)
+            listed, checked = (np.ascontiguousarray(row[state.particle]) if same else row[:0] for row in rows)
+            self._kept_list = listed, checked, self._kept_list[2]
         self._particle, place = state.particle, np.zeros(count, np.int32)
         place[state.particle] = np.arange(len(state), dtype=np.int32)
         self._wall, self._gave, self._gave_spin = (

@@ -16,7 +16,7 @@ class Memory(NamedTuple):
     pairs (k, 2) and values (k, 3): see `Engine.take_impulses`. wall: (8, n) impulses along the normals of four sides, and along
     their tangents. given: (n, 3) velocity and spin that contacts gave in the last substep, over `kick` seconds. h: length of the
     last substep, s. hertz: frequency of the springs; finer: for how long, s, a higher one would have been possible. listed,
-    checked: (n, 2) of the list of pairs, and skin: its numbers, as of `Engine.save_list`; empty without one.
+    checked: (n, 2) of the list of pairs, and skin: its numbers, as of `Engine.save_list`. Empty without one.
     """
 
     pairs: Array
@@ -45,9 +45,7 @@ class Memory(NamedTuple):
         wall[:, to], given[to] = self.wall[:, alive], self.given[alive]
         pairs = now[self.pairs].astype(np.int32)
         kept = (pairs >= 0).all(axis=1)
-        return self._replace(
-            pairs=pairs[kept], values=self.values[kept], wall=wall, given=given, listed=none, checked=none, skin=()
-        )
+        return self._replace(pairs=pairs[kept], values=self.values[kept], wall=wall, given=given, listed=none, checked=none)
 
 
 def columns_of(given: Array) -> tuple[Array, Array]:

@@ -218,5 +218,5 @@ class Measures(Particles):
     def rebuilds(self) -> int:
         """How often the neighbour list has been built."""
         if self._by_impulses:
-            return self._impulses.rebuilds
+            return int(self._impulses.rebuilds)
         return self._contacts.broad_phase.rebuilds if self._contacts else 0

@@ -307,7 +307,7 @@ def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
     none = np.empty((0, 2), world.dtype)
     listed, checked = (arrays.get(f"impulses.{name}", none).copy() for name in ("listed", "checked"))
     skin = tuple(checks.number("skin", number, least=0.0) for number in facts.get("skin") or ())
-    if len(skin) not in (0, 6) or bool(skin) != bool(len(listed)) or len(listed) not in (0, len(given)):
+    if len(skin) not in (0, 6) or (len(listed) and not skin) or len(listed) not in (0, len(given)):
         raise InputError(
             f"impulses.skin has {len(skin)} numbers and impulses.listed {len(listed)} rows; allowed are 6 and one "
             "for each row of impulses.given, or none"
