@@ -8,7 +8,7 @@ Per substep of length h:
  4. contacts: one sweep over the pairs, with springs; pairs that meet fast bounce, in closed form.
  5. drift: walls once more, then x += v h.
  6. relax: sweeps without the springs.
- 7. remember what contacts gave.
+ 7. remember what contacts gave, in the last one.
 
 Velocities within a frame are those of the middle of a substep (Stormer and Verlet). With v, a and c the velocity, the
 acceleration by forces and that by contacts at the start of a frame, its first substep begins from v + a h / 2 - c h' / 2, h'
@@ -247,7 +247,8 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
         if sweep > 0 and w.room != OPEN:
             team_stage(w.team, relax_walls_stage, w, blocks)
         each_group(w, relax_stage)
-    team_stage(w.team, remember_stage, w, blocks)
+    if w.substep + 1 == w.substeps:  # what contacts gave before is asked for by no one
+        team_stage(w.team, remember_stage, w, blocks)
     for b in range(blocks):
         stale |= w.stale[b] != 0
     return stale

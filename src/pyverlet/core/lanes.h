@@ -36,13 +36,6 @@ LANES_INLINE mask both(mask a, mask b) { return a & b; }
 LANES_INLINE mask either(mask a, mask b) { return a | b; }
 LANES_INLINE mask outside(mask a) { return ~a; }
 LANES_INLINE lanes choose(mask m, lanes a, lanes b) { return (lanes)(((mask)a & m) | ((mask)b & ~m)); }
-LANES_INLINE int any_lane(mask m) {
-    int64_t words[sizeof(mask) / 8], any = 0;
-    memcpy(words, &m, sizeof m);
-    for (unsigned k = 0; k < sizeof(mask) / 8; k++)
-        any |= words[k];
-    return any != 0;
-}
 /* Bit l is set where the mask is in lane l. */
 LANES_INLINE int bits_of(mask m) {
     int bits = 0;
@@ -67,6 +60,17 @@ LANES_INLINE int bits_of(mask m) {
         bits |= (m[l] & 1) << l;
 #endif
     return bits;
+}
+LANES_INLINE int any_lane(mask m) {
+#ifdef __AVX__
+    return bits_of(m) != 0;
+#else
+    int64_t words[sizeof(mask) / 8], any = 0;
+    memcpy(words, &m, sizeof m);
+    for (unsigned k = 0; k < sizeof(mask) / 8; k++)
+        any |= words[k];
+    return any != 0;
+#endif
 }
 /* The number of the lowest bit that is set, of a number that is not 0. */
 LANES_INLINE int lowest_bit(uint32_t bits) { return __builtin_ctz(bits); }

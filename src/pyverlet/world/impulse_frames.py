@@ -67,6 +67,7 @@ class ImpulseFrames:
         self._engine: Any = self._core.Engine(1)
         self._checked: Any = None  # what the world was made of when it was last found to be known
         self._law: Any = None  # numbers that the engine holds
+        self._pull: tuple[Any, float] = None, 0.0  # gravity, and how strong it is, m/s^2
         self._room: Any = None
         self.growth = Growth()
         self.forget()
@@ -212,10 +213,10 @@ class ImpulseFrames:
 
     def _strongest(self, gravity: tuple[float, float]) -> float:
         """The largest acceleration by gravity alone, m/s^2."""
-        if not self._free:
-            return 0.0
-        x, y = map(self._dtype.type, gravity)
-        return float(np.sqrt(x * x + y * y))
+        if gravity is not self._pull[0]:
+            x, y = map(self._dtype.type, gravity)
+            self._pull = gravity, float(np.sqrt(x * x + y * y))
+        return self._pull[1] if self._free else 0.0
 
     def _limit(self, world: Any, watch: Any, dt: float) -> None:
         """Take back what energy a frame of dt seconds has gained, if it is too much."""
