@@ -189,9 +189,42 @@ def test_impulses_survive_new_lists() -> None:
     assert all(loads[1][pair] == pytest.approx(load, rel=1e-5) for pair, load in carried.items())
 
 
+def test_pairs_that_links_keep_apart_are_not_listed() -> None:
+    world = crowd("box", "1:5", 200)
+    world.step(1 / 60)
+    particle = world._slots.particle
+    pairs = np.sort(particle[listed(world)[1]], axis=1)[::3]
+    pairs = pairs[np.lexsort(pairs.T[::-1])]
+    begin = np.searchsorted(pairs[:, 0], np.arange(len(world) + 1))
+    world._impulses._engine.set_linked(begin, np.ascontiguousarray(pairs[:, 1], np.int32))
+    world.step(1 / 60)
+    left = {tuple(pair) for pair in np.sort(world._slots.particle[listed(world)[1]], axis=1).tolist()}
+    assert left
+    assert not left & {tuple(pair) for pair in pairs.tolist()}
+
+
 def test_an_empty_world_and_a_lone_disc_have_no_pairs() -> None:
     world = pv.World(collisions=pv.Collisions(impulses=True))
     world.step(1 / 60)
     world.add(position=(0, 0), radius=1.0)
     world.step(1 / 60)
     assert listed(world)[0] == set()
+
+
+@pytest.mark.filterwarnings("ignore::pyverlet.ground.errors.CoarseStepWarning")
+@pytest.mark.parametrize(("kind", "sizes"), [("box", "giants"), ("periodic", "1:50"), ("tube", "1:5"), ("open", "equal")])
+def test_who_touches_is_always_listed(kind: str, sizes: str) -> None:
+    # While particles move, come, go, grow, and change whom they collide with.
+    chance, world = np.random.default_rng(8), crowd(kind, sizes, 300)
+    for frame in range(120):
+        if frame % 10 == 3:
+            world.add(position=chance.uniform(-1, 1, (5, 2)), radius=0.08, velocity=chance.normal(0, 3, (5, 2)))
+        if frame % 10 == 6:
+            world.remove(chance.choice(len(world), 4, replace=False))
+        if frame % 20 == 9:
+            world.radius[5:8] *= 1.1
+            world.velocity[20:30] += chance.normal(0, 2, (10, 2))
+        if frame == 60:
+            world.mask[:20] = 2
+        world.step(1 / 60)
+        assert brute_force(world._slots, -1e-6) <= listed(world)[0]
