@@ -107,13 +107,19 @@ def drift(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t, p
 @cython.nogil
 @cython.exceptval(check=False)
 def remember(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t) -> cython.void:
-    """What the contacts of this substep gave."""
+    """What the contacts of this substep gave; of a blow to the spin no more than twice what they gave in the last one.
+
+    The velocity at the end of a frame goes on by half of it, as if it were given evenly.
+    """
     i: cython.Py_ssize_t
     if w.rough:
         for i in range(a, b):
+            turned: real = w.motion[4 * i + 2] - w.free_spin[i]
+            before: real = w.given_spin[i] if w.given_spin[i] > 0 else -w.given_spin[i]
+            most: real = before + before + w.rest_speed / w.radius[i]
             w.given[2 * i] = w.motion[4 * i] - w.free[2 * i]
             w.given[2 * i + 1] = w.motion[4 * i + 1] - w.free[2 * i + 1]
-            w.given_spin[i] = w.motion[4 * i + 2] - w.free_spin[i]
+            w.given_spin[i] = max(min(turned, most), -most)
     else:
         given: cython.pointer(real) = w.given
         velocity: cython.pointer(real) = w.velocity

@@ -15,11 +15,11 @@ from pyverlet import core
 from pyverlet.ground.constants import REST_ACCELERATIONS
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.laws.contacts.broadphase import Fast
-from pyverlet.laws.integrators import PositionVerlet, SemiImplicitEuler, TimeCorrectedVerlet
 from pyverlet.laws.limiter import watched
 from pyverlet.laws.rooms import Box, Circle, Open, Periodic
 from pyverlet.state.moves import first_non_finite
 from pyverlet.state.slots import Slots
+from pyverlet.world.free_steps import FreeSteps, kicks
 
 Array = NDArray[Any]
 
@@ -45,6 +45,9 @@ RELAXING_SWEEPS = 2
 
 NEAR = 0.05
 """Of the largest radius: pairs and walls with larger gaps carry no load."""
+
+ROOMS = Open, Circle, Box, Periodic
+"""Whose walls the core knows; others confine the particles after each substep."""
 
 OPEN, CAGE, BOX = range(3)
 """Rooms, as the core numbers them."""
@@ -75,7 +78,7 @@ class ImpulseFrames:
         self._dtype = dtype
         self._engine: Any = None
         self._synced = False  # whether `_motion` holds the velocities of now
-        self._parts = 1
+        self._parts, self._flight = 1, FreeSteps()
         self.forget()
 
     def forget(self) -> None:
@@ -140,8 +143,6 @@ class ImpulseFrames:
         Raises:
             InputError: there is such a thing in the world.
         """
-        integrator, room = world.integrator, world.boundary
-        known = type(integrator) in (PositionVerlet, TimeCorrectedVerlet, SemiImplicitEuler)
         unknown = {
             "links": bool(world.links),
             "obstacles": bool(world.obstacles),
@@ -149,15 +150,10 @@ class ImpulseFrames:
             "events": world.tells_events,
             "contacts=True": world._touches is not None,
             "sleep=True": world._sleep is not None,
-            repr(integrator): not known or getattr(integrator, "naive_start", False),
-            f"a room of type {type(room).__name__}": type(room) not in (Circle, Box, Open, Periodic),
             "brute force": not isinstance(world.collisions.method, Fast),
         }
         if found := [name for name, there in unknown.items() if there]:
-            raise InputError(
-                f"impulses is True in a world with {found[0]}; allowed are circles in a Circle, Box, Periodic or Open room, with "
-                "forces, stepped by PositionVerlet, TimeCorrectedVerlet or SemiImplicitEuler"
-            )
+            raise InputError(f"impulses is True in a world with {found[0]}; allowed are circles in a room, with forces")
 
     def run(self, world: Any, dt: float, done: Callable[[str], None]) -> None:
         """Advance the gathered slots by a frame of dt seconds.
@@ -171,47 +167,67 @@ class ImpulseFrames:
         contacts = world._contacts if len(world) > 1 else None
         contained = contacts is not None or not isinstance(world.boundary, Open)
         substeps = world.substeps * (int(np.ceil(dt / LONGEST_FRAME * (1 - 1e-9))) if contained else 1)
-        h, half = dt / substeps, world.integrator.velocity_lag
-        first_kick = half * (h + (self._h if self._kick else 0.0)) if half else h
+        by_core = kicks(world.integrator)
+        h, half = dt / substeps, world.integrator.velocity_lag if by_core else 0.5
+        before = self._h if self._kick else 0.0
         self._stiffen(h, dt)
         watch = watched(world, dt / world.substeps, None) if contained else None
         state.h = h
+        if getattr(world.integrator, "naive_start", False):
+            self._start_naively(world, (1.0 - half) * h)
         rough = bool(contacts and contacts._rubs(state)) or getattr(world.boundary, "friction", 0.0) > 0.0
-        step, stale = 0, None
+        own_walls = None if isinstance(world.boundary, ROOMS) else world.boundary.confine
+        step, stale, each = 0, None, bool(forces.forces) or not by_core or own_walls is not None
         if contacts:
             contacts.broad_phase.replacing = self._harvest
         while step < substeps:
-            if step == 0 or forces.forces:
+            opens = step == 0 or not by_core  # from velocities that belong to the positions
+            kick = half * (h + before) if half and opens else h
+            taken_back, scale = (half * before / self._kick if opens else 0.0, kick / self._kick) if self._kick else (0.0, 1.0)
+            if not by_core:
+                self._flight.take(world.integrator, state, forces, world.time + step * h, h)
+            elif step == 0 or forces.forces:
                 self._evaluate(world, step * h, half * h if step else 0.0)
-                done("integrate")
-            last = 1.0 if not self._kick else self._kick
-            kick = first_kick if step == 0 else h
+            done("integrate")
             self._load(world, contacts, stale)
             done("broad phase")
-            self._set_law(forces.strongest, h, kick, kick / last, opening=step == 0, half=half, rough=rough, state=state)
+            opening = 0.0 if not by_core else half * h if half and opens else h
+            self._set_law(forces.strongest, h, kick, opening, taken_back, scale, rough, state)
             if step == 0:
                 self._set_room(world.boundary)
                 if contacts and self._engine.strays():
                     self._load(world, contacts, True)
             if rough and not self._synced:
                 self._motion[:, :2], self._motion[:, 2] = state.velocity, state.spin
-            # The first substep has a kick of its own; forces of Python are asked in each.
-            stop = step + 1 if forces.forces or kick != h else substeps
-            before = step
+            # The first substep has a kick of its own; integrators and forces of Python are asked in each.
+            start, stop = step, step + 1 if each or kick != h else substeps
             step, stale = self._engine.run(step, stop, self._parts)
-            self._kick, self._synced = (h if step > 1 else first_kick), not forces.forces
+            self._kick, self._synced = kick if step == start + 1 else h, not each
             if rough:
                 state.velocity[:], state.spin[:] = self._motion[:, :2], self._motion[:, 2]
             if contacts:
-                contacts.broad_phase.aged(step - before - 1)
+                contacts.broad_phase.aged(step - start - 1)
             done("contacts")
-            world._show(step * h, half * h) if step < substeps else None
+            if own_walls:
+                own_walls(state, h, half * h if by_core else 0.0, 0.0)
+            if not by_core:
+                self._flight.end(state, self._gave, self._gave_spin, h / self._kick)
+            before = h
+            world._show(step * h, half * h if by_core else 0.0) if step < substeps else None
         self._h, self._synced = h, False
         self._given[:, :2], self._given[:, 2] = self._gave, self._gave_spin
-        self._end(world, dt, half * h)
+        self._end(world, dt, half * h if by_core else 0.0)
         if watch:
             watch.close(state, contacts)
         done("finish")
+
+    def _start_naively(self, world: Any, missing: float) -> None:
+        """Kick those that are new by what x_prev = x - v h leaves out: it takes the first kick to be a whole one."""
+        state = world._slots
+        fresh = np.isnan(state.acceleration[:, 0])
+        if fresh.any():
+            self._evaluate(world, 0.0, 0.0)
+            state.velocity[fresh] += state.real(missing) * state.acceleration[fresh]
 
     def _evaluate(self, world: Any, since: float, ahead: float) -> None:
         """Accelerations by gravity and forces; these see velocities of now, not of half a substep ago."""
@@ -230,6 +246,7 @@ class ImpulseFrames:
         if half:
             self._evaluate(world, dt, half)
             state.velocity += state.real(half) * (state.acceleration + by_contacts)
+            state.spin += self._given[:, 2] * state.real(half / self._kick)
         state.acceleration += by_contacts
         if (particle := first_non_finite(state)) >= 0:
             self.forget()
@@ -246,17 +263,16 @@ class ImpulseFrames:
             self._hertz = min(best, self._hertz * 2.0 ** (STIFFENING * dt))
 
     def _set_law(
-        self, strongest: float, h: float, kick: float, scale: float, *, opening: bool, half: float, rough: bool, state: Slots
+        self, strongest: float, h: float, kick: float, opening: float, taken_back: float, scale: float, rough: bool, state: Slots
     ) -> None:
         omega = 2.0 * np.pi * self._hertz
         damped = 2.0 * DAMPING + h * omega
         hard = h * omega * damped
-        known = self._kick > 0.0
         self._engine.set_law(
             h=h,
-            opening=(half * h if half else h) if opening else h,
-            taken_back=half * self._h / self._kick if opening and known else 0.0,
-            scale=scale if known else 1.0,
+            opening=opening,
+            taken_back=taken_back,
+            scale=scale,
             rest_speed=REST_ACCELERATIONS * strongest * h,
             restless=strongest == 0.0,
             rate=omega / damped,
@@ -273,7 +289,7 @@ class ImpulseFrames:
         if isinstance(room, Circle):
             speed = room.angular_velocity * room.radius
             self._engine.set_room(CAGE, *room.center, room.radius, 0.0, room.restitution, room.friction, speed)
-        elif isinstance(room, Open) or (isinstance(room, Periodic) and room.axes == "xy"):
+        elif not isinstance(room, Box | Periodic) or (isinstance(room, Periodic) and room.axes == "xy"):
             self._engine.set_room(OPEN, *(0.0,) * 7)
         else:
             corners = room._box if isinstance(room, Periodic) else (*room.lower, *room.upper)
