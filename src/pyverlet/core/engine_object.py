@@ -45,7 +45,9 @@ class Engine:
         self.arrays = {
             "fastest": np.zeros(threads, np.float64 if cython.sizeof(real) == 8 else np.float32),
             "stale": np.zeros(threads, np.int32),
+            "again": np.zeros(threads, np.int32),
         }
+        self.w.again = small_integers(self.arrays["again"])
         self.w.fastest, self.w.stale = reals(self.arrays["fastest"]), small_integers(self.arrays["stale"])
 
     def __dealloc__(self):
@@ -70,6 +72,8 @@ class Engine:
         w: cython.pointer(Step) = cython.address(self.w)
         made_of = a["made_of"]
         w.groups = len(a["lanes"])
+        self.arrays["bounced"], self.arrays["searched"] = np.zeros(w.groups, np.int32), np.zeros(w.groups, np.int32)
+        w.bounced, w.searched = small_integers(self.arrays["bounced"]), small_integers(self.arrays["searched"])
         w.begin, w.lanes, w.hit, w.hit_time = (
             integers(a["begin"]),
             integers(a["lanes"]),

@@ -22,10 +22,13 @@ from cython.cimports.lanes import above, any_lane, lanes, larger, largest_lane, 
 from cython.cimports.libc.math import sqrt
 from cython.cimports.team import team_barrier
 
-from pyverlet.core.contacts import relax_contacts, solve_contacts
+from pyverlet.core.contacts import bounce_again, relax_contacts, solve_contacts
 from pyverlet.core.step import Step
 from pyverlet.core.walls import bounce_walls, hold_walls, list_walls, relax_walls, warm_walls
 from pyverlet.core.warm_start import warm_start
+
+MOST_ROUNDS = cython.declare(cython.int, 100)
+"""Over the groups in which pairs have bounced."""
 
 
 @cython.cfunc
@@ -131,6 +134,30 @@ def remember(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def bounce_on(w: cython.pointer(Step), part: cython.int, parts: cython.int) -> cython.void:
+    """What bounces may meet others, of other groups: until nobody does."""
+    turn: cython.int
+    parity: cython.Py_ssize_t
+    half: cython.Py_ssize_t
+    p: cython.int
+    for turn in range(1, MOST_ROUNDS):
+        again: cython.bint = False
+        for p in range(parts):
+            again |= w.again[p] != 0
+        if not again:
+            return
+        again = False
+        for parity in range(2):
+            for half in range(w.cut[parity * (parts + 1) + part], w.cut[parity * (parts + 1) + part + 1]):
+                again |= bounce_again(w, 2 * half + parity, 2 * turn + 1 + parity)
+            team_barrier(w.team)
+        w.again[part] = again
+        team_barrier(w.team)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def substep(
     w: cython.pointer(Step), part: cython.int, parts: cython.int, a: cython.Py_ssize_t, b: cython.Py_ssize_t
 ) -> cython.void:
@@ -146,7 +173,9 @@ def substep(
         fastest: real = 0
         for p in range(parts):
             fastest = max(fastest, w.fastest[p])
-        w.far = 2 * w.h * cython.cast(real, sqrt(fastest)) + w.near
+        fastest = cython.cast(real, sqrt(fastest))
+        w.far = 2 * w.h * fastest + w.near
+        w.least_bounce = max(w.rest_speed, fastest * cython.cast(real, 1e-14 if cython.sizeof(real) == 8 else 2e-6))
     team_barrier(w.team)
     walled: cython.Py_ssize_t = list_walls(w, a, b)
     for i in range(a, a + walled):
@@ -160,10 +189,13 @@ def substep(
         bounce_walls(w, w.at_wall[i])
         hold_walls(w, w.at_wall[i])
     team_barrier(w.team)
+    again: cython.bint = False
     for parity in range(2):
         for half in range(w.cut[parity * (parts + 1) + part], w.cut[parity * (parts + 1) + part + 1]):
-            solve_contacts(w, 2 * half + parity)
+            again |= solve_contacts(w, 2 * half + parity, 1 + parity)
+        w.again[part] = again
         team_barrier(w.team)
+    bounce_on(w, part, parts)
     for i in range(a, a + walled):
         hold_walls(w, w.at_wall[i])
     drift(w, a, b, part)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.laws.integrators import Forces, Integrator, PositionVerlet, SemiImplicitEuler, TimeCorrectedVerlet
@@ -25,7 +26,7 @@ class FreeSteps:
     """What an integrator does where nothing touches, substep by substep."""
 
     def __init__(self) -> None:
-        self._left: NDArray[Any] | None = None
+        self._left = self._particle = np.empty(0)
 
     def take(self, integrator: Integrator, state: Slots, forces: Forces, t: float, h: float) -> None:
         """Leave positions, and have the mean velocity and acceleration of the substep from t on."""
@@ -37,9 +38,13 @@ class FreeSteps:
         state.velocity[:] = (state.position - position) / state.real(h)
         state.acceleration[:] = (after - before) / state.real(h)
         state.position[:] = position
-        self._left = after - state.velocity
+        self._left, self._particle = after - state.velocity, state.particle
 
     def end(self, state: Slots, given: NDArray[Any], given_spin: NDArray[Any], share: float) -> None:
         """Velocities at the end of the substep, in which contacts gave `share` times these, as if evenly."""
+        if self._particle is not state.particle:  # the list of pairs has been made anew since, and particles sorted
+            by_particle = np.empty_like(self._left)
+            by_particle[self._particle] = self._left
+            self._left = by_particle[state.particle]
         state.velocity += self._left + state.real(0.5 * share) * given
         state.spin += state.real(0.5 * share) * given_spin

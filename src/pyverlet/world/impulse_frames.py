@@ -177,7 +177,7 @@ class ImpulseFrames:
             self._start_naively(world, (1.0 - half) * h)
         rough = bool(contacts and contacts._rubs(state)) or getattr(world.boundary, "friction", 0.0) > 0.0
         own_walls = None if isinstance(world.boundary, ROOMS) else world.boundary.confine
-        step, stale, each = 0, None, bool(forces.forces) or not by_core or own_walls is not None
+        step, stale, each = 0, None, bool(forces.forces or own_walls or world.onlooker) or not by_core
         if contacts:
             contacts.broad_phase.replacing = self._harvest
         while step < substeps:
