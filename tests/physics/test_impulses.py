@@ -282,7 +282,7 @@ def test_integrators_fly_freely_between_contacts(integrator: pv.Integrator) -> N
 def test_a_room_of_the_users_own_confines() -> None:
     room = pv.Box((-1, 0), (1, 10), restitution=1)
     world = pv.World(boundary=naive.ClampAndFlip(room), collisions=law(), dtype=np.float64)
-    world.add(position=[[0, 2], [0.2, 4]], radius=0.5)
+    world.add(position=[(0.0, 2.0), (0.2, 4.0)], radius=0.5)
     for _ in range(200):
         world.step(FRAME)
         assert (world.position[:, 1] >= 0.5 - 1e-9).all()

@@ -41,8 +41,8 @@ MOST_PASSES = cython.declare(cython.int, 100)
 def fast_ones(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: lanes, depth: lanes, nx: lanes, ny: lanes) -> mask:
     """Those of the pairs from k on that meet in this substep, and bounce.
 
-    They have restitution or friction; meet faster than contacts at rest, and than what their contact has borne lately is worth; were apart a
-    substep ago; and would meet without the impulses of contacts, too: what only these push together carries load.
+    They have restitution or friction; meet faster than contacts at rest, and than what their contact has borne lately is worth;
+    were apart a substep ago; and would meet without the impulses of contacts, too: what only these push together carries load.
     """
     rest: lanes = spread(-w.least_bounce)
     # Who comes to touch at the very end of the substep is left to the next: a spring would stop it, for a rounding of the depth.
