@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -66,11 +67,21 @@ def _ask(process: subprocess.Popen[str], question: str = "") -> list[float]:
     return [float(word) for word in line.split()]
 
 
-def compare(checkout: Path, particles: int, threads: int, turns: int) -> str:
-    """A line with both: medians, their quiet tenth, the median and the quartiles of the ratio of turns that follow each other."""
-    here, there = Path(pv.__file__).parents[1], checkout / "src"
-    if not (there / "pyverlet").is_dir():
+@contextmanager
+def _installed(checkout: Path) -> Iterator[Path]:
+    """A folder with the package of this checkout, its core compiled."""
+    if not (checkout / "src" / "pyverlet").is_dir():
         raise pv.InputError(f"checkout is {str(checkout)!r}; allowed is a folder with src/pyverlet in it")
+    with tempfile.TemporaryDirectory() as folder:
+        pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "-q", "install", "--no-deps", "--target", folder]
+        if subprocess.run([*pip, str(checkout)]).returncode:
+            raise pv.InputError(f"checkout is {str(checkout)!r}, which pip could not install; its own words are above")
+        yield Path(folder)
+
+
+def compare(there: Path, particles: int, threads: int, turns: int) -> str:
+    """A line with both: medians, their quiet tenth, the median and the quartiles of the ratio of turns that follow each other."""
+    here = Path(pv.__file__).parents[1]
     with _heap(there, particles, threads) as other, _heap(here, particles, threads) as ours:
         before, now = _ask(other), _ask(ours)
         times = np.empty((turns, 2))
@@ -89,6 +100,7 @@ def main(checkout: Path, particles: list[int], threads: list[int], turns: int) -
     """Print a line for each number of particles and of threads."""
     print(f"settled for 25 s; {turns} turns of {FRAMES} frames each; ms a frame; there, here; overlap in the mean")
     print(f"{'particles':>10}{'threads':>8}  {'quiet tenth':>17}{'median':>19}{'ratio':>9}")
-    for number in particles:
-        for count in threads:
-            print(compare(checkout, number, count, turns), flush=True)
+    with _installed(checkout) as there:
+        for number in particles:
+            for count in threads:
+                print(compare(there, number, count, turns), flush=True)

@@ -22,6 +22,7 @@ from cython.cimports.lanes import (
     store,
     take,
 )
+from cython.cimports.libc.stdint import int32_t
 
 from pyverlet.core.impacts import resolve_impacts
 from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, clamped, motion_of, slip_of
@@ -29,8 +30,8 @@ from pyverlet.core.step import OPEN, TOUCHED, Step
 from pyverlet.core.walls import bounce_walls
 from pyverlet.core.warm_start import measure_pairs
 
-MOST_PASSES = cython.declare(cython.int, 8)
-"""Over a group of cell rows, until no pair in it bounces any more."""
+MOST_PASSES = cython.declare(cython.int, 100)
+"""Over a group of cell rows, until no pair in it bounces any more: a row of discs that touch needs one for each of them."""
 
 
 @cython.cfunc
@@ -40,16 +41,19 @@ MOST_PASSES = cython.declare(cython.int, 8)
 def fast_ones(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: lanes, depth: lanes, nx: lanes, ny: lanes) -> mask:
     """Those of the pairs from k on that meet in this substep, and bounce.
 
-    They have restitution; meet faster than contacts at rest, and than what their contact has borne lately is worth; were apart a
-    substep ago; and would meet without the impulses of contacts, too: what only these push together carries load.
+    They have restitution or friction; meet faster than contacts at rest, and than what their contact has borne lately is worth;
+    were apart a substep ago; and would meet without the impulses of contacts, too: what only these push together carries load.
     """
-    rest: lanes = spread(-w.rest_speed)
-    fast: mask = both(above(rest, speed), above(spread(-w.h) * speed, -depth))
+    rest: lanes = spread(-w.least_bounce)
+    # Who comes to touch at the very end of the substep is left to the next: a spring would stop it, for a rounding of the depth.
+    rounding: lanes = spread(1e-12 if cython.sizeof(real) == 8 else 1e-5) * load(w.reach, k * w.sized)
+    fast: mask = both(above(rest, speed), above(rounding - spread(w.h) * speed, -depth))
     if any_lane(fast):
         u: lanes2 = take(w.free, w.i, k)
         v: lanes2 = take(w.free, w.j, k)
         fast = both(fast, above(rest, (v.x - u.x) * nx + (v.y - u.y) * ny))
-        fast = both(fast, above(load(w.restitution, k * w.mixed), spread(0)))
+        at: cython.Py_ssize_t = k * w.mixed
+        fast = both(fast, above(load(w.restitution, at) + load(w.friction, at), spread(0)))
         if not w.restless:
             carried: lanes = load(w.load, k)
             fast = both(fast, both(above(spread(TOUCHED), carried), above(rest + spread(4) * carried, speed)))
@@ -98,15 +102,15 @@ def find_hits(w: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint)
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, hits: cython.Py_ssize_t) -> cython.void:
+def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, hits: cython.Py_ssize_t) -> cython.bint:
     """Let pairs of group s that meet fast bounce, until none does; walls that they are thrown at throw them back."""
     first: cython.Py_ssize_t = w.begin[s]
     a: cython.Py_ssize_t
-    _: cython.int
-    for _ in range(MOST_PASSES):
+    n: cython.int
+    for n in range(MOST_PASSES):
         left: cython.Py_ssize_t = resolve_impacts(w, first, hits) if hits else 0
         if left == 0:
-            return
+            return n > 0
         if w.room != OPEN:
             for a in range(first, first + left):
                 k: cython.Py_ssize_t = w.hit[a] if w.hit[a] >= 0 else -1 - w.hit[a]
@@ -114,6 +118,7 @@ def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, hits: cython.Py_
                 bounce_walls(w, w.j[k])
         measure_pairs(w, s)
         hits = find_hits(w, s, True) if w.rough else find_hits(w, s, False)
+    return True
 
 
 @cython.cfunc
@@ -158,6 +163,7 @@ def solve(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint
                 after = choose(fast, before, after)
         else:
             after = choose(loaded, larger(before - speed, zero), zero)
+            after = choose(fast_ones(w, k, speed, depth, nx, ny), before, after)  # it bounces in the next substep
         store(w.impulse, k, after)
         tangent: lanes = zero
         if rough:
@@ -172,11 +178,48 @@ def solve(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def solve_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
-    """Soft contacts of group s; then pairs that meet fast bounce."""
+def solve_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.int) -> cython.bint:
+    """Soft contacts of group s; then pairs that meet fast bounce. Whether any did."""
     hits: cython.Py_ssize_t = solve(w, s, True, True) if w.rough else solve(w, s, False, True)
-    if hits:
-        bounce_pairs(w, s, hits)
+    bounced: cython.bint = hits > 0 and bounce_pairs(w, s, hits)
+    w.bounced[s] = stage if bounced else 0
+    w.searched[s] = stage
+    return bounced
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def bounced_around(w: cython.pointer(Step), s: cython.Py_ssize_t) -> int32_t:
+    """The stage of this substep in which a pair of a group that shares particles with group s bounced last, 0: none."""
+    latest: int32_t = 0
+    rows: cython.Py_ssize_t = w.lists.rows
+    g: cython.Py_ssize_t
+    if s == rows:  # circles that stand in no cell may meet any
+        for g in range(rows):
+            latest = max(latest, w.bounced[g])
+        return latest
+    if s > 0 or w.cells.wraps_v:
+        latest = max(latest, w.bounced[s - 1 if s > 0 else rows - 1])
+    if s + 1 < rows or w.cells.wraps_v:
+        latest = max(latest, w.bounced[s + 1 if s + 1 < rows else 0])
+    return max(latest, w.bounced[rows]) if w.groups > rows else latest
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def bounce_again(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.int) -> cython.bint:
+    """Let pairs of group s bounce that others have thrown at each other since it was searched; whether any did."""
+    if bounced_around(w, s) <= w.searched[s]:
+        return False
+    w.searched[s] = stage
+    measure_pairs(w, s)
+    hits: cython.Py_ssize_t = find_hits(w, s, True) if w.rough else find_hits(w, s, False)
+    if not bounce_pairs(w, s, hits):
+        return False
+    w.bounced[s] = stage
+    return True
 
 
 @cython.cfunc

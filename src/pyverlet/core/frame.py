@@ -8,7 +8,7 @@ Per substep of length h:
  4. contacts: one sweep over the pairs, with springs; pairs that meet fast bounce, in closed form.
  5. drift: walls once more, then x += v h.
  6. relax: sweeps without the springs.
- 7. remember what contacts gave, in the last one.
+ 7. remember what contacts gave.
 
 Velocities within a frame are those of the middle of a substep (Stormer and Verlet). With v, a and c the velocity, the
 acceleration by forces and that by contacts at the start of a frame, its first substep begins from v + a h / 2 - c h' / 2, h'
@@ -24,11 +24,13 @@ from cython.cimports.libc.stdint import int32_t
 from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK
-from pyverlet.core.contacts import relax_contacts, solve_contacts
+from pyverlet.core.contacts import bounce_again, relax_contacts, solve_contacts
 from pyverlet.core.relisting import each_group
 from pyverlet.core.step import OPEN, Step
 from pyverlet.core.walls import bounce_walls, hold_walls, list_walls, relax_walls, warm_walls
 from pyverlet.core.warm_start import warm_start
+
+MOST_ROUNDS = cython.declare(cython.int, 100)  # over the groups in which pairs have bounced
 
 
 @cython.cfunc
@@ -110,13 +112,18 @@ def drift(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t, p
 @cython.nogil
 @cython.exceptval(check=False)
 def remember(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t) -> cython.void:
-    """What the contacts of this substep gave."""
+    """What the contacts of this substep gave: the velocity at the end of a frame goes on by half of it, as if given evenly.
+
+    Of a blow to the spin no more than twice what they gave in the last one.
+    """
     i: cython.Py_ssize_t
     if w.rough:
         for i in range(a, b):
-            w.given[2 * i] = w.motion[4 * i] - w.free[2 * i]
-            w.given[2 * i + 1] = w.motion[4 * i + 1] - w.free[2 * i + 1]
-            w.given_spin[i] = w.motion[4 * i + 2] - w.free_spin[i]
+            turned: real = w.motion[4 * i + 2] - w.free_spin[i]
+            before: real = w.given_spin[i] if w.given_spin[i] > 0 else -w.given_spin[i]
+            most: real = before + before + w.rest_speed / w.radius[i]
+            w.given[2 * i], w.given[2 * i + 1] = w.motion[4 * i] - w.free[2 * i], w.motion[4 * i + 1] - w.free[2 * i + 1]
+            w.given_spin[i] = max(min(turned, most), -most)
     else:
         given: cython.pointer(real) = w.given
         velocity: cython.pointer(real) = w.velocity
@@ -212,7 +219,43 @@ def warm_start_stage(what: cython.p_void, item: cython.int) -> cython.void:
 def solve_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """The contacts of a group, and its impacts."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    solve_contacts(w, 2 * item + w.parity)
+    s: cython.Py_ssize_t = 2 * item + w.parity
+    solve_contacts(w, s, phase_of(w, s))
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def bounce_stage(what: cython.p_void, item: cython.int) -> cython.void:
+    """Pairs of a group that bounces in others have thrown at each other."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    bounce_again(w, 2 * item + w.parity, 3 * w.turn + phase_of(w, 2 * item + w.parity))
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def phase_of(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.int:
+    """When a group has its turn: 1 even ones, 2 odd ones, 3 the last, of circles that stand in no cell."""
+    return 3 if s == w.lists.rows else 1 + cython.cast(cython.int, s % 2)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def bounce_on(w: cython.pointer(Step)) -> cython.void:
+    """What bounces may meet others, of other groups: until nobody does."""
+    s: cython.Py_ssize_t
+    again: cython.bint = True
+    w.turn = 0
+    while again and w.turn < MOST_ROUNDS:
+        again = False
+        for s in range(w.groups):
+            again |= w.bounced[s] > 3 * w.turn
+        w.turn += 1
+        if again:
+            each_group(w, bounce_stage)
 
 
 @cython.cfunc
@@ -231,23 +274,26 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     """One substep; returns whether particles may leave where the list of pairs is good in the next one."""
     b: cython.Py_ssize_t
     sweep: cython.int
-    fastest: real = 0
+    most: real = 0
     stale: cython.bint = False
     team_stage(w.team, kick_stage, w, blocks)
     for b in range(blocks):
-        fastest = max(fastest, w.fastest[b])
-    w.far = 2 * w.h * cython.cast(real, sqrt(fastest)) + w.near
+        most = max(most, w.fastest[b])
+    fastest: real = cython.cast(real, sqrt(most))
+    w.far = 2 * w.h * fastest + w.near
+    w.least_bounce = max(w.rest_speed, fastest * cython.cast(real, 1e-14 if cython.sizeof(real) == 8 else 2e-6))
     team_stage(w.team, warm_walls_stage, w, blocks)
     each_group(w, warm_start_stage)
     if w.room != OPEN:
         team_stage(w.team, hold_walls_stage, w, blocks)
     each_group(w, solve_stage)
+    bounce_on(w)
     team_stage(w.team, drift_stage, w, blocks)
     for sweep in range(w.relaxes):
         if sweep > 0 and w.room != OPEN:
             team_stage(w.team, relax_walls_stage, w, blocks)
         each_group(w, relax_stage)
-    if w.substep + 1 == w.substeps:  # what contacts gave before is asked for by no one
+    if w.rough or w.substep + 1 == w.substeps:  # what smooth contacts gave before is asked for by no one
         team_stage(w.team, remember_stage, w, blocks)
     for b in range(blocks):
         stale |= w.stale[b] != 0

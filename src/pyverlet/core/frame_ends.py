@@ -52,6 +52,9 @@ def end_stage(what: cython.p_void, block: cython.int) -> cython.void:
         for i in range(2 * a, 2 * b):
             w.acceleration[i] += w.given[i] * w.by_contacts
             w.velocity[i] += w.half * w.acceleration[i]
+        if w.rough:
+            for i in range(a, b):
+                w.spin[i] += w.given_spin[i] * (w.half * w.by_contacts)
     for i in range(2 * a, 2 * b):
         finite &= isfinite(w.position[i] + w.velocity[i]) != 0
     w.stale[block] = cython.cast(int32_t, not finite)

@@ -157,7 +157,7 @@ def impact(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
     x /= distance
     y /= distance
     speed: cython.double = (m.ux + m.ax * back) * x + (m.uy + m.ay * back) * y
-    if speed >= -w.rest_speed:
+    if speed >= -w.least_bounce:
         return False
     push: cython.double = -(1 + w.restitution[k * w.mixed]) * speed
     strike_pair(w, k, cython.address(m), push * x, push * y, 0, t)

@@ -59,6 +59,9 @@ Step = cython.struct(
     tangent_impulse=cython.pointer(real),
     hit=cython.pointer(int64_t),  # pairs of a group that meet fast, from its begin on
     hit_time=cython.pointer(cython.double),  # s into the substep
+    bounced=cython.pointer(int32_t),  # (groups,) stage of this substep in which a pair of the group bounced last, 0: none
+    searched=cython.pointer(int32_t),  # (groups,) stage in which it was last searched for pairs that do
+    turn=cython.int,  # over the groups, for pairs that bounces in others have thrown at each other
     # ---- what pairs are made of; one for all, or one a lane
     reach=cython.pointer(real),  # r_i + r_j, m
     share=cython.pointer(real),  # of i in the inverse mass of the pair
@@ -99,6 +102,7 @@ Step = cython.struct(
     taken_back=real,  # share of `given` that the velocity at the start of a frame already holds, else 0
     scale=real,  # by which impulses are worth more in the first substep of a call than in the last one
     rest_speed=real,  # contacts that meet more slowly rest, m/s
+    least_bounce=real,  # the same, or what speeds are rounded by if that is more: slower ones do not bounce
     restless=cython.bint,  # nothing accelerates: nothing rests
     rate=real,  # of the springs, 1/s
     stiff=real,  # share of a violation that a sweep corrects

@@ -123,7 +123,7 @@ def bounce(w: cython.pointer(Step), i: cython.Py_ssize_t, side: cython.int, wall
     uy += w.acceleration[2 * i + 1] * back
     speed: cython.double = ux * nx + uy * ny
     free: cython.double = w.free[2 * i] * nx + w.free[2 * i + 1] * ny
-    if speed <= w.rest_speed or free <= w.rest_speed:  # what only contacts push there carries load
+    if speed <= w.least_bounce or free <= w.least_bounce:  # what only contacts push there carries load
         return False
     e: cython.double = max(w.wall_restitution, cython.cast(cython.double, w.own_restitution[i]))
     push: cython.double = (1 + e) * speed

@@ -16,12 +16,12 @@ from pyverlet.ground.constants import REST_ACCELERATIONS, SKIN, SURPLUS
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.laws.contacts.broadphase import Fast
 from pyverlet.laws.contacts.growth import Growth
-from pyverlet.laws.integrators import PositionVerlet, SemiImplicitEuler, TimeCorrectedVerlet
 from pyverlet.laws.limiter import fall, watched
-from pyverlet.laws.rooms import Box, Circle, Open, Periodic
+from pyverlet.laws.rooms import Open
 from pyverlet.state.moves import first_non_finite
 from pyverlet.state.slots import Slots
-from pyverlet.world.impulse_materials import materials_of
+from pyverlet.world.free_steps import FreeSteps, kicks
+from pyverlet.world.impulse_materials import ROOMS, materials_of, walls_of
 from pyverlet.world.impulse_memory import Memory, columns_of
 
 Array = NDArray[Any]
@@ -54,9 +54,6 @@ belongs before."""
 NEAR = 0.05
 """Of the largest radius: pairs and walls with larger gaps carry no load."""
 
-OPEN, CAGE, BOX = range(3)
-"""Rooms, as the core numbers them."""
-
 
 class ImpulseFrames:
     """The law of impulses in one world."""
@@ -65,6 +62,7 @@ class ImpulseFrames:
         self._dtype = dtype
         self._core = core.unit("engine", dtype)
         self._engine: Any = self._core.Engine(1)
+        self._parts, self._flight = 1, FreeSteps()
         self._checked: Any = None  # what the world was made of when it was last found to be known
         self._law: Any = None  # numbers that the engine holds
         self._pull: tuple[Any, float] = None, 0.0  # gravity, and how strong it is, m/s^2
@@ -120,7 +118,7 @@ class ImpulseFrames:
             InputError: there is something in the world that this law does not know yet.
             NonFiniteError: a particle turned NaN or infinite.
         """
-        known = world.integrator, world.boundary, world.collisions, len(world.links), len(world.obstacles)
+        known = world.collisions, len(world.links), len(world.obstacles)
         if known != self._checked:
             self.check(world)
             self._checked = known
@@ -137,8 +135,6 @@ class ImpulseFrames:
         Raises:
             InputError: there is such a thing in the world.
         """
-        integrator, room = world.integrator, world.boundary
-        known = type(integrator) in (PositionVerlet, TimeCorrectedVerlet, SemiImplicitEuler)
         unknown = {
             "links": bool(world.links),
             "obstacles": bool(world.obstacles),
@@ -146,15 +142,10 @@ class ImpulseFrames:
             "events": world.tells_events,
             "contacts=True": world._touches is not None,
             "sleep=True": world._sleep is not None,
-            repr(integrator): not known or getattr(integrator, "naive_start", False),
-            f"a room of type {type(room).__name__}": type(room) not in (Circle, Box, Open, Periodic),
             "brute force": not isinstance(world.collisions.method, Fast),
         }
         if found := [name for name, there in unknown.items() if there]:
-            raise InputError(
-                f"impulses is True in a world with {found[0]}; allowed are circles in a Circle, Box, Periodic or Open room, with "
-                "forces, stepped by PositionVerlet, TimeCorrectedVerlet or SemiImplicitEuler"
-            )
+            raise InputError(f"impulses is True in a world with {found[0]}; allowed are circles in a room, with forces")
 
     def run(self, world: Any, dt: float, done: Callable[[str], None]) -> None:
         """Advance the gathered slots by a frame of dt seconds.
@@ -167,42 +158,53 @@ class ImpulseFrames:
         substeps = world.substeps
         if contained and dt > LONGEST_FRAME:
             substeps *= int(np.ceil(dt / LONGEST_FRAME * (1 - 1e-9)))
-        h, half = dt / substeps, world.integrator.velocity_lag
-        first_kick = half * (h + (self._h if self._kick else 0.0)) if half else h
+        by_core = kicks(world.integrator)
+        h, half = dt / substeps, world.integrator.velocity_lag if by_core else 0.5
+        before = self._h if self._kick else 0.0
         self._stiffen(h, dt)
-        alone = not (forces.forces or world.onlooker)
+        own_walls = None if isinstance(world.boundary, ROOMS) else world.boundary.confine
+        alone = by_core and not (forces.forces or own_walls or world.onlooker)
         watch = watched(world, dt / world.substeps, None) if contained and (forces.forces or world.links) else None
         gravity = world.gravity
         state.h = h
         self._load(world)
+        if getattr(world.integrator, "naive_start", False):
+            self._start_naively(world, (1.0 - half) * h)
         rough = max(collisions.friction, state.most_friction, getattr(world.boundary, "friction", 0.0)) > 0.0
         done("gather")
         step, finite = 0, True
         while step < substeps:
-            if not alone:
+            opens, known = step == 0 or not by_core, self._kick > 0.0  # opens: from velocities that belong to the positions
+            kick = half * (h + before) if half and opens else h
+            if not by_core:
+                self._flight.take(world.integrator, state, forces, world.time + step * h, h)
+            elif not alone:
                 self._evaluate(world, step * h, half * h if step else 0.0)
-                done("integrate")
-            strongest = self._strongest(gravity) if alone else forces.strongest
-            kick, known = (first_kick if step == 0 else h), self._kick > 0.0
-            # The first substep may have a kick of its own; forces of Python are asked in each, and onlookers look in between.
+            # The first substep may have a kick of its own; integrators and forces of Python are asked in each, and onlookers
+            # look in between.
             stop = step + 1 if not alone or kick != h else substeps
-            self._set_law(strongest, h, kick, rough=rough)
+            last_kick = kick if stop == step + 1 else h
+            self._set_law(self._strongest(gravity) if alone else forces.strongest, h, kick, rough=rough)
             engine.set_frame(
-                (half * h if half else h) if step == 0 else h,
-                half * self._h / self._kick if step == 0 and known else 0.0,
+                0.0 if not by_core else half * h if half and opens else h,
+                half * before / self._kick if opens and known else 0.0,
                 kick / self._kick if known else 1.0,
                 half * h if stop == substeps else 0.0,
-                1.0 / (kick if stop == step + 1 else h) if stop == substeps else 0.0,
+                1.0 / last_kick if stop == substeps else 0.0,
                 alone,
                 *gravity,
             )
             finite = engine.run(step, stop, self._parts)
-            self._kick, step = (kick if stop == step + 1 else h), stop
+            self._kick, before, step = last_kick, h, stop
             done("contacts")
-            world._show(step * h, half * h) if step < substeps else None
+            if own_walls:
+                own_walls(state, h, half * h if by_core else 0.0, 0.0)
+            if not by_core:
+                self._flight.end(state, self._gave, self._gave_spin, h / self._kick)
+            world._show(step * h, half * h if by_core else 0.0) if step < substeps else None
         self._h = h
         if not alone:
-            self._end(world, dt, half * h)
+            self._end(world, dt, half * h if by_core else 0.0)
         if not finite or not alone:
             self._refuse_non_finite(world)
         if contained and gravity == world.gravity:
@@ -237,6 +239,14 @@ class ImpulseFrames:
             self.forget()
             raise NonFiniteError(particle, "contacts", world.time)
 
+    def _start_naively(self, world: Any, missing: float) -> None:
+        """Kick those that are new by what x_prev = x - v h leaves out: it takes the first kick to be a whole one."""
+        state = world._slots
+        fresh = np.isnan(state.acceleration[:, 0])
+        if fresh.any():
+            self._evaluate(world, 0.0, 0.0)
+            state.velocity[fresh] += state.real(missing) * state.acceleration[fresh]
+
     def _evaluate(self, world: Any, since: float, ahead: float) -> None:
         """Accelerations by gravity and forces; these see velocities of now, not of half a substep ago."""
         state, forces = world._slots, world._force_sum
@@ -254,6 +264,7 @@ class ImpulseFrames:
         if half:
             self._evaluate(world, dt, half)
             state.velocity += state.real(half) * (state.acceleration + by_contacts)
+            state.spin += self._gave_spin * state.real(half / self._kick)
         state.acceleration += by_contacts
 
     def _stiffen(self, h: float, dt: float) -> None:
@@ -287,16 +298,6 @@ class ImpulseFrames:
             self._engine.set_law(*numbers)
             self._law = numbers
 
-    def _set_room(self, room: Any) -> None:
-        if isinstance(room, Circle):
-            speed = room.angular_velocity * room.radius
-            self._engine.set_room(CAGE, *room.center, room.radius, 0.0, room.restitution, room.friction, speed)
-        elif isinstance(room, Open) or (isinstance(room, Periodic) and room.axes == "xy"):
-            self._engine.set_room(OPEN, *(0.0,) * 7)
-        else:
-            corners = room._box if isinstance(room, Periodic) else (*room.lower, *room.upper)
-            self._engine.set_room(BOX, *corners, room.restitution, room.friction, 0.0)
-
     # ---- arrays --------------------------------------------------------------------------------------------------------------
 
     def _load(self, world: Any) -> None:
@@ -315,7 +316,7 @@ class ImpulseFrames:
             self._skin = collisions.method.skin
             if self._kept_list is None:
                 engine.set_skin(SKIN if self._skin is None else self._skin, self._skin is None)
-        self._set_room(world.boundary)
+        engine.set_room(*walls_of(world.boundary))
         if world.boundary is not self._room:
             engine.set_seam(*state.seam)
             self._room = world.boundary

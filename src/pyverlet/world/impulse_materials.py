@@ -1,4 +1,4 @@
-"""What the compiled core is told of the circles of a world: sizes, and whether they are all alike."""
+"""What the compiled core is told of the circles of a world, sizes and whether they are all alike, and of its walls."""
 
 from __future__ import annotations
 
@@ -8,9 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.rooms import Box, Circle, Open, Periodic
 from pyverlet.state.slots import Slots
 
 Array = NDArray[Any]
+
+ROOMS = Open, Circle, Box, Periodic
+"""Whose walls the core knows; others confine the particles after each substep."""
+
+OPEN, CAGE, BOX = range(3)
+"""Rooms, as the core numbers them."""
 
 ALONE = 256
 MUCH_LARGER = 4.0
@@ -39,3 +46,14 @@ def materials_of(state: Slots, radius: Array, collisions: Collisions) -> dict[st
 def _differs(column: Array) -> bool:
     """Whether not all are the same."""
     return bool(len(column) and (column != column[0]).any())
+
+
+def walls_of(room: Any) -> tuple[float, ...]:
+    """The arguments of `Engine.set_room`."""
+    if isinstance(room, Circle):
+        speed = room.angular_velocity * room.radius
+        return CAGE, *room.center, room.radius, 0.0, room.restitution, room.friction, speed
+    if not isinstance(room, Box | Periodic) or (isinstance(room, Periodic) and room.axes == "xy"):
+        return OPEN, *(0.0,) * 7
+    corners = room._box if isinstance(room, Periodic) else (*room.lower, *room.upper)
+    return BOX, *corners, room.restitution, room.friction, 0.0

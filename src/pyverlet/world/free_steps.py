@@ -1,0 +1,50 @@
+"""Substeps of any integrator, in the form in which the law of impulses takes them.
+
+The law works on the mean velocity u of a substep. A step of an integrator from (x, v) to (x*, v*) has u* = (x* - x) / h and
+the mean acceleration a = (v* - v) / h. Contacts that give c h in a substep, as they did in the last, change u by c h / 2, as
+forces do in x* = x + v h + a h^2 / 2; what they give more or less goes into u whole. Then x' = x + u h and
+v' = u + (v* - u*) + c' h / 2: the integrator's own step where nothing touches.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.laws.integrators import Forces, Integrator, PositionVerlet, SemiImplicitEuler, TimeCorrectedVerlet
+from pyverlet.state.slots import Slots
+
+
+def kicks(integrator: Integrator) -> bool:
+    """Whether a substep is a kick and a drift, which the core does itself."""
+    return type(integrator) in (PositionVerlet, TimeCorrectedVerlet, SemiImplicitEuler)
+
+
+class FreeSteps:
+    """What an integrator does where nothing touches, substep by substep."""
+
+    def __init__(self) -> None:
+        self._left = self._particle = np.empty(0)
+
+    def take(self, integrator: Integrator, state: Slots, forces: Forces, t: float, h: float) -> None:
+        """Leave positions, and have the mean velocity and acceleration of the substep from t on."""
+        position, before, acceleration = state.position.copy(), state.velocity.copy(), state.acceleration
+        integrator.step(state, forces, t, h)
+        if state.acceleration is not acceleration:  # the core holds that array
+            state._scratch[0], state.acceleration = state.acceleration, acceleration
+        after = state.velocity.copy()
+        state.velocity[:] = (state.position - position) / state.real(h)
+        state.acceleration[:] = (after - before) / state.real(h)
+        state.position[:] = position
+        self._left, self._particle = after - state.velocity, state.particle
+
+    def end(self, state: Slots, given: NDArray[Any], given_spin: NDArray[Any], share: float) -> None:
+        """Velocities at the end of the substep, in which contacts gave `share` times these, as if evenly."""
+        if self._particle is not state.particle:  # the list of pairs has been made anew since, and particles sorted
+            by_particle = np.empty_like(self._left)
+            by_particle[self._particle] = self._left
+            self._left = by_particle[state.particle]
+        state.velocity += self._left + state.real(0.5 * share) * given
+        state.spin += state.real(0.5 * share) * given_spin
