@@ -40,3 +40,14 @@ def test_a_stretch_that_can_be_seen_is_measured() -> None:
     pair = world.add(position=[(3.0, 7.0), (4.0, 7.0)], radius=0.1)
     world.links.append(pv.Spring(pair, 0, 1, stiffness=1e6, length=0.99))
     assert world.energy().links == pytest.approx(0.5e6 * 1e-4, rel=1e-3)
+
+
+def test_what_links_show_is_no_more_than_their_coordinates_hide() -> None:
+    # An obstacle throws an angle about: its force is no measure of what it holds then. The ledger, by positions, closes.
+    rng = np.random.default_rng(256)
+    world = pv.World(ledger=True, threads=1)
+    circles = world.add(position=rng.uniform(-6.36, 6.36, (6, 2)), radius=0.921)
+    world.links.append(pv.Angle(circles, np.arange(4), np.arange(1, 5), np.arange(2, 6), compliance=0.00154))
+    world.obstacles.append(pv.Capsule((8.92, -4.55), (-0.817, 5.79), radius=0.3))
+    world.step(1 / 240)
+    assert sum(vars(world.ledger).values()) == pytest.approx(world.energy().total, rel=1e-6)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-import sys
+import cProfile
 import time
 from collections.abc import Callable
 from functools import partial
@@ -27,19 +27,9 @@ def grid(columns: int, rows: int, apart: float) -> Any:
 
 def calls(act: Callable[[], object]) -> int:
     """How many functions Python calls, its own and those of C, in `act`."""
-    count = 0
-
-    def note(frame: Any, event: str, about: Any) -> None:
-        nonlocal count
-        count += event in ("call", "c_call")
-
-    before = sys.getprofile()
-    sys.setprofile(note)
-    try:
-        act()
-    finally:
-        sys.setprofile(before)
-    return count
+    profile = cProfile.Profile()
+    profile.runcall(act)
+    return sum(entry.callcount for entry in profile.getstats())
 
 
 def frames(world: pv.World, count: int = 6, act: Callable[[int], object] = lambda k: None) -> int:

@@ -96,7 +96,7 @@ class Pool(ABC):
         """(k,) the same, row by row."""
 
     def energy_by_pull(self, position: Array, seam: Seam) -> float:
-        """As `energy`, but F^2 / 2 k of rows whose value is mostly rounding."""
+        """As `energy`, but F^2 / 2 k of rows whose value is mostly rounding: no more than what that may hide."""
         rows = self.rows
         if not np.isfinite(rows["stiffness"]).any():
             return 0.0
@@ -105,8 +105,9 @@ class Pool(ABC):
         size = np.abs(position[self.entries["particle"]]).max(axis=1, initial=0.0).astype(float)
         coarse = float(np.finfo(position.dtype).eps) * np.maximum.reduceat(size, self.first[:-1])
         coarse *= np.sqrt(self.slope(position, seam))
-        hidden = (rows["intact"] != 0) & (energies < 0.5 * stiffness * (UNSURE * coarse) ** 2) & np.isfinite(stiffness)
-        return float(np.where(hidden, 0.5 * rows["force"] ** 2 / stiffness, energies).sum())
+        most = 0.5 * stiffness * (UNSURE * coarse) ** 2
+        hidden = (rows["intact"] != 0) & (energies < most) & np.isfinite(stiffness)
+        return float(np.where(hidden, np.minimum(0.5 * rows["force"] ** 2 / stiffness, most), energies).sum())
 
     def slope(self, position: Array, seam: Seam) -> Array:
         """(k,) the largest |grad C|^2 of the particles of each row; 1 for distances."""
