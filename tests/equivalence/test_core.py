@@ -37,7 +37,9 @@ def world(dtype: Any, *, friction: float = 0.3, restitution: float = 0.5, gravit
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("more", [{}, {"friction": 0.0}, {"gravity": 0.0, "restitution": 1.0, "friction": 0.0}])
+@pytest.mark.parametrize(
+    "more", [{}, {"restitution": 0.3}, {"friction": 0.0}, {"gravity": 0.0, "restitution": 1.0, "friction": 0.0}]
+)
 def test_uncompiled_it_has_the_same_bits(dtype: Any, more: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> None:
     compiled = world(dtype, **more)
     compiled.run(seconds=0.4)

@@ -159,7 +159,8 @@ def impact(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
     speed: cython.double = (m.ux + m.ax * back) * x + (m.uy + m.ay * back) * y
     if speed >= -w.least_bounce:
         return False
-    push: cython.double = -(1 + w.restitution[k * w.mixed]) * speed
+    e: cython.double = w.restitution[k * w.mixed]
+    push: cython.double = -(1 + e) * speed
     strike_pair(w, k, cython.address(m), push * x, push * y, 0, t)
     rub(w, k, cython.address(m), x, y, push, t)
     return True
@@ -200,7 +201,8 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
         more: cython.double = w.restitution[hits[g] * w.mixed] * given[g]
         strike_pair(w, hits[g], cython.address(m[g]), more * nx[g], more * ny[g], 0, t)
     for g in range(count):
-        rub(w, hits[g], cython.address(m[g]), nx[g], ny[g], (1 + w.restitution[hits[g] * w.mixed]) * given[g], t)
+        e: cython.double = w.restitution[hits[g] * w.mixed]
+        rub(w, hits[g], cython.address(m[g]), nx[g], ny[g], (1 + e) * given[g], t)
 
 
 @cython.cfunc
