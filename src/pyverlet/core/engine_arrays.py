@@ -75,12 +75,13 @@ def make_lane_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype
     """Of so many lanes."""
     w.lists.lanes_room = lanes
     a |= {name: np.zeros(lanes, np.uint32) for name in ("i", "j")}
-    a |= {name: np.zeros((2, lanes), dtype) for name in ("gap", "normal")}
+    a |= {name: np.zeros((2, lanes), dtype) for name in ("gap", "normal", "struck")}
     a |= {name: np.zeros(lanes, dtype) for name in ("depth", "load", "impulse", "tangent_impulse")}
     a |= {"hit": np.zeros(lanes, np.int64), "hit_time": np.zeros(lanes)}
     w.hit, w.hit_time, w.i, w.j = integers(a["hit"]), doubles(a["hit_time"]), indices(a["i"]), indices(a["j"])
     w.gap_x, w.gap_y = map_row(a["gap"], 0), map_row(a["gap"], 1)
     w.normal_x, w.normal_y = map_row(a["normal"], 0), map_row(a["normal"], 1)
+    w.struck_x, w.struck_y = map_row(a["struck"], 0), map_row(a["struck"], 1)
     w.depth, w.load = reals(a["depth"]), reals(a["load"])
     w.impulse, w.tangent_impulse = reals(a["impulse"]), reals(a["tangent_impulse"])
 

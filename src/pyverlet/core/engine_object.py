@@ -125,6 +125,13 @@ class Engine:
             c.low_x, c.low_y, c.period_x, c.period_y = low_x, low_y, period_x, period_y
             self.ls.good = False
 
+    def note(self, wall_given):
+        """Keep what impacts give, and add what walls give to (count, 2) m/s; None: do not."""
+        self.w.noting = wall_given is not None
+        if wall_given is not None:
+            self.arrays["wall_given"] = wall_given
+            self.w.wall_given = reals(wall_given)
+
     def set_skin(self, diameters: cython.double, adapts: cython.bint):
         """How thick the skin is, in mean diameters, or begins with."""
         self.ls.diameters, self.ls.adapts = diameters, adapts
@@ -140,12 +147,12 @@ class Engine:
 
     def set_frame(
         self, opening: real, taken_back: real, scale: real, half: real, by_contacts: real, falls_free: cython.bint,
-        gravity_x: real, gravity_y: real,
+        gravity_x: real, gravity_y: real, weigh: real,
     ):  # fmt: skip
         """How the next call begins, and ends if gravity is all there is beside contacts: see `Step`."""
         w: cython.pointer(Step) = cython.address(self.w)
         w.opening, w.taken_back, w.scale, w.half, w.by_contacts = opening, taken_back, scale, half, by_contacts
-        w.falls_free, w.gravity_x, w.gravity_y = falls_free, gravity_x, gravity_y
+        w.falls_free, w.gravity_x, w.gravity_y, w.weigh = falls_free, gravity_x, gravity_y, weigh
 
     # ---- the list of pairs ---------------------------------------------------------------------------------------------------
 

@@ -104,6 +104,17 @@ def strike(
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def note_wall(w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.double, dy: cython.double) -> cython.void:
+    """A wall has changed the velocity of a particle."""
+    if w.noting:
+        w.wall_given[2 * i] += cython.cast(real, dx)
+        w.wall_given[2 * i + 1] += cython.cast(real, dy)
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def strike_pair(
@@ -113,6 +124,9 @@ def strike_pair(
     """Push j by (jx, jy) and i the other way, over the reduced mass; jt of it along the tangent turns them."""
     at: cython.Py_ssize_t = k * w.mixed
     rest: cython.double = 1 - m.part
+    if w.noting:
+        w.struck_x[k] += cython.cast(real, jx)
+        w.struck_y[k] += cython.cast(real, jy)
     strike(w, m.i, -jx * m.part, -jy * m.part, jt * m.part * w.turn_i[at], t)
     strike(w, m.j, jx * rest, jy * rest, jt * rest * w.turn_j[at], t)
 

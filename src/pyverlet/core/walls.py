@@ -7,7 +7,7 @@ import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
 
-from pyverlet.core.impacts import NEVER, strike
+from pyverlet.core.impacts import NEVER, note_wall, strike
 from pyverlet.core.step import CAGE, OPEN, Step
 
 Wall = cython.struct(
@@ -128,6 +128,7 @@ def bounce(w: cython.pointer(Step), i: cython.Py_ssize_t, side: cython.int, wall
     e: cython.double = max(w.wall_restitution, cython.cast(cython.double, w.own_restitution[i]))
     push: cython.double = (1 + e) * speed
     strike(w, i, -push * nx, -push * ny, 0, t)
+    note_wall(w, i, -push * nx, -push * ny)
     mu: cython.double = w.wall_friction
     if w.own_friction[i] >= 0:
         mu = sqrt(mu * w.own_friction[i])
@@ -136,6 +137,7 @@ def bounce(w: cython.pointer(Step), i: cython.Py_ssize_t, side: cython.int, wall
         most: cython.double = mu * push
         jt: cython.double = min(max(-slip / 3, -most), most)
         strike(w, i, jt * ny, -jt * nx, -jt * 2 / w.radius[i], t)
+        note_wall(w, i, jt * ny, -jt * nx)
     if t == 0 and wall.gap < 0:  # it was beyond: put back
         w.position[2 * i] += cython.cast(real, wall.gap * nx)
         w.position[2 * i + 1] += cython.cast(real, wall.gap * ny)
@@ -168,6 +170,7 @@ def hold(
     change: cython.double = w.wall_impulse[at] - before
     v[width * i] -= cython.cast(real, change * wall.nx)
     v[width * i + 1] -= cython.cast(real, change * wall.ny)
+    note_wall(w, i, -w.weigh * change * wall.nx, -w.weigh * change * wall.ny)
     if w.rough:
         mu: cython.double = w.wall_friction
         if w.own_friction[i] >= 0:
@@ -179,6 +182,7 @@ def hold(
         rubbed: cython.double = w.wall_tangent[at] - old
         v[4 * i] += cython.cast(real, rubbed * wall.ny)
         v[4 * i + 1] -= cython.cast(real, rubbed * wall.nx)
+        note_wall(w, i, w.weigh * rubbed * wall.ny, -w.weigh * rubbed * wall.nx)
         v[4 * i + 2] -= cython.cast(real, rubbed * 2 / w.radius[i])
 
 
@@ -241,6 +245,7 @@ def warm_walls(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
             v: cython.pointer(real) = w.motion if w.rough else w.velocity
             v[width * i] += cython.cast(real, jt * wall.ny - jn * wall.nx)
             v[width * i + 1] -= cython.cast(real, jt * wall.nx + jn * wall.ny)
+            note_wall(w, i, w.weigh * (jt * wall.ny - jn * wall.nx), -w.weigh * (jt * wall.nx + jn * wall.ny))
             if w.rough:
                 v[4 * i + 2] -= cython.cast(real, jt * 2 / w.radius[i])
 

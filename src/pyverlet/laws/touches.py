@@ -111,19 +111,35 @@ class Touches:
             nonlocal before, steps
             done(stage)
             if stage == "gather":
-                self._given, self._heard, steps = np.zeros((3, len(state), 2)), [], 0
+                self.open(len(state))
+                steps = 0
             elif stage in _STAGES:
                 self._note(_STAGES[stage], state, before)
             elif stage == "integrate":
                 steps += 1
             elif stage == "finish":
                 pairs = np.empty((0, 2), np.int64) if listed is None else _rows(*listed(), state.particle)
-                self._end = _End(state, users.number.copy(), self._given, self._heard, room, course, pairs, steps * h)
-                self._found, self._shown, self._is_shown = None, [], False
-                self._virial = virial() if virial else 0.0
+                self.close(state, users, room, course, pairs, steps * h, virial() if virial else 0.0)
             before = state.velocity.copy()
 
         return told
+
+    def open(self, count: int) -> None:
+        """A frame of so many particles begins."""
+        self._given, self._heard = np.zeros((3, count, 2)), []
+
+    def give(self, whose: int, particle: Array, impulse: Floats) -> None:
+        """Particles (k,), by the user's index, have got (k, 2) N s of circles (0), walls (1) or obstacles (2)."""
+        for axis in range(2):
+            self._given[whose, :, axis] += np.bincount(particle, impulse[:, axis], self._given.shape[1])
+
+    def close(
+        self, state: Slots, users: State, room: Boundary, course: Course, pairs: Array, dt: float, virial: float
+    ) -> None:  # fmt: skip
+        """The frame of dt seconds is over. pairs: (k, 2) that may have touched; virial: of contacts between circles, N s m."""
+        self._end = _End(state, users.number.copy(), self._given, self._heard, room, course, pairs, dt)
+        self._found, self._shown, self._is_shown = None, [], False
+        self._virial = virial
 
     def _note(self, whose: int, state: Slots, before: Array) -> None:
         now = state.velocity

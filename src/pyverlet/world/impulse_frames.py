@@ -23,6 +23,7 @@ from pyverlet.state.slots import Slots
 from pyverlet.world.free_steps import FreeSteps, kicks
 from pyverlet.world.impulse_materials import ROOMS, materials_of, walls_of
 from pyverlet.world.impulse_memory import Memory, columns_of
+from pyverlet.world.impulse_notes import ImpulseNotes
 
 Array = NDArray[Any]
 
@@ -118,13 +119,11 @@ class ImpulseFrames:
             InputError: there is something in the world that this law does not know yet.
             NonFiniteError: a particle turned NaN or infinite.
         """
-        known = world.collisions, len(world.links), len(world.obstacles)
-        if known != self._checked:
+        if (known := (world.collisions, len(world.links), len(world.obstacles))) != self._checked:
             self.check(world)
             self._checked = known
-        slots = world._slots
-        slots.rows = self._core
-        slots.clear_notes()
+        world._slots.rows = self._core
+        world._slots.clear_notes()
         if world._gather():
             self._engine.forget_list()
         self.run(world, dt, world.profile.mark)
@@ -140,7 +139,6 @@ class ImpulseFrames:
             "obstacles": bool(world.obstacles),
             "a ledger": world.keeps_ledger,
             "events": world.tells_events,
-            "contacts=True": world._touches is not None,
             "sleep=True": world._sleep is not None,
             "brute force": not isinstance(world.collisions.method, Fast),
         }
@@ -172,6 +170,7 @@ class ImpulseFrames:
             self._start_naively(world, (1.0 - half) * h)
         rough = max(collisions.friction, state.most_friction, getattr(world.boundary, "friction", 0.0)) > 0.0
         done("gather")
+        notes = None if world._touches is None else ImpulseNotes(world._touches, engine, state)
         step, finite = 0, True
         while step < substeps:
             opens, known = step == 0 or not by_core, self._kick > 0.0  # opens: from velocities that belong to the positions
@@ -180,9 +179,8 @@ class ImpulseFrames:
                 self._flight.take(world.integrator, state, forces, world.time + step * h, h)
             elif not alone:
                 self._evaluate(world, step * h, half * h if step else 0.0)
-            # The first substep may have a kick of its own; integrators and forces of Python are asked in each, and onlookers
-            # look in between.
-            stop = step + 1 if not alone or kick != h else substeps
+            # The first substep may have a kick of its own; whoever looks or acts in each has a call for each.
+            stop = step + 1 if not alone or notes or kick != h else substeps
             last_kick = kick if stop == step + 1 else h
             self._set_law(self._strongest(gravity) if alone else forces.strongest, h, kick, rough=rough)
             engine.set_frame(
@@ -193,8 +191,11 @@ class ImpulseFrames:
                 1.0 / last_kick if stop == substeps else 0.0,
                 alone,
                 *gravity,
+                h / kick,
             )
             finite = engine.run(step, stop, self._parts)
+            if notes:
+                notes.read(h / kick)
             self._kick, before, step = last_kick, h, stop
             done("contacts")
             if own_walls:
@@ -209,6 +210,8 @@ class ImpulseFrames:
             self._refuse_non_finite(world)
         if contained and gravity == world.gravity:
             self._limit(world, watch, dt)
+        if notes:
+            notes.close(world, dt)
         if state.seam:
             engine.wrap_seam()
         done("finish")

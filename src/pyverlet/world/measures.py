@@ -105,7 +105,8 @@ class Measures(Particles):
         of an `obstacle`, else -1; `point` (2), m; `normal` (2) out of a; `impulse` along it, N s, summed over the frame, and
         `rub`, what a got along (-n_y, n_x): of walls and obstacles. Of circles the impulses are the smallest that explain what
         each has got; friction between them is left out. They are found in a number of steps that costs less than a frame: good to
-        0.1 % for heaps of some hundred circles, while deep in heaps of thousands they are evened out.
+        0.1 % for heaps of some hundred circles, while deep in heaps of thousands they are evened out. With
+        `Collisions(impulses=True)` they are the impulses of the law itself, friction included.
 
         Raises:
             InputError: the world notes none.
