@@ -11,11 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.compile.bundle import hold
-from pyverlet.compile.rows import WIDTH
-from pyverlet.compile.stealing import Claims
+from pyverlet import core
 from pyverlet.ground import memory
-from pyverlet.kernels import motion, tables
 from pyverlet.state import seam
 from pyverlet.state.state import COLUMNS, EVERYONE, MARKS, ROWS, SET, State
 from pyverlet.state.unchanged import Unchanged
@@ -33,7 +30,7 @@ class Slots:
 
     Attributes:
         real: rounds a number to the dtype; it remembers some, for NumPy takes longer to round one than a kernel to be called.
-        reals: the same of several at once. claims: for kernels whose threads claim what they do.
+        reals: the same of several at once. motion: the unit of the core for arrays of this dtype.
         particle: (n,) the user's index of the particle in each slot.
         position, velocity, acceleration, spin, radius, mass, grown, restitution, friction: as in State.
         category, mask: as in State, or empty while every circle collides with every other.
@@ -67,9 +64,9 @@ class Slots:
         self._kept: dict[str, Array] = {}
         self.drop, self.lean, self.total_mass, self.pins, self.taken, self.worked, self.given = 1.0, 0.0, 0.0, False, 0.0, 0.0, 0
         self.h = 0.0
-        self.claims = Claims()
-        self._none = tuple(np.empty(shape, dtype) for shape in (0, (0, 2), (0, WIDTH)))
+        self.motion = core.unit("motion", dtype)
         self._circles: Any = None
+        self._claims: Any = None
         self._resize(0)
 
     def __len__(self) -> int:
@@ -146,10 +143,10 @@ class Slots:
         self.seam = state.seam
         given = (state.position, state.velocity, state.acceleration, state.spin)
         if not self._given_back.recall(given):  # a user who has changed nothing need not wait for it to be copied again
-            motion.take_motion(self.position, self.velocity, self.acceleration, self.spin, *given, self.particle)
+            self.motion.take_motion(self.position, self.velocity, self.acceleration, self.spin, *given, self.particle)
         # What seldom changes is compared in the user's order, where neighbours in memory need no index.
         now = (state.radius, state.mass, state.restitution, state.friction, state.category, state.mask)
-        if self._grows or self.size is not self.radius or motion.any_differs(*(*self._given.values(), *now)):
+        if self._grows or self.size is not self.radius or self.motion.any_differs(*(*self._given.values(), *now)):
             return self._take_given(state)
         return False
 
@@ -159,7 +156,7 @@ class Slots:
         changed = self._changed
         for name in _GIVEN:
             given, now = self._given[name], getattr(state, name)
-            changed |= name in _LISTED and motion.differs(given, now)
+            changed |= name in _LISTED and _differs(given, now)
             self._given[name] = (now[:1] if (now == now[:1]).all() else now).copy()
         for name in (*SET, "grown"):
             memory.take(self._given.get(name, state.grown), self.particle, getattr(self, name))  # one number, if that of all
@@ -230,7 +227,7 @@ class Slots:
         if self.seam:
             self.seam.wrap(self.position)
         given, moved = (state.position, state.velocity, state.acceleration, state.spin), (self.position, self.velocity)
-        motion.put_motion(*moved, self.acceleration, self.spin, *given, state.angle, 0.5 * dt, self.particle)
+        self.motion.put_motion(*moved, self.acceleration, self.spin, *given, state.angle, 0.5 * dt, self.particle)
         self._given_back.remember(given)
         self._grows |= self.size is not self.radius  # some may have been found on top of others since the gathering
         if self._grows:
@@ -239,7 +236,7 @@ class Slots:
     def where(self) -> Array:
         """(n, 2) the positions of now in the user's order, m."""
         position = np.empty_like(self.position)
-        motion.put_rows(position, self.position, self.particle)
+        position[self.particle] = self.position
         return position
 
     def in_users_order(self) -> State:
@@ -257,7 +254,7 @@ class Slots:
         spare = memory.empty(self.position.shape, self.dtype)
         for name in ROWS:
             old = getattr(self, name)
-            motion.take_rows(spare, old, order)
+            np.take(old, order, axis=0, out=spare, mode="clip")  # any other mode fills a copy
             setattr(self, name, spare)
             spare = old
         alike = {name for name, given in self._given.items() if len(given) == 1}  # for all: any order is as good
@@ -270,7 +267,7 @@ class Slots:
 
     def save(self, state: State) -> dict[str, Array]:
         """What outlives a frame here, not in the user's arrays: the order, who carried weight, who sleeps; if lists are void."""
-        void = self._changed or any(motion.differs(self._given[name], getattr(state, name)) for name in _LISTED)
+        void = self._changed or any(_differs(self._given[name], getattr(state, name)) for name in _LISTED)
         columns = {name: getattr(self, name).copy() for name in ("particle", *_REMEMBERED)}
         return columns | {"void": np.array([void or len(state) != len(self)])}
 
@@ -281,17 +278,6 @@ class Slots:
         self.gather(state)
         if saved["void"][0]:  # the next frame is to find that out, too
             self._changed = self._grows = True
-
-    def circles(self) -> Any:
-        """What walls and obstacles need of the particles: `kernels.tables.Circles`, of which that for contacts is empty."""
-        none, rows, wide = self._none
-        arrays = (
-            self.position, self.velocity, self.acceleration, self.inverse_mass, rows, rows, self.resting, self.spin, none,
-            self.fed, wide, self.turn, self.lift, none, self.start, self.radius, self.restitution, self.friction, self.hits,
-            self.spent, rows, none, none, none, none, rows,
-        )  # fmt: skip
-        self._circles = hold(tables.Circles, arrays, self._circles)
-        return self._circles
 
     def scratch(self, number: int) -> Array:
         """An (n, 2) array for use within one substep; its contents are left over from whoever used it last."""
@@ -314,3 +300,8 @@ class Slots:
             self._slot_of = np.empty_like(self.particle)
             self._slot_of[self.particle] = np.arange(len(self), dtype=self.particle.dtype)
         return self._slot_of[particles]
+
+
+def _differs(given: Array, now: Array) -> bool:
+    """Whether two columns differ anywhere; one number stands for equal ones."""
+    return len(given) not in (1, len(now)) or bool((given != now).any())

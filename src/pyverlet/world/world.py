@@ -14,10 +14,11 @@ from pyverlet.ground.constants import ALL_THREADS_FROM, MOST_SUBSTEPS, ONE_THREA
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.ground.turns import in_turn
 from pyverlet.laws.coarse import Coarse
+from pyverlet.laws.contacts._held import leave
 from pyverlet.laws.contacts.collisions import Collisions, ContactSolver
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceList, ForceSum
-from pyverlet.laws.integrators import Integrator, TimeCorrectedVerlet
+from pyverlet.laws.integrators import Integrator, PositionVerlet, TimeCorrectedVerlet
 from pyverlet.laws.ledger import Bookkeeper
 from pyverlet.laws.limiter import Watch, watched
 from pyverlet.laws.links import Links
@@ -214,7 +215,10 @@ class World(Measures, Queries, Doors):
         if contacts:
             contacts.end(self._slots, self._state, lag, self.substeps * h, self.gravity, marked=marked)
         self.boundary.leave(self._slots)
-        self.integrator.end(self._slots, h)
+        if type(self.integrator).end is PositionVerlet.end:  # circles at rest carry weight with the velocity kept
+            leave(self._slots, h)
+        else:
+            self.integrator.end(self._slots, h)
         finite = watch is not None and watch.close(self._slots, contacts)
         done("finish")
         return finite
