@@ -37,19 +37,27 @@ class Native:
 
     def __init__(self, function: Callable[..., Any], arguments: int, results: int) -> None:
         self.call = numba.njit(nogil=True, error_model="numpy")(function)
-        try:
-            self.call.compile((_REAL,) * arguments)
-        except Exception as error:  # the compiler raises all kinds
-            raise NotCompiled(f"does not compile: {_reason(str(error))}") from error
-        (compiled,) = self.call.overloads.values()
+        compiled, parts = self._compiled(arguments)
+        if any(isinstance(part, types.Array) and part.ndim == 0 for part in parts):  # of `np.where`
+            self.call = numba.njit(nogil=True, error_model="numpy")(_as_numbers(self.call, results))
+            compiled, parts = self._compiled(arguments)
         returned = compiled.signature.return_type
-        parts = list(returned) if isinstance(returned, types.BaseTuple) else [returned]
         if len(parts) != results or not all(isinstance(part, types.Integer | types.Float | types.Boolean) for part in parts):
             raise NotCompiled(f"returns {_plain(returned)}")
         self._attempt = _attempt(compiled, parts)
         self._loops: dict[Any, Any] = {}
         self._arrays: tuple[Any, ...] = (None,) * 4
         self._addresses: tuple[int, ...] = ()
+
+    def _compiled(self, arguments: int) -> tuple[Any, list[Any]]:
+        """The compiled code, and the types of the numbers that it returns."""
+        try:
+            self.call.compile((_REAL,) * arguments)
+        except Exception as error:  # the compiler raises all kinds
+            raise NotCompiled(f"does not compile: {_reason(str(error))}") from error
+        (compiled,) = self.call.overloads.values()
+        returned = compiled.signature.return_type
+        return compiled, list(returned) if isinstance(returned, types.BaseTuple) else [returned]
 
     def add(self, state: Any, position: Any, t: float) -> int:
         """Add the two numbers returned for (x, y, vx, vy, mass, t) of every free particle to `state.force`.
@@ -78,6 +86,19 @@ class Native:
             kind = ctypes.CFUNCTYPE(back, *(ctypes.c_void_p for _ in range(pointers)), ctypes.c_int64, *after)
             self._loops[dtype] = kind(compiled.address), compiled
         return self._loops[dtype][0]
+
+
+def _as_numbers(function: Any, results: int) -> Any:
+    """The same force or potential, whose results are numbers where they were arrays without axes."""
+
+    def one(x: float, y: float, mass: float) -> Any:
+        return np.asarray(function(x, y, mass)).item()
+
+    def pair(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> Any:
+        fx, fy = function(x, y, vx, vy, mass, t)
+        return np.asarray(fx).item(), np.asarray(fy).item()
+
+    return one if results == 1 else pair
 
 
 def _force_loop(attempt: Any) -> Any:

@@ -30,7 +30,7 @@ class Slots:
 
     Attributes:
         real: rounds a number to the dtype; it remembers some, for NumPy takes longer to round one than a kernel to be called.
-        reals: the same of several at once. motion: the unit of the core for arrays of this dtype.
+        reals: the same of several at once.
         particle: (n,) the user's index of the particle in each slot.
         position, velocity, acceleration, spin, radius, mass, grown, restitution, friction: as in State.
         category, mask: as in State, or empty while every circle collides with every other.
@@ -64,13 +64,17 @@ class Slots:
         self._kept: dict[str, Array] = {}
         self.drop, self.lean, self.total_mass, self.pins, self.taken, self.worked, self.given = 1.0, 0.0, 0.0, False, 0.0, 0.0, 0
         self.h = 0.0
-        self.motion = core.unit("motion", dtype)
         self._circles: Any = None
         self._claims: Any = None
         self._resize(0)
 
     def __len__(self) -> int:
         return len(self.radius)
+
+    @property
+    def motion(self) -> Any:
+        """The unit of the core that moves particles, for this dtype."""
+        return core.unit("motion", self.dtype)
 
     def _resize(self, count: int) -> None:
         """Room for `count` particles: those of `_kept`, as they stood, and behind them the new ones."""

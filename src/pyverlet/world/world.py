@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from pyverlet.compile import jit
 from pyverlet.ground import checks
 from pyverlet.ground.constants import ALL_THREADS_FROM, MOST_SUBSTEPS, ONE_THREAD_BELOW, REST_ACCELERATIONS, STANDARD_GRAVITY
 from pyverlet.ground.errors import InputError, NonFiniteError
+from pyverlet.ground.threads import max_threads
 from pyverlet.ground.turns import in_turn
 from pyverlet.laws.coarse import Coarse
-from pyverlet.laws.contacts._held import leave
+from pyverlet.laws.contacts._held import end
 from pyverlet.laws.contacts.collisions import Collisions, ContactSolver
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceList, ForceSum
-from pyverlet.laws.integrators import Integrator, PositionVerlet, TimeCorrectedVerlet
+from pyverlet.laws.integrators import Integrator, TimeCorrectedVerlet
 from pyverlet.laws.ledger import Bookkeeper
 from pyverlet.laws.limiter import Watch, watched
 from pyverlet.laws.links import Links
@@ -215,10 +215,7 @@ class World(Measures, Queries, Doors):
         if contacts:
             contacts.end(self._slots, self._state, lag, self.substeps * h, self.gravity, marked=marked)
         self.boundary.leave(self._slots)
-        if type(self.integrator).end is PositionVerlet.end:  # circles at rest carry weight with the velocity kept
-            leave(self._slots, h)
-        else:
-            self.integrator.end(self._slots, h)
+        end(self.integrator, self._slots, h)
         finite = watch is not None and watch.close(self._slots, contacts)
         done("finish")
         return finite
@@ -344,13 +341,12 @@ class World(Measures, Queries, Doors):
     def threads(self) -> int:
         """Threads the parallel stages use at most, fewer where these do not gain: the result is the same for any number."""
         if self._threads is None:
-            return jit.max_threads() if len(self) >= ALL_THREADS_FROM else 1
+            return max_threads() if len(self) >= ALL_THREADS_FROM else 1
         return self._threads if len(self) >= ONE_THREAD_BELOW else 1
 
     @threads.setter
     def threads(self, value: int | None) -> None:
-        most = jit.max_threads()
-        self._threads = None if value is None else checks.whole("threads", value, most=most, most_is=" (the cores here)")
+        self._threads = None if value is None else checks.whole("threads", value, most=max_threads(), most_is=" (the cores here)")
 
     # ---- save and restore ----------------------------------------------------------------------------------------------
 

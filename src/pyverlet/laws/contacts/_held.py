@@ -10,6 +10,7 @@ from pyverlet.compile.bundle import hold
 from pyverlet.compile.rows import WIDTH
 from pyverlet.compile.stealing import Claims
 from pyverlet.kernels import leaving, motion, tables
+from pyverlet.laws.integrators import Integrator, PositionVerlet
 from pyverlet.state.slots import Array, Slots
 
 
@@ -68,3 +69,11 @@ def leave(state: Slots, h: float) -> None:
     leaving.leave(*held, *state.reals(state.lean, h, 0.5 * h))
     if len(state.along):
         state.along = state.along[:0].copy()  # of use no more, and as large as a column
+
+
+def end(integrator: Integrator, state: Slots, h: float) -> None:
+    """`Integrator.end`, but for circles at rest, which carry weight with the velocity that integrators of Stormer's kind keep."""
+    if type(integrator).end is PositionVerlet.end:
+        leave(state, h)
+    else:
+        integrator.end(state, h)

@@ -168,10 +168,10 @@ def force(
 ) -> FunctionForce | Callable[[Function], FunctionForce]:
     """Make a force of a function (x, y, vx, vy, mass, t) -> (fx, fy) of plain numbers, in SI units.
 
-    At every evaluation it is called once, with float64 arrays of all particles for x, y, vx, vy and mass, if it is written so that
-    it takes them (arithmetic, functions of NumPy, `np.where` in place of `if`); else particle by particle, which takes about a
-    microsecond for each. Where Numba is installed (`pip install pyverlet[native]`) it is compiled instead when it is first used,
-    and must be numeric code as Numba compiles it: arithmetic, `math` or NumPy, `if`, loops, constants.
+    At every evaluation it is called once, with float64 arrays of all particles for x, y, vx, vy and mass, if it is written so
+    that it takes them (arithmetic, functions of NumPy, `np.where` in place of `if`); else particle by particle, which takes about
+    a microsecond for each. Where Numba is installed (`pip install pyverlet[native]`) it is compiled instead when it is first
+    used, and must be numeric code as Numba compiles it: arithmetic, `math` or NumPy, `if`, loops, constants.
 
     Args:
         function: to be decorated.
