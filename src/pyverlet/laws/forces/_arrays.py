@@ -88,8 +88,10 @@ class OnArrays:
                 except Exception:  # whatever the user's code raises
                     values[:, k] = np.nan
                     continue
-                parts = self._parts(returned)
-                if any(part.shape for part in parts):
-                    raise NotNumbers(f"returns {returned!r}")
-                values[:, k] = parts
+                numbers = returned if isinstance(returned, tuple) else (returned,)
+                if len(numbers) != self._results or not all(type(number) in (float, int) for number in numbers):
+                    numbers = tuple(self._parts(returned))
+                    if any(part.shape for part in numbers):
+                        raise NotNumbers(f"returns {returned!r}")
+                values[:, k] = numbers
         return [*values]

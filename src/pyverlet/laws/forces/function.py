@@ -170,7 +170,7 @@ def force(
 
     At every evaluation it is called once, with float64 arrays of all particles for x, y, vx, vy and mass, if it is written so
     that it takes them (arithmetic, functions of NumPy, `np.where` in place of `if`); else particle by particle, which takes about
-    a microsecond for each. Where Numba is installed (`pip install pyverlet[native]`) it is compiled instead when it is first
+    two microseconds for each. Where Numba is installed (`pip install pyverlet[native]`) it is compiled instead when it is first
     used, and must be numeric code as Numba compiles it: arithmetic, `math` or NumPy, `if`, loops, constants.
 
     Args:
