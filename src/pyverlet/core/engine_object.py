@@ -95,11 +95,29 @@ class Engine:
         w.room, w.x0, w.y0, w.x1, w.y1 = room, x0, y0, x1, y1
         w.wall_restitution, w.wall_friction, w.wall_speed = restitution, friction, speed
 
+    def set_links(self, cut, rows, passes, period_x, period_y):
+        """Rows of links (world/link_rows.py), blocks of each thread (parts + 1,), and periods of the room, m or 0."""
+        self.arrays["links"] = cut, rows
+        r = rows
+        w: cython.pointer(Step) = cython.address(self.w)
+        w.link_cut, w.link_passes, w.period_x, w.period_y = integers(cut), passes, period_x, period_y
+        w.block_begin, w.block_band, w.link_single = integers(r["begin"]), integers(r["band"]), small_integers(r["single"])
+        w.link_first, w.link_node, w.link_kind = integers(r["first"]), indices(r["node"]), small_integers(r["kind"])
+        w.link_gradient, w.link_rest, w.link_stiffness = doubles(r["gradient"]), doubles(r["rest"]), doubles(r["stiffness"])
+        w.link_damping, w.link_upper, w.link_strength = doubles(r["damping"]), doubles(r["upper"]), doubles(r["strength"])
+        w.link_intact, w.link_acts = small_integers(r["intact"]), small_integers(r["acts"])
+        w.link_impulse, w.link_pull, w.link_value = doubles(r["impulse"]), doubles(r["pull"]), doubles(r["value"])
+        w.link_next, w.link_soft, w.link_target = doubles(r["next"]), doubles(r["soft"]), doubles(r["target"])
+        w.link_aim, w.link_left, w.link_matrix = doubles(r["aim"]), doubles(r["left"]), doubles(r["matrix"])
+        w.link_pivot, w.link_inverse = doubles(r["pivot"]), doubles(r["inverse"])
+        w.link_rows, w.link_band = len(r["kind"]), r["matrix"].shape[1] - 1
+
     def set_law(self, **n):
         """Numbers of the substeps that come."""
         w: cython.pointer(Step) = cython.address(self.w)
         w.h, w.opening, w.taken_back, w.scale = n["h"], n["opening"], n["taken_back"], n["scale"]
         w.rest_speed, w.restless, w.rate, w.stiff, w.leak = n["rest_speed"], n["restless"], n["rate"], n["stiff"], n["leak"]
+        w.kick = n["kick"]
         w.push, w.near, w.relaxes, w.rough = n["push"], n["near"], n["relaxes"], n["rough"]
 
     def set_list(self, cut, checked, allowed: cython.double):

@@ -5,7 +5,7 @@ Per substep of length h:
  1. kick: velocities gain the acceleration; walls give what they gave in the last substep.
  2. warm start: so do contacts, along the normals of now.
  3. walls: what comes fast bounces, the rest is held.
- 4. contacts: one sweep over the pairs, with springs; pairs that meet fast bounce, in closed form.
+ 4. contacts: one sweep over the pairs, with springs; pairs that meet fast bounce, in closed form. Links, block by block.
  5. drift: walls once more, then x += v h.
  6. relax: sweeps without the springs.
  7. remember what contacts gave.
@@ -23,6 +23,7 @@ from cython.cimports.libc.math import sqrt
 from cython.cimports.team import team_barrier
 
 from pyverlet.core.contacts import relax_contacts, solve_contacts
+from pyverlet.core.links import begin_links, end_links, solve_links
 from pyverlet.core.step import Step
 from pyverlet.core.walls import bounce_walls, hold_walls, list_walls, relax_walls, warm_walls
 from pyverlet.core.warm_start import warm_start
@@ -150,6 +151,9 @@ def substep(
         for half in range(w.cut[parity * (parts + 1) + part], w.cut[parity * (parts + 1) + part + 1]):
             warm_start(w, 2 * half + parity)
         team_barrier(w.team)
+    if w.link_rows:
+        begin_links(w, part)
+        team_barrier(w.team)
     for i in range(a, a + walled):
         bounce_walls(w, w.at_wall[i])
         hold_walls(w, w.at_wall[i])
@@ -157,6 +161,9 @@ def substep(
     for parity in range(2):
         for half in range(w.cut[parity * (parts + 1) + part], w.cut[parity * (parts + 1) + part + 1]):
             solve_contacts(w, 2 * half + parity)
+        team_barrier(w.team)
+    if w.link_rows:
+        solve_links(w, part, True)
         team_barrier(w.team)
     for i in range(a, a + walled):
         hold_walls(w, w.at_wall[i])
@@ -169,6 +176,11 @@ def substep(
             for half in range(w.cut[parity * (parts + 1) + part], w.cut[parity * (parts + 1) + part + 1]):
                 relax_contacts(w, 2 * half + parity)
             team_barrier(w.team)
+        if w.link_rows:
+            solve_links(w, part, False)
+            team_barrier(w.team)
+    if w.link_rows:
+        end_links(w, part)
     remember(w, a, b)
 
 
