@@ -353,8 +353,9 @@ def test_a_slow_frame_that_waits_for_a_compiler_publishes_no_moment_twice_unless
     with session:
         wait_until(lambda: world.frames > 6)
     times = [moment for moment, _ in seen]
-    told = [moment for moment, busy in seen if busy]
-    assert len(times) - len(set(times)) == (1 if long else 0)
+    told = {moment for moment, busy in seen if busy}
+    # A moment comes again only to say that it takes long; on a busy machine that may be so more than once.
+    assert {moment for moment in times if times.count(moment) > 1} <= told
     assert bool(told) == long
 
 
