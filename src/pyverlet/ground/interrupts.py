@@ -46,7 +46,8 @@ class _Whole:
                 self._before(*pressed)
 
     def _note(self, number: int, frame: FrameType | None) -> None:
-        if self._pressed or self._long:
+        # While it is set up or taken down, an exception would leave this in place of what was there.
+        if self._depth and (self._pressed or self._long):
             self._pressed = None
             self._before(number, frame)
         else:
