@@ -18,127 +18,20 @@ being the substep before, and contacts give c (h + h') / 2; at the end v + (a + 
 from __future__ import annotations
 
 import cython
-from cython.cimports.lanes import above, any_lane, lanes, larger, largest_lane, load, outside, real, spread, store, sum_of_pairs
+from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
 from cython.cimports.libc.stdint import int32_t
 from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.contacts import bounce_again, relax_contacts, solve_contacts
+from pyverlet.core.particle_stages import drift, kick_stage, remember_stage
 from pyverlet.core.relisting import each_group
 from pyverlet.core.step import OPEN, Step
 from pyverlet.core.walls import bounce_walls, hold_walls, list_walls, relax_walls, warm_walls
 from pyverlet.core.warm_start import warm_start
 
 MOST_ROUNDS = cython.declare(cython.int, 100)  # over the groups in which pairs have bounced
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def kick(shared: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t, part: cython.int) -> cython.void:
-    """Forces; what contacts gave in the last substep of the frame before comes back as `given` says."""
-    own: Step = shared[0]
-    w: cython.pointer(Step) = cython.address(own)
-    begins: cython.bint = w.substep == w.first
-    kicked: real = w.opening if begins else w.h
-    back: real = w.taken_back if begins else cython.cast(real, 0)
-    most: real = 0
-    i: cython.Py_ssize_t
-    if w.rough:
-        for i in range(a, b):
-            x: real = w.motion[4 * i] + w.acceleration[2 * i] * kicked - w.given[2 * i] * back
-            y: real = w.motion[4 * i + 1] + w.acceleration[2 * i + 1] * kicked - w.given[2 * i + 1] * back
-            s: real = w.motion[4 * i + 2] - w.given_spin[i] * back
-            w.motion[4 * i], w.motion[4 * i + 1], w.motion[4 * i + 2] = x, y, s
-            w.free[2 * i], w.free[2 * i + 1], w.free_spin[i] = x, y, s
-            square: real = x * x + y * y
-            most = square if square > most else most
-    else:
-        fastest: lanes = spread(0)
-        whole: cython.Py_ssize_t = 2 * b - 2 * b % 8
-        for i in range(2 * a, whole, 8):
-            u: lanes = load(w.velocity, i) + load(w.acceleration, i) * spread(kicked) - load(w.given, i) * spread(back)
-            store(w.velocity, i, u)
-            store(w.free, i, u)
-            fastest = larger(sum_of_pairs(u * u), fastest)
-        most = largest_lane(fastest)
-        for i in range(whole // 2, b):
-            x = w.velocity[2 * i] + w.acceleration[2 * i] * kicked - w.given[2 * i] * back
-            y = w.velocity[2 * i + 1] + w.acceleration[2 * i + 1] * kicked - w.given[2 * i + 1] * back
-            w.velocity[2 * i], w.velocity[2 * i + 1], w.free[2 * i], w.free[2 * i + 1] = x, y, x, y
-            square = x * x + y * y
-            most = square if square > most else most
-    moved: cython.pointer(real) = w.moved
-    position: cython.pointer(real) = w.position
-    listed: cython.pointer(real) = w.listed
-    for i in range(2 * a, 2 * b):
-        moved[i] = position[i] - listed[i]
-    w.fastest[part] = most
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def drift(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t, part: cython.int) -> cython.void:
-    """x += v h; whether a particle may leave where the list of pairs is good in the next substep."""
-    own: Step = w[0]
-    o: cython.pointer(Step) = cython.address(own)
-    h: real = o.h
-    i: cython.Py_ssize_t
-    stale: cython.bint = False
-    whole: cython.Py_ssize_t = a if o.rough else b - b % 4
-    for i in range(2 * a, 2 * whole, 8):
-        step: lanes = load(o.velocity, i) * spread(h)
-        there: lanes = load(o.position, i) + step
-        store(o.position, i, there)
-        away: lanes = there + step - load(o.checked, i)
-        stale |= any_lane(outside(above(spread(o.allowed), sum_of_pairs(away * away))))
-    v: cython.pointer(real) = o.motion if o.rough else o.velocity
-    width: cython.Py_ssize_t = 4 if o.rough else 2
-    for i in range(whole, b):
-        dx: real = v[width * i] * h
-        dy: real = v[width * i + 1] * h
-        x: real = o.position[2 * i] + dx
-        y: real = o.position[2 * i + 1] + dy
-        o.position[2 * i], o.position[2 * i + 1] = x, y
-        dx += x - o.checked[2 * i]
-        dy += y - o.checked[2 * i + 1]
-        stale |= not (dx * dx + dy * dy < o.allowed)
-    w.stale[part] = stale
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def remember(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t) -> cython.void:
-    """What the contacts of this substep gave: the velocity at the end of a frame goes on by half of it, as if given evenly.
-
-    Of a blow to the spin no more than twice what they gave in the last one.
-    """
-    i: cython.Py_ssize_t
-    if w.rough:
-        for i in range(a, b):
-            turned: real = w.motion[4 * i + 2] - w.free_spin[i]
-            before: real = w.given_spin[i] if w.given_spin[i] > 0 else -w.given_spin[i]
-            most: real = before + before + w.rest_speed / w.radius[i]
-            w.given[2 * i], w.given[2 * i + 1] = w.motion[4 * i] - w.free[2 * i], w.motion[4 * i + 1] - w.free[2 * i + 1]
-            w.given_spin[i] = max(min(turned, most), -most)
-    else:
-        given: cython.pointer(real) = w.given
-        velocity: cython.pointer(real) = w.velocity
-        free: cython.pointer(real) = w.free
-        for i in range(2 * a, 2 * b):
-            given[i] = velocity[i] - free[i]
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def kick_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """Forces on a block of particles."""
-    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    kick(w, block * BLOCK, min((block + 1) * BLOCK, w.count), block)
 
 
 @cython.cfunc
@@ -193,15 +86,6 @@ def drift_stage(what: cython.p_void, block: cython.int) -> cython.void:
     drift(w, a, min(a + BLOCK, w.count), block)
     if w.relaxes > 0:
         relax_walls_stage(what, block)
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def remember_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """What contacts gave a block of particles."""
-    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    remember(w, block * BLOCK, min((block + 1) * BLOCK, w.count))
 
 
 @cython.cfunc

@@ -1,0 +1,166 @@
+"""What the compiled core holds of one world under the law of impulses: its arrays, and what contacts remember."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet import core
+from pyverlet.ground.constants import SKIN
+from pyverlet.state.slots import Slots
+from pyverlet.world.impulse_materials import materials_of, walls_of
+from pyverlet.world.impulse_memory import Memory, columns_of
+
+Array = NDArray[Any]
+
+SORTED_FROM = 1024
+UNSORTED = 0.2
+"""Slots of so many particles and more are put into the order of the cells when such a part of them is followed by one that
+belongs before."""
+
+
+class ImpulseArrays:
+    """An engine of the core, and the arrays that it works on: those of the slots, and those that outlive a frame.
+
+    Attributes:
+        core: the unit of the core in this precision.
+        engine: steps particles; see `core.engine_object`.
+        kick, h: seconds of acceleration of the last substep, and its length; 0 before the first.
+        hertz, finer: frequency of the springs of contacts, and for how long, s, a higher one would have been possible.
+        gave, gave_spin: (slots, 2) m/s and (slots,) rad/s that contacts gave in the last substep.
+        parts: threads that go through a frame.
+        free: whether any particle is not pinned.
+        largest: radius, m.
+    """
+
+    def __init__(self, dtype: np.dtype[Any]) -> None:
+        self._dtype = dtype
+        self.core = core.unit("engine", dtype)
+        self.engine: Any = self.core.Engine(1)
+        self.parts = 1
+        self._room: Any = None
+        self.forget()
+
+    def forget(self) -> None:
+        """No contact remembers anything."""
+        self.restore(Memory.empty(self._dtype))
+
+    def save(self) -> Memory:
+        """What `restore` needs to go on with the same bits."""
+        particle, count = self._particle, int(self._particle.max(initial=-1)) + 1
+        wall, given = np.zeros((8, count), self._dtype), np.zeros((count, 3), self._dtype)
+        wall[:, particle], given[particle, :2], given[particle, 2] = self._wall, self.gave, self.gave_spin
+        pairs, values = (array.copy() for array in self._impulses())
+        kept = self._kept_list or (self.engine.save_list() if self.kick else None)
+        if kept is None:
+            none = np.empty((0, 2), self._dtype)
+            return Memory(pairs, values, wall, given, self.kick, self.h, self.hertz, self.finer, none, none)
+        listed, checked = (np.zeros((count if len(rows) else 0, 2), self._dtype) for rows in kept[:2])
+        if len(listed):
+            listed[particle], checked[particle] = kept[:2]
+        skin = kept[2]
+        return Memory(pairs, values, wall, given, self.kick, self.h, self.hertz, self.finer, listed, checked, skin)
+
+    def restore(self, memory: Memory) -> None:
+        """Back to what `save` returned."""
+        self._kept: tuple[Array, Array] | None = (memory.pairs, memory.values)  # what the engine is still to be given
+        self._kept_list: Any = (memory.listed, memory.checked, memory.skin) if memory.skin else None
+        self._particle = np.arange(len(memory.given), dtype=np.int32)
+        self._wall, self.gave, self.gave_spin = memory.wall, *columns_of(memory.given)
+        self.kick, self.h, self.hertz, self.finer = memory.kick, memory.h, memory.hertz, memory.finer
+        self._made = -1  # of `Slots.given`, what the engine holds; -1: nothing
+        self._collisions: Any = None
+        self._skin: float | None = -1.0
+
+    def _impulses(self) -> tuple[Array, Array]:
+        """Pairs and values of `Memory`."""
+        return self._kept if self._kept is not None else self.engine.take_impulses(self._particle)
+
+    def renumber(self, now: Array) -> None:
+        """The particles are now at `now` (n,), or no more (-1)."""
+        self.restore(self.save().renumbered(now))
+
+    def load(self, world: Any) -> None:
+        """Have the engine see the particles of now, and what they are made of."""
+        state, engine, collisions = world._slots, self.engine, world.collisions
+        parts = world._team.now
+        if engine.threads < parts:
+            engine.set_threads(parts)
+        self.parts = parts
+        if self._particle is not state.particle or self._kept is not None:
+            self._follow(state)
+        if state.given != self._made or collisions is not self._collisions:
+            self._hold(state)
+            self._set_materials(world)
+        if collisions.method.skin != self._skin:
+            self._skin = collisions.method.skin
+            if self._kept_list is None:
+                engine.set_skin(SKIN if self._skin is None else self._skin, self._skin is None)
+        engine.set_room(*walls_of(world.boundary))
+        if world.boundary is not self._room:
+            engine.set_seam(*state.seam)
+            self._room = world.boundary
+        if self._kept_list is not None:
+            engine.set_skin(self._kept_list[2][0], self._skin is None)
+            engine.restore_list(*self._kept_list)
+            self._kept_list = None
+        if len(state) >= SORTED_FROM:
+            self._sort(state)
+        if state.seam:
+            engine.follow_seam()
+
+    def _sort(self, state: Slots) -> None:
+        """Put slots in the order of the cells if many are not; the list of pairs stays what it is."""
+        falls, order = self.engine.order()
+        if falls > UNSORTED * len(state):
+            self.engine.renumber(order)
+            self._wall, self.gave = np.ascontiguousarray(self._wall[:, order]), self.gave[order]
+            self.gave_spin = self.gave_spin[order]
+            state.reorder(order)
+            self._particle = state.particle
+            self._hold(state)
+
+    def _follow(self, state: Slots) -> None:
+        """Have what is remembered of particles in the order of the slots of now."""
+        count = max(int(state.particle.max(initial=-1)), int(self._particle.max(initial=-1))) + 1
+        pairs, values = self._impulses()
+        wall, given = np.zeros((8, count), self._dtype), np.zeros((count, 3), self._dtype)
+        wall[:, self._particle] = self._wall
+        given[self._particle, :2], given[self._particle, 2] = self.gave, self.gave_spin
+        if self._kept_list is not None:
+            rows, same = self._kept_list[:2], len(self._kept_list[0]) == len(state)
+            listed, checked = (np.ascontiguousarray(row[state.particle]) if same else row[:0] for row in rows)
+            self._kept_list = listed, checked, self._kept_list[2]
+        self._particle, place = state.particle, np.zeros(count, np.int32)
+        place[state.particle] = np.arange(len(state), dtype=np.int32)
+        self._wall, self.gave, self.gave_spin = (
+            np.ascontiguousarray(wall[:, state.particle]),
+            *columns_of(given[state.particle]),
+        )
+        self._hold(state)
+        self.engine.give_impulses(place[pairs], values)
+        self._kept = None
+
+    def _hold(self, state: Slots) -> None:
+        """Have the engine take the arrays of now."""
+        count, real = len(state), self._dtype
+        self.engine.set_particles(
+            position=state.position, velocity=state.velocity, acceleration=state.acceleration,
+            inverse_mass=state.inverse_mass, radius=state.radius, own_restitution=state.restitution,
+            own_friction=state.friction, spin=state.spin, motion=np.zeros((count, 4), real), free=np.zeros((count, 2), real),
+            free_spin=np.zeros(count, real), given=self.gave, given_spin=self.gave_spin, wall_impulse=self._wall[:4],
+            wall_tangent=self._wall[4:], at_wall=np.zeros(count, np.int32),
+            particle=state.particle, category=state.category, mask=state.mask,
+        )  # fmt: skip
+
+    def _set_materials(self, world: Any) -> None:
+        """What circles are made of has changed."""
+        state = world._slots
+        self._made, self._collisions = state.given, world.collisions
+        state.grown.fill(1)
+        state.resize()
+        self.free = bool((state.inverse_mass > 0).any())
+        self.largest = float(state.radius.max(initial=0.0))
+        self.engine.set_materials(**materials_of(state, world._state.radius, world.collisions))
