@@ -89,6 +89,11 @@ class ImpulseFrames:
         Raises:
             InputError: there is such a thing in the world.
         """
+        if found := self.unknown(world):
+            raise InputError(f"impulses is True in a world with {found[0]}; allowed are circles in a room, with forces")
+
+    def unknown(self, world: Any) -> list[str]:
+        """What this law does not know yet."""
         unknown = {
             "links": bool(world.links),
             "obstacles": bool(world.obstacles),
@@ -97,8 +102,7 @@ class ImpulseFrames:
             "sleep=True": world._sleep is not None,
             "brute force": not isinstance(world.collisions.method, Fast),
         }
-        if found := [name for name, there in unknown.items() if there]:
-            raise InputError(f"impulses is True in a world with {found[0]}; allowed are circles in a room, with forces")
+        return [name for name, there in unknown.items() if there]
 
     def run(self, world: Any, dt: float, done: Callable[[str], None]) -> None:
         """Advance the gathered slots by a frame of dt seconds.
