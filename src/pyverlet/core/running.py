@@ -48,7 +48,10 @@ def refresh(w: cython.pointer(Step)) -> cython.bint:
         fill_alike(w, ls)
         each_group(w, fill_stage)
         ls.refill = False
-    return renew_list(w) if strays(w) else True
+    stale: cython.bint = ls.stale if w.substep > 0 else False
+    if not stale and (w.substep == 0 or not w.falls_free):
+        stale = strays(w)
+    return renew_list(w) if stale else True
 
 
 @cython.cfunc
@@ -62,10 +65,10 @@ def run_substeps(what: cython.p_void, item: cython.int) -> cython.void:
         team_stage(w.team, begin_stage, w, blocks)
     going: cython.bint = refresh(w)
     while going and w.substep < w.substeps:
-        stale: cython.bint = substep(w, blocks)
+        w.lists.stale = substep(w, blocks)
         w.substep += 1
         w.lists.age += 1
-        if stale and w.substep < w.substeps:
+        if w.lists.stale and w.substep < w.substeps:
             going = renew_list(w)
     if going:
         team_stage(w.team, end_stage, w, blocks)

@@ -32,7 +32,7 @@ class ImpulseArrays:
         gave, gave_spin: (slots, 2) m/s and (slots,) rad/s that contacts gave in the last substep.
         parts: threads that go through a frame.
         free: whether any particle is not pinned.
-        largest: radius, m.
+        largest, mean_radius: m.
     """
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
@@ -163,4 +163,6 @@ class ImpulseArrays:
         state.resize()
         self.free = bool((state.inverse_mass > 0).any())
         self.largest = float(state.radius.max(initial=0.0))
-        self.engine.set_materials(**materials_of(state, world._state.radius, world.collisions))
+        materials = materials_of(state, world._state.radius, world.collisions)
+        self.mean_radius = materials["mean_radius"]
+        self.engine.set_materials(**materials)

@@ -14,7 +14,6 @@ from pyverlet.state.slots import Slots
 Array = NDArray[Any]
 
 ROOMS = Open, Circle, Box, Periodic
-"""Whose walls the core knows; others confine the particles after each substep."""
 
 OPEN, CAGE, BOX = range(3)
 """Rooms, as the core numbers them."""
@@ -48,8 +47,15 @@ def _differs(column: Array) -> bool:
     return bool(len(column) and (column != column[0]).any())
 
 
+def knows(room: Any) -> bool:
+    """Whether the core knows the walls of a room; others, of a user's own, confine the particles after each substep."""
+    return type(room).confine in (each.confine for each in ROOMS)
+
+
 def walls_of(room: Any) -> tuple[float, ...]:
     """The arguments of `Engine.set_room`."""
+    if not knows(room):
+        return OPEN, *(0.0,) * 7
     if isinstance(room, Circle):
         speed = room.angular_velocity * room.radius
         return CAGE, *room.center, room.radius, 0.0, room.restitution, room.friction, speed

@@ -48,5 +48,4 @@ class ImpulseNotes:
         state = self._state
         free = np.flatnonzero(self._by_walls.any(axis=1) & (state.inverse_mass > 0))
         self._touches.give(1, state.particle[free], state.mass[free, None] * self._by_walls[free].astype(float))
-        none: NDArray[np.int64] = np.empty((0, 2), np.int64)
-        self._touches.close(state, world._state, world.boundary, world._course, none, dt, self._virial)
+        self._touches.close(state, world._state, world.boundary, world._course, self._touches.pairs_heard(), dt, self._virial)
