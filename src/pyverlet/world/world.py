@@ -406,3 +406,4 @@ class World(Measures, Queries, Doors):
         if self._contacts:
             self._contacts.restore(saved.contacts, self._slots)
         self._impulses.restore(saved.impulses)
+        self._by_impulses = saved.impulses.kick > 0
