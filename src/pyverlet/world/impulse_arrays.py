@@ -74,6 +74,13 @@ class ImpulseArrays:
         self._collisions: Any = None
         self._skin: float | None = -1.0
 
+    def forget_list(self) -> None:
+        """The list of pairs is no longer about the particles of now."""
+        self.engine.forget_list()
+        if self._kept_list is not None:
+            listed, checked, skin = self._kept_list
+            self._kept_list = listed[:0], checked[:0], skin
+
     def _impulses(self) -> tuple[Array, Array]:
         """Pairs and values of `Memory`."""
         return self._kept if self._kept is not None else self.engine.take_impulses(self._particle)

@@ -77,10 +77,11 @@ class ImpulseFrames:
         if (known := (world.collisions, len(world.links), len(world.obstacles))) != self._checked:
             self.check(world)
             self._checked = known
+        world.links.begin()
         world._slots.rows = self.held.core
         world._slots.clear_notes()
         if world._gather():
-            self.held.engine.forget_list()
+            self.held.forget_list()
         if not self.run(world, dt, world.profile.mark):
             self._refuse_non_finite(world, dt)
 
