@@ -91,14 +91,16 @@ class Engine:
         self.ls.category, self.ls.mask = indices(a["category"]), indices(a["mask"])
 
     def set_materials(self, **n):
-        """sized, varied, mixed: whether radii, masses, and any of restitution, friction and radii differ.
+        """collides: whether there are pairs at all. sized, varied, mixed: whether radii, masses, and any of restitution, friction and radii differ.
 
         bulk: largest radius of circles that stand in cells, m; smallest, largest and mean_radius, m. restitution, friction: of
         circles without values of their own. picky: whether some pairs are no pairs: of pinned or filtered ones, or linked ones.
         """
         w: cython.pointer(Step) = cython.address(self.w)
         ls: cython.pointer(Lists) = cython.address(self.ls)
-        w.sized, w.varied, w.mixed = n["sized"], n["varied"], n["mixed"]
+        w.sized, w.varied, w.mixed, w.collides = n["sized"], n["varied"], n["mixed"], n["collides"]
+        if not w.collides:
+            w.groups, ls.listed, ls.good = 0, False, False
         self.c.bulk, self.c.smallest, ls.largest, ls.mean_radius = n["bulk"], n["smallest"], n["largest"], n["mean_radius"]
         ls.restitution, ls.friction, ls.picky = n["restitution"], n["friction"], n["picky"] or ls.linked
         ls.refill = True

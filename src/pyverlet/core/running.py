@@ -39,6 +39,8 @@ def strays(w: cython.pointer(Step)) -> cython.bint:
 def refresh(w: cython.pointer(Step)) -> cython.bint:
     """Have a list of pairs that is good for the first substep. False: arrays are too small for it."""
     ls: cython.pointer(Lists) = w.lists
+    if not w.collides:
+        return True
     if not ls.good:
         return make_list(w, False)
     if w.substep == 0 and has_paid(w, ls):
@@ -68,7 +70,7 @@ def run_substeps(what: cython.p_void, item: cython.int) -> cython.void:
         w.lists.stale = substep(w, blocks)
         w.substep += 1
         w.lists.age += 1
-        if w.lists.stale and w.substep < w.substeps:
+        if w.lists.stale and w.collides and w.substep < w.substeps:
             going = renew_list(w)
     if going:
         team_stage(w.team, end_stage, w, blocks)

@@ -41,6 +41,7 @@ Step = cython.struct(
     listed=cython.pointer(real),  # (count, 2) positions when the list of pairs was made
     moved=cython.pointer(real),  # (count, 2) since then, m
     checked=cython.pointer(real),  # (count, 2) positions when the list was last found to be good
+    collides=cython.bint,  # whether particles meet each other; else there are no pairs
     # ---- candidate pairs, in batches of eight that share no particle, by groups of cell rows
     groups=cython.Py_ssize_t,
     begin=cython.pointer(int64_t),  # (groups + 1,) of its lanes

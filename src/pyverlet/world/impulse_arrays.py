@@ -101,8 +101,8 @@ class ImpulseArrays:
         if state.given != self._made or collisions is not self._collisions:
             self._hold(state)
             self._set_materials(world)
-        if collisions.method.skin != self._skin:
-            self._skin = collisions.method.skin
+        if (skin := collisions.method.skin if collisions else None) != self._skin:
+            self._skin = skin
             if self._kept_list is None:
                 engine.set_skin(SKIN if self._skin is None else self._skin, self._skin is None)
         engine.set_room(*walls_of(world.boundary))

@@ -102,7 +102,7 @@ class ImpulseFrames:
             "a ledger": world.keeps_ledger,
             "events": world.tells_events,
             "sleep=True": world._sleep is not None,
-            "brute force": not isinstance(world.collisions.method, Fast),
+            "brute force": world.collisions is not None and not isinstance(world.collisions.method, Fast),
         }
         return [name for name, there in unknown.items() if there]
 
@@ -111,7 +111,7 @@ class ImpulseFrames:
         state, forces, engine, collisions = world._slots, world._force_sum, self.held.engine, world.collisions
         contained = len(world) > 1 or not isinstance(world.boundary, Open)
         substeps = world.substeps
-        if contained and dt > LONGEST_FRAME:
+        if contained and collisions and dt > LONGEST_FRAME:
             substeps *= int(np.ceil(dt / LONGEST_FRAME * (1 - 1e-9)))
         by_core = kicks(world.integrator)
         h, half = dt / substeps, world.integrator.velocity_lag if by_core else 0.5
@@ -125,7 +125,7 @@ class ImpulseFrames:
         self.held.load(world)
         if getattr(world.integrator, "naive_start", False):
             self._start_naively(world, (1.0 - half) * h)
-        rough = max(collisions.friction, state.most_friction, getattr(world.boundary, "friction", 0.0)) > 0.0
+        rough = max(collisions.friction if collisions else 0.0, state.most_friction, getattr(world.boundary, "friction", 0.0)) > 0.0
         done("gather")
         notes = None if world._touches is None else ImpulseNotes(world._touches, engine, state)
         step, finite = 0, True

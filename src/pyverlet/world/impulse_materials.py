@@ -23,12 +23,13 @@ MUCH_LARGER = 4.0
 """Circles so many times as large as all but one in ALONE stand in no cell of the grid."""
 
 
-def materials_of(state: Slots, radius: Array, collisions: Collisions) -> dict[str, Any]:
+def materials_of(state: Slots, radius: Array, collisions: Collisions | None) -> dict[str, Any]:
     """The arguments of `Engine.set_materials`; radius: (n,) m, in the user's order, on which the last bit of a mean depends."""
     ordered = np.sort(radius)[::-1] if len(radius) else np.ones(1)
     # Very few that are much larger than all others stand in no cell.
     usual = float(ordered[min(len(ordered) // ALONE, len(ordered) - 1)])
     return {
+        "collides": collisions is not None,
         "sized": _differs(state.radius),
         "varied": _differs(state.inverse_mass),
         "mixed": any(map(_differs, (state.radius, state.restitution, state.friction))),
@@ -36,8 +37,8 @@ def materials_of(state: Slots, radius: Array, collisions: Collisions) -> dict[st
         "smallest": float(ordered[-1]),
         "largest": float(ordered[0]),
         "mean_radius": float(radius.mean(dtype=np.float64)) if len(radius) else 1.0,
-        "restitution": collisions.restitution,
-        "friction": collisions.friction,
+        "restitution": collisions.restitution if collisions else 0.0,
+        "friction": collisions.friction if collisions else 0.0,
         "picky": bool(len(state.category)) or not bool((state.inverse_mass > 0).all()),
     }
 

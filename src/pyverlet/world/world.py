@@ -129,9 +129,7 @@ class World(Measures, Queries, Doors):
             self.profile.end()
 
     def _choose(self) -> bool:
-        by = self._collisions is not None and (
-            self._collisions.impulses is True or (self._collisions.impulses is None and not self._impulses.unknown(self))
-        )
+        by = not self._impulses.unknown(self) if self._collisions is None or self._collisions.impulses is None else self._collisions.impulses
         if by != self._by_impulses:
             self._by_impulses = by
             self._impulses.forget()
