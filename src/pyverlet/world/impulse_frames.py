@@ -98,7 +98,6 @@ class ImpulseFrames:
         """What this law does not know yet."""
         unknown = {
             "links": bool(world.links),
-            "obstacles": bool(world.obstacles),
             "a ledger": world.keeps_ledger,
             "events": world.tells_events,
             "sleep=True": world._sleep is not None,
@@ -122,10 +121,10 @@ class ImpulseFrames:
         watch = watched(world, dt / world.substeps, None) if contained and (forces.forces or world.links) else None
         gravity = world.gravity
         state.h = h
-        self.held.load(world)
+        self.held.load(world, dt)
         if getattr(world.integrator, "naive_start", False):
             self._start_naively(world, (1.0 - half) * h)
-        rough = max(collisions.friction if collisions else 0.0, state.most_friction, getattr(world.boundary, "friction", 0.0)) > 0.0
+        rough = max(collisions.friction if collisions else 0.0, state.most_friction, getattr(world.boundary, "friction", 0.0), self.held.obstacle_friction) > 0.0
         done("gather")
         notes = None if world._touches is None else ImpulseNotes(world._touches, engine, state)
         step, finite = 0, True

@@ -367,7 +367,7 @@ class World(Measures, Queries, Doors):
             h_last=self._h_last,
             slots=self._slots.save(self._state),
             contacts=self._contacts.save() if self._contacts else None,
-            impulses=self._impulses.save(),
+            impulses=self._impulses.save(self._course),
             books=self._books and self._books.copy(),
             events=self._events and self._events.copy(),
             sleep=self._sleep and self._sleep.copy(),
