@@ -29,6 +29,7 @@ from pyverlet.core.obstacles import place_moving
 from pyverlet.core.particle_stages import drift, kick_stage, remember_stage
 from pyverlet.core.relisting import each_group
 from pyverlet.core.step import OPEN, Step
+from pyverlet.core.surface_sides import keep_side
 from pyverlet.core.surfaces import bounce_surfaces, hold_surfaces, relax_surfaces, warm_surfaces
 from pyverlet.core.warm_start import warm_start
 
@@ -43,7 +44,9 @@ def warm_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     n: cython.Py_ssize_t
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
-        warm_surfaces(w, w.at_surface[n])
+        i: cython.Py_ssize_t = w.at_surface[n]
+        w.begun[2 * i], w.begun[2 * i + 1] = w.position[2 * i], w.position[2 * i + 1]
+        warm_surfaces(w, i)
 
 
 @cython.cfunc
@@ -78,7 +81,9 @@ def drift_stage(what: cython.p_void, block: cython.int) -> cython.void:
     a: cython.Py_ssize_t = block * BLOCK
     n: cython.Py_ssize_t
     for n in range(a, a + w.at_surface_count[block]):
+        bounce_surfaces(w, w.at_surface[n])  # pairs may have thrown it there
         hold_surfaces(w, w.at_surface[n])
+        keep_side(w, w.at_surface[n])
     drift(w, a, min(a + BLOCK, w.count), block)
     if w.relaxes > 0:
         relax_surfaces_stage(what, block)
