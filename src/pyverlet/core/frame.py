@@ -20,7 +20,6 @@ from __future__ import annotations
 import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
-from cython.cimports.libc.stdint import int32_t
 from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK

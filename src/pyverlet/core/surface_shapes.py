@@ -59,7 +59,7 @@ Spot = cython.struct(
     reach=cython.double,  # radius and rounding
     left=cython.bint,  # whether what is before its start, or beyond its end, belongs to the neighbour
     right=cython.bint,
-    above=cython.bint,  # whether it is on the side of greater y, as of its last impact: that moves where its path would have begun
+    above=cython.bint,  # whether it is on the side of greater y, as of its last impact: that moves where its path begins
     wx=cython.double,  # of the particle in the room
     wy=cython.double,
 )
@@ -242,9 +242,7 @@ def measure_surface(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def flat_time(
-    gap: cython.double, u: cython.double, a: cython.double, h: cython.double, since: cython.double
-) -> cython.double:
+def flat_time(gap: cython.double, u: cython.double, a: cython.double, h: cython.double, since: cython.double) -> cython.double:
     """When a rim meets a plane that it comes to with u in the middle of the substep, s; not before `since`."""
     if gap <= 0 and since == 0:
         return 0.0

@@ -206,11 +206,11 @@ def hold(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, re
 @cython.exceptval(check=False)
 def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """Hold particle i at the surfaces that it may reach in this substep."""
-    n: cython.int
+    _: cython.int
     k: cython.Py_ssize_t
     for k in range(w.contact_begin[i], w.contact_end[i]):
         measure_surface(w, i, k, False)
-    for n in range(MOST_TURNS_AROUND):
+    for _ in range(MOST_TURNS_AROUND):
         most: cython.double = 0
         change: cython.double = 0
         loaded: cython.int = 0

@@ -145,7 +145,9 @@ def take_apart(world: World) -> Parts:
     facts["impulses"] = {"kick": memory.kick, "h": memory.h, "hertz": memory.hertz, "finer": memory.finer}
     if memory.kick:
         facts["impulses"]["skin"] = list(memory.skin)
-        arrays |= {f"impulses.{name}": getattr(memory, name) for name in Memory._fields if isinstance(getattr(memory, name), np.ndarray)}
+        arrays |= {
+            f"impulses.{name}": getattr(memory, name) for name in Memory._fields if isinstance(getattr(memory, name), np.ndarray)
+        }
     if saved.books:
         facts["books"] = {
             "energy": saved.books._energy, "resting": saved.books._resting, "ledger": saved.books.ledger.as_dict(),
@@ -304,7 +306,9 @@ def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
     if not (pairs[:, 0] < pairs[:, 1]).all() or not (np.diff(pairs[:, 0]) >= 0).all():
         raise InputError("impulses.pairs are not sorted; allowed are pairs low < high, by the lower")
     if len(surfaces) and not (surfaces[:, 0] < len(given)).all():
-        raise InputError(f"impulses.surfaces has particle {surfaces[:, 0].max()}; allowed are those of impulses.given, {len(given)}")
+        raise InputError(
+            f"impulses.surfaces has particle {surfaces[:, 0].max()}; allowed are those of impulses.given, {len(given)}"
+        )
     if len(given) > len(world):
         raise InputError(f"impulses.given has {len(given)} rows; allowed are at most {len(world)}, one for each particle")
     none = np.empty((0, 2), world.dtype)
