@@ -163,6 +163,8 @@ def treat(bits, k, at, circles, pairs, law, spent):
             if along < 0:
                 if not _bounce(i, j, dx, dy, reach, m[E, one], m[MU, one], m[R_I, one], m[R_J, one], circles, law, spent):
                     continue
+                if pairs.bounced.shape[0] > 0 and m[E, one] > 0:
+                    pairs.bounced[k + lane] += np.uint8(1)
                 dx, dy = _apart(i, j, k + lane, circles, pairs)
             elif not along > _slow(circles, i, j, law) * np.sqrt(dx * dx + dy * dy) and not (law.weight == 0 and m[E, one] > 0):
                 continue

@@ -83,12 +83,14 @@ NEWS = {
     "begin": Field(np.int64, "begin", 4, least=-1),
     "begin_how": Field(np.float64, "begin", 6),
     "end": Field(np.int64, "end", 2, least=-1),
+    "end_at": Field(np.int64, "end", 2, least=-1),
     "broken": Field(np.int64, "broken", 4, least=-1),
     "broken_force": Field(np.float64, "broken", infinite=True),
     "islands": Field(np.int64, "islands", least=0, order="ascending"),
     "members": Field(np.int64, "islands", least=1),
 }
-"""What happened in the last frame, and who sleeps. Of `begin` a, b, wall and obstacle; speed, point (2), normal (2), impulse."""
+"""What happened in the last frame, and who sleeps. Of `begin` a, b, wall and obstacle; speed, point (2), normal (2), impulse. Of
+`end` a and b; wall and obstacle, which files of older versions lack."""
 
 LINKED = {
     "number": Field(np.int64, "linked", least=0, most=2**31, order="ascending"),
@@ -345,7 +347,7 @@ def _books(facts: Facts) -> Bookkeeper:
 
 def _events_apart(events: Events, arrays: dict[str, Array]) -> None:
     arrays["news.touching"] = events._touching
-    arrays["news.end"] = np.column_stack((events.end["a"], events.end["b"]))
+    arrays["news.end"], arrays["news.end_at"] = np.hsplit(np.column_stack([events.end[name] for name in _WHO]), 2)
     arrays["news.begin"] = np.column_stack([events.begin[name] for name in _WHO])
     arrays["news.begin_how"] = np.column_stack([events.begin[name] for name in _HOW])
 
@@ -355,7 +357,9 @@ def _events(facts: Facts, arrays: dict[str, Array]) -> Events:
     events.hit_speed = facts["hit_speed"]
     events._touching = arrays["news.touching"]
     events.end = np.zeros(len(arrays["news.end"]), CONTACT)
-    events.end["a"], events.end["b"] = arrays["news.end"].T
+    surfaces = arrays.get("news.end_at", np.full(arrays["news.end"].shape, -1))
+    for name, column in zip(_WHO, (*arrays["news.end"].T, *surfaces.T), strict=True):
+        events.end[name] = column
     events.begin, how = np.zeros(len(arrays["news.begin"]), HIT), arrays["news.begin_how"]
     for name, column in zip(_WHO, arrays["news.begin"].T, strict=True):
         events.begin[name] = column

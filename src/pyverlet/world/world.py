@@ -91,7 +91,7 @@ class World(Measures, Queries, Doors):
     ) -> None:
         self._state = State(checks.floating("dtype", dtype))
         self._h_last: float | None = None  # substep of the frame before; None: the integrator starts anew
-        self._slots = Slots(self._state.dtype, sleeps=sleep)
+        self._slots = Slots(self._state.dtype, sleeps=sleep, events=events)
         self.links, self.forces, self.obstacles = Links(self._state), ForceList(), Obstacles()
         self._events, self._touches = Events() if events else None, Touches() if contacts else None
         self._sleep, self._books = Sleep() if sleep else None, Bookkeeper() if ledger else None
@@ -196,7 +196,7 @@ class World(Measures, Queries, Doors):
                 checks.positive("mass", self._state.mass, infinite_is="pinned")
                 self.boundary.check(self._state.radius)
             except InputError:
-                self._slots = Slots(self.dtype, sleeps=self._sleep is not None)  # new to the next frame, which refuses them again
+                self._slots = Slots(self.dtype, sleeps=self._sleep is not None, events=self._events is not None)  # new to the next frame
                 raise
         if self._contacts and not self._impulses.steps:
             self._contacts.begin(self._slots, changed=changed)
