@@ -29,7 +29,7 @@ from pyverlet.laws.touches import Touches
 from pyverlet.state.moves import first_non_finite
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
-from pyverlet.world.actors import Actor, act_once
+from pyverlet.world.actors import Actor, act_after, act_once
 from pyverlet.world.convenience import Doors
 from pyverlet.world.impulse_frames import ImpulseFrames
 from pyverlet.world.measures import Measures
@@ -127,6 +127,7 @@ class World(Measures, Queries, Doors):
                 self._refuse_non_finite(h)
             self._accept(dt, h, books)
             self.profile.end()
+        act_after(self, dt)
 
     def _frame(self, h: float, done: Callable[[str], None]) -> bool:
         """The table of contents of the engine; `done` hears which stage has ended. True if all is known to be finite."""
