@@ -270,7 +270,7 @@ def test_contacts_end_where_one_or_none_is_left(left: int) -> None:
     assert len(world.events.begin) == 2
     world.remove(np.arange(3) >= left)
     world.step(1 / 60)
-    assert world.events.end[["a", "b"]].tolist() == [(-1, -1), (0 if left else -1, -1)]
+    assert world.events.end[["a", "b"]].tolist() == [(0 if left else -1, -1), (-1, -1)]
     for _ in range(60):
         world.step(1 / 60)
         assert len(world.events.end) == 0

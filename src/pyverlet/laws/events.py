@@ -58,7 +58,9 @@ class Told(NamedTuple):
 
 
 class Events:
-    """Contacts of the last frame, as structured arrays sorted by a, then b. Those who touch in any substep touch in the frame.
+    """Contacts of the last frame, as structured arrays sorted by a, then b; a removed particle stays where it was.
+
+    Those who touch in any substep touch in the frame.
 
     Contacts with each wall of the room, each obstacle and each other particle are told apart. A contact begins again with every
     bounce, after an end, even if it touched in the frame before. In a pile that comes to rest, contacts without weight may end
@@ -141,10 +143,10 @@ class Events:
         ended = np.concatenate((lost, gone, np.repeat(again, bounces - 1 + _among(again, self._touching))))
         speeds = kernels.largest(begun, *told[:2])
         self._touching = now
-        self.end = _sorted(_contacts(ended, state))[0]
-        met, order = _sorted(_contacts(np.repeat(begun, times), state))
-        speeds = np.repeat(speeds, times)[order]
-        self.begin = place.hits(met, speeds, state)
+        self.end = _contacts(np.sort(ended ^ _SURFACE) ^ _SURFACE, state)  # walls and obstacles before particles
+        order = np.argsort(begun ^ _SURFACE)
+        begun, speeds = (np.repeat(column[order], times[order]) for column in (begun, speeds))
+        self.begin = place.hits(_contacts(begun, state), speeds, state)
         self.hit = self.begin[speeds >= self._hit_speed]
         self.forget()
 
@@ -336,12 +338,6 @@ def _contacts(keys: Array, state: State) -> Array:
     found["wall"] = np.where(number < FIRST_OBSTACLE, number, -1)
     found["obstacle"] = np.where((number >= FIRST_OBSTACLE) & (number < _LOST), number - FIRST_OBSTACLE, -1)
     return found
-
-
-def _sorted(found: Array) -> tuple[Array, Array]:
-    """Contacts sorted by a, b, wall and obstacle, and the order they were in."""
-    order = np.lexsort((found["obstacle"], found["wall"], found["b"], found["a"]))
-    return found[order], order
 
 
 def _index(number: Array, state: State) -> Array:

@@ -58,6 +58,13 @@ def act_once(world: World, dt: float) -> None:
             actor.act(world, dt)
 
 
+def act_after(world: World, dt: float) -> None:
+    """Actors that look at what a frame has done."""
+    for actor in tuple(world.actors):
+        if isinstance(actor, Actor):
+            actor.after(world, dt)
+
+
 class Emitter(Actor):
     """Adds particles at random places of a region where nobody is, nor an obstacle; while there is no room, it waits.
 
