@@ -126,7 +126,6 @@ class World(Measures, Queries, Doors):
             elif not self._frame(h, self._listen(h, books or self.profile.mark)):
                 self._refuse_non_finite(h)
             self._accept(dt, h, books)
-            self.profile.end()
         act_after(self, dt)
 
     def _frame(self, h: float, done: Callable[[str], None]) -> bool:
@@ -197,7 +196,9 @@ class World(Measures, Queries, Doors):
                 checks.positive("mass", self._state.mass, infinite_is="pinned")
                 self.boundary.check(self._state.radius)
             except InputError:
-                self._slots = Slots(self.dtype, sleeps=self._sleep is not None, events=self._events is not None)  # new to the next frame
+                self._slots = Slots(
+                    self.dtype, sleeps=self._sleep is not None, events=self._events is not None
+                )  # new to the next frame
                 raise
         if self._contacts and not self._impulses.steps:
             self._contacts.begin(self._slots, changed=changed)
@@ -231,6 +232,7 @@ class World(Measures, Queries, Doors):
         self.time, self.frames, self._h_last = self.time + dt, self.frames + 1, h
         for each in self._looks:
             each.look(self, h)
+        self.profile.end()
 
     def _show(self, since: float, lag: float) -> None:
         if self.onlooker and since:
