@@ -15,6 +15,7 @@ from pyverlet.ground.constants import REST_ACCELERATIONS, SURPLUS
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.laws.contacts.broadphase import Fast
 from pyverlet.laws.contacts.growth import Growth
+from pyverlet.laws.integrators import PositionVerlet
 from pyverlet.laws.limiter import fall, watched
 from pyverlet.laws.rooms import Open
 from pyverlet.state.moves import first_non_finite
@@ -44,6 +45,9 @@ PUSH_OUT = 15.0
 """Fastest pushing out of overlaps, in mean radii a second."""
 
 RELAXING_SWEEPS = 2
+
+PASSES = 4
+"""Of the fixed-point iteration for forces that depend on the velocity."""
 
 NEAR = 0.05
 """Of the largest radius: pairs and walls with larger gaps carry no load."""
@@ -118,10 +122,13 @@ class ImpulseFrames:
         self._stiffen(h, dt)
         own_walls = None if knows(world.boundary) else world.boundary.confine
         alone = by_core and not (forces.forces or own_walls)
-        watch = watched(world, dt / world.substeps, None) if contained and (forces.forces or world.links) else None
+        limited = bool(collisions and len(world) > 1) or bool(world.obstacles)
+        watch = watched(world, dt / world.substeps, None) if limited and (forces.forces or world.links) else None
         gravity = world.gravity
         state.h = h
         self.held.load(world, dt)
+        if type(world.integrator) is PositionVerlet and before not in (0.0, h):
+            self._keep_way(state, before, h)
         if getattr(world.integrator, "naive_start", False):
             self._start_naively(world, (1.0 - half) * h)
         rough = max(collisions.friction if collisions else 0.0, state.most_friction, getattr(world.boundary, "friction", 0.0), self.held.obstacle_friction) > 0.0
@@ -130,18 +137,21 @@ class ImpulseFrames:
         step, finite = 0, True
         while step < substeps:
             opens, known = step == 0 or not by_core, self.held.kick > 0.0  # opens: from velocities that belong to the positions
-            kick = half * (h + before) if half and opens else h
+            kick, opening = half * (h + before) if half and opens else h, 0.0 if not by_core else half * h if half and opens else h
             if not by_core:
                 self._flight.take(world.integrator, state, forces, world.time + step * h, h)
             elif not alone:
                 self._evaluate(world, step * h, half * h if step else 0.0)
+                # Rounded as the method that keeps u, back by half a substep and on by a whole one: x' = 2 x - x_prev + a h^2.
+                state.velocity -= state.real(h - opening) * state.acceleration
+                opening = h
             done("integrate")
             # The first substep may have a kick of its own; whoever looks or acts in each has a call for each.
             stop = step + 1 if not alone or notes or world.onlooker or kick != h else substeps
             last_kick = kick if stop == step + 1 else h
             self._set_law(self._strongest(world.gravity) if alone else forces.strongest, h, kick, rough=rough)
             engine.set_frame(
-                0.0 if not by_core else half * h if half and opens else h,
+                opening,
                 half * before / self.held.kick if opens and known else 0.0,
                 kick / self.held.kick if known else 1.0,
                 half * h if stop == substeps else 0.0,
@@ -155,17 +165,17 @@ class ImpulseFrames:
                 notes.read(h / kick)
             self.held.kick, before, step = last_kick, h, stop
             done("contacts")
-            if own_walls:
-                own_walls(state, h, half * h if by_core else 0.0, 0.0)
             if not by_core:
                 self._flight.end(state, self.held.gave, self.held.gave_spin, h / self.held.kick)
+            if own_walls:
+                own_walls(state, h, half * h if by_core else 0.0, 0.0)
             world._show(step * h, half * h if by_core else 0.0) if step < substeps else None
         self.held.h = h
         if not alone:
             self._end(world, dt, half * h if by_core else 0.0)
         if (not finite or not alone) and first_non_finite(state) >= 0:
             return False
-        if contained and gravity == world.gravity:
+        if limited and gravity == world.gravity:
             self._limit(world, watch, dt)
         if notes:
             notes.close(world, dt)
@@ -211,6 +221,12 @@ class ImpulseFrames:
         self.run(world, dt, look)
         raise NonFiniteError(last, "contacts", world.time)
 
+    def _keep_way(self, state: Any, before: float, h: float) -> None:
+        """x - x_prev is kept, whatever the new step, and a h^2 comes to it: the flaw of plain Verlet, shown on purpose."""
+        known = ~np.isnan(state.acceleration[:, 0])
+        a, half, more = state.acceleration[known], state.real(0.5 * before), state.real(before / h - 1.0)
+        state.velocity[known] += more * (state.velocity[known] - half * a) + state.real(0.5 * (h - before)) * a
+
     def _start_naively(self, world: Any, missing: float) -> None:
         """Kick those that are new by what x_prev = x - v h leaves out: it takes the first kick to be a whole one."""
         state = world._slots
@@ -220,15 +236,19 @@ class ImpulseFrames:
             state.velocity[fresh] += state.real(missing) * state.acceleration[fresh]
 
     def _evaluate(self, world: Any, since: float, ahead: float) -> None:
-        """Accelerations by gravity and forces; these see velocities of now, not of half a substep ago."""
+        """Accelerations by gravity and forces; these see velocities of now, not of half a substep ago.
+
+        Those of now depend on the accelerations: a user's own force, across the velocity say, finds them by fixed-point iteration.
+        """
         state, forces = world._slots, world._force_sum
-        if ahead and forces.velocity_dependent:
-            velocity = state.velocity.copy()
-            state.velocity += state.real(ahead) * (state.acceleration + self.held.gave / state.real(self.held.kick))
+        if not (ahead and forces.velocity_dependent):
             forces(state, world.time + since)
-            state.velocity[:] = velocity
-        else:
+            return
+        velocity, by_contacts = state.velocity.copy(), self.held.gave / state.real(self.held.kick)
+        for _ in range(PASSES if forces.functions else 1):
+            state.velocity[:] = velocity + state.real(ahead) * (state.acceleration + by_contacts)
             forces(state, world.time + since)
+        state.velocity[:] = velocity
 
     def _end(self, world: Any, dt: float, half: float) -> None:
         """Velocities that belong to the positions, and the accelerations of now."""
