@@ -9,7 +9,7 @@ from __future__ import annotations
 import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import floor, sqrt
-from cython.cimports.libc.stdint import int32_t, int64_t
+from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK, wrapped
@@ -61,10 +61,13 @@ def near_side(w: cython.pointer(Step), i: cython.Py_ssize_t, side: cython.int, f
 @cython.nogil
 @cython.exceptval(check=False)
 def put_surface(w: cython.pointer(Step), begin: cython.Py_ssize_t, end: cython.Py_ssize_t, which: int32_t) -> cython.Py_ssize_t:
-    """Put a surface into the places from begin to end, in order; returns where they end then. Those that are there stay alone."""
+    """Put a surface into the places from begin to end, in order; returns where they end then. Those that are there stay alone.
+
+    Sides of the room come last, after obstacles, and these after pinned circles: where there is no room for all, it wins.
+    """
     k: cython.Py_ssize_t = end
     n: cython.Py_ssize_t
-    while k > begin and w.surface[k - 1] > which:
+    while k > begin and cython.cast(uint32_t, w.surface[k - 1]) < cython.cast(uint32_t, which):
         k -= 1
     if k > begin and w.surface[k - 1] == which:
         return end

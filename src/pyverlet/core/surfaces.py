@@ -31,6 +31,12 @@ MOST_BOUNCES = cython.declare(cython.int, 256)
 MOST_TURNS_AROUND = cython.declare(cython.int, 64)
 """Over the contacts of a particle that lies between several: in a narrow wedge each gives what the other takes."""
 
+JAMMED = cython.declare(cython.double, 0.9)
+"""Of the change halfway through these turns: where the last one still changes as much, no impulses hold it at all surfaces."""
+
+SQUEEZED = cython.declare(cython.double, 0.5)
+"""Of its impulse: how fast a surface then lets a particle into it."""
+
 SETTLED = cython.declare(cython.double, 1e-4)
 """Of its impulses: no more turns are needed if none changes by more."""
 
@@ -175,8 +181,12 @@ def keep_with_pair(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.void
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def hold(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, relax: cython.bint) -> cython.double:
+def hold(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, relax: cython.bint, leak: cython.double
+) -> cython.double:  # fmt: skip
     """A contact at rest: an impulse that lets the rim come to the surface within this substep, and no farther.
+
+    leak: of the impulse; so fast the rim may go on into the surface.
 
     Returns by how much that differs from what it gave before.
     """
@@ -201,7 +211,7 @@ def hold(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, re
             slide: cython.double = (ux * ny - uy * nx) * w.h * bend
             away: cython.double = 1 - sqrt(1 - slide * slide) if slide * slide < 1 else 1.0
             speed += away / (bend * w.h)
-    after: cython.double = max(before + speed, 0.0)
+    after: cython.double = max(before + speed - leak * before, 0.0)
     if before == 0 and after == 0:
         return 0.0
     row[first + PUSH] = after
@@ -225,21 +235,42 @@ def hold(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, re
 @cython.exceptval(check=False)
 def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """Hold particle i at the surfaces that it may reach in this substep."""
-    n: cython.int
+    turn: cython.int
     k: cython.Py_ssize_t
+    change: cython.double = 0
+    halfway: cython.double = 0
     for k in range(w.contact_begin[i], w.contact_end[i]):
         measure_surface(w, i, k, False)
-    for n in range(MOST_TURNS_AROUND):
+    for turn in range(MOST_TURNS_AROUND):
         most: cython.double = 0
-        change: cython.double = 0
         loaded: cython.int = 0
+        change = 0
         for k in range(w.contact_begin[i], w.contact_end[i]):
             if w.contact[CONTACT * k + GAP] < w.far or w.contact[CONTACT * k + PUSH] > 0:
-                change = max(change, hold(w, i, k, False))
+                change = max(change, hold(w, i, k, False, 0))
                 most = max(most, w.contact[CONTACT * k + PUSH])
                 loaded += w.contact[CONTACT * k + PUSH] > 0
         if loaded < 2 or change <= SETTLED * most:
-            break
+            return
+        if 2 * turn == MOST_TURNS_AROUND:
+            halfway = change
+    if change > JAMMED * halfway:
+        squeeze(w, i)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def squeeze(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
+    """Surfaces leave less room than particle i needs: they share what is missing, but for the room, which has the last word."""
+    turn: cython.int
+    k: cython.Py_ssize_t
+    for turn in range(MOST_TURNS_AROUND + 1):
+        last: cython.bint = turn == MOST_TURNS_AROUND
+        for k in range(w.contact_begin[i], w.contact_end[i]):
+            near: cython.bint = w.contact[CONTACT * k + GAP] < w.far or w.contact[CONTACT * k + PUSH] > 0
+            if near and (not last or 0 <= w.surface[k] < SIDES):
+                hold(w, i, k, False, 0 if last else SQUEEZED)
 
 
 @cython.cfunc
@@ -251,7 +282,7 @@ def relax_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void
     for k in range(w.contact_begin[i], w.contact_end[i]):
         if w.contact[CONTACT * k + PUSH] > 0:
             measure_surface(w, i, k, True)
-            hold(w, i, k, True)
+            hold(w, i, k, True, 0)
 
 
 @cython.cfunc
