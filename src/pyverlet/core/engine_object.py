@@ -101,7 +101,7 @@ class Engine:
         ls: cython.pointer(Lists) = cython.address(self.ls)
         w.sized, w.varied, w.mixed, w.collides = n["sized"], n["varied"], n["mixed"], n["collides"]
         if not w.collides:
-            w.groups, ls.listed, ls.good = 0, False, False
+            w.groups, w.pins, ls.listed, ls.good = 0, False, False, False
         w.surfaces_good = False
         self.c.bulk, self.c.smallest, ls.largest, ls.mean_radius = n["bulk"], n["smallest"], n["largest"], n["mean_radius"]
         ls.restitution, ls.friction, ls.picky = n["restitution"], n["friction"], n["picky"] or ls.linked

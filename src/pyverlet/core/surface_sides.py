@@ -13,7 +13,7 @@ from cython.cimports.libc.stdint import int64_t
 from pyverlet.core.cells import wrapped
 from pyverlet.core.obstacles import FACES, LENGTH, PLACE, ROUNDING, SEGMENT
 from pyverlet.core.step import Step
-from pyverlet.core.surface_shapes import SIDES
+from pyverlet.core.surface_rows import SIDES
 
 
 @cython.cfunc
