@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pyverlet.ground.constants import REST_ACCELERATIONS, SURPLUS
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.laws.contacts.broadphase import Fast
+from pyverlet.laws.contacts.collisions import Collisions
 from pyverlet.laws.contacts.growth import Growth
 from pyverlet.laws.integrators import PositionVerlet
 from pyverlet.laws.limiter import fall, watched
@@ -22,6 +23,7 @@ from pyverlet.state.moves import first_non_finite
 from pyverlet.world.free_steps import FreeSteps, kicks
 from pyverlet.world.impulse_arrays import ImpulseArrays
 from pyverlet.world.impulse_materials import knows
+from pyverlet.world.impulse_memory import Memory
 from pyverlet.world.impulse_notes import ImpulseNotes
 
 Array = NDArray[Any]
@@ -60,16 +62,31 @@ class ImpulseFrames:
         self._dtype = dtype
         self.held = ImpulseArrays(dtype)
         self._flight = FreeSteps()
-        self._checked: Any = None  # what the world was made of when it was last found to be known
         self._law: Any = None  # numbers that the engine holds
         self._pull: tuple[Any, float] = None, 0.0  # gravity, and how strong it is, m/s^2
         self.growth = Growth()
+        self.steps = False  # whether the last frame was one of this law
         # What contacts remember between frames.
-        self.forget, self.save, self.restore, self.renumber = (
-            self.held.forget, self.held.save, self.held.restore, self.held.renumber,
-        )  # fmt: skip
+        self.forget, self.save, self.renumber = self.held.forget, self.held.save, self.held.renumber
+
+    def restore(self, memory: Memory) -> None:
+        """Back to what `save` returned."""
+        self.held.restore(memory)
+        self.steps = memory.kick > 0
 
     # ---- a frame -------------------------------------------------------------------------------------------------------------
+
+    def takes(self, world: Any) -> bool:
+        """Whether the frame that begins is one of this law. Another one forgets what contacts have remembered."""
+        law = world.collisions
+        wanted = Collisions.impulses if law is None else law.impulses
+        steps = not self.unknown(world) if wanted is None else wanted
+        if steps != self.steps:
+            self.steps = steps
+            self.forget()
+            if world._contacts:
+                world._contacts.broad_phase.forget()
+        return steps
 
     def step(self, world: Any, dt: float) -> None:
         """Advance the slots of a world by a frame of dt seconds: all of `World.step` but for what its arrays become.
@@ -78,9 +95,8 @@ class ImpulseFrames:
             InputError: there is something in the world that this law does not know yet.
             NonFiniteError: a particle turned NaN or infinite.
         """
-        if (known := (world.collisions, len(world.links), len(world.obstacles))) != self._checked:
-            self.check(world)
-            self._checked = known
+        if found := self.unknown(world):
+            raise InputError(f"impulses is True in a world with {found[0]}; allowed are circles, obstacles and forces in a room")
         world.links.begin()
         world._slots.rows = self.held.core
         world._slots.clear_notes()
@@ -89,25 +105,20 @@ class ImpulseFrames:
         if not self.run(world, dt, world.profile.mark):
             self._refuse_non_finite(world, dt)
 
-    def check(self, world: Any) -> None:
-        """Refuse what this law does not know yet.
-
-        Raises:
-            InputError: there is such a thing in the world.
-        """
-        if found := self.unknown(world):
-            raise InputError(f"impulses is True in a world with {found[0]}; allowed are circles in a room, with forces")
-
     def unknown(self, world: Any) -> list[str]:
-        """What this law does not know yet."""
-        unknown = {
-            "links": bool(world.links),
-            "a ledger": world.keeps_ledger,
-            "events": world.tells_events,
-            "sleep=True": world._sleep is not None,
-            "brute force": world.collisions is not None and not isinstance(world.collisions.method, Fast),
-        }
-        return [name for name, there in unknown.items() if there]
+        """What there is in a world that this law does not know yet."""
+        law, found = world.collisions, []
+        if world.links:
+            found.append("links")
+        if world._books:
+            found.append("a ledger")
+        if world._events:
+            found.append("events")
+        if world._sleep:
+            found.append("sleep=True")
+        if law and not isinstance(law.method, Fast):
+            found.append("brute force")
+        return found
 
     def run(self, world: Any, dt: float, done: Callable[[str], None]) -> bool:
         """Advance the gathered slots by a frame of dt seconds. False if a particle turned NaN or infinite."""
@@ -131,13 +142,24 @@ class ImpulseFrames:
             self._keep_way(state, before, h)
         if getattr(world.integrator, "naive_start", False):
             self._start_naively(world, (1.0 - half) * h)
-        rough = max(collisions.friction if collisions else 0.0, state.most_friction, getattr(world.boundary, "friction", 0.0), self.held.obstacle_friction) > 0.0
+        rough = (
+            max(
+                collisions.friction if collisions else 0.0,
+                state.most_friction,
+                getattr(world.boundary, "friction", 0.0),
+                self.held.obstacle_friction,
+            )
+            > 0.0
+        )
         done("gather")
         notes = None if world._touches is None else ImpulseNotes(world._touches, engine, state)
         step, finite = 0, True
         while step < substeps:
             opens, known = step == 0 or not by_core, self.held.kick > 0.0  # opens: from velocities that belong to the positions
-            kick, opening = half * (h + before) if half and opens else h, 0.0 if not by_core else half * h if half and opens else h
+            kick, opening = (
+                half * (h + before) if half and opens else h,
+                0.0 if not by_core else half * h if half and opens else h,
+            )
             if not by_core:
                 self._flight.take(world.integrator, state, forces, world.time + step * h, h)
             elif not alone:
@@ -238,7 +260,7 @@ class ImpulseFrames:
     def _evaluate(self, world: Any, since: float, ahead: float) -> None:
         """Accelerations by gravity and forces; these see velocities of now, not of half a substep ago.
 
-        Those of now depend on the accelerations: a user's own force, across the velocity say, finds them by fixed-point iteration.
+        Those of now depend on the accelerations: for a user's own force they are found by fixed-point iteration.
         """
         state, forces = world._slots, world._force_sum
         if not (ahead and forces.velocity_dependent):

@@ -89,7 +89,7 @@ class ObstacleRows:
         self.friction = float(self._segments[:, _FRICTION].max(initial=0.0))
 
     def _build(self, engine: Any, count: int, radius: float, dt: float) -> None:
-        """Make the grid, with cells as wide as the largest particle, or wider where there would be too many. count: of obstacles."""
+        """Make the grid of `count` obstacles, with cells as wide as the largest particle, or wider: not too many."""
         s, body = self._segments, self._bodies[self._segments[:, 0].astype(np.int64)]
         speed = np.hypot(body[:, 3], body[:, 4]) + np.abs(body[:, 5]) * (np.hypot(s[:, 4], s[:, 5]) + s[:, _LENGTH])
         with np.errstate(over="ignore", invalid="ignore"):
