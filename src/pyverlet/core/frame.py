@@ -29,8 +29,9 @@ from pyverlet.core.obstacles import place_moving
 from pyverlet.core.particle_stages import drift, kick_stage, remember_stage
 from pyverlet.core.relisting import each_group
 from pyverlet.core.step import OPEN, Step
-from pyverlet.core.surface_sides import keep_side
-from pyverlet.core.surfaces import bounce_surfaces, hold_surfaces, relax_surfaces, warm_surfaces
+from pyverlet.core.surface_contacts import hold_surfaces, relax_surfaces, warm_surfaces
+from pyverlet.core.surface_sides import keep_sides
+from pyverlet.core.surfaces import bounce_surfaces
 from pyverlet.core.warm_start import warm_start
 
 MOST_ROUNDS = cython.declare(cython.int, 100)  # over the groups in which pairs have bounced
@@ -45,7 +46,6 @@ def warm_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
     n: cython.Py_ssize_t
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
         i: cython.Py_ssize_t = w.at_surface[n]
-        w.begun[2 * i], w.begun[2 * i + 1] = w.position[2 * i], w.position[2 * i + 1]
         warm_surfaces(w, i)
 
 
@@ -83,7 +83,8 @@ def drift_stage(what: cython.p_void, block: cython.int) -> cython.void:
     for n in range(a, a + w.at_surface_count[block]):
         bounce_surfaces(w, w.at_surface[n])  # pairs may have thrown it there
         hold_surfaces(w, w.at_surface[n])
-        keep_side(w, w.at_surface[n])
+    if w.segments > 0:
+        keep_sides(w, block)
     drift(w, a, min(a + BLOCK, w.count), block)
     if w.relaxes > 0:
         relax_surfaces_stage(what, block)

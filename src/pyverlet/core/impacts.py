@@ -89,6 +89,8 @@ def strike(
     w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.double, dy: cython.double, turn: cython.double, t: cython.double
 ) -> cython.void:
     """Change the velocity of a particle by an impulse at time t; contacts do not remember it."""
+    if w.since[i] == 0:
+        w.begun[2 * i], w.begun[2 * i + 1] = w.position[2 * i], w.position[2 * i + 1]
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     v[width * i] += cython.cast(real, dx)

@@ -48,7 +48,7 @@ Spot = cython.struct(
     reach=cython.double,  # radius and rounding
     left=cython.bint,  # whether what is before its start, or beyond its end, belongs to the neighbour
     right=cython.bint,
-    above=cython.bint,  # whether it is on the side of greater y, as of its last impact: that moves where its path begins
+    above=cython.bint,  # whether it was on the side of greater y at its last impact, which moves where its path would begin
     wx=cython.double,  # of the particle in the room
     wy=cython.double,
 )
