@@ -207,9 +207,10 @@ class Engine:
         w: cython.pointer(Step) = cython.address(self.w)
         ls: cython.pointer(Lists) = cython.address(self.ls)
         pairs, lanes = ls.raw_begin[w.groups] * 11 // 10 + 64, w.begin[w.groups] * 11 // 10 + 64
-        if pairs > ls.pairs_room:
+        listed: cython.bint = ls.good  # then places of surfaces are missing
+        if pairs > ls.pairs_room and not listed:
             make_found_arrays(ls, self.arrays, pairs)
-        if lanes > ls.lanes_room:
+        if lanes > ls.lanes_room and not listed:
             make_lane_arrays(w, self.arrays, lanes, self.dtype)
             make_kept_arrays(ls, self.arrays, lanes, self.dtype)
             make_material_arrays(w, self.arrays, self.dtype)
