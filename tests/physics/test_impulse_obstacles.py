@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -141,9 +142,7 @@ def test_a_pile_on_obstacles_rests_however_long_frames_are(capsules: bool) -> No
     t = np.linspace(-1, 1, 21)
     valley = np.column_stack((6 * t, 4 * t * t))
     if capsules:
-        floor: list[pv.Obstacle] = [
-            pv.Capsule(a, b, radius=0.2, friction=0.3) for a, b in zip(valley[:-1], valley[1:], strict=True)
-        ]
+        floor: list[pv.Obstacle] = [pv.Capsule(a, b, radius=0.2, friction=0.3) for a, b in pairwise(valley)]
     else:
         floor = [pv.Chain(valley, friction=0.3)]
     world = world_with(*floor, collisions=law(friction=0.3), boundary=pv.Box((-6, -1), (6, 30)))
