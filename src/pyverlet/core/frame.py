@@ -24,6 +24,7 @@ from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.contacts import bounce_again, relax_contacts, solve_contacts
+from pyverlet.core.hearing import hear_loads, hear_surface_loads
 from pyverlet.core.obstacles import place_moving
 from pyverlet.core.particle_stages import drift, kick_stage, remember_stage
 from pyverlet.core.relisting import each_group
@@ -155,6 +156,26 @@ def relax_stage(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def hear_stage(what: cython.p_void, item: cython.int) -> cython.void:
+    """Which pairs of a group touch."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    hear_loads(w, 2 * item + w.parity)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def hear_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """Which surfaces particles of a block touch."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    n: cython.Py_ssize_t
+    for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
+        hear_surface_loads(w, w.at_surface[n])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     """One substep; returns whether particles may leave where the list of pairs is good in the next one."""
     b: cython.Py_ssize_t
@@ -181,6 +202,9 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
         if sweep > 0 and surfaces:
             team_stage(w.team, relax_surfaces_stage, w, blocks)
         each_group(w, relax_stage)
+    if w.listening:
+        each_group(w, hear_stage)
+        team_stage(w.team, hear_surfaces_stage, w, blocks)
     if w.rough or w.substep + 1 == w.substeps:  # what smooth contacts gave before is asked for by no one
         team_stage(w.team, remember_stage, w, blocks)
     for b in range(blocks):

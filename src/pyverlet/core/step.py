@@ -66,6 +66,12 @@ Step = cython.struct(
     struck_y=cython.pointer(real),
     bounced=cython.pointer(int32_t),  # (groups,) stage of this substep in which a pair of the group bounced last, 0: none
     searched=cython.pointer(int32_t),  # (groups,) stage in which it was last searched for pairs that do
+    listening=cython.bint,  # whether it is asked for who touches and bounces
+    collected=cython.bint,  # whether all that has been heard of the lists of now has been taken
+    waiting=cython.bint,  # for that, before lists are made anew
+    touched=cython.pointer(int32_t),  # whether they did, while `listening`
+    bounces=cython.pointer(int32_t),
+    met=cython.pointer(real),  # largest speed at which they met, m/s
     turn=cython.int,  # over the groups, for pairs that bounces in others have thrown at each other
     # ---- what pairs are made of; one for all, or one a lane
     reach=cython.pointer(real),  # r_i + r_j, m

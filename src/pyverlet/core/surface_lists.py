@@ -15,7 +15,7 @@ from cython.cimports.team import team_stage
 from pyverlet.core.cells import BLOCK, wrapped
 from pyverlet.core.obstacles import head_of, near_segment
 from pyverlet.core.step import BOX, CAGE, Step
-from pyverlet.core.surface_rows import CONTACT, DRAG, PUSH, SIDES, pinned_lane
+from pyverlet.core.surface_rows import CONTACT, DRAG, HEARD, HEARD_BOUNCES, HEARD_SPEED, PUSH, SIDES, pinned_lane
 
 FASTER = cython.declare(cython.double, 2.2)
 """Of what a particle moves in a substep: it sees surfaces that far away."""
@@ -160,6 +160,7 @@ def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
         w.contact_end[i] = cython.cast(int32_t, end)
         for k in range(begin, end):
             w.contact[CONTACT * k + PUSH] = w.contact[CONTACT * k + DRAG] = 0
+            w.contact[CONTACT * k + HEARD_SPEED] = w.contact[CONTACT * k + HEARD_BOUNCES] = w.contact[CONTACT * k + HEARD] = 0
             if w.surface[k] < 0:
                 w.contact[CONTACT * k + PUSH] = w.impulse[pinned_lane(w, k)]
                 w.contact[CONTACT * k + DRAG] = -w.tangent_impulse[pinned_lane(w, k)] if w.rough else 0

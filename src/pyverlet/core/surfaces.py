@@ -6,6 +6,7 @@ from __future__ import annotations
 import cython
 from cython.cimports.lanes import real
 
+from pyverlet.core.hearing import hear_pair, hear_surface
 from pyverlet.core.impacts import NEVER, strike
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import (
@@ -84,6 +85,10 @@ def bounce_at(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
     given: cython.double = (1 + row[first + BOUNCE]) * speed
     strike(w, i, -given * nx, -given * ny, 0, hit.time)
     note_surface(w, i, k, -given * nx, -given * ny, True)
+    if w.surface[k] < 0:
+        hear_pair(w, pinned_lane(w, k), speed, row[first + BOUNCE] * speed)
+    else:
+        hear_surface(w, k, speed, row[first + BOUNCE] * speed)
     mu: cython.double = row[first + RUB]
     if w.rough and mu > 0:
         slip: cython.double = ux * ny - uy * nx - w.motion[4 * i + 2] * w.radius[i]

@@ -226,7 +226,8 @@ class World(Measures, Queries, Doors):
         self._course.end(dt)
         self.links.scatter()
         if self._events:
-            pairs = self._contacts.packed(self._slots) if self._contacts and len(self) > 1 else None
+            packed = self._contacts and len(self) > 1 and not self._impulses.steps
+            pairs = self._contacts.packed(self._slots) if self._contacts and packed else None
             self._events.close(self._slots, self._state, pairs, self._place())
         self.profile.mark("scatter")
         self.time, self.frames, self._h_last = self.time + dt, self.frames + 1, h
