@@ -26,7 +26,8 @@ def world_with(*obstacles: pv.Obstacle, **options: Any) -> pv.World:
 def tilted(angle: float, **surface: Any) -> tuple[pv.Segment, Any, Any]:
     """A long segment that falls to the right by an angle, with its direction and its normal."""
     way, normal = np.array([np.cos(angle), -np.sin(angle)]), np.array([np.sin(angle), np.cos(angle)])
-    return pv.Segment(-40 * way, 40 * way, **surface), way, normal
+    start, end = (-40 * way).tolist(), (40 * way).tolist()
+    return pv.Segment(start, end, **surface), way, normal
 
 
 # ---- impacts ---------------------------------------------------------------------------------------------------------------
