@@ -287,7 +287,7 @@ def test_restore_brings_moving_obstacles_back() -> None:
 
 
 def test_a_world_without_obstacles_has_no_such_stage() -> None:
-    world = world_with()
+    world = world_with(collisions=pv.Collisions(impulses=False))
     world.add(position=(0, 0))
     world.step(DT)
     assert "obstacles" not in world.profile.stages

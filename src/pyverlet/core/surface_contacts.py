@@ -66,14 +66,30 @@ def excess_speed(w: cython.pointer(Step), first: cython.Py_ssize_t, vx: cython.d
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def ends_inside(w: cython.pointer(Step), first: cython.Py_ssize_t, ux: cython.double, uy: cython.double) -> cython.bint:
+    """Whether a way with (ux, uy) against a round obstacle ends inside it: many bounces round much."""
+    row: cython.pointer(cython.double) = w.contact
+    if row[first + BEND] >= 0:
+        return False
+    reach: cython.double = -1 / row[first + BEND]
+    x: cython.double = (row[first + GAP] + reach) * row[first + NORMAL] - ux * w.h
+    y: cython.double = (row[first + GAP] + reach) * row[first + NORMAL + 1] - uy * w.h
+    return x * x + y * y < reach * reach
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def hold(
-    w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, relax: cython.bint, leak: cython.double
+    w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, relax: cython.bint, leak: cython.double,
+    rubs: cython.bint,
 ) -> cython.double:  # fmt: skip
     """A contact at rest: an impulse that lets the rim come to the surface within this substep, and no farther.
 
-    leak: of the impulse; so fast the rim may go on into the surface.
+    leak: of the impulse; so fast the rim may go on into the surface. rubs: whether friction follows.
 
     Returns by how much that differs from what it gave before.
     """
@@ -93,7 +109,7 @@ def hold(
     else:
         if before == 0 and not 0 <= w.surface[k] < SIDES and speed > w.least_bounce:
             free: cython.double = (w.free[2 * i] - row[first + SPEED]) * nx + (w.free[2 * i + 1] - row[first + SPEED + 1]) * ny
-            if free > w.least_bounce:  # it has bounced if it meets it at all
+            if free > w.least_bounce and not ends_inside(w, first, ux, uy):  # it has bounced if it meets it at all
                 return 0.0
         speed = excess_speed(w, first, v[width * i], v[width * i + 1])
     after: cython.double = max(before + speed - leak * before, 0.0)
@@ -101,7 +117,7 @@ def hold(
         return 0.0
     row[first + PUSH] = after
     rubbed: cython.double = 0.0
-    if w.rough:
+    if rubs:
         ux -= (after - before) * nx
         uy -= (after - before) * ny
         slip: cython.double = ux * ny - uy * nx - v[4 * i + 2] * w.radius[i]
@@ -147,14 +163,12 @@ def hold_two(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
-    """Hold particle i at the surfaces that it may reach in this substep."""
+def hold_all(w: cython.pointer(Step), i: cython.Py_ssize_t, rubs: cython.bint) -> cython.bint:
+    """One after the other, until none changes any more. False: no impulses hold particle i at all surfaces."""
     turn: cython.int
     k: cython.Py_ssize_t
     change: cython.double = 0
     halfway: cython.double = 0
-    for k in range(w.contact_begin[i], w.contact_end[i]):
-        measure_surface(w, i, k, False)
     for turn in range(MOST_TURNS_AROUND):
         most: cython.double = 0
         loaded: cython.int = 0
@@ -163,19 +177,42 @@ def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
         change = 0
         for k in range(w.contact_begin[i], w.contact_end[i]):
             if w.contact[CONTACT * k + GAP] < w.far or w.contact[CONTACT * k + PUSH] > 0:
-                change = max(change, hold(w, i, k, False, 0))
+                change = max(change, hold(w, i, k, False, 0, rubs))
                 most = max(most, w.contact[CONTACT * k + PUSH])
                 if w.contact[CONTACT * k + PUSH] > 0:
                     loaded += 1
-                    bends |= w.rough and w.contact[CONTACT * k + BEND] != 0  # friction changes what the bend asks for
+                    bends |= rubs and w.contact[CONTACT * k + BEND] != 0  # friction changes what the bend asks for
                     if loaded == 2 and turn % TOGETHER == 8:
                         hold_two(w, i, one, k)
                     one = k
         if (loaded < 2 and not bends) or change <= SETTLED * most:
-            return
+            return True
         if 2 * turn == MOST_TURNS_AROUND:
             halfway = change
-    if change > JAMMED * halfway:
+    return change <= JAMMED * halfway
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
+    """Hold particle i at the surfaces that it may reach in this substep.
+
+    Out of a wedge narrower than the angle of friction no impulses push it, as friction grows with them: then without.
+    """
+    k: cython.Py_ssize_t
+    for k in range(w.contact_begin[i], w.contact_end[i]):
+        measure_surface(w, i, k, False)
+    if hold_all(w, i, w.rough):
+        return
+    for k in range(w.contact_begin[i], w.contact_end[i]):
+        first: cython.Py_ssize_t = CONTACT * k
+        if w.contact[first + DRAG] != 0:
+            push_off(w, i, k, 0, -w.contact[first + DRAG], w.contact[first + NORMAL], w.contact[first + NORMAL + 1])
+            w.contact[first + DRAG] = 0
+            if w.surface[k] < 0:
+                keep_with_pair(w, k)
+    if not (w.rough and hold_all(w, i, False)):
         squeeze(w, i)
 
 
@@ -191,7 +228,7 @@ def squeeze(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
         for k in range(w.contact_begin[i], w.contact_end[i]):
             near: cython.bint = w.contact[CONTACT * k + GAP] < w.far or w.contact[CONTACT * k + PUSH] > 0
             if near and (not last or 0 <= w.surface[k] < SIDES):
-                hold(w, i, k, False, 0 if last else SQUEEZED)
+                hold(w, i, k, False, 0 if last else SQUEEZED, False)
 
 
 @cython.cfunc
@@ -203,7 +240,7 @@ def relax_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void
     for k in range(w.contact_begin[i], w.contact_end[i]):
         if w.contact[CONTACT * k + PUSH] > 0:
             measure_surface(w, i, k, True)
-            hold(w, i, k, True, 0)
+            hold(w, i, k, True, 0, w.rough)
 
 
 @cython.cfunc

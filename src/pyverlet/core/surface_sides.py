@@ -127,8 +127,13 @@ def keep_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def keep_sides(w: cython.pointer(Step), block: cython.int) -> cython.void:
-    """The free particles of a block stay on their side of lines."""
+    """The free particles of a block stay on their side of lines. Most blocks have none that is thrown, nor fast ones."""
     i: cython.Py_ssize_t
+    any_thrown: int32_t = 0
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, w.count)):
+        any_thrown |= w.thrown[i]
+    if any_thrown == 0 and w.far <= w.lists.half_skin:
+        return
     for i in range(block * BLOCK, min((block + 1) * BLOCK, w.count)):
         if w.inverse_mass[i] > 0:
             keep_side(w, i)

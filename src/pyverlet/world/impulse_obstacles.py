@@ -42,7 +42,7 @@ class ObstacleRows:
     def __init__(self) -> None:
         self.friction = 0.0
         self._segments, self._bodies, self._moving = np.zeros((0, _WIDTH)), np.zeros((0, 6)), np.zeros(0, np.int32)
-        self._owners: list[tuple[int, int]] = []  # of each segment the id of its obstacle, and which of its segments it is
+        self._owners = np.zeros((0, 2), np.int64)  # of each segment the id of its obstacle, and which of its segments it is
         self._seen: Any = None
         self._seen_version = -1
 
@@ -59,17 +59,23 @@ class ObstacleRows:
                 if not engine.place_obstacles(self._moving, dt, False):
                     self._build(engine, course.count, radius, dt)
             return None
+        same = self._seen is not None and self._seen[1:] == seen[1:]
         self._seen, self._seen_version, owners = seen, course.version, course.owners()
-        if owners != self._owners or not self._owners:
+        before = len(self._owners)
+        if not same or not before or not np.array_equal(owners[:before], self._owners):
             renamed = _renamed(self._owners, owners)
             self._owners, self._segments = owners, np.zeros((len(owners), _WIDTH))
             self._fill(course)
             self._build(engine, course.count, radius, dt)
             return renamed
-        segments, bodies = self._segments[:, : len(_GIVEN)].copy(), self._bodies
+        # Others may have been changed, and some have come: only these are listed anew.
+        segments, bodies, more = self._segments[:, : len(_GIVEN)].copy(), self._bodies, len(owners) - before
+        self._owners, self._segments = owners, np.concatenate((self._segments, np.zeros((more, _WIDTH))))
         self._fill(course)
-        other = (segments != self._segments[:, : len(_GIVEN)]).any(axis=1)
-        other |= (bodies != self._bodies).any(axis=1)[self._segments[:, 0].astype(np.int64)]
+        other = np.ones(len(owners), bool)
+        other[:before] = (segments != self._segments[:before, : len(_GIVEN)]).any(axis=1)
+        other[:before] |= (bodies != self._bodies[: len(bodies)]).any(axis=1)[segments[:, 0].astype(np.int64)]
+        self._reach(course.count, dt)
         self._give(engine, keep=True)
         if not engine.place_obstacles(np.flatnonzero(other).astype(np.int32), dt, True):
             self._build(engine, course.count, radius, dt)
@@ -90,16 +96,7 @@ class ObstacleRows:
 
     def _build(self, engine: Any, count: int, radius: float, dt: float) -> None:
         """Make the grid of `count` obstacles, with cells as wide as the largest particle, or wider: not too many."""
-        s, body = self._segments, self._bodies[self._segments[:, 0].astype(np.int64)]
-        speed = np.hypot(body[:, 3], body[:, 4]) + np.abs(body[:, 5]) * (np.hypot(s[:, 4], s[:, 5]) + s[:, _LENGTH])
-        with np.errstate(over="ignore", invalid="ignore"):
-            around = s[:, _ROUNDING] + s[:, _INNER] + SPARE_FRAMES * dt * speed
-            farthest = np.abs(body[:, :2]).max(axis=1) + s[:, _LENGTH] + np.hypot(s[:, 4], s[:, 5]) + around
-        if not (farthest < FARTHEST).all():
-            number = int(s[np.nan_to_num(farthest, nan=np.inf).argmax(), 0]) % count
-            raise InputError(
-                f"obstacles[{number}] is farther away than numbers reach; allowed are speeds that keep it at a place"
-            )
+        s, (around, farthest) = self._segments, self._reach(count, dt)
         cell, links = max(2.0 * radius, 4.0 * float(farthest.max(initial=0.0)) / 2.0**50, float(np.finfo(float).tiny)), 0.0
         if radius == 0.0 and len(s):
             cell = max(float(np.median(around + s[:, _LENGTH])), cell)
@@ -118,11 +115,30 @@ class ObstacleRows:
                 return
             self._links = np.zeros((2 * len(self._links), 2), np.int32)
 
+    def _reach(self, count: int, dt: float) -> tuple[Array, Array]:
+        """How far from each segment it is listed, and how far from the origin that is, m. count: of obstacles.
+
+        Raises:
+            InputError: one is farther away than numbers reach.
+        """
+        s, body = self._segments, self._bodies[self._segments[:, 0].astype(np.int64)]
+        speed = np.hypot(body[:, 3], body[:, 4]) + np.abs(body[:, 5]) * (np.hypot(s[:, 4], s[:, 5]) + s[:, _LENGTH])
+        with np.errstate(over="ignore", invalid="ignore"):
+            around = s[:, _ROUNDING] + s[:, _INNER] + SPARE_FRAMES * dt * speed
+            farthest = np.abs(body[:, :2]).max(axis=1) + s[:, _LENGTH] + np.hypot(s[:, 4], s[:, 5]) + around
+        if not (farthest < FARTHEST).all():
+            number = int(s[np.nan_to_num(farthest, nan=np.inf).argmax(), 0]) % count
+            raise InputError(
+                f"obstacles[{number}] is farther away than numbers reach; allowed are speeds that keep it at a place"
+            )
+        return around, farthest
+
     def _give(self, engine: Any, *, keep: bool) -> None:
         engine.set_obstacles(self._segments, self._bodies, self._moving, self._cell, self._heads, self._links, keep)
 
 
-def _renamed(before: list[tuple[int, int]], after: list[tuple[int, int]]) -> Array:
+def _renamed(before: Array, after: Array) -> Array:
     """Of each surface of before its number after, or -1."""
-    now = {owner: k for k, owner in enumerate(after)}
-    return np.concatenate((np.arange(SIDES), np.array([now.get(owner, -SIDES - 1) for owner in before], np.int64) + SIDES))
+    now = {owner: k for k, owner in enumerate(map(tuple, after.tolist()))}
+    found = [now.get(owner, -SIDES - 1) for owner in map(tuple, before.tolist())]
+    return np.concatenate((np.arange(SIDES), np.array(found, np.int64) + SIDES))

@@ -128,14 +128,14 @@ class Tables:
         """Of obstacles, without images."""
         return len(self._seen)
 
-    def owners(self) -> list[tuple[int, int]]:
-        """Of each segment the id of its obstacle, and which of its segments it is, images counted on."""
-        sides, images = len(self._own_segments.rows), len(self._segments) // max(len(self._own_segments.rows), 1)
-        count = np.diff(self._first)
-        which = np.repeat([id(each) for each in self._seen], count).tolist() if sides else []
-        number = (np.arange(sides) - np.repeat(self._first[:-1], count)).tolist()
+    def owners(self) -> Array:
+        """(n, 2) of each segment the id of its obstacle, and which of its segments it is, images counted on."""
+        sides, count = len(self._own_segments.rows), np.diff(self._first)
+        images = len(self._segments) // max(sides, 1)
+        who = np.repeat(np.fromiter(map(id, self._seen), np.int64, len(self._seen)), count)
+        number = np.arange(sides) - np.repeat(self._first[:-1], count)
         step = int(count.max(initial=0))
-        return [(who, k + image * step) for image in range(images) for who, k in zip(which, number, strict=True)]
+        return np.column_stack((np.tile(who, images), (number + step * np.arange(images)[:, None]).ravel()))
 
     def _numbers(self) -> dict[int, int]:
         """The index of each obstacle by its id."""
