@@ -102,8 +102,8 @@ class World(Measures, Queries, Doors):
         self.time, self.frames, self.profile, self.actors = 0.0, 0, Profile(), list[Actor]()
         self._run, self._impulses = Substeps(), ImpulseFrames(self._state.dtype)
         self._team, self._looks = Team(), (Coarse(), Precision())
+        # Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins.
         self.onlooker: Callable[[Moment], None] | None = None
-        """Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins."""
 
     # ---- one frame -----------------------------------------------------------------------------------------------------
 
@@ -226,9 +226,8 @@ class World(Measures, Queries, Doors):
         self._course.end(dt)
         self.links.scatter()
         if self._events:
-            packed = self._contacts and len(self) > 1 and not self._impulses.steps
-            pairs = self._contacts.packed(self._slots) if self._contacts and packed else None
-            self._events.close(self._slots, self._state, pairs, self._place())
+            pairs = self._contacts.packed(self._slots) if self._contacts and len(self) > 1 else None
+            self._events.close(self._slots, self._state, None if self._impulses.steps else pairs, self._place())
         self.profile.mark("scatter")
         self.time, self.frames, self._h_last = self.time + dt, self.frames + 1, h
         for each in self._looks:
