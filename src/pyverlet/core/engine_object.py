@@ -98,6 +98,7 @@ class Engine:
 
         bulk: largest radius of circles that stand in cells, m; smallest, largest and mean_radius, m. restitution, friction: of
         circles without values of their own. picky: whether some pairs are no pairs: of pinned or filtered ones, or linked ones.
+        brute: whether all others are listed; bulk is then 0.
         """
         w: cython.pointer(Step) = cython.address(self.w)
         ls: cython.pointer(Lists) = cython.address(self.ls)
@@ -107,7 +108,7 @@ class Engine:
         w.surfaces_good = False
         self.c.bulk, self.c.smallest, ls.largest, ls.mean_radius = n["bulk"], n["smallest"], n["largest"], n["mean_radius"]
         ls.restitution, ls.friction, ls.picky = n["restitution"], n["friction"], n["picky"] or ls.linked
-        ls.refill = True
+        ls.refill, ls.brute = True, n["brute"]
         make_material_arrays(w, self.arrays, self.dtype)
 
     def set_linked(self, begin, to):

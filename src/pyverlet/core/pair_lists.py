@@ -46,6 +46,7 @@ Lists = cython.struct(
     speeds=cython.pointer(real),  # (blocks,) square of the largest
     # ---- who makes no pairs
     picky=cython.bint,
+    brute=cython.bint,  # all others do
     filtered=cython.bint,
     category=cython.pointer(uint32_t),
     mask=cython.pointer(uint32_t),

@@ -9,6 +9,7 @@ from cython.cimports.libc.math import sqrt
 from cython.cimports.libc.stdint import int64_t
 from cython.cimports.team import team_function, team_stage
 
+from pyverlet.core.all_pairs import list_all
 from pyverlet.core.cell_grids import fit_cells, measure_extent
 from pyverlet.core.cells import BLOCK, Cells, copy_spots, find_cells, sort_by_cell
 from pyverlet.core.list_age import WORTH_LOOKING, adapt_skin, bound_moves, find_patch, lay_patches, slack_left
@@ -99,7 +100,11 @@ def list_stage(what: cython.p_void, item: cython.int) -> cython.void:
     ls: cython.pointer(Lists) = w.lists
     s: cython.Py_ssize_t = 2 * item + w.parity
     alone: cython.bint = s == ls.rows
-    found: int64_t = list_alone(w.cells, ls, w.inverse_mass, s) if alone else list_rows(w.cells, ls, w.inverse_mass, s)
+    found: int64_t
+    if ls.brute and alone:
+        found = list_all(w.cells, ls, w.inverse_mass, s)
+    else:
+        found = list_alone(w.cells, ls, w.inverse_mass, s) if alone else list_rows(w.cells, ls, w.inverse_mass, s)
     ls.found[s] = found - ls.raw_begin[s]
     w.lanes[s] = w.swept[s] = 0
     if found <= ls.raw_begin[s + 1]:

@@ -11,7 +11,7 @@ from pyverlet import core
 from pyverlet.ground.constants import SKIN
 from pyverlet.laws.obstacles import Course
 from pyverlet.state.slots import Slots
-from pyverlet.world.impulse_materials import materials_of, walls_of
+from pyverlet.world.impulse_materials import materials_of, skin_of, walls_of
 from pyverlet.world.impulse_memory import Memory, columns_of
 from pyverlet.world.impulse_obstacles import ObstacleRows
 
@@ -118,7 +118,7 @@ class ImpulseArrays:
         if state.given != self._made or collisions is not self._collisions:
             self._hold(state)
             self._set_materials(world)
-        if (skin := collisions.method.skin if collisions else None) != self._skin:
+        if (skin := skin_of(collisions)) != self._skin:
             self._skin = skin
             if self._kept_list is None:
                 engine.set_skin(SKIN if self._skin is None else self._skin, self._skin is None)

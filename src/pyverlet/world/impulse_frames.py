@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from pyverlet.ground.constants import REST_ACCELERATIONS, SURPLUS
 from pyverlet.ground.errors import InputError, NonFiniteError
-from pyverlet.laws.contacts.broadphase import Fast
 from pyverlet.laws.contacts.collisions import Collisions
 from pyverlet.laws.contacts.growth import Growth
 from pyverlet.laws.integrators import PositionVerlet
@@ -108,15 +107,13 @@ class ImpulseFrames:
 
     def unknown(self, world: Any) -> list[str]:
         """What there is in a world that this law does not know yet."""
-        law, found = world.collisions, []
+        found = []
         if world.links:
             found.append("links")
         if world._books:
             found.append("a ledger")
         if world._sleep:
             found.append("sleep=True")
-        if law and not isinstance(law.method, Fast):
-            found.append("brute force")
         return found
 
     def run(self, world: Any, dt: float, done: Callable[[str], None]) -> bool:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.laws.contacts.broadphase import BruteForce
 from pyverlet.laws.contacts.collisions import Collisions
 from pyverlet.laws.rooms import Box, Circle, Open, Periodic
 from pyverlet.state.slots import Slots
@@ -22,18 +23,23 @@ ALONE = 256
 MUCH_LARGER = 4.0
 """Circles so many times as large as all but one in ALONE stand in no cell of the grid."""
 
+ALL = 1e12
+"""Mean diameters: farther than positions of either precision mean anything."""
+
 
 def materials_of(state: Slots, radius: Array, collisions: Collisions | None) -> dict[str, Any]:
     """The arguments of `Engine.set_materials`; radius: (n,) m, in the user's order, on which the last bit of a mean depends."""
     ordered = np.sort(radius)[::-1] if len(radius) else np.ones(1)
     # Very few that are much larger than all others stand in no cell.
     usual = float(ordered[min(len(ordered) // ALONE, len(ordered) - 1)])
+    brute = collisions is not None and isinstance(collisions.method, BruteForce)
     return {
         "collides": collisions is not None,
         "sized": _differs(state.radius),
         "varied": _differs(state.inverse_mass),
         "mixed": any(map(_differs, (state.radius, state.restitution, state.friction))),
-        "bulk": float(ordered[ordered <= MUCH_LARGER * usual][0]),
+        "brute": brute,
+        "bulk": 0.0 if brute else float(ordered[ordered <= MUCH_LARGER * usual][0]),
         "smallest": float(ordered[-1]),
         "largest": float(ordered[0]),
         "mean_radius": float(radius.mean(dtype=np.float64)) if len(radius) else 1.0,
@@ -41,6 +47,13 @@ def materials_of(state: Slots, radius: Array, collisions: Collisions | None) -> 
         "friction": collisions.friction if collisions else 0.0,
         "picky": bool(len(state.category)) or not bool((state.inverse_mass > 0).all()),
     }
+
+
+def skin_of(collisions: Collisions | None) -> float | None:
+    """Thickness of the skin in mean diameters; None: it adapts. For brute force no pair is too far apart to be listed."""
+    if collisions is None:
+        return None
+    return ALL if isinstance(collisions.method, BruteForce) else collisions.method.skin
 
 
 def _differs(column: Array) -> bool:

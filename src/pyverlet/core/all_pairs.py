@@ -1,0 +1,56 @@
+# mypy: ignore-errors
+"""All pairs there are, for brute force: no cells, no skin that could wear out; the method that others are compared with."""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import rint
+from cython.cimports.libc.stdint import int64_t, uint32_t
+
+from pyverlet.core.cells import Cells
+from pyverlet.core.pair_lists import Lists, may_touch
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def has_nearest(c: cython.pointer(Cells), a: int64_t, b: int64_t) -> cython.bint:
+    """Whether of the images of place b one is so much nearer to place a that it stays the nearest as long as the list lasts."""
+    du: real = c.spot_u[b] - c.spot_u[a]
+    dv: real = c.spot_v[b] - c.spot_v[a]
+    if c.wraps_u:
+        du = du - c.period_u * cython.cast(real, rint(du / c.period_u))
+    if c.wraps_v:
+        dv = dv - c.period_v * cython.cast(real, rint(dv / c.period_v))
+    wide: real = c.spot_r[a] + c.spot_r[b] + c.skin
+    return du * du + dv * dv < wide * wide
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def list_all(
+    c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), s: cython.Py_ssize_t
+) -> int64_t:
+    """Note all pairs as group s; returns where they end, also beyond the room.
+
+    Places a and a + step, step by step: those next to each other in the list share no circle, so that they fill batches.
+    """
+    found: int64_t = ls.raw_begin[s]
+    room: int64_t = ls.raw_begin[s + 1]
+    periodic: cython.bint = c.wraps_u or c.wraps_v
+    step: int64_t
+    a: int64_t
+    for step in range(1, c.count):
+        for a in range(c.count - step):
+            if ls.picky and not may_touch(c, ls, inverse_mass, a, a + step):
+                continue
+            if periodic and not has_nearest(c, a, a + step):
+                continue
+            if found < room:
+                ls.raw_i[found] = cython.cast(uint32_t, a)
+                ls.raw_j[found] = cython.cast(uint32_t, a + step)
+            found += 1
+    return found
