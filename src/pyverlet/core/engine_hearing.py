@@ -8,7 +8,7 @@ import numpy as np
 from cython.cimports.arrays import reals, small_integers
 
 from pyverlet.core.step import Step
-from pyverlet.core.surface_rows import HEARD_BOUNCES, HEARD_SPEED, HEARD
+from pyverlet.core.surface_rows import HEARD, HEARD_BOUNCES, HEARD_SPEED
 
 
 @cython.cfunc
@@ -42,6 +42,11 @@ def hear(w: cython.pointer(Step), a):
     place = np.arange(len(slot)) - np.repeat(np.cumsum(count) - count, count) + begin[slot]
     touching = rows[place, HEARD] > 0
     slot, place = slot[touching], place[touching]
-    surfaces = slot, a[f"surface{w.side}"][place].astype(np.int64), rows[place, HEARD_SPEED], rows[place, HEARD_BOUNCES].astype(np.int64)
+    surfaces = (
+        slot,
+        a[f"surface{w.side}"][place].astype(np.int64),
+        rows[place, HEARD_SPEED],
+        rows[place, HEARD_BOUNCES].astype(np.int64),
+    )
     rows[:, HEARD_SPEED:] = 0
     return pairs, surfaces

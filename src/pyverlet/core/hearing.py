@@ -7,7 +7,7 @@ import cython
 from cython.cimports.lanes import real
 
 from pyverlet.core.step import Step
-from pyverlet.core.surface_rows import HEARD_BOUNCES, CONTACT, HEARD_SPEED, PUSH, HEARD
+from pyverlet.core.surface_rows import CONTACT, HEARD, HEARD_BOUNCES, HEARD_SPEED, PUSH
 
 
 @cython.cfunc

@@ -14,6 +14,7 @@ from pyverlet.core.cells import wrapped
 from pyverlet.core.obstacles import FACES, LENGTH, PLACE, ROUNDING, SEGMENT
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import SIDES
+from pyverlet.core.work import book_place
 
 
 @cython.cfunc
@@ -61,3 +62,5 @@ def keep_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
         w.position[2 * i + 1] += cython.cast(real, back * c)
         w.moved[2 * i] -= cython.cast(real, back * s)
         w.moved[2 * i + 1] += cython.cast(real, back * c)
+        if w.booking:
+            book_place(w, i, -back * s, back * c)
