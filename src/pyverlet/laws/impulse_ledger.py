@@ -21,8 +21,8 @@ class ImpulsePage(Page):
     def begin(self, engine: Any, share: float) -> None:
         """Substeps begin; of what contacts gave in the last one, velocities hold `share`."""
         engine.book(True)
-        whole, rubbed = engine.energy_of_last(share)
-        self._engine, self._sums = engine, (0.0, -rubbed, 0.0, -whole)
+        # Along tangents as the last frame has found it: lists of contacts may be made anew since.
+        self._engine, self._sums = engine, (0.0, -self._resting if share else 0.0, 0.0, -engine.energy_of_last(share)[0])
 
     def moved(self, lag: float, gave: Any, kick: float) -> None:
         """A substep is over, and velocities are those of `lag` s ago; contacts gave `gave` (n, 2) m/s in it."""
@@ -49,10 +49,10 @@ class ImpulsePage(Page):
 
     def end(self, share: float) -> None:
         """Substeps are over, and velocities those of now, with `share` of what contacts gave in the last one."""
-        whole, rubbed = self._engine.energy_of_last(share)
+        whole, self._resting = self._engine.energy_of_last(share)
         self._engine.book(False)
         impacts, friction, walls, places = self._engine.arrays["work"].sum(axis=0).tolist()
-        self._add(impacts, friction + rubbed, walls, float(self._engine.arrays["gained"].sum()) + places + whole)
+        self._add(impacts, friction + self._resting, walls, float(self._engine.arrays["gained"].sum()) + places + whole)
 
     def _add(self, *more: float) -> None:
         self._sums = tuple(a + b for a, b in zip(self._sums, more, strict=True))  # type: ignore[assignment]
@@ -78,5 +78,5 @@ class ImpulsePage(Page):
         page.limiter += limiter
         page.residual -= contacts + limiter
         page.seam -= self._risen
-        self._books.ledger, self._books._resting = page, 0.0
+        self._books.ledger, self._books._resting = page, self._resting
         self._books._energy = self._now.energy - self._risen
