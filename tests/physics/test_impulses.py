@@ -235,7 +235,7 @@ def test_a_drum_takes_discs_along() -> None:
 
 @pytest.mark.parametrize(
     ("what", "more"),
-    [("links", {}), ("a ledger", {"ledger": True}), ("sleep=True", {"sleep": True})],
+    [("links", {}), ("sleep=True", {"sleep": True})],
 )
 def test_what_it_does_not_know_is_refused(what: str, more: dict[str, Any]) -> None:
     world = pv.World(collisions=law(), **more)

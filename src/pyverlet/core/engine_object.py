@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import cython
 import numpy as np
-from cython.cimports.arrays import indices, integers, reals, small_integers
+from cython.cimports.arrays import doubles, indices, integers, reals, small_integers
 from cython.cimports.lanes import real
 from cython.cimports.team import team_free, team_new, team_run
 
@@ -21,6 +21,7 @@ from pyverlet.core.engine_arrays import (
 from pyverlet.core.engine_hearing import hear, make_hearing_arrays
 from pyverlet.core.engine_impulses import fill_kept, read_impulses
 from pyverlet.core.engine_surfaces import give_surfaces, make_surface_arrays, place_obstacles, set_obstacles, take_surfaces
+from pyverlet.core.engine_work import energy_of_last, friction_of_last
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.running import remake_list, run_substeps
 from pyverlet.core.seams import follow_seam, wrap_seam
@@ -162,6 +163,19 @@ class Engine:
         if wall_given is not None:
             self.arrays["wall_given"], self.arrays["obstacle_given"] = wall_given, obstacle_given
             self.w.wall_given, self.w.obstacle_given = reals(wall_given), reals(obstacle_given)
+
+    def book(self, wanted: cython.bint):
+        """Note from now on what contacts change of the energy: "gained" (blocks,) and "work" (count, 4) J; or no more."""
+        w: cython.pointer(Step) = cython.address(self.w)
+        w.booking = wanted
+        if wanted:
+            self.arrays |= {"gained": np.zeros((w.count + BLOCK - 1) // BLOCK + 1), "work": np.zeros((w.count + 1, 4))}
+            w.gained, w.work = doubles(self.arrays["gained"]), doubles(self.arrays["work"])
+
+    def energy_of_last(self, share: cython.double):
+        """(all, that along tangents) J by `share` of what contacts gave in the last substep, as velocities have it now."""
+        w: cython.pointer(Step) = cython.address(self.w)
+        return energy_of_last(w, share), friction_of_last(w, share)
 
     def listen(self, wanted: cython.bint):
         """Note from now on who touches, or no more; what was heard is forgotten."""

@@ -33,6 +33,7 @@ from pyverlet.core.surface_contacts import hold_surfaces, relax_surfaces, warm_s
 from pyverlet.core.surface_sides import keep_sides
 from pyverlet.core.surfaces import bounce_surfaces
 from pyverlet.core.warm_start import warm_start
+from pyverlet.core.work import book_drift, book_end, book_grips, book_rubbing, book_start
 
 MOST_ROUNDS = cython.declare(cython.int, 100)  # over the groups in which pairs have bounced
 
@@ -86,6 +87,8 @@ def drift_stage(what: cython.p_void, block: cython.int) -> cython.void:
     if w.segments > 0:
         keep_sides(w, block)
     drift(w, a, min(a + BLOCK, w.count), block)
+    if w.booking:
+        book_drift(w, block)
     if w.relaxes > 0:
         relax_surfaces_stage(what, block)
 
@@ -156,6 +159,15 @@ def relax_stage(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def rubbing_stage(what: cython.p_void, item: cython.int) -> cython.void:
+    """What the pairs of a group have rubbed."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    book_rubbing(w, 2 * item + w.parity)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def hear_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Which pairs of a group touch."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -183,6 +195,8 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     most: real = 0
     stale: cython.bint = False
     team_stage(w.team, kick_stage, w, blocks)
+    if w.booking:
+        team_stage(w.team, book_start, w, blocks)
     for b in range(blocks):
         most = max(most, w.fastest[b])
     fastest: real = cython.cast(real, sqrt(most))
@@ -202,6 +216,11 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
         if sweep > 0 and surfaces:
             team_stage(w.team, relax_surfaces_stage, w, blocks)
         each_group(w, relax_stage)
+    if w.booking and w.rough:
+        each_group(w, rubbing_stage)
+        team_stage(w.team, book_grips, w, blocks)
+    if w.booking:
+        team_stage(w.team, book_end, w, blocks)
     if w.listening:
         each_group(w, hear_stage)
         team_stage(w.team, hear_surfaces_stage, w, blocks)

@@ -17,6 +17,7 @@ from cython.cimports.libc.stdint import int64_t
 
 from pyverlet.core.hearing import hear_pair
 from pyverlet.core.step import MOST_JOINT, Step
+from pyverlet.core.work import book_impact
 
 NEVER = cython.declare(cython.double, 1e300)
 SAME_TIME = cython.declare(cython.double, 1e-3)  # of h
@@ -105,6 +106,8 @@ def strike(
     w.moved[2 * i] -= cython.cast(real, dx * t)
     w.moved[2 * i + 1] -= cython.cast(real, dy * t)
     w.since[i] = max(w.since[i], t, 1e-300)
+    if w.booking:
+        book_impact(w, i, dx, dy, turn, t)
 
 
 @cython.cfunc

@@ -16,6 +16,7 @@ from pyverlet.core.cells import BLOCK, wrapped
 from pyverlet.core.impacts import NEVER
 from pyverlet.core.obstacles import BODY_OF, FACES, LENGTH, PLACE, ROUNDING, SEGMENT, head_of
 from pyverlet.core.step import Step
+from pyverlet.core.work import book_place
 
 Way = cython.struct(x=cython.double, y=cython.double, dx=cython.double, dy=cython.double)
 """Of a particle in a substep: from where to how far, m."""
@@ -121,6 +122,8 @@ def keep_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     w.position[2 * i + 1] += cython.cast(real, from_y)
     w.moved[2 * i] += cython.cast(real, from_x)
     w.moved[2 * i + 1] += cython.cast(real, from_y)
+    if w.booking:
+        book_place(w, i, from_x, from_y)
 
 
 @cython.cfunc

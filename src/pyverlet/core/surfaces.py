@@ -21,6 +21,7 @@ from pyverlet.core.surface_rows import (
 )
 from pyverlet.core.surface_shapes import measure_surface
 from pyverlet.core.surface_times import Hit, meet_surface, set_speed
+from pyverlet.core.work import book_belt, book_place
 
 MOST_BOUNCES = cython.declare(cython.int, 256)
 """Of one particle in a substep, one after the other."""
@@ -96,12 +97,16 @@ def bounce_at(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
         jt: cython.double = min(max(-slip / 3, -most), most)
         strike(w, i, jt * ny, -jt * nx, -jt * 2 / w.radius[i], hit.time)
         note_surface(w, i, k, jt * ny, -jt * nx, True)
+        if w.booking:
+            book_belt(w, i, k, jt, nx, ny)
     gap: cython.double = row[first + GAP]
     if hit.time == 0 and gap < 0:  # it was beyond: put back
         w.position[2 * i] += cython.cast(real, gap * nx)
         w.position[2 * i + 1] += cython.cast(real, gap * ny)
         w.moved[2 * i] += cython.cast(real, gap * nx)
         w.moved[2 * i + 1] += cython.cast(real, gap * ny)
+        if w.booking:
+            book_place(w, i, gap * nx, gap * ny)
 
 
 @cython.cfunc

@@ -84,15 +84,9 @@ class Bookkeeper:
         other.ledger, other._energy, other._resting = replace(self.ledger), self._energy, self._resting
         return other
 
-    def frame(
-        self, state: Slots, forces: ForceSum, links: Links, t: float, h: float, lag: float, done: Callable[[str], None]
-    ) -> Page:
-        """The books of one frame, to be told of each stage; it passes on what it is told to `done`."""
-        return Page(self, state, forces, links, t, h, lag, done)
-
 
 class Page:
-    """The books of one frame."""
+    """The books of one frame, to be told of each stage; it passes on what it is told to `done`."""
 
     def __init__(
         self, books: Bookkeeper, state: Slots, forces: ForceSum, links: Links, t: float, h: float, lag: float,

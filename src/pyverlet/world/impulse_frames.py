@@ -15,6 +15,7 @@ from pyverlet.ground.constants import REST_ACCELERATIONS, SURPLUS
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.laws.contacts.collisions import Collisions
 from pyverlet.laws.contacts.growth import Growth
+from pyverlet.laws.impulse_ledger import ImpulsePage
 from pyverlet.laws.integrators import PositionVerlet
 from pyverlet.laws.limiter import fall, watched
 from pyverlet.laws.rooms import Open
@@ -88,8 +89,10 @@ class ImpulseFrames:
                 world._contacts.broad_phase.forget()
         return steps
 
-    def step(self, world: Any, dt: float) -> None:
+    def step(self, world: Any, dt: float, done: Callable[[str], None]) -> None:
         """Advance the slots of a world by a frame of dt seconds: all of `World.step` but for what its arrays become.
+
+        done: is told of each stage, and may be the page of a ledger.
 
         Raises:
             InputError: there is something in the world that this law does not know yet.
@@ -102,7 +105,7 @@ class ImpulseFrames:
         world._slots.clear_notes()
         if world._gather():
             self.held.forget_list()
-        if not self.run(world, dt, world.profile.mark):
+        if not self.run(world, dt, done):
             self._refuse_non_finite(world, dt)
 
     def unknown(self, world: Any) -> list[str]:
@@ -110,8 +113,6 @@ class ImpulseFrames:
         found = []
         if world.links:
             found.append("links")
-        if world._books:
-            found.append("a ledger")
         if world._sleep:
             found.append("sleep=True")
         return found
@@ -148,6 +149,9 @@ class ImpulseFrames:
             > 0.0
         )
         done("gather")
+        page = done if isinstance(done, ImpulsePage) else None
+        if page:
+            page.begin(engine, half * before / self.held.kick if self.held.kick else 0.0)
         notes = None if world._touches is None else ImpulseNotes(world._touches, engine, state)
         if listens := world._events is not None:
             engine.listen(True)
@@ -185,16 +189,21 @@ class ImpulseFrames:
                 notes.read(h / kick)
             self.held.kick, before, step = last_kick, h, stop
             done("contacts")
+            lag = half * h if by_core else 0.0
             if not by_core:
                 self._flight.end(state, self.held.gave, self.held.gave_spin, h / self.held.kick)
             if own_walls:
-                own_walls(state, h, half * h if by_core else 0.0, 0.0)
+                page.confined(own_walls, h, lag, 0.0) if page else own_walls(state, h, lag, 0.0)
+            if page:
+                page.moved(lag, self.held.gave, self.held.kick)
             world._show(step * h, half * h if by_core else 0.0) if step < substeps else None
         self.held.h = h
         if not alone:
             self._end(world, dt, half * h if by_core else 0.0)
         if (not finite or not alone) and first_non_finite(state) >= 0:
             return False
+        if page:
+            page.end(half * h / self.held.kick)
         if limited and gravity == world.gravity:
             self._limit(world, watch, dt)
         if notes:
@@ -202,9 +211,9 @@ class ImpulseFrames:
         if listens:
             world._events.hear(told_of(engine, state, world._course))
             engine.listen(False)
+        done("finish")
         if state.seam:
             engine.wrap_seam()
-        done("finish")
         return True
 
     def _strongest(self, gravity: tuple[float, float]) -> float:

@@ -17,7 +17,10 @@ from pyverlet.ground.turns import of_one_frame
 from pyverlet.laws.contacts.collisions import Collisions, ContactSolver, Overlap, measure_overlap
 from pyverlet.laws.energy import Energy, energy
 from pyverlet.laws.events import Events, Place
-from pyverlet.laws.ledger import Bookkeeper, Ledger
+from pyverlet.laws.forces import ForceSum
+from pyverlet.laws.impulse_ledger import ImpulsePage
+from pyverlet.laws.integrators import Integrator
+from pyverlet.laws.ledger import Bookkeeper, Ledger, Page
 from pyverlet.laws.obstacles import Course, Obstacle, Obstacles
 from pyverlet.laws.rooms import Boundary
 from pyverlet.laws.touches import Touches
@@ -45,6 +48,9 @@ class Measures(Particles):
     collisions: Collisions | None
     _contacts: ContactSolver | None
     _impulses: Any
+    _force_sum: ForceSum
+    integrator: Integrator
+    profile: Any
 
     @of_one_frame
     def energy(self) -> Energy:
@@ -175,6 +181,13 @@ class Measures(Particles):
             self._contacts.weigh(bool(self.boundary.seam) and self.boundary.perimeter() is None)
             listed, virial = self._contacts.listed, self._contacts.virial
         return self._touches.frame(self._slots, self._state, h, self.boundary, self._course, listed, virial, told)
+
+    def _open_books(self, h: float, by_impulses: bool) -> Any:
+        """The books of a frame with steps of h seconds, if there are any."""
+        lag = self.integrator.velocity_lag * h
+        kind = ImpulsePage if by_impulses else Page
+        about = self._slots, self._force_sum, self.links, self.time, h, lag, self.profile.mark
+        return self._books and kind(self._books, *about)
 
     def _spent(self) -> tuple[float, float, float, float]:
         """What impacts, friction, the energy limiter and the room have given in this frame, J, as they have noted."""

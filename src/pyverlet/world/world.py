@@ -120,9 +120,9 @@ class World(Measures, Queries, Doors):
         with self._state.turn.frame():
             self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
             self.profile.begin()
-            books = self._open_books(h)
-            if self._impulses.takes(self):
-                self._impulses.step(self, dt)
+            books = self._open_books(h, by_impulses := self._impulses.takes(self))
+            if by_impulses:
+                self._impulses.step(self, dt, books or self.profile.mark)
             elif not self._frame(h, self._listen(h, books or self.profile.mark)):
                 self._refuse_non_finite(h)
             self._accept(dt, h, books)
@@ -238,10 +238,6 @@ class World(Measures, Queries, Doors):
         if self.onlooker and since:
             self.onlooker(Moment(self._slots, self.time + since, lag))
             self.profile.mark("pictures")
-
-    def _open_books(self, h: float) -> Any:
-        lag = self.integrator.velocity_lag * h
-        return self._books and self._books.frame(self._slots, self._force_sum, self.links, self.time, h, lag, self.profile.mark)
 
     def _clear_notes(self) -> None:
         """What walls and contacts note about a frame starts anew."""

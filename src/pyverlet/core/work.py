@@ -1,0 +1,176 @@
+# mypy: ignore-errors
+"""What contacts change of the energy, for the ledger; only while `booking`.
+
+Let u_0 and u be velocities of the middle of a substep before and after contacts, and a the acceleration by forces. Contacts that
+change u before x += u h change the energy that a particle has at the end of the substep, with the potential of a, by
+m (|u - a h/2|^2 - |u_0 - a h/2|^2) / 2, and those after it by the same with + a h/2. Likewise an impulse J at time t, which also
+moves the end of the path by -J t / m, changes it by J . (mean of u before and after + a (t - h/2)).
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+
+from pyverlet.core.cells import BLOCK
+from pyverlet.core.step import Step
+from pyverlet.core.surface_rows import CONTACT, DRAG, NORMAL, SIDES, SPEED
+
+WORK = cython.declare(cython.int, 4)  # numbers a particle, J
+BY_IMPACTS = cython.declare(cython.int, 0)  # along normals, by impacts
+BY_FRICTION = cython.declare(cython.int, 1)
+BY_WALLS = cython.declare(cython.int, 2)  # by surfaces of the room that move along themselves
+BY_PLACES = cython.declare(cython.int, 3)  # against `acceleration`, by moving particles
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def energy_of(w: cython.pointer(Step), block: cython.int, kinetic: cython.double, lag: cython.double) -> cython.double:
+    """Sum over a block of `kinetic` times the kinetic energies, spins included, and of m a . u lag, J."""
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    total: cython.double = 0
+    i: cython.Py_ssize_t
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, w.count)):
+        if w.inverse_mass[i] > 0:
+            ux: cython.double = v[width * i]
+            uy: cython.double = v[width * i + 1]
+            rim: cython.double = w.motion[4 * i + 2] if w.rough else 0
+            rim *= w.radius[i]
+            pulled: cython.double = lag * (w.acceleration[2 * i] * ux + w.acceleration[2 * i + 1] * uy)
+            total += (kinetic * (ux * ux + uy * uy + 0.5 * rim * rim) * 0.5 + pulled) / w.inverse_mass[i]
+    return total
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def book_start(what: cython.p_void, block: cython.int) -> cython.void:
+    """Before contacts."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    h: cython.double = w.h
+    w.gained[block] -= energy_of(w, block, 1, -0.5 * h)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def book_drift(w: cython.pointer(Step), block: cython.int) -> cython.void:
+    """Between the contacts that come before the drift and those that come after it."""
+    h: cython.double = w.h
+    w.gained[block] -= energy_of(w, block, 0, h)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def book_end(what: cython.p_void, block: cython.int) -> cython.void:
+    """After contacts."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    h: cython.double = w.h
+    w.gained[block] += energy_of(w, block, 1, 0.5 * h)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def book_place(w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.double, dy: cython.double) -> cython.double:
+    """Particle i has been moved: returns what that changes of its energy in `acceleration`, J, and notes it."""
+    if w.inverse_mass[i] == 0:
+        return 0.0
+    gained: cython.double = -(w.acceleration[2 * i] * dx + w.acceleration[2 * i + 1] * dy) / w.inverse_mass[i]
+    w.work[WORK * i + BY_PLACES] += gained
+    return gained
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def book_impact(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.double, dy: cython.double, turn: cython.double, t: cython.double
+) -> cython.void:
+    """An impulse at time t has just changed the velocity of particle i by (dx, dy), and its spin unless it was normal."""
+    if w.inverse_mass[i] == 0:
+        return
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    back: cython.double = 0.5 * cython.cast(cython.double, w.h)
+    ux: cython.double = v[width * i] - 0.5 * dx - w.acceleration[2 * i] * back
+    uy: cython.double = v[width * i + 1] - 0.5 * dy - w.acceleration[2 * i + 1] * back
+    work: cython.double = ux * dx + uy * dy
+    if turn != 0:
+        r: cython.double = w.radius[i]
+        spin: cython.double = w.motion[4 * i + 2] - 0.5 * turn
+        work += 0.5 * r * r * turn * spin
+    work = work / w.inverse_mass[i] + book_place(w, i, -dx * t, -dy * t)
+    w.work[WORK * i + (BY_IMPACTS if turn == 0 else BY_FRICTION)] += work
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def book_belt(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, jt: cython.double, nx: cython.double, ny: cython.double
+) -> cython.void:
+    """The surface of contact k has given particle i jt along (ny, -nx): no friction is lost or won by that it moves itself."""
+    along: cython.double = w.contact[CONTACT * k + SPEED] * ny - w.contact[CONTACT * k + SPEED + 1] * nx
+    if along != 0 and w.inverse_mass[i] > 0:
+        w.work[WORK * i + BY_FRICTION] -= jt * along / w.inverse_mass[i]
+        if 0 <= w.surface[k] < SIDES:
+            w.work[WORK * i + BY_WALLS] += jt * along / w.inverse_mass[i]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def book_grips(what: cython.p_void, block: cython.int) -> cython.void:
+    """What surfaces have rubbed particles of a block in this substep: half the sum of slips before and after all contacts."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    row: cython.pointer(cython.double) = w.contact
+    h: cython.double = w.h
+    n: cython.Py_ssize_t
+    k: cython.Py_ssize_t
+    for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
+        i: cython.Py_ssize_t = w.at_surface[n]
+        for k in range(w.contact_begin[i], w.contact_end[i]):
+            first: cython.Py_ssize_t = CONTACT * k
+            if row[first + DRAG] != 0 and w.inverse_mass[i] > 0:
+                nx: cython.double = row[first + NORMAL]
+                ny: cython.double = row[first + NORMAL + 1]
+                jt: cython.double = row[first + DRAG]
+                ux: cython.double = w.free[2 * i]
+                uy: cython.double = w.free[2 * i + 1]
+                turn: cython.double = w.free_spin[i]
+                ux = 0.5 * (ux + w.motion[4 * i] - w.acceleration[2 * i] * h)
+                uy = 0.5 * (uy + w.motion[4 * i + 1] - w.acceleration[2 * i + 1] * h)
+                turn = 0.5 * (turn + w.motion[4 * i + 2]) * w.radius[i]
+                w.work[WORK * i + BY_FRICTION] += jt * (ux * ny - uy * nx - turn) / w.inverse_mass[i]
+                book_belt(w, i, k, jt, nx, ny)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def book_rubbing(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
+    """What the pairs of group s have rubbed in this substep, likewise: whatever the order of contacts, it is the same."""
+    k: cython.Py_ssize_t
+    first: cython.Py_ssize_t = w.begin[s]
+    for k in range(first, first + w.swept[s]):
+        if w.tangent_impulse[k] != 0:
+            i: cython.Py_ssize_t = w.i[k]
+            j: cython.Py_ssize_t = w.j[k]
+            if k > first and w.i[k - 1] == w.i[k] and w.j[k - 1] == w.j[k]:
+                continue  # a pair that is repeated to fill a batch
+            ux: cython.double = w.free[2 * j]
+            uy: cython.double = w.free[2 * j + 1]
+            a: cython.double = w.free_spin[i]
+            b: cython.double = w.free_spin[j]
+            ux = ux - w.free[2 * i] + w.motion[4 * j] - w.motion[4 * i]
+            uy = uy - w.free[2 * i + 1] + w.motion[4 * j + 1] - w.motion[4 * i + 1]
+            a = (a + w.motion[4 * i + 2]) * w.radius[i]
+            b = (b + w.motion[4 * j + 2]) * w.radius[j]
+            inverse: cython.double = w.inverse_mass[i]
+            inverse += w.inverse_mass[j]
+            slip: cython.double = 0.5 * (ux * w.normal_y[k] - uy * w.normal_x[k] + a + b)
+            w.work[WORK * i + BY_FRICTION] += w.tangent_impulse[k] * slip / inverse
