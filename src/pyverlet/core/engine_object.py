@@ -20,6 +20,8 @@ from pyverlet.core.engine_arrays import (
     make_particle_arrays,
 )
 from pyverlet.core.engine_impulses import fill_kept, read_impulses
+from pyverlet.core.engine_links import fill_links
+from pyverlet.core.link_arrays import Links
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.running import remake_list, run_substeps
 from pyverlet.core.step import Step
@@ -36,6 +38,7 @@ class Engine:
     w: Step
     c: Cells
     ls: Lists
+    lk: Links
     arrays = cython.declare(dict, visibility="public")
     threads = cython.declare(cython.int, visibility="readonly")
     dtype = cython.declare(object, visibility="readonly")
@@ -49,7 +52,7 @@ class Engine:
             raise MemoryError
         self.threads = threads
         self.dtype = np.dtype(np.float64 if cython.sizeof(real) == 8 else np.float32)
-        w.cells, w.lists = c, ls
+        w.cells, w.lists, w.links, w.linked = c, ls, cython.address(self.lk), False
         ls.per_particle, ls.per_pair, ls.alone_room = 4.0, 1.25, 64.0
         ls.pairs_room = ls.lanes_room = 0
         w.count, w.groups = -1, 0
@@ -111,6 +114,13 @@ class Engine:
         self.ls.linked_begin, self.ls.linked_to = integers(begin), small_integers(to)
         self.ls.picky = self.ls.picky or self.ls.linked
         self.ls.good = False
+
+    def set_links(self, rows, passes, period_x, period_y):
+        """Links (world/link_rows.py), passes over them in a substep, and periods of the room, m or 0; rows: None, there are none."""
+        self.w.linked = rows is not None
+        if rows is not None:
+            self.arrays["links"] = rows
+            fill_links(cython.address(self.lk), rows, passes, period_x, period_y)
 
     def set_room(self, room, x0, y0, x1, y1, restitution, friction, speed):
         """Walls: none (0); a cage (1) by centre and radius; a box (2) by two corners; m. speed: of a cage's surface, m/s."""

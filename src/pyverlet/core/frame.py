@@ -25,6 +25,7 @@ from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.contacts import bounce_again, relax_contacts, solve_contacts
+from pyverlet.core.links import begin_links, end_links, relax_links, remember_links_stage, solve_links
 from pyverlet.core.particle_stages import drift, kick_stage, remember_stage
 from pyverlet.core.relisting import each_group
 from pyverlet.core.step import OPEN, Step
@@ -64,6 +65,18 @@ def hold_walls_stage(what: cython.p_void, block: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def hold_on_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """Walls once more hold particles of a block."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    a: cython.Py_ssize_t = block * BLOCK
+    i: cython.Py_ssize_t
+    for i in range(a, a + w.walled[block]):
+        hold_walls(w, w.at_wall[i])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def relax_walls_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Walls that carry particles of a block."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -80,9 +93,8 @@ def drift_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Walls once more, then a block of particles moves."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     a: cython.Py_ssize_t = block * BLOCK
-    i: cython.Py_ssize_t
-    for i in range(a, a + w.walled[block]):
-        hold_walls(w, w.at_wall[i])
+    if not w.linked:
+        hold_on_stage(what, block)
     drift(w, a, min(a + BLOCK, w.count), block)
     if w.relaxes > 0:
         relax_walls_stage(what, block)
@@ -166,19 +178,31 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     fastest: real = cython.cast(real, sqrt(most))
     w.far = 2 * w.h * fastest + w.near
     w.least_bounce = max(w.rest_speed, fastest * cython.cast(real, 1e-14 if cython.sizeof(real) == 8 else 2e-6))
+    if w.linked:
+        begin_links(w)
     team_stage(w.team, warm_walls_stage, w, blocks)
     each_group(w, warm_start_stage)
     if w.room != OPEN:
         team_stage(w.team, hold_walls_stage, w, blocks)
     each_group(w, solve_stage)
     bounce_on(w)
+    if w.linked:
+        if w.room != OPEN:
+            team_stage(w.team, hold_on_stage, w, blocks)
+        solve_links(w)
     team_stage(w.team, drift_stage, w, blocks)
     for sweep in range(w.relaxes):
         if sweep > 0 and w.room != OPEN:
             team_stage(w.team, relax_walls_stage, w, blocks)
         each_group(w, relax_stage)
+        if w.linked:
+            relax_links(w, sweep % 2 == 1)
+    if w.linked:
+        end_links(w)
     if w.rough or w.substep + 1 == w.substeps:  # what smooth contacts gave before is asked for by no one
         team_stage(w.team, remember_stage, w, blocks)
+        if w.linked:
+            team_stage(w.team, remember_links_stage, w, (w.links.count + BLOCK - 1) // BLOCK)
     for b in range(blocks):
         stale |= w.stale[b] != 0
     return stale

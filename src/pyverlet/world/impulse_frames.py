@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pyverlet.ground.constants import REST_ACCELERATIONS, SURPLUS
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.laws.contacts.broadphase import Fast
+from pyverlet.kernels.runs import partners
 from pyverlet.laws.contacts.growth import Growth
 from pyverlet.laws.limiter import fall, watched
 from pyverlet.laws.rooms import Open
@@ -22,6 +23,8 @@ from pyverlet.world.free_steps import FreeSteps, kicks
 from pyverlet.world.impulse_arrays import ImpulseArrays
 from pyverlet.world.impulse_materials import ROOMS
 from pyverlet.world.impulse_notes import ImpulseNotes
+from pyverlet.world.impulse_memory import Memory
+from pyverlet.world.link_rows import LinkRows
 
 Array = NDArray[Any]
 
@@ -56,14 +59,20 @@ class ImpulseFrames:
         self._dtype = dtype
         self.held = ImpulseArrays(dtype)
         self._flight = FreeSteps()
+        self._links = LinkRows()
+        self._apart: Any = None  # pairs that the engine does not let touch
+        self._linked: Any = None  # passes and seam that the engine knows of links
         self._checked: Any = None  # what the world was made of when it was last found to be known
         self._law: Any = None  # numbers that the engine holds
         self._pull: tuple[Any, float] = None, 0.0  # gravity, and how strong it is, m/s^2
         self.growth = Growth()
         # What contacts remember between frames.
-        self.forget, self.save, self.restore, self.renumber = (
-            self.held.forget, self.held.save, self.held.restore, self.held.renumber,
-        )  # fmt: skip
+        self.forget, self.save, self.renumber = self.held.forget, self.held.save, self.held.renumber
+
+    def restore(self, memory: Memory) -> None:
+        """Back to what `save` returned; links have gone back to theirs."""
+        self._links.forget()
+        self.held.restore(memory)
 
     # ---- a frame -------------------------------------------------------------------------------------------------------------
 
@@ -79,6 +88,7 @@ class ImpulseFrames:
             self._checked = known
         world._slots.rows = self.held.core
         world._slots.clear_notes()
+        self._keep_apart(world)
         if world._gather():
             self.held.engine.forget_list()
         self.run(world, dt, world.profile.mark)
@@ -90,7 +100,6 @@ class ImpulseFrames:
             InputError: there is such a thing in the world.
         """
         unknown = {
-            "links": bool(world.links),
             "obstacles": bool(world.obstacles),
             "a ledger": world.keeps_ledger,
             "events": world.tells_events,
@@ -109,7 +118,7 @@ class ImpulseFrames:
         state, forces, engine, collisions = world._slots, world._force_sum, self.held.engine, world.collisions
         contained = len(world) > 1 or not isinstance(world.boundary, Open)
         substeps = world.substeps
-        if contained and dt > LONGEST_FRAME:
+        if (contained or world.links) and dt > LONGEST_FRAME:
             substeps *= int(np.ceil(dt / LONGEST_FRAME * (1 - 1e-9)))
         by_core = kicks(world.integrator)
         h, half = dt / substeps, world.integrator.velocity_lag if by_core else 0.5
@@ -121,6 +130,7 @@ class ImpulseFrames:
         gravity = world.gravity
         state.h = h
         self.held.load(world)
+        self._load_links(world)
         if getattr(world.integrator, "naive_start", False):
             self._start_naively(world, (1.0 - half) * h)
         rough = max(collisions.friction, state.most_friction, getattr(world.boundary, "friction", 0.0)) > 0.0
@@ -170,6 +180,25 @@ class ImpulseFrames:
         if state.seam:
             engine.wrap_seam()
         done("finish")
+
+    def _keep_apart(self, world: Any) -> None:
+        """Pairs that links keep from touching, if they are others than before."""
+        if (world.links or self._apart is not None) and (apart := world.links.known_apart()) is not self._apart:
+            self._apart = apart
+            begin, to = partners(apart, len(world))
+            self.held.engine.set_linked(begin, to.astype(np.int32))
+
+    def _load_links(self, world: Any) -> None:
+        if not (world.links or self._links.rows):
+            return
+        changed, links = self._links.load(world.links, world._slots, world._state.mass), world.links
+        if changed or (links.iterations, world._slots.seam) != self._linked:
+            self._linked = links.iterations, world._slots.seam
+            self.held.engine.set_links(self._links.rows, links.iterations, *world._slots.seam.period)
+
+    def end_links(self, world: Any) -> None:
+        """The frame is good: what it did to the links holds."""
+        world.links.accept(self._links.hand_over() if world.links else [])
 
     def _strongest(self, gravity: tuple[float, float]) -> float:
         """The largest acceleration by gravity alone, m/s^2."""

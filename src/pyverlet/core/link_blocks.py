@@ -1,0 +1,151 @@
+# mypy: ignore-errors
+"""Blocks of rows: chains are solved directly, single rows (angles, areas) one by one; chunk by chunk of a colour."""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.libc.math import INFINITY, sqrt
+
+from pyverlet.core.link_arrays import DISTANCE, Links
+from pyverlet.core.link_chains import give, solve_chain
+from pyverlet.core.link_shapes import Way, measure_row, mobility, push, way_between
+from pyverlet.core.link_softness import Softness, before_that, capped, softness
+
+AVERAGED = cython.declare(cython.double, 120.0)
+"""1/s: rate of the mean of the pull that is shown, and that breaks."""
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def begin_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
+    """What row r measures, its numbers, and what it gave in the last substep, along the gradient of now."""
+    e: cython.Py_ssize_t = k.first[r]
+    if k.intact[r] == 0:
+        return
+    value: cython.double = measure_row(k, r, 0)
+    before: cython.double = before_that(value, k.value[r], k.next[r], k.rest[r])
+    for e in range(k.first[r], k.first[r + 1]):
+        k.gradient[2 * e], k.gradient[2 * e + 1] = k.slope[2 * e], k.slope[2 * e + 1]
+    moves: cython.double = mobility(k, r)
+    soft: Softness = softness(k, k.stiffness[r], k.damping[r], moves, value, before)
+    k.soft[r], k.target[r], k.value[r] = soft.soft, soft.target, value
+    k.impulse[r] = capped(k, k.impulse[r], k.load[r], moves) if soft.soft < INFINITY else 0
+    k.load[r] = k.impulse[r]
+    if k.kind[r] == DISTANCE:
+        d: Way = way_between(k, k.node[k.first[r]], k.node[k.first[r] + 1], 0)
+        length: cython.double = sqrt(d.x * d.x + d.y * d.y)
+        k.way[2 * r], k.way[2 * r + 1] = d.x, d.y
+        k.given[2 * r] = k.given[2 * r + 1] = 0
+        if length > 0:
+            give(k, r, k.impulse[r] * d.x / length, k.impulse[r] * d.y / length)
+    else:
+        push_row(k, r, k.impulse[r], k.gradient)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def push_row(
+    k: cython.pointer(Links), r: cython.Py_ssize_t, impulse: cython.double, gradient: cython.pointer(cython.double)
+) -> cython.void:
+    """Give an impulse along a gradient of row r."""
+    e: cython.Py_ssize_t
+    for e in range(k.first[r], k.first[r + 1]):
+        push(k, k.node[e], impulse * gradient[2 * e], impulse * gradient[2 * e + 1])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def solve_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
+    """A single row: a step of Newton's method for what it measures after the drift, along its gradient at the start."""
+    e: cython.Py_ssize_t
+    if k.intact[r] == 0 or k.soft[r] == INFINITY:
+        return
+    left: cython.double = k.target[r] - k.soft[r] * k.impulse[r] - measure_row(k, r, k.h)
+    along: cython.double = 0
+    square: cython.double = 0
+    for e in range(k.first[r], k.first[r + 1]):
+        x: cython.double = k.slope[2 * e]
+        y: cython.double = k.slope[2 * e + 1]
+        along += k.weight[k.node[e]] * (k.gradient[2 * e] * x + k.gradient[2 * e + 1] * y)
+        square += k.weight[k.node[e]] * (x * x + y * y)
+    turned: cython.bint = 2 * along < square  # the gradient has turned away: that of after the drift
+    change: cython.double = k.soft[r] + k.h * (square if turned else along)
+    if change > 0:
+        change = left / change
+        k.impulse[r] += change
+        push_row(k, r, change, k.slope if turned else k.gradient)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def relax_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
+    """After the drift: a rigid single row changes no more, along the mean of its gradients before and after."""
+    e: cython.Py_ssize_t
+    rate: cython.double = 0
+    square: cython.double = 0
+    if k.intact[r] == 0 or k.stiffness[r] < INFINITY:
+        return
+    for e in range(k.first[r], k.first[r + 1]):
+        i: cython.Py_ssize_t = k.node[e]
+        x: cython.double = k.slope[2 * e]
+        y: cython.double = k.slope[2 * e + 1]
+        rate += x * k.u[2 * i] + y * k.u[2 * i + 1]
+        square += k.weight[i] * (x * x + y * y)
+    if square > 0:
+        k.impulse[r] -= rate / square
+        push_row(k, r, -rate / square, k.slope)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def solve_block(k: cython.pointer(Links), b: cython.Py_ssize_t, drifts: cython.bint) -> cython.void:
+    """A chain, or a single row."""
+    r: cython.Py_ssize_t = k.block[b]
+    if r == k.block[b + 1]:
+        return
+    if k.kind[r] == DISTANCE:
+        solve_chain(k, r, k.block[b + 1], drifts)
+    elif drifts:
+        solve_row(k, r)
+    else:
+        relax_row(k, r)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def finish_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
+    """Before the drift: what row r will measure after it, and its gradient in the middle of the two."""
+    e: cython.Py_ssize_t = k.first[r]
+    if k.intact[r] == 0:
+        return
+    k.next[r] = measure_row(k, r, k.h)
+    if k.kind[r] == DISTANCE:
+        p: Way = way_between(k, k.node[e], k.node[e + 1], k.h)
+        p.x += k.way[2 * r]
+        p.y += k.way[2 * r + 1]
+        length: cython.double = sqrt(p.x * p.x + p.y * p.y)
+        k.middle[2 * r] = p.x / length if length > 0 else 0
+        k.middle[2 * r + 1] = p.y / length if length > 0 else 0
+    else:
+        for e in range(k.first[r], k.first[r + 1]):
+            k.slope[2 * e] = (k.slope[2 * e] + k.gradient[2 * e]) / 2
+            k.slope[2 * e + 1] = (k.slope[2 * e + 1] + k.gradient[2 * e + 1]) / 2
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def end_row(k: cython.pointer(Links), r: cython.Py_ssize_t, mean: cython.double) -> cython.void:
+    """The mean of what row r pulls with; if that is too much, it breaks."""
+    if k.intact[r] == 0:
+        return
+    k.pull[r] += mean * (-k.impulse[r] / k.kick - k.pull[r])
+    if k.pull[r] > k.strength[r] or -k.pull[r] > k.strength[r]:
+        k.intact[r] = 0
+        k.impulse[r] = 0
