@@ -85,7 +85,7 @@ def test_the_list_is_that_of_all_pairs_against_all(kind: str, sizes: str, dtype:
         if seed == 3:
             world.category[: n // 3], world.mask[: n // 2] = 2, 1
         world.step(1e-9)
-        slots, skin = world._slots, world._impulses._engine.save_list()[2][1] * 2
+        slots, skin = world._slots, world._impulses.held.engine.save_list()[2][1] * 2
         found, _ = listed(world)
         # Rounding of coordinates, and of periods, decides about pairs at the very rim of the skin.
         slack = 1e-5 if dtype == np.float32 else 1e-12
@@ -180,7 +180,7 @@ def test_impulses_survive_new_lists() -> None:
         before = world.rebuilds
         for _ in range(60):
             if anew:
-                world._impulses._engine.forget_list()
+                world._impulses.held.engine.forget_list()
             world.step(1 / 60)
             assert np.hypot(*world.velocity.T).max() < 1e-6
         assert world.rebuilds - before == (60 if anew else 0)
@@ -198,7 +198,7 @@ def test_pairs_that_links_keep_apart_are_not_listed() -> None:
     pairs = np.sort(particle[listed(world)[1]], axis=1)[::3]
     pairs = pairs[np.lexsort(pairs.T[::-1])]
     begin = np.searchsorted(pairs[:, 0], np.arange(len(world) + 1))
-    world._impulses._engine.set_linked(begin, np.ascontiguousarray(pairs[:, 1], np.int32))
+    world._impulses.held.engine.set_linked(begin, np.ascontiguousarray(pairs[:, 1], np.int32))
     world.step(1 / 60)
     left = {tuple(pair) for pair in np.sort(world._slots.particle[listed(world)[1]], axis=1).tolist()}
     assert left

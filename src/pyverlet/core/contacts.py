@@ -27,7 +27,7 @@ from cython.cimports.libc.stdint import int32_t
 from pyverlet.core.impacts import resolve_impacts
 from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, clamped, motion_of, slip_of
 from pyverlet.core.step import OPEN, TOUCHED, Step
-from pyverlet.core.walls import bounce_walls
+from pyverlet.core.surfaces import bounce_surfaces
 from pyverlet.core.warm_start import measure_pairs
 
 MOST_PASSES = cython.declare(cython.int, 100)
@@ -103,7 +103,7 @@ def find_hits(w: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint)
 @cython.nogil
 @cython.exceptval(check=False)
 def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, hits: cython.Py_ssize_t) -> cython.bint:
-    """Let pairs of group s that meet fast bounce, until none does; walls that they are thrown at throw them back."""
+    """Let pairs of group s that meet fast bounce, until none does; surfaces that they are thrown at throw them back."""
     first: cython.Py_ssize_t = w.begin[s]
     a: cython.Py_ssize_t
     n: cython.int
@@ -111,11 +111,10 @@ def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, hits: cython.Py_
         left: cython.Py_ssize_t = resolve_impacts(w, first, hits) if hits else 0
         if left == 0:
             return n > 0
-        if w.room != OPEN:
-            for a in range(first, first + left):
-                k: cython.Py_ssize_t = w.hit[a] if w.hit[a] >= 0 else -1 - w.hit[a]
-                bounce_walls(w, w.i[k])
-                bounce_walls(w, w.j[k])
+        for a in range(first, first + left):
+            k: cython.Py_ssize_t = w.hit[a] if w.hit[a] >= 0 else -1 - w.hit[a]
+            bounce_surfaces(w, w.i[k])
+            bounce_surfaces(w, w.j[k])
         measure_pairs(w, s)
         hits = find_hits(w, s, True) if w.rough else find_hits(w, s, False)
     return True

@@ -9,6 +9,7 @@ from cython.cimports.arrays import doubles, indices, integers, octets, reals, sm
 from cython.cimports.lanes import real
 
 from pyverlet.core.cells import BLOCK, LEVELS, Cells
+from pyverlet.core.engine_surfaces import make_surface_rows
 from pyverlet.core.pair_groups import GROUP
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.step import Step
@@ -41,12 +42,12 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     a |= {name: np.zeros(count + 8, dtype) for name in ("spot_u", "spot_v", "spot_r")}
     a |= {name: np.zeros(count, np.uint32) for name in ("cell", "order", "patch", "used", "batch")}
     a |= {name: np.zeros(blocks, dtype) for name in ("fastest", "speeds")}
-    a |= {name: np.zeros(blocks, np.int32) for name in ("stale", "walled")}
+    a |= {name: np.zeros(blocks, np.int32) for name in ("stale",)}
     a |= {name: np.zeros(groups, np.int64) for name in ("begin", "lanes", "row", "found", "raw_begin", "looked", "beyond")}
     a |= {"head": np.zeros(count, np.int32), "start": np.zeros(4 * count + 72, np.uint32)}
     a |= {"extent": np.zeros((blocks, 4), dtype), "box": np.zeros((2 * count + 64, 4), dtype)}
     w.listed, w.checked, w.moved = reals(a["listed"]), reals(a["checked"]), reals(a["moved"])
-    w.fastest, w.stale, w.walled = reals(a["fastest"]), small_integers(a["stale"]), small_integers(a["walled"])
+    w.fastest, w.stale = reals(a["fastest"]), small_integers(a["stale"])
     a |= {name: np.zeros(groups, np.int32) for name in ("bounced", "searched")}
     w.bounced, w.searched = small_integers(a["bounced"]), small_integers(a["searched"])
     w.begin, w.lanes = integers(a["begin"]), integers(a["lanes"])
@@ -58,6 +59,7 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     ls.looked, ls.beyond = integers(a["looked"]), integers(a["beyond"])
     ls.listed = ls.good = ls.harvested = False
     w.groups = ls.rows = 0
+    make_surface_rows(w, a)
 
 
 @cython.cfunc

@@ -7,10 +7,9 @@ import cython
 import numpy as np
 from cython.cimports.arrays import indices, integers, reals, small_integers
 from cython.cimports.lanes import real
-from cython.cimports.libc.math import rint
 from cython.cimports.team import team_free, team_new, team_run
 
-from pyverlet.core.cells import BLOCK, Cells, wrapped
+from pyverlet.core.cells import BLOCK, Cells
 from pyverlet.core.engine_arrays import (
     make_found_arrays,
     make_kept_arrays,
@@ -22,8 +21,11 @@ from pyverlet.core.engine_arrays import (
 from pyverlet.core.engine_impulses import fill_kept, read_impulses
 from pyverlet.core.engine_links import fill_links
 from pyverlet.core.link_arrays import Links
+from pyverlet.core.link_ends import show_links
+from pyverlet.core.engine_surfaces import give_surfaces, make_surface_arrays, place_obstacles, set_obstacles, take_surfaces
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.running import remake_list, run_substeps
+from pyverlet.core.seams import follow_seam, wrap_seam
 from pyverlet.core.step import Step
 
 
@@ -52,7 +54,7 @@ class Engine:
             raise MemoryError
         self.threads = threads
         self.dtype = np.dtype(np.float64 if cython.sizeof(real) == 8 else np.float32)
-        w.cells, w.lists, w.links, w.linked = c, ls, cython.address(self.lk), False
+        w.cells, w.lists, w.link_table, w.linked = c, ls, cython.address(self.lk), False
         ls.per_particle, ls.per_pair, ls.alone_room = 4.0, 1.25, 64.0
         ls.pairs_room = ls.lanes_room = 0
         w.count, w.groups = -1, 0
@@ -73,7 +75,7 @@ class Engine:
     # ---- what there is -------------------------------------------------------------------------------------------------------
 
     def set_particles(self, **a):
-        """Arrays by slot, those of walls (4, count). category and mask are empty if all circles collide with all.
+        """Arrays by slot. category and mask are empty if all circles collide with all.
 
         With another number of particles there is no list any more: take what contacts remember before.
         """
@@ -86,22 +88,24 @@ class Engine:
         w.spin = reals(a["spin"])
         w.motion, w.free, w.free_spin = reals(a["motion"]), reals(a["free"]), reals(a["free_spin"])
         w.given, w.given_spin = reals(a["given"]), reals(a["given_spin"])
-        w.wall_impulse, w.wall_tangent = reals(a["wall_impulse"]), reals(a["wall_tangent"])
-        w.at_wall = small_integers(a["at_wall"])
+        w.surfaces_good = False
         w.own_restitution, w.own_friction = reals(a["own_restitution"]), reals(a["own_friction"])
         self.c.position, self.c.radius = w.position, w.radius
         self.ls.particle, self.ls.filtered = small_integers(a["particle"]), len(a["category"]) > 0
         self.ls.category, self.ls.mask = indices(a["category"]), indices(a["mask"])
 
     def set_materials(self, **n):
-        """sized, varied, mixed: whether radii, masses, and any of restitution, friction and radii differ.
+        """collides: whether there are pairs at all. sized, varied, mixed: whether radii, masses, and any of restitution, friction and radii differ.
 
         bulk: largest radius of circles that stand in cells, m; smallest, largest and mean_radius, m. restitution, friction: of
         circles without values of their own. picky: whether some pairs are no pairs: of pinned or filtered ones, or linked ones.
         """
         w: cython.pointer(Step) = cython.address(self.w)
         ls: cython.pointer(Lists) = cython.address(self.ls)
-        w.sized, w.varied, w.mixed = n["sized"], n["varied"], n["mixed"]
+        w.sized, w.varied, w.mixed, w.collides = n["sized"], n["varied"], n["mixed"], n["collides"]
+        if not w.collides:
+            w.groups, ls.listed, ls.good = 0, False, False
+        w.surfaces_good = False
         self.c.bulk, self.c.smallest, ls.largest, ls.mean_radius = n["bulk"], n["smallest"], n["largest"], n["mean_radius"]
         ls.restitution, ls.friction, ls.picky = n["restitution"], n["friction"], n["picky"] or ls.linked
         ls.refill = True
@@ -122,10 +126,16 @@ class Engine:
             self.arrays["links"] = rows
             fill_links(cython.address(self.lk), rows, passes, period_x, period_y)
 
+    def show_links(self, half: cython.double, kick: cython.double):
+        """Velocities of now, at the end of a frame, are those that links allow: see `link_ends`."""
+        if self.w.linked and half > 0:
+            show_links(cython.address(self.w), half, kick)
+
     def set_room(self, room, x0, y0, x1, y1, restitution, friction, speed):
         """Walls: none (0); a cage (1) by centre and radius; a box (2) by two corners; m. speed: of a cage's surface, m/s."""
         w: cython.pointer(Step) = cython.address(self.w)
-        w.room, w.x0, w.y0, w.x1, w.y1 = room, x0, y0, x1, y1
+        if (w.room, w.x0, w.y0, w.x1, w.y1) != (room, x0, y0, x1, y1):
+            w.room, w.x0, w.y0, w.x1, w.y1, w.surfaces_good = room, x0, y0, x1, y1, False
         w.wall_restitution, w.wall_friction, w.wall_speed = restitution, friction, speed
 
     def set_seam(self, low_x: cython.double, low_y: cython.double, period_x: cython.double, period_y: cython.double):
@@ -135,12 +145,35 @@ class Engine:
             c.low_x, c.low_y, c.period_x, c.period_y = low_x, low_y, period_x, period_y
             self.ls.good = False
 
-    def note(self, wall_given):
-        """Keep what impacts give, and add what walls give to (count, 2) m/s; None: do not."""
+    def set_obstacles(self, segments, bodies, moving, cell: cython.double, heads, links, keep: cython.bint):
+        """Segments (n, SEGMENT) and bodies (k, 6) of all obstacles, which segments move, and arrays for their grid.
+
+        heads: a power of two. keep: the grid is good. Who touches which is found anew; what contacts remember is kept.
+        """
+        self.arrays.update(segments=segments, bodies=bodies, moving=moving, heads=heads, links=links)
+        set_obstacles(cython.address(self.w), self.arrays, cell, keep)
+
+    def place_obstacles(self, which, dt: cython.double, fresh: cython.bint):
+        """Obstacles as a frame of dt seconds begins: of segments `which`, those that leave where they are listed are listed anew.
+
+        fresh: they have been changed otherwise. Returns whether there was room for all.
+        """
+        return place_obstacles(cython.address(self.w), which, dt, fresh)
+
+    def take_surfaces(self):
+        """(slot, surface, values) of what contacts with surfaces remember: (k,), (k,) and (k, 2) m/s."""
+        return take_surfaces(cython.address(self.w), self.arrays)
+
+    def give_surfaces(self, slot, surface, values):
+        """Find them again in the next list; sorted by slot."""
+        give_surfaces(cython.address(self.w), self.arrays, slot, surface, values)
+
+    def note(self, wall_given, obstacle_given):
+        """Keep what impacts give, and add what walls and obstacles give to (count, 2) m/s; None: do not."""
         self.w.noting = wall_given is not None
         if wall_given is not None:
-            self.arrays["wall_given"] = wall_given
-            self.w.wall_given = reals(wall_given)
+            self.arrays["wall_given"], self.arrays["obstacle_given"] = wall_given, obstacle_given
+            self.w.wall_given, self.w.obstacle_given = reals(wall_given), reals(obstacle_given)
 
     def set_skin(self, diameters: cython.double, adapts: cython.bint):
         """How thick the skin is, in mean diameters, or begins with."""
@@ -181,6 +214,9 @@ class Engine:
             make_lane_arrays(w, self.arrays, lanes, self.dtype)
             make_kept_arrays(ls, self.arrays, lanes, self.dtype)
             make_material_arrays(w, self.arrays, self.dtype)
+        blocks = (w.count + BLOCK - 1) // BLOCK
+        if blocks and w.contact_count[0] > w.contact_room:
+            make_surface_arrays(w, self.arrays, w.contact_count[0] * 5 // 4)
 
     def run(self, substep: cython.int, substeps: cython.int, parts: cython.int):
         """Substeps from `substep` on by `parts` threads, with lists of pairs that are good in each.
@@ -216,7 +252,7 @@ class Engine:
 
     def order(self):
         """(falls, order): slots in the order of the cells, and how often they fall; (0, None) without a list."""
-        return (self.c.falls, self.arrays["order"].astype(np.int32)) if self.ls.good else (0, None)
+        return (self.c.falls, self.arrays["order"].astype(np.int32)) if self.ls.good and self.w.collides else (0, None)
 
     def renumber(self, order):
         """The particle of slot order[k] will be in slot k, where `order` is that of `order()`; arrays are set afterwards."""
@@ -234,38 +270,12 @@ class Engine:
         self.c.falls = 0
 
     def follow_seam(self):
-        """In a periodic room: places become the images nearest to where the list was last looked at.
-
-        Those that have come far are put inside the room, and the list is to be made anew: far away digits are lost.
-        """
-        w: cython.pointer(Step) = cython.address(self.w)
-        c: cython.pointer(Cells) = cython.address(self.c)
-        i: cython.Py_ssize_t
-        axis: cython.int
-        strayed: cython.bint = False
-        for axis in range(2):
-            period: cython.double = c.period_y if axis else c.period_x
-            low: cython.double = c.low_y if axis else c.low_x
-            if period > 0 and self.ls.good:
-                for i in range(w.count):
-                    away: cython.double = cython.cast(cython.double, w.position[2 * i + axis]) - w.checked[2 * i + axis]
-                    turns: cython.double = rint(away / period)
-                    if turns != 0:
-                        w.position[2 * i + axis] = cython.cast(real, w.position[2 * i + axis] - period * turns)
-                    far: cython.double = w.position[2 * i + axis] - low
-                    strayed |= far > 1.5 * period or far < -0.5 * period
-        if strayed:
-            self.ls.good = False
-            self.wrap_seam()
+        """In a periodic room: places become the images nearest to where the list was last looked at."""
+        follow_seam(cython.address(self.w))
 
     def wrap_seam(self):
         """Put all places inside a periodic room."""
-        w: cython.pointer(Step) = cython.address(self.w)
-        c: cython.pointer(Cells) = cython.address(self.c)
-        i: cython.Py_ssize_t
-        for i in range(w.count):
-            w.position[2 * i] = wrapped(w.position[2 * i], c.low_x, c.period_x)
-            w.position[2 * i + 1] = wrapped(w.position[2 * i + 1], c.low_y, c.period_y)
+        wrap_seam(cython.address(self.w))
 
     # ---- what outlives it ----------------------------------------------------------------------------------------------------
 
@@ -287,7 +297,7 @@ class Engine:
         """(listed, checked, numbers): what `restore_list` needs to make the same list again; empty arrays without one."""
         ls: cython.pointer(Lists) = cython.address(self.ls)
         numbers = (ls.diameters, ls.half_skin, self.c.skin, self.w.allowed, float(ls.age), float(ls.hold))
-        rows = self.w.count if ls.good else 0
+        rows = self.w.count if ls.good and self.w.collides else 0
         return self.arrays["listed"][:rows].copy(), self.arrays["checked"][:rows].copy(), tuple(map(float, numbers))
 
     def restore_list(self, listed, checked, numbers):
@@ -296,7 +306,7 @@ class Engine:
         ls: cython.pointer(Lists) = cython.address(self.ls)
         ls.diameters, ls.half_skin, self.c.skin = numbers[:3]
         ls.hold = int(numbers[5])
-        if len(listed) != w.count:
+        if len(listed) != w.count or not w.collides:
             return
         self.c.position = reals(listed)
         while True:

@@ -2,11 +2,11 @@
 """A frame: its substeps, stage by stage; the threads of the team share out the items of each stage.
 
 Per substep of length h:
- 1. kick: velocities gain the acceleration; walls give what they gave in the last substep.
+ 1. kick: velocities gain the acceleration; surfaces, walls and obstacles, give what they gave in the last substep.
  2. warm start: so do contacts, along the normals of now.
- 3. walls: what comes fast bounces, the rest is held.
+ 3. surfaces: what comes fast bounces, the rest is held.
  4. contacts: one sweep over the pairs, with springs; pairs that meet fast bounce, in closed form.
- 5. drift: walls once more, then x += v h.
+ 5. drift: surfaces once more, then x += v h.
  6. relax: sweeps without the springs.
  7. remember what contacts gave.
 
@@ -26,10 +26,11 @@ from cython.cimports.team import team_stage
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.contacts import bounce_again, relax_contacts, solve_contacts
 from pyverlet.core.links import begin_links, end_links, relax_links, remember_links_stage, solve_links
+from pyverlet.core.obstacles import place_moving
 from pyverlet.core.particle_stages import drift, kick_stage, remember_stage
 from pyverlet.core.relisting import each_group
 from pyverlet.core.step import OPEN, Step
-from pyverlet.core.walls import bounce_walls, hold_walls, list_walls, relax_walls, warm_walls
+from pyverlet.core.surfaces import bounce_surfaces, hold_surfaces, relax_surfaces, warm_surfaces
 from pyverlet.core.warm_start import warm_start
 
 MOST_ROUNDS = cython.declare(cython.int, 100)  # over the groups in which pairs have bounced
@@ -38,66 +39,60 @@ MOST_ROUNDS = cython.declare(cython.int, 100)  # over the groups in which pairs 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def warm_walls_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """Which particles of a block may meet a wall, and what walls gave them in the last substep."""
+def warm_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """What surfaces gave particles of a block in the last substep."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    a: cython.Py_ssize_t = block * BLOCK
-    walled: cython.Py_ssize_t = list_walls(w, a, min(a + BLOCK, w.count))
-    w.walled[block] = cython.cast(int32_t, walled)
-    i: cython.Py_ssize_t
-    for i in range(a, a + walled):
-        warm_walls(w, w.at_wall[i])
+    n: cython.Py_ssize_t
+    for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
+        warm_surfaces(w, w.at_surface[n])
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def hold_walls_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """Particles of a block that come fast bounce from walls, others are held."""
+def hold_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """Particles of a block that come fast bounce from surfaces, others are held."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    a: cython.Py_ssize_t = block * BLOCK
-    i: cython.Py_ssize_t
-    for i in range(a, a + w.walled[block]):
-        bounce_walls(w, w.at_wall[i])
-        hold_walls(w, w.at_wall[i])
+    n: cython.Py_ssize_t
+    for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
+        bounce_surfaces(w, w.at_surface[n])
+        hold_surfaces(w, w.at_surface[n])
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def hold_on_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """Walls once more hold particles of a block."""
+    """Surfaces once more hold particles of a block."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    a: cython.Py_ssize_t = block * BLOCK
-    i: cython.Py_ssize_t
-    for i in range(a, a + w.walled[block]):
-        hold_walls(w, w.at_wall[i])
+    n: cython.Py_ssize_t
+    for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
+        hold_surfaces(w, w.at_surface[n])
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def relax_walls_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """Walls that carry particles of a block."""
+def relax_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """Surfaces that carry particles of a block."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    a: cython.Py_ssize_t = block * BLOCK
-    i: cython.Py_ssize_t
-    for i in range(a, a + w.walled[block]):
-        relax_walls(w, w.at_wall[i])
+    n: cython.Py_ssize_t
+    for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
+        relax_surfaces(w, w.at_surface[n])
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def drift_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """Walls once more, then a block of particles moves."""
+    """Surfaces once more, then a block of particles moves."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     a: cython.Py_ssize_t = block * BLOCK
     if not w.linked:
         hold_on_stage(what, block)
     drift(w, a, min(a + BLOCK, w.count), block)
     if w.relaxes > 0:
-        relax_walls_stage(what, block)
+        relax_surfaces_stage(what, block)
 
 
 @cython.cfunc
@@ -180,20 +175,23 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     w.least_bounce = max(w.rest_speed, fastest * cython.cast(real, 1e-14 if cython.sizeof(real) == 8 else 2e-6))
     if w.linked:
         begin_links(w)
-    team_stage(w.team, warm_walls_stage, w, blocks)
+    surfaces: cython.bint = w.room != OPEN or w.segments > 0
+    place_moving(w)
+    if surfaces:
+        team_stage(w.team, warm_surfaces_stage, w, blocks)
     each_group(w, warm_start_stage)
-    if w.room != OPEN:
-        team_stage(w.team, hold_walls_stage, w, blocks)
+    if surfaces:
+        team_stage(w.team, hold_surfaces_stage, w, blocks)
     each_group(w, solve_stage)
     bounce_on(w)
     if w.linked:
-        if w.room != OPEN:
+        if surfaces:
             team_stage(w.team, hold_on_stage, w, blocks)
         solve_links(w)
     team_stage(w.team, drift_stage, w, blocks)
     for sweep in range(w.relaxes):
-        if sweep > 0 and w.room != OPEN:
-            team_stage(w.team, relax_walls_stage, w, blocks)
+        if sweep > 0 and surfaces:
+            team_stage(w.team, relax_surfaces_stage, w, blocks)
         each_group(w, relax_stage)
         if w.linked:
             relax_links(w, sweep % 2 == 1)
@@ -202,7 +200,7 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     if w.rough or w.substep + 1 == w.substeps:  # what smooth contacts gave before is asked for by no one
         team_stage(w.team, remember_stage, w, blocks)
         if w.linked:
-            team_stage(w.team, remember_links_stage, w, (w.links.count + BLOCK - 1) // BLOCK)
+            team_stage(w.team, remember_links_stage, w, (w.link_table.count + BLOCK - 1) // BLOCK)
     for b in range(blocks):
         stale |= w.stale[b] != 0
     return stale

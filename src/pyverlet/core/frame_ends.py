@@ -48,7 +48,7 @@ def end_stage(what: cython.p_void, block: cython.int) -> cython.void:
         for i in range(a, b):
             w.velocity[2 * i], w.velocity[2 * i + 1] = w.motion[4 * i], w.motion[4 * i + 1]
             w.spin[i] = w.motion[4 * i + 2]
-    if w.falls_free and w.substep == w.substeps:
+    if w.falls_free and w.by_contacts > 0:  # the frame is over
         for i in range(2 * a, 2 * b):
             w.acceleration[i] += w.given[i] * w.by_contacts
             w.velocity[i] += w.half * w.acceleration[i]

@@ -104,17 +104,6 @@ def strike(
 
 
 @cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def note_wall(w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.double, dy: cython.double) -> cython.void:
-    """A wall has changed the velocity of a particle."""
-    if w.noting:
-        w.wall_given[2 * i] += cython.cast(real, dx)
-        w.wall_given[2 * i + 1] += cython.cast(real, dy)
-
-
-@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def strike_pair(

@@ -62,6 +62,7 @@ Links = cython.struct(
     given=cython.pointer(cython.double),  # (rows, 2) N s to the second end in this substep
     along=cython.pointer(cython.double),  # (rows, 2) the direction that an impulse has
     wanted=cython.pointer(cython.double),  # (rows, 2) m along it; N s that turn what has been given into it
+    turning=cython.pointer(cython.double),  # (rows,) by how much it would turn in this substep if it turned as in the last
     turned=cython.pointer(cython.double),  # (rows,) N s/m by which a taut link resists being turned
     answer=cython.pointer(cython.double),  # (rows, 2) N s
     inverse=cython.pointer(cython.double),  # (rows, 3) of the block of the matrix, symmetric

@@ -9,7 +9,10 @@ from cython.cimports.libc.math import INFINITY, sqrt
 from pyverlet.core.link_arrays import DISTANCE, Links
 from pyverlet.core.link_chains import give, solve_chain
 from pyverlet.core.link_shapes import Way, measure_row, mobility, push, way_between
-from pyverlet.core.link_softness import Softness, before_that, capped, softness
+from pyverlet.core.link_softness import Softness, before_that, kept_share, softness
+
+FARTHEST = cython.declare(cython.double, 0.5)
+"""Most that a link is taken to turn in a substep, rad."""
 
 AVERAGED = cython.declare(cython.double, 120.0)
 """1/s: rate of the mean of the pull that is shown, and that breaks."""
@@ -19,28 +22,56 @@ AVERAGED = cython.declare(cython.double, 120.0)
 @cython.nogil
 @cython.exceptval(check=False)
 def begin_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
-    """What row r measures, its numbers, and what it gave in the last substep, along the gradient of now."""
+    """What row r measures, its numbers, and how it turns."""
     e: cython.Py_ssize_t = k.first[r]
     if k.intact[r] == 0:
         return
     value: cython.double = measure_row(k, r, 0)
     before: cython.double = before_that(value, k.value[r], k.next[r], k.rest[r])
-    for e in range(k.first[r], k.first[r + 1]):
-        k.gradient[2 * e], k.gradient[2 * e + 1] = k.slope[2 * e], k.slope[2 * e + 1]
-    moves: cython.double = mobility(k, r)
-    soft: Softness = softness(k, k.stiffness[r], k.damping[r], moves, value, before)
-    k.soft[r], k.target[r], k.value[r] = soft.soft, soft.target, value
-    k.impulse[r] = capped(k, k.impulse[r], k.load[r], moves) if soft.soft < INFINITY else 0
-    k.load[r] = k.impulse[r]
     if k.kind[r] == DISTANCE:
-        d: Way = way_between(k, k.node[k.first[r]], k.node[k.first[r] + 1], 0)
-        length: cython.double = sqrt(d.x * d.x + d.y * d.y)
+        i: cython.Py_ssize_t = k.node[e]
+        j: cython.Py_ssize_t = k.node[e + 1]
+        d: Way = way_between(k, i, j, 0)
+        square: cython.double = d.x * d.x + d.y * d.y
+        turns: cython.double = 0
+        if square > 0:
+            turns = k.h * ((k.u[2 * j + 1] - k.u[2 * i + 1]) * d.x - (k.u[2 * j] - k.u[2 * i]) * d.y) / square
         k.way[2 * r], k.way[2 * r + 1] = d.x, d.y
+        k.turning[r] = max(min(turns, FARTHEST), -FARTHEST)
         k.given[2 * r] = k.given[2 * r + 1] = 0
-        if length > 0:
-            give(k, r, k.impulse[r] * d.x / length, k.impulse[r] * d.y / length)
     else:
-        push_row(k, r, k.impulse[r], k.gradient)
+        for e in range(k.first[r], k.first[r + 1]):
+            k.gradient[2 * e], k.gradient[2 * e + 1] = k.slope[2 * e], k.slope[2 * e + 1]
+    soft: Softness = softness(k, k.stiffness[r], k.damping[r], mobility(k, r), value, before)
+    k.soft[r], k.target[r], k.value[r] = soft.soft, soft.target, value
+    if soft.soft == INFINITY:
+        k.impulse[r] = 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def warm_block(k: cython.pointer(Links), b: cython.Py_ssize_t) -> cython.void:
+    """What rows of a block gave in the last substep, along the gradients of now.
+
+    A chain gives one share of all of it: what its light particles get is a small difference of large impulses.
+    """
+    r: cython.Py_ssize_t
+    share: cython.double = 1
+    for r in range(k.block[b], k.block[b + 1]):
+        if k.intact[r]:
+            share = min(share, kept_share(k, k.impulse[r], k.load[r], mobility(k, r)))
+    for r in range(k.block[b], k.block[b + 1]):
+        k.impulse[r] *= k.scale * share
+        k.load[r] = k.impulse[r]
+        if k.kind[r] == DISTANCE:
+            x: cython.double = k.way[2 * r]
+            y: cython.double = k.way[2 * r + 1]
+            length: cython.double = sqrt(x * x + y * y)
+            if length > 0:
+                give(k, r, k.impulse[r] * x / length, k.impulse[r] * y / length)
+        else:
+            push_row(k, r, k.impulse[r], k.gradient)
 
 
 @cython.cfunc

@@ -6,10 +6,10 @@ With J = P d along its direction d it is to have |p| - L + soft J = target. So w
 
     (C_r + h (w_1 + w_2)) F_r - h w_1 F_(r-1) - h w_2 F_(r+1) = e d + (-P t / b) t,    C = soft d d^T + t t^T / b,
 
-with t across d. d is the direction at the start of the substep (SHAKE), so that motion is reversible and keeps energy: but that
-is stable only while the tension T turns no end through more than s = 4 T h^2 / (m L) = 4 in a substep (leapfrog). A light chain with a
-heavy end is far beyond. Where s is not small, d goes over to p / |p|, the direction at the end of the substep, which is stable at
-any s, and b = q J / |p| is by how much P turns with it; q is the share of that direction.
+with t across d. d is the direction d_0 at the start of the substep (SHAKE), so that motion is reversible and keeps energy: but that is
+stable only where s = 4 T h^2 / (m L) < 4, T being the tension (leapfrog), and a light chain with a heavy end is far beyond. Where s is
+not small, the force is that of d = d_0 + q (d_1 - 2 d_0 + d_-1), which is stable at any s if q > 1/4, and keeps energy (Newmark's
+method with beta = q); d_0 - d_-1 is told by the velocities of the last substep, and b = q J / |p| is by how much P turns with p.
 """
 
 from __future__ import annotations
@@ -24,8 +24,14 @@ MOST_RELEASES = cython.declare(cython.int, 8)
 SINGULAR = cython.declare(cython.double, 1e-12)
 """Of what a link adds to its own block: a pivot below is one of a link whose length others have settled."""
 
+AHEAD = cython.declare(cython.double, 0.3)
+"""Share of the direction ahead where s is large. Stable at any s are those from 1/4 on (Newmark 1959)."""
+
+DAMPED = cython.declare(cython.double, 0.05)
+"""Share of it that damps, as the backward Euler method does."""
+
 STEEP = cython.declare(cython.double, 0.5)
-"""Cosine between d and p / |p| below which d becomes that."""
+"""Cosine between the directions before and after a substep: below it a step of Newton's method is one for a linear row."""
 
 
 @cython.cfunc
@@ -47,23 +53,33 @@ def aim_at_length(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void
     if k.impulse[r] > 0:
         pulled = 0
     s: cython.double = 2 * k.h * pulled * (k.weight[k.node[e]] + k.weight[k.node[e + 1]]) / length
-    q: cython.double = s * s / (s * s + 1)
+    q: cython.double = AHEAD * s * s / (s * s + 4)
     x: cython.double = p.x / length
     y: cython.double = p.y / length
     dx: cython.double = k.way[2 * r] / start
     dy: cython.double = k.way[2 * r + 1] / start
-    if dx * x + dy * y < STEEP:
-        q = 1
-    dx += q * (x - dx)
-    dy += q * (y - dy)
-    unit: cython.double = sqrt(dx * dx + dy * dy)
-    dx /= unit
-    dy /= unit
-    k.along[2 * r], k.along[2 * r + 1] = dx, dy
+    cosine: cython.double = dx * x + dy * y
+    across: cython.double = 0
+    turning: cython.double = q * (1 - DAMPED) * k.turning[r]
     k.turned[r] = q * pulled / length
+    if cosine < STEEP:  # far from the answer: linear about the start
+        k.turned[r] = q * pulled / start
+        error = p.x * dx + p.y * dy - k.rest[r]
+        across = k.turned[r] * (p.y * dx - p.x * dy) - turning * pulled
+        cosine = 1
+    else:
+        x0: cython.double = dx
+        y0: cython.double = dy
+        dx += q * (x - dx) + turning * y0
+        dy += q * (y - dy) - turning * x0
+        unit: cython.double = sqrt(dx * dx + dy * dy)
+        dx /= unit
+        dy /= unit
+        cosine = x * dx + y * dy
+    k.along[2 * r], k.along[2 * r + 1] = dx, dy
     k.impulse[r] = k.given[2 * r] * dx + k.given[2 * r + 1] * dy
-    k.wanted[2 * r] = (k.target[r] - k.soft[r] * k.impulse[r] - error) / (x * dx + y * dy)
-    k.wanted[2 * r + 1] = k.given[2 * r] * dy - k.given[2 * r + 1] * dx  # -P t with t = (-dy, dx)
+    k.wanted[2 * r] = (k.target[r] - k.soft[r] * k.impulse[r] - error) / cosine
+    k.wanted[2 * r + 1] = k.given[2 * r] * dy - k.given[2 * r + 1] * dx - across  # -P t with t = (-dy, dx)
 
 
 @cython.cfunc

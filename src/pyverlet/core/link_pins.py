@@ -7,8 +7,8 @@ import cython
 from cython.cimports.libc.math import INFINITY
 
 from pyverlet.core.link_arrays import Links
-from pyverlet.core.link_shapes import nearest_image
-from pyverlet.core.link_softness import Softness, before_that, capped, softness
+from pyverlet.core.link_shapes import unwrapped
+from pyverlet.core.link_softness import Softness, before_that, kept_share, softness
 
 
 @cython.cfunc
@@ -18,7 +18,7 @@ def pin_value(k: cython.pointer(Links), p: cython.Py_ssize_t, axis: cython.int, 
     """A coordinate of its particle beyond that of the pin, m."""
     i: cython.Py_ssize_t = k.pin_node[p]
     away: cython.double = k.x[2 * i + axis] - k.pin_point[2 * p + axis]
-    return nearest_image(away, k.period_y if axis else k.period_x) + ahead * k.u[2 * i + axis]
+    return unwrapped(away, k.period_y if axis else k.period_x) + ahead * k.u[2 * i + axis]
 
 
 @cython.cfunc
@@ -39,7 +39,7 @@ def begin_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
         k.pin_value[at] = value
         if soft.soft == INFINITY:
             k.pin_impulse[at] = 0
-        k.pin_impulse[at] = capped(k, k.pin_impulse[at], k.pin_load[at], k.own[i])
+        k.pin_impulse[at] *= k.scale * kept_share(k, k.pin_impulse[at], k.pin_load[at], k.own[i])
         k.pin_load[at] = k.pin_impulse[at]
         k.u[2 * i + axis] += k.own[i] * k.pin_impulse[at]
 

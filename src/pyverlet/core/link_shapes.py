@@ -17,7 +17,7 @@ Way = cython.struct(x=cython.double, y=cython.double)
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def nearest_image(way: cython.double, period: cython.double) -> cython.double:
+def unwrapped(way: cython.double, period: cython.double) -> cython.double:
     """Across the seam of a periodic room."""
     return way - period * rint(way / period) if period > 0 else way
 
@@ -29,8 +29,8 @@ def nearest_image(way: cython.double, period: cython.double) -> cython.double:
 def way_between(k: cython.pointer(Links), i: cython.Py_ssize_t, j: cython.Py_ssize_t, ahead: cython.double) -> Way:
     """From linked particle i to the nearest image of j, m, `ahead` seconds from now at the velocities of now."""
     found: Way
-    found.x = nearest_image(k.x[2 * j] - k.x[2 * i], k.period_x) + ahead * (k.u[2 * j] - k.u[2 * i])
-    found.y = nearest_image(k.x[2 * j + 1] - k.x[2 * i + 1], k.period_y) + ahead * (k.u[2 * j + 1] - k.u[2 * i + 1])
+    found.x = unwrapped(k.x[2 * j] - k.x[2 * i], k.period_x) + ahead * (k.u[2 * j] - k.u[2 * i])
+    found.y = unwrapped(k.x[2 * j + 1] - k.x[2 * i + 1], k.period_y) + ahead * (k.u[2 * j + 1] - k.u[2 * i + 1])
     return found
 
 

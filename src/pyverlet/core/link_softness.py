@@ -63,14 +63,12 @@ def softness(
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def capped(
+def kept_share(
     k: cython.pointer(Links), impulse: cython.double, load: cython.double, mobility: cython.double
 ) -> cython.double:
-    """What the last substep gave, as it is given again: a blow, of a rope that snaps taut, is not; load may double.
+    """How much of what the last substep gave is given again: a blow, of a rope that snaps taut, is not; load may double.
 
     load: what that substep began with.
     """
-    if mobility <= 0:
-        return impulse * k.scale
-    most: cython.double = 2 * fabs(load) + k.least / mobility
-    return max(min(impulse, most), -most) * k.scale
+    most: cython.double = 2 * fabs(load) + (k.least / mobility if mobility > 0 else INFINITY)
+    return most / fabs(impulse) if fabs(impulse) > most else 1.0

@@ -13,7 +13,7 @@ from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.link_arrays import Links
-from pyverlet.core.link_blocks import AVERAGED, begin_row, end_row, finish_row, solve_block
+from pyverlet.core.link_blocks import AVERAGED, begin_row, end_row, finish_row, solve_block, warm_block
 from pyverlet.core.link_pins import begin_pin, end_pin, finish_pin, hold_pin, rest_pin, settle_pin
 from pyverlet.core.step import Step
 
@@ -24,7 +24,7 @@ from pyverlet.core.step import Step
 def take_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Velocities of a block of linked particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    k: cython.pointer(Links) = w.links
+    k: cython.pointer(Links) = w.link_table
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
     a: cython.Py_ssize_t = block * BLOCK
@@ -40,7 +40,7 @@ def take_stage(what: cython.p_void, block: cython.int) -> cython.void:
 def put_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """And back."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    k: cython.pointer(Links) = w.links
+    k: cython.pointer(Links) = w.link_table
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
     a: cython.Py_ssize_t = block * BLOCK
@@ -57,7 +57,7 @@ def put_stage(what: cython.p_void, block: cython.int) -> cython.void:
 def open_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Where a block of linked particles is, and what it weighs."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    k: cython.pointer(Links) = w.links
+    k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
     i: cython.Py_ssize_t
     take_stage(what, block)
@@ -74,7 +74,7 @@ def open_stage(what: cython.p_void, block: cython.int) -> cython.void:
 def warmed_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """What links have given a block is free motion to contacts: it does not bounce."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    k: cython.pointer(Links) = w.links
+    k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
     i: cython.Py_ssize_t
     for i in range(a, min(a + BLOCK, k.count)):
@@ -95,7 +95,7 @@ def warmed_stage(what: cython.p_void, block: cython.int) -> cython.void:
 def remember_links_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """What links gave a block before `free` counts as given, too."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    k: cython.pointer(Links) = w.links
+    k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
     i: cython.Py_ssize_t
     for i in range(a, min(a + BLOCK, k.count)):
@@ -110,11 +110,22 @@ def remember_links_stage(what: cython.p_void, block: cython.int) -> cython.void:
 @cython.exceptval(check=False)
 def begin_chunk(what: cython.p_void, item: cython.int) -> cython.void:
     """Rows of a chunk as they begin a substep."""
-    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).links
-    c: cython.Py_ssize_t = k.colour[k.now] + item
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     r: cython.Py_ssize_t
-    for r in range(k.block[k.chunk[c]], k.block[k.chunk[c + 1]]):
+    for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
         begin_row(k, r)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def warm_chunk(what: cython.p_void, item: cython.int) -> cython.void:
+    """What rows of a chunk gave in the last substep."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    c: cython.Py_ssize_t = k.colour[k.now] + item
+    b: cython.Py_ssize_t
+    for b in range(k.chunk[c], k.chunk[c + 1]):
+        warm_block(k, b)
 
 
 @cython.cfunc
@@ -122,7 +133,7 @@ def begin_chunk(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.exceptval(check=False)
 def solve_chunk(what: cython.p_void, item: cython.int) -> cython.void:
     """Where rows of a chunk are to be after the drift. If nothing else joins their particles, a second step settles them."""
-    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).links
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     c: cython.Py_ssize_t = k.colour[k.now] + item
     b: cython.Py_ssize_t
     for b in range(k.chunk[c], k.chunk[c + 1]):
@@ -136,7 +147,7 @@ def solve_chunk(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.exceptval(check=False)
 def relax_chunk(what: cython.p_void, item: cython.int) -> cython.void:
     """How rows of a chunk change after the drift."""
-    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).links
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     c: cython.Py_ssize_t = k.colour[k.now] + item
     b: cython.Py_ssize_t
     for b in range(k.chunk[c], k.chunk[c + 1]):
@@ -148,7 +159,7 @@ def relax_chunk(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.exceptval(check=False)
 def finish_chunk(what: cython.p_void, item: cython.int) -> cython.void:
     """Rows of a chunk are solved."""
-    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).links
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     r: cython.Py_ssize_t
     for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
         finish_row(k, r)
@@ -159,7 +170,7 @@ def finish_chunk(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.exceptval(check=False)
 def end_chunk(what: cython.p_void, item: cython.int) -> cython.void:
     """What rows of a chunk pull with."""
-    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).links
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     r: cython.Py_ssize_t
     for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
         end_row(k, r, min(1.0, AVERAGED * k.kick))
@@ -178,7 +189,7 @@ def blocks_of(k: cython.pointer(Links)) -> cython.int:
 @cython.exceptval(check=False)
 def begin_links(w: cython.pointer(Step)) -> cython.void:
     """After the kick: what links gave in the last substep."""
-    k: cython.pointer(Links) = w.links
+    k: cython.pointer(Links) = w.link_table
     p: cython.Py_ssize_t
     c: cython.int
     opens: cython.bint = w.substep == w.first
@@ -187,11 +198,12 @@ def begin_links(w: cython.pointer(Step)) -> cython.void:
     k.scale = w.scale if opens else 1
     k.least = w.rest_speed
     team_stage(w.team, open_stage, w, blocks_of(k))
+    team_stage(w.team, begin_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
     for p in range(k.pins):
         begin_pin(k, p)
     for c in range(k.colours):
         k.now = c
-        team_stage(w.team, begin_chunk, w, cython.cast(cython.int, k.colour[c + 1] - k.colour[c]))
+        team_stage(w.team, warm_chunk, w, cython.cast(cython.int, k.colour[c + 1] - k.colour[c]))
     team_stage(w.team, warmed_stage, w, blocks_of(k))
 
 
@@ -200,7 +212,7 @@ def begin_links(w: cython.pointer(Step)) -> cython.void:
 @cython.exceptval(check=False)
 def solve_links(w: cython.pointer(Step)) -> cython.void:
     """Before the drift: where rows are to be after it. There and back, if blocks share particles."""
-    k: cython.pointer(Links) = w.links
+    k: cython.pointer(Links) = w.link_table
     p: cython.Py_ssize_t
     c: cython.int
     _: cython.int
@@ -225,7 +237,7 @@ def solve_links(w: cython.pointer(Step)) -> cython.void:
 @cython.exceptval(check=False)
 def relax_links(w: cython.pointer(Step), back: cython.bint) -> cython.void:
     """After the drift: rigid rows change no more. back: the last colour first."""
-    k: cython.pointer(Links) = w.links
+    k: cython.pointer(Links) = w.link_table
     p: cython.Py_ssize_t
     c: cython.int
     team_stage(w.team, take_stage, w, blocks_of(k))
@@ -244,7 +256,7 @@ def relax_links(w: cython.pointer(Step), back: cython.bint) -> cython.void:
 @cython.exceptval(check=False)
 def end_links(w: cython.pointer(Step)) -> cython.void:
     """What links pull with; those that pull too hard break."""
-    k: cython.pointer(Links) = w.links
+    k: cython.pointer(Links) = w.link_table
     p: cython.Py_ssize_t
     team_stage(w.team, end_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
     for p in range(k.pins):

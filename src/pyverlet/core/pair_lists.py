@@ -29,6 +29,7 @@ PLACE_BITS = cython.declare(uint32_t, (1 << 31) - 1)
 Lists = cython.struct(
     listed=cython.bint,  # whether there are lanes, whose impulses are of now
     good=cython.bint,  # whether they are still about the particles of now
+    stale=cython.bint,  # whether particles may leave where it is good in the next substep
     harvested=cython.bint,  # whether what contacts remember is in `kept`
     short=cython.bint,  # whether arrays have turned out to be too small
     refill=cython.bint,  # whether what pairs are made of has changed

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Substeps one after the other, with a list of pairs that is good in each."""
+"""Substeps one after the other, with lists of pairs and surfaces that are good in each."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from pyverlet.core.frame_ends import begin_stage, end_stage
 from pyverlet.core.list_age import adapt_skin, has_paid
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.pair_materials import fill_alike
-from pyverlet.core.relisting import each_group, fill_stage, make_list, renew_list
+from pyverlet.core.relisting import each_group, fill_stage, listed_stage, make_list, renew_list
 from pyverlet.core.step import Step
+from pyverlet.core.surface_lists import list_surfaces
 
 
 @cython.cfunc
@@ -36,37 +37,72 @@ def strays(w: cython.pointer(Step)) -> cython.bint:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def look_anew(w: cython.pointer(Step), whole: cython.bint) -> cython.bint:
+    """Particles have moved far, or (`whole`) are others: who may meet whom. False: arrays are too small for it."""
+    ls: cython.pointer(Lists) = w.lists
+    blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
+    w.surfaces_good, ls.stale = False, False
+    if w.collides:
+        return make_list(w, False) if whole else renew_list(w)
+    ls.half_skin = 0.5 * ls.largest
+    w.allowed = cython.cast(real, ls.half_skin * ls.half_skin)
+    team_stage(w.team, listed_stage, w, blocks)
+    ls.good = True
+    return True
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def see_surfaces(w: cython.pointer(Step)) -> cython.bint:
+    """The list of surfaces in sight. False: it has too few places."""
+    w.margin = cython.cast(real, 2 * w.lists.half_skin)
+    w.lists.short = not list_surfaces(w)
+    return not w.lists.short
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def refresh(w: cython.pointer(Step)) -> cython.bint:
-    """Have a list of pairs that is good for the first substep. False: arrays are too small for it."""
+    """Have lists of pairs and surfaces that are good for the first substep. False: arrays are too small for them."""
     ls: cython.pointer(Lists) = w.lists
     if not ls.good:
-        return make_list(w, False)
-    if w.substep == 0 and has_paid(w, ls):
+        if not look_anew(w, True):
+            return False
+    elif w.collides and w.substep == 0 and has_paid(w, ls):
         adapt_skin(w, ls)
-        return make_list(w, False)
-    if ls.refill:
-        fill_alike(w, ls)
-        each_group(w, fill_stage)
-        ls.refill = False
-    return renew_list(w) if strays(w) else True
+        if not look_anew(w, True):
+            return False
+    else:
+        if ls.refill and w.collides:
+            fill_alike(w, ls)
+            each_group(w, fill_stage)
+            ls.refill = False
+        stale: cython.bint = ls.stale if w.substep > 0 else False
+        if not stale and (w.substep == 0 or not w.falls_free):
+            stale = strays(w)
+        if stale and not look_anew(w, False):
+            return False
+    return True if w.surfaces_good else see_surfaces(w)
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def run_substeps(what: cython.p_void, item: cython.int) -> cython.void:
-    """Substeps until all are done, or arrays are too small for a list of pairs."""
+    """Substeps until all are done, or arrays are too small for a list."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
     if w.substep == w.first:
         team_stage(w.team, begin_stage, w, blocks)
     going: cython.bint = refresh(w)
     while going and w.substep < w.substeps:
-        stale: cython.bint = substep(w, blocks)
+        w.lists.stale = substep(w, blocks)
         w.substep += 1
         w.lists.age += 1
-        if stale and w.substep < w.substeps:
-            going = renew_list(w)
+        if w.lists.stale and w.substep < w.substeps:
+            going = look_anew(w, False) and see_surfaces(w)
     if going:
         team_stage(w.team, end_stage, w, blocks)
 

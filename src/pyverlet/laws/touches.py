@@ -151,6 +151,11 @@ class Touches:
         """A contact solver's word, in any substep: what slots i (k,) have given slots j, (k, 2) N s; it need not come sorted."""
         self._heard.append((state.particle[i].astype(np.int64), state.particle[j].astype(np.int64), np.array(impulse, float)))
 
+    def pairs_heard(self) -> Array:
+        """(k, 2) user's indices, sorted, of those that have given each other something in this frame."""
+        rows = [np.sort(np.column_stack((i, j)), axis=1) for i, j, _ in self._heard]
+        return np.unique(np.concatenate([np.empty((0, 2), np.int64), *rows]), axis=0)
+
     def array(self, state: State) -> Array:
         """TOUCH, sorted by a, then b; without removed particles. It is renumbered when particles are removed later."""
         if self._end is None:

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from pyverlet import core
 from pyverlet.ground.constants import SKIN
+from pyverlet.laws.obstacles import Course
 from pyverlet.state.slots import Slots
 from pyverlet.world.impulse_materials import materials_of, walls_of
 from pyverlet.world.impulse_memory import Memory, columns_of
+from pyverlet.world.impulse_obstacles import ObstacleRows
 
 Array = NDArray[Any]
 
@@ -32,7 +34,8 @@ class ImpulseArrays:
         gave, gave_spin: (slots, 2) m/s and (slots,) rad/s that contacts gave in the last substep.
         parts: threads that go through a frame.
         free: whether any particle is not pinned.
-        largest: radius, m.
+        largest, mean_radius: m.
+        obstacle_friction: the largest of obstacles.
     """
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
@@ -41,49 +44,70 @@ class ImpulseArrays:
         self.engine: Any = self.core.Engine(1)
         self.parts = 1
         self._room: Any = None
+        self._obstacles = ObstacleRows()
         self.forget()
 
     def forget(self) -> None:
         """No contact remembers anything."""
         self.restore(Memory.empty(self._dtype))
 
-    def save(self) -> Memory:
-        """What `restore` needs to go on with the same bits."""
+    def save(self, course: Course | None = None) -> Memory:
+        """What `restore` needs to go on with the same bits; course: the obstacles of now, which surfaces are numbered after."""
         particle, count = self._particle, int(self._particle.max(initial=-1)) + 1
-        wall, given = np.zeros((8, count), self._dtype), np.zeros((count, 3), self._dtype)
-        wall[:, particle], given[particle, :2], given[particle, 2] = self._wall, self.gave, self.gave_spin
+        given = np.zeros((count, 3), self._dtype)
+        given[particle, :2], given[particle, 2] = self.gave, self.gave_spin
         pairs, values = (array.copy() for array in self._impulses())
+        surfaces, pushes = (array.copy() for array in self._at_surfaces())
+        if course is not None and not self._named_anew and (now := self._obstacles.renamed(course)) is not None:
+            surfaces[:, 1] = now[surfaces[:, 1]]
+            surfaces, pushes = surfaces[surfaces[:, 1] >= 0], pushes[surfaces[:, 1] >= 0]
         kept = self._kept_list or (self.engine.save_list() if self.kick else None)
         if kept is None:
             none = np.empty((0, 2), self._dtype)
-            return Memory(pairs, values, wall, given, self.kick, self.h, self.hertz, self.finer, none, none)
+            return Memory(pairs, values, surfaces, pushes, given, self.kick, self.h, self.hertz, self.finer, none, none)
         listed, checked = (np.zeros((count if len(rows) else 0, 2), self._dtype) for rows in kept[:2])
         if len(listed):
             listed[particle], checked[particle] = kept[:2]
         skin = kept[2]
-        return Memory(pairs, values, wall, given, self.kick, self.h, self.hertz, self.finer, listed, checked, skin)
+        return Memory(pairs, values, surfaces, pushes, given, self.kick, self.h, self.hertz, self.finer, listed, checked, skin)
 
-    def restore(self, memory: Memory) -> None:
-        """Back to what `save` returned."""
+    def restore(self, memory: Memory, *, named_anew: bool = True) -> None:
+        """Back to what `save` returned. named_anew: its surfaces are numbered after the obstacles of now."""
+        self._kept_surfaces: tuple[Array, Array] | None = memory.surfaces, memory.pushes
+        self._named_anew = named_anew
         self._kept: tuple[Array, Array] | None = (memory.pairs, memory.values)  # what the engine is still to be given
         self._kept_list: Any = (memory.listed, memory.checked, memory.skin) if memory.skin else None
         self._particle = np.arange(len(memory.given), dtype=np.int32)
-        self._wall, self.gave, self.gave_spin = memory.wall, *columns_of(memory.given)
+        self.gave, self.gave_spin = columns_of(memory.given)
         self.kick, self.h, self.hertz, self.finer = memory.kick, memory.h, memory.hertz, memory.finer
         self._made = -1  # of `Slots.given`, what the engine holds; -1: nothing
         self._collisions: Any = None
         self._skin: float | None = -1.0
 
+    def forget_list(self) -> None:
+        """The list of pairs is no longer about the particles of now."""
+        self.engine.forget_list()
+        if self._kept_list is not None:
+            listed, checked, skin = self._kept_list
+            self._kept_list = listed[:0], checked[:0], skin
+
     def _impulses(self) -> tuple[Array, Array]:
         """Pairs and values of `Memory`."""
         return self._kept if self._kept is not None else self.engine.take_impulses(self._particle)
 
+    def _at_surfaces(self) -> tuple[Array, Array]:
+        """Surfaces and pushes of `Memory`."""
+        if self._kept_surfaces is not None:
+            return self._kept_surfaces
+        slot, surface, pushes = self.engine.take_surfaces()
+        return np.column_stack((self._particle[slot], surface)).astype(np.int32), pushes
+
     def renumber(self, now: Array) -> None:
         """The particles are now at `now` (n,), or no more (-1)."""
-        self.restore(self.save().renumbered(now))
+        self.restore(self.save().renumbered(now), named_anew=False)
 
-    def load(self, world: Any) -> None:
-        """Have the engine see the particles of now, and what they are made of."""
+    def load(self, world: Any, dt: float) -> None:
+        """Have the engine see the particles of a frame of dt seconds, and what they are made of."""
         state, engine, collisions = world._slots, self.engine, world.collisions
         parts = world._team.now
         if engine.threads < parts:
@@ -94,14 +118,15 @@ class ImpulseArrays:
         if state.given != self._made or collisions is not self._collisions:
             self._hold(state)
             self._set_materials(world)
-        if collisions.method.skin != self._skin:
-            self._skin = collisions.method.skin
+        if (skin := collisions.method.skin if collisions else None) != self._skin:
+            self._skin = skin
             if self._kept_list is None:
                 engine.set_skin(SKIN if self._skin is None else self._skin, self._skin is None)
         engine.set_room(*walls_of(world.boundary))
         if world.boundary is not self._room:
             engine.set_seam(*state.seam)
             self._room = world.boundary
+        self._follow_obstacles(world, dt)
         if self._kept_list is not None:
             engine.set_skin(self._kept_list[2][0], self._skin is None)
             engine.restore_list(*self._kept_list)
@@ -116,18 +141,18 @@ class ImpulseArrays:
         falls, order = self.engine.order()
         if falls > UNSORTED * len(state):
             self.engine.renumber(order)
-            self._wall, self.gave = np.ascontiguousarray(self._wall[:, order]), self.gave[order]
-            self.gave_spin = self.gave_spin[order]
+            self.gave, self.gave_spin = self.gave[order], self.gave_spin[order]
+            surfaces = self._at_surfaces()
             state.reorder(order)
             self._particle = state.particle
             self._hold(state)
+            self._give_surfaces(*surfaces)
 
     def _follow(self, state: Slots) -> None:
         """Have what is remembered of particles in the order of the slots of now."""
         count = max(int(state.particle.max(initial=-1)), int(self._particle.max(initial=-1))) + 1
         pairs, values = self._impulses()
-        wall, given = np.zeros((8, count), self._dtype), np.zeros((count, 3), self._dtype)
-        wall[:, self._particle] = self._wall
+        surfaces, given = self._at_surfaces(), np.zeros((count, 3), self._dtype)
         given[self._particle, :2], given[self._particle, 2] = self.gave, self.gave_spin
         if self._kept_list is not None:
             rows, same = self._kept_list[:2], len(self._kept_list[0]) == len(state)
@@ -135,13 +160,31 @@ class ImpulseArrays:
             self._kept_list = listed, checked, self._kept_list[2]
         self._particle, place = state.particle, np.zeros(count, np.int32)
         place[state.particle] = np.arange(len(state), dtype=np.int32)
-        self._wall, self.gave, self.gave_spin = (
-            np.ascontiguousarray(wall[:, state.particle]),
-            *columns_of(given[state.particle]),
-        )
+        self.gave, self.gave_spin = columns_of(given[state.particle])
         self._hold(state)
         self.engine.give_impulses(place[pairs], values)
+        self._give_surfaces(*surfaces)
         self._kept = None
+
+    def _give_surfaces(self, surfaces: Array, pushes: Array) -> None:
+        """Have the engine remember contacts with surfaces, by particles and numbers of now."""
+        place = np.zeros(len(self._particle), np.int32)
+        place[self._particle] = np.arange(len(self._particle), dtype=np.int32)
+        slot = place[surfaces[:, 0]]
+        order = np.argsort(slot, kind="stable")
+        self.engine.give_surfaces(slot[order], surfaces[order, 1], pushes[order])
+        self._kept_surfaces = None
+
+    def _follow_obstacles(self, world: Any, dt: float) -> None:
+        """Have the engine see the obstacles of now."""
+        now = self._obstacles.begin(world._course, self.engine, self.largest, dt)
+        if now is not None and not self._named_anew:
+            surfaces, pushes = self._at_surfaces()
+            surfaces[:, 1] = now[surfaces[:, 1]]
+            held = surfaces[:, 1] >= 0
+            self._give_surfaces(surfaces[held], pushes[held])
+        self._named_anew = False
+        self.obstacle_friction = self._obstacles.friction
 
     def _hold(self, state: Slots) -> None:
         """Have the engine take the arrays of now."""
@@ -150,8 +193,7 @@ class ImpulseArrays:
             position=state.position, velocity=state.velocity, acceleration=state.acceleration,
             inverse_mass=state.inverse_mass, radius=state.radius, own_restitution=state.restitution,
             own_friction=state.friction, spin=state.spin, motion=np.zeros((count, 4), real), free=np.zeros((count, 2), real),
-            free_spin=np.zeros(count, real), given=self.gave, given_spin=self.gave_spin, wall_impulse=self._wall[:4],
-            wall_tangent=self._wall[4:], at_wall=np.zeros(count, np.int32),
+            free_spin=np.zeros(count, real), given=self.gave, given_spin=self.gave_spin,
             particle=state.particle, category=state.category, mask=state.mask,
         )  # fmt: skip
 
@@ -163,4 +205,6 @@ class ImpulseArrays:
         state.resize()
         self.free = bool((state.inverse_mass > 0).any())
         self.largest = float(state.radius.max(initial=0.0))
-        self.engine.set_materials(**materials_of(state, world._state.radius, world.collisions))
+        materials = materials_of(state, world._state.radius, world.collisions)
+        self.mean_radius = materials["mean_radius"]
+        self.engine.set_materials(**materials)

@@ -21,7 +21,7 @@ from pyverlet.laws.rooms import Open
 from pyverlet.state.moves import first_non_finite
 from pyverlet.world.free_steps import FreeSteps, kicks
 from pyverlet.world.impulse_arrays import ImpulseArrays
-from pyverlet.world.impulse_materials import ROOMS
+from pyverlet.world.impulse_materials import knows
 from pyverlet.world.impulse_notes import ImpulseNotes
 from pyverlet.world.impulse_memory import Memory
 from pyverlet.world.link_rows import LinkRows
@@ -43,8 +43,8 @@ STIFFENING, SOFTENING = 0.4, 1.0
 DAMPING = 15.0
 """Damping ratio of the springs."""
 
-PUSH_OUT = 3.0
-"""Fastest pushing out of overlaps, m/s."""
+PUSH_OUT = 15.0
+"""Fastest pushing out of overlaps, in mean radii a second."""
 
 RELAXING_SWEEPS = 2
 
@@ -67,7 +67,12 @@ class ImpulseFrames:
         self._pull: tuple[Any, float] = None, 0.0  # gravity, and how strong it is, m/s^2
         self.growth = Growth()
         # What contacts remember between frames.
-        self.forget, self.save, self.renumber = self.held.forget, self.held.save, self.held.renumber
+        self.save, self.renumber = self.held.save, self.held.renumber
+
+    def forget(self) -> None:
+        """No contact remembers anything."""
+        self._links.forget()
+        self.held.forget()
 
     def restore(self, memory: Memory) -> None:
         """Back to what `save` returned; links have gone back to theirs."""
@@ -90,8 +95,9 @@ class ImpulseFrames:
         world._slots.clear_notes()
         self._keep_apart(world)
         if world._gather():
-            self.held.engine.forget_list()
-        self.run(world, dt, world.profile.mark)
+            self.held.forget_list()
+        if not self.run(world, dt, world.profile.mark):
+            self._refuse_non_finite(world, dt)
 
     def check(self, world: Any) -> None:
         """Refuse what this law does not know yet.
@@ -99,41 +105,40 @@ class ImpulseFrames:
         Raises:
             InputError: there is such a thing in the world.
         """
+        if found := self.unknown(world):
+            raise InputError(f"impulses is True in a world with {found[0]}; allowed are circles in a room, with forces")
+
+    def unknown(self, world: Any) -> list[str]:
+        """What this law does not know yet."""
         unknown = {
-            "obstacles": bool(world.obstacles),
             "a ledger": world.keeps_ledger,
             "events": world.tells_events,
             "sleep=True": world._sleep is not None,
-            "brute force": not isinstance(world.collisions.method, Fast),
+            "brute force": world.collisions is not None and not isinstance(world.collisions.method, Fast),
         }
-        if found := [name for name, there in unknown.items() if there]:
-            raise InputError(f"impulses is True in a world with {found[0]}; allowed are circles in a room, with forces")
+        return [name for name, there in unknown.items() if there]
 
-    def run(self, world: Any, dt: float, done: Callable[[str], None]) -> None:
-        """Advance the gathered slots by a frame of dt seconds.
-
-        Raises:
-            NonFiniteError: a particle turned NaN or infinite.
-        """
+    def run(self, world: Any, dt: float, done: Callable[[str], None]) -> bool:
+        """Advance the gathered slots by a frame of dt seconds. False if a particle turned NaN or infinite."""
         state, forces, engine, collisions = world._slots, world._force_sum, self.held.engine, world.collisions
         contained = len(world) > 1 or not isinstance(world.boundary, Open)
         substeps = world.substeps
-        if (contained or world.links) and dt > LONGEST_FRAME:
+        if (contained and collisions or world.links) and dt > LONGEST_FRAME:
             substeps *= int(np.ceil(dt / LONGEST_FRAME * (1 - 1e-9)))
         by_core = kicks(world.integrator)
         h, half = dt / substeps, world.integrator.velocity_lag if by_core else 0.5
         before = self.held.h if self.held.kick else 0.0
         self._stiffen(h, dt)
-        own_walls = None if isinstance(world.boundary, ROOMS) else world.boundary.confine
-        alone = by_core and not (forces.forces or own_walls or world.onlooker)
+        own_walls = None if knows(world.boundary) else world.boundary.confine
+        alone = by_core and not (forces.forces or own_walls)
         watch = watched(world, dt / world.substeps, None) if contained and (forces.forces or world.links) else None
         gravity = world.gravity
         state.h = h
-        self.held.load(world)
+        self.held.load(world, dt)
         self._load_links(world)
         if getattr(world.integrator, "naive_start", False):
             self._start_naively(world, (1.0 - half) * h)
-        rough = max(collisions.friction, state.most_friction, getattr(world.boundary, "friction", 0.0)) > 0.0
+        rough = max(collisions.friction if collisions else 0.0, state.most_friction, getattr(world.boundary, "friction", 0.0), self.held.obstacle_friction) > 0.0
         done("gather")
         notes = None if world._touches is None else ImpulseNotes(world._touches, engine, state)
         step, finite = 0, True
@@ -144,10 +149,11 @@ class ImpulseFrames:
                 self._flight.take(world.integrator, state, forces, world.time + step * h, h)
             elif not alone:
                 self._evaluate(world, step * h, half * h if step else 0.0)
+            done("integrate")
             # The first substep may have a kick of its own; whoever looks or acts in each has a call for each.
-            stop = step + 1 if not alone or notes or kick != h else substeps
+            stop = step + 1 if not alone or notes or world.onlooker or kick != h else substeps
             last_kick = kick if stop == step + 1 else h
-            self._set_law(self._strongest(gravity) if alone else forces.strongest, h, kick, rough=rough)
+            self._set_law(self._strongest(world.gravity) if alone else forces.strongest, h, kick, rough=rough)
             engine.set_frame(
                 0.0 if not by_core else half * h if half and opens else h,
                 half * before / self.held.kick if opens and known else 0.0,
@@ -155,7 +161,7 @@ class ImpulseFrames:
                 half * h if stop == substeps else 0.0,
                 1.0 / last_kick if stop == substeps else 0.0,
                 alone,
-                *gravity,
+                *world.gravity,
                 h / kick,
             )
             finite = engine.run(step, stop, self.held.parts)
@@ -171,8 +177,9 @@ class ImpulseFrames:
         self.held.h = h
         if not alone:
             self._end(world, dt, half * h if by_core else 0.0)
-        if not finite or not alone:
-            self._refuse_non_finite(world)
+        engine.show_links(half * h, self.held.kick)
+        if (not finite or not alone) and first_non_finite(state) >= 0:
+            return False
         if contained and gravity == world.gravity:
             self._limit(world, watch, dt)
         if notes:
@@ -180,6 +187,7 @@ class ImpulseFrames:
         if state.seam:
             engine.wrap_seam()
         done("finish")
+        return True
 
     def _keep_apart(self, world: Any) -> None:
         """Pairs that links keep from touching, if they are others than before."""
@@ -221,10 +229,21 @@ class ImpulseFrames:
         if watch is not None:
             watch.close(state, self)
 
-    def _refuse_non_finite(self, world: Any) -> None:
-        if (particle := first_non_finite(world._slots)) >= 0:
-            self.forget()
-            raise NonFiniteError(particle, "contacts", world.time)
+    def _refuse_non_finite(self, world: Any, dt: float) -> None:
+        """Run a bad frame again from the last good state, looking after every stage: normal frames pay nothing for it."""
+        state = world._slots
+        last = first_non_finite(state)
+
+        def look(stage: str) -> None:
+            bad = ~np.isfinite(state.acceleration).all(axis=1) if stage == "integrate" and world.forces else np.zeros(1, bool)
+            if (particle := int(state.particle[bad.argmax()]) if bad.any() else first_non_finite(state)) >= 0:
+                self.forget()
+                raise NonFiniteError(particle, stage, world.time)
+
+        self.forget()
+        world._gather()
+        self.run(world, dt, look)
+        raise NonFiniteError(last, "contacts", world.time)
 
     def _start_naively(self, world: Any, missing: float) -> None:
         """Kick those that are new by what x_prev = x - v h leaves out: it takes the first kick to be a whole one."""
@@ -274,7 +293,7 @@ class ImpulseFrames:
             hard / (1.0 + hard),
             # As in a substep whose kick is as long as itself: the depth at which a contact carries its load stays the same.
             h / kick / (1.0 + hard),
-            PUSH_OUT,
+            PUSH_OUT * self.held.mean_radius,
             NEAR * self.held.largest + 2.0 * REST_ACCELERATIONS * strongest * h * h,
             REST_ACCELERATIONS * strongest * h,
             strongest == 0.0,

@@ -14,7 +14,6 @@ from pyverlet.state.slots import Slots
 Array = NDArray[Any]
 
 ROOMS = Open, Circle, Box, Periodic
-"""Whose walls the core knows; others confine the particles after each substep."""
 
 OPEN, CAGE, BOX = range(3)
 """Rooms, as the core numbers them."""
@@ -24,12 +23,13 @@ MUCH_LARGER = 4.0
 """Circles so many times as large as all but one in ALONE stand in no cell of the grid."""
 
 
-def materials_of(state: Slots, radius: Array, collisions: Collisions) -> dict[str, Any]:
+def materials_of(state: Slots, radius: Array, collisions: Collisions | None) -> dict[str, Any]:
     """The arguments of `Engine.set_materials`; radius: (n,) m, in the user's order, on which the last bit of a mean depends."""
     ordered = np.sort(radius)[::-1] if len(radius) else np.ones(1)
     # Very few that are much larger than all others stand in no cell.
     usual = float(ordered[min(len(ordered) // ALONE, len(ordered) - 1)])
     return {
+        "collides": collisions is not None,
         "sized": _differs(state.radius),
         "varied": _differs(state.inverse_mass),
         "mixed": any(map(_differs, (state.radius, state.restitution, state.friction))),
@@ -37,8 +37,8 @@ def materials_of(state: Slots, radius: Array, collisions: Collisions) -> dict[st
         "smallest": float(ordered[-1]),
         "largest": float(ordered[0]),
         "mean_radius": float(radius.mean(dtype=np.float64)) if len(radius) else 1.0,
-        "restitution": collisions.restitution,
-        "friction": collisions.friction,
+        "restitution": collisions.restitution if collisions else 0.0,
+        "friction": collisions.friction if collisions else 0.0,
         "picky": bool(len(state.category)) or not bool((state.inverse_mass > 0).all()),
     }
 
@@ -48,8 +48,15 @@ def _differs(column: Array) -> bool:
     return bool(len(column) and (column != column[0]).any())
 
 
+def knows(room: Any) -> bool:
+    """Whether the core knows the walls of a room; others, of a user's own, confine the particles after each substep."""
+    return type(room).confine in (each.confine for each in ROOMS)
+
+
 def walls_of(room: Any) -> tuple[float, ...]:
     """The arguments of `Engine.set_room`."""
+    if not knows(room):
+        return OPEN, *(0.0,) * 7
     if isinstance(room, Circle):
         speed = room.angular_velocity * room.radius
         return CAGE, *room.center, room.radius, 0.0, room.restitution, room.friction, speed

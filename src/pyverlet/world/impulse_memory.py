@@ -11,17 +11,18 @@ Array = NDArray[Any]
 
 
 class Memory(NamedTuple):
-    """What outlives a frame, by the user's index: contacts between particles and on walls, what they gave each, and the step.
+    """What outlives a frame, by the user's index: contacts between particles and with surfaces, what they gave each, and the step.
 
-    pairs (k, 2) and values (k, 3): see `Engine.take_impulses`. wall: (8, n) impulses along the normals of four sides, and along
-    their tangents. given: (n, 3) velocity and spin that contacts gave in the last substep, over `kick` seconds. h: length of the
+    pairs (k, 2) and values (k, 3): see `Engine.take_impulses`. surfaces (k, 2) particles and which surface, as the core numbers
+    them, and pushes (k, 2) their impulses along the normals and the tangents, m/s. given: (n, 3) velocity and spin that contacts gave in the last substep, over `kick` seconds. h: length of the
     last substep, s. hertz: frequency of the springs; finer: for how long, s, a higher one would have been possible. listed,
     checked: (n, 2) of the list of pairs, and skin: its numbers, as of `Engine.save_list`. Empty without one.
     """
 
     pairs: Array
     values: Array
-    wall: Array
+    surfaces: Array
+    pushes: Array
     given: Array
     kick: float
     h: float
@@ -34,18 +35,21 @@ class Memory(NamedTuple):
     @classmethod
     def empty(cls, dtype: np.dtype[Any]) -> Memory:
         """No contact remembers anything."""
-        rows, none = np.empty((0, 2), dtype), np.empty((0, 3), dtype)
-        return cls(np.empty((0, 2), np.int32), none, np.empty((8, 0), dtype), none, 0.0, 0.0, 0.0, 0.0, rows, rows)
+        rows, none, nobody = np.empty((0, 2), dtype), np.empty((0, 3), dtype), np.empty((0, 2), np.int32)
+        return cls(nobody, none, nobody, np.empty((0, 2)), none, 0.0, 0.0, 0.0, 0.0, rows, rows)
 
     def renumbered(self, now: Array) -> Memory:
         """Of the particles that are now at `now` (n,), or no more (-1). There is no list of pairs."""
         count, alive = int(now.max(initial=-1)) + 1, now[: len(self.given)] >= 0
-        wall, given = np.zeros((8, count), self.wall.dtype), np.zeros((count, 3), self.given.dtype)
-        to, none = now[: len(self.given)][alive], self.listed[:0]
-        wall[:, to], given[to] = self.wall[:, alive], self.given[alive]
-        pairs = now[self.pairs].astype(np.int32)
-        kept = (pairs >= 0).all(axis=1)
-        return self._replace(pairs=pairs[kept], values=self.values[kept], wall=wall, given=given, listed=none, checked=none)
+        given = np.zeros((count, 3), self.given.dtype)
+        given[now[: len(self.given)][alive]] = self.given[alive]
+        pairs, surfaces, none = now[self.pairs].astype(np.int32), self.surfaces.copy(), self.listed[:0]
+        surfaces[:, 0] = now[surfaces[:, 0]]
+        kept, held = (pairs >= 0).all(axis=1), surfaces[:, 0] >= 0
+        return self._replace(
+            pairs=pairs[kept], values=self.values[kept], surfaces=surfaces[held], pushes=self.pushes[held], given=given,
+            listed=none, checked=none,
+        )  # fmt: skip
 
 
 def columns_of(given: Array) -> tuple[Array, Array]:

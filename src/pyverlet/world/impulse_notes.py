@@ -16,10 +16,10 @@ class ImpulseNotes:
 
     def __init__(self, touches: Touches, engine: Any, state: Slots) -> None:
         self._touches, self._engine, self._state = touches, engine, state
-        self._by_walls = np.zeros((len(state), 2), state.dtype)
+        self._by_walls, self._by_obstacles = np.zeros((2, len(state), 2), state.dtype)
         self._virial = 0.0
         touches.open(len(state))
-        engine.note(self._by_walls)
+        engine.note(self._by_walls, self._by_obstacles)
 
     def read(self, weigh: float) -> None:
         """A substep is over. weigh: what impulses of contacts at rest are worth."""
@@ -44,9 +44,9 @@ class ImpulseNotes:
 
     def close(self, world: Any, dt: float) -> None:
         """The frame of dt seconds is over."""
-        self._engine.note(None)
+        self._engine.note(None, None)
         state = self._state
-        free = np.flatnonzero(self._by_walls.any(axis=1) & (state.inverse_mass > 0))
-        self._touches.give(1, state.particle[free], state.mass[free, None] * self._by_walls[free].astype(float))
-        none: NDArray[np.int64] = np.empty((0, 2), np.int64)
-        self._touches.close(state, world._state, world.boundary, world._course, none, dt, self._virial)
+        for whose, given in ((1, self._by_walls), (2, self._by_obstacles)):
+            free = np.flatnonzero(given.any(axis=1) & (state.inverse_mass > 0))
+            self._touches.give(whose, state.particle[free], state.mass[free, None] * given[free].astype(float))
+        self._touches.close(state, world._state, world.boundary, world._course, self._touches.pairs_heard(), dt, self._virial)

@@ -68,6 +68,7 @@ class LinkRows:
         where: list[tuple[int, int, int]] = []  # pool, its row, kind
         parts: list[tuple[int, ...]] = []
         for number, pool in enumerate(pools):
+            pool.gives = bool(np.isfinite(pool.rows["stiffness"]).any())
             if isinstance(pool, PinPool):
                 continue
             first, node = pool.first.tolist(), compact[pool.entries["particle"]].tolist()

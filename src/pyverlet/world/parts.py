@@ -101,12 +101,13 @@ LINKED = {
 IMPULSES = {
     "pairs": Field(np.int32, "impulses", 2, least=0, below="particles"),
     "values": Field(None, "impulses", 3),
-    "wall": Field(None, "remembered", 8),
+    "surfaces": Field(np.int32, "surfaces", 2, least=0),
+    "pushes": Field(np.float64, "surfaces", 2),
     "given": Field(None, "remembered", 3),
     "listed": Field(None, "neighbours", 2),
     "checked": Field(None, "neighbours", 2),
 }
-"""What contacts gave in the last substep: `world.impulse_memory.Memory`, of walls by particle; where their list was made."""
+"""What contacts gave in the last substep: `world.impulse_memory.Memory`; where their list was made."""
 
 FIELDS = {
     f"{room}.{name}": field
@@ -144,8 +145,7 @@ def take_apart(world: World) -> Parts:
     facts["impulses"] = {"kick": memory.kick, "h": memory.h, "hertz": memory.hertz, "finer": memory.finer}
     if memory.kick:
         facts["impulses"]["skin"] = list(memory.skin)
-        arrays |= {f"impulses.{name}": getattr(memory, name) for name in ("pairs", "values", "given", "listed", "checked")}
-        arrays["impulses.wall"] = np.ascontiguousarray(memory.wall.T)
+        arrays |= {f"impulses.{name}": getattr(memory, name) for name in Memory._fields if isinstance(getattr(memory, name), np.ndarray)}
     if saved.books:
         facts["books"] = {
             "energy": saved.books._energy, "resting": saved.books._resting, "ledger": saved.books.ledger.as_dict(),
@@ -297,11 +297,14 @@ def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
     if not numbers["kick"]:
         return Memory.empty(world.dtype)
     try:
-        pairs, values, wall, given = (arrays[f"impulses.{name}"] for name in ("pairs", "values", "wall", "given"))
+        names = "pairs", "values", "surfaces", "pushes", "given"
+        pairs, values, surfaces, pushes, given = (arrays[f"impulses.{name}"] for name in names)
     except KeyError as error:
         raise InputError(f"the array {error} is missing; allowed are files that have all") from None
     if not (pairs[:, 0] < pairs[:, 1]).all() or not (np.diff(pairs[:, 0]) >= 0).all():
         raise InputError("impulses.pairs are not sorted; allowed are pairs low < high, by the lower")
+    if len(surfaces) and not (surfaces[:, 0] < len(given)).all():
+        raise InputError(f"impulses.surfaces has particle {surfaces[:, 0].max()}; allowed are those of impulses.given, {len(given)}")
     if len(given) > len(world):
         raise InputError(f"impulses.given has {len(given)} rows; allowed are at most {len(world)}, one for each particle")
     none = np.empty((0, 2), world.dtype)
@@ -315,7 +318,8 @@ def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
     return Memory(
         pairs.copy(),
         values.copy(),
-        np.ascontiguousarray(wall.T),
+        surfaces.copy(),
+        pushes.copy(),
         given.copy(),
         **numbers,
         listed=listed,

@@ -121,12 +121,21 @@ class World(Measures, Queries, Doors):
             self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
             self.profile.begin()
             books = self._open_books(h)
-            if self._by_impulses:
+            if self._choose():
                 self._impulses.step(self, dt)
             elif not self._frame(h, self._listen(h, books or self.profile.mark)):
                 self._refuse_non_finite(h)
             self._accept(dt, h, books)
             self.profile.end()
+
+    def _choose(self) -> bool:
+        by = not self._impulses.unknown(self) if self._collisions is None or self._collisions.impulses is None else self._collisions.impulses
+        if by != self._by_impulses:
+            self._by_impulses = by
+            self._impulses.forget()
+            if self._contacts:
+                self._contacts.broad_phase.forget()
+        return by
 
     def _frame(self, h: float, done: Callable[[str], None]) -> bool:
         """The table of contents of the engine; `done` hears which stage has ended. True if all is known to be finite."""
@@ -329,7 +338,7 @@ class World(Measures, Queries, Doors):
     def collisions(self, value: Collisions | None) -> None:
         if value is not None and not isinstance(value, Collisions):
             raise InputError(f"collisions is {value!r}; allowed are pyverlet.Collisions(...) and None")
-        self._collisions, self._by_impulses = value, value is not None and value.impulses
+        self._collisions, self._by_impulses = value, value is not None and bool(value.impulses)
         about = self._state.dtype, self.links.unlist, self._events, self._sleep
         self._contacts = None if value is None else ContactSolver(value, *about)
 
@@ -358,7 +367,7 @@ class World(Measures, Queries, Doors):
             h_last=self._h_last,
             slots=self._slots.save(self._state),
             contacts=self._contacts.save() if self._contacts else None,
-            impulses=self._impulses.save(),
+            impulses=self._impulses.save(self._course),
             books=self._books and self._books.copy(),
             events=self._events and self._events.copy(),
             sleep=self._sleep and self._sleep.copy(),
@@ -395,3 +404,4 @@ class World(Measures, Queries, Doors):
         if self._contacts:
             self._contacts.restore(saved.contacts, self._slots)
         self._impulses.restore(saved.impulses)
+        self._by_impulses = saved.impulses.kick > 0

@@ -51,7 +51,7 @@ class Collisions:
     restitution: float = 0.0
     friction: float = 0.0
     method: Fast | BruteForce = field(default_factory=Fast)
-    impulses: bool = False
+    impulses: bool | None = None
 
     def __post_init__(self) -> None:
         checks.fraction("restitution", self.restitution)

@@ -113,6 +113,25 @@ class Tables:
         for k in which:
             self._refresh(k)
 
+    @property
+    def segments(self) -> Array:
+        """Records `kernels.obstacles.SEGMENT`, those of images behind the others."""
+        return self._segments
+
+    @property
+    def bodies(self) -> Array:
+        """(n, 6) pivots, m, angles, rad, and their velocities; those of images behind the others."""
+        return self._bodies.view(np.float64).reshape(-1, 6)
+
+    def owners(self) -> list[tuple[int, int]]:
+        """Of each segment the id of its obstacle, and which of its segments it is, images counted on."""
+        sides, images = len(self._own_segments.rows), len(self._segments) // max(len(self._own_segments.rows), 1)
+        count = np.diff(self._first)
+        which = np.repeat([id(each) for each in self._seen], count).tolist() if sides else []
+        number = (np.arange(sides) - np.repeat(self._first[:-1], count)).tolist()
+        step = int(count.max(initial=0))
+        return [(who, k + image * step) for image in range(images) for who, k in zip(which, number, strict=True)]
+
     def _numbers(self) -> dict[int, int]:
         """The index of each obstacle by its id."""
         if self._number is None:

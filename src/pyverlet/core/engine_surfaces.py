@@ -1,0 +1,112 @@
+# mypy: ignore-errors
+"""Surfaces as Python gives them to the engine, and what their contacts remember."""
+
+from __future__ import annotations
+
+import cython
+import numpy as np
+from cython.cimports.arrays import doubles, integers, small_integers
+from cython.cimports.libc.stdint import int32_t
+
+from pyverlet.core.cells import BLOCK
+from pyverlet.core.obstacles import PLACE, keeps_place, list_segment, put_segment
+from pyverlet.core.step import Step
+from pyverlet.core.surface_shapes import CONTACT, DRAG, PUSH
+
+
+@cython.cfunc
+def make_surface_arrays(w: cython.pointer(Step), a, room: cython.Py_ssize_t):
+    """Two lists with so many places each; what the one before remembers is kept."""
+    old = w.side != 0
+    for side in range(2):
+        surface, contact = np.zeros(room + 8, np.int32), np.zeros((room + 8, CONTACT))
+        if (side == 0) == old and w.contact_room > 0:
+            before = len(a[f"surface{side}"])
+            surface[:before], contact[:before] = a[f"surface{side}"], a[f"contact{side}"]
+        a[f"surface{side}"], a[f"contact{side}"] = surface, contact
+    w.contact_room = room
+    point_to_surfaces(w, a)
+
+
+@cython.cfunc
+def make_surface_rows(w: cython.pointer(Step), a):
+    """Of each particle, which places are its; none so far."""
+    blocks = (w.count + BLOCK - 1) // BLOCK
+    for side in range(2):
+        a[f"contact_begin{side}"], a[f"contact_end{side}"] = np.zeros(w.count, np.int32), np.zeros(w.count, np.int32)
+    a["at_surface"], a["at_surface_count"] = np.zeros(w.count, np.int32), np.zeros(blocks, np.int32)
+    a["contact_count"] = np.zeros(blocks, np.int64)
+    w.at_surface, w.at_surface_count = small_integers(a["at_surface"]), small_integers(a["at_surface_count"])
+    w.contact_count = integers(a["contact_count"])
+    w.surfaces_good, w.surfaces_kept = False, True
+    if w.contact_room == 0:
+        make_surface_arrays(w, a, 64)
+    point_to_surfaces(w, a)
+
+
+@cython.cfunc
+def point_to_surfaces(w: cython.pointer(Step), a):
+    """The addresses of both lists."""
+    now, before = ("1", "0") if w.side else ("0", "1")
+    if "contact_begin0" in a:
+        w.contact_begin, w.contact_end = small_integers(a["contact_begin" + now]), small_integers(a["contact_end" + now])
+        w.old_begin, w.old_end = small_integers(a["contact_begin" + before]), small_integers(a["contact_end" + before])
+    w.surface, w.contact = small_integers(a["surface" + now]), doubles(a["contact" + now])
+    w.old_surface, w.old_contact = small_integers(a["surface" + before]), doubles(a["contact" + before])
+
+
+@cython.cfunc
+def take_surfaces(w: cython.pointer(Step), a):
+    """(slot, surface, values) of contacts that carry load."""
+    # The list before, as long as it has not been looked through.
+    side = (1 - w.side if w.surfaces_kept else w.side) if w.count > 0 else 0
+    if w.count <= 0:
+        return np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros((0, 2))
+    begin, end = a[f"contact_begin{side}"], a[f"contact_end{side}"]
+    count = end - begin
+    slot = np.repeat(np.arange(w.count, dtype=np.int32), count)
+    place = np.arange(len(slot)) - np.repeat(np.cumsum(count) - count, count) + begin[slot]
+    values = a[f"contact{side}"][place, PUSH : DRAG + 1]
+    loaded = values[:, 0] > 0
+    return slot[loaded], a[f"surface{side}"][place[loaded]], values[loaded]
+
+
+@cython.cfunc
+def give_surfaces(w: cython.pointer(Step), a, slot, surface, values):
+    """Have the next list find them; sorted by slot."""
+    if len(slot) > w.contact_room:
+        w.contact_room = 0
+        make_surface_arrays(w, a, len(slot))
+    before = "0" if w.side else "1"
+    a["surface" + before][: len(slot)] = surface
+    a["contact" + before][: len(slot), PUSH : DRAG + 1] = values
+    for name, side in (("contact_begin", "left"), ("contact_end", "right")):
+        a[name + before][:] = np.searchsorted(slot, np.arange(w.count), side)
+    w.surfaces_good, w.surfaces_kept = False, True
+
+
+@cython.cfunc
+def set_obstacles(w: cython.pointer(Step), a, cell: cython.double, keep: cython.bint):
+    """Take the segments, and have none in the grid unless it is to be kept."""
+    w.segments, w.moving_count = len(a["segments"]), len(a["moving"])
+    w.segment, w.body, w.moving = doubles(a["segments"]), doubles(a["bodies"]), small_integers(a["moving"])
+    w.cell, w.cell_heads, w.head, w.link = cell, len(a["heads"]), small_integers(a["heads"]), small_integers(a["links"])
+    w.surfaces_good = False
+    if not keep:
+        a["heads"].fill(-1)
+        w.links, w.links_room = 0, len(a["links"])
+
+
+@cython.cfunc
+def place_obstacles(w: cython.pointer(Step), which, dt: cython.double, fresh: cython.bint):
+    """Place segments; list those that leave where they are listed."""
+    n: cython.Py_ssize_t
+    segment: cython.pointer(int32_t) = small_integers(which)
+    for n in range(len(which)):
+        k: cython.Py_ssize_t = segment[n]
+        put_segment(w, k, 0.0, PLACE)
+        if fresh or not keeps_place(w, k, dt):
+            w.surfaces_good = False
+            if not list_segment(w, k, dt):
+                return False
+    return True

@@ -1,0 +1,162 @@
+# mypy: ignore-errors
+"""Obstacles as the core knows them: every shape is made of rounded segments, which stand in a grid of hashed cells."""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.libc.math import cos, fabs, floor, sin, sqrt
+from cython.cimports.libc.stdint import int32_t, int64_t
+
+from pyverlet.core.step import Step
+
+SEGMENT = cython.declare(cython.int, 32)
+"""Numbers of a segment, in metres. The first 18 are as in `laws.obstacles`, the others are made here."""
+BODY_OF = cython.declare(cython.int, 0)
+FIRST_FACE = cython.declare(cython.int, 1)  # of the polygon, FACES many; none if it is no part of one
+FACES = cython.declare(cython.int, 2)
+AROUND = cython.declare(cython.int, 3)  # its surface runs counter-clockwise around it, else along it
+LOCAL = cython.declare(cython.int, 4)  # start and direction (4) as built
+LENGTH = cython.declare(cython.int, 8)
+ROUNDING = cython.declare(cython.int, 9)
+INNER = cython.declare(cython.int, 10)  # who is inside its polygon is as near as this
+BEFORE = cython.declare(cython.int, 11)  # (2) from its start to the neighbour's, in its own frame; 0: there is none
+AFTER = cython.declare(cython.int, 13)
+RESTITUTION = cython.declare(cython.int, 15)
+FRICTION = cython.declare(cython.int, 16)
+BELT = cython.declare(cython.int, 17)
+PLACE = cython.declare(cython.int, 18)  # start and direction (4) at the beginning of the substep
+LATE = cython.declare(cython.int, 22)  # and at its end
+SPARE = cython.declare(cython.int, 26)  # how far it may move until it is to be listed again
+LISTED = cython.declare(cython.int, 27)  # start and end (4) when it was
+
+SPARE_FRAMES = cython.declare(cython.double, 4.0)
+"""Frames for which a segment that moves is listed ahead."""
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def put_segment(w: cython.pointer(Step), k: cython.Py_ssize_t, time: cython.double, to: cython.int) -> cython.void:
+    """Where segment k stands so many seconds into the frame, to `to` of its row: PLACE or LATE."""
+    at: cython.Py_ssize_t = SEGMENT * k
+    b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[at + BODY_OF])
+    turned: cython.double = w.body[b + 2] + w.body[b + 5] * time
+    c: cython.double = cos(turned)
+    s: cython.double = sin(turned)
+    lx: cython.double = w.segment[at + LOCAL]
+    ly: cython.double = w.segment[at + LOCAL + 1]
+    lc: cython.double = w.segment[at + LOCAL + 2]
+    ls: cython.double = w.segment[at + LOCAL + 3]
+    w.segment[at + to] = w.body[b] + w.body[b + 3] * time + c * lx - s * ly
+    w.segment[at + to + 1] = w.body[b + 1] + w.body[b + 4] * time + s * lx + c * ly
+    w.segment[at + to + 2] = c * lc - s * ls
+    w.segment[at + to + 3] = s * lc + c * ls
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def place_moving(w: cython.pointer(Step)) -> cython.void:
+    """Segments that move, at the beginning and the end of the substep."""
+    n: cython.Py_ssize_t
+    now: cython.double = w.substep * cython.cast(cython.double, w.h)
+    for n in range(w.moving_count):
+        put_segment(w, w.moving[n], now, PLACE)
+        put_segment(w, w.moving[n], now + w.h, LATE)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def head_of(w: cython.pointer(Step), column: int64_t, row: int64_t) -> cython.Py_ssize_t:
+    """The head of a cell: a hash, so that the table need not cover the plane."""
+    mixed: int64_t = (column * 73856093) ^ (row * 19349663)
+    return (mixed ^ (mixed >> 15)) & (w.cell_heads - 1)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def list_segment(w: cython.pointer(Step), k: cython.Py_ssize_t, dt: cython.double) -> cython.bint:
+    """Put segment k into the cells that it may come to in some frames of dt seconds. False: there is no room."""
+    at: cython.Py_ssize_t = SEGMENT * k
+    b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[at + BODY_OF])
+    lx: cython.double = w.segment[at + LOCAL]
+    ly: cython.double = w.segment[at + LOCAL + 1]
+    speed: cython.double = sqrt(w.body[b + 3] * w.body[b + 3] + w.body[b + 4] * w.body[b + 4])
+    speed += fabs(w.body[b + 5]) * (sqrt(lx * lx + ly * ly) + w.segment[at + LENGTH])
+    spare: cython.double = SPARE_FRAMES * dt * speed
+    far: cython.double = w.segment[at + ROUNDING] + spare
+    x: cython.double = w.segment[at + PLACE]
+    y: cython.double = w.segment[at + PLACE + 1]
+    dx: cython.double = w.segment[at + PLACE + 2] * w.segment[at + LENGTH]
+    dy: cython.double = w.segment[at + PLACE + 3] * w.segment[at + LENGTH]
+    if w.segment[at + FACES] > 0:
+        far += w.segment[at + INNER]
+    row: int64_t
+    column: int64_t
+    first: int64_t = cython.cast(int64_t, floor((min(y, y + dy) - far) / w.cell))
+    last: int64_t = cython.cast(int64_t, floor((max(y, y + dy) + far) / w.cell))
+    for row in range(first, last + 1):
+        s0: cython.double = 0.0  # the part of the segment that is near the row
+        s1: cython.double = 1.0
+        if dy != 0.0:
+            p: cython.double = (row * w.cell - far - y) / dy
+            q: cython.double = ((row + 1) * w.cell + far - y) / dy
+            s0, s1 = max(min(p, q), 0.0), min(max(p, q), 1.0)
+        left: cython.double = min(x + s0 * dx, x + s1 * dx) - far
+        right: cython.double = max(x + s0 * dx, x + s1 * dx) + far
+        for column in range(cython.cast(int64_t, floor(left / w.cell)), cython.cast(int64_t, floor(right / w.cell)) + 1):
+            if w.links == w.links_room:
+                return False
+            head: cython.Py_ssize_t = head_of(w, column, row)
+            w.link[2 * w.links], w.link[2 * w.links + 1] = cython.cast(int32_t, k), w.head[head]
+            w.head[head] = cython.cast(int32_t, w.links)
+            w.links += 1
+    w.segment[at + SPARE] = spare
+    w.segment[at + LISTED], w.segment[at + LISTED + 1] = x, y
+    w.segment[at + LISTED + 2], w.segment[at + LISTED + 3] = x + dx, y + dy
+    return True
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def keeps_place(w: cython.pointer(Step), k: cython.Py_ssize_t, dt: cython.double) -> cython.bint:
+    """Whether segment k stays within what it was listed for until the end of a frame of dt seconds that begins now."""
+    at: cython.Py_ssize_t = SEGMENT * k
+    late: cython.int
+    far: cython.double = 0.0
+    for late in range(2):
+        if late == 1:
+            put_segment(w, k, dt, LATE)
+        to: cython.Py_ssize_t = at + (LATE if late == 1 else PLACE)
+        x: cython.double = w.segment[to] - w.segment[at + LISTED]
+        y: cython.double = w.segment[to + 1] - w.segment[at + LISTED + 1]
+        far = max(far, x * x + y * y)
+        x = w.segment[to] + w.segment[to + 2] * w.segment[at + LENGTH] - w.segment[at + LISTED + 2]
+        y = w.segment[to + 1] + w.segment[to + 3] * w.segment[at + LENGTH] - w.segment[at + LISTED + 3]
+        far = max(far, x * x + y * y)
+    return far <= w.segment[at + SPARE] * w.segment[at + SPARE]
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def near_segment(
+    w: cython.pointer(Step), k: cython.Py_ssize_t, x: cython.double, y: cython.double, reach: cython.double
+) -> cython.bint:
+    """Whether a point is within reach of segment k, wherever it moves until it is listed again."""
+    at: cython.Py_ssize_t = SEGMENT * k
+    ox: cython.double = x - w.segment[at + PLACE]
+    oy: cython.double = y - w.segment[at + PLACE + 1]
+    along: cython.double = w.segment[at + PLACE + 2] * ox + w.segment[at + PLACE + 3] * oy
+    across: cython.double = w.segment[at + PLACE + 2] * oy - w.segment[at + PLACE + 3] * ox
+    past: cython.double = along - min(max(along, 0.0), w.segment[at + LENGTH])
+    far: cython.double = reach + w.segment[at + ROUNDING] + 2 * w.segment[at + SPARE]
+    if w.segment[at + FACES] > 0:
+        far += w.segment[at + INNER]
+    return past * past + across * across <= far * far

@@ -1,0 +1,47 @@
+# mypy: ignore-errors
+"""Places in a periodic room: inside it between frames, and where the list of pairs was made within one."""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import rint
+
+from pyverlet.core.cells import Cells, wrapped
+from pyverlet.core.step import Step
+
+
+@cython.cfunc
+def follow_seam(w: cython.pointer(Step)):
+    """Places become the images nearest to where the list was last looked at.
+
+    Those that have come far are put inside the room, and the list is to be made anew: far away digits are lost.
+    """
+    c: cython.pointer(Cells) = w.cells
+    i: cython.Py_ssize_t
+    axis: cython.int
+    strayed: cython.bint = False
+    for axis in range(2):
+        period: cython.double = c.period_y if axis else c.period_x
+        low: cython.double = c.low_y if axis else c.low_x
+        if period > 0 and w.lists.good:
+            for i in range(w.count):
+                away: cython.double = cython.cast(cython.double, w.position[2 * i + axis]) - w.checked[2 * i + axis]
+                turns: cython.double = rint(away / period)
+                if turns != 0:
+                    w.position[2 * i + axis] = cython.cast(real, w.position[2 * i + axis] - period * turns)
+                far: cython.double = w.position[2 * i + axis] - low
+                strayed |= far > 1.5 * period or far < -0.5 * period
+    if strayed:
+        w.lists.good = False
+        wrap_seam(w)
+
+
+@cython.cfunc
+def wrap_seam(w: cython.pointer(Step)):
+    """Put all places inside a periodic room."""
+    c: cython.pointer(Cells) = w.cells
+    i: cython.Py_ssize_t
+    for i in range(w.count):
+        w.position[2 * i] = wrapped(w.position[2 * i], c.low_x, c.period_x)
+        w.position[2 * i + 1] = wrapped(w.position[2 * i + 1], c.low_y, c.period_y)

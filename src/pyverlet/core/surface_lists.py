@@ -1,0 +1,196 @@
+# mypy: ignore-errors
+"""Which surfaces each particle may touch as long as it stays near where it was: made anew with every look at the list of pairs.
+
+Places of the list hold what contacts remember. There are two lists: the one before is where a new one looks for that.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import floor, sqrt
+from cython.cimports.libc.stdint import int32_t, int64_t
+from cython.cimports.team import team_stage
+
+from pyverlet.core.cells import BLOCK, wrapped
+from pyverlet.core.obstacles import head_of, near_segment
+from pyverlet.core.step import BOX, CAGE, Step
+from pyverlet.core.surface_shapes import CONTACT, DRAG, PUSH, SIDES
+
+FASTER = cython.declare(cython.double, 2.2)
+"""Of what a particle moves in a substep: it sees surfaces that far away."""
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def sight(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
+    """How far from its rim particle i is to see surfaces, m."""
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    x: cython.double = v[width * i]
+    y: cython.double = v[width * i + 1]
+    return w.margin + max(FASTER * sqrt(x * x + y * y) * w.h, cython.cast(cython.double, w.near))
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def near_side(w: cython.pointer(Step), i: cython.Py_ssize_t, side: cython.int, far: cython.double) -> cython.bint:
+    """Whether a side of the room is in sight."""
+    x: cython.double = w.position[2 * i]
+    y: cython.double = w.position[2 * i + 1]
+    far += w.radius[i]
+    if w.room == CAGE:
+        x -= w.x0
+        y -= w.y0
+        return side == 0 and (w.x1 <= far or x * x + y * y > (w.x1 - far) * (w.x1 - far))
+    if side == 0:
+        return x - far < w.x0
+    if side == 1:
+        return x + far > w.x1
+    if side == 2:
+        return y - far < w.y0
+    return y + far > w.y1
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def put_surface(w: cython.pointer(Step), begin: cython.Py_ssize_t, end: cython.Py_ssize_t, which: int32_t) -> cython.Py_ssize_t:
+    """Put a surface into the places from begin to end, in order; returns where they end then. Those that are there stay alone."""
+    k: cython.Py_ssize_t = end
+    n: cython.Py_ssize_t
+    while k > begin and w.surface[k - 1] > which:
+        k -= 1
+    if k > begin and w.surface[k - 1] == which:
+        return end
+    for n in range(end, k, -1):
+        w.surface[n] = w.surface[n - 1]
+    w.surface[k] = which
+    return end + 1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def see(w: cython.pointer(Step), i: cython.Py_ssize_t, begin: cython.Py_ssize_t, fill: cython.bint) -> cython.Py_ssize_t:
+    """The surfaces in sight of particle i, from place `begin` on: returns the end. Without `fill` some are counted twice."""
+    end: cython.Py_ssize_t = begin
+    far: cython.double = sight(w, i)
+    side: cython.int
+    if w.room == BOX or w.room == CAGE:
+        for side in range(4):
+            if near_side(w, i, side, far):
+                end = put_surface(w, begin, end, side) if fill else end + 1
+    if w.segments == 0:
+        return end
+    x: cython.double = wrapped(w.position[2 * i], w.cells.low_x, w.cells.period_x)
+    y: cython.double = wrapped(w.position[2 * i + 1], w.cells.low_y, w.cells.period_y)
+    far += w.radius[i]
+    row: int64_t
+    column: int64_t
+    first: int64_t = cython.cast(int64_t, floor((x - far) / w.cell))
+    last: int64_t = cython.cast(int64_t, floor((x + far) / w.cell))
+    low: int64_t = cython.cast(int64_t, floor((y - far) / w.cell))
+    high: int64_t = cython.cast(int64_t, floor((y + far) / w.cell))
+    k: cython.Py_ssize_t
+    if (last - first + 1) * cython.cast(cython.double, high - low + 1) > w.segments:  # so far that all are looked at in less time
+        for k in range(w.segments):
+            if near_segment(w, k, x, y, far):
+                end = put_surface(w, begin, end, cython.cast(int32_t, SIDES + k)) if fill else end + 1
+        return end
+    for row in range(low, high + 1):
+        for column in range(first, last + 1):
+            link: int32_t = w.head[head_of(w, column, row)]
+            while link >= 0:
+                k = w.link[2 * link]
+                link = w.link[2 * link + 1]
+                if near_segment(w, k, x, y, far):
+                    end = put_surface(w, begin, end, cython.cast(int32_t, SIDES + k)) if fill else end + 1
+    return end
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def count_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """How many surfaces are in sight of each particle of a block."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    i: cython.Py_ssize_t
+    a: cython.Py_ssize_t = block * BLOCK
+    total: cython.Py_ssize_t = 0
+    touching: cython.Py_ssize_t = 0
+    for i in range(a, min(a + BLOCK, w.count)):
+        found: cython.Py_ssize_t = see(w, i, 0, False) if w.inverse_mass[i] > 0 else 0
+        w.contact_begin[i] = cython.cast(int32_t, total)
+        w.contact_end[i] = cython.cast(int32_t, found)
+        total += found
+        if found > 0:
+            w.at_surface[a + touching] = cython.cast(int32_t, i)
+            touching += 1
+    w.contact_count[block] = total
+    w.at_surface_count[block] = cython.cast(int32_t, touching)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """List them, with what their contacts remember; the block begins at place contact_count."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    i: cython.Py_ssize_t
+    k: cython.Py_ssize_t
+    o: cython.Py_ssize_t
+    a: cython.Py_ssize_t = block * BLOCK
+    for i in range(a, min(a + BLOCK, w.count)):
+        begin: cython.Py_ssize_t = w.contact_begin[i] + w.contact_count[block]
+        w.contact_begin[i] = cython.cast(int32_t, begin)
+        end: cython.Py_ssize_t = see(w, i, begin, True) if w.contact_end[i] > 0 else begin
+        w.contact_end[i] = cython.cast(int32_t, end)
+        for k in range(begin, end):
+            w.contact[CONTACT * k + PUSH] = w.contact[CONTACT * k + DRAG] = 0
+            for o in range(w.old_begin[i], w.old_end[i]):
+                if w.old_surface[o] == w.surface[k]:
+                    w.contact[CONTACT * k + PUSH] = w.old_contact[CONTACT * o + PUSH]
+                    w.contact[CONTACT * k + DRAG] = w.old_contact[CONTACT * o + DRAG]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def swap_surfaces(w: cython.pointer(Step)) -> cython.void:
+    """The list of now becomes the one before."""
+    w.side = 1 - w.side
+    w.contact_begin, w.old_begin = w.old_begin, w.contact_begin
+    w.contact_end, w.old_end = w.old_end, w.contact_end
+    w.surface, w.old_surface = w.old_surface, w.surface
+    w.contact, w.old_contact = w.old_contact, w.contact
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def list_surfaces(w: cython.pointer(Step)) -> cython.bint:
+    """List the surfaces in sight of all particles. False: there are too few places."""
+    block: cython.int
+    blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
+    w.surfaces_good = False
+    if not w.surfaces_kept:
+        swap_surfaces(w)
+        w.surfaces_kept = True
+    team_stage(w.team, count_stage, w, blocks)
+    total: int64_t = 0
+    for block in range(blocks):
+        here: int64_t = w.contact_count[block]
+        w.contact_count[block] = total
+        total += here
+    if total > w.contact_room:
+        w.contact_count[0] = total
+        return False
+    team_stage(w.team, fill_surfaces_stage, w, blocks)
+    w.surfaces_good, w.surfaces_kept = True, False
+    return True

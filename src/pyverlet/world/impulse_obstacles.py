@@ -1,0 +1,114 @@
+"""The obstacles of a world as the compiled core takes them, frame by frame: only what has changed is listed anew."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.ground.constants import OBSTACLE_LINKS
+from pyverlet.laws.obstacles import Course
+
+Array = NDArray[Any]
+
+SIDES = 4
+"""Surfaces below are sides of the room, as the core numbers them; from there on they are segments."""
+
+_GIVEN = (
+    "body", "first", "faces", "around", "lx", "ly", "lc", "ls", "length", "rounding", "inner", "before_x", "before_y", "after_x",
+    "after_y", "restitution", "friction", "belt",
+)  # fmt: skip
+_WIDTH, _LENGTH, _ROUNDING, _INNER, _FRICTION = 32, 8, 9, 10, 16
+
+_SPARE_LINKS = 1024
+"""Room in the grid for what moves."""
+
+
+class ObstacleRows:
+    """Segments and bodies of the obstacles of one world, in the core's form.
+
+    Attributes:
+        friction: the largest of all.
+    """
+
+    def __init__(self) -> None:
+        self.friction = 0.0
+        self._segments, self._bodies, self._moving = np.zeros((0, _WIDTH)), np.zeros((0, 6)), np.zeros(0, np.int32)
+        self._owners: list[tuple[int, int]] = []  # of each segment the id of its obstacle, and which of its segments it is
+        self._seen: Any = None
+        self._seen_version = -1
+
+    def begin(self, course: Course, engine: Any, radius: float, dt: float) -> Array | None:
+        """Give the engine the obstacles of now, as a frame of dt seconds begins; radius: of the largest particle, m.
+
+        Returns of each surface of before its number now, or -1; None: they are the same.
+        """
+        course.begin()
+        seen = course.version, course.seam, engine
+        if seen == self._seen:
+            if len(self._moving):
+                self._bodies[:] = course.bodies
+                if not engine.place_obstacles(self._moving, dt, False):
+                    self._build(engine, radius, dt)
+            return None
+        self._seen, self._seen_version, owners = seen, course.version, course.owners()
+        if owners != self._owners or not self._owners:
+            renamed = _renamed(self._owners, owners)
+            self._owners, self._segments = owners, np.zeros((len(owners), _WIDTH))
+            self._fill(course)
+            self._build(engine, radius, dt)
+            return renamed
+        segments, bodies = self._segments[:, : len(_GIVEN)].copy(), self._bodies
+        self._fill(course)
+        other = (segments != self._segments[:, : len(_GIVEN)]).any(axis=1)
+        other |= (bodies != self._bodies).any(axis=1)[self._segments[:, 0].astype(np.int64)]
+        self._give(engine, keep=True)
+        if not engine.place_obstacles(np.flatnonzero(other).astype(np.int32), dt, True):
+            self._build(engine, radius, dt)
+        return None
+
+    def renamed(self, course: Course) -> Array | None:
+        """As `begin` returns, of what the engine has seen last."""
+        course.begin()
+        return None if course.version == self._seen_version else _renamed(self._owners, course.owners())
+
+    def _fill(self, course: Course) -> None:
+        self._bodies = course.bodies.copy()
+        for column, name in enumerate(_GIVEN):
+            self._segments[:, column] = course.segments[name]
+        moves = (self._bodies[:, 3:] != 0.0).any(axis=1)
+        self._moving = np.flatnonzero(moves[self._segments[:, 0].astype(np.int64)]).astype(np.int32)
+        self.friction = float(self._segments[:, _FRICTION].max(initial=0.0))
+
+    def _build(self, engine: Any, radius: float, dt: float) -> None:
+        """Make the grid, with cells as wide as the largest particle, or wider where there would be too many."""
+        s, body = self._segments, self._bodies[self._segments[:, 0].astype(np.int64)]
+        speed = np.hypot(body[:, 3], body[:, 4]) + np.abs(body[:, 5]) * (np.hypot(s[:, 4], s[:, 5]) + s[:, _LENGTH])
+        around = s[:, _ROUNDING] + s[:, _INNER] + 4.0 * dt * speed
+        cell, links = max(2.0 * radius, float(np.finfo(float).tiny)), 0.0
+        if radius == 0.0 and len(s):
+            cell = max(float(np.median(around + s[:, _LENGTH])), cell)
+        while True:
+            across = 2.0 * around / cell + 3.0
+            links = float((s[:, _LENGTH] / cell * 2.0 * across + across * across).sum())
+            if links <= OBSTACLE_LINKS + 64 * len(s):
+                break
+            cell *= 2.0
+        room = int(links) + _SPARE_LINKS
+        self._cell, self._links = cell, np.zeros((room, 2), np.int32)
+        self._heads = np.full(1 << max(int(links).bit_length(), 6), -1, np.int32)
+        while True:
+            self._give(engine, keep=False)
+            if engine.place_obstacles(np.arange(len(s), dtype=np.int32), dt, True):
+                return
+            self._links = np.zeros((2 * len(self._links), 2), np.int32)
+
+    def _give(self, engine: Any, *, keep: bool) -> None:
+        engine.set_obstacles(self._segments, self._bodies, self._moving, self._cell, self._heads, self._links, keep)
+
+
+def _renamed(before: list[tuple[int, int]], after: list[tuple[int, int]]) -> Array:
+    """Of each surface of before its number after, or -1."""
+    now = {owner: k for k, owner in enumerate(after)}
+    return np.concatenate((np.arange(SIDES), np.array([now.get(owner, -SIDES - 1) for owner in before], np.int64) + SIDES))
