@@ -19,6 +19,7 @@ Links = cython.struct(
     own=cython.pointer(cython.double),  # (count,) inverse mass, 1/kg
     weight=cython.pointer(cython.double),  # (count,) the same as rows feel it: less if it is pinned
     warm=cython.pointer(cython.double),  # (count, 2) m/s that links gave before contacts were solved
+    loaned=cython.pointer(cython.double),  # (count, 2) m/s of it that are taken back before rows are solved
     react=cython.pointer(cython.double),  # (count, 2) N s that rows have given it since, whatever its mass
     # ---- pins
     pins=cython.Py_ssize_t,
@@ -55,6 +56,7 @@ Links = cython.struct(
     next=cython.pointer(cython.double),  # where the drift takes it
     soft=cython.pointer(cython.double),  # of C_next + soft J = target
     target=cython.pointer(cython.double),
+    keeps=cython.pointer(cython.double),  # (rows,) share of `load` that is not
     acts=cython.pointer(int32_t),
     # ---- distances
     way=cython.pointer(cython.double),  # (rows, 2) from the first end to the second at the start of the substep, m

@@ -64,14 +64,45 @@ def warm_block(k: cython.pointer(Links), b: cython.Py_ssize_t) -> cython.void:
     for r in range(k.block[b], k.block[b + 1]):
         k.impulse[r] *= k.scale * share
         k.load[r] = k.impulse[r]
+        moves: cython.double = k.h * mobility(k, r)
+        k.keeps[r] = k.soft[r] / (k.soft[r] + moves) if k.soft[r] < INFINITY and k.soft[r] + moves > 0 else 1
+        lent: cython.double = 1 - k.keeps[r]
         if k.kind[r] == DISTANCE:
             x: cython.double = k.way[2 * r]
             y: cython.double = k.way[2 * r + 1]
             length: cython.double = sqrt(x * x + y * y)
             if length > 0:
-                give(k, r, k.impulse[r] * x / length, k.impulse[r] * y / length)
+                e: cython.Py_ssize_t = k.first[r]
+                x *= k.impulse[r] / length
+                y *= k.impulse[r] / length
+                give(k, r, x, y)
+                lend(k, k.node[e], -lent * x, -lent * y)
+                lend(k, k.node[e + 1], lent * x, lent * y)
         else:
             push_row(k, r, k.impulse[r], k.gradient)
+            for e in range(k.first[r], k.first[r + 1]):
+                lend(k, k.node[e], lent * k.impulse[r] * k.gradient[2 * e], lent * k.impulse[r] * k.gradient[2 * e + 1])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def lend(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
+    """Of what linked particle i was given, this impulse is taken back before rows are solved."""
+    if k.own[i] > 0:
+        k.loaned[2 * i] += k.weight[i] * x
+        k.loaned[2 * i + 1] += k.weight[i] * y
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def take_back_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
+    """Row r begins to be solved with what it keeps."""
+    k.impulse[r] *= k.keeps[r]
+    if k.kind[r] == DISTANCE:
+        k.given[2 * r] *= k.keeps[r]
+        k.given[2 * r + 1] *= k.keeps[r]
 
 
 @cython.cfunc

@@ -44,14 +44,12 @@ def aim_at_length(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void
     length: cython.double = sqrt(p.x * p.x + p.y * p.y)
     start: cython.double = sqrt(k.way[2 * r] * k.way[2 * r] + k.way[2 * r + 1] * k.way[2 * r + 1])
     error: cython.double = length - k.rest[r]
-    pulled: cython.double = sqrt(k.given[2 * r] * k.given[2 * r] + k.given[2 * r + 1] * k.given[2 * r + 1])
+    pulled: cython.double = max(-k.impulse[r], -k.load[r], 0.0)
     k.acts[r] = k.intact[r] != 0 and k.soft[r] < INFINITY and length > 0 and start > 0
-    if k.acts[r] and k.upper[r] <= 0 and k.impulse[r] >= 0 and error < k.target[r]:
+    if k.upper[r] <= 0 and k.impulse[r] >= 0 and k.load[r] >= 0 and error < k.target[r]:
         k.acts[r] = 0
     if not k.acts[r]:
         return
-    if k.impulse[r] > 0:
-        pulled = 0
     s: cython.double = 2 * k.h * pulled * (k.weight[k.node[e]] + k.weight[k.node[e + 1]]) / length
     q: cython.double = AHEAD * s * s / (s * s + 4)
     x: cython.double = p.x / length

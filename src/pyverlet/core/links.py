@@ -13,7 +13,7 @@ from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.link_arrays import Links
-from pyverlet.core.link_blocks import AVERAGED, begin_row, end_row, finish_row, solve_block, warm_block
+from pyverlet.core.link_blocks import AVERAGED, begin_row, end_row, finish_row, solve_block, take_back_row, warm_block
 from pyverlet.core.link_pins import begin_pin, end_pin, finish_pin, hold_pin, rest_pin, settle_pin
 from pyverlet.core.step import Step
 
@@ -66,6 +66,32 @@ def open_stage(what: cython.p_void, block: cython.int) -> cython.void:
         k.x[2 * i], k.x[2 * i + 1] = w.position[2 * at], w.position[2 * at + 1]
         k.own[i] = k.weight[i] = w.inverse_mass[at]
         k.react[2 * i] = k.react[2 * i + 1] = 0
+        k.loaned[2 * i] = k.loaned[2 * i + 1] = 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def take_back_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """Velocities of a block before rows are solved: without what they were lent."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    a: cython.Py_ssize_t = block * BLOCK
+    i: cython.Py_ssize_t
+    take_stage(what, block)
+    for i in range(a, min(a + BLOCK, k.count)):
+        k.u[2 * i] -= k.loaned[2 * i]
+        k.u[2 * i + 1] -= k.loaned[2 * i + 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def take_back_chunk(what: cython.p_void, item: cython.int) -> cython.void:
+    """And what rows of a chunk lent."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    r: cython.Py_ssize_t
+    for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
+        take_back_row(k, r)
 
 
 @cython.cfunc
@@ -216,7 +242,8 @@ def solve_links(w: cython.pointer(Step)) -> cython.void:
     p: cython.Py_ssize_t
     c: cython.int
     _: cython.int
-    team_stage(w.team, take_stage, w, blocks_of(k))
+    team_stage(w.team, take_back_stage, w, blocks_of(k))
+    team_stage(w.team, take_back_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
     for p in range(k.pins):
         hold_pin(k, p)
     for _ in range(k.passes):
