@@ -7,7 +7,8 @@ import cython
 from cython.cimports.libc.math import INFINITY, sqrt
 
 from pyverlet.core.link_arrays import DISTANCE, Links
-from pyverlet.core.link_chains import give, solve_chain
+from pyverlet.core.link_chains import give, step_chain
+from pyverlet.core.link_lengths import solve_chain
 from pyverlet.core.link_shapes import Way, measure_row, mobility, push, way_between
 from pyverlet.core.link_softness import Softness, before_that, kept_share, softness
 
@@ -171,7 +172,10 @@ def solve_block(k: cython.pointer(Links), b: cython.Py_ssize_t, drifts: cython.b
     if r == k.block[b + 1]:
         return
     if k.kind[r] == DISTANCE:
-        solve_chain(k, r, k.block[b + 1], drifts)
+        if drifts:
+            solve_chain(k, r, k.block[b + 1], k.colours == 1)
+        else:
+            step_chain(k, r, k.block[b + 1], False, False)
     elif drifts:
         solve_row(k, r)
     else:

@@ -37,8 +37,11 @@ STEEP = cython.declare(cython.double, 0.5)
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def aim_at_length(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
-    """What row r lacks after the drift: `along`, `wanted` and `turned`; whether it acts."""
+def aim_at_length(k: cython.pointer(Links), r: cython.Py_ssize_t, lost: cython.bint) -> cython.void:
+    """What row r lacks after the drift: `along`, `wanted` and `turned`; whether it acts.
+
+    lost: no direction but that of the place reached is worth anything.
+    """
     e: cython.Py_ssize_t = k.first[r]
     p: Way = way_between(k, k.node[e], k.node[e + 1], k.h)
     length: cython.double = sqrt(p.x * p.x + p.y * p.y)
@@ -60,7 +63,11 @@ def aim_at_length(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void
     across: cython.double = 0
     turning: cython.double = q * (1 - DAMPED) * k.turning[r]
     k.turned[r] = q * pulled / length
-    if cosine < STEEP:  # far from the answer: linear about the start
+    if lost:
+        dx, dy = x, y
+        k.turned[r] = 0
+        cosine = 1
+    elif cosine < STEEP:  # far from the answer: linear about the start
         k.turned[r] = q * pulled / start
         error = p.x * dx + p.y * dy - k.rest[r]
         across = k.turned[r] * (p.y * dx - p.x * dy) - turning * pulled
@@ -77,7 +84,8 @@ def aim_at_length(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void
     k.along[2 * r], k.along[2 * r + 1] = dx, dy
     k.impulse[r] = k.given[2 * r] * dx + k.given[2 * r + 1] * dy
     k.wanted[2 * r] = (k.target[r] - k.soft[r] * k.impulse[r] - error) / cosine
-    k.wanted[2 * r + 1] = k.given[2 * r] * dy - k.given[2 * r + 1] * dx - across  # -P t with t = (-dy, dx)
+    # -P t with t = (-dy, dx)
+    k.wanted[2 * r + 1] = 0 if lost else k.given[2 * r] * dy - k.given[2 * r + 1] * dx - across
 
 
 @cython.cfunc
@@ -192,15 +200,15 @@ def give(k: cython.pointer(Links), r: cython.Py_ssize_t, x: cython.double, y: cy
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def solve_chain(
-    k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, drifts: cython.bint
+def step_chain(
+    k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, drifts: cython.bint, lost: cython.bint
 ) -> cython.void:
     """One step of Newton's method: lengths after the drift; afterwards (not drifts) their rates. Ropes do not push."""
     r: cython.Py_ssize_t
     tries: cython.int = 0
     for r in range(first, end):
         if drifts:
-            aim_at_length(k, r)
+            aim_at_length(k, r, lost)
             if not k.acts[r] and (k.given[2 * r] != 0 or k.given[2 * r + 1] != 0):
                 give(k, r, -k.given[2 * r], -k.given[2 * r + 1])
                 k.impulse[r] = 0
@@ -218,7 +226,7 @@ def solve_chain(
                     k.impulse[r] = 0
             for r in range(first, end):
                 if k.acts[r]:
-                    aim_at_length(k, r)
+                    aim_at_length(k, r, lost)
     for r in range(first, end):
         if k.acts[r]:
             give(k, r, k.answer[2 * r], k.answer[2 * r + 1])

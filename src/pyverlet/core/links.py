@@ -158,14 +158,12 @@ def warm_chunk(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def solve_chunk(what: cython.p_void, item: cython.int) -> cython.void:
-    """Where rows of a chunk are to be after the drift. If nothing else joins their particles, a second step settles them."""
+    """Where rows of a chunk are to be after the drift."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     c: cython.Py_ssize_t = k.colour[k.now] + item
     b: cython.Py_ssize_t
     for b in range(k.chunk[c], k.chunk[c + 1]):
         solve_block(k, b, True)
-        if k.colours == 1:
-            solve_block(k, b, True)
 
 
 @cython.cfunc
