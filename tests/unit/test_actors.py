@@ -143,3 +143,37 @@ def test_an_actor_that_is_listed_twice_acts_twice() -> None:
     world.actors += [Calls(turns, "a")] * 2
     world.step(1 / 60)
     assert turns == [("a", 0)] * 2
+
+
+class Ring(pv.Circle):
+    """A room of the user's own."""
+
+
+REGIONS = {"box": pv.Box((-9, -0.05), (9, 0.05)), "circle": pv.Circle(radius=0.2), "own": Ring(radius=0.2)}
+WAYS = [((0.1, 3.0), (0.0, -150.0)), ((3.0, 0.04), (-150.0, 0.0)), ((-1.05, -1.0), (75.0, 75.0))]
+
+
+@pytest.mark.parametrize("region", REGIONS)
+@pytest.mark.parametrize("periodic", [False, True])
+def test_a_sink_catches_what_crosses_it_within_a_frame(region: str, periodic: bool) -> None:
+    # 2.5 m a frame, through a region of 0.1 to 0.4 m; beside them one that passes by, and one that is put on the other side.
+    room: pv.Boundary = pv.Periodic((-4, -10), (4, 10)) if periodic else pv.Open()
+    world = pv.World(gravity=(0, 0), boundary=room, collisions=None)
+    world.actors.append(sink := pv.Sink(REGIONS[region]))
+    position, velocity = zip(*WAYS, strict=True)
+    world.add(position=position, velocity=velocity, mass=1)
+    passing = world.add(position=(0.0, 0.3), velocity=(150, 0), mass=2)
+    world.add(position=(0, 5), mass=3)
+    for frame in range(3):
+        world.position[world.mass == 3, 1] = 5 if frame % 2 else -5
+        world.step(1 / 60)
+        passing.position[0] = (0.0, 0.3)
+    assert (sink.removed, world.mass.tolist()) == (3, [2, 3])
+
+
+def test_a_sink_catches_what_crosses_the_seam_into_it() -> None:
+    world = pv.World(gravity=(0, 0), boundary=pv.Periodic((-4, -4), (4, 4)), collisions=None)
+    world.actors.append(pv.Sink(pv.Box((-3.6, -1), (-3.4, 1))))
+    world.add(position=[(3.5, 0), (3.5, 2)], velocity=(150, 0), mass=[1, 2])
+    world.step(1 / 60)
+    assert world.mass.tolist() == [2]

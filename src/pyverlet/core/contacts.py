@@ -26,7 +26,7 @@ from cython.cimports.libc.stdint import int32_t
 
 from pyverlet.core.impacts import resolve_impacts
 from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, clamped, motion_of, slip_of
-from pyverlet.core.step import OPEN, TOUCHED, Step
+from pyverlet.core.step import TOUCHED, Step
 from pyverlet.core.surfaces import bounce_surfaces
 from pyverlet.core.warm_start import measure_pairs
 

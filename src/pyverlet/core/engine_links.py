@@ -17,7 +17,7 @@ def fill_links(k: cython.pointer(Links), a, passes: cython.int, period_x: cython
     k.count, k.rows, k.pins, k.colours, k.passes = particles, rows, pins, len(a["colour"]) - 1, passes
     k.period_x, k.period_y = period_x, period_y
     if "x" not in a:
-        a |= {name: np.zeros((particles, 2)) for name in ("x", "u", "warm", "loaned", "react")}
+        a |= {name: np.zeros((particles, 2)) for name in ("x", "u", "warm", "loaned", "driven", "react")}
         a |= {name: np.zeros(particles) for name in ("own", "weight")}
         a |= {name: np.zeros((len(a["node"]), 2)) for name in ("gradient", "slope")}
         a |= {name: np.zeros(rows) for name in ("soft", "target", "turned", "turning", "keeps")}
@@ -31,6 +31,7 @@ def fill_links(k: cython.pointer(Links), a, passes: cython.int, period_x: cython
     k.upper, k.strength, k.intact = doubles(a["upper"]), doubles(a["strength"]), small_integers(a["intact"])
     k.impulse, k.load, k.pull, k.value = doubles(a["impulse"]), doubles(a["load"]), doubles(a["pull"]), doubles(a["value"])
     k.next, k.soft, k.target, k.turned = doubles(a["next"]), doubles(a["soft"]), doubles(a["target"]), doubles(a["turned"])
+    k.driven = doubles(a["driven"])
     k.loaned, k.keeps = doubles(a["loaned"]), doubles(a["keeps"])
     k.turning = doubles(a["turning"])
     k.acts, k.way, k.middle, k.given = small_integers(a["acts"]), doubles(a["way"]), doubles(a["middle"]), doubles(a["given"])

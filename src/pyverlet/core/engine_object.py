@@ -95,7 +95,8 @@ class Engine:
         self.ls.category, self.ls.mask = indices(a["category"]), indices(a["mask"])
 
     def set_materials(self, **n):
-        """collides: whether there are pairs at all. sized, varied, mixed: whether radii, masses, and any of restitution, friction and radii differ.
+        """collides: whether there are pairs at all. sized, varied, mixed: whether radii, masses, and any of restitution,
+        friction and radii differ.
 
         bulk: largest radius of circles that stand in cells, m; smallest, largest and mean_radius, m. restitution, friction: of
         circles without values of their own. picky: whether some pairs are no pairs: of pinned or filtered ones, or linked ones.

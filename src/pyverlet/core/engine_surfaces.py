@@ -9,7 +9,7 @@ from cython.cimports.arrays import doubles, integers, small_integers
 from cython.cimports.libc.stdint import int32_t
 
 from pyverlet.core.cells import BLOCK
-from pyverlet.core.obstacles import PLACE, keeps_place, list_segment, put_segment
+from pyverlet.core.obstacles import LATE, PLACE, keeps_place, list_segment, put_segment
 from pyverlet.core.step import Step
 from pyverlet.core.surface_shapes import CONTACT, DRAG, PUSH
 
@@ -35,7 +35,9 @@ def make_surface_rows(w: cython.pointer(Step), a):
     for side in range(2):
         a[f"contact_begin{side}"], a[f"contact_end{side}"] = np.zeros(w.count, np.int32), np.zeros(w.count, np.int32)
     a["at_surface"], a["at_surface_count"] = np.zeros(w.count, np.int32), np.zeros(blocks, np.int32)
-    a["contact_count"] = np.zeros(blocks, np.int64)
+    a["contact_count"], a["since"] = np.zeros(blocks, np.int64), np.zeros(w.count)
+    a["thrown"], a["begun"] = np.zeros(w.count, np.int32), np.zeros((w.count, 2))
+    w.since, w.thrown, w.begun = doubles(a["since"]), small_integers(a["thrown"]), doubles(a["begun"])
     w.at_surface, w.at_surface_count = small_integers(a["at_surface"]), small_integers(a["at_surface_count"])
     w.contact_count = integers(a["contact_count"])
     w.surfaces_good, w.surfaces_kept = False, True
@@ -105,6 +107,7 @@ def place_obstacles(w: cython.pointer(Step), which, dt: cython.double, fresh: cy
     for n in range(len(which)):
         k: cython.Py_ssize_t = segment[n]
         put_segment(w, k, 0.0, PLACE)
+        put_segment(w, k, 0.0, LATE)
         if fresh or not keeps_place(w, k, dt):
             w.surfaces_good = False
             if not list_segment(w, k, dt):

@@ -20,7 +20,6 @@ from __future__ import annotations
 import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
-from cython.cimports.libc.stdint import int32_t
 from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK
@@ -30,6 +29,7 @@ from pyverlet.core.obstacles import place_moving
 from pyverlet.core.particle_stages import drift, kick_stage, remember_stage
 from pyverlet.core.relisting import each_group
 from pyverlet.core.step import OPEN, Step
+from pyverlet.core.surface_sides import keep_side
 from pyverlet.core.surfaces import bounce_surfaces, hold_surfaces, relax_surfaces, warm_surfaces
 from pyverlet.core.warm_start import warm_start
 
@@ -44,7 +44,9 @@ def warm_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     n: cython.Py_ssize_t
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
-        warm_surfaces(w, w.at_surface[n])
+        i: cython.Py_ssize_t = w.at_surface[n]
+        w.begun[2 * i], w.begun[2 * i + 1] = w.position[2 * i], w.position[2 * i + 1]
+        warm_surfaces(w, i)
 
 
 @cython.cfunc
@@ -67,7 +69,9 @@ def hold_on_stage(what: cython.p_void, block: cython.int) -> cython.void:
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     n: cython.Py_ssize_t
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
+        bounce_surfaces(w, w.at_surface[n])  # pairs may have thrown it there
         hold_surfaces(w, w.at_surface[n])
+        keep_side(w, w.at_surface[n])
 
 
 @cython.cfunc

@@ -101,6 +101,7 @@ def strike(
     w.position[2 * i + 1] -= cython.cast(real, dy * t)
     w.moved[2 * i] -= cython.cast(real, dx * t)
     w.moved[2 * i + 1] -= cython.cast(real, dy * t)
+    w.since[i] = max(w.since[i], t, 1e-300)
 
 
 @cython.cfunc
@@ -118,6 +119,7 @@ def strike_pair(
         w.struck_y[k] += cython.cast(real, jy)
     strike(w, m.i, -jx * m.part, -jy * m.part, jt * m.part * w.turn_i[at], t)
     strike(w, m.j, jx * rest, jy * rest, jt * rest * w.turn_j[at], t)
+    w.thrown[m.i] = w.thrown[m.j] = 1
 
 
 @cython.cfunc

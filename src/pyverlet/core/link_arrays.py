@@ -20,6 +20,7 @@ Links = cython.struct(
     weight=cython.pointer(cython.double),  # (count,) the same as rows feel it: less if it is pinned
     warm=cython.pointer(cython.double),  # (count, 2) m/s that links gave before contacts were solved
     loaned=cython.pointer(cython.double),  # (count, 2) m/s of it that are taken back before rows are solved
+    driven=cython.pointer(cython.double),  # (count, 2) m/s^2 that forces give it alone
     react=cython.pointer(cython.double),  # (count, 2) N s that rows have given it since, whatever its mass
     # ---- pins
     pins=cython.Py_ssize_t,

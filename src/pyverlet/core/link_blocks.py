@@ -10,7 +10,7 @@ from pyverlet.core.link_arrays import DISTANCE, Links
 from pyverlet.core.link_chains import give, step_chain
 from pyverlet.core.link_lengths import solve_chain
 from pyverlet.core.link_shapes import Way, measure_row, mobility, push, way_between
-from pyverlet.core.link_softness import Softness, before_that, kept_share, softness
+from pyverlet.core.link_softness import Softness, averaged, before_that, kept_share, softness
 
 FARTHEST = cython.declare(cython.double, 0.5)
 """Most that a link is taken to turn in a substep, rad."""
@@ -211,7 +211,7 @@ def end_row(k: cython.pointer(Links), r: cython.Py_ssize_t, mean: cython.double)
     """The mean of what row r pulls with; if that is too much, it breaks."""
     if k.intact[r] == 0:
         return
-    k.pull[r] += mean * (-k.impulse[r] / k.kick - k.pull[r])
+    k.pull[r] = averaged(k.pull[r], -k.impulse[r] / k.kick, mean)
     if k.pull[r] > k.strength[r] or -k.pull[r] > k.strength[r]:
         k.intact[r] = 0
         k.impulse[r] = 0

@@ -8,7 +8,7 @@ from cython.cimports.libc.math import INFINITY
 
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_shapes import unwrapped
-from pyverlet.core.link_softness import Softness, before_that, kept_share, softness
+from pyverlet.core.link_softness import Softness, averaged, before_that, kept_share, softness
 
 
 @cython.cfunc
@@ -118,7 +118,7 @@ def end_pin(k: cython.pointer(Links), p: cython.Py_ssize_t, mean: cython.double)
     axis: cython.int
     for axis in range(2):
         at: cython.Py_ssize_t = 2 * p + axis
-        k.pin_pull[at] += mean * (-k.pin_impulse[at] / k.kick - k.pin_pull[at])
+        k.pin_pull[at] = averaged(k.pin_pull[at], -k.pin_impulse[at] / k.kick, mean)
     square: cython.double = k.pin_pull[2 * p] * k.pin_pull[2 * p] + k.pin_pull[2 * p + 1] * k.pin_pull[2 * p + 1]
     if square > k.pin_strength[p] * k.pin_strength[p]:
         k.pin_intact[p] = 0

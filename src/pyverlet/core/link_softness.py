@@ -19,6 +19,9 @@ from pyverlet.core.link_arrays import Links
 BLENDED = cython.declare(cython.double, 0.04)
 """(omega h)^4 at which a soft row is half midpoint, half backward."""
 
+LEAST = cython.declare(cython.double, 1e-25)
+"""N. Less is none: the mean of a pull that has ended would become a denormal number, and stay one."""
+
 Softness = cython.struct(soft=cython.double, target=cython.double)
 
 
@@ -72,3 +75,13 @@ def kept_share(
     """
     most: cython.double = 2 * fabs(load) + (k.least / mobility if mobility > 0 else INFINITY)
     return most / fabs(impulse) if fabs(impulse) > most else 1.0
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def averaged(mean: cython.double, pull: cython.double, share: cython.double) -> cython.double:
+    """The mean of a pull, of which this is the share of now."""
+    after: cython.double = mean + share * (pull - mean)
+    return after if fabs(after) > LEAST else 0.0

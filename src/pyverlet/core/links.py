@@ -74,13 +74,17 @@ def open_stage(what: cython.p_void, block: cython.int) -> cython.void:
 @cython.exceptval(check=False)
 def take_back_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Velocities of a block before rows are solved: without what they were lent."""
-    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
     i: cython.Py_ssize_t
+    axis: cython.int
     take_stage(what, block)
     for i in range(a, min(a + BLOCK, k.count)):
-        k.u[2 * i] -= k.loaned[2 * i]
-        k.u[2 * i + 1] -= k.loaned[2 * i + 1]
+        for axis in range(2):
+            k.u[2 * i + axis] -= k.loaned[2 * i + axis]
+            if k.own[i] > 0:
+                w.acceleration[2 * cython.cast(cython.Py_ssize_t, k.slot[i]) + axis] = cython.cast(real, k.driven[2 * i + axis])
 
 
 @cython.cfunc
@@ -98,7 +102,8 @@ def take_back_chunk(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def warmed_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """What links have given a block is free motion to contacts: it does not bounce."""
+    """What links have given a block is free motion to contacts, and an acceleration as others are, as long as they are solved."""
+    axis: cython.int
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
@@ -111,6 +116,9 @@ def warmed_stage(what: cython.p_void, block: cython.int) -> cython.void:
             k.warm[2 * i] = cython.cast(cython.double, x) - w.free[2 * at]
             k.warm[2 * i + 1] = cython.cast(cython.double, y) - w.free[2 * at + 1]
             w.free[2 * at], w.free[2 * at + 1] = x, y
+            for axis in range(2):
+                k.driven[2 * i + axis] = w.acceleration[2 * at + axis]
+                w.acceleration[2 * at + axis] += cython.cast(real, k.warm[2 * i + axis] / k.kick)
         k.react[2 * i] = k.react[2 * i + 1] = 0
     put_stage(what, block)
 

@@ -51,6 +51,10 @@ def kick(shared: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_
     listed: cython.pointer(real) = w.listed
     for i in range(2 * a, 2 * b):
         moved[i] = position[i] - listed[i]
+    since: cython.pointer(cython.double) = w.since
+    for i in range(a, b):
+        since[i] = 0
+        w.thrown[i] = 0
     w.fastest[part] = most
 
 

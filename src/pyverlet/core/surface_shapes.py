@@ -45,6 +45,9 @@ RUB = cython.declare(cython.int, 7)
 PUSH = cython.declare(cython.int, 8)  # impulses along the normal and the tangent over the mass, m/s
 DRAG = cython.declare(cython.int, 9)
 
+ROUNDED = cython.declare(cython.double, 1e-6)
+"""Of the reach: a face goes on so far beyond its ends, for what touches it at a joint to meet it in spite of rounding."""
+
 FARAWAY = cython.declare(cython.double, 1e300)
 
 Spot = cython.struct(
@@ -56,6 +59,7 @@ Spot = cython.struct(
     reach=cython.double,  # radius and rounding
     left=cython.bint,  # whether what is before its start, or beyond its end, belongs to the neighbour
     right=cython.bint,
+    above=cython.bint,  # whether it is on the side of greater y, as of its last impact: that moves where its path begins
     wx=cython.double,  # of the particle in the room
     wy=cython.double,
 )
@@ -85,6 +89,17 @@ def spot_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t
     before_y: cython.double = w.segment[at + BEFORE + 1]
     after_x: cython.double = w.segment[at + AFTER]
     after_y: cython.double = w.segment[at + AFTER + 1]
+    since: cython.double = w.since[i]
+    late: cython.double = p.y
+    if since > 0:
+        width: cython.Py_ssize_t = 4 if w.rough else 2
+        v: cython.pointer(real) = w.motion if w.rough else w.velocity
+        b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[at + BODY_OF])
+        half: cython.double = 0.5 * (w.h - since)
+        ox = v[width * i] - w.acceleration[2 * i] * half - w.body[b + 3]
+        oy = v[width * i + 1] - w.acceleration[2 * i + 1] * half - w.body[b + 4]
+        late += (p.c * oy - p.s * ox) * since
+    p.above = late >= 0
     p.left = p.x < 0 and p.x * before_x + p.y * before_y > 0
     # A joint belongs to the segment that begins there.
     p.right = beyond > 0 and (after_x != 0 or after_y != 0)
@@ -118,16 +133,16 @@ def measure_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_
     p: Spot = spot_of(w, i, at, LATE if late else PLACE)
     near: cython.double = min(max(p.x, 0.0), p.length)
     nx: cython.double = 0.0
-    ny: cython.double = -1.0 if p.y >= 0 else 1.0
+    ny: cython.double = -1.0 if p.above else 1.0
     row[first + BEND] = 0.0
-    if w.segment[at + FACES] > 0 and p.y > 0:  # behind the face
+    if w.segment[at + FACES] > 0 and p.above:  # behind the face
         inside: cython.double = depth_inside(w, at, p.wx, p.wy)
         ny = 1.0
         row[first + GAP] = -(p.reach + p.y) if inside == p.y and inside > 0 else FARAWAY
     elif p.left or p.right:
         row[first + GAP] = FARAWAY
     elif near == p.x and p.length > 0:
-        row[first + GAP] = (p.y if p.y >= 0 else -p.y) - p.reach
+        row[first + GAP] = -ny * p.y - p.reach
     else:
         distance: cython.double = sqrt((p.x - near) * (p.x - near) + p.y * p.y)
         row[first + GAP] = distance - p.reach
@@ -227,9 +242,7 @@ def measure_surface(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def flat_time(
-    gap: cython.double, u: cython.double, a: cython.double, h: cython.double, since: cython.double
-) -> cython.double:
+def flat_time(gap: cython.double, u: cython.double, a: cython.double, h: cython.double, since: cython.double) -> cython.double:
     """When a rim meets a plane that it comes to with u in the middle of the substep, s; not before `since`."""
     if gap <= 0 and since == 0:
         return 0.0
@@ -330,14 +343,14 @@ def meet_segment(
         hit.time = 0.0
         return hit
     p: Spot = spot_of(w, i, at, PLACE)
-    if w.segment[at + FACES] > 0 and p.y > 0 and since == 0:
+    if w.segment[at + FACES] > 0 and p.above:
         return hit
     vx: cython.double = p.c * ux + p.s * uy
     vy: cython.double = p.c * uy - p.s * ux
     ax: cython.double = p.c * w.acceleration[2 * i] + p.s * w.acceleration[2 * i + 1]
     ay: cython.double = p.c * w.acceleration[2 * i + 1] - p.s * w.acceleration[2 * i]
     nx: cython.double = 0.0
-    ny: cython.double = -1.0 if p.y >= 0 else 1.0
+    ny: cython.double = -1.0 if p.above else 1.0
     x: cython.double
     y: cython.double
     half: cython.double
@@ -346,7 +359,8 @@ def meet_segment(
         t = flat_time(-ny * p.y - p.reach, vy * ny, ay * ny, h, since if since > 0 else 1e-300)
         if t != NEVER:
             x = p.x + vx * t - 0.5 * ax * t * (h - t)
-            if 0 <= x <= p.length:
+            slack: cython.double = ROUNDED * p.reach
+            if -slack <= x <= p.length + slack:
                 hit.time = t
     end: cython.int
     for end in range(1 if p.length == 0 else 2):

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
-from cython.cimports.libc.math import fabs
+from cython.cimports.libc.math import fabs, sqrt
 
 from pyverlet.core.impacts import NEVER, strike
 from pyverlet.core.step import Step
@@ -137,7 +137,6 @@ def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bin
     """Let particle i bounce from surfaces that it meets fast in this substep; not from those that carry its load."""
     n: cython.int
     k: cython.Py_ssize_t
-    since: cython.double = 0
     if w.inverse_mass[i] == 0:
         return False
     for n in range(MOST_BOUNCES):
@@ -147,13 +146,12 @@ def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bin
         for k in range(w.contact_begin[i], w.contact_end[i]):
             if w.restless or w.contact[CONTACT * k + PUSH] == 0:
                 measure_surface(w, i, k, False)
-                hit: Hit = meets(w, i, k, since)
+                hit: Hit = meets(w, i, k, w.since[i])
                 if hit.time < first.time:
                     first, which = hit, k
         if which < 0:
             return n > 0
         bounce_at(w, i, which, cython.address(first))
-        since = max(first.time, 1e-300)
     return True
 
 
@@ -180,9 +178,12 @@ def hold(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, re
             free: cython.double = (w.free[2 * i] - row[first + SPEED]) * nx + (w.free[2 * i + 1] - row[first + SPEED + 1]) * ny
             if free > w.least_bounce:  # it has bounced if it meets it at all
                 return 0.0
-        slide: cython.double = ux * ny - uy * nx
-        speed += 0.5 * slide * slide * row[first + BEND] * w.h  # a way along the tangent leaves a round surface
         speed -= row[first + GAP] / w.h
+        bend: cython.double = row[first + BEND]
+        if bend != 0:  # the surface bends away from the tangent, by 1 - cos of what is gone along it
+            slide: cython.double = (ux * ny - uy * nx) * w.h * bend
+            away: cython.double = 1 - sqrt(1 - slide * slide) if slide * slide < 1 else 1.0
+            speed += away / (bend * w.h)
     after: cython.double = max(before + speed, 0.0)
     if before == 0 and after == 0:
         return 0.0
@@ -205,11 +206,11 @@ def hold(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, re
 @cython.exceptval(check=False)
 def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """Hold particle i at the surfaces that it may reach in this substep."""
-    n: cython.int
+    _: cython.int
     k: cython.Py_ssize_t
     for k in range(w.contact_begin[i], w.contact_end[i]):
         measure_surface(w, i, k, False)
-    for n in range(MOST_TURNS_AROUND):
+    for _ in range(MOST_TURNS_AROUND):
         most: cython.double = 0
         change: cython.double = 0
         loaded: cython.int = 0

@@ -66,7 +66,7 @@ def _bounce(i, j, dx, dy, reach, e, mu, ri, rj, circles, law, spent):
     At the time t ago at which their distance was `reach` they met at the speed v_n along n. They part with e v_n; the impulse
     (1 + e) v_n / W, W = w_i + w_j, keeps the momentum, for e = 1 the energy too, and what was gained in velocity has carried them
     for the time t. Friction takes the slip v_t of the rims, as far as mu times the impulse goes: a disc has I = m r^2 / 2, so
-    that the rims have the inverse mass 3 W along the tangent (n_y, -n_x). Returns whether they have met in this substep.
+    that the rims have the inverse mass 3 W along the tangent (n_y, -n_x). Returns v_n; 0 if they have not met in this substep.
     """
     zero = law.h - law.h
     half = law.h / (law.h + law.h)
@@ -81,13 +81,13 @@ def _bounce(i, j, dx, dy, reach, e, mu, ri, rj, circles, law, spent):
     # given distance always alike: it heats a gas, or cools it, by up to 3e-8 of its energy an impact.
     distance = np.sqrt(np.float64(dx) * dx + np.float64(dy) * dy)
     if not distance > 0.0:
-        return False
+        return 0.0
     nx, ny = dx / distance, dy / distance
     ux = np.float64(v[j, 0]) - v[i, 0] + (np.float64(law.lag) - time) * ax
     uy = np.float64(v[j, 1]) - v[i, 1] + (np.float64(law.lag) - time) * ay
     hit = -(ux * nx + uy * ny)
     if not hit > _slow(circles, i, j, law):
-        return False
+        return 0.0
     kick = (hit + e * hit) / (np.float64(wi) + wj)
     px, py, turn_i, turn_j = kick * nx, kick * ny, 0.0, 0.0
     if spent.shape[0] > 0:
@@ -109,7 +109,7 @@ def _bounce(i, j, dx, dy, reach, e, mu, ri, rj, circles, law, spent):
         _own(circles, j, px * wj, py * wj, turn_j)
     _kick(circles, i, -px * wi, -py * wi, time)
     _kick(circles, j, px * wj, py * wj, time)
-    return True
+    return hit
 
 
 @kernel
@@ -161,8 +161,11 @@ def treat(bits, k, at, circles, pairs, law, spent):
             vy = v[j, 1] - v[i, 1] + law.lag * (a[j, 1] - a[i, 1])
             along = dx * vx + dy * vy
             if along < 0:
-                if not _bounce(i, j, dx, dy, reach, m[E, one], m[MU, one], m[R_I, one], m[R_J, one], circles, law, spent):
+                hit = _bounce(i, j, dx, dy, reach, m[E, one], m[MU, one], m[R_I, one], m[R_J, one], circles, law, spent)
+                if not hit > 0.0:
                     continue
+                if pairs.bounced.shape[0] > 0 and m[E, one] * hit > _slow(circles, i, j, law):  # as of walls
+                    pairs.bounced[k + lane] += np.uint8(1)
                 dx, dy = _apart(i, j, k + lane, circles, pairs)
             elif not along > _slow(circles, i, j, law) * np.sqrt(dx * dx + dy * dy) and not (law.weight == 0 and m[E, one] > 0):
                 continue

@@ -26,6 +26,12 @@ REFLECTIONS = 8
 # What is noted of a circle in `fed`: a contact at rest has fed its velocity, a wall has touched it; in this substep, or the last.
 CARRIES, AT_WALL, CARRIED, WAS_AT_WALL = 1, 2, 4, 8
 
+SURFACES, FIRST_OBSTACLE = 8, 16
+"""Surfaces noted of a circle in a frame at most, and the number of the first obstacle; walls of the room have lower ones."""
+
+BOUNCED = 256
+"""Bits of `Body.fed` from here on count how often the circle has bounced; they are not kept."""
+
 LOADED = CARRIES | CARRIED | WAS_AT_WALL
 
 
@@ -84,7 +90,7 @@ def put(i, body, circles):
     velocity[i, 0] = body.vx
     velocity[i, 1] = body.vy
     circles.spin[i] = body.spin
-    circles.fed[i] = body.fed
+    circles.fed[i] = body.fed & (BOUNCED - 1)
     circles.resting[i] = body.resting
     circles.hits[i] = body.hit
     if spent.shape[0] > 0:
@@ -110,6 +116,33 @@ def noted(b, resting):
         b.x, b.y, b.vx, b.vy, b.ax, b.ay, b.spin, b.radius, b.inverse_mass, b.restitution, b.friction, b.fed, resting, b.hit,
         b.to_impact, b.to_friction, b.from_x, b.from_y, b.share, b.turn, b.lift,
     )  # fmt: skip
+
+
+@kernel
+def hit_with(b, hit):
+    """The circle b, but with this as the largest speed it hit with."""
+    return Body(
+        b.x, b.y, b.vx, b.vy, b.ax, b.ay, b.spin, b.radius, b.inverse_mass, b.restitution, b.friction, b.fed, b.resting, hit,
+        b.to_impact, b.to_friction, b.from_x, b.from_y, b.share, b.turn, b.lift,
+    )  # fmt: skip
+
+
+@kernel
+def note(impacts, i, surface, bounces, speed):
+    """Circle i has met a surface and has bounced off it so often. impacts: as in `Slots`; empty where no events are recorded."""
+    if impacts.shape[0] == 0:
+        return
+    number, at = np.int64(impacts[i, 0]), np.int64(0)
+    while at < number and impacts[i, 1 + 3 * at] != surface:
+        at += 1
+    if at == SURFACES:
+        return
+    k = 1 + 3 * at
+    if at == number:
+        impacts[i, 0] = number + 1
+        impacts[i, k], impacts[i, k + 1], impacts[i, k + 2] = surface, 0, 0
+    impacts[i, k + 1] += bounces
+    impacts[i, k + 2] = max(impacts[i, k + 2], speed)
 
 
 @kernel
@@ -170,6 +203,7 @@ def meet(b, nx, ny, depth, h, lag, e, mu, rest_speed):
             shift = depth + travelled
             to_impact -= 0.5 * mass * (hit * hit - leaving * leaving)
     held = after == zero
+    fed = (b.fed | AT_WALL) + (0 if held else BOUNCED)
     # A circle in a pile ends each substep with the velocity that the next one's gravity needs to press it down again.
     lift = b.lift if held else zero
     lx, ly = -lift * b.ax, -lift * b.ay
@@ -200,7 +234,7 @@ def meet(b, nx, ny, depth, h, lag, e, mu, rest_speed):
             x += back * ny
             y -= back * nx
     return Body(
-        x, y, vx, vy, b.ax, b.ay, spin, b.radius, b.inverse_mass, b.restitution, b.friction, b.fed | AT_WALL, resting,
+        x, y, vx, vy, b.ax, b.ay, spin, b.radius, b.inverse_mass, b.restitution, b.friction, fed, resting,
         max(b.hit, hit if vn < zero else zero), to_impact, to_friction, b.from_x, b.from_y, b.share, turn, b.lift,
     )  # fmt: skip
 
@@ -279,10 +313,11 @@ def at_cage(b, x0, y0, size, h, lag, e, mu, rest_speed):
 
 
 @kernel
-def _at_box(b, x0, y0, x1, y1, h, lag, e, mu, rest_speed):
-    """The circle b is beyond at least one wall of the box: what becomes of it. In a corner one axis acts after the other."""
+def _at_box(i, circles, x0, y0, x1, y1, h, lag, e, mu, rest_speed):
+    """Circle i is beyond at least one wall of the box: what becomes of it. In a corner one axis acts after the other."""
     zero = h - h
     one = h / h
+    b = look(i, circles)
     r = b.radius
     for axis in range(2):
         low, high = (x0 + r, x1 - r) if axis == 0 else (y0 + r, y1 - r)
@@ -293,8 +328,11 @@ def _at_box(b, x0, y0, x1, y1, h, lag, e, mu, rest_speed):
                 break
             inward = one if below > zero else -one
             nx, ny = (inward, zero) if axis == 0 else (zero, inward)
-            held = b.resting
-            b = meet(noted(b, np.int64(0)), nx, ny, below if below > zero else above, h, lag, e, mu, rest_speed)
+            held, hit = b.resting, b.hit
+            b = hit_with(noted(b, np.int64(0)), -one)
+            b = meet(b, nx, ny, below if below > zero else above, h, lag, e, mu, rest_speed)
+            note(circles.impacts, i, np.int64(2 * axis if below > zero else 2 * axis + 1), np.int64(b.resting == 0), b.hit)
+            b = hit_with(b, max(hit, b.hit))
             if b.resting != 0:
                 break
             b = noted(b, held)
@@ -310,7 +348,7 @@ def _box_some(circles, x0, y0, x1, y1, first, stop, h, lag, e, mu, rest_speed):
     found = np.empty(_CHUNK, np.uint32)
     for k in range(beyond_box(x0, y0, x1, y1, circles.position, circles.radius, circles.inverse_mass, first, stop, found)):
         i = found[k]
-        put(i, _at_box(look(i, circles), x0, y0, x1, y1, h, lag, e, mu, rest_speed), circles)
+        put(i, _at_box(i, circles, x0, y0, x1, y1, h, lag, e, mu, rest_speed), circles)
 
 
 @parallel_kernel

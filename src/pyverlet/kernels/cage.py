@@ -18,6 +18,7 @@ from pyverlet.compile.lanes import (
     smaller,
     spread,
     square_root,
+    store,
     take,
     where_above,
     where_zero,
@@ -26,7 +27,7 @@ from pyverlet.compile.lanes import (
 from pyverlet.compile.stealing import claim_evenly, none_claimed
 from pyverlet.ground.constants import FED, PUSHED
 from pyverlet.kernels.beyond import beyond_circle
-from pyverlet.kernels.bounds import AT_WALL, LOADED, at_cage, look
+from pyverlet.kernels.bounds import AT_WALL, BOUNCED, LOADED, at_cage, hit_with, look, note
 from pyverlet.kernels.bounds import put as put_back
 from pyverlet.kernels.motion import arrive
 
@@ -71,7 +72,7 @@ def _wall(dx, dy, ux, uy, ax, ay, room, rest_speed, zero, half, h):
 def _hold(which, circles, x0, y0, size, h, lag, rest_speed):
     """Hold the circles of `which`, all beyond the wall, on it; eight times the same is as good as once."""
     position, velocity, acceleration = circles.position, circles.velocity, circles.acceleration
-    radius, hits = circles.radius, circles.hits
+    radius, hits, impacts, speeds = circles.radius, circles.hits, circles.impacts, np.empty(LANES, circles.hits.dtype)
     none = h - h
     zero, half, h, lag = spread(none), spread(h / (h + h)), spread(h), spread(lag)
     x0, y0, size, rest_speed = spread(x0), spread(y0), spread(size), spread(rest_speed)
@@ -89,8 +90,18 @@ def _hold(which, circles, x0, y0, size, h, lag, rest_speed):
         hit = square_root(larger(vn * vn + (depth + depth) * an, zero))
         hit = where_zero(smaller(vn, zero), zero, hit)
         place(hits, which, k, larger(pick(hits, which, k), hit))
+        if impacts.shape[0] > 0:
+            _note(which, k, hit, impacts, speeds)
         _wait(which, k, x + depth * nx, y + depth * ny, x0, y0, room, zero, position)
         put(velocity, which, k, vx + away * nx, vy + away * ny)
+
+
+@kernel
+def _note(which, k, hit, impacts, speeds):
+    """Eight circles have met the wall and stay there. speeds: (8,), overwritten."""
+    store(speeds, 0, hit)
+    for lane in range(LANES):
+        note(impacts, which[k + lane], np.int64(0), np.int64(0), speeds[lane])
 
 
 @kernel
@@ -120,6 +131,7 @@ def _rest(which, circles, x0, y0, size, h, lag, e, mu, rest_speed):
     position, velocity, acceleration, spin = circles.position, circles.velocity, circles.acceleration, circles.spin
     radius, restitution, friction, fed, hits = circles.radius, circles.restitution, circles.friction, circles.fed, circles.hits
     start, turn, lift = circles.start, circles.turn, circles.lift
+    impacts, speeds = circles.impacts, np.empty(LANES, hits.dtype)
     rubs, left = turn.shape[0] > 0, 0
     none = h - h
     zero, half, share = spread(none), spread(h / (h + h)), spread(position.dtype.type(PUSHED / FED))
@@ -150,6 +162,8 @@ def _rest(which, circles, x0, y0, size, h, lag, e, mu, rest_speed):
         lx, ly = zero - lifted * ax, zero - lifted * ay
         away = larger(before, lx * nx + ly * ny) - before
         place(hits, which, k, larger(pick(hits, which, k), hit))
+        if impacts.shape[0] > 0:
+            _note(which, k, hit, impacts, speeds)
         x, y = x + depth * nx, y + depth * ny
         vx, vy = vx + away * nx, vy + away * ny
         own = pick(friction, which, k)
@@ -236,7 +250,9 @@ def _confine_some(circles, x0, y0, size, first, stop, h, lag, e, mu, rest_speed)
         if k > 0 and i == found[k - 1]:  # to fill a pack
             continue
         resting[i] = 0
-        put_back(i, at_cage(look(i, circles), x0, y0, size, h, lag, e, mu, rest_speed), circles)
+        b = at_cage(hit_with(look(i, circles), h - h - h), x0, y0, size, h, lag, e, mu, rest_speed)
+        note(circles.impacts, i, np.int64(0), b.fed // BOUNCED, b.hit)
+        put_back(i, hit_with(b, max(b.hit, circles.hits[i])), circles)
 
 
 @parallel_kernel

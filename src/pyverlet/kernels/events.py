@@ -15,8 +15,10 @@ def _key(i, j, particle):
 
 
 @kernel
-def heard(first, count, pair_i, pair_j, closing, touched, particle, keys, speeds):
-    """Key (smaller index << 32, larger index + 1) and speed of pairs that have touched; closing becomes -1. Returns how many.
+def heard(first, count, pair_i, pair_j, closing, bounced, touched, particle, keys, speeds, bounces):
+    """Key (smaller index << 32, larger index + 1), speed and bounces of pairs that have touched; closing becomes -1, bounced 0.
+
+    Returns how many.
 
     touched: (room,) bool, becomes whether each has.
     """
@@ -27,7 +29,9 @@ def heard(first, count, pair_i, pair_j, closing, touched, particle, keys, speeds
             if touched[k]:
                 keys[found] = _key(pair_i[k], pair_j[k], particle)
                 speeds[found] = closing[k]
+                bounces[found] = bounced[k]
                 closing[k] = -1
+                bounced[k] = 0
                 found += 1
     return found
 
@@ -44,30 +48,32 @@ def recall(first, count, pair_i, pair_j, touched, particle, keys):
 
 
 @kernel
-def changed(first, count, pair_i, pair_j, closing, touched, particle, new, speeds, gone):
-    """Keys and speeds of pairs that have touched and had not, keys of those that had and have not; closing becomes -1.
+def changed(first, count, pair_i, pair_j, closing, bounced, touched, particle, new, speeds, bounces, gone):
+    """Keys, speeds and bounces of pairs that have touched and had not, or have bounced, and keys of those that had and have not.
 
-    The pairs come in packs of eight. touched: (room,) bool, whether each had, becomes whether it has. Returns how many are new,
-    and gone.
+    closing becomes -1, bounced 0. The pairs come in packs of eight. touched: (room,) bool, whether each had, becomes whether it
+    has. Returns how many of each there are.
     """
+    packs = bounced.view(np.uint64)
     begun = ended = 0
     zero, silent = spread(closing.dtype.type(0)), spread(closing.dtype.type(-1))
     for s in range(first.shape[0]):
         for pack in range(first[s], first[s] + count[s], LANES):
             differs = (ALL - which_above(zero, load(closing, pack))) ^ which_set(touched, pack, 1)
-            if differs != 0:  # in a heap at rest, for hardly any pack
+            if differs != 0 or packs[pack // LANES] != 0:  # in a heap at rest, for hardly any pack
                 for k in range(pack, pack + LANES):
                     now = closing[k] >= 0
-                    if now == touched[k]:
+                    if now == touched[k] and bounced[k] == 0:
                         continue
                     key = _key(pair_i[k], pair_j[k], particle)
                     if now:
-                        new[begun], speeds[begun] = key, closing[k]
+                        new[begun], speeds[begun], bounces[begun] = key, closing[k], bounced[k]
                         begun += 1
                     else:
                         gone[ended] = key
                         ended += 1
                     touched[k] = now
+                packs[pack // LANES] = 0
             store(closing, pack, silent)
     return begun, ended
 

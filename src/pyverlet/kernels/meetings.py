@@ -22,7 +22,7 @@ import numpy as np
 
 from pyverlet.compile.bundle import bundle
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
-from pyverlet.kernels.bounds import look, meet, moved, noted, put, wide
+from pyverlet.kernels.bounds import FIRST_OBSTACLE, hit_with, look, meet, moved, note, noted, put, wide
 from pyverlet.kernels.obstacles import first_link, search, tolerance
 
 MEETINGS, BOUNCES = 256, 8
@@ -109,6 +109,16 @@ def _beyond(room, x, y, radius):
 
 
 @kernel
+def _wall(room, nx, ny):
+    """Number of the wall of the room with this normal: of a rectangle left, right, floor and ceiling; of a cage there is one."""
+    if room[0] != RECTANGLE:
+        return np.int64(0)
+    if nx != 0.0:
+        return np.int64(0 if nx > 0.0 else 1)
+    return np.int64(2 if ny > 0.0 else 3)
+
+
+@kernel
 def _kept(room, b):
     """The circle b, not beyond any wall of the room."""
     for _ in range(2):  # a corner
@@ -120,13 +130,15 @@ def _kept(room, b):
 
 
 @kernel
-def _touched(b, nx, ny, depth, wx, wy, h, lag, e, mu, rest_speed, which):
+def _touched(b, i, impacts, surface, nx, ny, depth, wx, wy, h, lag, e, mu, rest_speed, which):
     """The circle b meets a surface that moves with (wx, wy): what becomes of it, and the surface; NOBODY's if it bounced."""
-    resting, from_x, from_y = b.resting, b.from_x, b.from_y
+    resting, hit, from_x, from_y = b.resting, b.hit, b.from_x, b.from_y
     # As the surface sees it: how fast it is, and how far it went.
     b = noted(moved(b, b.x, b.y, b.vx - wx, b.vy - wy, from_x + h * wx, from_y + h * wy), np.int64(0))
-    b = meet(b, nx, ny, depth, h, lag, e, mu, rest_speed)
+    b = meet(hit_with(b, -1.0), nx, ny, depth, h, lag, e, mu, rest_speed)
     held = b.resting != 0
+    note(impacts, i, surface, np.int64(not held), b.hit)
+    b = hit_with(b, max(hit, b.hit))
     b = noted(moved(b, b.x, b.y, b.vx + wx, b.vy + wy, from_x, from_y), resting | b.resting)
     speed = nx * (wx - b.lift * b.ax) + ny * (wy - b.lift * b.ay)
     return b, Surface(nx, ny, nx * b.x + ny * b.y, speed, which if held else NOBODY)
@@ -227,7 +239,9 @@ def _carried(segment, time, px, py, qx, qy):
 
 
 @kernel
-def _travel(b, px, py, segments, bodies, until, x0, y0, x1, y1, cell, heads, links, room, h, lag, rest_speed):
+def _travel(
+    b, i, impacts, px, py, segments, bodies, until, x0, y0, x1, y1, cell, heads, links, room, h, lag, rest_speed
+):
     """The circle b comes from p: (what becomes of it, whether it has met anything, the acceleration left to it if it is held)."""
     size, along_x, along_y, bounces = b.radius, 0.0, 0.0, 0
     x_then, y_then, vx_then, vy_then = b.x, b.y, b.vx, b.vy
@@ -246,7 +260,7 @@ def _travel(b, px, py, segments, bodies, until, x0, y0, x1, y1, cell, heads, lin
             if segment.around == 0 and nx * segment.bs - ny * segment.bc < 0.0:
                 belt_x, belt_y = -belt_x, -belt_y
             wx, wy = body.vx - body.spin * touch_y + belt_x, body.vy + body.spin * touch_x + belt_y
-            e, mu = segment.restitution, segment.friction
+            e, mu, surface = segment.restitution, segment.friction, FIRST_OBSTACLE + segment.body
             squeezed = number == 0 and time <= 0.0 and (time < 0.0 or gap < segment.rounding + (1.0 - SQUEEZED) * size)
         else:
             if number == 0:
@@ -255,11 +269,12 @@ def _travel(b, px, py, segments, bodies, until, x0, y0, x1, y1, cell, heads, lin
             if depth <= least:
                 break
             k, time, wx, wy, e, mu, squeezed = ROOM, 0.0, 0.0, 0.0, room[5], room[6], False
+            surface = _wall(room, nx, ny)
         if number == MEETINGS or bounces == BOUNCES:
             b = moved(b, px, py, b.vx, b.vy, b.from_x, b.from_y)
             break
         vx, vy = b.vx, b.vy
-        b, new = _touched(b, nx, ny, depth, wx, wy, h, lag, e, mu, np.inf if squeezed else rest_speed, k)
+        b, new = _touched(b, i, impacts, surface, nx, ny, depth, wx, wy, h, lag, e, mu, np.inf if squeezed else rest_speed, k)
         if k != ROOM:
             if time < 0.0:  # it was inside: the way so far does not count
                 px, py = b.x, b.y
@@ -347,8 +362,8 @@ def _collide(first, stop, circles, course, until, x0, y0, x1, y1, cell, h, lag, 
                 x = _unrounded(b.x + rest_x, px, b.vx, b.ax, long, drop, step)
                 y = _unrounded(b.y + rest_y, py, b.vy, b.ay, long, drop, step)
                 b, met, along_x, along_y = _travel(
-                    moved(b, x, y, b.vx, b.vy, b.from_x, b.from_y), px, py, segments, bodies, until, x0, y0, x1, y1, cell,
-                    heads, links, room, long, np.float64(lag), np.float64(rest_speed),
+                    moved(b, x, y, b.vx, b.vy, b.from_x, b.from_y), i, circles.impacts, px, py, segments, bodies, until, x0, y0,
+                    x1, y1, cell, heads, links, room, long, np.float64(lag), np.float64(rest_speed),
                 )  # fmt: skip
                 if met:
                     along[i, 0], along[i, 1] = along_x, along_y

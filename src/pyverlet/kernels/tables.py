@@ -48,6 +48,7 @@ class Circles:
     friction: Any
     hits: Any
     spent: Any
+    impacts: Any
     before: Any
     spin_before: Any
     lent: Any
@@ -77,6 +78,7 @@ class Pairs:
     deep: Any
     deeps: Any
     spent: Any
+    bounced: Any
 
 
 class Law(NamedTuple):

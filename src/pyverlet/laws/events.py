@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import is_
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,24 +10,26 @@ from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.kernels import events as kernels
+from pyverlet.kernels.bounds import FIRST_OBSTACLE, SURFACES
 from pyverlet.laws.contacts.wide import Wide
-from pyverlet.laws.obstacles import Course
+from pyverlet.laws.obstacles import Course, Obstacle
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
 Array = NDArray[Any]
-Told = tuple[Array, Array, Array]
-"""Keys, sorted, of those who have parted in a frame, who have met, and who touch."""
+Compared = tuple[Array, Array, Array]
+"""Keys, sorted, of contacts that have ended in a frame, that have begun, and that touch."""
 
 WALL = -1
 """In the place of b: a wall of the bounds, or an obstacle."""
 
-CONTACT = np.dtype([("a", np.int64), ("b", np.int64)])
-"""Indices a < b of two particles; or a and WALL."""
+CONTACT = np.dtype([("a", np.int64), ("b", np.int64), ("wall", np.int64), ("obstacle", np.int64)])
+"""Indices a < b of two particles; or a and WALL, and which wall of the room or which obstacle it is, else -1."""
 
-_LOWER = 0xFFFFFFFF
-"""Bits of a key that are b + 1, of two particles' a < b; 0 is a wall. The others are a."""
+_LOWER, _SURFACE, _LOST = 0xFFFFFFFF, 0x80000000, 0x7FFFFFFF
+"""Bits of a key that are b + 1, of two particles' a < b, or `_SURFACE` and the number of one; the others are a. Numbers from
+`FIRST_OBSTACLE` on are obstacles', lower ones are walls', and `_LOST` is that of obstacles that have been removed."""
 
 HIT = np.dtype(
     [
@@ -34,21 +37,42 @@ HIT = np.dtype(
         ("point", np.float64, (2,)), ("normal", np.float64, (2,)), ("impulse", np.float64),
     ]
 )  # fmt: skip
-"""The same, and the normal speed they met with, m/s; which wall of the room or which obstacle it was, else -1; where they touch,
-m, and the unit normal out of a, both as of the end of the frame; what turned them, (1 + e) times the reduced mass times the
-speed, N s. NaN where a room of the user's own does not say."""
+"""The same, and the largest normal speed they met with, m/s; where they touch, m, and the unit normal out of a, both as of the
+end of the frame; what turned them, (1 + e) times the reduced mass times the speed, N s. NaN where a room of the user's own does
+not say."""
+
+
+class Told(NamedTuple):
+    """What was told of contacts, in any order."""
+
+    keys: Array
+    speeds: Array
+    """Largest speed of approach, m/s."""
+    bounces: Array
+    """How often they bounced."""
+
+    @classmethod
+    def of(cls, parts: list[Told]) -> Told:
+        """All of these."""
+        return cls(*(np.concatenate([part[k] for part in parts]) for k in range(3)))
 
 
 class Events:
-    """Contacts of the last frame, as structured arrays sorted by a, then b. Those who touch in any substep touch in the frame.
+    """Contacts of the last frame, as structured arrays sorted by a, then b; a removed particle stays where it was.
 
-    In a pile that comes to rest, contacts without weight may end and begin again. Indices stay valid until the next frame: when
-    particles are removed, these arrays are renumbered in place, and a removed particle is -1 in them. Copies are not.
+    Those who touch in any substep touch in the frame.
+
+    Contacts with each wall of the room, each obstacle and each other particle are told apart. A contact begins again with every
+    bounce, after an end, even if it touched in the frame before. In a pile that comes to rest, contacts without weight may end
+    and begin again.
+
+    Indices stay valid until the next frame: when particles are removed, these arrays are renumbered in place, and a removed
+    particle is -1 in them. Copies are not renumbered.
 
     Attributes:
-        begin: HIT, those who touch now and did not in the frame before.
-        end: CONTACT, those who did and do not now; a particle that has been removed is -1.
-        hit: HIT, those of `begin` who met with at least `hit_speed`.
+        begin: HIT, contacts that touch now and did not in the frame before, and bounces.
+        end: CONTACT, those that did and do not now, and those that bounce; a removed particle or obstacle is -1.
+        hit: HIT, those of `begin` that met with at least `hit_speed`.
     """
 
     def __init__(self) -> None:
@@ -57,9 +81,9 @@ class Events:
         self.end = np.empty(0, CONTACT)
         self._touching = np.empty(0, np.int64)  # keys, sorted
         self._at_wall = self._touching  # those of them that are about walls; known where the next is
+        self._obstacles: list[Obstacle] | None = None  # that the keys number; None: those of now
         self._known: Array | None = None  # `touched` of the list in which those of the frame before are marked
-        self._keys: list[Array] = []
-        self._speeds: list[Array] = []
+        self._told: list[Told] = []
 
     def __repr__(self) -> str:
         return f"Events of the last frame: {len(self.begin)} begin, {len(self.end)} end, {len(self.hit)} hit"
@@ -82,6 +106,7 @@ class Events:
     def take(self, other: Events) -> None:
         """Remember what the other does."""
         self._hit_speed, self._touching, self._known = other._hit_speed, other._touching, None
+        self._at_wall, self._obstacles = other._at_wall, other._obstacles
         self.begin, self.end, self.hit = other.begin.copy(), other.end.copy(), other.hit.copy()
 
     def renumber(self, now: Array) -> None:
@@ -92,68 +117,94 @@ class Events:
     # ---- what the engine tells ---------------------------------------------------------------------------------------
 
     def collect(self, state: Slots, pairs: Wide) -> None:
-        """The list of pairs is about to change, or the frame ends: keep what was heard."""
+        """The list of pairs is about to change, or the frame ends: keep what was told."""
         room, which = len(pairs.closing), pairs.listed()
-        keys, speeds = np.empty(room, np.int64), np.empty(room)
-        found = kernels.heard(*which, pairs.closing, pairs.touched, state.particle, keys, speeds)
-        self._keys.append(keys[:found])
-        self._speeds.append(speeds[:found])
+        told = _room_for(room)
+        found = kernels.heard(*which, pairs.closing, pairs.bounced, pairs.touched, state.particle, *told)
+        self._told.append(Told(*(column[:found] for column in told)))
 
     def forget(self) -> None:
         """A frame begins, or begins again."""
-        self._keys, self._speeds = [], []
+        self._told = []
 
     def close(self, slots: Slots, state: State, pairs: Wide | None, place: Place) -> None:
-        """The frame has gone well: what was heard is what happened; `pairs`: the list of now; `place`: who and what they met."""
-        at_wall = np.flatnonzero(slots.hits >= 0)
-        walls, wall_speeds = slots.particle[at_wall].astype(np.int64) << 32, slots.hits[at_wall].astype(float)
-        if pairs and pairs.touched is self._known and not (self._keys or (len(slots.island) and len(slots.asleep))):
-            told, speeds = self._compare_pairs(slots, state, pairs, walls, wall_speeds)
-        else:
-            told, speeds = self._compare_keys(slots, state, pairs, walls, wall_speeds)
-        gone, new, self._touching = told
-        self.end, met = _contacts(np.concatenate((gone, new)), len(gone), state)
-        self.begin = place.hits(met, speeds, state)
+        """The frame has gone well: what was told is what happened; `pairs`: the list of now; `place`: what they met."""
+        lost = self._number_obstacles(place.course.seen())
+        walls = place.walls(slots)
+        compare = self._compare_keys
+        if pairs and pairs.touched is self._known and not (self._told or (len(slots.island) and len(slots.asleep))):
+            compare = self._compare_pairs
+        told, (gone, new, now) = compare(slots, state, pairs, walls)
+        # Bounces: each is a beginning, and but for the last an end; another one, if they touched before, ends what went on.
+        again, bounces = _counted(told)
+        begun = np.unique(np.concatenate((new, again)))
+        times = np.ones(len(begun), np.int64)
+        times[np.searchsorted(begun, again)] = bounces
+        ended = np.concatenate((lost, gone, np.repeat(again, bounces - 1 + _among(again, self._touching))))
+        speeds = kernels.largest(begun, *told[:2])
+        self._touching = now
+        self.end = _contacts(np.sort(ended ^ _SURFACE) ^ _SURFACE, state)  # walls and obstacles before particles
+        order = np.argsort(begun ^ _SURFACE)
+        begun, speeds = (np.repeat(column[order], times[order]) for column in (begun, speeds))
+        self.begin = place.hits(_contacts(begun, state), speeds, state)
         self.hit = self.begin[speeds >= self._hit_speed]
         self.forget()
 
-    def _compare_pairs(self, slots: Slots, state: State, pairs: Wide, walls: Array, wall_speeds: Array) -> tuple[Told, Array]:
+    def _compare_pairs(self, slots: Slots, state: State, pairs: Any, walls: Told) -> tuple[Told, Compared]:
         """The list is that of the frame before, where those who touched are marked: few have changed, and are sorted."""
         room = len(pairs.closing)
-        new, speeds, gone = np.empty(room, np.int64), np.empty(room), np.empty(room, np.int64)
-        which = pairs.listed()
-        begun, ended = kernels.changed(*which, pairs.closing, pairs.touched, slots.particle, new, speeds, gone)
-        told = _numbered(np.concatenate((new[:begun], walls)), state)
-        walls, before = np.sort(told[begun:]), self._at_wall
-        self._at_wall = walls
-        left = np.unique(np.concatenate((_numbered(gone[:ended], state), before[kernels.absent(before, walls)])))
-        come = np.unique(np.concatenate((told[:begun], walls[kernels.absent(walls, before)])))
-        now = kernels.replaced(self._touching, left, come) if len(left) or len(come) else self._touching
-        return (left, come, now), kernels.largest(come, told, np.concatenate((speeds[:begun], wall_speeds)))
+        found, gone = _room_for(room), np.empty(room, np.int64)
+        changed: Any = kernels.changed
+        which = (*pairs.listed(), pairs.closing, pairs.bounced, pairs.touched, slots.particle)
+        begun, ended = changed(*which, *found, gone)
+        told = Told.of([Told(*(column[:begun] for column in found)), walls])
+        told = told._replace(keys=_numbered(told.keys, state))
+        before = self._at_wall
+        self._at_wall = now = np.unique(told.keys[begun:])
+        left = np.unique(np.concatenate((_numbered(gone[:ended], state), before[kernels.absent(before, now)])))
+        come = np.unique(told.keys)
+        come = come[~_among(come, self._touching)]
+        touching = kernels.replaced(self._touching, left, come) if len(left) or len(come) else self._touching
+        return told, (left, come, touching)
 
-    def _compare_keys(
-        self, slots: Slots, state: State, pairs: Wide | None, walls: Array, wall_speeds: Array
-    ) -> tuple[Told, Array]:
+    def _compare_keys(self, slots: Slots, state: State, pairs: Wide | None, walls: Told) -> tuple[Told, Compared]:
         """The list is another, or circles sleep, who are not in it: all that touch are sorted and compared with those before."""
-        earlier = np.sort(np.concatenate(self._keys)) if self._keys else self._touching[:0]
+        earlier = np.sort(np.concatenate([told.keys for told in self._told])) if self._told else self._touching[:0]
         if pairs:
             self.collect(slots, pairs)
             if len(earlier):
                 kernels.recall(*pairs.listed(), pairs.touched, slots.particle, earlier)
         self._known = pairs.touched if pairs and not len(slots.asleep) else None
-        told = _numbered(np.concatenate((*self._keys, walls)), state)
+        told = Told.of([*self._told, walls])
+        told = told._replace(keys=_numbered(told.keys, state))
         # Those who sleep are not listed, but go on. To sort keys alone takes a third of what it takes to know their order.
-        now = np.sort(np.concatenate((told, self._sleeping(slots, state))))
+        now = np.sort(np.concatenate((told.keys, self._sleeping(slots, state))))
         now = now[np.diff(now, prepend=-1) > 0]
-        self._at_wall = now[(now & _LOWER) == 0]
+        self._at_wall = now[(now & _SURFACE) != 0]
         gone, new = self._touching[kernels.absent(self._touching, now)], now[kernels.absent(now, self._touching)]
-        return (gone, new, now), kernels.largest(new, told, np.concatenate((*self._speeds, wall_speeds)))
+        return told, (gone, new, now)
+
+    def _number_obstacles(self, obstacles: list[Obstacle]) -> Array:
+        """Number obstacles in the keys as they are numbered now; returns the keys of contacts with those that were removed."""
+        before, self._obstacles = self._obstacles, obstacles
+        if before is None or (len(before) == len(obstacles) and all(map(is_, before, obstacles))):
+            return self._touching[:0]
+        numbers = {id(obstacle): k for k, obstacle in enumerate(obstacles)}
+        now = np.array([*range(FIRST_OBSTACLE), *(FIRST_OBSTACLE + numbers.get(id(each), _LOST) for each in before)])
+        at_wall = (self._touching & _SURFACE) != 0
+        keys = self._touching[at_wall]
+        which = now[keys & _LOST]
+        kept = which < _LOST
+        lost: Array = keys[~kept] | _LOST
+        self._at_wall = np.sort((keys[kept] & ~_LOST) | which[kept])
+        self._touching = np.sort(np.concatenate((self._touching[~at_wall], self._at_wall)))
+        return lost
 
     def _sleeping(self, slots: Slots, state: State) -> Array:
         """Those of the contacts of the frame before whose circles sleep."""
         numbers = np.sort(state.number[slots.particle[slots.asleep]])
         b = (self._touching & _LOWER) - 1
-        return self._touching[_among(self._touching >> 32, numbers) & ((b < 0) | _among(b, numbers))]
+        return self._touching[_among(self._touching >> 32, numbers) & ((b >= _SURFACE - 1) | _among(b, numbers))]
 
 
 class Place(NamedTuple):
@@ -167,8 +218,9 @@ class Place(NamedTuple):
     def hits(self, met: Array, speed: Array, state: State) -> Array:
         """HIT from CONTACT and m/s, of circles that are where they are now."""
         found = np.zeros(len(met), HIT)
-        for name, column in (("a", met["a"]), ("b", met["b"]), ("speed", speed), ("wall", -1), ("obstacle", -1)):
-            found[name] = column
+        for name in CONTACT.names or ():
+            found[name] = met[name]
+        found["speed"] = speed
         at_wall = met["b"] == WALL
         pair, single = np.flatnonzero(~at_wall), np.flatnonzero(at_wall)
 
@@ -188,7 +240,7 @@ class Place(NamedTuple):
         if len(single):
             a = met["a"][single]
             x, e = of(state.position, a), of(state.restitution, a)
-            gap, into, surface = self._nearest(x, found, single)
+            gap, into, surface = self._surface(x, met["wall"][single], met["obstacle"][single])
             both = np.maximum(surface, np.where(e >= 0, e, 0.0))
             self._write(found, single, x - gap[:, None] * into, -into, both, 1 / of(state.mass, a))
         return found
@@ -197,26 +249,54 @@ class Place(NamedTuple):
         found["point"][rows], found["normal"][rows] = self.room.seam.wrapped(point), normal
         found["impulse"][rows] = (1 + e) * found["speed"][rows] / np.where(weight > 0, weight, np.inf)
 
-    def _nearest(self, x: Array, found: Array, rows: Array) -> tuple[Array, Array, Array]:
-        """Which wall or obstacle it was; its distance from the centres x, m, its normal, and its restitution."""
-        gap, into, surface = np.full(len(x), np.inf), np.full((len(x), 2), np.nan), np.zeros(len(x))
-        facing = self.room.facing(x)
-        if facing is not None:
-            wall = np.argmin(facing[0], axis=1)
-            found["wall"][rows], row = wall, np.arange(len(x))
-            gap, into = facing[0][row, wall].copy(), np.array(facing[1][row, wall])
-            surface[:] = getattr(self.room, "restitution", 0.0)
-        elif self.room.extent() is not None:  # of the user's own: it may have been its wall
-            found["wall"][rows] = 0
-        row, which, far, normal = self.course.facing(x)
-        nearer = np.diff(row, prepend=-1) > 0  # of equally near ones the first
-        nearer[nearer] = far[nearer] < gap[row[nearer]]
-        row, which = row[nearer], which[nearer]
-        found["obstacle"][rows[row]], found["wall"][rows[row]] = which, -1
-        gap[row], into[row] = far[nearer], normal[nearer]
+    def walls(self, slots: Slots) -> Told:
+        """What was noted of walls and obstacles in this frame."""
+        at = np.flatnonzero(slots.hits >= 0)
+        rows, hits = slots.impacts[at].astype(float), slots.hits[at].astype(float)
+        noted = rows[:, 1:].reshape(len(at), SURFACES, 3)
+        is_noted = np.arange(SURFACES) < rows[:, :1]
+        who, which = np.nonzero(is_noted)
+        surface, bounces, speeds = noted[who, which].T
+        number = surface.astype(np.int64)
+        obstacle = number >= FIRST_OBSTACLE  # with images in a periodic room
+        number[obstacle] = FIRST_OBSTACLE + (number[obstacle] - FIRST_OBSTACLE) % max(len(self.course.seen()), 1)
+        # A room of the user's own notes in `hits` alone.
+        bare = np.flatnonzero(hits > np.where(is_noted, noted[:, :, 2], -1.0).max(axis=1, initial=-1.0))
+        facing = self.room.facing(slots.position[at[bare]]) if len(bare) else None
+        nearest = np.zeros(len(bare), np.int64) if facing is None else np.argmin(facing[0], axis=1)
+        number, who = np.concatenate((number, nearest)), np.concatenate((who, bare))
+        keys = (slots.particle[at[who]].astype(np.int64) << 32) + _SURFACE + number
+        none = np.zeros(len(bare), np.int64)
+        return Told(keys, np.concatenate((speeds, hits[bare])), np.concatenate((bounces.astype(np.int64), none)))
+
+    def _surface(self, x: Array, wall: Array, obstacle: Array) -> tuple[Array, Array, Array]:
+        """Distance of walls or obstacles from centres x, m, their normals and restitutions; NaN where that is not known."""
+        gap, into, surface = np.full(len(x), np.nan), np.full((len(x), 2), np.nan), np.zeros(len(x))
+        surface[wall >= 0] = getattr(self.room, "restitution", 0.0)
         obstacles = self.course.seen()
-        surface[row] = [obstacles[k].restitution for k in which]
-        return np.where(np.isfinite(gap), gap, np.nan), into, surface
+        surface[obstacle >= 0] = np.array([each.restitution for each in obstacles] or [0.0])[obstacle[obstacle >= 0]]
+        rows = np.flatnonzero(wall >= 0)
+        if len(rows) and (found := self.room.facing(x[rows])) is not None:
+            far, normal = found
+            row, column = np.arange(len(rows)), wall[rows]
+            gap[rows], into[rows] = far[row, column], normal[row, column]
+        rows = np.flatnonzero(obstacle >= 0)
+        if len(rows):
+            facing = self.course.facing(x[rows], np.inf)
+            mine = facing.obstacle == obstacle[rows[facing.row]]
+            gap[rows[facing.row[mine]]], into[rows[facing.row[mine]]] = facing.gap[mine], facing.normal[mine]
+        return gap, into, surface
+
+
+def _room_for(room: int) -> Told:
+    return Told(np.empty(room, np.int64), np.empty(room), np.empty(room, np.int64))
+
+
+def _counted(told: Told) -> tuple[Array, Array]:
+    """Keys, sorted, of those that have bounced, and how often."""
+    bounced = np.flatnonzero(told.bounces)
+    keys, where = np.unique(told.keys[bounced], return_inverse=True)
+    return keys, np.bincount(where, told.bounces[bounced], len(keys)).astype(np.int64)
 
 
 def renumber(records: Array, now: Array) -> None:
@@ -235,8 +315,10 @@ def _numbered(keys: Array, state: State) -> Array:
     """Keys from numbers, which particles keep, in the place of keys from indices, which they do not."""
     if _as_indices(state):
         return keys
-    b = (keys & _LOWER) - 1
-    return np.asarray((state.number[keys >> 32] << 32) + np.where(b >= 0, state.number[b] + 1, 0))
+    lower = keys & _LOWER
+    at_wall = (lower & _SURFACE) != 0
+    other = np.where(at_wall, lower, state.number[np.where(at_wall, 0, lower - 1)] + 1)
+    return np.asarray((state.number[keys >> 32] << 32) + other)
 
 
 def _among(keys: Array, others: Array) -> Array:
@@ -247,11 +329,15 @@ def _among(keys: Array, others: Array) -> Array:
     return np.asarray(others[where] == keys)
 
 
-def _contacts(keys: Array, split: int, state: State) -> tuple[Array, Array]:
-    """CONTACT from the first `split` keys, and from the others, by the indices of now; removed particles are -1."""
-    found = np.empty(len(keys), CONTACT)
-    found["a"], found["b"] = _index(keys >> 32, state), _index((keys & _LOWER) - 1, state)
-    return found[:split], found[split:]
+def _contacts(keys: Array, state: State) -> Array:
+    """CONTACT from keys, by the indices of now; removed particles are -1."""
+    found, lower = np.empty(len(keys), CONTACT), keys & _LOWER
+    at_wall = (lower & _SURFACE) != 0
+    number = np.where(at_wall, lower & _LOST, _LOST)
+    found["a"], found["b"] = _index(keys >> 32, state), np.where(at_wall, WALL, _index(lower - 1, state))
+    found["wall"] = np.where(number < FIRST_OBSTACLE, number, -1)
+    found["obstacle"] = np.where((number >= FIRST_OBSTACLE) & (number < _LOST), number - FIRST_OBSTACLE, -1)
+    return found
 
 
 def _index(number: Array, state: State) -> Array:

@@ -16,6 +16,7 @@ from pyverlet.compile.rows import WIDTH
 from pyverlet.compile.stealing import Claims
 from pyverlet.ground import memory
 from pyverlet.kernels import motion, tables
+from pyverlet.kernels.bounds import SURFACES
 from pyverlet.state import seam
 from pyverlet.state.state import COLUMNS, EVERYONE, MARKS, ROWS, SET, State
 from pyverlet.state.unchanged import Unchanged
@@ -53,15 +54,17 @@ class Slots:
         lean: times -a h it is the velocity with which circles at rest against others end a substep; 0 until contacts say so.
         resting: (n,) bits of `kernels.motion`: who held it in the last substep, a wall or, after a frame, another particle.
         hits: (n,) largest speed with which the circle met a wall in this frame, m/s; negative: none.
+        impacts: (n, 1 + 3 SURFACES), of each circle in this frame: how many surfaces it has met, and of each of these its number,
+            how often it bounced, and the largest speed, m/s; empty unless events are recorded.
         spent: (n, 2) J that impacts on walls, and friction there, have taken in this frame, negative: to be summed, for rows stay
             where they are; empty unless somebody keeps account. taken: J, by the energy limiter. worked: J, brought by the room.
 
     Args:
-        sleeps: whether particles may sleep.
+        sleeps: whether particles may sleep. events: whether events are recorded.
     """
 
-    def __init__(self, dtype: np.dtype[Any], *, sleeps: bool = False) -> None:
-        self.dtype, self._sleeps = dtype, sleeps
+    def __init__(self, dtype: np.dtype[Any], *, sleeps: bool = False, events: bool = False) -> None:
+        self.dtype, self._sleeps, self._events = dtype, sleeps, events
         self.real = lru_cache(64)(dtype.type)
         self.reals = lru_cache(64)(lambda *numbers: tuple(map(dtype.type, numbers)))
         self._kept: dict[str, Array] = {}
@@ -97,6 +100,7 @@ class Slots:
         self._given: dict[str, Any] = {name: np.zeros(0, np.uint32 if name in MARKS else self.dtype) for name in _GIVEN}
         self._changed = self._grows = True
         self.hits = np.full(count, -1, self.dtype)
+        self.impacts = np.zeros((count if self._events else 0, 1 + 3 * SURFACES), self.dtype)
         self.spent = np.empty((0, 2))
         self.category = self.mask = np.empty(0, np.uint32)
         self.most_restitution = self.most_friction = -1.0
@@ -200,6 +204,7 @@ class Slots:
     def clear_notes(self) -> None:
         """Forget what walls and friction have noted in the last frame."""
         self.hits.fill(-1)
+        self.impacts[:, 0] = 0
         self.taken = self.worked = 0.0
         if len(self.spent):
             self.spent.fill(0)
@@ -266,6 +271,8 @@ class Slots:
         for name in (*COLUMNS, *MARKS, "inverse_mass", "particle", "resting", *_REMEMBERED, "start", "hits"):
             if name not in alike and len(column := getattr(self, name)):
                 setattr(self, name, memory.taken(column, order))
+        if len(self.impacts):
+            self.impacts = self.impacts[order]
         self.resize()
         self._slot_of = None
 
@@ -289,7 +296,7 @@ class Slots:
         arrays = (
             self.position, self.velocity, self.acceleration, self.inverse_mass, rows, rows, self.resting, self.spin, none,
             self.fed, wide, self.turn, self.lift, none, self.start, self.radius, self.restitution, self.friction, self.hits,
-            self.spent, rows, none, none, none, none, rows,
+            self.spent, self.impacts, rows, none, none, none, none, rows,
         )  # fmt: skip
         self._circles = hold(tables.Circles, arrays, self._circles)
         return self._circles

@@ -1,6 +1,6 @@
 """Actors do something to a world before each frame: emitters add particles, sinks remove them.
 
-To add one: a class deriving from `Actor` with `act`; `save` and `restore` if it remembers anything.
+To add one: a class deriving from `Actor` with `act`, perhaps `after`; `save` and `restore` if it remembers anything.
 """
 
 from __future__ import annotations
@@ -21,6 +21,9 @@ from pyverlet.laws.rooms import Boundary, Box, Circle
 if TYPE_CHECKING:
     from pyverlet.world.world import World
 
+_PLACES = 33
+"""Places on a way at which a sink asks a region of the user's own."""
+
 _TRIES = 4
 """Places an emitter looks at for each particle that is due."""
 
@@ -34,6 +37,9 @@ class Actor(Shown, ABC):
 
         Those removed before it is their turn do not act; those added act from the next frame on.
         """
+
+    def after(self, world: World, dt: float) -> None:
+        """Called after a frame of dt seconds that went well."""
 
     def save(self) -> Any:
         """What `restore` needs to act again as from now; part of `world.save()`."""
@@ -50,6 +56,13 @@ def act_once(world: World, dt: float) -> None:
         # In most frames the list stays as it is, and looking for each actor in it would cost n^2.
         if (place < len(actors) and actors[place] is actor) or any(listed is actor for listed in actors):
             actor.act(world, dt)
+
+
+def act_after(world: World, dt: float) -> None:
+    """Actors that look at what a frame has done."""
+    for actor in tuple(world.actors):
+        if isinstance(actor, Actor):
+            actor.after(world, dt)
 
 
 class Emitter(Actor):
@@ -147,7 +160,7 @@ class Emitter(Actor):
 
 
 class Sink(Actor):
-    """Removes the particles whose centre is in a region.
+    """Removes the particles whose centre is in a region, before a frame, or has crossed it in a straight line, after that frame.
 
     Args:
         region: Box, Circle or a boundary of your own.
@@ -165,13 +178,63 @@ class Sink(Actor):
         self.region = region
         self.outside = bool(outside)
         self.removed = 0
+        self._start = np.empty(0, np.int64), np.empty((0, 2))  # numbers and positions when the frame began
 
     def act(self, world: World, dt: float) -> None:
-        outside = self.region.outside(world.position)
-        gone = np.flatnonzero(outside if self.outside else ~outside)
+        self._remove(world, np.flatnonzero(self._takes(world.position)))
+        self._start = world.number.copy(), world.position.copy()
+
+    def after(self, world: World, dt: float) -> None:
+        number, start = self._start
+        if not len(number) or not len(world):
+            return
+        where = np.searchsorted(number, world.number).clip(max=len(number) - 1)
+        known = np.flatnonzero(number[where] == world.number)
+        start, end = start[where[known]].astype(float), world.position[known].astype(float)
+        way = world.boundary.seam.nearest(end - start)
+        crossed = self._crossed(start, start + way)
+        if world.boundary.seam:  # the part of the way beyond the seam
+            crossed |= self._crossed(end - way, end)
+        crossed &= ~self._takes(end)  # these are removed before the next frame
+        self._remove(world, known[crossed])
+
+    def _remove(self, world: World, gone: NDArray[np.intp]) -> None:
         if len(gone):
             world.remove(gone)
             self.removed += len(gone)
+
+    def _takes(self, position: NDArray[Any]) -> NDArray[np.bool_]:
+        """Which of these centres are where particles are removed."""
+        outside = self.region.outside(position)
+        return np.asarray(outside if self.outside else ~outside)
+
+    def _crossed(self, start: NDArray[Any], end: NDArray[Any]) -> NDArray[np.bool_]:
+        """Which of the ways from `start` (n, 2) to `end`, m, lead through places where particles are removed."""
+        crossed = np.zeros(len(start), bool)
+        if self.outside and type(self.region) in (Box, Circle):
+            return crossed  # convex: ways between places inside stay inside
+        extent = self.region.extent()
+        may = (start != end).any(axis=1)
+        if extent is not None and not self.outside:
+            low, high = np.array(extent[:2]), np.array(extent[2:])
+            may &= ((np.minimum(start, end) <= high) & (np.maximum(start, end) >= low)).all(axis=1)
+        rows = np.flatnonzero(may)
+        p, way = start[rows], end[rows] - start[rows]
+        if type(self.region) is Box:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                one, other = (low - p) / way, (high - p) / way
+            # A way along an axis is between the sides across it: the rows that are not have been left out.
+            enters = np.where(way == 0, 0.0, np.minimum(one, other)).max(axis=1, initial=0.0)
+            leaves = np.where(way == 0, 1.0, np.maximum(one, other)).min(axis=1, initial=1.0)
+            crossed[rows] = enters <= leaves
+        elif type(self.region) is Circle:
+            to = np.asarray(self.region.center) - p
+            t = ((to * way).sum(axis=1) / (way * way).sum(axis=1)).clip(0, 1)
+            crossed[rows] = np.hypot(*(to - t[:, None] * way).T) <= self.region.radius
+        else:
+            for t in np.linspace(0, 1, _PLACES):
+                crossed[rows] |= self._takes(p + t * way)
+        return crossed
 
     def save(self) -> Any:
         return self.removed

@@ -14,17 +14,18 @@ from numpy.typing import NDArray
 from pyverlet.ground.constants import REST_ACCELERATIONS, SURPLUS
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.laws.contacts.broadphase import Fast
-from pyverlet.kernels.runs import partners
+from pyverlet.laws.contacts.collisions import Collisions
 from pyverlet.laws.contacts.growth import Growth
+from pyverlet.laws.integrators import PositionVerlet
 from pyverlet.laws.limiter import fall, watched
 from pyverlet.laws.rooms import Open
 from pyverlet.state.moves import first_non_finite
 from pyverlet.world.free_steps import FreeSteps, kicks
 from pyverlet.world.impulse_arrays import ImpulseArrays
+from pyverlet.world.impulse_links import ImpulseLinks
 from pyverlet.world.impulse_materials import knows
-from pyverlet.world.impulse_notes import ImpulseNotes
 from pyverlet.world.impulse_memory import Memory
-from pyverlet.world.link_rows import LinkRows
+from pyverlet.world.impulse_notes import ImpulseNotes
 
 Array = NDArray[Any]
 
@@ -48,6 +49,9 @@ PUSH_OUT = 15.0
 
 RELAXING_SWEEPS = 2
 
+PASSES = 4
+"""Of the fixed-point iteration for forces that depend on the velocity."""
+
 NEAR = 0.05
 """Of the largest radius: pairs and walls with larger gaps carry no load."""
 
@@ -59,27 +63,38 @@ class ImpulseFrames:
         self._dtype = dtype
         self.held = ImpulseArrays(dtype)
         self._flight = FreeSteps()
-        self._links = LinkRows()
-        self._apart: Any = None  # pairs that the engine does not let touch
-        self._linked: Any = None  # passes and seam that the engine knows of links
-        self._checked: Any = None  # what the world was made of when it was last found to be known
+        self.links = ImpulseLinks()
         self._law: Any = None  # numbers that the engine holds
         self._pull: tuple[Any, float] = None, 0.0  # gravity, and how strong it is, m/s^2
         self.growth = Growth()
+        self.steps = False  # whether the last frame was one of this law
         # What contacts remember between frames.
         self.save, self.renumber = self.held.save, self.held.renumber
 
     def forget(self) -> None:
         """No contact remembers anything."""
-        self._links.forget()
+        self.links.forget()
         self.held.forget()
 
     def restore(self, memory: Memory) -> None:
         """Back to what `save` returned; links have gone back to theirs."""
-        self._links.forget()
+        self.links.forget()
         self.held.restore(memory)
+        self.steps = memory.kick > 0
 
     # ---- a frame -------------------------------------------------------------------------------------------------------------
+
+    def takes(self, world: Any) -> bool:
+        """Whether the frame that begins is one of this law. Another one forgets what contacts have remembered."""
+        law = world.collisions
+        wanted = Collisions.impulses if law is None else law.impulses
+        steps = not self.unknown(world) if wanted is None else wanted
+        if steps != self.steps:
+            self.steps = steps
+            self.forget()
+            if world._contacts:
+                world._contacts.broad_phase.forget()
+        return steps
 
     def step(self, world: Any, dt: float) -> None:
         """Advance the slots of a world by a frame of dt seconds: all of `World.step` but for what its arrays become.
@@ -88,35 +103,28 @@ class ImpulseFrames:
             InputError: there is something in the world that this law does not know yet.
             NonFiniteError: a particle turned NaN or infinite.
         """
-        if (known := (world.collisions, len(world.links), len(world.obstacles))) != self._checked:
-            self.check(world)
-            self._checked = known
+        if found := self.unknown(world):
+            raise InputError(f"impulses is True in a world with {found[0]}; allowed are circles, obstacles and forces in a room")
         world._slots.rows = self.held.core
         world._slots.clear_notes()
-        self._keep_apart(world)
+        self.links.keep_apart(world, self.held.engine)
         if world._gather():
             self.held.forget_list()
         if not self.run(world, dt, world.profile.mark):
             self._refuse_non_finite(world, dt)
 
-    def check(self, world: Any) -> None:
-        """Refuse what this law does not know yet.
-
-        Raises:
-            InputError: there is such a thing in the world.
-        """
-        if found := self.unknown(world):
-            raise InputError(f"impulses is True in a world with {found[0]}; allowed are circles in a room, with forces")
-
     def unknown(self, world: Any) -> list[str]:
-        """What this law does not know yet."""
-        unknown = {
-            "a ledger": world.keeps_ledger,
-            "events": world.tells_events,
-            "sleep=True": world._sleep is not None,
-            "brute force": world.collisions is not None and not isinstance(world.collisions.method, Fast),
-        }
-        return [name for name, there in unknown.items() if there]
+        """What there is in a world that this law does not know yet."""
+        law, found = world.collisions, []
+        if world._books:
+            found.append("a ledger")
+        if world._events:
+            found.append("events")
+        if world._sleep:
+            found.append("sleep=True")
+        if law and not isinstance(law.method, Fast):
+            found.append("brute force")
+        return found
 
     def run(self, world: Any, dt: float, done: Callable[[str], None]) -> bool:
         """Advance the gathered slots by a frame of dt seconds. False if a particle turned NaN or infinite."""
@@ -131,31 +139,48 @@ class ImpulseFrames:
         self._stiffen(h, dt)
         own_walls = None if knows(world.boundary) else world.boundary.confine
         alone = by_core and not (forces.forces or own_walls)
-        watch = watched(world, dt / world.substeps, None) if contained and (forces.forces or world.links) else None
+        limited = bool(collisions and len(world) > 1) or bool(world.obstacles)
+        watch = watched(world, dt / world.substeps, None) if limited and (forces.forces or world.links) else None
         gravity = world.gravity
         state.h = h
         self.held.load(world, dt)
-        self._load_links(world)
+        self.links.load(world, self.held.engine)
+        if type(world.integrator) is PositionVerlet and before not in (0.0, h):
+            self._keep_way(state, before, h)
         if getattr(world.integrator, "naive_start", False):
             self._start_naively(world, (1.0 - half) * h)
-        rough = max(collisions.friction if collisions else 0.0, state.most_friction, getattr(world.boundary, "friction", 0.0), self.held.obstacle_friction) > 0.0
+        rough = (
+            max(
+                collisions.friction if collisions else 0.0,
+                state.most_friction,
+                getattr(world.boundary, "friction", 0.0),
+                self.held.obstacle_friction,
+            )
+            > 0.0
+        )
         done("gather")
         notes = None if world._touches is None else ImpulseNotes(world._touches, engine, state)
         step, finite = 0, True
         while step < substeps:
             opens, known = step == 0 or not by_core, self.held.kick > 0.0  # opens: from velocities that belong to the positions
-            kick = half * (h + before) if half and opens else h
+            kick, opening = (
+                half * (h + before) if half and opens else h,
+                0.0 if not by_core else half * h if half and opens else h,
+            )
             if not by_core:
                 self._flight.take(world.integrator, state, forces, world.time + step * h, h)
             elif not alone:
                 self._evaluate(world, step * h, half * h if step else 0.0)
+                # Rounded as the method that keeps u, back by half a substep and on by a whole one: x' = 2 x - x_prev + a h^2.
+                state.velocity -= state.real(h - opening) * state.acceleration
+                opening = h
             done("integrate")
             # The first substep may have a kick of its own; whoever looks or acts in each has a call for each.
             stop = step + 1 if not alone or notes or world.onlooker or kick != h else substeps
             last_kick = kick if stop == step + 1 else h
             self._set_law(self._strongest(world.gravity) if alone else forces.strongest, h, kick, rough=rough)
             engine.set_frame(
-                0.0 if not by_core else half * h if half and opens else h,
+                opening,
                 half * before / self.held.kick if opens and known else 0.0,
                 kick / self.held.kick if known else 1.0,
                 half * h if stop == substeps else 0.0,
@@ -169,10 +194,10 @@ class ImpulseFrames:
                 notes.read(h / kick)
             self.held.kick, before, step = last_kick, h, stop
             done("contacts")
-            if own_walls:
-                own_walls(state, h, half * h if by_core else 0.0, 0.0)
             if not by_core:
                 self._flight.end(state, self.held.gave, self.held.gave_spin, h / self.held.kick)
+            if own_walls:
+                own_walls(state, h, half * h if by_core else 0.0, 0.0)
             world._show(step * h, half * h if by_core else 0.0) if step < substeps else None
         self.held.h = h
         if not alone:
@@ -180,7 +205,7 @@ class ImpulseFrames:
         engine.show_links(half * h, self.held.kick)
         if (not finite or not alone) and first_non_finite(state) >= 0:
             return False
-        if contained and gravity == world.gravity:
+        if limited and gravity == world.gravity:
             self._limit(world, watch, dt)
         if notes:
             notes.close(world, dt)
@@ -188,25 +213,6 @@ class ImpulseFrames:
             engine.wrap_seam()
         done("finish")
         return True
-
-    def _keep_apart(self, world: Any) -> None:
-        """Pairs that links keep from touching, if they are others than before."""
-        if (world.links or self._apart is not None) and (apart := world.links.known_apart()) is not self._apart:
-            self._apart = apart
-            begin, to = partners(apart, len(world))
-            self.held.engine.set_linked(begin, to.astype(np.int32))
-
-    def _load_links(self, world: Any) -> None:
-        if not (world.links or self._links.rows):
-            return
-        changed, links = self._links.load(world.links, world._slots, world._state.mass), world.links
-        if changed or (links.iterations, world._slots.seam) != self._linked:
-            self._linked = links.iterations, world._slots.seam
-            self.held.engine.set_links(self._links.rows, links.iterations, *world._slots.seam.period)
-
-    def end_links(self, world: Any) -> None:
-        """The frame is good: what it did to the links holds."""
-        world.links.accept(self._links.hand_over() if world.links else [])
 
     def _strongest(self, gravity: tuple[float, float]) -> float:
         """The largest acceleration by gravity alone, m/s^2."""
@@ -245,6 +251,12 @@ class ImpulseFrames:
         self.run(world, dt, look)
         raise NonFiniteError(last, "contacts", world.time)
 
+    def _keep_way(self, state: Any, before: float, h: float) -> None:
+        """x - x_prev is kept, whatever the new step, and a h^2 comes to it: the flaw of plain Verlet, shown on purpose."""
+        known = ~np.isnan(state.acceleration[:, 0])
+        a, half, more = state.acceleration[known], state.real(0.5 * before), state.real(before / h - 1.0)
+        state.velocity[known] += more * (state.velocity[known] - half * a) + state.real(0.5 * (h - before)) * a
+
     def _start_naively(self, world: Any, missing: float) -> None:
         """Kick those that are new by what x_prev = x - v h leaves out: it takes the first kick to be a whole one."""
         state = world._slots
@@ -254,15 +266,19 @@ class ImpulseFrames:
             state.velocity[fresh] += state.real(missing) * state.acceleration[fresh]
 
     def _evaluate(self, world: Any, since: float, ahead: float) -> None:
-        """Accelerations by gravity and forces; these see velocities of now, not of half a substep ago."""
+        """Accelerations by gravity and forces; these see velocities of now, not of half a substep ago.
+
+        Those of now depend on the accelerations: for a user's own force they are found by fixed-point iteration.
+        """
         state, forces = world._slots, world._force_sum
-        if ahead and forces.velocity_dependent:
-            velocity = state.velocity.copy()
-            state.velocity += state.real(ahead) * (state.acceleration + self.held.gave / state.real(self.held.kick))
+        if not (ahead and forces.velocity_dependent):
             forces(state, world.time + since)
-            state.velocity[:] = velocity
-        else:
+            return
+        velocity, by_contacts = state.velocity.copy(), self.held.gave / state.real(self.held.kick)
+        for _ in range(PASSES if forces.functions else 1):
+            state.velocity[:] = velocity + state.real(ahead) * (state.acceleration + by_contacts)
             forces(state, world.time + since)
+        state.velocity[:] = velocity
 
     def _end(self, world: Any, dt: float, half: float) -> None:
         """Velocities that belong to the positions, and the accelerations of now."""

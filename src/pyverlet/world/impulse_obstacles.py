@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.constants import OBSTACLE_LINKS
+from pyverlet.ground.errors import InputError
 from pyverlet.laws.obstacles import Course
 
 Array = NDArray[Any]
@@ -20,6 +21,12 @@ _GIVEN = (
     "after_y", "restitution", "friction", "belt",
 )  # fmt: skip
 _WIDTH, _LENGTH, _ROUNDING, _INNER, _FRICTION = 32, 8, 9, 10, 16
+
+SPARE_FRAMES = 4.0
+"""Frames for which a segment that moves is listed ahead; as in `core.obstacles`."""
+
+FARTHEST = 1e100
+"""m from the origin to where an obstacle can still be listed."""
 
 _SPARE_LINKS = 1024
 """Room in the grid for what moves."""
@@ -50,14 +57,14 @@ class ObstacleRows:
             if len(self._moving):
                 self._bodies[:] = course.bodies
                 if not engine.place_obstacles(self._moving, dt, False):
-                    self._build(engine, radius, dt)
+                    self._build(engine, course.count, radius, dt)
             return None
         self._seen, self._seen_version, owners = seen, course.version, course.owners()
         if owners != self._owners or not self._owners:
             renamed = _renamed(self._owners, owners)
             self._owners, self._segments = owners, np.zeros((len(owners), _WIDTH))
             self._fill(course)
-            self._build(engine, radius, dt)
+            self._build(engine, course.count, radius, dt)
             return renamed
         segments, bodies = self._segments[:, : len(_GIVEN)].copy(), self._bodies
         self._fill(course)
@@ -65,7 +72,7 @@ class ObstacleRows:
         other |= (bodies != self._bodies).any(axis=1)[self._segments[:, 0].astype(np.int64)]
         self._give(engine, keep=True)
         if not engine.place_obstacles(np.flatnonzero(other).astype(np.int32), dt, True):
-            self._build(engine, radius, dt)
+            self._build(engine, course.count, radius, dt)
         return None
 
     def renamed(self, course: Course) -> Array | None:
@@ -81,12 +88,19 @@ class ObstacleRows:
         self._moving = np.flatnonzero(moves[self._segments[:, 0].astype(np.int64)]).astype(np.int32)
         self.friction = float(self._segments[:, _FRICTION].max(initial=0.0))
 
-    def _build(self, engine: Any, radius: float, dt: float) -> None:
-        """Make the grid, with cells as wide as the largest particle, or wider where there would be too many."""
+    def _build(self, engine: Any, count: int, radius: float, dt: float) -> None:
+        """Make the grid of `count` obstacles, with cells as wide as the largest particle, or wider: not too many."""
         s, body = self._segments, self._bodies[self._segments[:, 0].astype(np.int64)]
         speed = np.hypot(body[:, 3], body[:, 4]) + np.abs(body[:, 5]) * (np.hypot(s[:, 4], s[:, 5]) + s[:, _LENGTH])
-        around = s[:, _ROUNDING] + s[:, _INNER] + 4.0 * dt * speed
-        cell, links = max(2.0 * radius, float(np.finfo(float).tiny)), 0.0
+        with np.errstate(over="ignore", invalid="ignore"):
+            around = s[:, _ROUNDING] + s[:, _INNER] + SPARE_FRAMES * dt * speed
+            farthest = np.abs(body[:, :2]).max(axis=1) + s[:, _LENGTH] + np.hypot(s[:, 4], s[:, 5]) + around
+        if not (farthest < FARTHEST).all():
+            number = int(s[np.nan_to_num(farthest, nan=np.inf).argmax(), 0]) % count
+            raise InputError(
+                f"obstacles[{number}] is farther away than numbers reach; allowed are speeds that keep it at a place"
+            )
+        cell, links = max(2.0 * radius, 4.0 * float(farthest.max(initial=0.0)) / 2.0**50, float(np.finfo(float).tiny)), 0.0
         if radius == 0.0 and len(s):
             cell = max(float(np.median(around + s[:, _LENGTH])), cell)
         while True:

@@ -44,7 +44,6 @@ class Measures(Particles):
     obstacles: Obstacles
     collisions: Collisions | None
     _contacts: ContactSolver | None
-    _by_impulses: bool
     _impulses: Any
 
     @of_one_frame
@@ -218,6 +217,6 @@ class Measures(Particles):
     @property
     def rebuilds(self) -> int:
         """How often the neighbour list has been built."""
-        if self._by_impulses:
+        if self._impulses.steps:
             return int(self._impulses.rebuilds)
         return self._contacts.broad_phase.rebuilds if self._contacts else 0

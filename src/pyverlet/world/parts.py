@@ -83,12 +83,14 @@ NEWS = {
     "begin": Field(np.int64, "begin", 4, least=-1),
     "begin_how": Field(np.float64, "begin", 6),
     "end": Field(np.int64, "end", 2, least=-1),
+    "end_at": Field(np.int64, "end", 2, least=-1),
     "broken": Field(np.int64, "broken", 4, least=-1),
     "broken_force": Field(np.float64, "broken", infinite=True),
     "islands": Field(np.int64, "islands", least=0, order="ascending"),
     "members": Field(np.int64, "islands", least=1),
 }
-"""What happened in the last frame, and who sleeps. Of `begin` a, b, wall and obstacle; speed, point (2), normal (2), impulse."""
+"""What happened in the last frame, and who sleeps. Of `begin` a, b, wall and obstacle; speed, point (2), normal (2), impulse. Of
+`end` a and b; wall and obstacle, which files of older versions lack."""
 
 LINKED = {
     "number": Field(np.int64, "linked", least=0, most=2**31, order="ascending"),
@@ -145,7 +147,9 @@ def take_apart(world: World) -> Parts:
     facts["impulses"] = {"kick": memory.kick, "h": memory.h, "hertz": memory.hertz, "finer": memory.finer}
     if memory.kick:
         facts["impulses"]["skin"] = list(memory.skin)
-        arrays |= {f"impulses.{name}": getattr(memory, name) for name in Memory._fields if isinstance(getattr(memory, name), np.ndarray)}
+        arrays |= {
+            f"impulses.{name}": getattr(memory, name) for name in Memory._fields if isinstance(getattr(memory, name), np.ndarray)
+        }
     if saved.books:
         facts["books"] = {
             "energy": saved.books._energy, "resting": saved.books._resting, "ledger": saved.books.ledger.as_dict(),
@@ -304,7 +308,9 @@ def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
     if not (pairs[:, 0] < pairs[:, 1]).all() or not (np.diff(pairs[:, 0]) >= 0).all():
         raise InputError("impulses.pairs are not sorted; allowed are pairs low < high, by the lower")
     if len(surfaces) and not (surfaces[:, 0] < len(given)).all():
-        raise InputError(f"impulses.surfaces has particle {surfaces[:, 0].max()}; allowed are those of impulses.given, {len(given)}")
+        raise InputError(
+            f"impulses.surfaces has particle {surfaces[:, 0].max()}; allowed are those of impulses.given, {len(given)}"
+        )
     if len(given) > len(world):
         raise InputError(f"impulses.given has {len(given)} rows; allowed are at most {len(world)}, one for each particle")
     none = np.empty((0, 2), world.dtype)
@@ -341,7 +347,7 @@ def _books(facts: Facts) -> Bookkeeper:
 
 def _events_apart(events: Events, arrays: dict[str, Array]) -> None:
     arrays["news.touching"] = events._touching
-    arrays["news.end"] = np.column_stack((events.end["a"], events.end["b"]))
+    arrays["news.end"], arrays["news.end_at"] = np.hsplit(np.column_stack([events.end[name] for name in _WHO]), 2)
     arrays["news.begin"] = np.column_stack([events.begin[name] for name in _WHO])
     arrays["news.begin_how"] = np.column_stack([events.begin[name] for name in _HOW])
 
@@ -351,7 +357,9 @@ def _events(facts: Facts, arrays: dict[str, Array]) -> Events:
     events.hit_speed = facts["hit_speed"]
     events._touching = arrays["news.touching"]
     events.end = np.zeros(len(arrays["news.end"]), CONTACT)
-    events.end["a"], events.end["b"] = arrays["news.end"].T
+    surfaces = arrays.get("news.end_at", np.full(arrays["news.end"].shape, -1))
+    for name, column in zip(_WHO, (*arrays["news.end"].T, *surfaces.T), strict=True):
+        events.end[name] = column
     events.begin, how = np.zeros(len(arrays["news.begin"]), HIT), arrays["news.begin_how"]
     for name, column in zip(_WHO, arrays["news.begin"].T, strict=True):
         events.begin[name] = column

@@ -29,7 +29,7 @@ from pyverlet.laws.touches import Touches
 from pyverlet.state.moves import first_non_finite
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
-from pyverlet.world.actors import Actor, act_once
+from pyverlet.world.actors import Actor, act_after, act_once
 from pyverlet.world.convenience import Doors
 from pyverlet.world.impulse_frames import ImpulseFrames
 from pyverlet.world.measures import Measures
@@ -91,7 +91,7 @@ class World(Measures, Queries, Doors):
     ) -> None:
         self._state = State(checks.floating("dtype", dtype))
         self._h_last: float | None = None  # substep of the frame before; None: the integrator starts anew
-        self._slots = Slots(self._state.dtype, sleeps=sleep)
+        self._slots = Slots(self._state.dtype, sleeps=sleep, events=events)
         self.links, self.forces, self.obstacles = Links(self._state), ForceList(), Obstacles()
         self._events, self._touches = Events() if events else None, Touches() if contacts else None
         self._sleep, self._books = Sleep() if sleep else None, Bookkeeper() if ledger else None
@@ -121,21 +121,13 @@ class World(Measures, Queries, Doors):
             self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
             self.profile.begin()
             books = self._open_books(h)
-            if self._choose():
+            if self._impulses.takes(self):
                 self._impulses.step(self, dt)
             elif not self._frame(h, self._listen(h, books or self.profile.mark)):
                 self._refuse_non_finite(h)
             self._accept(dt, h, books)
             self.profile.end()
-
-    def _choose(self) -> bool:
-        by = not self._impulses.unknown(self) if self._collisions is None or self._collisions.impulses is None else self._collisions.impulses
-        if by != self._by_impulses:
-            self._by_impulses = by
-            self._impulses.forget()
-            if self._contacts:
-                self._contacts.broad_phase.forget()
-        return by
+        act_after(self, dt)
 
     def _frame(self, h: float, done: Callable[[str], None]) -> bool:
         """The table of contents of the engine; `done` hears which stage has ended. True if all is known to be finite."""
@@ -205,9 +197,9 @@ class World(Measures, Queries, Doors):
                 checks.positive("mass", self._state.mass, infinite_is="pinned")
                 self.boundary.check(self._state.radius)
             except InputError:
-                self._slots = Slots(self.dtype, sleeps=self._sleep is not None)  # new to the next frame, which refuses them again
+                self._slots = Slots(self.dtype, sleeps=self._sleep is not None, events=self._events is not None)  # new to the next frame
                 raise
-        if self._contacts and not self._by_impulses:
+        if self._contacts and not self._impulses.steps:
             self._contacts.begin(self._slots, changed=changed)
         return changed
 
@@ -231,7 +223,7 @@ class World(Measures, Queries, Doors):
         if books:
             books.close(self._spent())
         self._course.end(dt)
-        self._impulses.end_links(self) if self._by_impulses else self.links.scatter()
+        self._impulses.links.end(self) if self._impulses.steps else self.links.scatter()
         if self._events:
             pairs = self._contacts.packed(self._slots) if self._contacts and len(self) > 1 else None
             self._events.close(self._slots, self._state, pairs, self._place())
@@ -338,7 +330,7 @@ class World(Measures, Queries, Doors):
     def collisions(self, value: Collisions | None) -> None:
         if value is not None and not isinstance(value, Collisions):
             raise InputError(f"collisions is {value!r}; allowed are pyverlet.Collisions(...) and None")
-        self._collisions, self._by_impulses = value, value is not None and bool(value.impulses)
+        self._collisions = value
         about = self._state.dtype, self.links.unlist, self._events, self._sleep
         self._contacts = None if value is None else ContactSolver(value, *about)
 
@@ -404,4 +396,3 @@ class World(Measures, Queries, Doors):
         if self._contacts:
             self._contacts.restore(saved.contacts, self._slots)
         self._impulses.restore(saved.impulses)
-        self._by_impulses = saved.impulses.kick > 0

@@ -44,14 +44,14 @@ class Collisions:
         friction: mu of Coulomb, 0 or more. 0 leaves spin alone.
         method: how pairs are found, Fast() or the O(n^2) reference BruteForce(). Both find the same contacts.
         impulses: contacts remember impulses (docs/design/impulses.md): heaps stay at rest when the length of frames or the number
-            of substeps changes, in the room or on unequal masses. So far in worlds of circles, forces and a room, without
-            links, obstacles, events, a ledger or sleep.
+            of substeps changes, in the room or on unequal masses. So far in worlds of circles, obstacles, forces and a room,
+            without links, events, a ledger or sleep. None: where it knows all that there is in the world.
     """
 
     restitution: float = 0.0
     friction: float = 0.0
     method: Fast | BruteForce = field(default_factory=Fast)
-    impulses: bool | None = None
+    impulses: bool | None = False
 
     def __post_init__(self) -> None:
         checks.fraction("restitution", self.restitution)

@@ -47,6 +47,7 @@ class Wide:
         normal: (2, room) of pairs that touch, for others 0. depth: (room,) their overlap, m.
         slip: (room,) what contacts have slipped, m.
         closing: (room,) largest speed of approach since the last `collect`, m/s; negative: has not touched.
+        bounced: (room,) how often they have bounced since then; of a pair that is listed twice, noted once.
         touched: (room,) bool, whether pairs have in the frame before, as events mark it.
         spent: (strips, 3) J that impacts, and friction, have taken in this frame, negative; and the virial of contacts: sum of
             what pushes each pair apart times their distance, N s m.
@@ -90,7 +91,7 @@ class Wide:
         self.gap, self.normal = memory.empty((2, lanes), self._dtype), np.empty((2, 0), self._dtype)
         self._deep = np.empty(lanes // LANES, np.int64)
         self.depth = self.slip = self.closing = np.empty(0, self._dtype)
-        self.touched = np.zeros(0, bool)
+        self.touched, self.bounced = np.zeros(0, bool), np.zeros(0, np.uint8)
 
     def _hold_circles(self, count: int) -> None:
         """Room for what contacts that may bounce or rub note of circles."""
@@ -124,6 +125,7 @@ class Wide:
         self.spent[0] = spent
         if self._listens:
             self.closing, self.touched = np.full(len(self.lane_i), -1, self._dtype), np.zeros(len(self.lane_i), bool)
+            self.bounced = np.zeros(len(self.lane_i), np.uint8)
 
     def cut(self) -> Array:
         """(2, threads + 1): even and odd strips, each cut into as many parts of as nearly the same number of lanes as can be.
@@ -245,7 +247,7 @@ class Wide:
         circles = (
             state.position, state.velocity, state.acceleration, state.inverse_mass, self.origin, self.moved, state.resting,
             state.spin, self._carries, state.fed, self._rows, turn, self._lift, self._leans, state.start,
-            state.radius, state.restitution, state.friction, state.hits, state.spent, *noted,
+            state.radius, state.restitution, state.friction, state.hits, state.spent, state.impacts, *noted,
         )  # fmt: skip
         self.circles = hold(tables.Circles, circles, self.circles)
         carried = CARRIED_WEIGHT * strongest * h if strongest > 0 else np.inf
@@ -258,6 +260,7 @@ class Wide:
         pairs = (
             self.begin, self.lanes, self.apart, self.lane_i, self.lane_j, self.gap, self.reach, self.share, self.reduced,
             self.made_of, self.normal, self.depth, self.slip, self.closing, self._deep, self._deeps, self.spent,
+            self.bounced,
         )  # fmt: skip
         self.packed = hold(tables.Pairs, pairs, self.packed)
 

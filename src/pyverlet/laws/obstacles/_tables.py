@@ -123,6 +123,11 @@ class Tables:
         """(n, 6) pivots, m, angles, rad, and their velocities; those of images behind the others."""
         return self._bodies.view(np.float64).reshape(-1, 6)
 
+    @property
+    def count(self) -> int:
+        """Of obstacles, without images."""
+        return len(self._seen)
+
     def owners(self) -> list[tuple[int, int]]:
         """Of each segment the id of its obstacle, and which of its segments it is, images counted on."""
         sides, images = len(self._own_segments.rows), len(self._segments) // max(len(self._own_segments.rows), 1)
