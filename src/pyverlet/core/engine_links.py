@@ -36,6 +36,7 @@ def fill_links(k: cython.pointer(Links), a, passes: cython.int, period_x: cython
     k.turning = doubles(a["turning"])
     k.acts, k.way, k.middle, k.given = small_integers(a["acts"]), doubles(a["way"]), doubles(a["middle"]), doubles(a["given"])
     k.along, k.wanted, k.answer, k.inverse = doubles(a["along"]), doubles(a["wanted"]), doubles(a["answer"]), doubles(a["inverse"])
+    k.alone = small_integers(a["alone"])
     k.block, k.chunk, k.colour = integers(a["block"]), integers(a["chunk"]), integers(a["colour"])
     k.pin_node, k.pin_point, k.pin_intact = integers(a["pin_node"]), doubles(a["pin_point"]), small_integers(a["pin_intact"])
     k.pin_stiffness, k.pin_damping, k.pin_strength = doubles(a["pin_stiffness"]), doubles(a["pin_damping"]), doubles(a["pin_strength"])

@@ -71,6 +71,7 @@ Links = cython.struct(
     inverse=cython.pointer(cython.double),  # (rows, 3) of the block of the matrix, symmetric
     # ---- blocks: chains of distances, and single rows; chunks of blocks of a colour, which share no particle that can move
     block=cython.pointer(int64_t),  # (blocks + 1,) of its rows
+    alone=cython.pointer(int32_t),  # (blocks,) whether nothing else joins its particles that can move
     chunk=cython.pointer(int64_t),  # (chunks + 1,) of its blocks
     colour=cython.pointer(int64_t),  # (colours + 1,) of its chunks
     colours=cython.int,

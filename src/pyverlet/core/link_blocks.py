@@ -173,7 +173,7 @@ def solve_block(k: cython.pointer(Links), b: cython.Py_ssize_t, drifts: cython.b
         return
     if k.kind[r] == DISTANCE:
         if drifts:
-            solve_chain(k, r, k.block[b + 1], k.colours == 1)
+            solve_chain(k, r, k.block[b + 1], k.alone[b] != 0)
         else:
             step_chain(k, r, k.block[b + 1], False, False)
     elif drifts:

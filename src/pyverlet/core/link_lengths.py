@@ -13,7 +13,7 @@ from pyverlet.core.link_shapes import Way, way_between
 MOST_STEPS = cython.declare(cython.int, 20)
 LENGTH_SOLVED = cython.declare(cython.double, 1e-9)
 NEAR_ENOUGH = cython.declare(cython.double, 1e-3)
-"""Of lengths: errors that are left to chains alone, and to those of nets, which others undo."""
+"""Of lengths: errors that are left, and where Newton's method has failed."""
 
 LOST = cython.declare(cython.double, 0.01)
 """Of lengths: with a larger error Newton's method has failed."""
@@ -95,9 +95,11 @@ def approach(
 @cython.nogil
 @cython.exceptval(check=False)
 def solve_chain(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, alone: cython.bint) -> cython.void:
-    """Lengths after the drift. alone: nothing else joins these particles."""
-    good: cython.double = LENGTH_SOLVED if alone else NEAR_ENOUGH
-    if not approach(k, first, end, good, False) < LOST:
+    """Lengths after the drift. alone: nothing else joins these particles; in nets others undo what is more than one step."""
+    if not alone:
+        step_chain(k, first, end, True, False)
+    elif not approach(k, first, end, LENGTH_SOLVED, False) < LOST:
         sweep_chain(k, first, end)
-        if not approach(k, first, end, NEAR_ENOUGH, True) < 1:
+        swept: cython.double = misses(k, first, end)
+        if swept > NEAR_ENOUGH and not approach(k, first, end, NEAR_ENOUGH, True) < swept:
             sweep_chain(k, first, end)

@@ -225,10 +225,10 @@ def begin_links(w: cython.pointer(Step)) -> cython.void:
     p: cython.Py_ssize_t
     c: cython.int
     opens: cython.bint = w.substep == w.first
-    k.h = w.h
-    k.kick = w.h / w.weigh if opens and w.weigh > 0 else w.h
-    k.scale = w.scale if opens else 1
-    k.least = w.rest_speed
+    k.h = cython.cast(cython.double, w.h)
+    k.kick = cython.cast(cython.double, w.h / w.weigh if opens and w.weigh > 0 else w.h)
+    k.scale = cython.cast(cython.double, w.scale if opens else 1)
+    k.least = cython.cast(cython.double, w.rest_speed)
     team_stage(w.team, open_stage, w, blocks_of(k))
     team_stage(w.team, begin_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
     for p in range(k.pins):

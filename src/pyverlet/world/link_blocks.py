@@ -91,5 +91,6 @@ def by_colour(
     if order:
         chunk.append(len(order))
         colour_begin.append(len(chunk) - 1)
-    cuts = {"block": begins, "chunk": chunk, "colour": colour_begin}
-    return [blocks[k] for k in order], {name: np.array(cut, np.int64) for name, cut in cuts.items()}
+    cuts = {name: np.array(cut, np.int64) for name, cut in (("block", begins), ("chunk", chunk), ("colour", colour_begin))}
+    alone = [all(pinned[node] or len(last[node]) == 1 for node in nodes[k]) for k in order]
+    return [blocks[k] for k in order], cuts | {"alone": np.array(alone, np.int32)}
