@@ -7,7 +7,7 @@ import cython
 from cython.cimports.libc.math import INFINITY, sqrt
 
 from pyverlet.core.link_arrays import DISTANCE, Links
-from pyverlet.core.link_chains import give, step_chain
+from pyverlet.core.link_chains import CHORDS, give, step_chain
 from pyverlet.core.link_lengths import solve_chain
 from pyverlet.core.link_shapes import Way, measure_row, mobility, push, way_between
 from pyverlet.core.link_softness import Softness, averaged, before_that, kept_share, softness
@@ -175,7 +175,7 @@ def solve_block(k: cython.pointer(Links), b: cython.Py_ssize_t, drifts: cython.b
         if drifts:
             solve_chain(k, r, k.block[b + 1], k.alone[b] != 0)
         else:
-            step_chain(k, r, k.block[b + 1], False, False)
+            step_chain(k, r, k.block[b + 1], False, CHORDS)
     elif drifts:
         solve_row(k, r)
     else:

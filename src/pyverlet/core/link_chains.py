@@ -24,6 +24,11 @@ MOST_RELEASES = cython.declare(cython.int, 8)
 SINGULAR = cython.declare(cython.double, 1e-12)
 """Of what a link adds to its own block: a pivot below is one of a link whose length others have settled."""
 
+WAVES = cython.declare(cython.int, 0)
+CHORDS = cython.declare(cython.int, 1)
+LOST_WAY = cython.declare(cython.int, 2)
+"""Directions of impulses: as above; those at the start, whatever the tension; those of now."""
+
 AHEAD = cython.declare(cython.double, 0.3)
 """Share of the direction ahead where s is large. Stable at any s are those from 1/4 on (Newmark 1959)."""
 
@@ -37,10 +42,10 @@ STEEP = cython.declare(cython.double, 0.5)
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def aim_at_length(k: cython.pointer(Links), r: cython.Py_ssize_t, lost: cython.bint) -> cython.void:
+def aim_at_length(k: cython.pointer(Links), r: cython.Py_ssize_t, how: cython.int) -> cython.void:
     """What row r lacks after the drift: `along`, `wanted` and `turned`; whether it acts.
 
-    lost: no direction but that of the place reached is worth anything.
+    how: WAVES, CHORDS, or LOST_WAY, where no direction but that of the place reached is worth anything.
     """
     e: cython.Py_ssize_t = k.first[r]
     p: Way = way_between(k, k.node[e], k.node[e + 1], k.h)
@@ -54,7 +59,8 @@ def aim_at_length(k: cython.pointer(Links), r: cython.Py_ssize_t, lost: cython.b
     if not k.acts[r]:
         return
     s: cython.double = 2 * k.h * pulled * (k.weight[k.node[e]] + k.weight[k.node[e + 1]]) / length
-    q: cython.double = AHEAD * s * s / (s * s + 4)
+    q: cython.double = AHEAD * s * s / (s * s + 4) if how == WAVES else 0
+    lost: cython.bint = how == LOST_WAY
     x: cython.double = p.x / length
     y: cython.double = p.y / length
     dx: cython.double = k.way[2 * r] / start
@@ -201,14 +207,14 @@ def give(k: cython.pointer(Links), r: cython.Py_ssize_t, x: cython.double, y: cy
 @cython.nogil
 @cython.exceptval(check=False)
 def step_chain(
-    k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, drifts: cython.bint, lost: cython.bint
+    k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, drifts: cython.bint, how: cython.int
 ) -> cython.void:
     """One step of Newton's method: lengths after the drift; afterwards (not drifts) their rates. Ropes do not push."""
     r: cython.Py_ssize_t
     tries: cython.int = 0
     for r in range(first, end):
         if drifts:
-            aim_at_length(k, r, lost)
+            aim_at_length(k, r, how)
             if not k.acts[r] and (k.given[2 * r] != 0 or k.given[2 * r + 1] != 0):
                 give(k, r, -k.given[2 * r], -k.given[2 * r + 1])
                 k.impulse[r] = 0
@@ -226,7 +232,7 @@ def step_chain(
                     k.impulse[r] = 0
             for r in range(first, end):
                 if k.acts[r]:
-                    aim_at_length(k, r, lost)
+                    aim_at_length(k, r, how)
     for r in range(first, end):
         if k.acts[r]:
             give(k, r, k.answer[2 * r], k.answer[2 * r + 1])

@@ -7,7 +7,7 @@ import cython
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
 from pyverlet.core.link_arrays import Links
-from pyverlet.core.link_chains import give, step_chain
+from pyverlet.core.link_chains import CHORDS, LOST_WAY, WAVES, give, step_chain
 from pyverlet.core.link_shapes import Way, way_between
 
 MOST_STEPS = cython.declare(cython.int, 20)
@@ -79,14 +79,14 @@ def sweep_chain(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.
 @cython.nogil
 @cython.exceptval(check=False)
 def approach(
-    k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, good: cython.double, lost: cython.bint
+    k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, good: cython.double, how: cython.int
 ) -> cython.double:
     """Newton's method, until errors are `good`; returns the largest, of lengths."""
     tries: cython.int = 0
     missed: cython.double = INFINITY
     while tries < MOST_STEPS and not missed <= good:
         tries += 1
-        step_chain(k, first, end, True, lost)
+        step_chain(k, first, end, True, how)
         missed = misses(k, first, end)
     return missed
 
@@ -97,9 +97,9 @@ def approach(
 def solve_chain(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, alone: cython.bint) -> cython.void:
     """Lengths after the drift. alone: nothing else joins these particles; in nets others undo what is more than one step."""
     if not alone:
-        step_chain(k, first, end, True, False)
-    elif not approach(k, first, end, LENGTH_SOLVED, False) < LOST:
+        step_chain(k, first, end, True, CHORDS)
+    elif not approach(k, first, end, LENGTH_SOLVED, WAVES) < LOST:
         sweep_chain(k, first, end)
         swept: cython.double = misses(k, first, end)
-        if swept > NEAR_ENOUGH and not approach(k, first, end, NEAR_ENOUGH, True) < swept:
+        if swept > NEAR_ENOUGH and not approach(k, first, end, NEAR_ENOUGH, LOST_WAY) < swept:
             sweep_chain(k, first, end)
