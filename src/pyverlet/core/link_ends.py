@@ -83,7 +83,7 @@ def show_links(w: cython.pointer(Step), half: cython.double, kick: cython.double
         for axis in range(2):
             at: cython.Py_ssize_t = 2 * k.slot[i] + axis
             shown: real = cython.cast(real, k.u[2 * i + axis])
-            change: cython.double = cython.cast(cython.double, shown) - w.velocity[at]
+            change: real = shown - w.velocity[at]
             w.given[at] += cython.cast(real, change * kick / half)
             w.acceleration[at] += cython.cast(real, change / half)
             w.velocity[at] = shown

@@ -113,8 +113,8 @@ def warmed_stage(what: cython.p_void, block: cython.int) -> cython.void:
         x: real = cython.cast(real, k.u[2 * i])
         y: real = cython.cast(real, k.u[2 * i + 1])
         if k.own[i] > 0:
-            k.warm[2 * i] = cython.cast(cython.double, x) - w.free[2 * at]
-            k.warm[2 * i + 1] = cython.cast(cython.double, y) - w.free[2 * at + 1]
+            k.warm[2 * i] = x - w.free[2 * at]
+            k.warm[2 * i + 1] = y - w.free[2 * at + 1]
             w.free[2 * at], w.free[2 * at + 1] = x, y
             for axis in range(2):
                 k.driven[2 * i + axis] = w.acceleration[2 * at + axis]
