@@ -24,10 +24,21 @@ def fill_links(k: cython.pointer(Links), a, passes: cython.int, period_x: cython
         a |= {name: np.zeros((rows, 2)) for name in ("way", "middle", "given", "along", "wanted", "answer")}
         a |= {"inverse": np.zeros((rows, 3)), "acts": np.zeros(rows, np.int32)}
         a |= {"pin_soft": np.zeros(pins), "pin_target": np.zeros((pins, 2))}
-    k.slot, k.x, k.u, k.warm, k.react = indices(a["slot"]), doubles(a["x"]), doubles(a["u"]), doubles(a["warm"]), doubles(a["react"])
+    k.slot, k.x, k.u, k.warm, k.react = (
+        indices(a["slot"]),
+        doubles(a["x"]),
+        doubles(a["u"]),
+        doubles(a["warm"]),
+        doubles(a["react"]),
+    )
     k.own, k.weight = doubles(a["own"]), doubles(a["weight"])
     k.first, k.node, k.gradient, k.slope = integers(a["first"]), integers(a["node"]), doubles(a["gradient"]), doubles(a["slope"])
-    k.kind, k.rest, k.stiffness, k.damping = small_integers(a["kind"]), doubles(a["rest"]), doubles(a["stiffness"]), doubles(a["damping"])
+    k.kind, k.rest, k.stiffness, k.damping = (
+        small_integers(a["kind"]),
+        doubles(a["rest"]),
+        doubles(a["stiffness"]),
+        doubles(a["damping"]),
+    )
     k.upper, k.strength, k.intact = doubles(a["upper"]), doubles(a["strength"]), small_integers(a["intact"])
     k.impulse, k.load, k.pull, k.value = doubles(a["impulse"]), doubles(a["load"]), doubles(a["pull"]), doubles(a["value"])
     k.next, k.soft, k.target, k.turned = doubles(a["next"]), doubles(a["soft"]), doubles(a["target"]), doubles(a["turned"])
@@ -35,11 +46,20 @@ def fill_links(k: cython.pointer(Links), a, passes: cython.int, period_x: cython
     k.loaned, k.keeps = doubles(a["loaned"]), doubles(a["keeps"])
     k.turning = doubles(a["turning"])
     k.acts, k.way, k.middle, k.given = small_integers(a["acts"]), doubles(a["way"]), doubles(a["middle"]), doubles(a["given"])
-    k.along, k.wanted, k.answer, k.inverse = doubles(a["along"]), doubles(a["wanted"]), doubles(a["answer"]), doubles(a["inverse"])
+    k.along, k.wanted, k.answer, k.inverse = (
+        doubles(a["along"]),
+        doubles(a["wanted"]),
+        doubles(a["answer"]),
+        doubles(a["inverse"]),
+    )
     k.alone = small_integers(a["alone"])
     k.block, k.chunk, k.colour = integers(a["block"]), integers(a["chunk"]), integers(a["colour"])
     k.pin_node, k.pin_point, k.pin_intact = integers(a["pin_node"]), doubles(a["pin_point"]), small_integers(a["pin_intact"])
-    k.pin_stiffness, k.pin_damping, k.pin_strength = doubles(a["pin_stiffness"]), doubles(a["pin_damping"]), doubles(a["pin_strength"])
+    k.pin_stiffness, k.pin_damping, k.pin_strength = (
+        doubles(a["pin_stiffness"]),
+        doubles(a["pin_damping"]),
+        doubles(a["pin_strength"]),
+    )
     k.pin_impulse, k.pin_load, k.pin_pull = doubles(a["pin_impulse"]), doubles(a["pin_load"]), doubles(a["pin_pull"])
     k.pin_value, k.pin_next = doubles(a["pin_value"]), doubles(a["pin_next"])
     k.pin_soft, k.pin_target = doubles(a["pin_soft"]), doubles(a["pin_target"])

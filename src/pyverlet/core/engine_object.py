@@ -20,9 +20,9 @@ from pyverlet.core.engine_arrays import (
 )
 from pyverlet.core.engine_impulses import fill_kept, read_impulses
 from pyverlet.core.engine_links import fill_links
+from pyverlet.core.engine_surfaces import give_surfaces, make_surface_arrays, place_obstacles, set_obstacles, take_surfaces
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_ends import show_links
-from pyverlet.core.engine_surfaces import give_surfaces, make_surface_arrays, place_obstacles, set_obstacles, take_surfaces
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.running import remake_list, run_substeps
 from pyverlet.core.seams import follow_seam, wrap_seam
@@ -121,7 +121,7 @@ class Engine:
         self.ls.good = False
 
     def set_links(self, rows, passes, period_x, period_y):
-        """Links (world/link_rows.py), passes over them in a substep, and periods of the room, m or 0; rows: None, there are none."""
+        """Links (world/link_rows.py; None: there are none), passes over them in a substep, and periods of the room, m or 0."""
         self.w.linked = rows is not None
         if rows is not None:
             self.arrays["links"] = rows

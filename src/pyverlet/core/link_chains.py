@@ -6,10 +6,11 @@ With J = P d along its direction d it is to have |p| - L + soft J = target. So w
 
     (C_r + h (w_1 + w_2)) F_r - h w_1 F_(r-1) - h w_2 F_(r+1) = e d + (-P t / b) t,    C = soft d d^T + t t^T / b,
 
-with t across d. d is the direction d_0 at the start of the substep (SHAKE), so that motion is reversible and keeps energy: but that is
-stable only where s = 4 T h^2 / (m L) < 4, T being the tension (leapfrog), and a light chain with a heavy end is far beyond. Where s is
-not small, the force is that of d = d_0 + q (d_1 - 2 d_0 + d_-1), which is stable at any s if q > 1/4, and keeps energy (Newmark's
-method with beta = q); d_0 - d_-1 is told by the velocities of the last substep, and b = q J / |p| is by how much P turns with p.
+with t across d. d is the direction d_0 at the start of the substep (SHAKE), so that motion is reversible and keeps energy: but
+that is stable only where s = 4 T h^2 / (m L) < 4, T being the tension (leapfrog); a light chain with a heavy end is far beyond.
+Where s is not small, the force is that of d = d_0 + q (d_1 - 2 d_0 + d_-1), which is stable at any s if q > 1/4, and keeps energy
+(Newmark with beta = q); d_0 - d_-1 is told by the velocities of the last substep, and b = q J / |p| is by how much P turns
+with p. In nets d is d_0: tensions that a sweep has not settled would hold links where they are.
 """
 
 from __future__ import annotations

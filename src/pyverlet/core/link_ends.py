@@ -22,7 +22,6 @@ SWEEPS = cython.declare(cython.int, 3)
 def turn_impulses(k: cython.pointer(Links), share: cython.double) -> cython.void:
     """So much of what rows gave in the last substep was along the directions at its start: it is along those of now."""
     r: cython.Py_ssize_t
-    e: cython.Py_ssize_t
     for r in range(k.rows):
         measure_row(k, r, 0)
         k.target[r] = k.impulse[r]
@@ -48,12 +47,12 @@ def project(k: cython.pointer(Links)) -> cython.void:
     r: cython.Py_ssize_t
     b: cython.Py_ssize_t
     p: cython.Py_ssize_t
-    sweep: cython.int
+    _: cython.int
     for p in range(k.pins):
         if k.pin_intact[p] and k.pin_stiffness[p] == INFINITY:
             i: cython.Py_ssize_t = k.pin_node[p]
             k.weight[i] = k.u[2 * i] = k.u[2 * i + 1] = 0
-    for sweep in range(1 if k.colours == 1 else SWEEPS):
+    for _ in range(1 if k.colours == 1 else SWEEPS):
         for b in range(k.chunk[k.colour[k.colours]]):
             solve_block(k, b, False)
     for r in range(k.rows):

@@ -43,7 +43,7 @@ def misses(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ss
 @cython.nogil
 @cython.exceptval(check=False)
 def sweep_link(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
-    """Right the length of row r after the drift, along its direction then (position-based dynamics): stable whatever it begins from."""
+    """Right the length of row r after the drift, along its direction then: position-based dynamics, which is always stable."""
     e: cython.Py_ssize_t = k.first[r]
     if k.intact[r] == 0 or k.soft[r] == INFINITY:
         return

@@ -56,9 +56,7 @@ def hold_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
     gives: cython.double = k.pin_soft[p] + k.h * k.own[i]
     for axis in range(2):
         at: cython.Py_ssize_t = 2 * p + axis
-        change: cython.double = (
-            k.pin_target[at] - k.pin_soft[p] * k.pin_impulse[at] - pin_value(k, p, axis, k.h)
-        ) / gives
+        change: cython.double = (k.pin_target[at] - k.pin_soft[p] * k.pin_impulse[at] - pin_value(k, p, axis, k.h)) / gives
         k.pin_impulse[at] += change
         k.u[2 * i + axis] += k.own[i] * change
     k.weight[i] = k.own[i] * k.pin_soft[p] / gives

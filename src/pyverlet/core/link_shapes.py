@@ -116,7 +116,7 @@ def mobility(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.double:
 @cython.nogil
 @cython.exceptval(check=False)
 def push(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
-    """Give linked particle i an impulse, N s; of infinite mass it may belong to several rows of a colour, and none writes to it."""
+    """Give linked particle i an impulse, N s. One of infinite mass may belong to several rows of a colour: none writes to it."""
     if k.own[i] == 0:
         return
     k.u[2 * i] += k.weight[i] * x

@@ -29,9 +29,9 @@ Softness = cython.struct(soft=cython.double, target=cython.double)
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def before_that(value: cython.double, before: cython.double, next: cython.double, rest: cython.double) -> cython.double:
+def before_that(value: cython.double, before: cython.double, ahead: cython.double, rest: cython.double) -> cython.double:
     """What a row measured a substep ago; what it measures now if its particles have been put elsewhere, not moved there."""
-    return before if fabs(value - next) <= fabs(value - before) / 10 + 1e-5 * (1 + fabs(rest)) else value
+    return before if fabs(value - ahead) <= fabs(value - before) / 10 + 1e-5 * (1 + fabs(rest)) else value
 
 
 @cython.cfunc
@@ -66,9 +66,7 @@ def softness(
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def kept_share(
-    k: cython.pointer(Links), impulse: cython.double, load: cython.double, mobility: cython.double
-) -> cython.double:
+def kept_share(k: cython.pointer(Links), impulse: cython.double, load: cython.double, mobility: cython.double) -> cython.double:
     """How much of what the last substep gave is given again: a blow, of a rope that snaps taut, is not; load may double.
 
     load: what that substep began with.

@@ -1,8 +1,9 @@
 # mypy: ignore-errors
 """Links in a substep: impulses of the last one, lengths after the drift, rates afterwards; colour by colour of blocks.
 
-A sweep over rows that look at where particles will be is position-based dynamics with small steps (Macklin et al. 2019, "Small steps in
-physics simulation"): no error of a place is answered by a speed that lasts, so nets, rings and trees do not diverge.
+A sweep over rows that look at where particles will be is position-based dynamics with small steps (Macklin et al. 2019, "Small
+steps in physics simulation"). What rigid rows gave in the last substep is there while contacts are solved, so that these know the
+load of links; rows themselves begin from nothing: an impulse that errors had built up would hold nets out of shape.
 """
 
 from __future__ import annotations

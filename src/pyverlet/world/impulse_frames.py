@@ -131,7 +131,7 @@ class ImpulseFrames:
         state, forces, engine, collisions = world._slots, world._force_sum, self.held.engine, world.collisions
         contained = len(world) > 1 or not isinstance(world.boundary, Open)
         substeps = world.substeps
-        if (contained and collisions or world.links) and dt > LONGEST_FRAME:
+        if ((contained and collisions) or world.links) and dt > LONGEST_FRAME:
             substeps *= int(np.ceil(dt / LONGEST_FRAME * (1 - 1e-9)))
         by_core = kicks(world.integrator)
         h, half = dt / substeps, world.integrator.velocity_lag if by_core else 0.5

@@ -13,6 +13,7 @@ Block = list[int]
 CHUNK = 64
 """Rows that a thread takes at a time, about."""
 
+
 def follow(ends: list[tuple[int, int]]) -> list[tuple[Block, list[int]]]:
     """Runs of links that follow each other: their numbers, and the particles they go through, each once.
 
@@ -59,11 +60,10 @@ def follow(ends: list[tuple[int, int]]) -> list[tuple[Block, list[int]]]:
     return [run for run in runs if run[0]]
 
 
-def by_colour(
-    blocks: list[Block], nodes: list[tuple[int, ...]], parts: list[tuple[int, ...]], pinned: Array
-) -> tuple[list[Block], dict[str, Array]]:
+def by_colour(blocks: list[Block], nodes: list[tuple[int, ...]], pinned: Array) -> tuple[list[Block], dict[str, Array]]:
     """The blocks of each colour one after the other: those of one share no particle that can move. And where they begin:
-    rows of each `block`, blocks of each `chunk`, chunks of each `colour`."""
+    rows of each `block`, blocks of each `chunk`, chunks of each `colour`.
+    """
     last: dict[int, set[int]] = {}
     colours: list[int] = []
     for joined in nodes:

@@ -76,8 +76,8 @@ class LinkRows:
                 kind = DISTANCE if isinstance(pool, ChainPool) else ANGLE + int(pool.rows["kind"][row])
                 where.append((number, row, kind))
                 parts.append(tuple(node[first[row] : first[row + 1]]))
-        blocks = self._blocks([kind for *_, kind in where], parts)
-        blocks, cuts = by_colour([block for block, _ in blocks], [nodes for _, nodes in blocks], parts, self._pinned)
+        found = self._blocks([kind for *_, kind in where], parts)
+        blocks, cuts = by_colour([block for block, _ in found], [nodes for _, nodes in found], self._pinned)
         order = [row for block in blocks for row in block]
         source = np.array([where[row] for row in order], np.int64).reshape(-1, 3)
         entries = [parts[row] for row in order]
@@ -85,7 +85,7 @@ class LinkRows:
         self.rows["slot"] = np.zeros(len(self._particle), np.uint32)
 
     def _blocks(self, kinds: list[int], parts: list[tuple[int, ...]]) -> list[tuple[Block, tuple[int, ...]]]:
-        """Runs of distances that follow each other, turned so that each begins where the one before ends; single rows after them."""
+        """Runs of distances that follow each other, each turned to begin where the one before ends; single rows after them."""
         distance = [row for row, kind in enumerate(kinds) if kind == DISTANCE]
         found: list[tuple[Block, tuple[int, ...]]] = []
         for run, nodes in follow([parts[row] for row in distance]):  # type: ignore[misc]
