@@ -84,7 +84,7 @@ def find_hits(w: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint)
     """Note in `hit` which pairs of group s meet so fast that they bounce; returns how many do."""
     zero: lanes = spread(0)
     first: cython.Py_ssize_t = w.begin[s]
-    end: cython.Py_ssize_t = first + w.lanes[s]
+    end: cython.Py_ssize_t = first + w.swept[s]
     count: cython.Py_ssize_t = 0
     k: cython.Py_ssize_t
     for k in range(first, end, 8):
@@ -136,7 +136,7 @@ def solve(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint
     third: lanes = spread(cython.cast(real, 1.0) / 3)
     near: lanes = spread(-w.near)
     first: cython.Py_ssize_t = w.begin[s]
-    end: cython.Py_ssize_t = first + w.lanes[s]
+    end: cython.Py_ssize_t = first + w.swept[s]
     count: cython.Py_ssize_t = 0
     k: cython.Py_ssize_t
     for k in range(first, end, 8):

@@ -43,14 +43,16 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     a |= {name: np.zeros(count, np.uint32) for name in ("cell", "order", "patch", "used", "batch")}
     a |= {name: np.zeros(blocks, dtype) for name in ("fastest", "speeds")}
     a |= {name: np.zeros(blocks, np.int32) for name in ("stale",)}
-    a |= {name: np.zeros(groups, np.int64) for name in ("begin", "lanes", "row", "found", "raw_begin", "looked", "beyond")}
+    a |= {
+        name: np.zeros(groups, np.int64) for name in ("begin", "lanes", "swept", "row", "found", "raw_begin", "looked", "beyond")
+    }
     a |= {"head": np.zeros(count, np.int32), "start": np.zeros(4 * count + 72, np.uint32)}
     a |= {"extent": np.zeros((blocks, 4), dtype), "box": np.zeros((2 * count + 64, 4), dtype)}
     w.listed, w.checked, w.moved = reals(a["listed"]), reals(a["checked"]), reals(a["moved"])
     w.fastest, w.stale = reals(a["fastest"]), small_integers(a["stale"])
     a |= {name: np.zeros(groups, np.int32) for name in ("bounced", "searched")}
     w.bounced, w.searched = small_integers(a["bounced"]), small_integers(a["searched"])
-    w.begin, w.lanes = integers(a["begin"]), integers(a["lanes"])
+    w.begin, w.lanes, w.swept = integers(a["begin"]), integers(a["lanes"]), integers(a["swept"])
     c.spot_u, c.spot_v, c.spot_r = reals(a["spot_u"]), reals(a["spot_v"]), reals(a["spot_r"])
     c.cell, c.order, c.start, c.patch = indices(a["cell"]), indices(a["order"]), indices(a["start"]), indices(a["patch"])
     c.extent, c.box = reals(a["extent"]), reals(a["box"])

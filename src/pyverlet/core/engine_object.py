@@ -18,6 +18,7 @@ from pyverlet.core.engine_arrays import (
     make_material_arrays,
     make_particle_arrays,
 )
+from pyverlet.core.engine_hearing import hear, make_hearing_arrays
 from pyverlet.core.engine_impulses import fill_kept, read_impulses
 from pyverlet.core.engine_links import fill_links
 from pyverlet.core.engine_surfaces import give_surfaces, make_surface_arrays, place_obstacles, set_obstacles, take_surfaces
@@ -42,6 +43,7 @@ class Engine:
     ls: Lists
     lk: Links
     arrays = cython.declare(dict, visibility="public")
+    heard = cython.declare(list, visibility="readonly")
     threads = cython.declare(cython.int, visibility="readonly")
     dtype = cython.declare(object, visibility="readonly")
 
@@ -58,7 +60,7 @@ class Engine:
         ls.per_particle, ls.per_pair, ls.alone_room = 4.0, 1.25, 64.0
         ls.pairs_room = ls.lanes_room = 0
         w.count, w.groups = -1, 0
-        self.arrays = {}
+        self.arrays, self.heard = {}, []
         make_level_arrays(c, self.arrays, self.dtype)
 
     def __dealloc__(self):
@@ -105,7 +107,7 @@ class Engine:
         ls: cython.pointer(Lists) = cython.address(self.ls)
         w.sized, w.varied, w.mixed, w.collides = n["sized"], n["varied"], n["mixed"], n["collides"]
         if not w.collides:
-            w.groups, ls.listed, ls.good = 0, False, False
+            w.groups, w.pins, ls.listed, ls.good = 0, False, False, False
         w.surfaces_good = False
         self.c.bulk, self.c.smallest, ls.largest, ls.mean_radius = n["bulk"], n["smallest"], n["largest"], n["mean_radius"]
         ls.restitution, ls.friction, ls.picky = n["restitution"], n["friction"], n["picky"] or ls.linked
@@ -176,6 +178,18 @@ class Engine:
             self.arrays["wall_given"], self.arrays["obstacle_given"] = wall_given, obstacle_given
             self.w.wall_given, self.w.obstacle_given = reals(wall_given), reals(obstacle_given)
 
+    def listen(self, wanted: cython.bint):
+        """Note from now on who touches, or no more; what was heard is forgotten."""
+        w: cython.pointer(Step) = cython.address(self.w)
+        self.heard = []
+        w.listening, w.collected, w.waiting = wanted, True, False
+        if wanted:
+            hear(w, self.arrays)
+
+    def tell(self):
+        """What was heard since: of pairs (i, j, speed, bounces), of surfaces (slot, surface, speed, bounces); a list of such."""
+        return [*self.heard, hear(cython.address(self.w), self.arrays)]
+
     def set_skin(self, diameters: cython.double, adapts: cython.bint):
         """How thick the skin is, in mean diameters, or begins with."""
         self.ls.diameters, self.ls.adapts = diameters, adapts
@@ -209,12 +223,14 @@ class Engine:
         w: cython.pointer(Step) = cython.address(self.w)
         ls: cython.pointer(Lists) = cython.address(self.ls)
         pairs, lanes = ls.raw_begin[w.groups] * 11 // 10 + 64, w.begin[w.groups] * 11 // 10 + 64
-        if pairs > ls.pairs_room:
+        listed: cython.bint = ls.good  # then places of surfaces are missing
+        if pairs > ls.pairs_room and not listed:
             make_found_arrays(ls, self.arrays, pairs)
-        if lanes > ls.lanes_room:
+        if lanes > ls.lanes_room and not listed:
             make_lane_arrays(w, self.arrays, lanes, self.dtype)
             make_kept_arrays(ls, self.arrays, lanes, self.dtype)
             make_material_arrays(w, self.arrays, self.dtype)
+            make_hearing_arrays(w, self.arrays, self.dtype)
         blocks = (w.count + BLOCK - 1) // BLOCK
         if blocks and w.contact_count[0] > w.contact_room:
             make_surface_arrays(w, self.arrays, w.contact_count[0] * 5 // 4)
@@ -232,7 +248,11 @@ class Engine:
             if not self.ls.short:
                 break
             self.ls.short = False
-            self.make_room()
+            if w.waiting:
+                w.waiting, w.collected = False, True
+                self.heard.append(hear(w, self.arrays))
+            else:
+                self.make_room()
         finite: cython.bint = True
         b: cython.Py_ssize_t
         for b in range((w.count + BLOCK - 1) // BLOCK):

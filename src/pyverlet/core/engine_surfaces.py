@@ -11,7 +11,7 @@ from cython.cimports.libc.stdint import int32_t
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.obstacles import LATE, PLACE, keeps_place, list_segment, put_segment
 from pyverlet.core.step import Step
-from pyverlet.core.surface_shapes import CONTACT, DRAG, PUSH
+from pyverlet.core.surface_rows import CONTACT, DRAG, PUSH
 
 
 @cython.cfunc
@@ -69,7 +69,7 @@ def take_surfaces(w: cython.pointer(Step), a):
     slot = np.repeat(np.arange(w.count, dtype=np.int32), count)
     place = np.arange(len(slot)) - np.repeat(np.cumsum(count) - count, count) + begin[slot]
     values = a[f"contact{side}"][place, PUSH : DRAG + 1]
-    loaded = values[:, 0] > 0
+    loaded = (values[:, 0] > 0) & (a[f"surface{side}"][place] >= 0)  # those of pinned circles are pairs
     return slot[loaded], a[f"surface{side}"][place[loaded]], values[loaded]
 
 

@@ -24,13 +24,15 @@ from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.contacts import bounce_again, relax_contacts, solve_contacts
+from pyverlet.core.hearing import hear_loads, hear_surface_loads
 from pyverlet.core.links import begin_links, end_links, relax_links, remember_links_stage, solve_links
 from pyverlet.core.obstacles import place_moving
 from pyverlet.core.particle_stages import drift, kick_stage, remember_stage
 from pyverlet.core.relisting import each_group
 from pyverlet.core.step import OPEN, Step
-from pyverlet.core.surface_sides import keep_side
-from pyverlet.core.surfaces import bounce_surfaces, hold_surfaces, relax_surfaces, warm_surfaces
+from pyverlet.core.surface_contacts import hold_surfaces, relax_surfaces, warm_surfaces
+from pyverlet.core.surface_sides import keep_sides
+from pyverlet.core.surfaces import bounce_surfaces
 from pyverlet.core.warm_start import warm_start
 
 MOST_ROUNDS = cython.declare(cython.int, 100)  # over the groups in which pairs have bounced
@@ -45,7 +47,6 @@ def warm_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
     n: cython.Py_ssize_t
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
         i: cython.Py_ssize_t = w.at_surface[n]
-        w.begun[2 * i], w.begun[2 * i + 1] = w.position[2 * i], w.position[2 * i + 1]
         warm_surfaces(w, i)
 
 
@@ -71,7 +72,8 @@ def hold_on_stage(what: cython.p_void, block: cython.int) -> cython.void:
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
         bounce_surfaces(w, w.at_surface[n])  # pairs may have thrown it there
         hold_surfaces(w, w.at_surface[n])
-        keep_side(w, w.at_surface[n])
+    if w.segments > 0:
+        keep_sides(w, block)
 
 
 @cython.cfunc
@@ -165,6 +167,26 @@ def relax_stage(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def hear_stage(what: cython.p_void, item: cython.int) -> cython.void:
+    """Which pairs of a group touch."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    hear_loads(w, 2 * item + w.parity)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def hear_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """Which surfaces particles of a block touch."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    n: cython.Py_ssize_t
+    for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
+        hear_surface_loads(w, w.at_surface[n])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     """One substep; returns whether particles may leave where the list of pairs is good in the next one."""
     b: cython.Py_ssize_t
@@ -179,7 +201,7 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     w.least_bounce = max(w.rest_speed, fastest * cython.cast(real, 1e-14 if cython.sizeof(real) == 8 else 2e-6))
     if w.linked:
         begin_links(w)
-    surfaces: cython.bint = w.room != OPEN or w.segments > 0
+    surfaces: cython.bint = w.room != OPEN or w.segments > 0 or w.pins
     place_moving(w)
     if surfaces:
         team_stage(w.team, warm_surfaces_stage, w, blocks)
@@ -201,6 +223,9 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
             relax_links(w, sweep % 2 == 1)
     if w.linked:
         end_links(w)
+    if w.listening:
+        each_group(w, hear_stage)
+        team_stage(w.team, hear_surfaces_stage, w, blocks)
     if w.rough or w.substep + 1 == w.substeps:  # what smooth contacts gave before is asked for by no one
         team_stage(w.team, remember_stage, w, blocks)
         if w.linked:

@@ -15,6 +15,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import fabs, sqrt
 from cython.cimports.libc.stdint import int64_t
 
+from pyverlet.core.hearing import hear_pair
 from pyverlet.core.step import MOST_JOINT, Step
 
 NEVER = cython.declare(cython.double, 1e300)
@@ -88,6 +89,8 @@ def strike(
     w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.double, dy: cython.double, turn: cython.double, t: cython.double
 ) -> cython.void:
     """Change the velocity of a particle by an impulse at time t; contacts do not remember it."""
+    if w.since[i] == 0:
+        w.begun[2 * i], w.begun[2 * i + 1] = w.position[2 * i], w.position[2 * i + 1]
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     v[width * i] += cython.cast(real, dx)
@@ -168,6 +171,7 @@ def impact(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
     push: cython.double = -(1 + e) * speed
     strike_pair(w, k, cython.address(m), push * x, push * y, 0, t)
     rub(w, k, cython.address(m), x, y, push, t)
+    hear_pair(w, k, -speed, -e * speed)
     return True
 
 
@@ -208,6 +212,8 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
     for g in range(count):
         e: cython.double = w.restitution[hits[g] * w.mixed]
         rub(w, hits[g], cython.address(m[g]), nx[g], ny[g], (1 + e) * given[g], t)
+        if given[g] > 0:
+            hear_pair(w, hits[g], given[g], e * given[g])
 
 
 @cython.cfunc

@@ -9,7 +9,7 @@ from cython.cimports.libc.math import INFINITY, sqrt
 from pyverlet.core.link_arrays import DISTANCE, Links
 from pyverlet.core.link_chains import CHORDS, give, step_chain
 from pyverlet.core.link_lengths import solve_chain
-from pyverlet.core.link_shapes import Way, measure_row, mobility, push, way_between
+from pyverlet.core.link_shapes import LinkWay, measure_row, mobility, push, way_between
 from pyverlet.core.link_softness import Softness, averaged, before_that, kept_share, softness
 
 FARTHEST = cython.declare(cython.double, 0.5)
@@ -32,7 +32,7 @@ def begin_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
     if k.kind[r] == DISTANCE:
         i: cython.Py_ssize_t = k.node[e]
         j: cython.Py_ssize_t = k.node[e + 1]
-        d: Way = way_between(k, i, j, 0)
+        d: LinkWay = way_between(k, i, j, 0)
         square: cython.double = d.x * d.x + d.y * d.y
         turns: cython.double = 0
         if square > 0:
@@ -192,7 +192,7 @@ def finish_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
         return
     k.next[r] = measure_row(k, r, k.h)
     if k.kind[r] == DISTANCE:
-        p: Way = way_between(k, k.node[e], k.node[e + 1], k.h)
+        p: LinkWay = way_between(k, k.node[e], k.node[e + 1], k.h)
         p.x += k.way[2 * r]
         p.y += k.way[2 * r + 1]
         length: cython.double = sqrt(p.x * p.x + p.y * p.y)

@@ -19,7 +19,7 @@ import cython
 from cython.cimports.libc.math import INFINITY, sqrt
 
 from pyverlet.core.link_arrays import Links
-from pyverlet.core.link_shapes import Way, push, way_between
+from pyverlet.core.link_shapes import LinkWay, push, way_between
 
 MOST_RELEASES = cython.declare(cython.int, 8)
 SINGULAR = cython.declare(cython.double, 1e-12)
@@ -49,7 +49,7 @@ def aim_at_length(k: cython.pointer(Links), r: cython.Py_ssize_t, how: cython.in
     how: WAVES, CHORDS, or LOST_WAY, where no direction but that of the place reached is worth anything.
     """
     e: cython.Py_ssize_t = k.first[r]
-    p: Way = way_between(k, k.node[e], k.node[e + 1], k.h)
+    p: LinkWay = way_between(k, k.node[e], k.node[e + 1], k.h)
     length: cython.double = sqrt(p.x * p.x + p.y * p.y)
     start: cython.double = sqrt(k.way[2 * r] * k.way[2 * r] + k.way[2 * r + 1] * k.way[2 * r + 1])
     error: cython.double = length - k.rest[r]

@@ -10,7 +10,7 @@ from cython.cimports.libc.math import INFINITY, sqrt
 from pyverlet.core.link_arrays import DISTANCE, Links
 from pyverlet.core.link_blocks import push_row, solve_block
 from pyverlet.core.link_chains import give
-from pyverlet.core.link_shapes import Way, measure_row, way_between
+from pyverlet.core.link_shapes import LinkWay, measure_row, way_between
 from pyverlet.core.step import Step
 
 SWEEPS = cython.declare(cython.int, 3)
@@ -27,7 +27,7 @@ def turn_impulses(k: cython.pointer(Links), share: cython.double) -> cython.void
         k.target[r] = k.impulse[r]
         given: cython.double = share * k.impulse[r]
         if k.kind[r] == DISTANCE:
-            d: Way = way_between(k, k.node[k.first[r]], k.node[k.first[r] + 1], 0)
+            d: LinkWay = way_between(k, k.node[k.first[r]], k.node[k.first[r] + 1], 0)
             length: cython.double = sqrt(d.x * d.x + d.y * d.y)
             x: cython.double = d.x / length if length > 0 else 0
             y: cython.double = d.y / length if length > 0 else 0

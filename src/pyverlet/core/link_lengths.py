@@ -8,7 +8,7 @@ from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_chains import CHORDS, LOST_WAY, WAVES, give, step_chain
-from pyverlet.core.link_shapes import Way, way_between
+from pyverlet.core.link_shapes import LinkWay, way_between
 
 MOST_STEPS = cython.declare(cython.int, 20)
 LENGTH_SOLVED = cython.declare(cython.double, 1e-9)
@@ -31,7 +31,7 @@ def misses(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ss
     for r in range(first, end):
         if k.intact[r] and k.soft[r] < INFINITY:
             e: cython.Py_ssize_t = k.first[r]
-            p: Way = way_between(k, k.node[e], k.node[e + 1], k.h)
+            p: LinkWay = way_between(k, k.node[e], k.node[e + 1], k.h)
             length: cython.double = sqrt(p.x * p.x + p.y * p.y)
             left: cython.double = length - k.rest[r] + k.soft[r] * k.impulse[r] - k.target[r]
             if k.upper[r] > 0 or k.impulse[r] < 0 or left > 0:
@@ -47,7 +47,7 @@ def sweep_link(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
     e: cython.Py_ssize_t = k.first[r]
     if k.intact[r] == 0 or k.soft[r] == INFINITY:
         return
-    p: Way = way_between(k, k.node[e], k.node[e + 1], k.h)
+    p: LinkWay = way_between(k, k.node[e], k.node[e + 1], k.h)
     length: cython.double = sqrt(p.x * p.x + p.y * p.y)
     gives: cython.double = k.soft[r] + k.h * (k.weight[k.node[e]] + k.weight[k.node[e + 1]])
     if length == 0 or gives <= 0:

@@ -10,7 +10,7 @@ from pyverlet.core.link_arrays import ANGLE, DISTANCE, Links
 
 TURN = cython.declare(cython.double, 6.283185307179586)
 
-Way = cython.struct(x=cython.double, y=cython.double)
+LinkWay = cython.struct(x=cython.double, y=cython.double)
 
 
 @cython.cfunc
@@ -26,9 +26,9 @@ def unwrapped(way: cython.double, period: cython.double) -> cython.double:
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def way_between(k: cython.pointer(Links), i: cython.Py_ssize_t, j: cython.Py_ssize_t, ahead: cython.double) -> Way:
+def way_between(k: cython.pointer(Links), i: cython.Py_ssize_t, j: cython.Py_ssize_t, ahead: cython.double) -> LinkWay:
     """From linked particle i to the nearest image of j, m, `ahead` seconds from now at the velocities of now."""
-    found: Way
+    found: LinkWay
     found.x = unwrapped(k.x[2 * j] - k.x[2 * i], k.period_x) + ahead * (k.u[2 * j] - k.u[2 * i])
     found.y = unwrapped(k.x[2 * j + 1] - k.x[2 * i + 1], k.period_y) + ahead * (k.u[2 * j + 1] - k.u[2 * i + 1])
     return found
@@ -49,8 +49,8 @@ def set_slope(k: cython.pointer(Links), e: cython.Py_ssize_t, x: cython.double, 
 def measure_angle(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.double) -> cython.double:
     """Angle at the second of three particles beyond that at rest, rad."""
     e: cython.Py_ssize_t = k.first[r]
-    a: Way = way_between(k, k.node[e + 1], k.node[e], ahead)
-    b: Way = way_between(k, k.node[e + 1], k.node[e + 2], ahead)
+    a: LinkWay = way_between(k, k.node[e + 1], k.node[e], ahead)
+    b: LinkWay = way_between(k, k.node[e + 1], k.node[e + 2], ahead)
     aa: cython.double = a.x * a.x + a.y * a.y
     bb: cython.double = b.x * b.x + b.y * b.y
     if aa > 0 and bb > 0:
@@ -70,10 +70,10 @@ def measure_area(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.d
     end: cython.Py_ssize_t = k.first[r + 1]
     e: cython.Py_ssize_t
     twice: cython.double = 0
-    before: Way = way_between(k, k.node[first], k.node[end - 1], ahead)
-    here: Way = way_between(k, k.node[first], k.node[first], ahead)
+    before: LinkWay = way_between(k, k.node[first], k.node[end - 1], ahead)
+    here: LinkWay = way_between(k, k.node[first], k.node[first], ahead)
     for e in range(first, end):
-        after: Way = way_between(k, k.node[first], k.node[e + 1 if e + 1 < end else first], ahead)
+        after: LinkWay = way_between(k, k.node[first], k.node[e + 1 if e + 1 < end else first], ahead)
         twice += here.x * after.y - here.y * after.x
         set_slope(k, e, (after.y - before.y) / 2, (before.x - after.x) / 2)
         before.x, before.y = here.x, here.y
@@ -88,7 +88,7 @@ def measure_row(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.do
     """What row r measures beyond its value at rest, `ahead` seconds from now, and its `slope` then (not of distances)."""
     if k.kind[r] == DISTANCE:
         e: cython.Py_ssize_t = k.first[r]
-        d: Way = way_between(k, k.node[e], k.node[e + 1], ahead)
+        d: LinkWay = way_between(k, k.node[e], k.node[e + 1], ahead)
         return sqrt(d.x * d.x + d.y * d.y) - k.rest[r]
     if k.kind[r] == ANGLE:
         return measure_angle(k, r, ahead)

@@ -3,7 +3,8 @@
 
 Each pair takes the lowest colour that neither of its circles has; eight of one colour are a batch. What is left over fills
 batches in its order, where one that shares a particle with the batch waits for the next: around a large circle many do. A batch
-that is not full repeats its last pair: both lanes write the same.
+that is not full repeats its last pair: both lanes write the same. Pairs with a pinned circle come after all batches: that is a
+surface for the other one, and no sweep over pairs goes through them.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ COLOURS = cython.declare(cython.int, 16)
 NO_COLOUR = cython.declare(cython.int, 15)
 LAST_COLOUR = cython.declare(uint32_t, 1 << 15)
 MOST_COLOURS = cython.declare(uint32_t, (1 << 15) - 1)
+PINNED = cython.declare(cython.int, 32)
 
 WAITING = cython.declare(int64_t, 32)
 """Pairs that are looked at for each batch of what is left over."""
@@ -132,10 +134,10 @@ def put_batches(
     low: int64_t = ls.raw_begin[s]
     end: int64_t = ls.found[s] + low
     room: int64_t = w.begin[s + 1]
-    first: int64_t[33]
+    first: int64_t[34]
     p: int64_t
     key: cython.int
-    for key in range(2 * COLOURS + 1):
+    for key in range(PINNED + 2):
         first[key] = 0
     if not alone:
         forget_colours(c, ls, s)
@@ -143,18 +145,19 @@ def put_batches(
         a: uint32_t = ls.raw_i[p]
         b: uint32_t = ls.raw_j[p] & PLACE_BITS
         colour: cython.int = NO_COLOUR
-        if not alone:
+        pinned: cython.bint = ls.picky and (w.inverse_mass[c.order[a]] == 0 or w.inverse_mass[c.order[b]] == 0)
+        if not alone and not pinned:
             # Bit NO_COLOUR is never used up.
             free: uint32_t = (MOST_COLOURS & ~(ls.used[a] | ls.used[b])) | LAST_COLOUR
             colour = lowest_bit(free)
             free &= ~free + 1
             ls.used[a] |= free
             ls.used[b] |= free
-        key = colour + COLOURS if ls.raw_j[p] & CLOSE_BIT else colour
+        key = PINNED if pinned else colour + COLOURS if ls.raw_j[p] & CLOSE_BIT else colour
         ls.key[p] = cython.cast(uint8_t, key)
         first[key + 1] += 1
     first[0] = low
-    for key in range(2 * COLOURS):
+    for key in range(PINNED):
         first[key + 1] += first[key]
     for p in range(low, end):
         key = ls.key[p]
@@ -179,6 +182,12 @@ def put_batches(
         if key % COLOURS == NO_COLOUR:
             k = put_rest(w, ls, c, low, left, k, room)
             left = low
+    w.swept[s] = k - w.begin[s]
+    for p in range(begin, end):
+        pair = ls.sorted[p]
+        if k < room:
+            put_pair(w, c, k, ls.raw_i[pair], ls.raw_j[pair] & PLACE_BITS)
+        k += 1
     return k
 
 

@@ -101,7 +101,7 @@ def list_stage(what: cython.p_void, item: cython.int) -> cython.void:
     alone: cython.bint = s == ls.rows
     found: int64_t = list_alone(w.cells, ls, w.inverse_mass, s) if alone else list_rows(w.cells, ls, w.inverse_mass, s)
     ls.found[s] = found - ls.raw_begin[s]
-    w.lanes[s] = 0
+    w.lanes[s] = w.swept[s] = 0
     if found <= ls.raw_begin[s + 1]:
         end: int64_t = put_batches(w, ls, w.cells, s, alone)
         w.lanes[s] = end - w.begin[s]
@@ -222,6 +222,9 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
     ls.age = 0
     ls.rebuilds += 1
     ls.listed, ls.good, ls.harvested, ls.refill = True, True, False, False
+    w.pins = False
+    for s in range(w.groups):
+        w.pins |= w.lanes[s] > w.swept[s]
     return True
 
 

@@ -41,6 +41,9 @@ def look_anew(w: cython.pointer(Step), whole: cython.bint) -> cython.bint:
     """Particles have moved far, or (`whole`) are others: who may meet whom. False: arrays are too small for it."""
     ls: cython.pointer(Lists) = w.lists
     blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
+    if w.listening and not w.collected:
+        w.waiting = ls.short = True
+        return False
     w.surfaces_good, ls.stale = False, False
     if w.collides:
         return make_list(w, False) if whole else renew_list(w)
@@ -100,6 +103,7 @@ def run_substeps(what: cython.p_void, item: cython.int) -> cython.void:
     while going and w.substep < w.substeps:
         w.lists.stale = substep(w, blocks)
         w.substep += 1
+        w.collected = False
         w.lists.age += 1
         if w.lists.stale and w.substep < w.substeps:
             going = look_anew(w, False) and see_surfaces(w)

@@ -9,13 +9,13 @@ from __future__ import annotations
 import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import floor, sqrt
-from cython.cimports.libc.stdint import int32_t, int64_t
+from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK, wrapped
 from pyverlet.core.obstacles import head_of, near_segment
 from pyverlet.core.step import BOX, CAGE, Step
-from pyverlet.core.surface_shapes import CONTACT, DRAG, PUSH, SIDES
+from pyverlet.core.surface_rows import CONTACT, DRAG, HEARD, HEARD_BOUNCES, HEARD_SPEED, PUSH, SIDES, pinned_lane
 
 FASTER = cython.declare(cython.double, 2.2)
 """Of what a particle moves in a substep: it sees surfaces that far away."""
@@ -61,10 +61,13 @@ def near_side(w: cython.pointer(Step), i: cython.Py_ssize_t, side: cython.int, f
 @cython.nogil
 @cython.exceptval(check=False)
 def put_surface(w: cython.pointer(Step), begin: cython.Py_ssize_t, end: cython.Py_ssize_t, which: int32_t) -> cython.Py_ssize_t:
-    """Put a surface into the places from begin to end, in order; returns where they end then. Those that are there stay alone."""
+    """Put a surface into the places from begin to end, in order; returns where they end then. Those that are there stay alone.
+
+    Sides of the room come last, after obstacles, and these after pinned circles: where there is no room for all, it wins.
+    """
     k: cython.Py_ssize_t = end
     n: cython.Py_ssize_t
-    while k > begin and w.surface[k - 1] > which:
+    while k > begin and cython.cast(uint32_t, w.surface[k - 1]) < cython.cast(uint32_t, which):
         k -= 1
     if k > begin and w.surface[k - 1] == which:
         return end
@@ -82,6 +85,10 @@ def see(w: cython.pointer(Step), i: cython.Py_ssize_t, begin: cython.Py_ssize_t,
     end: cython.Py_ssize_t = begin
     far: cython.double = sight(w, i)
     side: cython.int
+    pair: int32_t = w.lists.head[i] if w.pins else -1
+    while pair >= 0:
+        end = put_surface(w, begin, end, -1 - pair) if fill else end + 1
+        pair = w.lists.kept_next[pair]
     if w.room == BOX or w.room == CAGE:
         for side in range(4):
             if near_side(w, i, side, far):
@@ -153,10 +160,32 @@ def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
         w.contact_end[i] = cython.cast(int32_t, end)
         for k in range(begin, end):
             w.contact[CONTACT * k + PUSH] = w.contact[CONTACT * k + DRAG] = 0
+            w.contact[CONTACT * k + HEARD_SPEED] = w.contact[CONTACT * k + HEARD_BOUNCES] = w.contact[CONTACT * k + HEARD] = 0
+            if w.surface[k] < 0:
+                w.contact[CONTACT * k + PUSH] = w.impulse[pinned_lane(w, k)]
+                w.contact[CONTACT * k + DRAG] = -w.tangent_impulse[pinned_lane(w, k)] if w.rough else 0
+                continue
             for o in range(w.old_begin[i], w.old_end[i]):
                 if w.old_surface[o] == w.surface[k]:
                     w.contact[CONTACT * k + PUSH] = w.old_contact[CONTACT * o + PUSH]
                     w.contact[CONTACT * k + DRAG] = w.old_contact[CONTACT * o + DRAG]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def chain_pinned(w: cython.pointer(Step)) -> cython.void:
+    """Hang pairs with a pinned circle on a chain of the free one: the chains of contacts that the list was made with."""
+    i: cython.Py_ssize_t
+    s: cython.Py_ssize_t
+    k: cython.Py_ssize_t
+    for i in range(w.count):
+        w.lists.head[i] = -1
+    for s in range(w.groups):
+        for k in range(w.begin[s] + w.swept[s], w.begin[s] + w.lanes[s]):
+            i = w.j[k] if w.inverse_mass[w.i[k]] == 0 else w.i[k]
+            w.lists.kept_next[k] = w.lists.head[i]
+            w.lists.head[i] = cython.cast(int32_t, k)
 
 
 @cython.cfunc
@@ -182,6 +211,8 @@ def list_surfaces(w: cython.pointer(Step)) -> cython.bint:
     if not w.surfaces_kept:
         swap_surfaces(w)
         w.surfaces_kept = True
+    if w.pins:
+        chain_pinned(w)
     team_stage(w.team, count_stage, w, blocks)
     total: int64_t = 0
     for block in range(blocks):

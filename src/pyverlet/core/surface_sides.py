@@ -1,63 +1,134 @@
 # mypy: ignore-errors
 """Lines have two sides: nobody gets to the other one by impacts that were not resolved in the order of their times.
 
-A pair may meet before one of the two has met a line, and be solved after: its path is then another than that which bounced.
+A pair may meet before one of the two has met a line, and be solved after: its path is then another than that which bounced. And
+what is thrown much faster than it was may get to lines that are in none of its contacts.
 """
 
 from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
-from cython.cimports.libc.stdint import int64_t
+from cython.cimports.libc.math import fabs, floor
+from cython.cimports.libc.stdint import int32_t, int64_t
 
-from pyverlet.core.cells import wrapped
-from pyverlet.core.obstacles import FACES, LENGTH, PLACE, ROUNDING, SEGMENT
+from pyverlet.core.cells import BLOCK, wrapped
+from pyverlet.core.impacts import NEVER
+from pyverlet.core.obstacles import BODY_OF, FACES, LENGTH, PLACE, ROUNDING, SEGMENT, head_of
 from pyverlet.core.step import Step
-from pyverlet.core.surface_shapes import SIDES
+
+Way = cython.struct(x=cython.double, y=cython.double, dx=cython.double, dy=cython.double)
+"""Of a particle in a substep: from where to how far, m."""
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def crossing(w: cython.pointer(Step), k: cython.Py_ssize_t, way: cython.pointer(Way)) -> cython.double:
+    """Which part of a way leads to line k, if it crosses that, else NEVER."""
+    at: cython.Py_ssize_t = SEGMENT * k
+    if w.segment[at + FACES] > 0 or w.segment[at + LENGTH] == 0:
+        return NEVER
+    b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[at + BODY_OF])
+    h: cython.double = w.h
+    c: cython.double = w.segment[at + PLACE + 2]
+    s: cython.double = w.segment[at + PLACE + 3]
+    x: cython.double = way.x - w.segment[at + PLACE]
+    y: cython.double = way.y - w.segment[at + PLACE + 1]
+    dx: cython.double = way.dx - w.body[b + 3] * h
+    dy: cython.double = way.dy - w.body[b + 4] * h
+    across: cython.double = c * y - s * x
+    gone: cython.double = c * dy - s * dx
+    if gone == 0 or across * (across + gone) > 0:
+        return NEVER
+    part: cython.double = -across / gone
+    crossed: cython.double = c * x + s * y + part * (c * dx + s * dy)
+    return NEVER if crossed < 0 or crossed > w.segment[at + LENGTH] else part
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def first_crossing(w: cython.pointer(Step), way: cython.pointer(Way)) -> cython.Py_ssize_t:
+    """The line that a way crosses first, -1: none."""
+    found: cython.Py_ssize_t = -1
+    first: cython.double = NEVER
+    k: cython.Py_ssize_t
+    part: cython.double
+    row: int64_t
+    column: int64_t
+    left: int64_t = cython.cast(int64_t, floor(min(way.x, way.x + way.dx) / w.cell))
+    right: int64_t = cython.cast(int64_t, floor(max(way.x, way.x + way.dx) / w.cell))
+    low: int64_t = cython.cast(int64_t, floor(min(way.y, way.y + way.dy) / w.cell))
+    high: int64_t = cython.cast(int64_t, floor(max(way.y, way.y + way.dy) / w.cell))
+    if (right - left + 1) * cython.cast(cython.double, high - low + 1) > w.segments:
+        for k in range(w.segments):
+            part = crossing(w, k, way)
+            if part < first:
+                first, found = part, k
+        return found
+    for row in range(low, high + 1):
+        for column in range(left, right + 1):
+            link: int32_t = w.head[head_of(w, column, row)]
+            while link >= 0:
+                k = w.link[2 * link]
+                link = w.link[2 * link + 1]
+                part = crossing(w, k, way)
+                if part < first or (part == first and part != NEVER and k < found):
+                    first, found = part, k
+    return found
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def keep_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
-    """If the way of particle i from the beginning of the substep to its end crosses a line, it ends on it, on its own side."""
+    """If the way of particle i in this substep crosses lines, it ends at the first of them, on its own side."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
-    k: cython.Py_ssize_t
-    if not w.thrown[i]:
+    h: cython.double = w.h
+    struck: cython.bint = w.since[i] > 0
+    from_x: cython.double = w.begun[2 * i] if struck else w.position[2 * i]
+    from_y: cython.double = w.begun[2 * i + 1] if struck else w.position[2 * i + 1]
+    way: Way
+    way.dx = w.position[2 * i] + v[width * i] * h - from_x
+    way.dy = w.position[2 * i + 1] + v[width * i + 1] * h - from_y
+    if not w.thrown[i] and way.dx * way.dx + way.dy * way.dy <= w.lists.half_skin * w.lists.half_skin:
+        return  # it saw all that it may come to
+    way.x = wrapped(cython.cast(real, from_x), w.cells.low_x, w.cells.period_x)
+    way.y = wrapped(cython.cast(real, from_y), w.cells.low_y, w.cells.period_y)
+    k: cython.Py_ssize_t = first_crossing(w, cython.address(way))
+    if k < 0:
         return
-    for k in range(w.contact_begin[i], w.contact_end[i]):
-        at: cython.Py_ssize_t = SEGMENT * (cython.cast(int64_t, w.surface[k]) - SIDES)
-        if at < 0 or w.segment[at + FACES] > 0:
-            continue
-        c: cython.double = w.segment[at + PLACE + 2]
-        s: cython.double = w.segment[at + PLACE + 3]
-        # Places are taken as one: in a periodic room both are shifted alike.
-        x: cython.double = w.begun[2 * i]
-        y: cython.double = w.begun[2 * i + 1]
-        dx: cython.double = w.position[2 * i] + cython.cast(cython.double, v[width * i]) * w.h - x
-        dy: cython.double = w.position[2 * i + 1] + cython.cast(cython.double, v[width * i + 1]) * w.h - y
-        ox: cython.double = wrapped(cython.cast(real, x), w.cells.low_x, w.cells.period_x) - w.segment[at + PLACE]
-        oy: cython.double = wrapped(cython.cast(real, y), w.cells.low_y, w.cells.period_y) - w.segment[at + PLACE + 1]
-        along: cython.double = c * ox + s * oy
-        across: cython.double = c * oy - s * ox
-        gone: cython.double = c * dy - s * dx
-        if across * (across + gone) >= 0:
-            continue
-        crossed: cython.double = along - across / gone * (c * dx + s * dy)
-        if crossed < 0 or crossed > w.segment[at + LENGTH]:
-            continue
-        side: cython.double = 1.0 if across > 0 else -1.0
-        wanted: cython.double = side * (w.segment[at + ROUNDING] + w.radius[i])
-        # To there across the line, and at rest against it.
-        rate: cython.double = c * v[width * i + 1] - s * v[width * i]
-        back: cython.double = wanted - (across + gone) + (rate * w.h if rate * side < 0 else 0.0)
-        if rate * side < 0:
-            v[width * i] += cython.cast(real, rate * s)
-            v[width * i + 1] -= cython.cast(real, rate * c)
-            w.free[2 * i] += cython.cast(real, rate * s)
-            w.free[2 * i + 1] -= cython.cast(real, rate * c)
-        w.position[2 * i] -= cython.cast(real, back * s)
-        w.position[2 * i + 1] += cython.cast(real, back * c)
-        w.moved[2 * i] -= cython.cast(real, back * s)
-        w.moved[2 * i + 1] += cython.cast(real, back * c)
+    line: cython.Py_ssize_t = SEGMENT * k
+    b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[line + BODY_OF])
+    c: cython.double = w.segment[line + PLACE + 2]
+    s: cython.double = w.segment[line + PLACE + 3]
+    gone: cython.double = c * (way.dy - w.body[b + 4] * h) - s * (way.dx - w.body[b + 3] * h)
+    # It stops where it touches the line, or does not move against it if it did already; and goes on along it.
+    part: cython.double = crossing(w, k, cython.address(way)) - (w.segment[line + ROUNDING] + w.radius[i]) / fabs(gone)
+    part = max(part, 0.0)
+    rate: cython.double = c * (v[width * i + 1] - w.body[b + 4]) - s * (v[width * i] - w.body[b + 3])
+    if rate * gone > 0:
+        v[width * i] += cython.cast(real, rate * s)
+        v[width * i + 1] -= cython.cast(real, rate * c)
+        w.free[2 * i] += cython.cast(real, rate * s)
+        w.free[2 * i + 1] -= cython.cast(real, rate * c)
+    rest: cython.double = (1 - part) * h
+    from_x += part * way.dx + rest * w.body[b + 3] - v[width * i] * h - w.position[2 * i]
+    from_y += part * way.dy + rest * w.body[b + 4] - v[width * i + 1] * h - w.position[2 * i + 1]
+    w.position[2 * i] += cython.cast(real, from_x)
+    w.position[2 * i + 1] += cython.cast(real, from_y)
+    w.moved[2 * i] += cython.cast(real, from_x)
+    w.moved[2 * i + 1] += cython.cast(real, from_y)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def keep_sides(w: cython.pointer(Step), block: cython.int) -> cython.void:
+    """The free particles of a block stay on their side of lines."""
+    i: cython.Py_ssize_t
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, w.count)):
+        if w.inverse_mass[i] > 0:
+            keep_side(w, i)

@@ -239,9 +239,7 @@ def _carried(segment, time, px, py, qx, qy):
 
 
 @kernel
-def _travel(
-    b, i, impacts, px, py, segments, bodies, until, x0, y0, x1, y1, cell, heads, links, room, h, lag, rest_speed
-):
+def _travel(b, i, impacts, px, py, segments, bodies, until, x0, y0, x1, y1, cell, heads, links, room, h, lag, rest_speed):
     """The circle b comes from p: (what becomes of it, whether it has met anything, the acceleration left to it if it is held)."""
     size, along_x, along_y, bounces = b.radius, 0.0, 0.0, 0
     x_then, y_then, vx_then, vy_then = b.x, b.y, b.vx, b.vy

@@ -123,6 +123,10 @@ class Events:
         found = kernels.heard(*which, pairs.closing, pairs.bounced, pairs.touched, state.particle, *told)
         self._told.append(Told(*(column[:found] for column in told)))
 
+    def hear(self, told: list[Told]) -> None:
+        """All that was noted of a frame that ends, but for walls of a room of the user's own."""
+        self._told = told
+
     def forget(self) -> None:
         """A frame begins, or begins again."""
         self._told = []
@@ -286,6 +290,16 @@ class Place(NamedTuple):
             mine = facing.obstacle == obstacle[rows[facing.row]]
             gap[rows[facing.row[mine]]], into[rows[facing.row[mine]]] = facing.gap[mine], facing.normal[mine]
         return gap, into, surface
+
+
+def key_of_pair(a: Array, b: Array) -> Array:
+    """Of contacts between particles with these indices, a < b."""
+    return np.asarray((a << 32) + b + 1)
+
+
+def key_of_surface(a: Array, number: Array, obstacle: Array) -> Array:
+    """Of contacts with walls of the room, or (`obstacle`) with obstacles, of these numbers."""
+    return np.asarray((a << 32) + _SURFACE + np.where(obstacle, FIRST_OBSTACLE + number, number))
 
 
 def _room_for(room: int) -> Told:

@@ -22,6 +22,7 @@ from pyverlet.laws.rooms import Open
 from pyverlet.state.moves import first_non_finite
 from pyverlet.world.free_steps import FreeSteps, kicks
 from pyverlet.world.impulse_arrays import ImpulseArrays
+from pyverlet.world.impulse_events import told_of
 from pyverlet.world.impulse_links import ImpulseLinks
 from pyverlet.world.impulse_materials import knows
 from pyverlet.world.impulse_memory import Memory
@@ -118,8 +119,6 @@ class ImpulseFrames:
         law, found = world.collisions, []
         if world._books:
             found.append("a ledger")
-        if world._events:
-            found.append("events")
         if world._sleep:
             found.append("sleep=True")
         if law and not isinstance(law.method, Fast):
@@ -160,6 +159,8 @@ class ImpulseFrames:
         )
         done("gather")
         notes = None if world._touches is None else ImpulseNotes(world._touches, engine, state)
+        if listens := world._events is not None:
+            engine.listen(True)
         step, finite = 0, True
         while step < substeps:
             opens, known = step == 0 or not by_core, self.held.kick > 0.0  # opens: from velocities that belong to the positions
@@ -209,6 +210,9 @@ class ImpulseFrames:
             self._limit(world, watch, dt)
         if notes:
             notes.close(world, dt)
+        if listens:
+            world._events.hear(told_of(engine, state, world._course))
+            engine.listen(False)
         if state.seam:
             engine.wrap_seam()
         done("finish")

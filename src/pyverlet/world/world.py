@@ -102,8 +102,8 @@ class World(Measures, Queries, Doors):
         self.time, self.frames, self.profile, self.actors = 0.0, 0, Profile(), list[Actor]()
         self._run, self._impulses = Substeps(), ImpulseFrames(self._state.dtype)
         self._team, self._looks = Team(), (Coarse(), Precision())
+        # Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins.
         self.onlooker: Callable[[Moment], None] | None = None
-        """Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins."""
 
     # ---- one frame -----------------------------------------------------------------------------------------------------
 
@@ -126,7 +126,6 @@ class World(Measures, Queries, Doors):
             elif not self._frame(h, self._listen(h, books or self.profile.mark)):
                 self._refuse_non_finite(h)
             self._accept(dt, h, books)
-            self.profile.end()
         act_after(self, dt)
 
     def _frame(self, h: float, done: Callable[[str], None]) -> bool:
@@ -228,11 +227,12 @@ class World(Measures, Queries, Doors):
         self._impulses.links.end(self) if self._impulses.steps else self.links.scatter()
         if self._events:
             pairs = self._contacts.packed(self._slots) if self._contacts and len(self) > 1 else None
-            self._events.close(self._slots, self._state, pairs, self._place())
+            self._events.close(self._slots, self._state, None if self._impulses.steps else pairs, self._place())
         self.profile.mark("scatter")
         self.time, self.frames, self._h_last = self.time + dt, self.frames + 1, h
         for each in self._looks:
             each.look(self, h)
+        self.profile.end()
 
     def _show(self, since: float, lag: float) -> None:
         if self.onlooker and since:

@@ -45,7 +45,7 @@ class Collisions:
         method: how pairs are found, Fast() or the O(n^2) reference BruteForce(). Both find the same contacts.
         impulses: contacts remember impulses (docs/design/impulses.md): heaps stay at rest when the length of frames or the number
             of substeps changes, in the room or on unequal masses. So far in worlds of circles, obstacles, forces and a room,
-            without links, events, a ledger or sleep. None: where it knows all that there is in the world.
+            without links, a ledger or sleep. None: where it knows all that there is in the world.
     """
 
     restitution: float = 0.0

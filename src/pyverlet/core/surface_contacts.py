@@ -1,0 +1,227 @@
+# mypy: ignore-errors
+"""Contacts of particles with surfaces: hard ones, with impulses that last. One particle at a time."""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import fabs, sqrt
+
+from pyverlet.core.step import Step
+from pyverlet.core.surface_rows import BEND, CONTACT, DRAG, GAP, NORMAL, PUSH, RUB, SIDES, SPEED, pinned_lane
+from pyverlet.core.surface_shapes import measure_surface
+from pyverlet.core.surfaces import push_off
+
+MOST_TURNS_AROUND = cython.declare(cython.int, 64)
+"""Over the contacts of a particle that lies between several: in a narrow wedge each gives what the other takes."""
+
+TOGETHER = cython.declare(cython.int, 16)
+"""Turns from one to the next in which two surfaces are solved at once: with friction, they have to settle in between."""
+
+JAMMED = cython.declare(cython.double, 0.9)
+"""Of the change halfway through these turns: where the last one still changes as much, no impulses hold it at all surfaces."""
+
+SQUEEZED = cython.declare(cython.double, 0.5)
+"""Of its impulse: how fast a surface then lets a particle into it."""
+
+PARALLEL = cython.declare(cython.double, 1e-5)
+"""Square of the sine of the angle of surfaces that are no corner any more."""
+
+SETTLED = cython.declare(cython.double, 1e-5)
+"""Of its impulses: no more turns are needed if none changes by more."""
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def keep_with_pair(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.void:
+    """What the contact with a pinned circle remembers is what its pair does: rounded alike, for worlds that are saved."""
+    lane: cython.Py_ssize_t = pinned_lane(w, k)
+    w.impulse[lane] = cython.cast(real, w.contact[CONTACT * k + PUSH])
+    w.contact[CONTACT * k + PUSH] = w.impulse[lane]
+    if w.rough:
+        w.tangent_impulse[lane] = cython.cast(real, -w.contact[CONTACT * k + DRAG])
+        w.contact[CONTACT * k + DRAG] = -w.tangent_impulse[lane]
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def excess_speed(w: cython.pointer(Step), first: cython.Py_ssize_t, vx: cython.double, vy: cython.double) -> cython.double:
+    """How much faster into a surface than to just come to it in this substep, m/s."""
+    row: cython.pointer(cython.double) = w.contact
+    nx: cython.double = row[first + NORMAL]
+    ny: cython.double = row[first + NORMAL + 1]
+    ux: cython.double = vx - row[first + SPEED]
+    uy: cython.double = vy - row[first + SPEED + 1]
+    speed: cython.double = ux * nx + uy * ny - row[first + GAP] / w.h
+    bend: cython.double = row[first + BEND]
+    if bend != 0:  # the surface bends away from the tangent, by 1 - cos of what is gone along it
+        slide: cython.double = (ux * ny - uy * nx) * w.h * bend
+        away: cython.double = 1 - sqrt(1 - slide * slide) if slide * slide < 1 else 1.0
+        speed += away / (bend * w.h)
+    return speed
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def hold(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, relax: cython.bint, leak: cython.double
+) -> cython.double:  # fmt: skip
+    """A contact at rest: an impulse that lets the rim come to the surface within this substep, and no farther.
+
+    leak: of the impulse; so fast the rim may go on into the surface.
+
+    Returns by how much that differs from what it gave before.
+    """
+    row: cython.pointer(cython.double) = w.contact
+    first: cython.Py_ssize_t = CONTACT * k
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    nx: cython.double = row[first + NORMAL]
+    ny: cython.double = row[first + NORMAL + 1]
+    before: cython.double = row[first + PUSH]
+    ux: cython.double = v[width * i] - row[first + SPEED]
+    uy: cython.double = v[width * i + 1] - row[first + SPEED + 1]
+    speed: cython.double = ux * nx + uy * ny
+    if relax:  # a velocity of the middle of the substep, along the chord of a round path
+        slide: cython.double = ux * ny - uy * nx
+        speed -= 0.5 * slide * slide * row[first + BEND] * w.h
+    else:
+        if before == 0 and not 0 <= w.surface[k] < SIDES and speed > w.least_bounce:
+            free: cython.double = (w.free[2 * i] - row[first + SPEED]) * nx + (w.free[2 * i + 1] - row[first + SPEED + 1]) * ny
+            if free > w.least_bounce:  # it has bounced if it meets it at all
+                return 0.0
+        speed = excess_speed(w, first, v[width * i], v[width * i + 1])
+    after: cython.double = max(before + speed - leak * before, 0.0)
+    if before == 0 and after == 0:
+        return 0.0
+    row[first + PUSH] = after
+    rubbed: cython.double = 0.0
+    if w.rough:
+        ux -= (after - before) * nx
+        uy -= (after - before) * ny
+        slip: cython.double = ux * ny - uy * nx - v[4 * i + 2] * w.radius[i]
+        most: cython.double = row[first + RUB] * after
+        old: cython.double = row[first + DRAG]
+        row[first + DRAG] = min(max(old - slip / 3, -most), most)
+        rubbed = row[first + DRAG] - old
+    if w.surface[k] < 0:
+        keep_with_pair(w, k)
+    push_off(w, i, k, after - before, rubbed, nx, ny)
+    return fabs(after - before)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def hold_two(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, o: cython.Py_ssize_t) -> cython.void:
+    """Two surfaces that carry load, of a corner: what each is to give, solved for at once; one after the other takes long."""
+    a: cython.Py_ssize_t = CONTACT * k
+    b: cython.Py_ssize_t = CONTACT * o
+    row: cython.pointer(cython.double) = w.contact
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    across: cython.double = row[a + NORMAL] * row[b + NORMAL + 1] - row[a + NORMAL + 1] * row[b + NORMAL]
+    if across * across < PARALLEL:
+        return
+    along: cython.double = row[a + NORMAL] * row[b + NORMAL] + row[a + NORMAL + 1] * row[b + NORMAL + 1]
+    first: cython.double = excess_speed(w, a, v[width * i], v[width * i + 1])
+    second: cython.double = excess_speed(w, b, v[width * i], v[width * i + 1])
+    more: cython.double = (first - along * second) / (across * across)
+    other: cython.double = (second - along * first) / (across * across)
+    if row[a + PUSH] + more > 0 and row[b + PUSH] + other > 0:
+        row[a + PUSH] += more
+        row[b + PUSH] += other
+        if w.surface[k] < 0:
+            keep_with_pair(w, k)
+        if w.surface[o] < 0:
+            keep_with_pair(w, o)
+        push_off(w, i, k, more, 0, row[a + NORMAL], row[a + NORMAL + 1])
+        push_off(w, i, o, other, 0, row[b + NORMAL], row[b + NORMAL + 1])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
+    """Hold particle i at the surfaces that it may reach in this substep."""
+    turn: cython.int
+    k: cython.Py_ssize_t
+    change: cython.double = 0
+    halfway: cython.double = 0
+    for k in range(w.contact_begin[i], w.contact_end[i]):
+        measure_surface(w, i, k, False)
+    for turn in range(MOST_TURNS_AROUND):
+        most: cython.double = 0
+        loaded: cython.int = 0
+        bends: cython.bint = False
+        one: cython.Py_ssize_t = -1
+        change = 0
+        for k in range(w.contact_begin[i], w.contact_end[i]):
+            if w.contact[CONTACT * k + GAP] < w.far or w.contact[CONTACT * k + PUSH] > 0:
+                change = max(change, hold(w, i, k, False, 0))
+                most = max(most, w.contact[CONTACT * k + PUSH])
+                if w.contact[CONTACT * k + PUSH] > 0:
+                    loaded += 1
+                    bends |= w.rough and w.contact[CONTACT * k + BEND] != 0  # friction changes what the bend asks for
+                    if loaded == 2 and turn % TOGETHER == 8:
+                        hold_two(w, i, one, k)
+                    one = k
+        if (loaded < 2 and not bends) or change <= SETTLED * most:
+            return
+        if 2 * turn == MOST_TURNS_AROUND:
+            halfway = change
+    if change > JAMMED * halfway:
+        squeeze(w, i)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def squeeze(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
+    """Surfaces leave less room than particle i needs: they share what is missing, but for the room, which has the last word."""
+    turn: cython.int
+    k: cython.Py_ssize_t
+    for turn in range(MOST_TURNS_AROUND + 1):
+        last: cython.bint = turn == MOST_TURNS_AROUND
+        for k in range(w.contact_begin[i], w.contact_end[i]):
+            near: cython.bint = w.contact[CONTACT * k + GAP] < w.far or w.contact[CONTACT * k + PUSH] > 0
+            if near and (not last or 0 <= w.surface[k] < SIDES):
+                hold(w, i, k, False, 0 if last else SQUEEZED)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def relax_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
+    """Surfaces that carry load: no speed into them."""
+    k: cython.Py_ssize_t
+    for k in range(w.contact_begin[i], w.contact_end[i]):
+        if w.contact[CONTACT * k + PUSH] > 0:
+            measure_surface(w, i, k, True)
+            hold(w, i, k, True, 0)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def warm_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
+    """What surfaces gave particle i in the last substep, along the normals of now."""
+    k: cython.Py_ssize_t
+    for k in range(w.contact_begin[i], w.contact_end[i]):
+        first: cython.Py_ssize_t = CONTACT * k
+        if w.surface[k] < 0 and w.noting:
+            w.struck_x[pinned_lane(w, k)] = w.struck_y[pinned_lane(w, k)] = 0
+        if w.contact[first + PUSH] > 0:
+            measure_surface(w, i, k, False)
+            if w.substep == w.first:
+                w.contact[first + PUSH] *= w.scale
+                w.contact[first + DRAG] *= w.scale
+                if w.surface[k] < 0:
+                    keep_with_pair(w, k)
+            jt: cython.double = w.contact[first + DRAG] if w.rough else 0.0
+            push_off(w, i, k, w.contact[first + PUSH], jt, w.contact[first + NORMAL], w.contact[first + NORMAL + 1])

@@ -1,0 +1,130 @@
+# mypy: ignore-errors
+"""Contacts with surfaces, as rows of numbers; those with sides of the room and with pinned circles.
+
+The unit normal into the surface, the gap of the rim, how the path of a particle that slides along it bends, the velocity of the
+surface, its restitution and friction, and the impulses that the contact remembers.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import sqrt
+
+from pyverlet.core.step import CAGE, Step
+
+SIDES = cython.declare(cython.int, 4)
+"""Surfaces below are sides of the room: left, right, bottom, top of a box; a cage has side 0 only.
+
+From there on they are segments. Negative ones are pinned circles: -1 - k is that of lane k of the list of pairs.
+"""
+
+CONTACT = cython.declare(cython.int, 13)
+NORMAL = cython.declare(cython.int, 0)  # (2)
+GAP = cython.declare(cython.int, 2)  # m
+BEND = cython.declare(cython.int, 3)  # 1/m; positive: the surface bends towards the particle, as a cage does
+SPEED = cython.declare(cython.int, 4)  # (2) m/s
+BOUNCE = cython.declare(cython.int, 6)
+RUB = cython.declare(cython.int, 7)
+PUSH = cython.declare(cython.int, 8)  # impulses along the normal and the tangent over the mass, m/s
+DRAG = cython.declare(cython.int, 9)
+HEARD_SPEED = cython.declare(cython.int, 10)  # as in `Step`, of this frame, while `listening`
+HEARD_BOUNCES = cython.declare(cython.int, 11)
+HEARD = cython.declare(cython.int, 12)
+
+ROUNDED = cython.declare(cython.double, 1e-6)
+"""Of the reach: a face goes on so far beyond its ends, for what touches it at a joint to meet it in spite of rounding."""
+
+FARAWAY = cython.declare(cython.double, 1e300)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def mix(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.Py_ssize_t, e: cython.double, mu: cython.double
+) -> cython.void:
+    """Restitution and friction of a surface and of what touches it: the larger one, and the geometric mean, as in Box2D."""
+    own: cython.double = w.own_friction[i]
+    w.contact[first + BOUNCE] = max(e, cython.cast(cython.double, w.own_restitution[i]))
+    w.contact[first + RUB] = sqrt(mu * own) if own >= 0 else mu
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def measure_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t) -> cython.void:
+    """Where particle i is nearest to the side of the room of contact k."""
+    row: cython.pointer(cython.double) = w.contact
+    first: cython.Py_ssize_t = CONTACT * k
+    side: cython.int = w.surface[k]
+    x: cython.double = w.position[2 * i]
+    y: cython.double = w.position[2 * i + 1]
+    r: cython.double = w.radius[i]
+    row[first + SPEED] = row[first + SPEED + 1] = row[first + BEND] = 0.0
+    if w.room == CAGE:
+        x -= w.x0
+        y -= w.y0
+        d: cython.double = sqrt(x * x + y * y)
+        nx: cython.double = x / d if d > 0 else 1.0
+        ny: cython.double = y / d if d > 0 else 0.0
+        row[first + NORMAL], row[first + NORMAL + 1] = nx, ny
+        row[first + GAP] = w.x1 - r - d
+        row[first + BEND] = 1 / (w.x1 - r) if w.x1 > r else 0.0
+        row[first + SPEED], row[first + SPEED + 1] = -w.wall_speed * ny, w.wall_speed * nx
+    else:
+        row[first + NORMAL] = -1.0 if side == 0 else 1.0 if side == 1 else 0.0
+        row[first + NORMAL + 1] = -1.0 if side == 2 else 1.0 if side == 3 else 0.0
+        if side == 0:
+            row[first + GAP] = x - r - w.x0
+        elif side == 1:
+            row[first + GAP] = w.x1 - r - x
+        elif side == 2:
+            row[first + GAP] = y - r - w.y0
+        else:
+            row[first + GAP] = w.y1 - r - y
+    mix(w, i, first, w.wall_restitution, w.wall_friction)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def pinned_lane(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.Py_ssize_t:
+    """The lane of the pair whose pinned circle is the surface of contact k."""
+    return -1 - cython.cast(cython.Py_ssize_t, w.surface[k])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def measure_pinned(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, late: cython.bint) -> cython.void:
+    """Where particle i is nearest to the pinned circle of contact k; late: at the end of the substep."""
+    row: cython.pointer(cython.double) = w.contact
+    first: cython.Py_ssize_t = CONTACT * k
+    lane: cython.Py_ssize_t = pinned_lane(w, k)
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    sign: cython.double = 1.0 if cython.cast(cython.Py_ssize_t, w.i[lane]) == i else -1.0
+    j: cython.Py_ssize_t = w.j[lane] if sign > 0 else w.i[lane]
+    x: cython.double = sign * w.gap_x[lane] + w.moved[2 * j]
+    y: cython.double = sign * w.gap_y[lane] + w.moved[2 * j + 1]
+    if late:  # the other may have moved already or not
+        x += v[width * j] * cython.cast(cython.double, w.h) - (w.position[2 * i] - cython.cast(cython.double, w.listed[2 * i]))
+        y += v[width * j + 1] * cython.cast(cython.double, w.h)
+        y -= w.position[2 * i + 1] - cython.cast(cython.double, w.listed[2 * i + 1])
+    else:
+        x -= w.moved[2 * i]
+        y -= w.moved[2 * i + 1]
+    reach: cython.double = w.reach[lane * w.sized]
+    distance: cython.double = sqrt(x * x + y * y)
+    nx: cython.double = x / distance if distance > 0 else 1.0
+    ny: cython.double = y / distance if distance > 0 else 0.0
+    row[first + NORMAL], row[first + NORMAL + 1] = nx, ny
+    row[first + GAP], row[first + BEND] = distance - reach, -1 / reach
+    turn: cython.double = w.motion[4 * j + 2] * cython.cast(cython.double, w.radius[j]) if w.rough else 0.0
+    row[first + SPEED], row[first + SPEED + 1] = v[width * j] + turn * ny, v[width * j + 1] - turn * nx
+    row[first + BOUNCE], row[first + RUB] = w.restitution[lane * w.mixed], w.friction[lane * w.mixed]
+    w.normal_x[lane], w.normal_y[lane] = cython.cast(real, sign * nx), cython.cast(real, sign * ny)
+    w.depth[lane] = cython.cast(real, reach - distance)

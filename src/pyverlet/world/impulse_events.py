@@ -1,0 +1,28 @@
+"""Who has touched and bounced in a frame of the law of impulses, in the form in which events take it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pyverlet.laws.events import Told, key_of_pair, key_of_surface
+from pyverlet.laws.obstacles import Course
+from pyverlet.state.slots import Slots
+from pyverlet.world.impulse_obstacles import SIDES
+
+
+def told_of(engine: Any, state: Slots, course: Course) -> list[Told]:
+    """What the engine has heard since it listens, by the user's indices."""
+    told, particle = [], state.particle.astype(np.int64)
+    bodies = course.segments["body"] % max(course.count, 1) if course.count else np.zeros(0, np.int64)
+    for (i, j, speed, bounces), (slot, surface, fast, thrown) in engine.tell():
+        a, b = particle[i], particle[j]
+        # A lane may stand twice in a batch, the second time for nothing.
+        key, first = np.unique(key_of_pair(np.minimum(a, b), np.maximum(a, b)), return_index=True)
+        told.append(Told(key, speed[first], bounces[first].astype(np.int64)))
+        at_obstacle = surface >= SIDES
+        number = surface.copy()
+        number[at_obstacle] = bodies[surface[at_obstacle] - SIDES]
+        told.append(Told(key_of_surface(particle[slot], number, at_obstacle), fast, thrown))
+    return told
