@@ -47,11 +47,11 @@ def friction_of_last(w: cython.pointer(Step), share: cython.double) -> cython.do
             y: cython.double = w.velocity[2 * j + 1] - half * w.given[2 * j + 1]
             x -= w.velocity[2 * i] - half * w.given[2 * i]
             y -= w.velocity[2 * i + 1] - half * w.given[2 * i + 1]
-            turns: cython.double = w.radius[i] * (w.spin[i] - half * w.given_spin[i])
-            turns += w.radius[j] * (w.spin[j] - half * w.given_spin[j])
+            rim_speed: cython.double = w.radius[i] * (w.spin[i] - half * w.given_spin[i])
+            rim_speed += w.radius[j] * (w.spin[j] - half * w.given_spin[j])
             inverse: cython.double = w.inverse_mass[i]
             inverse += w.inverse_mass[j]
-            total += jt * (x * w.normal_y[k] - y * w.normal_x[k] + turns) / inverse
+            total += jt * (x * w.normal_y[k] - y * w.normal_x[k] + rim_speed) / inverse
     row: cython.pointer(cython.double) = w.contact
     if w.surfaces_good:
         for i in range(w.count):
@@ -60,8 +60,7 @@ def friction_of_last(w: cython.pointer(Step), share: cython.double) -> cython.do
                 if row[first + PUSH] > 0 and row[first + DRAG] != 0 and w.inverse_mass[i] > 0:
                     x = w.velocity[2 * i] - half * w.given[2 * i] - row[first + SPEED]
                     y = w.velocity[2 * i + 1] - half * w.given[2 * i + 1] - row[first + SPEED + 1]
-                    turns = w.radius[i] * (w.spin[i] - half * w.given_spin[i])
-                    total += (
-                        row[first + DRAG] * (x * row[first + NORMAL + 1] - y * row[first + NORMAL] - turns) / w.inverse_mass[i]
-                    )
+                    rim_speed = w.radius[i] * (w.spin[i] - half * w.given_spin[i])
+                    slip: cython.double = x * row[first + NORMAL + 1] - y * row[first + NORMAL] - rim_speed
+                    total += row[first + DRAG] * slip / w.inverse_mass[i]
     return share * total

@@ -20,19 +20,19 @@ def follow_seam(w: cython.pointer(Step)):
     c: cython.pointer(Cells) = w.cells
     i: cython.Py_ssize_t
     axis: cython.int
-    strayed: cython.bint = False
+    too_far: cython.bint = False
     for axis in range(2):
         period: cython.double = c.period_y if axis else c.period_x
         low: cython.double = c.low_y if axis else c.low_x
         if period > 0 and w.lists.good:
             for i in range(w.count):
                 away: cython.double = cython.cast(cython.double, w.position[2 * i + axis]) - w.checked[2 * i + axis]
-                turns: cython.double = rint(away / period)
-                if turns != 0:
-                    w.position[2 * i + axis] = cython.cast(real, w.position[2 * i + axis] - period * turns)
+                periods: cython.double = rint(away / period)
+                if periods != 0:
+                    w.position[2 * i + axis] = cython.cast(real, w.position[2 * i + axis] - period * periods)
                 far: cython.double = w.position[2 * i + axis] - low
-                strayed |= far > 1.5 * period or far < -0.5 * period
-    if strayed:
+                too_far |= far > 1.5 * period or far < -0.5 * period
+    if too_far:
         w.lists.good = False
         wrap_seam(w)
 

@@ -139,15 +139,8 @@ class ImpulseFrames:
             self._keep_way(state, before, h)
         if getattr(world.integrator, "naive_start", False):
             self._start_naively(world, (1.0 - half) * h)
-        rough = (
-            max(
-                collisions.friction if collisions else 0.0,
-                state.most_friction,
-                getattr(world.boundary, "friction", 0.0),
-                self.held.obstacle_friction,
-            )
-            > 0.0
-        )
+        frictions = collisions.friction if collisions else 0.0, getattr(world.boundary, "friction", 0.0)
+        rough = max(*frictions, state.most_friction, self.held.obstacle_friction) > 0.0
         done("gather")
         page = done if isinstance(done, ImpulsePage) else None
         if page:
@@ -158,10 +151,8 @@ class ImpulseFrames:
         step, finite = 0, True
         while step < substeps:
             opens, known = step == 0 or not by_core, self.held.kick > 0.0  # opens: from velocities that belong to the positions
-            kick, opening = (
-                half * (h + before) if half and opens else h,
-                0.0 if not by_core else half * h if half and opens else h,
-            )
+            kick = half * (h + before) if half and opens else h
+            opening = 0.0 if not by_core else half * h if half and opens else h
             if not by_core:
                 self._flight.take(world.integrator, state, forces, world.time + step * h, h)
             elif not alone:

@@ -147,9 +147,7 @@ def take_apart(world: World) -> Parts:
     facts["impulses"] = {"kick": memory.kick, "h": memory.h, "hertz": memory.hertz, "finer": memory.finer}
     if memory.kick:
         facts["impulses"]["skin"] = list(memory.skin)
-        arrays |= {
-            f"impulses.{name}": getattr(memory, name) for name in Memory._fields if isinstance(getattr(memory, name), np.ndarray)
-        }
+        arrays |= {f"impulses.{name}": getattr(memory, name) for name in IMPULSES}
     if saved.books:
         facts["books"] = {
             "energy": saved.books._energy, "resting": saved.books._resting, "ledger": saved.books.ledger.as_dict(),

@@ -196,9 +196,8 @@ class World(Measures, Queries, Doors):
                 checks.positive("mass", self._state.mass, infinite_is="pinned")
                 self.boundary.check(self._state.radius)
             except InputError:
-                self._slots = Slots(
-                    self.dtype, sleeps=self._sleep is not None, events=self._events is not None
-                )  # new to the next frame
+                # New to the next frame, which refuses them again.
+                self._slots = Slots(self.dtype, sleeps=self._sleep is not None, events=self._events is not None)
                 raise
         if self._contacts and not self._impulses.steps:
             self._contacts.begin(self._slots, changed=changed)
