@@ -235,13 +235,11 @@ def test_a_drum_takes_discs_along() -> None:
 
 @pytest.mark.parametrize(
     ("what", "more"),
-    [("links", {}), ("sleep=True", {"sleep": True})],
+    [("sleep=True", {"sleep": True})],
 )
 def test_what_it_does_not_know_is_refused(what: str, more: dict[str, Any]) -> None:
     world = pv.World(collisions=law(), **more)
-    pair = world.add(position=[(0, 0), (3, 0)])
-    if what == "links":
-        world.links.append(pv.Stick(pair, 0, 1))
+    world.add(position=[(0, 0), (3, 0)])
     with pytest.raises(pv.InputError, match=what):
         world.step(FRAME)
 

@@ -20,8 +20,11 @@ from pyverlet.core.engine_arrays import (
 )
 from pyverlet.core.engine_hearing import hear, make_hearing_arrays
 from pyverlet.core.engine_impulses import fill_kept, read_impulses
+from pyverlet.core.engine_links import fill_links
 from pyverlet.core.engine_surfaces import give_surfaces, make_surface_arrays, place_obstacles, set_obstacles, take_surfaces
 from pyverlet.core.engine_work import energy_of_last, friction_of_last
+from pyverlet.core.link_arrays import Links
+from pyverlet.core.link_ends import show_links
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.running import remake_list, run_substeps
 from pyverlet.core.seams import follow_seam, wrap_seam
@@ -39,6 +42,7 @@ class Engine:
     w: Step
     c: Cells
     ls: Lists
+    lk: Links
     arrays = cython.declare(dict, visibility="public")
     heard = cython.declare(list, visibility="readonly")
     threads = cython.declare(cython.int, visibility="readonly")
@@ -53,7 +57,7 @@ class Engine:
             raise MemoryError
         self.threads = threads
         self.dtype = np.dtype(np.float64 if cython.sizeof(real) == 8 else np.float32)
-        w.cells, w.lists = c, ls
+        w.cells, w.lists, w.link_table, w.linked = c, ls, cython.address(self.lk), False
         ls.per_particle, ls.per_pair, ls.alone_room = 4.0, 1.25, 64.0
         ls.pairs_room = ls.lanes_room = 0
         w.count, w.groups = -1, 0
@@ -119,6 +123,18 @@ class Engine:
         self.ls.linked_begin, self.ls.linked_to = integers(begin), small_integers(to)
         self.ls.picky = self.ls.picky or self.ls.linked
         self.ls.good = False
+
+    def set_links(self, rows, passes, period_x, period_y):
+        """Links (world/link_rows.py; None: there are none), passes over them in a substep, and periods of the room, m or 0."""
+        self.w.linked = rows is not None
+        if rows is not None:
+            self.arrays["links"] = rows
+            fill_links(cython.address(self.lk), rows, passes, period_x, period_y)
+
+    def show_links(self, half: cython.double, kick: cython.double):
+        """Velocities of now, at the end of a frame, are those that links allow: see `link_ends`."""
+        if self.w.linked and half > 0:
+            show_links(cython.address(self.w), half, kick)
 
     def set_room(self, room, x0, y0, x1, y1, restitution, friction, speed):
         """Walls: none (0); a cage (1) by centre and radius; a box (2) by two corners; m. speed: of a cage's surface, m/s."""

@@ -25,6 +25,7 @@ from cython.cimports.team import team_stage
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.contacts import bounce_again, relax_contacts, solve_contacts
 from pyverlet.core.hearing import hear_loads, hear_surface_loads
+from pyverlet.core.links import begin_links, end_links, relax_links, remember_links_stage, solve_links
 from pyverlet.core.obstacles import place_moving
 from pyverlet.core.particle_stages import drift, kick_stage, remember_stage
 from pyverlet.core.relisting import each_group
@@ -65,6 +66,20 @@ def hold_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def hold_on_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """Surfaces once more hold particles of a block."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    n: cython.Py_ssize_t
+    for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
+        bounce_surfaces(w, w.at_surface[n])  # pairs may have thrown it there
+        hold_surfaces(w, w.at_surface[n])
+    if w.segments > 0:
+        keep_sides(w, block)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def relax_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Surfaces that carry particles of a block."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -80,12 +95,8 @@ def drift_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Surfaces once more, then a block of particles moves."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     a: cython.Py_ssize_t = block * BLOCK
-    n: cython.Py_ssize_t
-    for n in range(a, a + w.at_surface_count[block]):
-        bounce_surfaces(w, w.at_surface[n])  # pairs may have thrown it there
-        hold_surfaces(w, w.at_surface[n])
-    if w.segments > 0:
-        keep_sides(w, block)
+    if not w.linked:
+        hold_on_stage(what, block)
     drift(w, a, min(a + BLOCK, w.count), block)
     if w.booking:
         book_drift(w, block)
@@ -202,6 +213,8 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     fastest: real = cython.cast(real, sqrt(most))
     w.far = 2 * w.h * fastest + w.near
     w.least_bounce = max(w.rest_speed, fastest * cython.cast(real, 1e-14 if cython.sizeof(real) == 8 else 2e-6))
+    if w.linked:
+        begin_links(w)
     surfaces: cython.bint = w.room != OPEN or w.segments > 0 or w.pins
     place_moving(w)
     if surfaces:
@@ -211,11 +224,19 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
         team_stage(w.team, hold_surfaces_stage, w, blocks)
     each_group(w, solve_stage)
     bounce_on(w)
+    if w.linked:
+        if surfaces:
+            team_stage(w.team, hold_on_stage, w, blocks)
+        solve_links(w)
     team_stage(w.team, drift_stage, w, blocks)
     for sweep in range(w.relaxes):
         if sweep > 0 and surfaces:
             team_stage(w.team, relax_surfaces_stage, w, blocks)
         each_group(w, relax_stage)
+        if w.linked:
+            relax_links(w, sweep % 2 == 1)
+    if w.linked:
+        end_links(w)
     if w.booking and w.rough:
         each_group(w, rubbing_stage)
         team_stage(w.team, book_grips, w, blocks)
@@ -226,6 +247,8 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
         team_stage(w.team, hear_surfaces_stage, w, blocks)
     if w.rough or w.substep + 1 == w.substeps:  # what smooth contacts gave before is asked for by no one
         team_stage(w.team, remember_stage, w, blocks)
+        if w.linked:
+            team_stage(w.team, remember_links_stage, w, (w.link_table.count + BLOCK - 1) // BLOCK)
     for b in range(blocks):
         stale |= w.stale[b] != 0
     return stale

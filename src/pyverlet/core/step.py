@@ -9,6 +9,7 @@ from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 from cython.cimports.team import thread_team
 
 from pyverlet.core.cells import Cells
+from pyverlet.core.link_arrays import Links
 from pyverlet.core.pair_lists import Lists
 
 OPEN = cython.declare(cython.int, 0)
@@ -166,4 +167,6 @@ Step = cython.struct(
     parity=cython.Py_ssize_t,  # of the groups that are gone through now: see `each_group`
     cells=cython.pointer(Cells),
     lists=cython.pointer(Lists),
+    link_table=cython.pointer(Links),
+    linked=cython.bint,  # whether there are any
 )

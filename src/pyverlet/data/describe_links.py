@@ -12,6 +12,7 @@ from pyverlet.data.describe import OBJECT, STATE, TYPE
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.fields import Field
 from pyverlet.laws.links import Angle, Area, Link, Pin, Rope, Spring, Stick
+from pyverlet.laws.links._link import REMEMBERED
 from pyverlet.world.world import World
 
 _REST: dict[Any, str] = {Stick: "length", Rope: "length", Spring: "length", Angle: "angle", Area: "area", Pin: "point"}
@@ -33,6 +34,7 @@ _MOVING = {
     "intact": Field(np.uint8, "rows", least=0, most=1),
     "force": Field(np.float64, "rows"),
     "last": Field(np.float64, "rows"),
+    **{name: Field(np.float64, "rows", 2) for name in REMEMBERED},
 }
 
 
@@ -118,7 +120,7 @@ def _append(world: World, name: str, table: dict[str, Any], own: dict[str, type]
         link._collide = table["collide"]
         if not isinstance(link._collide, bool):
             raise InputError(f"{name}: collide is {link._collide!r}; allowed are true and false")
-    moving = {key: _column(name, key, table[STATE], field, world, sizes) for key, field in _MOVING.items()}
+    moving = {key: _column(name, key, table[STATE], field, world, sizes) for key, field in _MOVING.items() if key in table[STATE]}
     world.links.append(link)
     for key, column in moving.items():
         link._pool.rows[key][link._where] = column

@@ -23,6 +23,7 @@ from pyverlet.state.moves import first_non_finite
 from pyverlet.world.free_steps import FreeSteps, kicks
 from pyverlet.world.impulse_arrays import ImpulseArrays
 from pyverlet.world.impulse_events import told_of
+from pyverlet.world.impulse_links import ImpulseLinks
 from pyverlet.world.impulse_materials import knows
 from pyverlet.world.impulse_memory import Memory
 from pyverlet.world.impulse_notes import ImpulseNotes
@@ -63,15 +64,22 @@ class ImpulseFrames:
         self._dtype = dtype
         self.held = ImpulseArrays(dtype)
         self._flight = FreeSteps()
+        self.links = ImpulseLinks()
         self._law: Any = None  # numbers that the engine holds
         self._pull: tuple[Any, float] = None, 0.0  # gravity, and how strong it is, m/s^2
         self.growth = Growth()
         self.steps = False  # whether the last frame was one of this law
         # What contacts remember between frames.
-        self.forget, self.save, self.renumber = self.held.forget, self.held.save, self.held.renumber
+        self.save, self.renumber = self.held.save, self.held.renumber
+
+    def forget(self) -> None:
+        """No contact remembers anything."""
+        self.links.forget()
+        self.held.forget()
 
     def restore(self, memory: Memory) -> None:
-        """Back to what `save` returned."""
+        """Back to what `save` returned; links have gone back to theirs."""
+        self.links.forget()
         self.held.restore(memory)
         self.steps = memory.kick > 0
 
@@ -100,9 +108,9 @@ class ImpulseFrames:
         """
         if found := self.unknown(world):
             raise InputError(f"impulses is True in a world with {found[0]}; allowed are circles, obstacles and forces in a room")
-        world.links.begin()
         world._slots.rows = self.held.core
         world._slots.clear_notes()
+        self.links.keep_apart(world, self.held.engine)
         if world._gather():
             self.held.forget_list()
         if not self.run(world, dt, done):
@@ -111,8 +119,6 @@ class ImpulseFrames:
     def unknown(self, world: Any) -> list[str]:
         """What there is in a world that this law does not know yet."""
         found = []
-        if world.links:
-            found.append("links")
         if world._sleep:
             found.append("sleep=True")
         return found
@@ -122,7 +128,7 @@ class ImpulseFrames:
         state, forces, engine, collisions = world._slots, world._force_sum, self.held.engine, world.collisions
         contained = len(world) > 1 or not isinstance(world.boundary, Open)
         substeps = world.substeps
-        if contained and collisions and dt > LONGEST_FRAME:
+        if ((contained and collisions) or world.links) and dt > LONGEST_FRAME:
             substeps *= int(np.ceil(dt / LONGEST_FRAME * (1 - 1e-9)))
         by_core = kicks(world.integrator)
         h, half = dt / substeps, world.integrator.velocity_lag if by_core else 0.5
@@ -135,6 +141,7 @@ class ImpulseFrames:
         gravity = world.gravity
         state.h = h
         self.held.load(world, dt)
+        self.links.load(world, self.held.engine)
         if type(world.integrator) is PositionVerlet and before not in (0.0, h):
             self._keep_way(state, before, h)
         if getattr(world.integrator, "naive_start", False):
@@ -191,6 +198,7 @@ class ImpulseFrames:
         self.held.h = h
         if not alone:
             self._end(world, dt, half * h if by_core else 0.0)
+        engine.show_links(half * h, self.held.kick)
         if (not finite or not alone) and first_non_finite(state) >= 0:
             return False
         if page:

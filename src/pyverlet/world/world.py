@@ -223,7 +223,7 @@ class World(Measures, Queries, Doors):
         if books:
             books.close(self._spent())
         self._course.end(dt)
-        self.links.scatter()
+        self._impulses.links.end(self) if self._impulses.steps else self.links.scatter()
         if self._events:
             pairs = self._contacts.packed(self._slots) if self._contacts and len(self) > 1 else None
             self._events.close(self._slots, self._state, None if self._impulses.steps else pairs, self._place())

@@ -25,6 +25,11 @@ Floats = NDArray[np.float64]
 MOVING = ("intact", "force", "last")
 """Columns that a frame changes."""
 
+REMEMBERED = "impulse", "load", "pull", "value", "next"
+"""Of the law of impulses: accumulated impulse, N s, its mean as a force, N, what the row measured a substep ago, and what it
+would measure next; two each, for x and y of pins.
+"""
+
 
 class _InTurn(ABCMeta):
     """Links are made in one turn: no other thread removes particles between looking them up and noting their numbers."""
@@ -67,7 +72,7 @@ class Link(metaclass=_InTurn):
     def __getstate__(self) -> dict[str, Any]:
         kept = {name: value for name, value in vars(self).items() if name not in ("_pool", "_id", "_moving")}
         if self._pool is not None:
-            kept["_moving"] = {name: self._pool.rows[name][self._where].copy() for name in MOVING}
+            kept["_moving"] = {name: self._pool.rows[name][self._where].copy() for name in (*MOVING, *REMEMBERED)}
         return kept
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -131,6 +136,7 @@ class Link(metaclass=_InTurn):
         if self._pool is not None:
             self._pool.rows[column][self._where] = value
             self._pool.changed = True
+            self._pool.edits += 1
 
     @property
     def force(self) -> Floats:

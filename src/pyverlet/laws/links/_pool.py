@@ -7,10 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.laws.links._link import Array
+from pyverlet.laws.links._link import REMEMBERED, Array
 from pyverlet.laws.links._table import Table
 from pyverlet.laws.links._work import Work
 from pyverlet.state.seam import Seam
+
+NEVER = 1e300
+"""What a row that has not been solved yet would measure next."""
 
 
 class Pool(ABC):
@@ -22,6 +25,7 @@ class Pool(ABC):
         drawn: whether its rows are lines between their particles.
         stale: rows have come or gone since `pack`.
         changed: numbers of rows have changed since `begin`.
+        edits: how often rows have come, gone or been given other numbers.
         gives: whether any row stores energy, once a frame has begun.
     """
 
@@ -31,21 +35,38 @@ class Pool(ABC):
     def __init__(self, **columns: Any) -> None:
         self.rows = Table(
             owner=np.int64, arity=np.int64, stiffness=np.float64, damping=np.float64, strength=np.float64, intact=np.uint8,
-            collide=np.uint8, force=np.float64, last=np.float64, **columns,
+            collide=np.uint8, force=np.float64, last=np.float64,
+            **dict.fromkeys(REMEMBERED, (np.float64, (2,))), **columns,
         )  # fmt: skip
         self.entries = Table(particle=np.int64)
         self.stale = self.changed = True
+        self.edits = 0
 
     def append(self, owner: int, particles: Array, columns: dict[str, Any]) -> slice:
         """Add a row for each of the (k, p) particles, given in the user's indices."""
         self.stale = True
+        self.edits += 1
         count, arity = particles.shape
         self.entries.append(particles.size, particle=particles.ravel())
-        return self.rows.append(count, owner=owner, arity=arity, intact=1, force=0.0, last=0.0, **columns)
+        return self.rows.append(
+            count,
+            owner=owner,
+            arity=arity,
+            intact=1,
+            force=0.0,
+            last=0.0,
+            impulse=0.0,
+            load=0.0,
+            pull=0.0,
+            value=0.0,
+            next=NEVER,
+            **columns,
+        )
 
     def keep(self, mask: Array) -> None:
         """Remove all other rows."""
         self.stale = True
+        self.edits += 1
         self.entries.keep(np.repeat(mask, self.rows["arity"]))
         self.rows.keep(mask)
 

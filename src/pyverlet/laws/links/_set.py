@@ -181,6 +181,10 @@ class Links(Shared):
         for pool in self._kept:
             pool.begin()
         self._bundled = False
+        return self.begin_apart()
+
+    def begin_apart(self) -> bool:
+        """A frame begins. True if other pairs than before are no contacts (`unlist`)."""
         self._know_apart()
         changed, self._apart_changed = self._apart_changed, False
         return changed
@@ -267,22 +271,22 @@ class Links(Shared):
     def scatter(self) -> None:
         """The frame is good: what it did to the links holds."""
         self._past = self._work.end(self._state) if self._kept else None
-        self.broken = self.broken[:0]
+        self.accept([(pool, rows, pool.pulled()[rows]) for pool in self._kept if len(rows := pool.broken())])
         for pool in self._kept:
-            snapped = pool.broken()
-            if len(snapped):
-                self.broken = np.concatenate((self.broken, self._note(pool, snapped)))
-                # What is left is packed anew, as by `restore`: chains are cut where links have broken.
-                pool.stale = self._apart_stale = True
             pool.end()
 
-    def _note(self, pool: Pool, snapped: Array) -> Array:
+    def accept(self, torn: list[tuple[Pool, Array, Array]]) -> None:
+        """A frame is good: of each pool the rows that broke, and what they pulled with, N. What is left is packed anew."""
+        self.broken = np.concatenate((self.broken[:0], *(self._note(*each) for each in torn)))
+        for pool, *_ in torn:
+            pool.edits, pool.stale, self._apart_stale = pool.edits + 1, True, True
+
+    def _note(self, pool: Pool, snapped: Array, pull: Array) -> Array:
         """The BROKEN entries of these rows of a pool."""
         note, number = np.empty(len(snapped), BROKEN), {owner: k for k, owner in enumerate(self._links)}
-        for k, row in enumerate(snapped):
-            link = self._links[int(pool.rows["owner"][row])]
-            within = int(row) - link._where.start
-            note[k] = (number[link._id], within, link.particles[within, 0], link.particles[within, -1], pool.pulled()[row])
+        for k, (row, owner) in enumerate(zip(snapped, pool.rows["owner"][snapped].tolist(), strict=True)):
+            ends = self._links[owner].particles[within := int(row) - self._links[owner]._where.start]
+            note[k] = (number[owner], within, ends[0], ends[-1], pull[k])
         return note
 
     # ---- to look at ----------------------------------------------------------------------------------------------------

@@ -1,0 +1,65 @@
+# mypy: ignore-errors
+"""Links as Python gives them to the engine (`world/link_rows.py`)."""
+
+from __future__ import annotations
+
+import cython
+import numpy as np
+from cython.cimports.arrays import doubles, indices, integers, small_integers
+
+from pyverlet.core.link_arrays import Links
+
+
+@cython.cfunc
+def fill_links(k: cython.pointer(Links), a, passes: cython.int, period_x: cython.double, period_y: cython.double):
+    """Take the addresses of what `LinkRows` has, and make what only the core looks at."""
+    particles, rows, pins = len(a["slot"]), len(a["kind"]), len(a["pin_node"])
+    k.count, k.rows, k.pins, k.colours, k.passes = particles, rows, pins, len(a["colour"]) - 1, passes
+    k.period_x, k.period_y = period_x, period_y
+    if "x" not in a:
+        a |= {name: np.zeros((particles, 2)) for name in ("x", "u", "warm", "loaned", "driven", "react")}
+        a |= {name: np.zeros(particles) for name in ("own", "weight")}
+        a |= {name: np.zeros((len(a["node"]), 2)) for name in ("gradient", "slope")}
+        a |= {name: np.zeros(rows) for name in ("soft", "target", "turned", "turning", "keeps")}
+        a |= {name: np.zeros((rows, 2)) for name in ("way", "middle", "given", "along", "wanted", "answer")}
+        a |= {"inverse": np.zeros((rows, 3)), "acts": np.zeros(rows, np.int32)}
+        a |= {"pin_soft": np.zeros(pins), "pin_target": np.zeros((pins, 2))}
+    k.slot, k.x, k.u, k.warm, k.react = (
+        indices(a["slot"]),
+        doubles(a["x"]),
+        doubles(a["u"]),
+        doubles(a["warm"]),
+        doubles(a["react"]),
+    )
+    k.own, k.weight = doubles(a["own"]), doubles(a["weight"])
+    k.first, k.node, k.gradient, k.slope = integers(a["first"]), integers(a["node"]), doubles(a["gradient"]), doubles(a["slope"])
+    k.kind, k.rest, k.stiffness, k.damping = (
+        small_integers(a["kind"]),
+        doubles(a["rest"]),
+        doubles(a["stiffness"]),
+        doubles(a["damping"]),
+    )
+    k.upper, k.strength, k.intact = doubles(a["upper"]), doubles(a["strength"]), small_integers(a["intact"])
+    k.impulse, k.load, k.pull, k.value = doubles(a["impulse"]), doubles(a["load"]), doubles(a["pull"]), doubles(a["value"])
+    k.next, k.soft, k.target, k.turned = doubles(a["next"]), doubles(a["soft"]), doubles(a["target"]), doubles(a["turned"])
+    k.driven = doubles(a["driven"])
+    k.loaned, k.keeps = doubles(a["loaned"]), doubles(a["keeps"])
+    k.turning = doubles(a["turning"])
+    k.acts, k.way, k.middle, k.given = small_integers(a["acts"]), doubles(a["way"]), doubles(a["middle"]), doubles(a["given"])
+    k.along, k.wanted, k.answer, k.inverse = (
+        doubles(a["along"]),
+        doubles(a["wanted"]),
+        doubles(a["answer"]),
+        doubles(a["inverse"]),
+    )
+    k.alone = small_integers(a["alone"])
+    k.block, k.chunk, k.colour = integers(a["block"]), integers(a["chunk"]), integers(a["colour"])
+    k.pin_node, k.pin_point, k.pin_intact = integers(a["pin_node"]), doubles(a["pin_point"]), small_integers(a["pin_intact"])
+    k.pin_stiffness, k.pin_damping, k.pin_strength = (
+        doubles(a["pin_stiffness"]),
+        doubles(a["pin_damping"]),
+        doubles(a["pin_strength"]),
+    )
+    k.pin_impulse, k.pin_load, k.pin_pull = doubles(a["pin_impulse"]), doubles(a["pin_load"]), doubles(a["pin_pull"])
+    k.pin_value, k.pin_next = doubles(a["pin_value"]), doubles(a["pin_next"])
+    k.pin_soft, k.pin_target = doubles(a["pin_soft"]), doubles(a["pin_target"])

@@ -1,0 +1,217 @@
+# mypy: ignore-errors
+"""Blocks of rows: chains are solved directly, single rows (angles, areas) one by one; chunk by chunk of a colour."""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.libc.math import INFINITY, sqrt
+
+from pyverlet.core.link_arrays import DISTANCE, Links
+from pyverlet.core.link_chains import CHORDS, give, step_chain
+from pyverlet.core.link_lengths import solve_chain
+from pyverlet.core.link_shapes import LinkWay, measure_row, mobility, push, way_between
+from pyverlet.core.link_softness import Softness, averaged, before_that, kept_share, softness
+
+FARTHEST = cython.declare(cython.double, 0.5)
+"""Most that a link is taken to turn in a substep, rad."""
+
+AVERAGED = cython.declare(cython.double, 120.0)
+"""1/s: rate of the mean of the pull that is shown, and that breaks."""
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def begin_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
+    """What row r measures, its numbers, and how it turns."""
+    e: cython.Py_ssize_t = k.first[r]
+    if k.intact[r] == 0:
+        return
+    value: cython.double = measure_row(k, r, 0)
+    before: cython.double = before_that(value, k.value[r], k.next[r], k.rest[r])
+    if k.kind[r] == DISTANCE:
+        i: cython.Py_ssize_t = k.node[e]
+        j: cython.Py_ssize_t = k.node[e + 1]
+        d: LinkWay = way_between(k, i, j, 0)
+        square: cython.double = d.x * d.x + d.y * d.y
+        turns: cython.double = 0
+        if square > 0:
+            turns = k.h * ((k.u[2 * j + 1] - k.u[2 * i + 1]) * d.x - (k.u[2 * j] - k.u[2 * i]) * d.y) / square
+        k.way[2 * r], k.way[2 * r + 1] = d.x, d.y
+        k.turning[r] = max(min(turns, FARTHEST), -FARTHEST)
+        k.given[2 * r] = k.given[2 * r + 1] = 0
+    else:
+        for e in range(k.first[r], k.first[r + 1]):
+            k.gradient[2 * e], k.gradient[2 * e + 1] = k.slope[2 * e], k.slope[2 * e + 1]
+    soft: Softness = softness(k, k.stiffness[r], k.damping[r], mobility(k, r), value, before)
+    k.soft[r], k.target[r], k.value[r] = soft.soft, soft.target, value
+    if soft.soft == INFINITY:
+        k.impulse[r] = 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def warm_block(k: cython.pointer(Links), b: cython.Py_ssize_t) -> cython.void:
+    """What rows of a block gave in the last substep, along the gradients of now.
+
+    A chain gives one share of all of it: what its light particles get is a small difference of large impulses.
+    """
+    r: cython.Py_ssize_t
+    share: cython.double = 1
+    for r in range(k.block[b], k.block[b + 1]):
+        if k.intact[r]:
+            share = min(share, kept_share(k, k.impulse[r], k.load[r], mobility(k, r)))
+    for r in range(k.block[b], k.block[b + 1]):
+        k.impulse[r] *= k.scale * share
+        k.load[r] = k.impulse[r]
+        moves: cython.double = k.h * mobility(k, r)
+        k.keeps[r] = k.soft[r] / (k.soft[r] + moves) if k.soft[r] < INFINITY and k.soft[r] + moves > 0 else 1
+        lent: cython.double = 1 - k.keeps[r]
+        if k.kind[r] == DISTANCE:
+            x: cython.double = k.way[2 * r]
+            y: cython.double = k.way[2 * r + 1]
+            length: cython.double = sqrt(x * x + y * y)
+            if length > 0:
+                e: cython.Py_ssize_t = k.first[r]
+                x *= k.impulse[r] / length
+                y *= k.impulse[r] / length
+                give(k, r, x, y)
+                lend(k, k.node[e], -lent * x, -lent * y)
+                lend(k, k.node[e + 1], lent * x, lent * y)
+        else:
+            push_row(k, r, k.impulse[r], k.gradient)
+            for e in range(k.first[r], k.first[r + 1]):
+                lend(k, k.node[e], lent * k.impulse[r] * k.gradient[2 * e], lent * k.impulse[r] * k.gradient[2 * e + 1])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def lend(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
+    """Of what linked particle i was given, this impulse is taken back before rows are solved."""
+    if k.own[i] > 0:
+        k.loaned[2 * i] += k.weight[i] * x
+        k.loaned[2 * i + 1] += k.weight[i] * y
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def take_back_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
+    """Row r begins to be solved with what it keeps."""
+    k.impulse[r] *= k.keeps[r]
+    if k.kind[r] == DISTANCE:
+        k.given[2 * r] *= k.keeps[r]
+        k.given[2 * r + 1] *= k.keeps[r]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def push_row(
+    k: cython.pointer(Links), r: cython.Py_ssize_t, impulse: cython.double, gradient: cython.pointer(cython.double)
+) -> cython.void:
+    """Give an impulse along a gradient of row r."""
+    e: cython.Py_ssize_t
+    for e in range(k.first[r], k.first[r + 1]):
+        push(k, k.node[e], impulse * gradient[2 * e], impulse * gradient[2 * e + 1])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def solve_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
+    """A single row: a step of Newton's method for what it measures after the drift, along its gradient at the start."""
+    e: cython.Py_ssize_t
+    if k.intact[r] == 0 or k.soft[r] == INFINITY:
+        return
+    left: cython.double = k.target[r] - k.soft[r] * k.impulse[r] - measure_row(k, r, k.h)
+    along: cython.double = 0
+    square: cython.double = 0
+    for e in range(k.first[r], k.first[r + 1]):
+        x: cython.double = k.slope[2 * e]
+        y: cython.double = k.slope[2 * e + 1]
+        along += k.weight[k.node[e]] * (k.gradient[2 * e] * x + k.gradient[2 * e + 1] * y)
+        square += k.weight[k.node[e]] * (x * x + y * y)
+    turned: cython.bint = 2 * along < square  # the gradient has turned away: that of after the drift
+    change: cython.double = k.soft[r] + k.h * (square if turned else along)
+    if change > 0:
+        change = left / change
+        k.impulse[r] += change
+        push_row(k, r, change, k.slope if turned else k.gradient)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def relax_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
+    """After the drift: a rigid single row changes no more, along the mean of its gradients before and after."""
+    e: cython.Py_ssize_t
+    rate: cython.double = 0
+    square: cython.double = 0
+    if k.intact[r] == 0 or k.stiffness[r] < INFINITY:
+        return
+    for e in range(k.first[r], k.first[r + 1]):
+        i: cython.Py_ssize_t = k.node[e]
+        x: cython.double = k.slope[2 * e]
+        y: cython.double = k.slope[2 * e + 1]
+        rate += x * k.u[2 * i] + y * k.u[2 * i + 1]
+        square += k.weight[i] * (x * x + y * y)
+    if square > 0:
+        k.impulse[r] -= rate / square
+        push_row(k, r, -rate / square, k.slope)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def solve_block(k: cython.pointer(Links), b: cython.Py_ssize_t, drifts: cython.bint) -> cython.void:
+    """A chain, or a single row."""
+    r: cython.Py_ssize_t = k.block[b]
+    if r == k.block[b + 1]:
+        return
+    if k.kind[r] == DISTANCE:
+        if drifts:
+            solve_chain(k, r, k.block[b + 1], k.alone[b] != 0)
+        else:
+            step_chain(k, r, k.block[b + 1], False, CHORDS)
+    elif drifts:
+        solve_row(k, r)
+    else:
+        relax_row(k, r)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def finish_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
+    """Before the drift: what row r will measure after it, and its gradient in the middle of the two."""
+    e: cython.Py_ssize_t = k.first[r]
+    if k.intact[r] == 0:
+        return
+    k.next[r] = measure_row(k, r, k.h)
+    if k.kind[r] == DISTANCE:
+        p: LinkWay = way_between(k, k.node[e], k.node[e + 1], k.h)
+        p.x += k.way[2 * r]
+        p.y += k.way[2 * r + 1]
+        length: cython.double = sqrt(p.x * p.x + p.y * p.y)
+        k.middle[2 * r] = p.x / length if length > 0 else 0
+        k.middle[2 * r + 1] = p.y / length if length > 0 else 0
+    else:
+        for e in range(k.first[r], k.first[r + 1]):
+            k.slope[2 * e] = (k.slope[2 * e] + k.gradient[2 * e]) / 2
+            k.slope[2 * e + 1] = (k.slope[2 * e + 1] + k.gradient[2 * e + 1]) / 2
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def end_row(k: cython.pointer(Links), r: cython.Py_ssize_t, mean: cython.double) -> cython.void:
+    """The mean of what row r pulls with; if that is too much, it breaks."""
+    if k.intact[r] == 0:
+        return
+    k.pull[r] = averaged(k.pull[r], -k.impulse[r] / k.kick, mean)
+    if k.pull[r] > k.strength[r] or -k.pull[r] > k.strength[r]:
+        k.intact[r] = 0
+        k.impulse[r] = 0

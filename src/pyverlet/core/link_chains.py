@@ -1,0 +1,240 @@
+# mypy: ignore-errors
+"""Chains of distances, solved directly: a step of Newton's method is a block tridiagonal system, a block of 2 x 2 a link.
+
+Link r gives the impulse P to its second end and -P to its first. Between substeps of length h it is p = way + h (u_2 - u_1) long.
+With J = P d along its direction d it is to have |p| - L + soft J = target. So what P still lacks, F, solves
+
+    (C_r + h (w_1 + w_2)) F_r - h w_1 F_(r-1) - h w_2 F_(r+1) = e d + (-P t / b) t,    C = soft d d^T + t t^T / b,
+
+with t across d. d is the direction d_0 at the start of the substep (SHAKE), so that motion is reversible and keeps energy: but
+that is stable only where s = 4 T h^2 / (m L) < 4, T being the tension (leapfrog); a light chain with a heavy end is far beyond.
+Where s is not small, the force is that of d = d_0 + q (d_1 - 2 d_0 + d_-1), which is stable at any s if q > 1/4, and keeps energy
+(Newmark with beta = q); d_0 - d_-1 is told by the velocities of the last substep, and b = q J / |p| is by how much P turns
+with p. In nets d is d_0: tensions that a sweep has not settled would hold links where they are.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.libc.math import INFINITY, sqrt
+
+from pyverlet.core.link_arrays import Links
+from pyverlet.core.link_shapes import LinkWay, push, way_between
+
+MOST_RELEASES = cython.declare(cython.int, 8)
+SINGULAR = cython.declare(cython.double, 1e-12)
+"""Of what a link adds to its own block: a pivot below is one of a link whose length others have settled."""
+
+WAVES = cython.declare(cython.int, 0)
+CHORDS = cython.declare(cython.int, 1)
+LOST_WAY = cython.declare(cython.int, 2)
+"""Directions of impulses: as above; those at the start, whatever the tension; those of now."""
+
+AHEAD = cython.declare(cython.double, 0.3)
+"""Share of the direction ahead where s is large. Stable at any s are those from 1/4 on (Newmark 1959)."""
+
+DAMPED = cython.declare(cython.double, 0.05)
+"""Share of it that damps, as the backward Euler method does."""
+
+STEEP = cython.declare(cython.double, 0.5)
+"""Cosine between the directions before and after a substep: below it a step of Newton's method is one for a linear row."""
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def aim_at_length(k: cython.pointer(Links), r: cython.Py_ssize_t, how: cython.int) -> cython.void:
+    """What row r lacks after the drift: `along`, `wanted` and `turned`; whether it acts.
+
+    how: WAVES, CHORDS, or LOST_WAY, where no direction but that of the place reached is worth anything.
+    """
+    e: cython.Py_ssize_t = k.first[r]
+    p: LinkWay = way_between(k, k.node[e], k.node[e + 1], k.h)
+    length: cython.double = sqrt(p.x * p.x + p.y * p.y)
+    start: cython.double = sqrt(k.way[2 * r] * k.way[2 * r] + k.way[2 * r + 1] * k.way[2 * r + 1])
+    error: cython.double = length - k.rest[r]
+    pulled: cython.double = max(-k.impulse[r], -k.load[r], 0.0)
+    k.acts[r] = k.intact[r] != 0 and k.soft[r] < INFINITY and length > 0 and start > 0
+    if k.upper[r] <= 0 and k.impulse[r] >= 0 and k.load[r] >= 0 and error < k.target[r]:
+        k.acts[r] = 0
+    if not k.acts[r]:
+        return
+    s: cython.double = 2 * k.h * pulled * (k.weight[k.node[e]] + k.weight[k.node[e + 1]]) / length
+    q: cython.double = AHEAD * s * s / (s * s + 4) if how == WAVES else 0
+    lost: cython.bint = how == LOST_WAY
+    x: cython.double = p.x / length
+    y: cython.double = p.y / length
+    dx: cython.double = k.way[2 * r] / start
+    dy: cython.double = k.way[2 * r + 1] / start
+    cosine: cython.double = dx * x + dy * y
+    across: cython.double = 0
+    turning: cython.double = q * (1 - DAMPED) * k.turning[r]
+    k.turned[r] = q * pulled / length
+    if lost:
+        dx, dy = x, y
+        k.turned[r] = 0
+        cosine = 1
+    elif cosine < STEEP:  # far from the answer: linear about the start
+        k.turned[r] = q * pulled / start
+        error = p.x * dx + p.y * dy - k.rest[r]
+        across = k.turned[r] * (p.y * dx - p.x * dy) - turning * pulled
+        cosine = 1
+    else:
+        x0: cython.double = dx
+        y0: cython.double = dy
+        dx += q * (x - dx) + turning * y0
+        dy += q * (y - dy) - turning * x0
+        unit: cython.double = sqrt(dx * dx + dy * dy)
+        dx /= unit
+        dy /= unit
+        cosine = x * dx + y * dy
+    k.along[2 * r], k.along[2 * r + 1] = dx, dy
+    k.impulse[r] = k.given[2 * r] * dx + k.given[2 * r + 1] * dy
+    k.wanted[2 * r] = (k.target[r] - k.soft[r] * k.impulse[r] - error) / cosine
+    # -P t with t = (-dy, dx)
+    k.wanted[2 * r + 1] = 0 if lost else k.given[2 * r] * dy - k.given[2 * r + 1] * dx - across
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def aim_at_rest(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
+    """After the drift: rigid links change their length no more, along the mean of the ways before and after it."""
+    e: cython.Py_ssize_t = k.first[r]
+    i: cython.Py_ssize_t = k.node[e]
+    j: cython.Py_ssize_t = k.node[e + 1]
+    k.acts[r] = k.intact[r] != 0 and k.stiffness[r] == INFINITY and (k.upper[r] > 0 or k.impulse[r] < 0)
+    x: cython.double = k.middle[2 * r]
+    y: cython.double = k.middle[2 * r + 1]
+    k.along[2 * r], k.along[2 * r + 1] = x, y
+    k.turned[r] = 0
+    k.wanted[2 * r] = -k.h * ((k.u[2 * j] - k.u[2 * i]) * x + (k.u[2 * j + 1] - k.u[2 * i + 1]) * y)
+    k.wanted[2 * r + 1] = 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def eliminate(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, softly: cython.bint) -> cython.void:
+    """Down the chain: `answer` of each row without what follows, and the `inverse` of its block."""
+    r: cython.Py_ssize_t
+    before: cython.double = 0  # h times the inverse mass of the particle that r shares with the row before
+    fx: cython.double = 0
+    fy: cython.double = 0
+    gxx: cython.double = 0
+    gxy: cython.double = 0
+    gyy: cython.double = 0
+    for r in range(first, end):
+        e: cython.Py_ssize_t = k.first[r]
+        heavy: cython.double = k.h * k.weight[k.node[e]]
+        after: cython.double = k.h * k.weight[k.node[e + 1]]
+        before = heavy if r > first else 0
+        if k.acts[r] == 0:
+            fx = fy = gxx = gxy = gyy = 0
+        else:
+            dx: cython.double = k.along[2 * r]
+            dy: cython.double = k.along[2 * r + 1]
+            # The block in the frame of d and t.
+            xx: cython.double = heavy + after - before * before * gxx
+            xy: cython.double = -before * before * gxy
+            yy: cython.double = heavy + after - before * before * gyy
+            dd: cython.double = xx * dx * dx + 2 * xy * dx * dy + yy * dy * dy + (k.soft[r] if softly else 0)
+            dt: cython.double = (yy - xx) * dx * dy + xy * (dx * dx - dy * dy)
+            tt: cython.double = xx * dy * dy - 2 * xy * dx * dy + yy * dx * dx
+            b: cython.double = k.turned[r]
+            zd: cython.double = before * (fx * dx + fy * dy) + k.wanted[2 * r]
+            zt: cython.double = before * (fy * dx - fx * dy)
+            stiff: cython.double = b * tt + 1
+            pivot: cython.double = dd * stiff - b * dt * dt
+            if pivot <= SINGULAR * (heavy + after) or heavy + after <= 0:
+                k.acts[r] = 0
+                fx = fy = gxx = gxy = gyy = 0
+            else:
+                turn: cython.double = k.wanted[2 * r + 1]
+                fd: cython.double = (stiff * zd - dt * (b * zt + turn)) / pivot
+                ft: cython.double = (dd * (b * zt + turn) - b * dt * zd) / pivot
+                fx = fd * dx - ft * dy
+                fy = fd * dy + ft * dx
+                gdd: cython.double = stiff / pivot
+                gdt: cython.double = -b * dt / pivot
+                gtt: cython.double = b * dd / pivot
+                gxx = gdd * dx * dx - 2 * gdt * dx * dy + gtt * dy * dy
+                gyy = gdd * dy * dy + 2 * gdt * dx * dy + gtt * dx * dx
+                gxy = (gdd - gtt) * dx * dy + gdt * (dx * dx - dy * dy)
+        k.answer[2 * r], k.answer[2 * r + 1] = fx, fy
+        k.inverse[3 * r], k.inverse[3 * r + 1], k.inverse[3 * r + 2] = gxx, gxy, gyy
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def substitute(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.bint:
+    """Back up: the `answer` of each row. True if ropes would push, and are let go: the rest is to be solved again."""
+    fx: cython.double = 0
+    fy: cython.double = 0
+    pushes: cython.bint = False
+    r: cython.Py_ssize_t
+    for r in range(end - 1, first - 1, -1):
+        if r + 1 < end:
+            shared: cython.double = k.h * k.weight[k.node[k.first[r] + 1]]
+            x: cython.double = shared * fx
+            y: cython.double = shared * fy
+            fx = k.answer[2 * r] + k.inverse[3 * r] * x + k.inverse[3 * r + 1] * y
+            fy = k.answer[2 * r + 1] + k.inverse[3 * r + 1] * x + k.inverse[3 * r + 2] * y
+        else:
+            fx, fy = k.answer[2 * r], k.answer[2 * r + 1]
+        k.answer[2 * r], k.answer[2 * r + 1] = fx, fy
+        if k.acts[r] and k.upper[r] <= 0:
+            all_of_it: cython.double = k.impulse[r] + fx * k.along[2 * r] + fy * k.along[2 * r + 1]
+            if all_of_it > 0:
+                k.acts[r] = 0
+                pushes = True
+    return pushes
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def give(k: cython.pointer(Links), r: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
+    """An impulse between the ends of row r, N s."""
+    e: cython.Py_ssize_t = k.first[r]
+    k.given[2 * r] += x
+    k.given[2 * r + 1] += y
+    push(k, k.node[e], -x, -y)
+    push(k, k.node[e + 1], x, y)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def step_chain(
+    k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, drifts: cython.bint, how: cython.int
+) -> cython.void:
+    """One step of Newton's method: lengths after the drift; afterwards (not drifts) their rates. Ropes do not push."""
+    r: cython.Py_ssize_t
+    tries: cython.int = 0
+    for r in range(first, end):
+        if drifts:
+            aim_at_length(k, r, how)
+            if not k.acts[r] and (k.given[2 * r] != 0 or k.given[2 * r + 1] != 0):
+                give(k, r, -k.given[2 * r], -k.given[2 * r + 1])
+                k.impulse[r] = 0
+        else:
+            aim_at_rest(k, r)
+    while True:
+        eliminate(k, first, end, drifts)
+        tries += 1
+        if not substitute(k, first, end) or tries > MOST_RELEASES:
+            break
+        if drifts:
+            for r in range(first, end):  # what is let go of gives nothing at all
+                if not k.acts[r] and k.impulse[r] != 0:
+                    give(k, r, -k.given[2 * r], -k.given[2 * r + 1])
+                    k.impulse[r] = 0
+            for r in range(first, end):
+                if k.acts[r]:
+                    aim_at_length(k, r, how)
+    for r in range(first, end):
+        if k.acts[r]:
+            give(k, r, k.answer[2 * r], k.answer[2 * r + 1])
+            k.impulse[r] += k.answer[2 * r] * k.along[2 * r] + k.answer[2 * r + 1] * k.along[2 * r + 1]

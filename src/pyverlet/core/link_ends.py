@@ -1,0 +1,88 @@
+# mypy: ignore-errors
+"""What links make of the velocities that a frame ends with."""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import INFINITY, sqrt
+
+from pyverlet.core.link_arrays import DISTANCE, Links
+from pyverlet.core.link_blocks import push_row, solve_block
+from pyverlet.core.link_chains import give
+from pyverlet.core.link_shapes import LinkWay, measure_row, way_between
+from pyverlet.core.step import Step
+
+SWEEPS = cython.declare(cython.int, 3)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def turn_impulses(k: cython.pointer(Links), share: cython.double) -> cython.void:
+    """So much of what rows gave in the last substep was along the directions at its start: it is along those of now."""
+    r: cython.Py_ssize_t
+    for r in range(k.rows):
+        measure_row(k, r, 0)
+        k.target[r] = k.impulse[r]
+        given: cython.double = share * k.impulse[r]
+        if k.kind[r] == DISTANCE:
+            d: LinkWay = way_between(k, k.node[k.first[r]], k.node[k.first[r] + 1], 0)
+            length: cython.double = sqrt(d.x * d.x + d.y * d.y)
+            x: cython.double = d.x / length if length > 0 else 0
+            y: cython.double = d.y / length if length > 0 else 0
+            k.middle[2 * r], k.middle[2 * r + 1] = x, y
+            if k.intact[r]:
+                give(k, r, given * x - share * k.given[2 * r], given * y - share * k.given[2 * r + 1])
+        elif k.intact[r]:
+            push_row(k, r, -given, k.gradient)
+            push_row(k, r, given, k.slope)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def project(k: cython.pointer(Links)) -> cython.void:
+    """Velocities along which no rigid row changes, and no rigid pin moves; what rows remember is left as it is."""
+    r: cython.Py_ssize_t
+    b: cython.Py_ssize_t
+    p: cython.Py_ssize_t
+    _: cython.int
+    for p in range(k.pins):
+        if k.pin_intact[p] and k.pin_stiffness[p] == INFINITY:
+            i: cython.Py_ssize_t = k.pin_node[p]
+            k.weight[i] = k.u[2 * i] = k.u[2 * i + 1] = 0
+    for _ in range(1 if k.colours == 1 else SWEEPS):
+        for b in range(k.chunk[k.colour[k.colours]]):
+            solve_block(k, b, False)
+    for r in range(k.rows):
+        k.impulse[r] = k.target[r]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def show_links(w: cython.pointer(Step), half: cython.double, kick: cython.double) -> cython.void:
+    """The frame is over: velocities of now, which hold what rigid links hold (RATTLE, Andersen 1983).
+
+    Half a substep's share of what links gave was along the directions at its start. What that was off by counts as `given`: the
+    next frame takes it back. half: seconds by which velocities went on; kick: for which `given` stands.
+    """
+    k: cython.pointer(Links) = w.link_table
+    i: cython.Py_ssize_t
+    axis: cython.int
+    for i in range(k.count):
+        for axis in range(2):
+            k.x[2 * i + axis] = w.position[2 * k.slot[i] + axis]
+            k.u[2 * i + axis] = w.velocity[2 * k.slot[i] + axis]
+        k.own[i] = k.weight[i] = w.inverse_mass[k.slot[i]]
+    turn_impulses(k, half / kick)
+    project(k)
+    for i in range(k.count):
+        for axis in range(2):
+            at: cython.Py_ssize_t = 2 * k.slot[i] + axis
+            shown: real = cython.cast(real, k.u[2 * i + axis])
+            change: real = shown - w.velocity[at]
+            w.given[at] += cython.cast(real, change * kick / half)
+            w.acceleration[at] += cython.cast(real, change / half)
+            w.velocity[at] = shown

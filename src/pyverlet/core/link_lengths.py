@@ -1,0 +1,105 @@
+# mypy: ignore-errors
+"""Chains of distances: Newton's method until lengths are right; where it fails, sweeps link by link."""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.libc.math import INFINITY, fabs, sqrt
+
+from pyverlet.core.link_arrays import Links
+from pyverlet.core.link_chains import CHORDS, LOST_WAY, WAVES, give, step_chain
+from pyverlet.core.link_shapes import LinkWay, way_between
+
+MOST_STEPS = cython.declare(cython.int, 20)
+LENGTH_SOLVED = cython.declare(cython.double, 1e-9)
+NEAR_ENOUGH = cython.declare(cython.double, 1e-3)
+"""Of lengths: errors that are left, and where Newton's method has failed."""
+
+LOST = cython.declare(cython.double, 0.01)
+"""Of lengths: with a larger error Newton's method has failed."""
+
+LINK_SWEEPS = cython.declare(cython.int, 10)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def misses(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.double:
+    """The largest error that rows of a chain are left with, of their lengths."""
+    r: cython.Py_ssize_t
+    most: cython.double = 0
+    for r in range(first, end):
+        if k.intact[r] and k.soft[r] < INFINITY:
+            e: cython.Py_ssize_t = k.first[r]
+            p: LinkWay = way_between(k, k.node[e], k.node[e + 1], k.h)
+            length: cython.double = sqrt(p.x * p.x + p.y * p.y)
+            left: cython.double = length - k.rest[r] + k.soft[r] * k.impulse[r] - k.target[r]
+            if k.upper[r] > 0 or k.impulse[r] < 0 or left > 0:
+                most = max(most, fabs(left) / length if length > 0 else 1)
+    return most
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def sweep_link(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
+    """Right the length of row r after the drift, along its direction then: position-based dynamics, which is always stable."""
+    e: cython.Py_ssize_t = k.first[r]
+    if k.intact[r] == 0 or k.soft[r] == INFINITY:
+        return
+    p: LinkWay = way_between(k, k.node[e], k.node[e + 1], k.h)
+    length: cython.double = sqrt(p.x * p.x + p.y * p.y)
+    gives: cython.double = k.soft[r] + k.h * (k.weight[k.node[e]] + k.weight[k.node[e + 1]])
+    if length == 0 or gives <= 0:
+        return
+    before: cython.double = (k.given[2 * r] * p.x + k.given[2 * r + 1] * p.y) / length
+    after: cython.double = before + (k.target[r] - k.soft[r] * before - length + k.rest[r]) / gives
+    after = min(after, k.upper[r])
+    k.impulse[r] = after
+    give(k, r, (after - before) * p.x / length, (after - before) * p.y / length)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def sweep_chain(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
+    """There and back, from nothing: of a light chain that is jerked or pushed together, whose links turn over in a substep."""
+    r: cython.Py_ssize_t
+    _: cython.int
+    for r in range(first, end):
+        give(k, r, -k.given[2 * r], -k.given[2 * r + 1])
+    for _ in range(LINK_SWEEPS):
+        for r in range(first, end):
+            sweep_link(k, r)
+        for r in range(end - 1, first - 1, -1):
+            sweep_link(k, r)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def approach(
+    k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, good: cython.double, how: cython.int
+) -> cython.double:
+    """Newton's method, until errors are `good`; returns the largest, of lengths."""
+    tries: cython.int = 0
+    missed: cython.double = INFINITY
+    while tries < MOST_STEPS and not missed <= good:
+        tries += 1
+        step_chain(k, first, end, True, how)
+        missed = misses(k, first, end)
+    return missed
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def solve_chain(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, alone: cython.bint) -> cython.void:
+    """Lengths after the drift. alone: nothing else joins these particles; in nets others undo what is more than one step."""
+    if not alone:
+        step_chain(k, first, end, True, CHORDS)
+    elif not approach(k, first, end, LENGTH_SOLVED, WAVES) < LOST:
+        sweep_chain(k, first, end)
+        swept: cython.double = misses(k, first, end)
+        if swept > NEAR_ENOUGH and not approach(k, first, end, NEAR_ENOUGH, LOST_WAY) < swept:
+            sweep_chain(k, first, end)

@@ -1,0 +1,124 @@
+# mypy: ignore-errors
+"""Pins: implicit springs to points, or rigid ones. Rows then feel a particle as heavy as its pin is stiff."""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.libc.math import INFINITY
+
+from pyverlet.core.link_arrays import Links
+from pyverlet.core.link_shapes import unwrapped
+from pyverlet.core.link_softness import Softness, averaged, before_that, kept_share, softness
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def pin_value(k: cython.pointer(Links), p: cython.Py_ssize_t, axis: cython.int, ahead: cython.double) -> cython.double:
+    """A coordinate of its particle beyond that of the pin, m."""
+    i: cython.Py_ssize_t = k.pin_node[p]
+    away: cython.double = k.x[2 * i + axis] - k.pin_point[2 * p + axis]
+    return unwrapped(away, k.period_y if axis else k.period_x) + ahead * k.u[2 * i + axis]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def begin_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
+    """The numbers of a pin, and what it gave in the last substep."""
+    i: cython.Py_ssize_t = k.pin_node[p]
+    axis: cython.int
+    if k.pin_intact[p] == 0 or k.own[i] == 0:
+        return
+    for axis in range(2):
+        at: cython.Py_ssize_t = 2 * p + axis
+        value: cython.double = pin_value(k, p, axis, 0)
+        before: cython.double = before_that(value, k.pin_value[at], k.pin_next[at], k.pin_point[at])
+        soft: Softness = softness(k, k.pin_stiffness[p], k.pin_damping[p], k.own[i], value, before)
+        k.pin_soft[p], k.pin_target[at] = soft.soft, soft.target
+        k.pin_value[at] = value
+        if soft.soft == INFINITY:
+            k.pin_impulse[at] = 0
+        k.pin_impulse[at] *= k.scale * kept_share(k, k.pin_impulse[at], k.pin_load[at], k.own[i])
+        k.pin_load[at] = k.pin_impulse[at]
+        k.u[2 * i + axis] += k.own[i] * k.pin_impulse[at]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def hold_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
+    """Before rows are solved: the particle goes to its pin, as it would alone; from then on it is as heavy as that."""
+    i: cython.Py_ssize_t = k.pin_node[p]
+    axis: cython.int
+    if k.pin_intact[p] == 0 or k.own[i] == 0 or k.pin_soft[p] == INFINITY:
+        return
+    gives: cython.double = k.pin_soft[p] + k.h * k.own[i]
+    for axis in range(2):
+        at: cython.Py_ssize_t = 2 * p + axis
+        change: cython.double = (k.pin_target[at] - k.pin_soft[p] * k.pin_impulse[at] - pin_value(k, p, axis, k.h)) / gives
+        k.pin_impulse[at] += change
+        k.u[2 * i + axis] += k.own[i] * change
+    k.weight[i] = k.own[i] * k.pin_soft[p] / gives
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def finish_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
+    """Rows are solved: what the pin has given against them."""
+    i: cython.Py_ssize_t = k.pin_node[p]
+    axis: cython.int
+    if k.pin_intact[p] == 0 or k.own[i] == 0:
+        return
+    share: cython.double = k.weight[i] / k.own[i] - 1
+    for axis in range(2):
+        at: cython.Py_ssize_t = 2 * p + axis
+        k.pin_impulse[at] += share * k.react[2 * i + axis]
+        k.pin_next[at] = pin_value(k, p, axis, k.h)
+    k.react[2 * i] = k.react[2 * i + 1] = 0
+    k.weight[i] = 0 if k.pin_stiffness[p] == INFINITY else k.own[i]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def rest_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
+    """After the drift: what rigid pins hold does not move."""
+    i: cython.Py_ssize_t = k.pin_node[p]
+    axis: cython.int
+    if k.pin_intact[p] == 0 or k.own[i] == 0 or k.pin_stiffness[p] < INFINITY:
+        return
+    for axis in range(2):
+        k.pin_impulse[2 * p + axis] -= k.u[2 * i + axis] / k.own[i]
+        k.u[2 * i + axis] = 0
+    k.weight[i] = 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def settle_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
+    """After that: what rigid pins have given against rows."""
+    i: cython.Py_ssize_t = k.pin_node[p]
+    if k.pin_intact[p] != 0 and k.own[i] > 0 and k.weight[i] == 0:
+        k.pin_impulse[2 * p] -= k.react[2 * i]
+        k.pin_impulse[2 * p + 1] -= k.react[2 * i + 1]
+        k.react[2 * i] = k.react[2 * i + 1] = 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def end_pin(k: cython.pointer(Links), p: cython.Py_ssize_t, mean: cython.double) -> cython.void:
+    """The mean of what a pin pulls with; if that is too much, it breaks."""
+    i: cython.Py_ssize_t = k.pin_node[p]
+    axis: cython.int
+    for axis in range(2):
+        at: cython.Py_ssize_t = 2 * p + axis
+        k.pin_pull[at] = averaged(k.pin_pull[at], -k.pin_impulse[at] / k.kick, mean)
+    square: cython.double = k.pin_pull[2 * p] * k.pin_pull[2 * p] + k.pin_pull[2 * p + 1] * k.pin_pull[2 * p + 1]
+    if square > k.pin_strength[p] * k.pin_strength[p]:
+        k.pin_intact[p] = 0
+        k.pin_impulse[2 * p] = k.pin_impulse[2 * p + 1] = 0
+    k.weight[i] = k.own[i]

@@ -1,0 +1,125 @@
+# mypy: ignore-errors
+"""What rows of links measure (a distance, an angle, an area), now or ahead, and its gradient."""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.libc.math import atan2, rint, sqrt
+
+from pyverlet.core.link_arrays import ANGLE, DISTANCE, Links
+
+TURN = cython.declare(cython.double, 6.283185307179586)
+
+LinkWay = cython.struct(x=cython.double, y=cython.double)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def unwrapped(way: cython.double, period: cython.double) -> cython.double:
+    """Across the seam of a periodic room."""
+    return way - period * rint(way / period) if period > 0 else way
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def way_between(k: cython.pointer(Links), i: cython.Py_ssize_t, j: cython.Py_ssize_t, ahead: cython.double) -> LinkWay:
+    """From linked particle i to the nearest image of j, m, `ahead` seconds from now at the velocities of now."""
+    found: LinkWay
+    found.x = unwrapped(k.x[2 * j] - k.x[2 * i], k.period_x) + ahead * (k.u[2 * j] - k.u[2 * i])
+    found.y = unwrapped(k.x[2 * j + 1] - k.x[2 * i + 1], k.period_y) + ahead * (k.u[2 * j + 1] - k.u[2 * i + 1])
+    return found
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def set_slope(k: cython.pointer(Links), e: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
+    """The gradient of a row with respect to its particle at entry e."""
+    k.slope[2 * e], k.slope[2 * e + 1] = x, y
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def measure_angle(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.double) -> cython.double:
+    """Angle at the second of three particles beyond that at rest, rad."""
+    e: cython.Py_ssize_t = k.first[r]
+    a: LinkWay = way_between(k, k.node[e + 1], k.node[e], ahead)
+    b: LinkWay = way_between(k, k.node[e + 1], k.node[e + 2], ahead)
+    aa: cython.double = a.x * a.x + a.y * a.y
+    bb: cython.double = b.x * b.x + b.y * b.y
+    if aa > 0 and bb > 0:
+        set_slope(k, e, a.y / aa, -a.x / aa)
+        set_slope(k, e + 2, -b.y / bb, b.x / bb)
+        set_slope(k, e + 1, b.y / bb - a.y / aa, a.x / aa - b.x / bb)
+    value: cython.double = atan2(a.x * b.y - a.y * b.x, a.x * b.x + a.y * b.y) - k.rest[r]
+    return value - TURN * rint(value / TURN)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def measure_area(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.double) -> cython.double:
+    """Area inside a ring of particles beyond that at rest, m^2: the sum of triangles at its first particle."""
+    first: cython.Py_ssize_t = k.first[r]
+    end: cython.Py_ssize_t = k.first[r + 1]
+    e: cython.Py_ssize_t
+    twice: cython.double = 0
+    before: LinkWay = way_between(k, k.node[first], k.node[end - 1], ahead)
+    here: LinkWay = way_between(k, k.node[first], k.node[first], ahead)
+    for e in range(first, end):
+        after: LinkWay = way_between(k, k.node[first], k.node[e + 1 if e + 1 < end else first], ahead)
+        twice += here.x * after.y - here.y * after.x
+        set_slope(k, e, (after.y - before.y) / 2, (before.x - after.x) / 2)
+        before.x, before.y = here.x, here.y
+        here.x, here.y = after.x, after.y
+    return twice / 2 - k.rest[r]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def measure_row(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.double) -> cython.double:
+    """What row r measures beyond its value at rest, `ahead` seconds from now, and its `slope` then (not of distances)."""
+    if k.kind[r] == DISTANCE:
+        e: cython.Py_ssize_t = k.first[r]
+        d: LinkWay = way_between(k, k.node[e], k.node[e + 1], ahead)
+        return sqrt(d.x * d.x + d.y * d.y) - k.rest[r]
+    if k.kind[r] == ANGLE:
+        return measure_angle(k, r, ahead)
+    return measure_area(k, r, ahead)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def mobility(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.double:
+    """How much an impulse of row r changes its own rate, along its gradient at the start of the substep, 1/kg."""
+    e: cython.Py_ssize_t = k.first[r]
+    found: cython.double = 0
+    if k.kind[r] == DISTANCE:
+        return k.weight[k.node[e]] + k.weight[k.node[e + 1]]
+    for e in range(k.first[r], k.first[r + 1]):
+        x: cython.double = k.gradient[2 * e]
+        y: cython.double = k.gradient[2 * e + 1]
+        found += k.weight[k.node[e]] * (x * x + y * y)
+    return found
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def push(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
+    """Give linked particle i an impulse, N s. One of infinite mass may belong to several rows of a colour: none writes to it."""
+    if k.own[i] == 0:
+        return
+    k.u[2 * i] += k.weight[i] * x
+    k.u[2 * i + 1] += k.weight[i] * y
+    k.react[2 * i] += x
+    k.react[2 * i + 1] += y

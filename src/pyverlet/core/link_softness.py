@@ -1,0 +1,85 @@
+# mypy: ignore-errors
+"""Springs and dampers as implicit rows: C_next + soft J = target.
+
+With kicks of K = (h + h') / 2, h' being the substep before, the implicit midpoint rule has
+
+    J = -k (h' (C_before + C_now) + h (C_now + C_next)) / 4 - c (C_next - C_before) / 2,    C_next = C(x + u h),
+
+which is stable and keeps energy at any k. Where (omega h)^2 is so large that the swing cannot be followed, it goes over to
+J = -k K C_next - c K (C_next - C_now) / h. A rigid row has soft = target = 0.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.libc.math import INFINITY, fabs
+
+from pyverlet.core.link_arrays import Links
+
+BLENDED = cython.declare(cython.double, 0.04)
+"""(omega h)^4 at which a soft row is half midpoint, half backward."""
+
+LEAST = cython.declare(cython.double, 1e-25)
+"""N. Less is none: the mean of a pull that has ended would become a denormal number, and stay one."""
+
+Softness = cython.struct(soft=cython.double, target=cython.double)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def before_that(value: cython.double, before: cython.double, ahead: cython.double, rest: cython.double) -> cython.double:
+    """What a row measured a substep ago; what it measures now if its particles have been put elsewhere, not moved there."""
+    return before if fabs(value - ahead) <= fabs(value - before) / 10 + 1e-5 * (1 + fabs(rest)) else value
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def softness(
+    k: cython.pointer(Links), stiffness: cython.double, damping: cython.double, mobility: cython.double, now: cython.double,
+    before: cython.double,
+) -> Softness:  # fmt: skip
+    """Of a row that measures `now`, and `before` a substep ago."""
+    found: Softness
+    found.soft = found.target = 0
+    if stiffness == INFINITY:
+        return found
+    h: cython.double = k.h
+    kick: cython.double = k.kick
+    last: cython.double = 2 * kick - h
+    swing: cython.double = stiffness * mobility * h * h
+    q: cython.double = swing * swing / (swing * swing + BLENDED)
+    to_next: cython.double = (1 - q) * (stiffness * h / 4 + damping / 2) + q * (stiffness * kick + damping * kick / h)
+    of_now: cython.double = (1 - q) * stiffness * kick / 2 - q * damping * kick / h
+    of_before: cython.double = (1 - q) * (stiffness * last / 4 - damping / 2)
+    if to_next > 0:
+        found.soft = 1 / to_next
+        found.target = -(of_now * now + of_before * before) / to_next
+    else:
+        found.soft = INFINITY
+    return found
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def kept_share(k: cython.pointer(Links), impulse: cython.double, load: cython.double, mobility: cython.double) -> cython.double:
+    """How much of what the last substep gave is given again: a blow, of a rope that snaps taut, is not; load may double.
+
+    load: what that substep began with.
+    """
+    most: cython.double = 2 * fabs(load) + (k.least / mobility if mobility > 0 else INFINITY)
+    return most / fabs(impulse) if fabs(impulse) > most else 1.0
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def averaged(mean: cython.double, pull: cython.double, share: cython.double) -> cython.double:
+    """The mean of a pull, of which this is the share of now."""
+    after: cython.double = mean + share * (pull - mean)
+    return after if fabs(after) > LEAST else 0.0

@@ -1,0 +1,298 @@
+# mypy: ignore-errors
+"""Links in a substep: impulses of the last one, lengths after the drift, rates afterwards; colour by colour of blocks.
+
+A sweep over rows that look at where particles will be is position-based dynamics with small steps (Macklin et al. 2019, "Small
+steps in physics simulation"). What rigid rows gave in the last substep is there while contacts are solved, so that these know the
+load of links; rows themselves begin from nothing: an impulse that errors had built up would hold nets out of shape.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+from cython.cimports.team import team_stage
+
+from pyverlet.core.cells import BLOCK
+from pyverlet.core.link_arrays import Links
+from pyverlet.core.link_blocks import AVERAGED, begin_row, end_row, finish_row, solve_block, take_back_row, warm_block
+from pyverlet.core.link_pins import begin_pin, end_pin, finish_pin, hold_pin, rest_pin, settle_pin
+from pyverlet.core.step import Step
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def take_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """Velocities of a block of linked particles."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    a: cython.Py_ssize_t = block * BLOCK
+    i: cython.Py_ssize_t
+    for i in range(a, min(a + BLOCK, k.count)):
+        at: cython.Py_ssize_t = k.slot[i]
+        k.u[2 * i], k.u[2 * i + 1] = v[width * at], v[width * at + 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def put_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """And back."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    a: cython.Py_ssize_t = block * BLOCK
+    i: cython.Py_ssize_t
+    for i in range(a, min(a + BLOCK, k.count)):
+        at: cython.Py_ssize_t = k.slot[i]
+        if k.own[i] > 0:
+            v[width * at], v[width * at + 1] = cython.cast(real, k.u[2 * i]), cython.cast(real, k.u[2 * i + 1])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def open_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """Where a block of linked particles is, and what it weighs."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    a: cython.Py_ssize_t = block * BLOCK
+    i: cython.Py_ssize_t
+    take_stage(what, block)
+    for i in range(a, min(a + BLOCK, k.count)):
+        at: cython.Py_ssize_t = k.slot[i]
+        k.x[2 * i], k.x[2 * i + 1] = w.position[2 * at], w.position[2 * at + 1]
+        k.own[i] = k.weight[i] = w.inverse_mass[at]
+        k.react[2 * i] = k.react[2 * i + 1] = 0
+        k.loaned[2 * i] = k.loaned[2 * i + 1] = 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def take_back_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """Velocities of a block before rows are solved: without what they were lent."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    a: cython.Py_ssize_t = block * BLOCK
+    i: cython.Py_ssize_t
+    axis: cython.int
+    take_stage(what, block)
+    for i in range(a, min(a + BLOCK, k.count)):
+        for axis in range(2):
+            k.u[2 * i + axis] -= k.loaned[2 * i + axis]
+            if k.own[i] > 0:
+                w.acceleration[2 * cython.cast(cython.Py_ssize_t, k.slot[i]) + axis] = cython.cast(real, k.driven[2 * i + axis])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def take_back_chunk(what: cython.p_void, item: cython.int) -> cython.void:
+    """And what rows of a chunk lent."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    r: cython.Py_ssize_t
+    for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
+        take_back_row(k, r)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def warmed_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """What links have given a block is free motion to contacts, and an acceleration as others are, as long as they are solved."""
+    axis: cython.int
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    a: cython.Py_ssize_t = block * BLOCK
+    i: cython.Py_ssize_t
+    for i in range(a, min(a + BLOCK, k.count)):
+        at: cython.Py_ssize_t = k.slot[i]
+        x: real = cython.cast(real, k.u[2 * i])
+        y: real = cython.cast(real, k.u[2 * i + 1])
+        if k.own[i] > 0:
+            k.warm[2 * i] = x - w.free[2 * at]
+            k.warm[2 * i + 1] = y - w.free[2 * at + 1]
+            w.free[2 * at], w.free[2 * at + 1] = x, y
+            for axis in range(2):
+                k.driven[2 * i + axis] = w.acceleration[2 * at + axis]
+                w.acceleration[2 * at + axis] += cython.cast(real, k.warm[2 * i + axis] / k.kick)
+        k.react[2 * i] = k.react[2 * i + 1] = 0
+    put_stage(what, block)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def remember_links_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """What links gave a block before `free` counts as given, too."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    a: cython.Py_ssize_t = block * BLOCK
+    i: cython.Py_ssize_t
+    for i in range(a, min(a + BLOCK, k.count)):
+        at: cython.Py_ssize_t = k.slot[i]
+        if k.own[i] > 0:
+            w.given[2 * at] += cython.cast(real, k.warm[2 * i])
+            w.given[2 * at + 1] += cython.cast(real, k.warm[2 * i + 1])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def begin_chunk(what: cython.p_void, item: cython.int) -> cython.void:
+    """Rows of a chunk as they begin a substep."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    r: cython.Py_ssize_t
+    for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
+        begin_row(k, r)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def warm_chunk(what: cython.p_void, item: cython.int) -> cython.void:
+    """What rows of a chunk gave in the last substep."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    c: cython.Py_ssize_t = k.colour[k.now] + item
+    b: cython.Py_ssize_t
+    for b in range(k.chunk[c], k.chunk[c + 1]):
+        warm_block(k, b)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def solve_chunk(what: cython.p_void, item: cython.int) -> cython.void:
+    """Where rows of a chunk are to be after the drift."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    c: cython.Py_ssize_t = k.colour[k.now] + item
+    b: cython.Py_ssize_t
+    for b in range(k.chunk[c], k.chunk[c + 1]):
+        solve_block(k, b, True)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def relax_chunk(what: cython.p_void, item: cython.int) -> cython.void:
+    """How rows of a chunk change after the drift."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    c: cython.Py_ssize_t = k.colour[k.now] + item
+    b: cython.Py_ssize_t
+    for b in range(k.chunk[c], k.chunk[c + 1]):
+        solve_block(k, b, False)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def finish_chunk(what: cython.p_void, item: cython.int) -> cython.void:
+    """Rows of a chunk are solved."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    r: cython.Py_ssize_t
+    for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
+        finish_row(k, r)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def end_chunk(what: cython.p_void, item: cython.int) -> cython.void:
+    """What rows of a chunk pull with."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    r: cython.Py_ssize_t
+    for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
+        end_row(k, r, min(1.0, AVERAGED * k.kick))
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def blocks_of(k: cython.pointer(Links)) -> cython.int:
+    """How many blocks of linked particles there are."""
+    return cython.cast(cython.int, (k.count + BLOCK - 1) // BLOCK)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def begin_links(w: cython.pointer(Step)) -> cython.void:
+    """After the kick: what links gave in the last substep."""
+    k: cython.pointer(Links) = w.link_table
+    p: cython.Py_ssize_t
+    c: cython.int
+    opens: cython.bint = w.substep == w.first
+    k.h = cython.cast(cython.double, w.h)
+    k.kick = cython.cast(cython.double, w.h / w.weigh if opens and w.weigh > 0 else w.h)
+    k.scale = cython.cast(cython.double, w.scale if opens else 1)
+    k.least = cython.cast(cython.double, w.rest_speed)
+    team_stage(w.team, open_stage, w, blocks_of(k))
+    team_stage(w.team, begin_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
+    for p in range(k.pins):
+        begin_pin(k, p)
+    for c in range(k.colours):
+        k.now = c
+        team_stage(w.team, warm_chunk, w, cython.cast(cython.int, k.colour[c + 1] - k.colour[c]))
+    team_stage(w.team, warmed_stage, w, blocks_of(k))
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def solve_links(w: cython.pointer(Step)) -> cython.void:
+    """Before the drift: where rows are to be after it. There and back, if blocks share particles."""
+    k: cython.pointer(Links) = w.link_table
+    p: cython.Py_ssize_t
+    c: cython.int
+    _: cython.int
+    team_stage(w.team, take_back_stage, w, blocks_of(k))
+    team_stage(w.team, take_back_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
+    for p in range(k.pins):
+        hold_pin(k, p)
+    for _ in range(k.passes):
+        for c in range(k.colours):
+            k.now = c
+            team_stage(w.team, solve_chunk, w, cython.cast(cython.int, k.colour[c + 1] - k.colour[c]))
+        for c in range(k.colours - 1 if k.colours > 1 else -1, -1, -1):
+            k.now = c
+            team_stage(w.team, solve_chunk, w, cython.cast(cython.int, k.colour[c + 1] - k.colour[c]))
+    team_stage(w.team, finish_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
+    for p in range(k.pins):
+        finish_pin(k, p)
+    team_stage(w.team, put_stage, w, blocks_of(k))
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def relax_links(w: cython.pointer(Step), back: cython.bint) -> cython.void:
+    """After the drift: rigid rows change no more. back: the last colour first."""
+    k: cython.pointer(Links) = w.link_table
+    p: cython.Py_ssize_t
+    c: cython.int
+    team_stage(w.team, take_stage, w, blocks_of(k))
+    for p in range(k.pins):
+        rest_pin(k, p)
+    for c in range(k.colours):
+        k.now = k.colours - 1 - c if back else c
+        team_stage(w.team, relax_chunk, w, cython.cast(cython.int, k.colour[k.now + 1] - k.colour[k.now]))
+    for p in range(k.pins):
+        settle_pin(k, p)
+    team_stage(w.team, put_stage, w, blocks_of(k))
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def end_links(w: cython.pointer(Step)) -> cython.void:
+    """What links pull with; those that pull too hard break."""
+    k: cython.pointer(Links) = w.link_table
+    p: cython.Py_ssize_t
+    team_stage(w.team, end_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
+    for p in range(k.pins):
+        if k.pin_intact[p]:
+            end_pin(k, p, min(1.0, AVERAGED * k.kick))

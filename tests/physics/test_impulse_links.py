@@ -1,0 +1,378 @@
+"""Links under the law of impulses: pendulums, springs, chains and nets against closed forms and conservation laws."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet import builders, core, scenes
+from pyverlet.core import reference
+from pyverlet.data import snapshot
+from pyverlet.world.team import Team
+
+G, FRAME = 9.81, 1 / 60
+
+
+def made(**more: Any) -> pv.World:
+    options: dict[str, Any] = {"collisions": pv.Collisions(impulses=True), "dtype": np.float64}
+    return pv.World(**(options | more))
+
+
+def clock(steady: bool, count: int) -> list[float]:
+    return [FRAME] * count if steady else np.random.default_rng(1).choice([1 / 240, FRAME, 1 / 30], count).tolist()
+
+
+def lengths(group: Any, i: Any, j: Any) -> Any:
+    return np.hypot(*(group.position[j].astype(float) - group.position[i]).T)
+
+
+def stretch(group: Any, length: float) -> float:
+    return float(np.abs(np.hypot(*np.diff(group.position, axis=0).T) / length - 1).max())
+
+
+def circle(count: int) -> Any:
+    turn = 2 * np.pi * np.arange(count) / count
+    return np.column_stack((np.cos(turn), np.sin(turn)))
+
+
+# ---- closed forms ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("steady", [True, False])
+def test_a_pendulum_keeps_its_energy_and_length(dtype: Any, steady: bool) -> None:
+    # E = m g L (1 - cos a) is kept to (w h)^2 = 1e-4 at the longest substep: the method is symplectic, and so is what is shown.
+    world = made(dtype=dtype)
+    group = world.add(position=np.array([[0, 0], [1.3 * np.sin(2), -1.3 * np.cos(2)]]), radius=0.02, mass=0.7)
+    group.pin(0)
+    world.links.append(pv.Stick(group, 0, 1))
+    start, off = world.energy().total, 0.0
+    for dt in clock(steady, 600):
+        world.step(dt)
+        off = max(off, abs(world.energy().total - start))
+    assert off < (1e-3 if dtype == np.float32 else 1e-4) * 0.7 * G * 1.3
+    assert stretch(group, 1.3) < (1e-6 if dtype == np.float32 else 1e-10)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("steady", [True, False])
+def test_a_damped_spring_follows_its_closed_form(dtype: Any, steady: bool) -> None:
+    # x = A exp(-d t) (cos w t + d / w sin w t), d = c / (2 m*), w^2 = k / m* - d^2, m* = 1/2 kg; (w h)^2 / 12 w t = 7e-4.
+    world = made(dtype=dtype, gravity=(0, 0))
+    group = world.add(position=np.array([[0, 0], [1.1, 0]]), radius=0.02, mass=1.0)
+    stiffness, damping = 0.5 * (2 * np.pi) ** 2, 0.1
+    world.links.append(pv.Spring(group, 0, 1, length=1.0, stiffness=stiffness, damping=damping))
+    omega, time = np.sqrt(2 * stiffness - damping**2), 0.0
+    for dt in clock(steady, 600):
+        world.step(dt)
+        time += dt
+        x = 0.1 * np.exp(-damping * time) * (np.cos(omega * time) + damping / omega * np.sin(omega * time))
+        assert group.position[1, 0] - group.position[0, 0] - 1 == pytest.approx(x, abs=1e-3 * 0.1)
+
+
+def test_a_double_pendulum_keeps_its_energy() -> None:
+    # Chaotic, so energy is all there is to compare. 4 m g L is what it may fall through.
+    world = made()
+    group = world.add(position=[[0, 0], [1, 0], [1, 1]], radius=1e-6, mass=1.0)
+    group.pin(0)
+    world.links.append(pv.Stick(group, [0, 1], [1, 2]))
+    start, energy = world.energy().total, []
+    for _ in range(1200):
+        world.step(FRAME)
+        energy.append(world.energy().total)
+    assert np.abs(np.array(energy) - start).max() < 1e-3 * 4 * G
+    assert np.mean(energy[600:]) == pytest.approx(np.mean(energy[:600]), abs=1e-4 * 4 * G)
+
+
+@pytest.mark.parametrize("kind", [pv.Stick, pv.Rope])
+@pytest.mark.parametrize("bead", [1e-2, 1e-3])
+def test_a_light_chain_carries_a_hundred_thousand_times_a_bead(kind: Any, bead: float) -> None:
+    # At rest each pull is the weight below it.
+    world = made()
+    mass = np.append(np.full(10, bead), 100.0)
+    group = world.add(position=np.column_stack((np.zeros(11), -0.1 * np.arange(11))), radius=0.01, mass=mass)
+    pin, chain = world.links.append(pv.Pin(group, 0)), world.links.append(kind(group, range(10), range(1, 11)))
+    world.run(seconds=3.0)
+    below = np.cumsum(mass[::-1])[::-1]
+    assert chain.force == pytest.approx(G * below[1:], rel=1e-6)
+    assert pin.force == pytest.approx(G * below[:1], rel=1e-6)
+    assert stretch(group, 0.1) < 1e-8
+
+
+@pytest.mark.parametrize("kind", [pv.Stick, pv.Rope])
+def test_a_light_chain_swings_with_ten_thousand_times_a_bead(kind: Any) -> None:
+    # 4 T h^2 / (m L) is 17 here: a leapfrog with directions of the start of a substep is unstable beyond 4. What damps the waves
+    # on the chain turns its direction by 0.05 * 0.3 of w h: it takes 0.015 w h T v a second, 2 per mille of m g L in 4 s.
+    world = made()
+    mass, k = np.append(np.full(10, 0.01), 100.0), 0.1 * np.arange(11)
+    group = world.add(position=np.column_stack((k * np.sin(1), -k * np.cos(1))), radius=0.01, mass=mass)
+    world.links.append(pv.Pin(group, 0))
+    world.links.append(kind(group, range(10), range(1, 11)))
+    start = world.energy().total
+    for _ in range(240):
+        world.step(FRAME)
+        assert stretch(group, 0.1) < 1e-6
+    assert world.energy().total == pytest.approx(start, abs=2e-3 * 100 * G)
+
+
+def test_a_slack_rope_does_not_pull() -> None:
+    # Free fall until it is taut: x = 1/2 g t^2, exact for this integrator.
+    world = made()
+    group = world.add(position=np.array([[0, 0], [0.5, 0]]), radius=0.01, mass=1.0)
+    group.pin(0)
+    rope = world.links.append(pv.Rope(group, 0, 1, length=1.0))
+    world.run(seconds=0.25)
+    assert group.position[1] == pytest.approx([0.5, -0.5 * G * 0.25**2], abs=1e-12)
+    assert rope.force[0] == 0.0
+    world.run(seconds=2.0)
+    assert np.hypot(*group.position[1]) < 1 + 1e-8
+
+
+SINKS = pytest.mark.xfail(reason="since pinned circles are surfaces: with contacts of pairs the rope kept its length to 6e-4")
+
+
+@pytest.mark.parametrize("heavy", [1, pytest.param(100, marks=SINKS), pytest.param(1000, marks=SINKS)])
+def test_a_rope_over_a_smooth_disc_keeps_its_length(heavy: float) -> None:
+    # Equal loads on both sides: nothing slides, and each end pulls with its weight.
+    world = made()
+    world.add(position=[(0, 0)], radius=0.5, mass=1.0).pin(0)
+    place = 0.05 * (np.arange(41) - 20.0)
+    over, edge = 0.52, 0.26 * np.pi
+    down = np.column_stack((np.sign(place) * over, edge - np.abs(place)))
+    around = over * np.column_stack((np.sin(place / over), np.cos(place / over)))
+    mass = np.full(41, 0.01)
+    mass[[0, -1]] *= heavy
+    rope = world.add(position=np.where(np.abs(place)[:, None] < edge, around, down), radius=0.02, mass=mass)
+    i = np.arange(40)
+    start, pull = lengths(rope, i, i + 1), world.links.append(pv.Rope(rope, i, i + 1, collide=False))
+    for _ in range(600):
+        world.step(FRAME)
+        assert lengths(rope, i, i + 1) == pytest.approx(start, rel=1e-2)
+    assert pull.force[[0, -1]] == pytest.approx(G * mass[0], rel=5e-3)
+
+
+def test_it_breaks_at_its_breaking_force() -> None:
+    # The pull at rest is m g.
+    for strength, holds in ((0.99 * G, False), (1.01 * G, True)):
+        world = made()
+        group = world.add(position=[[0, 0], [0, -1]], radius=0.01, mass=1.0)
+        group.pin(0)
+        stick = world.links.append(pv.Stick(group, 0, 1, breaking_force=strength))
+        world.run(seconds=0.5)
+        assert stick.intact[0] == holds
+
+
+def test_area_and_angle_keep_their_values() -> None:
+    world = made()
+    ring = world.add(position=circle(12), radius=0.01, mass=1.0)
+    ring.pin(0)
+    world.links.append(pv.Spring(ring, range(12), np.roll(range(12), -1), stiffness=1e4, damping=10.0))
+    area = world.links.append(pv.Area(ring, compliance=1e-6))
+    rod = world.add(position=np.column_stack((0.1 * np.arange(4), np.zeros(4))), radius=0.01, mass=1.0)
+    rod.pin([0, 1])
+    world.links.append(pv.Stick(rod, range(3), range(1, 4)))
+    world.links.append(pv.Angle(rod, [0, 1], [1, 2], [2, 3]))
+    world.run(seconds=1.0)
+    x, y = ring.position.T
+    assert 0.5 * (x @ np.roll(y, -1) - np.roll(x, -1) @ y) == pytest.approx(area.area[0], rel=1e-3)
+    assert rod.position[:, 1] == pytest.approx(0.0, abs=1e-3)
+
+
+# ---- conservation ------------------------------------------------------------------------------------------------------------
+
+
+def test_free_linked_bodies_keep_momentum_and_angular_momentum() -> None:
+    world = made(gravity=(0, 0))
+    chance = np.random.default_rng(4)
+    group = world.add(position=chance.uniform(-1, 1, (6, 2)), velocity=chance.normal(0, 1, (6, 2)), radius=1e-6, mass=range(1, 7))
+    world.links.append(pv.Stick(group, range(5), range(1, 6)))
+    push = (world.mass[:, None] * world.velocity).sum(axis=0)
+    world.step(FRAME)  # velocities that no stick allows are gone
+    turn = world.angular_momentum()
+    world.run(seconds=2.0)
+    assert (world.mass[:, None] * world.velocity).sum(axis=0) == pytest.approx(push, abs=1e-11)
+    assert world.angular_momentum() == pytest.approx(turn, abs=2e-4)
+
+
+def test_a_ring_of_rigid_links_keeps_energy_and_angular_momentum() -> None:
+    # A chain and the link that closes it. Nothing acts on it from outside.
+    world, chance = made(gravity=(0, 0)), np.random.default_rng(0)
+    place, i = circle(24), np.arange(24)
+    speed = np.column_stack((-place[:, 1], place[:, 0])) + chance.normal(0, 0.3, (24, 2))
+    ring = world.add(position=place, velocity=speed, radius=0.01, mass=1.0)
+    world.links.append(pv.Stick(ring, i, np.roll(i, -1)))
+    start = lengths(ring, i, np.roll(i, -1))
+    world.step(FRAME)
+    energy, turn = world.energy().total, world.angular_momentum()
+    world.run(seconds=5.0)
+    assert lengths(ring, i, np.roll(i, -1)) == pytest.approx(start, rel=1e-3)
+    assert world.energy().total == pytest.approx(energy, rel=1e-3)
+    assert world.angular_momentum() == pytest.approx(turn, rel=1e-4)
+
+
+def test_touching_discs_of_a_chain_that_hit_each_other_gain_nothing() -> None:
+    world, chance = made(gravity=(0, 0)), np.random.default_rng(4)
+    place = np.column_stack((0.1 * np.arange(20), np.zeros(20)))
+    group = world.add(position=place, velocity=chance.normal(0, 1, (20, 2)), radius=0.05, mass=chance.uniform(1, 6, 20))
+    world.links.append(pv.Stick(group, range(19), range(1, 20)))
+    world.step(FRAME)
+    energy, turn = world.energy().total, world.angular_momentum()
+    for _ in range(300):
+        world.step(FRAME)
+        assert world.energy().total < 1.001 * energy
+    assert world.angular_momentum() == pytest.approx(turn, rel=1e-2)
+    assert stretch(group, 0.1) < 1e-5
+
+
+def test_nets_and_trees_of_rigid_links_do_not_diverge() -> None:
+    # A net that hangs by two corners with a ball thrown into it, and a star of thirty sticks. Energy has nowhere to come from.
+    world, n = made(), 15
+    y, x = np.mgrid[0:n, 0:n]
+    net = world.add(position=np.column_stack((0.1 * x.ravel(), -0.1 * y.ravel())), radius=0.02, mass=0.01)
+    k = np.arange(n * n).reshape(n, n)
+    net.pin([0, n - 1])
+    for i, j in ((k[:, :-1], k[:, 1:]), (k[:-1], k[1:])):
+        world.links.append(pv.Stick(net, i.ravel(), j.ravel(), collide=False))
+    world.add(position=[(0.7, 1.0)], velocity=[(0, -4)], radius=0.2, mass=0.5)
+    star = world.add(
+        position=np.vstack(([[9, 0]], (9, 0) + circle(30) * (0.5 + np.arange(30)[:, None] / 30))), radius=1e-4, mass=1.0
+    )
+    star.pin(1)
+    world.links.append(pv.Stick(star, [0] * 30, range(1, 31)))
+    start, fall = world.energy().total, G * (world.mass[np.isfinite(world.mass)].sum() * 1.5)
+    for _ in range(240):
+        world.step(FRAME)
+        assert world.energy().total < start + 1e-2 * fall
+
+
+def test_a_cloth_stretches_less_than_a_thousandth() -> None:
+    world = scenes.get("cloth").world(threads=1)
+    world.collisions = pv.Collisions(impulses=True)
+    for _ in range(90):
+        world.step(FRAME)
+    off = []
+    for link in world.links:
+        if isinstance(link, pv.Rope):
+            place = world.position[link.particles].astype(float)
+            off.append(np.maximum(np.hypot(*(place[:, 1] - place[:, 0]).T)[link.intact] / link.length[link.intact] - 1, 0.0))
+    assert np.concatenate(off).mean() < 5e-4
+    assert np.concatenate(off).max() < 3.5e-3
+
+
+# ---- rest --------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["dumb-bells", "ropes"])
+def test_heaps_of_linked_circles_rest_whatever_the_length_of_frames(kind: str) -> None:
+    world, chance = (
+        made(collisions=pv.Collisions(impulses=True, friction=0.3), boundary=pv.Box((0, 0), (6, 9))),
+        np.random.default_rng(3),
+    )
+    y, x = np.mgrid[0:12, 0:12]
+    place = np.column_stack((0.25 + 0.49 * x.ravel(), 0.3 + 0.5 * y.ravel())) + chance.normal(0, 0.005, (144, 2))
+    group, k = world.add(position=place, radius=0.2, mass=1.0), np.arange(144).reshape(12, 12)
+    if kind == "ropes":
+        world.links.append(pv.Rope(group, k[:, :-1][:, ::2].ravel(), k[:, 1:][:, ::2].ravel(), length=0.55))
+    else:
+        world.links.append(pv.Stick(group, k[:, ::2].ravel(), k[:, 1::2].ravel()))
+    world.run(seconds=10.0)
+    assert np.abs(world.velocity).max() < 1e-3
+    scale, before = 144 * G * 0.2, world.energy().total
+    for dt in np.random.default_rng(2).choice([1 / 240, FRAME], 200):
+        world.step(dt)
+        after = world.energy().total
+        assert after - before < 1e-4 * scale
+        before = after
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_a_soft_body_on_a_floor_neither_creeps_nor_shows_velocity(friction: float) -> None:
+    world = made(collisions=pv.Collisions(impulses=True, friction=friction), boundary=pv.Box((-3, 0), (3, 6), friction=friction))
+    builders.soft_body(world, [(-0.5, 0.3), (0.5, 0.3), (0.5, 1.3), (-0.5, 1.3)], spacing=0.2, filled=True)
+    world.run(seconds=8.0)
+    start = world.position.copy()
+    world.run(seconds=2.0)
+    assert np.abs(world.position - start).max() < 2 * 1e-5  # 0.01 mm/s
+    assert np.abs(world.velocity).max() < 1e-4
+
+
+# ---- the program -------------------------------------------------------------------------------------------------------------
+
+
+def net(dtype: Any, **more: Any) -> pv.World:
+    """A small net, rigid one way, with ropes, a pin, an angle and a ring beside it, over a floor."""
+    world = made(dtype=dtype, boundary=pv.Box((-2, -1), (3, 3), friction=0.3), substeps=4, **more)
+    y, x = np.mgrid[0:3, 0:3]
+    group = world.add(position=np.column_stack((0.3 * x.ravel(), 0.3 * y.ravel())), radius=0.1, mass=1.0)
+    i = np.arange(9).reshape(3, 3)
+    world.links.append(pv.Stick(group, i[:, :-1].ravel(), i[:, 1:].ravel()))
+    world.links.append(pv.Spring(group, i[:-1].ravel(), i[1:].ravel(), stiffness=300.0, damping=1.0))
+    world.links.append(pv.Pin(group, 8, compliance=1e-3))
+    other = world.add(position=np.array([[1, 0], [1.3, 0], [1.3, 0.4], [1, 0.3]]), velocity=(1, 2), radius=0.1, mass=0.5)
+    world.links.append(pv.Area(other, compliance=1e-3))
+    world.links.append(pv.Rope(other, [0, 1, 2, 3], [1, 2, 3, 0]))
+    world.links.append(pv.Angle(other, 0, 1, 2, compliance=0.1))
+    return world
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_uncompiled_it_has_the_same_bits(dtype: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    compiled = net(dtype)
+    compiled.run(seconds=0.1)
+    slow = reference.load("engine", dtype)
+    monkeypatch.setattr(core, "unit", lambda name, dtype: slow)
+    plain = net(dtype)
+    plain.run(seconds=0.1)
+    assert plain.state_hash() == compiled.state_hash()
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_saved_and_restored_it_has_the_same_bits(dtype: Any, tmp_path: Any) -> None:
+    world = net(dtype)
+    world.run(seconds=0.3)
+    saved = world.save()
+    snapshot.save(world, tmp_path / "net.zip")
+    other = snapshot.load(tmp_path / "net.zip")
+    hashes = []
+    for each in (world, other):
+        each.run(seconds=0.3)
+        hashes.append(each.state_hash())
+    world.restore(saved)
+    world.run(seconds=0.3)
+    assert {world.state_hash(), *hashes} == {hashes[0]}
+
+
+def test_removed_particles_and_links_leave_the_rest_as_it_is() -> None:
+    world = made()
+    group = world.add(position=np.column_stack((np.arange(6.0), np.zeros(6))), radius=0.1, mass=1.0)
+    weights = world.add(position=np.column_stack((np.arange(6.0), np.full(6, -0.5))), radius=0.1, mass=2.0)
+    group.pin(range(6))
+    sticks = world.links.append(pv.Stick((group, range(6)), (weights, range(6))))
+    other = world.links.append(pv.Rope((group, 0), (weights, 1), length=3.0))
+    world.run(seconds=0.5)
+    world.links.remove(other)
+    weights.remove([2])
+    world.step(FRAME)
+    assert sticks.force == pytest.approx(2 * G, rel=1e-6)
+    assert len(sticks) == 5
+
+
+def test_any_number_of_threads_has_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+    hashes = set()
+    for threads in (1, 2, 3):
+        monkeypatch.setattr(Team, "size", lambda team, most, frame_ms, threads=threads: threads)
+        world = made(boundary=pv.Box((0, 0), (30, 40)), dtype=np.float32)
+        y, x = np.mgrid[0:30, 0:25]
+        loose = np.random.default_rng(5).normal(0, 0.02, (750, 2))
+        group = world.add(position=1 + 1.1 * np.column_stack((x.ravel(), y.ravel())) + loose, radius=0.4)
+        k = np.arange(750).reshape(30, 25)
+        world.links.append(pv.Stick(group, k[:, ::5].ravel(), k[:, 1::5].ravel()))
+        world.links.append(pv.Rope(group, k[:, 1::5].ravel(), k[:, 2::5].ravel()))
+        world.links.append(pv.Spring(group, k[:-1, ::2].ravel(), k[1:, ::2].ravel(), stiffness=100.0))
+        world.run(seconds=0.3)
+        assert world._impulses.held.parts == threads
+        hashes.add(world.state_hash())
+    assert len(hashes) == 1
