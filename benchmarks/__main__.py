@@ -49,14 +49,13 @@ class Row:
     outside: int
 
 
-def settled_heap(particles: int) -> tuple[Array, float, float]:
-    """Positions of a settled cage, its radius, and the seconds spent on compiling."""
+def settled_heap(particles: int) -> tuple[Array, float]:
+    """Positions of a settled cage, and its radius."""
     world = pv.scenes.get("cage").world(particles=particles)
-    compile_s = pv.warm_up(world, settings=False)
     world.run(seconds=SETTLE_SECONDS, dt=DT)
     extent = world.boundary.extent()
     assert extent is not None
-    return world.position.copy(), extent[2], compile_s
+    return world.position.copy(), extent[2]
 
 
 def overlap(position: Array) -> pv.Overlap:
@@ -187,8 +186,8 @@ def main() -> None:
     engines = [engine for engine in ENGINES if installed(engine)]
     rows: list[Row] = []
     for particles in arguments.particles or [2_000, 20_000]:
-        position, cage, compile_s = settled_heap(particles)
-        print(f"\n{particles:,} discs settled for {SETTLE_SECONDS:g} s; compiling or loading took {compile_s:.1f} s")
+        position, cage = settled_heap(particles)
+        print(f"\n{particles:,} discs settled for {SETTLE_SECONDS:g} s")
         print(f"{'engine':<28}{'settings':<34}{'ms a frame':>11}{'ratio':>8}{'mean overlap':>14}{'max':>8}{'outside':>9}")
         for row in measure([e for e in engines if particles <= e.most], position, cage, arguments.frames):
             rows.append(row)

@@ -86,7 +86,6 @@ def measure(name: str, build: Callable[[], pv.World], counts: tuple[int, ...], f
     for threads in (1, None):
         pair.append(world := build())
         world.threads = threads
-        pv.warm_up(world, settings=False)
         world.run(seconds=SETTLE_SECONDS if len(world) > 100 else 1.0, dt=DT)
     for count in counts:
         times: list[list[float]] = [[], []]

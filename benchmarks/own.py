@@ -270,7 +270,6 @@ def small(machine_limit_ms: float = 0.15) -> Iterator[Row]:
 
 def memory(particles: int = 200_000) -> Iterator[Row]:
     """What the engine keeps beyond the arrays a user sees."""
-    pv.warm_up(pv.scenes.get("cage").world(particles=particles), settings=False)  # compiled code is as large for one particle
     tracemalloc.start()
     before = mapped()
     world = pv.scenes.get("cage").world(particles=particles)
@@ -295,8 +294,7 @@ def start() -> Iterator[Row]:
         ("import pyverlet", "import pyverlet", 0.6),
         (
             "second start to first frame",
-            "import pyverlet as pv\n"
-            "w = pv.scenes.get('cage').world(particles=5000); pv.warm_up(w, settings=False); w.step(1 / 60)",
+            "import pyverlet as pv\nw = pv.scenes.get('cage').world(particles=5000); w.step(1 / 60)",
             2.5,
         ),
     ):

@@ -18,8 +18,7 @@ from pyverlet.ground import errors
 from pyverlet.ground.errors import CoarseCoordinatesWarning, CoarseStepWarning, InputError, NonFiniteError, PyverletError
 from pyverlet.ground.submodules import lazily
 from pyverlet.laws import forces, integrators
-from pyverlet.laws.contacts.broadphase import BruteForce, Fast
-from pyverlet.laws.contacts.collisions import Collisions, Overlap
+from pyverlet.laws.collisions import BruteForce, Collisions, Fast, Overlap
 from pyverlet.laws.energy import Energy
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import Attractor, ConstantForce, Drag, Gravitation, PointSpring, Wind, force
@@ -45,7 +44,6 @@ from pyverlet.world.actors import Actor, Emitter, Sink
 from pyverlet.world.builders import bridge, chain, cloth, fill, net, rope, soft_body
 from pyverlet.world.clock import Clock, FrameBudget
 from pyverlet.world.panels import Panel, Panels
-from pyverlet.world.warmup import warm_up
 from pyverlet.world.world import World
 
 if TYPE_CHECKING:
@@ -74,7 +72,7 @@ __all__ = [
     "PositionVerlet", "ProjectOnly", "PyverletError", "Rope", "Segment", "SemiImplicitEuler", "Sink", "Slider", "Spring", "Stick",
     "TimeCorrectedVerlet", "Trajectory", "VelocityVerlet", "Wind", "World", "Worlds", "Yoshida4", "bridge", "builders",
     "chain", "cloth", "draw", "errors", "fill", "force", "forces", "integrators", "lab", "load", "net", "picture",
-    "read_trajectory", "rope", "save", "scenes", "slider", "soft_body", "sweep", "view", "viewers", "warm_up", "widget",
+    "read_trajectory", "rope", "save", "scenes", "slider", "soft_body", "sweep", "view", "viewers", "widget",
 ]  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from pyverlet import __version__, scenes
 from pyverlet.cli import main
 
 KEYS = {
-    "scene", "particles", "substeps", "integrator", "dtype", "threads", "frames", "seconds", "compile_s", "ms_per_frame",
+    "scene", "particles", "substeps", "integrator", "dtype", "threads", "frames", "seconds", "ms_per_frame",
     "ns_per_particle_substep", "stages", "energy", "overlap", "contacts", "escaped", "state_hash",
 }  # fmt: skip
 SMALL = ["cage", "--particles", "60", "--frames", "5"]

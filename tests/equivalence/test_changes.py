@@ -8,12 +8,12 @@ from unittest import mock
 
 import numpy as np
 import pytest
+from pyverlet.world.substeps import Substeps
 
 import pyverlet as pv
-from pyverlet.laws.contacts.collisions import ContactSolver
+from pyverlet.laws.collisions import ContactSolver
 from pyverlet.laws.integrators import BY_NAME
 from pyverlet.state.group import Group
-from pyverlet.world.substeps import Substeps
 
 ROOMS = {
     "cage": lambda: pv.Circle(radius=8),

@@ -20,7 +20,7 @@ def world(dtype: Any, *, friction: float = 0.3, restitution: float = 0.5, gravit
     chance = np.random.default_rng(1)
     made = pv.World(
         boundary=pv.Circle(radius=3, restitution=0.4, friction=friction),
-        collisions=pv.Collisions(impulses=True, restitution=restitution, friction=friction),
+        collisions=pv.Collisions(restitution=restitution, friction=friction),
         gravity=(0, gravity),
         dtype=dtype,
         substeps=4,
@@ -58,7 +58,7 @@ def test_any_number_of_threads_has_the_same_bits(friction: float, monkeypatch: p
         chance = np.random.default_rng(5)
         made = pv.World(
             boundary=pv.Box((0, 0), (30, 40), friction=friction, restitution=0.5),
-            collisions=pv.Collisions(impulses=True, friction=friction, restitution=0.3),
+            collisions=pv.Collisions(friction=friction, restitution=0.3),
         )
         x, y = np.mgrid[0.5:30, 0.5:30]
         made.add(

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 import pyverlet as pv
 from pyverlet.ground.constants import SKIN_MOST, WORTH_THINNING
-from pyverlet.laws.contacts.broadphase import BruteForce, Fast
-from pyverlet.laws.contacts.collisions import find_contacts
+from pyverlet.laws.collisions import BruteForce, Fast, find_contacts
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 

@@ -81,7 +81,7 @@ def test_the_list_is_that_of_all_pairs_against_all(kind: str, sizes: str, dtype:
         size = max(0.12 * np.sqrt(n), 4.5)
         world = pv.World(
             boundary=room(kind, size),
-            collisions=pv.Collisions(impulses=True, method=pv.Fast(skin=0.3)),
+            collisions=pv.Collisions(method=pv.Fast(skin=0.3)),
             gravity=(0, 0),
             dtype=dtype,
         )
@@ -111,7 +111,7 @@ def crowd(
     size = max(size, 4.5) if sizes == "giants" else size
     world = pv.World(
         boundary=room(kind, size),
-        collisions=pv.Collisions(impulses=True, friction=0.25, restitution=restitution, method=pv.Fast(skin=skin)),
+        collisions=pv.Collisions(friction=0.25, restitution=restitution, method=pv.Fast(skin=skin)),
         gravity=(0, -9.81 if kind in ("box", "channel") else 0),
         dtype=dtype,
         substeps=4,
@@ -217,7 +217,7 @@ def test_pairs_that_links_keep_apart_are_not_listed() -> None:
 
 
 def test_an_empty_world_and_a_lone_disc_have_no_pairs() -> None:
-    world = pv.World(collisions=pv.Collisions(impulses=True))
+    world = pv.World(collisions=pv.Collisions())
     world.step(1 / 60)
     world.add(position=(0, 0), radius=1.0)
     world.step(1 / 60)

@@ -18,7 +18,7 @@ METHODS: list[Any] = [pv.Fast(), pv.BruteForce()]
 
 def world_of(method: Any, room: Any, dtype: Any = np.float64, **law: float) -> pv.World:
     """40 circles of several sizes, apart from each other."""
-    world = pv.World(boundary=room, dtype=dtype, collisions=pv.Collisions(impulses=True, method=method, **law))
+    world = pv.World(boundary=room, dtype=dtype, collisions=pv.Collisions(method=method, **law))
     rng = np.random.default_rng(3)
     x, y = np.meshgrid(1.5 + 1.3 * np.arange(8), 2 + 1.3 * np.arange(5))
     world.add(
@@ -64,7 +64,7 @@ def test_it_is_the_physics_of_cells(room: Any, law: dict[str, float]) -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_a_chain_of_blows_ends_with_the_last(method: Any) -> None:
     # Newton: alike discs in a row hand on the velocity of the first, v, whatever order pairs are in.
-    world = pv.World(gravity=(0, 0), dtype=np.float64, collisions=pv.Collisions(restitution=1, impulses=True, method=method))
+    world = pv.World(gravity=(0, 0), dtype=np.float64, collisions=pv.Collisions(restitution=1, method=method))
     world.add(position=[(0, 0), *((2 + 1.0 * k, 0) for k in range(6))], velocity=[(3, 0)] + [(0, 0)] * 6, radius=0.5)
     for _ in range(60):
         world.step(1 / 60)
@@ -92,7 +92,7 @@ def test_one_meets_another_across_the_seam() -> None:
     # 2 m apart around the seam, minus two radii: a gap of 1 m, closed at 2 m/s, so that they bounce after 0.5 s.
     world = pv.World(
         gravity=(0, 0), boundary=pv.Periodic((0, 0), (10, 10)), dtype=np.float64,
-        collisions=pv.Collisions(restitution=1, impulses=True, method=pv.BruteForce()),
+        collisions=pv.Collisions(restitution=1, method=pv.BruteForce()),
     )  # fmt: skip
     world.add(position=[(1, 5), (9, 5)], velocity=[(-1, 0), (1, 0)], radius=0.5)
     for _ in range(60):

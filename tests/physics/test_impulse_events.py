@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.collisions import Collisions
 
 
 def bouncing(*, impulses: bool | None, room: pv.Boundary, **options: Any) -> pv.World:
@@ -53,7 +53,7 @@ def test_a_ball_is_heard_at_each_of_its_bounces() -> None:
     """After n bounces from a height H it has e^n of the speed sqrt(2 g H); in a frame of 0.25 s there are several."""
     e, height = 0.9, 0.05
     world = pv.World(
-        boundary=pv.Box((-1, 0), (1, 9), restitution=e), collisions=pv.Collisions(impulses=True), events=True, dtype=np.float64
+        boundary=pv.Box((-1, 0), (1, 9), restitution=e), collisions=pv.Collisions(), events=True, dtype=np.float64
     )
     world.add(position=(0, 0.1 + height), radius=0.1)
     speeds: list[float] = []
@@ -78,7 +78,7 @@ def test_to_listen_changes_no_bit(dtype: type) -> None:
         rng = np.random.default_rng(5)
         world = pv.World(
             boundary=pv.Circle(radius=6, friction=0.3), events=events, dtype=dtype,
-            collisions=pv.Collisions(restitution=0.3, friction=0.3, impulses=True),
+            collisions=pv.Collisions(restitution=0.3, friction=0.3),
         )  # fmt: skip
         world.add(position=rng.uniform(-3.5, 3.5, (300, 2)), radius=0.12)
         world.run(seconds=1.5)
@@ -88,7 +88,7 @@ def test_to_listen_changes_no_bit(dtype: type) -> None:
 
 def test_new_lists_lose_and_double_nothing() -> None:
     """Two discs that stay together while a fast one has lists made anew in each frame: one beginning, no end."""
-    world = pv.World(boundary=pv.Box((-9, 0), (9, 9)), collisions=pv.Collisions(impulses=True), events=True, gravity=(0, -10))
+    world = pv.World(boundary=pv.Box((-9, 0), (9, 9)), collisions=pv.Collisions(), events=True, gravity=(0, -10))
     world.add(position=[(0, 0.5), (0, 1.5)], radius=0.5)
     fast = world.add(position=(-8, 8), velocity=(60, 0), radius=0.1)
     begun, ended = [], []

@@ -13,7 +13,7 @@ G = 9.81
 
 
 def world_of(e: float = 0.0, mu: float = 0.0, **options: Any) -> pv.World:
-    law = pv.Collisions(restitution=e, friction=mu, impulses=True)
+    law = pv.Collisions(restitution=e, friction=mu)
     return pv.World(**{"ledger": True, "dtype": np.float64, "collisions": law, **options})
 
 

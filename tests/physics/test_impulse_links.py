@@ -17,7 +17,7 @@ G, FRAME = 9.81, 1 / 60
 
 
 def made(**more: Any) -> pv.World:
-    options: dict[str, Any] = {"collisions": pv.Collisions(impulses=True), "dtype": np.float64}
+    options: dict[str, Any] = {"collisions": pv.Collisions(), "dtype": np.float64}
     return pv.World(**(options | more))
 
 
@@ -250,7 +250,7 @@ def test_nets_and_trees_of_rigid_links_do_not_diverge() -> None:
 
 def test_a_cloth_stretches_less_than_a_thousandth() -> None:
     world = scenes.get("cloth").world(threads=1)
-    world.collisions = pv.Collisions(impulses=True)
+    world.collisions = pv.Collisions()
     for _ in range(90):
         world.step(FRAME)
     off = []
@@ -268,7 +268,7 @@ def test_a_cloth_stretches_less_than_a_thousandth() -> None:
 @pytest.mark.parametrize("kind", ["dumb-bells", "ropes"])
 def test_heaps_of_linked_circles_rest_whatever_the_length_of_frames(kind: str) -> None:
     world, chance = (
-        made(collisions=pv.Collisions(impulses=True, friction=0.3), boundary=pv.Box((0, 0), (6, 9))),
+        made(collisions=pv.Collisions(friction=0.3), boundary=pv.Box((0, 0), (6, 9))),
         np.random.default_rng(3),
     )
     y, x = np.mgrid[0:12, 0:12]
@@ -290,7 +290,7 @@ def test_heaps_of_linked_circles_rest_whatever_the_length_of_frames(kind: str) -
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_a_soft_body_on_a_floor_neither_creeps_nor_shows_velocity(friction: float) -> None:
-    world = made(collisions=pv.Collisions(impulses=True, friction=friction), boundary=pv.Box((-3, 0), (3, 6), friction=friction))
+    world = made(collisions=pv.Collisions(friction=friction), boundary=pv.Box((-3, 0), (3, 6), friction=friction))
     builders.soft_body(world, [(-0.5, 0.3), (0.5, 0.3), (0.5, 1.3), (-0.5, 1.3)], spacing=0.2, filled=True)
     world.run(seconds=8.0)
     start = world.position.copy()

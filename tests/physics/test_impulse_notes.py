@@ -15,7 +15,7 @@ G, FRAME = 9.81, 1 / 60
 
 def world(**more: Any) -> pv.World:
     law = {name: more.pop(name) for name in ("friction", "restitution") if name in more}
-    return pv.World(collisions=pv.Collisions(impulses=True, **law), contacts=True, **more)
+    return pv.World(collisions=pv.Collisions(**law), contacts=True, **more)
 
 
 @pytest.mark.parametrize(("dtype", "within"), [(np.float32, 1e-6), (np.float64, 1e-12)])
@@ -99,7 +99,7 @@ def test_noting_changes_no_bit(dtype: Any) -> None:
     for contacts in (False, True):
         heap = pv.World(
             boundary=pv.Circle(radius=6, friction=0.3),
-            collisions=pv.Collisions(impulses=True, friction=0.3, restitution=0.4),
+            collisions=pv.Collisions(friction=0.3, restitution=0.4),
             contacts=contacts,
             dtype=dtype,
         )

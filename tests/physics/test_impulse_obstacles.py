@@ -14,7 +14,7 @@ DT, H, G, R = 1 / 60, 1 / 480, 9.81, 0.25
 
 
 def law(**more: Any) -> pv.Collisions:
-    return pv.Collisions(impulses=True, **more)
+    return pv.Collisions(**more)
 
 
 def world_with(*obstacles: pv.Obstacle, **options: Any) -> pv.World:

@@ -14,7 +14,7 @@ FRAME, G = 1 / 60, 9.81
 
 
 def law(**more: Any) -> pv.Collisions:
-    return pv.Collisions(impulses=True, **more)
+    return pv.Collisions(**more)
 
 
 def heap(

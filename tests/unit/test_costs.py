@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.laws.contacts.broadphase import BruteForce
-from pyverlet.laws.contacts.collisions import find_contacts
+from pyverlet.laws.collisions import BruteForce, find_contacts
 from pyverlet.world import queries
 
 DT = 1 / 60

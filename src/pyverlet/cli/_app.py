@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from pyverlet import __version__, scenes, warm_up
+from pyverlet import __version__, scenes
 from pyverlet.cli import _check, _sweep
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
@@ -184,7 +184,7 @@ def run(
     if plot is None:
         panels = chosen.panels(integrators=methods, **overrides, ledger=ledger)
         with _kept(panels, trajectory, every) as observe:
-            results = [_measure(panel, chosen, count, dt, compile_kernels(panel.world), observe) for panel in panels]
+            results = [_measure(panel, chosen, count, dt, observe) for panel in panels]
         _tell_all(chosen, panels, results, as_json)
         return
     if trajectory:
@@ -216,7 +216,7 @@ def bench(
         float, typer.Option(parser=options.real, help="Simulated seconds to run before measuring.", metavar="S", show_default="5")
     ] = DEFAULT_SECONDS,
 ) -> None:
-    """Measure a scene once it is warm: kernels compiled, circles settled.
+    """Measure a scene once its circles have settled.
 
     Prints the median frame and, beside it, NumPy's a = b + s c on the same machine, so that figures from two machines
     can be compared.
@@ -239,33 +239,23 @@ def bench(
     if len(methods) > 1:
         raise InputError(f"integrators is {integrator!r}; allowed is one")
     world = chosen.world(**overrides, integrator=methods[0] if methods else None)
-    compile_s = compile_kernels(world)
     with Progress("settling, frame") as progress:
         for done in range(warm):
             world.step(dt)
             progress(done + 1, warm)
     triad = report.triad()
-    result = _measure(Panel("", world), chosen, count, dt, compile_s)
+    result = _measure(Panel("", world), chosen, count, dt)
     ratio = result.ns_per_particle_substep / triad["ns_per_element"]
     _tell(replace(result, extra={"settle_seconds": settle, "triad": triad, "ratio_to_triad": ratio}), as_json)
 
 
-def compile_kernels(world: World) -> float:
-    """The seconds its kernels took to compile or load."""
-    with Progress("compiling kernels, once") as progress:
-        return warm_up(world, progress, settings=False)
-
-
-def _measure(
-    panel: Panel, scene: Scene, frames: int, dt: float, compile_s: float, observe: Callable[[World], None] | None = None
-) -> Report:
+def _measure(panel: Panel, scene: Scene, frames: int, dt: float, observe: Callable[[World], None] | None = None) -> Report:
     with Progress("frame") as progress:
         return report.run(
             panel.world,
             scene=scene.name,
             frames=frames,
             dt=dt,
-            compile_s=compile_s,
             progress=progress,
             observe=observe,
             step=panel.step,
@@ -301,7 +291,6 @@ def _run_and_plot(scene: Scene, settings: Settings, frames: int, dt: float, path
         known = ", ".join(other.name for other in scenes.SCENES.values() if other.closed_form)
         raise InputError(f"plot is for scenes with a closed form to compare with ({known}), got {scene.name!r}")
     world = scene.build(settings)
-    compile_s = compile_kernels(world)
     recorder = trajectory.HeightRecorder()
     recorder(world)
     with Progress("frame") as progress:
@@ -310,7 +299,6 @@ def _run_and_plot(scene: Scene, settings: Settings, frames: int, dt: float, path
             scene=scene.name,
             frames=frames,
             dt=dt,
-            compile_s=compile_s,
             progress=progress,
             observe=recorder,
         )

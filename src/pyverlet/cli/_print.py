@@ -55,7 +55,6 @@ def report(values: Mapping[str, Any]) -> str:
             f"{values['integrator']}, {values['substeps']} substeps, {values['dtype']}, {_many(values['threads'], 'thread')}",
         ),
         ("simulated", f"{values['seconds']:.4g} s in {values['frames']:,} frames of {1e3 * values['dt']:.4g} ms"),
-        ("compiling", f"{values['compile_s']:.2f} s"),
         ("ms per frame", f"{frame['median']:.3f} median, {frame['p95']:.3f} for 95 % of frames"),
         ("budget", f"{_many(budget['frames_over'], 'frame')} over {budget['limit_ms']:g} ms"),
         ("per circle", f"{values['ns_per_particle_substep']:.1f} ns a substep"),

@@ -11,7 +11,7 @@ from pyverlet import record as recording
 from pyverlet import scenes
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
-from pyverlet.cli._app import app, compile_kernels
+from pyverlet.cli._app import app
 from pyverlet.cli._integrators import integrators
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.progress import Progress
@@ -78,7 +78,6 @@ def record(
         seconds = show.seconds(settings) if show.seconds else DEFAULT_SECONDS
     plan = recording.plan(path, seconds=seconds, fps=fps, size=None if size is None else options.pixels(size))
     world = chosen.build(settings)
-    compile_kernels(world)
     given = None if colour is None else options.COLOURS[colour]()
     if given is None and show.colours:
         with Progress("where each circle ends") as progress:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pyverlet.core.engine_object import Engine
 from pyverlet.core.measure import energies, energy_gained, momenta, pinned_move
-from pyverlet.core.overlap import overlaps, shrink_to_fit
+from pyverlet.core.overlap import overlaps, touching
 from pyverlet.core.rows import any_differs, differs, put_motion, take_motion
 
 __all__ = [
@@ -18,6 +18,6 @@ __all__ = [
     "overlaps",
     "pinned_move",
     "put_motion",
-    "shrink_to_fit",
     "take_motion",
+    "touching",
 ]

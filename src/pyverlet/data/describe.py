@@ -21,8 +21,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.fields import Field
 from pyverlet.laws import forces, integrators, naive, obstacles, rooms
-from pyverlet.laws.contacts.broadphase import BruteForce, Fast
-from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.collisions import BruteForce, Collisions, Fast
 from pyverlet.state.group import Group, Picked
 from pyverlet.world.actors import Actor, Emitter, Sink
 from pyverlet.world.world import World
@@ -94,7 +93,7 @@ _kind(naive.ProjectOnly, "room")
 
 _kind(Fast, "skin")
 _kind(BruteForce)
-_kind(Collisions, "restitution", "friction", "method", "impulses")
+_kind(Collisions, "restitution", "friction", "method")
 
 for _integrator in integrators.BY_NAME.values():
     _kind(_integrator, *inspect.signature(_integrator).parameters)

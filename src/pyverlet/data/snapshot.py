@@ -21,7 +21,7 @@ from pyverlet.data.describe import Builder, describe
 from pyverlet.data.durable import replacing
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
-from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.integrators import Integrator
 from pyverlet.laws.obstacles import Obstacle
 from pyverlet.laws.rooms import Boundary

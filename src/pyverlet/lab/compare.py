@@ -13,7 +13,6 @@ from pyverlet.ground.errors import InputError
 from pyverlet.lab.problems import Floats
 from pyverlet.laws.integrators import Integrator
 from pyverlet.scenes import Scene
-from pyverlet.world.warmup import warm_up
 
 Progress = Callable[[int, int], None]
 
@@ -135,7 +134,6 @@ def _run(
     start = world.energy().total
     if start == 0.0:
         raise InputError(f"scene is {scene.name!r}, which starts with an energy of 0 J; allowed is one whose drift has a measure")
-    warm_up(world, settings=False)
     time, energy, height, ms = np.zeros(frames + 1), np.zeros(frames + 1), np.zeros(frames + 1), np.zeros(frames)
     energy[0], height[0] = start, world.position[0, 1]
     for frame in range(1, frames + 1):

@@ -11,7 +11,7 @@ import numpy as np
 from pyverlet.ground.errors import CoarseStepWarning
 from pyverlet.lab.physics._worlds import RADIUS
 from pyverlet.lab.table import Table
-from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.rooms import Box
 from pyverlet.scenes.gas import henderson
 from pyverlet.state.slots import Slots

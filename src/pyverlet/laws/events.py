@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.kernels import events as kernels
 from pyverlet.kernels.bounds import FIRST_OBSTACLE, SURFACES
-from pyverlet.laws.contacts.wide import Wide
 from pyverlet.laws.obstacles import Course, Obstacle
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
@@ -82,7 +81,6 @@ class Events:
         self._touching = np.empty(0, np.int64)  # keys, sorted
         self._at_wall = self._touching  # those of them that are about walls; known where the next is
         self._obstacles: list[Obstacle] | None = None  # that the keys number; None: those of now
-        self._known: Array | None = None  # `touched` of the list in which those of the frame before are marked
         self._told: list[Told] = []
 
     def __repr__(self) -> str:
@@ -105,7 +103,7 @@ class Events:
 
     def take(self, other: Events) -> None:
         """Remember what the other does."""
-        self._hit_speed, self._touching, self._known = other._hit_speed, other._touching, None
+        self._hit_speed, self._touching = other._hit_speed, other._touching
         self._at_wall, self._obstacles = other._at_wall, other._obstacles
         self.begin, self.end, self.hit = other.begin.copy(), other.end.copy(), other.hit.copy()
 
@@ -116,13 +114,6 @@ class Events:
 
     # ---- what the engine tells ---------------------------------------------------------------------------------------
 
-    def collect(self, state: Slots, pairs: Wide) -> None:
-        """The list of pairs is about to change, or the frame ends: keep what was told."""
-        room, which = len(pairs.closing), pairs.listed()
-        told = _room_for(room)
-        found = kernels.heard(*which, pairs.closing, pairs.bounced, pairs.touched, state.particle, *told)
-        self._told.append(Told(*(column[:found] for column in told)))
-
     def hear(self, told: list[Told]) -> None:
         """All that was noted of a frame that ends, but for walls of a room of the user's own."""
         self._told = told
@@ -131,14 +122,11 @@ class Events:
         """A frame begins, or begins again."""
         self._told = []
 
-    def close(self, slots: Slots, state: State, pairs: Wide | None, place: Place) -> None:
-        """The frame has gone well: what was told is what happened; `pairs`: the list of now; `place`: what they met."""
+    def close(self, slots: Slots, state: State, place: Place) -> None:
+        """The frame has gone well: what was told is what happened; `place`: what they met."""
         lost = self._number_obstacles(place.course.seen())
         walls = place.walls(slots)
-        compare = self._compare_keys
-        if pairs and pairs.touched is self._known and not (self._told or (len(slots.island) and len(slots.asleep))):
-            compare = self._compare_pairs
-        told, (gone, new, now) = compare(slots, state, pairs, walls)
+        told, (gone, new, now) = self._compare_keys(slots, state, walls)
         # Bounces: each is a beginning, and but for the last an end; another one, if they touched before, ends what went on.
         again, bounces = _counted(told)
         begun = np.unique(np.concatenate((new, again)))
@@ -154,31 +142,8 @@ class Events:
         self.hit = self.begin[speeds >= self._hit_speed]
         self.forget()
 
-    def _compare_pairs(self, slots: Slots, state: State, pairs: Any, walls: Told) -> tuple[Told, Compared]:
-        """The list is that of the frame before, where those who touched are marked: few have changed, and are sorted."""
-        room = len(pairs.closing)
-        found, gone = _room_for(room), np.empty(room, np.int64)
-        changed: Any = kernels.changed
-        which = (*pairs.listed(), pairs.closing, pairs.bounced, pairs.touched, slots.particle)
-        begun, ended = changed(*which, *found, gone)
-        told = Told.of([Told(*(column[:begun] for column in found)), walls])
-        told = told._replace(keys=_numbered(told.keys, state))
-        before = self._at_wall
-        self._at_wall = now = np.unique(told.keys[begun:])
-        left = np.unique(np.concatenate((_numbered(gone[:ended], state), before[kernels.absent(before, now)])))
-        come = np.unique(told.keys)
-        come = come[~_among(come, self._touching)]
-        touching = kernels.replaced(self._touching, left, come) if len(left) or len(come) else self._touching
-        return told, (left, come, touching)
-
-    def _compare_keys(self, slots: Slots, state: State, pairs: Wide | None, walls: Told) -> tuple[Told, Compared]:
-        """The list is another, or circles sleep, who are not in it: all that touch are sorted and compared with those before."""
-        earlier = np.sort(np.concatenate([told.keys for told in self._told])) if self._told else self._touching[:0]
-        if pairs:
-            self.collect(slots, pairs)
-            if len(earlier):
-                kernels.recall(*pairs.listed(), pairs.touched, slots.particle, earlier)
-        self._known = pairs.touched if pairs and not len(slots.asleep) else None
+    def _compare_keys(self, slots: Slots, state: State, walls: Told) -> tuple[Told, Compared]:
+        """All that touch are sorted and compared with those before."""
         told = Told.of([*self._told, walls])
         told = told._replace(keys=_numbered(told.keys, state))
         # Those who sleep are not listed, but go on. To sort keys alone takes a third of what it takes to know their order.
@@ -300,10 +265,6 @@ def key_of_pair(a: Array, b: Array) -> Array:
 def key_of_surface(a: Array, number: Array, obstacle: Array) -> Array:
     """Of contacts with walls of the room, or (`obstacle`) with obstacles, of these numbers."""
     return np.asarray((a << 32) + _SURFACE + np.where(obstacle, FIRST_OBSTACLE + number, number))
-
-
-def _room_for(room: int) -> Told:
-    return Told(np.empty(room, np.int64), np.empty(room), np.empty(room, np.int64))
 
 
 def _counted(told: Told) -> tuple[Array, Array]:

@@ -33,7 +33,6 @@ from numpy.typing import NDArray
 from pyverlet.core import unit
 from pyverlet.ground.constants import ONE_THREAD_BELOW, SLEEP_NEAR, SURPLUS
 from pyverlet.kernels import clusters, measure, taking
-from pyverlet.laws.contacts.collisions import ContactSolver
 from pyverlet.laws.forces import Drag, ForceSum, has_potential
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course
@@ -95,19 +94,16 @@ class Watch:
         start = (then.position, then.velocity, then.spin, then.radius, then.mass)
         return float(measure.gained(*start, *motion, *self._gravity))
 
-    def close(self, slots: Slots, contacts: ContactSolver | None) -> bool:
-        """The frame is over: take back what has been gained too much, and let circles grow at a pace that gains less.
+    def close(self, slots: Slots, contacts: Any) -> bool:
+        """The frame is over: take back what has been gained too much.
 
         Returns whether all positions and velocities are known to be finite: so they are if their energy is.
         """
         finite = False
-        if self._forces.gravity != self._gravity:  # it has turned on the way, and drove the world
-            risen = 0.0
-        else:
+        if self._forces.gravity == self._gravity:  # else it has turned on the way, and drove the world
             gained = self._gained(slots)
             finite = not slots.pins and abs(gained) < np.inf  # what is pinned has none
             room = SURPLUS * fall(slots.total_mass, self._gravity, self._room.extent())
-            risen = gained / room if room > 0.0 else 0.0
             surplus = self._surplus(gained, room, slots)
             if surplus > 0.0 and self._pardon_mislaid(slots):
                 gained = self._gained(slots)
@@ -117,8 +113,6 @@ class Watch:
                 raised = self.take_back(slots, contacts.listed() if contacts else _NOBODY, surplus)
                 left = self._put_back(slots, raised, gained - surplus)
                 slots.taken = gained - left
-        if contacts:
-            contacts.growth.heed(risen)
         return finite
 
     def _surplus(self, gained: float, room: float, slots: Slots) -> float:

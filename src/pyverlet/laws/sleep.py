@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from pyverlet.ground.constants import SLEEP_AFTER_S, SLEEP_NEAR, SLEEP_SPEED
 from pyverlet.kernels import sleep as kernels
-from pyverlet.laws.contacts.broadphase import PairList
 from pyverlet.laws.forces import Drag
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
@@ -75,7 +74,7 @@ class Sleep:
         """Whether nothing can move."""
         return self.anyone and not slots.inverse_mass.any()
 
-    def touched(self, slots: Slots, pairs: PairList) -> bool:
+    def touched(self, slots: Slots, pairs: Any) -> bool:
         """Wake islands that somebody awake overlaps. Whether there were any: then the list lacks pairs."""
         if not self._members:
             return False
@@ -85,7 +84,7 @@ class Sleep:
             return False
         return self._wake(slots, np.isin(slots.island, slots.island[touched == 1]))
 
-    def end(self, slots: Slots, pairs: PairList, dt: float, gravity: float) -> bool:
+    def end(self, slots: Slots, pairs: Any, dt: float, gravity: float) -> bool:
         """At the end of a frame: let islands that have been calm long enough fall asleep. Whether there were any."""
         real = slots.real
         limit = real(SLEEP_SPEED**2 * gravity)

@@ -37,7 +37,6 @@ class Report:
     dt: float
     frames: int
     seconds: float
-    compile_s: float
     ms_per_frame: dict[str, float]
     budget: dict[str, float]
     ns_per_particle_substep: float
@@ -86,7 +85,6 @@ def run(
     scene: str,
     frames: int,
     dt: float,
-    compile_s: float = 0.0,
     progress: Progress | None = None,
     observe: Callable[[World], None] | None = None,
     step: Callable[[float], None] | None = None,
@@ -98,7 +96,6 @@ def run(
         scene: name to report.
         frames: at least 1.
         dt: seconds a frame.
-        compile_s: what compiling took before, to report.
         progress: called with (frames done, frames) after every frame.
         observe: called with the world after every frame, outside the measured time.
         step: makes one frame of dt seconds; world.step unless given.
@@ -133,7 +130,6 @@ def run(
         dt=dt,
         frames=frames,
         seconds=frames * dt,
-        compile_s=compile_s,
         ms_per_frame={"median": median, "p95": float(np.percentile(frame_ms, 95))},
         budget={"limit_ms": FRAME_BUDGET_MS, "frames_over": sum(ms > FRAME_BUDGET_MS for ms in frame_ms)},
         ns_per_particle_substep=1e6 * median / (len(world) * world.substeps),

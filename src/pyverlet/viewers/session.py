@@ -31,8 +31,7 @@ from pyverlet.viewers.gauges import Gauges
 from pyverlet.viewers.rhythm import PICTURE_S, Rhythm
 from pyverlet.viewers.stage import Stage
 from pyverlet.world.clock import Clock, FrameBudget
-from pyverlet.world.moments import Moment, rehearse_looking
-from pyverlet.world.warmup import warm_up_to_show
+from pyverlet.world.moments import Moment
 
 if TYPE_CHECKING:
     from pyverlet.world.panels import Panels
@@ -242,8 +241,6 @@ class Session(Door):
 
     def _enter(self, exhibit: Exhibit) -> None:
         self._stage = self._staged(exhibit)
-        for world in self._stage.worlds:
-            rehearse_looking(world.dtype, world.threads)
         self._fresh_start()
 
     def _put_on(self, exhibit: Exhibit) -> None:
@@ -275,8 +272,6 @@ class Session(Door):
         self._say_busy(f"building {name}")
         try:
             exhibit = self._repertoire.build(name, particles, self._on_the_way(name))
-            for world in exhibit.panels.worlds:  # what is left to compile would stop a frame later, unsaid
-                warm_up_to_show(world, lambda *_: self._say_busy(f"compiling what {name} needs, once"))
             self._enter(exhibit)
         except _Stopped:
             return

@@ -12,9 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.constants import REST_ACCELERATIONS, SURPLUS
-from pyverlet.ground.errors import InputError, NonFiniteError
-from pyverlet.laws.contacts.collisions import Collisions
-from pyverlet.laws.contacts.growth import Growth
+from pyverlet.ground.errors import NonFiniteError
 from pyverlet.laws.impulse_ledger import ImpulsePage
 from pyverlet.laws.integrators import PositionVerlet
 from pyverlet.laws.limiter import fall, watched
@@ -67,8 +65,6 @@ class ImpulseFrames:
         self.links = ImpulseLinks()
         self._law: Any = None  # numbers that the engine holds
         self._pull: tuple[Any, float] = None, 0.0  # gravity, and how strong it is, m/s^2
-        self.growth = Growth()
-        self.steps = False  # whether the last frame was one of this law
         # What contacts remember between frames.
         self.save, self.renumber = self.held.save, self.held.renumber
 
@@ -81,21 +77,8 @@ class ImpulseFrames:
         """Back to what `save` returned; links have gone back to theirs."""
         self.links.forget()
         self.held.restore(memory)
-        self.steps = memory.kick > 0
 
     # ---- a frame -------------------------------------------------------------------------------------------------------------
-
-    def takes(self, world: Any) -> bool:
-        """Whether the frame that begins is one of this law. Another one forgets what contacts have remembered."""
-        law = world.collisions
-        wanted = Collisions.impulses if law is None else law.impulses
-        steps = not self.unknown(world) if wanted is None else wanted
-        if steps != self.steps:
-            self.steps = steps
-            self.forget()
-            if world._contacts:
-                world._contacts.broad_phase.forget()
-        return steps
 
     def step(self, world: Any, dt: float, done: Callable[[str], None]) -> None:
         """Advance the slots of a world by a frame of dt seconds: all of `World.step` but for what its arrays become.
@@ -103,11 +86,8 @@ class ImpulseFrames:
         done: is told of each stage, and may be the page of a ledger.
 
         Raises:
-            InputError: there is something in the world that this law does not know yet.
             NonFiniteError: a particle turned NaN or infinite.
         """
-        if found := self.unknown(world):
-            raise InputError(f"impulses is True in a world with {found[0]}; allowed are circles, obstacles and forces in a room")
         world._slots.rows = self.held.core
         world._slots.clear_notes()
         self.links.keep_apart(world, self.held.engine)
@@ -115,13 +95,6 @@ class ImpulseFrames:
             self.held.forget_list()
         if not self.run(world, dt, done):
             self._refuse_non_finite(world, dt)
-
-    def unknown(self, world: Any) -> list[str]:
-        """What there is in a world that this law does not know yet."""
-        found = []
-        if world._sleep:
-            found.append("sleep=True")
-        return found
 
     def run(self, world: Any, dt: float, done: Callable[[str], None]) -> bool:
         """Advance the gathered slots by a frame of dt seconds. False if a particle turned NaN or infinite."""

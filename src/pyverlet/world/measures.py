@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -14,13 +14,13 @@ from pyverlet.core import unit
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Records
 from pyverlet.ground.turns import of_one_frame
-from pyverlet.laws.contacts.collisions import Collisions, ContactSolver, Overlap, measure_overlap
+from pyverlet.laws.collisions import Collisions, Overlap, measure_overlap
 from pyverlet.laws.energy import Energy, energy
 from pyverlet.laws.events import Events, Place
 from pyverlet.laws.forces import ForceSum
 from pyverlet.laws.impulse_ledger import ImpulsePage
 from pyverlet.laws.integrators import Integrator
-from pyverlet.laws.ledger import Bookkeeper, Ledger, Page
+from pyverlet.laws.ledger import Bookkeeper, Ledger
 from pyverlet.laws.obstacles import Course, Obstacle, Obstacles
 from pyverlet.laws.rooms import Boundary
 from pyverlet.laws.touches import Touches
@@ -46,7 +46,6 @@ class Measures(Particles):
     _course: Course
     obstacles: Obstacles
     collisions: Collisions | None
-    _contacts: ContactSolver | None
     _impulses: Any
     _force_sum: ForceSum
     integrator: Integrator
@@ -108,10 +107,7 @@ class Measures(Particles):
 
         Fields: circles `a` < `b`, or b = -1 and the number of a `wall` of the room (of a Box: left, right, floor, ceiling) or
         of an `obstacle`, else -1; `point` (2), m; `normal` (2) out of a; `impulse` along it, N s, summed over the frame, and
-        `rub`, what a got along (-n_y, n_x): of walls and obstacles. Of circles the impulses are the smallest that explain what
-        each has got; friction between them is left out. They are found in a number of steps that costs less than a frame: good to
-        0.1 % for heaps of some hundred circles, while deep in heaps of thousands they are evened out. With
-        `Collisions(impulses=True)` they are the impulses of the law itself, friction included.
+        `rub`, what a got along (-n_y, n_x).
 
         Raises:
             InputError: the world notes none.
@@ -172,28 +168,15 @@ class Measures(Particles):
         finally:
             self._touches = before
 
-    def _listen(self, h: float, told: Callable[[str], None]) -> Callable[[str], None]:
-        """Who is told of the stages of a frame: `told`, and before it those who note contacts."""
-        if self._touches is None:
-            return told
-        listed = virial = None
-        if self._contacts and len(self) > 1:
-            self._contacts.weigh(bool(self.boundary.seam) and self.boundary.perimeter() is None)
-            listed, virial = self._contacts.listed, self._contacts.virial
-        return self._touches.frame(self._slots, self._state, h, self.boundary, self._course, listed, virial, told)
-
-    def _open_books(self, h: float, by_impulses: bool) -> Any:
+    def _open_books(self, h: float) -> Any:
         """The books of a frame with steps of h seconds, if there are any."""
         lag = self.integrator.velocity_lag * h
-        kind = ImpulsePage if by_impulses else Page
         about = self._slots, self._force_sum, self.links, self.time, h, lag, self.profile.mark
-        return self._books and kind(self._books, *about)
+        return self._books and ImpulsePage(self._books, *about)
 
     def _spent(self) -> tuple[float, float, float, float]:
         """What impacts, friction, the energy limiter and the room have given in this frame, J, as they have noted."""
         spent = np.array([column.sum() for column in self._slots.spent.T])  # along the rows it takes NumPy ten times as long
-        if self._contacts:
-            spent += self._contacts.spent()
         return float(spent[0]), float(spent[1]), -self._slots.taken, self._slots.worked
 
     def momentum(self) -> Array:
@@ -215,7 +198,7 @@ class Measures(Particles):
     @of_one_frame
     def overlap(self) -> Overlap:
         """Mean and largest overlap of the touching pairs, as fractions of their contact distance, and how many there are."""
-        return measure_overlap(self._state, self.links.unlist)
+        return measure_overlap(self._state, self.links.known_apart())
 
     @of_one_frame
     def escaped(self) -> int:
@@ -230,6 +213,4 @@ class Measures(Particles):
     @property
     def rebuilds(self) -> int:
         """How often the neighbour list has been built."""
-        if self._impulses.steps:
-            return int(self._impulses.rebuilds)
-        return self._contacts.broad_phase.rebuilds if self._contacts else 0
+        return int(self._impulses.rebuilds)

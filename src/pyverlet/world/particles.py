@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.turns import Shared, in_turn, of_one_frame
-from pyverlet.laws.contacts.collisions import ContactSolver
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceList, Numbered
 from pyverlet.laws.links import Links
@@ -31,7 +30,6 @@ class Particles(Shared):
 
     _state: State
     _slots: Slots
-    _contacts: ContactSolver | None
     _impulses: Any
     _events: Events | None
     _touches: Touches | None
@@ -169,13 +167,11 @@ class Particles(Shared):
         kept[gone] = False
         now = self._state.remove(kept)
         self._slots.forget(now)
-        if self._contacts:
-            self._contacts.broad_phase.forget()
         self._renumber(now)
 
     def _renumber(self, now: Array) -> None:
         """Tell those who hold a particle by its index where it is now, or that it is no more (-1)."""
-        for holder in (self.links, self._contacts, self._impulses, self._events, self._touches, *self.forces):
+        for holder in (self.links, self._impulses, self._events, self._touches, *self.forces):
             if isinstance(holder, Numbered):
                 holder.renumber(now)
 

@@ -6,7 +6,6 @@ each number. Rooms, forces, obstacles, actors and links are not among them: they
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -14,12 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
-from pyverlet.ground.constants import SKIN_LEAST, SKIN_MOST
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.fields import Field
-from pyverlet.laws.contacts.broadphase import Fast
-from pyverlet.laws.contacts.loans import Lent
-from pyverlet.laws.contacts.slips import Kept
 from pyverlet.laws.events import CONTACT, HIT, Events
 from pyverlet.laws.ledger import Bookkeeper, Ledger
 from pyverlet.laws.links._set import BROKEN
@@ -65,19 +60,6 @@ SLOTS = {
 }
 """The engine's order, and what it remembers by slot."""
 
-CONTACTS = {
-    "built": Field(None, "listed", 2),
-    "checked": Field(None, "listed", 2),
-    "low": Field(np.int32, "slips", least=0, below="particles", order="rising"),
-    "high": Field(np.int32, "slips", least=0, below="particles"),
-    "slip": Field(None, "slips"),
-    "lent_particle": Field(np.int32, "lent", least=-1, below="particles"),
-    "lent": Field(None, "lent"),
-    "busy": Field(None, "lent"),
-    "held": Field(np.uint8, "lent"),
-}
-"""What contacts remember: where the list of pairs was made, what has slipped, who has lent whom inertia."""
-
 NEWS = {
     "touching": Field(np.int64, "touching", least=0, order="ascending"),
     "begin": Field(np.int64, "begin", 4, least=-1),
@@ -116,7 +98,6 @@ FIELDS = {
     for room, fields in (
         ("particles", PARTICLES),
         ("slots", SLOTS),
-        ("contacts", CONTACTS),
         ("news", NEWS),
         ("linked", LINKED),
         ("impulses", IMPULSES),
@@ -136,13 +117,12 @@ def take_apart(world: World) -> Parts:
     """All that moves in a world, as of now. The arrays are copies."""
     saved = world.save()
     facts: dict[str, Any] = {
-        "time": float(saved.time), "frames": saved.frames, "h_last": saved.h_last, "numbers": world._state.numbers,
+        "time": float(saved.time), "frames": saved.frames, "numbers": world._state.numbers,
         "apart_changed": bool(saved.links[3]),
     }  # fmt: skip
     arrays = {f"particles.{name}": array for name, array in saved.arrays.items()}
     arrays["particles.begun"] = np.array(world._state.begun, np.int64)
     arrays |= {f"slots.{name}": column for name, column in saved.slots.items()}
-    facts["contacts"] = None if saved.contacts is None else _contacts_apart(saved.contacts, arrays)
     memory = saved.impulses
     facts["impulses"] = {"kick": memory.kick, "h": memory.h, "hertz": memory.hertz, "finer": memory.finer}
     if memory.kick:
@@ -206,7 +186,7 @@ def put_together(world: World, parts: Parts) -> Saved:
     Raises:
         InputError: a number is not what it must be.
     """
-    facts, h_last = parts.facts, parts.facts.get("h_last")
+    facts = parts.facts
     links, pools, *_ = world.links.save()
     past = Past(*(parts.arrays[f"linked.{name}"] for name in LINKED)) if "linked.number" in parts.arrays else None
     return Saved(
@@ -214,9 +194,7 @@ def put_together(world: World, parts: Parts) -> Saved:
         arrays={name: parts.arrays[f"particles.{name}"] for name, _ in world._state.arrays()},
         time=checks.number("time", facts["time"]),
         frames=checks.whole("frames", facts.get("frames"), least=0, most=_MOST),
-        h_last=None if h_last is None else checks.number("h_last", h_last, above=0.0),
         slots=_slots(world, parts.arrays),
-        contacts=_contacts(world, facts.get("contacts"), parts.arrays),
         impulses=_impulses(world, facts.get("impulses") or {}, parts.arrays),
         books=_books(facts["books"]) if world.keeps_ledger else None,
         events=_events(facts, parts.arrays) if world.tells_events else None,
@@ -233,65 +211,6 @@ def _slots(world: World, arrays: dict[str, Array]) -> dict[str, Array]:
     if count > len(world) or len(slots["island"]) != (count if world._sleep else 0):
         raise InputError(f"slots.particle has {count} rows; allowed are at most {len(world)}, one for each particle")
     return slots
-
-
-# ---- contacts ----------------------------------------------------------------------------------------------------------
-
-
-def _contacts_apart(contacts: Any, arrays: dict[str, Array]) -> dict[str, Any]:
-    phase, slips, lent, (pace, risen) = contacts
-    facts: dict[str, Any] = {"pace": pace, "risen": risen}
-    if phase is not None:
-        kept, skin, age, hold, mean = phase
-        facts["list"] = {"skin": skin, "age": age, "hold": hold, "mean_radius": mean, "allowed": kept and kept[2]}
-        if kept is not None:
-            arrays["contacts.built"], arrays["contacts.checked"] = kept[:2]
-    if len(slips.low):
-        arrays |= {"contacts.low": slips.low, "contacts.high": slips.high, "contacts.slip": slips.slip}
-    if len(lent.particle):
-        names = ("contacts.lent_particle", "contacts.lent", "contacts.busy", "contacts.held")
-        arrays |= dict(zip(names, lent, strict=True))
-    return facts
-
-
-def _contacts(world: World, facts: Facts | None, arrays: dict[str, Array]) -> Any:
-    """What `ContactSolver.restore` takes; None where contacts remember nothing."""
-    if facts is None or not world.collisions:
-        return None
-    none = Kept(np.empty(0, np.int32), np.empty(0, np.int32), np.empty(0, world.dtype))
-    slips = Kept(*(arrays.get(f"contacts.{name}", empty) for name, empty in zip(("low", "high", "slip"), none, strict=True)))
-    if not (slips.low < slips.high).all():
-        raise InputError("contacts.low has a particle not less than contacts.high; allowed are pairs low < high")
-    empty = Lent(np.empty(0, np.int32), np.empty(0, world.dtype), np.empty(0, world.dtype), np.empty(0, np.uint8))
-    columns = ("lent_particle", "lent", "busy", "held")
-    lent = Lent(*(arrays.get(f"contacts.{name}", column) for name, column in zip(columns, empty, strict=True)))
-    alive = lent.particle[lent.particle >= 0]
-    if len(np.unique(alive)) < len(alive):
-        raise InputError("contacts.lent_particle has a particle twice; allowed is each once")
-    pace = checks.number("pace", facts["pace"], above=0.0), checks.number("risen", facts["risen"])
-    checks.fraction("pace", pace[0])
-    return _list(world, facts.get("list"), arrays), slips, lent, pace
-
-
-def _list(world: World, facts: Facts | None, arrays: dict[str, Array]) -> Any:
-    assert world.collisions is not None
-    method = world.collisions.method
-    if facts is None or not isinstance(method, Fast):
-        return None
-    skin, least, most = checks.number("skin", facts["skin"]), SKIN_LEAST / 2, 2 * SKIN_MOST
-    if not (least <= skin <= most if method.skin is None else skin == method.skin):
-        raise InputError(f"skin is {skin:g}; allowed is what the collisions say, or a number from {least:g} to {most:g}")
-    age, hold = (checks.whole(name, facts[name], least=0, most=_MOST) for name in ("age", "hold"))
-    mean = checks.number("mean_radius", facts["mean_radius"], least=0.0)
-    kept = None
-    if "contacts.built" in arrays:
-        allowed = checks.number("allowed", facts["allowed"], least=0.0)
-        if not mean:
-            raise InputError("mean_radius is 0; allowed is a number greater than 0 where there is a list of pairs")
-        if not arrays["slots.void"][0] and not math.isclose(mean, float(world.radius.mean(dtype=float)), rel_tol=1e-6):
-            raise InputError(f"mean_radius is {mean:g}; allowed is that of the particles, {float(world.radius.mean()):g}")
-        kept = arrays["contacts.built"], arrays["contacts.checked"], allowed
-    return kept, skin, age, hold, mean
 
 
 def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:

@@ -29,9 +29,7 @@ class Saved:
     arrays: dict[str, Array]
     time: float
     frames: int
-    h_last: float | None
     slots: dict[str, Array]
-    contacts: Any
     impulses: Any
     books: Bookkeeper | None
     events: Events | None

@@ -10,23 +10,21 @@ from numpy.typing import DTypeLike, NDArray
 
 from pyverlet.compile import jit
 from pyverlet.ground import checks
-from pyverlet.ground.constants import ALL_THREADS_FROM, MOST_SUBSTEPS, ONE_THREAD_BELOW, REST_ACCELERATIONS, STANDARD_GRAVITY
-from pyverlet.ground.errors import InputError, NonFiniteError
+from pyverlet.ground.constants import ALL_THREADS_FROM, MOST_SUBSTEPS, ONE_THREAD_BELOW, STANDARD_GRAVITY
+from pyverlet.ground.errors import InputError
 from pyverlet.ground.turns import in_turn
 from pyverlet.laws.coarse import Coarse
-from pyverlet.laws.contacts.collisions import Collisions, ContactSolver
+from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceList, ForceSum
 from pyverlet.laws.integrators import Integrator, TimeCorrectedVerlet
 from pyverlet.laws.ledger import Bookkeeper
-from pyverlet.laws.limiter import Watch, watched
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.precision import Precision
 from pyverlet.laws.rooms import Boundary, Open
 from pyverlet.laws.sleep import Sleep, laws
 from pyverlet.laws.touches import Touches
-from pyverlet.state.moves import first_non_finite
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 from pyverlet.world.actors import Actor, act_after, act_once
@@ -37,7 +35,6 @@ from pyverlet.world.moments import Moment
 from pyverlet.world.profile import Profile
 from pyverlet.world.queries import Queries
 from pyverlet.world.saved import Saved
-from pyverlet.world.substeps import Substeps
 from pyverlet.world.team import Team
 
 Array = NDArray[Any]
@@ -90,7 +87,6 @@ class World(Measures, Queries, Doors):
         sleep: bool = False,
     ) -> None:
         self._state = State(checks.floating("dtype", dtype))
-        self._h_last: float | None = None  # substep of the frame before; None: the integrator starts anew
         self._slots = Slots(self._state.dtype, sleeps=sleep, events=events)
         self.links, self.forces, self.obstacles = Links(self._state), ForceList(), Obstacles()
         self._events, self._touches = Events() if events else None, Touches() if contacts else None
@@ -100,7 +96,7 @@ class World(Measures, Queries, Doors):
         self.boundary = Open() if boundary is None else boundary
         self.collisions, self.substeps, self.threads = collisions, substeps, threads
         self.time, self.frames, self.profile, self.actors = 0.0, 0, Profile(), list[Actor]()
-        self._run, self._impulses = Substeps(), ImpulseFrames(self._state.dtype)
+        self._impulses = ImpulseFrames(self._state.dtype)
         self._team, self._looks = Team(), (Coarse(), Precision())
         # Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins.
         self.onlooker: Callable[[Moment], None] | None = None
@@ -120,67 +116,10 @@ class World(Measures, Queries, Doors):
         with self._state.turn.frame():
             self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
             self.profile.begin()
-            books = self._open_books(h, by_impulses := self._impulses.takes(self))
-            if by_impulses:
-                self._impulses.step(self, dt, books or self.profile.mark)
-            elif not self._frame(h, self._listen(h, books or self.profile.mark)):
-                self._refuse_non_finite(h)
+            books = self._open_books(h)
+            self._impulses.step(self, dt, books or self.profile.mark)
             self._accept(dt, h, books)
         act_after(self, dt)
-
-    def _frame(self, h: float, done: Callable[[str], None]) -> bool:
-        """The table of contents of the engine; `done` hears which stage has ended. True if all is known to be finite."""
-        state, forces, integrator = self._slots, self._force_sum, self.integrator
-        contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course or None
-        lag, state.drop, state.h, run = integrator.velocity_lag * h, integrator.drop, h, self._run.begin(contacts, course)
-        if not self._open(h, done):
-            return False
-        compiled = run.tells(done, self.profile.mark)
-        watch = watched(self, h, self._h_last) if contacts or course else None
-        while run.substep < self.substeps:
-            self._show(run.substep * h, lag)
-            if not run.leapt:
-                for part in run.parts:
-                    part.before(state, h)
-                if run.open(self, contacts if compiled else None, h, lag):
-                    continue
-                integrator.step(state, forces, self.time + run.substep * h, h)
-            done("integrate")
-            if contacts:
-                contacts.find(state, lag)
-                done("broad phase")
-                if compiled and run.go(self, contacts, h, lag):
-                    continue
-                run.touch(self, contacts, h, lag)
-                done("contacts")
-            if links:
-                run.solve(self, contacts, h, lag, done)
-            self.boundary.confine(state, h, lag, REST_ACCELERATIONS * forces.strongest * h)
-            done("bounds")
-            if course:
-                course.collide(state, self.boundary, run.substep * h, h, lag, REST_ACCELERATIONS * forces.strongest * h)
-                done("obstacles")
-            if contacts:
-                run.still(self, contacts, h, lag)
-            done("velocities")
-            if links:
-                run.note_pull(self, contacts, h, lag)
-                done("links")
-            run.substep += 1
-        return self._finish(contacts, watch, h, done, marked=run.marked)
-
-    def _open(self, h: float, done: Callable[[str], None]) -> bool:
-        """Take up what users have set, and begin; False if nobody is awake."""
-        if self.links.begin() and self._contacts:
-            self._contacts.broad_phase.forget()
-        self._course.begin()
-        self._clear_notes()
-        self._gather()
-        done("gather")  # before the velocities are those of the integrator
-        if self._sleep and self._sleep.all_asleep(self._slots):
-            return False
-        self.integrator.begin(self._slots, self._force_sum, self.time, h, self._h_last)
-        return True
 
     def _gather(self) -> bool:
         """Take up what users have set; whether a list of pairs is void."""
@@ -199,23 +138,7 @@ class World(Measures, Queries, Doors):
                 # New to the next frame, which refuses them again.
                 self._slots = Slots(self.dtype, sleeps=self._sleep is not None, events=self._events is not None)
                 raise
-        if self._contacts and not self._impulses.steps:
-            self._contacts.begin(self._slots, changed=changed)
         return changed
-
-    def _finish(self, contacts: ContactSolver | None, watch: Watch | None, h: float, done: Any, *, marked: bool) -> bool:
-        """The substeps are done: who rests, the velocities of now, and no more energy than there may be."""
-        lag = self.integrator.velocity_lag * h
-        # The pull of links is part of accelerations; and a function that has failed is asked again by who can say where.
-        if lag and self._force_sum.functions and not self.links and first_non_finite(self._slots) < 0:
-            self._force_sum.look_again(self._slots, self.time + self.substeps * h, lag)
-        if contacts:
-            contacts.end(self._slots, self._state, lag, self.substeps * h, self.gravity, marked=marked)
-        self.boundary.leave(self._slots)
-        self.integrator.end(self._slots, h)
-        finite = watch is not None and watch.close(self._slots, contacts)
-        done("finish")
-        return finite
 
     def _accept(self, dt: float, h: float, books: Any) -> None:
         """The frame has gone well: what it made of the state is the truth now."""
@@ -223,12 +146,11 @@ class World(Measures, Queries, Doors):
         if books:
             books.close(self._spent())
         self._course.end(dt)
-        self._impulses.links.end(self) if self._impulses.steps else self.links.scatter()
+        self._impulses.links.end(self)
         if self._events:
-            pairs = self._contacts.packed(self._slots) if self._contacts and len(self) > 1 else None
-            self._events.close(self._slots, self._state, None if self._impulses.steps else pairs, self._place())
+            self._events.close(self._slots, self._state, self._place())
         self.profile.mark("scatter")
-        self.time, self.frames, self._h_last = self.time + dt, self.frames + 1, h
+        self.time, self.frames = self.time + dt, self.frames + 1
         for each in self._looks:
             each.look(self, h)
         self.profile.end()
@@ -243,22 +165,6 @@ class World(Measures, Queries, Doors):
         self._slots.clear_notes()
         if self._events:
             self._events.forget()
-        if self._contacts:
-            self._contacts.clear_notes(self.boundary.bounces or self._course.bounces)
-
-    def _refuse_non_finite(self, h: float) -> None:
-        """Run a bad frame again from the last good state, looking after every stage: normal frames pay nothing for it."""
-        if first_non_finite(self._slots) < 0:
-            return
-
-        def look(stage: str) -> None:
-            particle = first_non_finite(self._slots)
-            if particle >= 0:
-                raise NonFiniteError(particle, stage, self.time)
-
-        if self._contacts:
-            self._contacts.broad_phase.forget()
-        self._frame(h, look)
 
     # ---- laws ----------------------------------------------------------------------------------------------------------
 
@@ -278,14 +184,13 @@ class World(Measures, Queries, Doors):
 
     @property
     def substeps(self) -> int:
-        """Steps of length h = dt / substeps in a frame; changing it restarts the integrator."""
+        """Steps of length h = dt / substeps in a frame."""
         return self._substeps
 
     @substeps.setter
     @in_turn
     def substeps(self, value: int) -> None:
         self._substeps = checks.whole("substeps", value, most=MOST_SUBSTEPS, most_is=" (finer steps take a smaller dt)")
-        self._h_last = None
 
     @property
     def integrator(self) -> Integrator:
@@ -298,7 +203,6 @@ class World(Measures, Queries, Doors):
         if not isinstance(value, Integrator):
             raise InputError(f"integrator is {value!r}; allowed is an object such as pyverlet.PositionVerlet()")
         self._integrator = value
-        self._h_last = None
         self._state.acceleration[:] = np.nan
 
     @property
@@ -313,8 +217,6 @@ class World(Measures, Queries, Doors):
             raise InputError(f"boundary is {value!r}; allowed is an object such as pyverlet.Circle(radius=10) or pyverlet.Open()")
         value.check(self._state.radius)
         self.links.check(value.seam)
-        if value.seam != self._state.seam and (contacts := getattr(self, "_contacts", None)):  # its list is about other images
-            contacts.broad_phase.forget()
         self._boundary, self._state.seam, self._course.seam = value, value.seam, value.seam
 
     @property
@@ -328,8 +230,6 @@ class World(Measures, Queries, Doors):
         if value is not None and not isinstance(value, Collisions):
             raise InputError(f"collisions is {value!r}; allowed are pyverlet.Collisions(...) and None")
         self._collisions = value
-        about = self._state.dtype, self.links.unlist, self._events, self._sleep
-        self._contacts = None if value is None else ContactSolver(value, *about)
 
     @property
     def threads(self) -> int:
@@ -353,9 +253,7 @@ class World(Measures, Queries, Doors):
             arrays={name: array.copy() for name, array in self._state.arrays()},
             time=self.time,
             frames=self.frames,
-            h_last=self._h_last,
             slots=self._slots.save(self._state),
-            contacts=self._contacts.save() if self._contacts else None,
             impulses=self._impulses.save(self._course),
             books=self._books and self._books.copy(),
             events=self._events and self._events.copy(),
@@ -383,13 +281,11 @@ class World(Measures, Queries, Doors):
         self.actors[:] = [actor for actor, _ in saved.actors]
         for actor, memory in saved.actors:
             actor.restore(memory)
-        self.time, self.frames, self._h_last = saved.time, saved.frames, saved.h_last
+        self.time, self.frames = saved.time, saved.frames
         self._slots.restore(saved.slots, self._state)
         self._books = saved.books and saved.books.copy()
         if self._sleep and saved.sleep:
             self._sleep.take(saved.sleep, laws(self))
         if self._events and saved.events:
             self._events.take(saved.events)
-        if self._contacts:
-            self._contacts.restore(saved.contacts, self._slots)
         self._impulses.restore(saved.impulses)

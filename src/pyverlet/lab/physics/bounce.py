@@ -9,7 +9,7 @@ from numpy.typing import DTypeLike
 
 from pyverlet.lab.physics._check import Result
 from pyverlet.lab.physics._worlds import DT, RADIUS, G
-from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.integrators import VelocityVerlet
 from pyverlet.laws.rooms import Boundary, Box, Circle, Open
 from pyverlet.world.world import World

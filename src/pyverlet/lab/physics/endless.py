@@ -6,7 +6,7 @@ import numpy as np
 
 from pyverlet.lab.physics._check import Result
 from pyverlet.lab.physics._worlds import RADIUS, frames
-from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.rooms import Periodic
 from pyverlet.scenes.gas import henderson
 from pyverlet.world.world import World

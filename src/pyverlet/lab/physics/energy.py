@@ -10,7 +10,7 @@ import numpy as np
 from pyverlet import scenes
 from pyverlet.lab.physics._check import Result
 from pyverlet.lab.physics._worlds import RADIUS, G, fastest, frames, in_disc
-from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.forces import Conservative, PointSpring
 from pyverlet.laws.naive import Naive
 from pyverlet.laws.rooms import Box, Circle

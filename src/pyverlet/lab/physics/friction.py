@@ -10,7 +10,7 @@ import numpy as np
 from pyverlet import scenes
 from pyverlet.lab.physics._check import Result
 from pyverlet.lab.physics._worlds import RADIUS, G, frames
-from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.rooms import Box
 from pyverlet.world.world import World
 

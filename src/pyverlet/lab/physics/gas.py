@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pyverlet.lab.physics._check import Result
 from pyverlet.lab.physics._worlds import RADIUS, frames, in_disc
-from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.rooms import Circle
 from pyverlet.world.world import World
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from pyverlet.lab.physics._check import Result
 from pyverlet.lab.physics._worlds import DT, RADIUS, Array, fastest, frames
-from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.rooms import Boundary, Box, Circle
 from pyverlet.world.world import World
 

@@ -7,7 +7,7 @@ import numpy as np
 from pyverlet.lab.physics._check import Result
 from pyverlet.lab.physics._worlds import DT, RADIUS, agitation, columns, frames
 from pyverlet.lab.physics.rest import STILL
-from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.rooms import Box
 from pyverlet.world.world import World
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from pyverlet.lab.truth._bounce import HEIGHT, RADIUS, H, ball, path
 from pyverlet.lab.truth._claim import Number, experiment
-from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.integrators import PositionVerlet
 from pyverlet.laws.naive import ProjectOnly
 from pyverlet.laws.rooms import Box

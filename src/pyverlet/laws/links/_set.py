@@ -17,7 +17,6 @@ from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import listed
 from pyverlet.ground.turns import Shared, in_turn, of_one_frame
 from pyverlet.kernels import link_rows, linked, runs
-from pyverlet.laws.contacts.broadphase import PairList
 from pyverlet.laws.links._chains import ChainPool
 from pyverlet.laws.links._link import Array, Link
 from pyverlet.laws.links._pool import Pool
@@ -230,7 +229,7 @@ class Links(Shared):
         self._know_apart()
         return self._apart
 
-    def unlist(self, pairs: PairList, particle: Array) -> None:
+    def unlist(self, pairs: Any, particle: Array) -> None:
         """Take the pairs of `apart` from a list of candidates; particle: the user's index in each slot."""
         self._know_apart()
         if len(self._apart):

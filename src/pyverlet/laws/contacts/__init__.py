@@ -1,1 +1,0 @@
-"""Circles that touch: who may, and what happens to them."""
