@@ -286,19 +286,6 @@ def test_restore_brings_moving_obstacles_back() -> None:
     assert angle == pytest.approx(4.0)
 
 
-def test_a_world_without_obstacles_has_no_such_stage() -> None:
-    world = world_with(collisions=pv.Collisions(impulses=False))
-    world.add(position=(0, 0))
-    world.step(DT)
-    assert "obstacles" not in world.profile.stages
-    world.obstacles.append(pv.Segment((-1, -2), (1, -2)))
-    world.step(DT)
-    assert "obstacles" in world.profile.stages
-    world.obstacles.clear()
-    world.run(seconds=1)
-    assert world.position[0, 1] < -3
-
-
 def test_changes_are_noticed() -> None:
     floor = pv.Segment((-5, 0), (5, 0))
     world = world_with(floor)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.kernels.tables import NEW
 
 RADIUS = 0.5
 LIMIT = np.tan(np.radians(15))  # 0.268
@@ -66,34 +65,3 @@ def test_a_pyramid_stands_while_others_come_and_go() -> None:
         world.step(1 / 60)
         world.remove(others)
     assert np.abs(circles.position - start).max() < 1e-3 * RADIUS
-
-
-def test_the_slip_of_a_pair_follows_its_particles() -> None:
-    world, circles = pyramid(1.1 * LIMIT)
-    gone = world.add(position=[(5, RADIUS), (9, RADIUS)], radius=RADIUS)
-    more = world.add(position=circles.position + np.array([12, 0]), radius=RADIUS)
-    world.run(seconds=2)
-
-    def slips() -> dict[tuple[int, int], float]:
-        kept = world.save().contacts[1]
-        assert (kept.slip < NEW).all()
-        return {(int(a), int(b)): float(s) for a, b, s in zip(*kept, strict=True)}
-
-    before = slips()
-    assert {(0, 2), (1, 2), (5, 7), (6, 7)} <= set(before)
-    assert before[0, 2] * before[1, 2] < 0  # mirrored
-    world.remove(gone)
-    # Two fewer before them, and the same slips.
-    assert slips() == {(a - 2 * (a > 2), b - 2 * (b > 2)): s for (a, b), s in before.items()}
-    assert len(circles) == len(more) == 3
-
-
-def test_friction_that_begins_later_starts_without_slip() -> None:
-    world, circles = pyramid(1.1 * LIMIT)
-    world.run(seconds=1)
-    world.collisions = pv.Collisions()
-    world.run(seconds=0.1)
-    assert world.save().contacts[1].slip.size == 0
-    circles.friction = 1.1 * LIMIT
-    world.step(1 / 60)
-    assert world.save().contacts[1].slip.size > 0

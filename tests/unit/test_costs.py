@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.laws.collisions import BruteForce, find_contacts
+from pyverlet.laws.collisions import find_contacts
 from pyverlet.world import queries
 
 DT = 1 / 60
@@ -231,7 +231,7 @@ def test_overlaps_are_those_that_all_pairs_have(room: pv.Boundary, scale: float,
     group.mass[:20] = np.inf
     group.category[30:60], group.mask[60:90] = 2, 1
     world.links.append(pv.Stick(group, 0, 100, length=scale, collide=False))
-    pairs = find_contacts(world._state, BruteForce())
+    pairs = find_contacts(world._state)
     pairs = pairs[~((pairs == (0, 100)).all(axis=1))]
     way = world.boundary.seam.nearest(world.position[pairs[:, 1]] - world.position[pairs[:, 0]])
     depth = 1 - np.hypot(*way.T) / world.radius[pairs].sum(axis=1)

@@ -42,7 +42,6 @@ def row(**options: Any) -> tuple[pv.World, pv.Group]:
 def test_circles_that_learn_to_bounce_in_flight_do() -> None:
     world, pair = row()
     world.step(1 / 60)
-    assert not len(world._contacts.broad_phase.list.pair_i)  # type: ignore[union-attr]  # only smooth circles can do without
     pair.restitution[:] = 1
     world.run(seconds=0.1)
     assert pair.velocity == pytest.approx(np.array([(-1, 0), (1, 0)]), abs=1e-12)
@@ -72,7 +71,6 @@ def test_the_way_back_leads_across_a_change_of_material() -> None:
     there = world.state_hash()
     group.friction[:] = -1
     world.run(seconds=0.2)
-    assert not len(world._contacts.broad_phase.list.pair_i)  # type: ignore[union-attr]
     world.restore(saved)
     world.run(seconds=0.5)
     assert world.state_hash() == there
