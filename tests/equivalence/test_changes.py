@@ -157,7 +157,7 @@ def test_a_frame_that_was_broken_off_leaves_the_one_before() -> None:
     def fail(moment: Any) -> None:
         raise ZeroDivisionError
 
-    world = pour(boundary=ROOMS["cage"]())
+    world = pour(boundary=pv.Circle(radius=8, friction=0.5), collisions=pv.Collisions(friction=0.5))
     world.run(seconds=20)
     for frame in range(60):
         before = told(world)

@@ -71,9 +71,11 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     """What kernels of all kinds make of the same input: numbers, and bytes of arrays."""
     engine, tools = unit_of("engine", dtype), unit_of("tools", dtype)
     position, velocity, spin, radius, mass = heap(dtype)
-    pairs = np.array([0]), np.array([50]), np.arange(50, dtype=np.uint32), np.arange(10, 60, dtype=np.uint32)
-    grown, fresh = np.ones(60, dtype), np.arange(60) % 3 == 0
-    engine.shrink_to_fit(position, radius, 0.0, 1.5, pairs, fresh, 0.05, grown)
+    pairs = np.column_stack((np.arange(50), np.arange(10, 60)))
+    near, bits = np.full((400, 2), -1), np.full(60, 3, np.uint32)
+    room = np.empty(60, np.int64), np.empty(128, np.int64), np.empty(60, np.int64)
+    fixed, images = np.isinf(mass).view(np.uint8), np.array([(0, 0), (0, 1.5), (0, -1.5)])
+    near_ones = engine.touching(position, radius, fixed, bits, bits, images, *room, near)
     ground = np.arange(40 * 60, dtype=np.uint32).reshape(40, 60)
     pixels, colour = ground.copy(), np.arange(60, dtype=np.uint32) * 0x10203
     tools.draw_discs(pixels, ground, position, radius, colour, -3.0, 2.0, 10.0)
@@ -83,12 +85,13 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     points, heading = np.ascontiguousarray(position[:5], float), np.tile([0.6, 0.8], (5, 1))
     tools.first_on_rays(points + 2.0, heading, np.full(5, 9.0), 1.0, cells, position, radius, index, distance)
     tools.nearest_to(points, cells, position, nearest, square)
-    arrays = (grown, pixels, index, distance, nearest, square)
+    arrays = (near, pixels, index, distance, nearest, square)
     return [
         *engine.energies(position, velocity, spin, radius, mass, 0.5, -9.81),
         *engine.momenta(position, velocity, spin, radius, mass),
         *engine.overlaps(position, radius, 0.0, 1.5, pairs),
         engine.pinned_move(mass, velocity, spin),
+        near_ones,
         tools.checksum(np.arange(9000, dtype=np.uint64) << np.uint64(40)),
         *(array.tobytes() for array in arrays),
     ]

@@ -32,7 +32,7 @@ def test_the_first_example_of_the_library() -> None:
     assert world.frames == 61
     assert world.energy().total == pytest.approx(world.energy().kinetic + world.energy().potential)
     assert world.momentum().shape == (2,)
-    assert {"integrate", "broad phase", "contacts", "bounds", "velocities"} <= set(world.profile.stages)
+    assert {"gather", "integrate", "contacts", "finish", "scatter"} <= set(world.profile.stages)
     assert world.profile.frame_ms == pytest.approx(sum(world.profile.stages.values()), rel=0.2)
     assert len(world.state_hash()) == 16
 

@@ -30,6 +30,9 @@ from pyverlet.core.step import TOUCHED, Step
 from pyverlet.core.surfaces import bounce_surfaces
 from pyverlet.core.warm_start import measure_pairs
 
+NO_WAY = cython.declare(real, 1e-12 if cython.sizeof(real) == 8 else 1e-5)
+"""Of the contact distance: less is rounding of places."""
+
 MOST_PASSES = cython.declare(cython.int, 100)
 """Over a group of cell rows, until no pair in it bounces any more: a row of discs that touch needs one for each of them."""
 
@@ -46,7 +49,7 @@ def fast_ones(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: lanes, depth
     """
     rest: lanes = spread(-w.least_bounce)
     # Who comes to touch at the very end of the substep is left to the next: a spring would stop it, for a rounding of the depth.
-    rounding: lanes = spread(1e-12 if cython.sizeof(real) == 8 else 1e-5) * load(w.reach, k * w.sized)
+    rounding: lanes = spread(NO_WAY) * load(w.reach, k * w.sized)
     fast: mask = both(above(rest, speed), above(rounding - spread(w.h) * speed, -depth))
     if any_lane(fast):
         u: lanes2 = take(w.free, w.i, k)
@@ -155,7 +158,9 @@ def solve(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint
             inside: lanes = before - spread(w.stiff) * (speed + bias) - spread(w.leak) * before
             apart: lanes = before - (speed - depth * spread(1 / w.h))
             after = larger(choose(above(depth, zero), inside, apart), zero)
-            after = choose(loaded, after, choose(above(speed, zero), zero, after))  # what parts without load is left alone
+            # What parts without load is left alone, unless only by rounding.
+            parts: lanes = spread(NO_WAY / w.h) * load(w.reach, k * w.sized)
+            after = choose(loaded, after, choose(above(speed, parts), zero, after))
             fast: mask = fast_ones(w, k, speed, depth, nx, ny)
             if any_lane(fast):
                 count += note_hits(shared, k, bits_of(fast), first + count)

@@ -7,9 +7,11 @@ import cython
 import numpy as np
 from cython.cimports.arrays import doubles, indices, integers, octets, reals, small_integers
 from cython.cimports.lanes import real
+from cython.cimports.libc.stdint import int32_t, uint32_t
 
 from pyverlet.core.cells import BLOCK, LEVELS, Cells
 from pyverlet.core.engine_surfaces import make_surface_rows
+from pyverlet.core.pair_batches import hang
 from pyverlet.core.pair_groups import GROUP
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.step import Step
@@ -46,7 +48,7 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     a |= {
         name: np.zeros(groups, np.int64) for name in ("begin", "lanes", "swept", "row", "found", "raw_begin", "looked", "beyond")
     }
-    a |= {"head": np.zeros(count, np.int32), "start": np.zeros(4 * count + 72, np.uint32)}
+    a["start"] = np.zeros(4 * count + 72, np.uint32)
     a |= {"extent": np.zeros((blocks, 4), dtype), "box": np.zeros((2 * count + 64, 4), dtype)}
     w.listed, w.checked, w.moved = reals(a["listed"]), reals(a["checked"]), reals(a["moved"])
     w.fastest, w.stale = reals(a["fastest"]), small_integers(a["stale"])
@@ -56,7 +58,9 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     c.spot_u, c.spot_v, c.spot_r = reals(a["spot_u"]), reals(a["spot_v"]), reals(a["spot_r"])
     c.cell, c.order, c.start, c.patch = indices(a["cell"]), indices(a["order"]), indices(a["start"]), indices(a["patch"])
     c.extent, c.box = reals(a["extent"]), reals(a["box"])
-    ls.used, ls.batch, ls.speeds, ls.head = indices(a["used"]), indices(a["batch"]), reals(a["speeds"]), small_integers(a["head"])
+    ls.used, ls.batch, ls.speeds = indices(a["used"]), indices(a["batch"]), reals(a["speeds"])
+    ls.fan = 0
+    make_chains(w, a, ls.lanes_room)
     ls.row, ls.found, ls.raw_begin = integers(a["row"]), integers(a["found"]), integers(a["raw_begin"])
     ls.looked, ls.beyond = integers(a["looked"]), integers(a["beyond"])
     ls.listed = ls.good = ls.harvested = False
@@ -103,6 +107,30 @@ def make_kept_arrays(ls: cython.pointer(Lists), a, lanes: cython.Py_ssize_t, dty
                 larger[:have] = a[name]
             a[name] = larger
     ls.kept_next, ls.kept_other, ls.kept = small_integers(a["kept_next"]), indices(a["kept_other"]), reals(a["kept"])
+
+
+@cython.cfunc
+def make_chains(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t):
+    """Chains of what contacts remember, several for each particle in a crowd, so that none is long; what hangs on them stays."""
+    ls: cython.pointer(Lists) = w.lists
+    fan: cython.Py_ssize_t = 1
+    while 8 * w.count * fan < lanes and w.count > 0:
+        fan *= 2
+    if fan == ls.fan:
+        return
+    old, chains = a.get("head"), ls.fan * w.count
+    ls.fan, a["head"] = fan, np.full(w.count * fan, -1, np.int32)
+    ls.head = small_integers(a["head"])
+    if not ls.harvested:
+        return
+    before: cython.pointer(int32_t) = small_integers(old)
+    c: cython.Py_ssize_t
+    for c in range(chains):
+        n: int32_t = before[c]
+        while n >= 0:
+            following: int32_t = ls.kept_next[n]
+            hang(ls, cython.cast(uint32_t, c // (chains // w.count)), ls.kept_other[n], n)
+            n = following
 
 
 @cython.cfunc

@@ -9,7 +9,7 @@ from cython.cimports.arrays import integers, reals, small_integers
 from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 
-from pyverlet.core.pair_batches import repeats
+from pyverlet.core.pair_batches import clear_chains, hang, repeats
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.step import TOUCHED, Step
 
@@ -64,12 +64,8 @@ def fill_kept(w: cython.pointer(Step), pairs, values):
     pair: cython.pointer(int32_t) = small_integers(pairs)
     value: cython.pointer(real) = reals(values)
     k: int64_t
-    i: int64_t
-    for i in range(w.count):
-        ls.head[i] = -1
+    clear_chains(w, ls)
     for k in range(len(pairs)):
         low: int32_t = min(pair[2 * k], pair[2 * k + 1])
-        ls.kept_other[k] = cython.cast(uint32_t, max(pair[2 * k], pair[2 * k + 1]))
         ls.kept[3 * k], ls.kept[3 * k + 1], ls.kept[3 * k + 2] = value[3 * k], value[3 * k + 1], value[3 * k + 2]
-        ls.kept_next[k] = ls.head[low]
-        ls.head[low] = cython.cast(int32_t, k)
+        hang(ls, cython.cast(uint32_t, low), cython.cast(uint32_t, max(pair[2 * k], pair[2 * k + 1])), k)

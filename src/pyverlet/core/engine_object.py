@@ -11,6 +11,7 @@ from cython.cimports.team import team_free, team_new, team_run
 
 from pyverlet.core.cells import BLOCK, Cells
 from pyverlet.core.engine_arrays import (
+    make_chains,
     make_found_arrays,
     make_kept_arrays,
     make_lane_arrays,
@@ -244,6 +245,7 @@ class Engine:
         if lanes > ls.lanes_room and not listed:
             make_lane_arrays(w, self.arrays, lanes, self.dtype)
             make_kept_arrays(ls, self.arrays, lanes, self.dtype)
+            make_chains(w, self.arrays, lanes)
             make_material_arrays(w, self.arrays, self.dtype)
             make_hearing_arrays(w, self.arrays, self.dtype)
         blocks = (w.count + BLOCK - 1) // BLOCK
@@ -325,7 +327,10 @@ class Engine:
 
     def give_impulses(self, pairs, values):
         """Find them again in the next list; pairs: slots (k, 2). All others carry none."""
-        make_kept_arrays(cython.address(self.ls), self.arrays, max(len(pairs), self.ls.lanes_room, 8), self.dtype)
+        room = max(len(pairs), self.ls.lanes_room, 8)
+        make_kept_arrays(cython.address(self.ls), self.arrays, room, self.dtype)
+        self.ls.harvested = False
+        make_chains(cython.address(self.w), self.arrays, room)
         fill_kept(cython.address(self.w), np.ascontiguousarray(pairs, np.int32), np.ascontiguousarray(values, self.dtype))
         self.ls.listed, self.ls.good, self.ls.harvested = False, False, True
 

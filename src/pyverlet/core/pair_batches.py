@@ -201,6 +201,37 @@ def repeats(w: cython.pointer(Step), s: cython.Py_ssize_t, k: int64_t) -> cython
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def chain_of(ls: cython.pointer(Lists), low: uint32_t, high: uint32_t) -> cython.Py_ssize_t:
+    """The chain that remembers the contact of two particles."""
+    return low * ls.fan + (high & (ls.fan - 1))
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def clear_chains(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.void:
+    """Nothing is remembered."""
+    i: cython.Py_ssize_t
+    for i in range(w.count * ls.fan):
+        ls.head[i] = -1
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def hang(ls: cython.pointer(Lists), low: uint32_t, high: uint32_t, k: int64_t) -> cython.void:
+    """Put what place k of `kept` says of two particles on their chain."""
+    chain: cython.Py_ssize_t = chain_of(ls, low, high)
+    ls.kept_other[k] = high
+    ls.kept_next[k] = ls.head[chain]
+    ls.head[chain] = cython.cast(int32_t, k)
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def keep_impulses(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
@@ -213,15 +244,13 @@ def keep_impulses(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.
         touched: cython.bint = w.impulse[k] > 0 or w.depth[k] > 0
         if (touched or w.load[k] != 0) and not repeats(w, s, k):
             low: uint32_t = min(w.i[k], w.j[k])
-            ls.kept_other[k] = max(w.i[k], w.j[k])
             ls.kept[3 * k] = w.impulse[k]
             ls.kept[3 * k + 1] = w.tangent_impulse[k] if w.rough else 0
             load: real = w.load[k] if w.load[k] > 0 else -w.load[k]
             if touched and load == 0 and not w.impulse[k] > 0:
                 load = TOUCHED
             ls.kept[3 * k + 2] = load if touched else -load
-            ls.kept_next[k] = ls.head[low]
-            ls.head[low] = cython.cast(int32_t, k)
+            hang(ls, low, max(w.i[k], w.j[k]), k)
 
 
 @cython.cfunc
@@ -235,7 +264,7 @@ def give_impulses(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.
         high: uint32_t = max(w.i[k], w.j[k])
         w.impulse[k] = w.tangent_impulse[k] = w.load[k] = 0
         w.depth[k] = -1
-        n: int32_t = ls.head[low]
+        n: int32_t = ls.head[chain_of(ls, low, high)]
         while n >= 0:
             if ls.kept_other[n] == high:
                 w.impulse[k], w.tangent_impulse[k], w.load[k] = ls.kept[3 * n], ls.kept[3 * n + 1], ls.kept[3 * n + 2]

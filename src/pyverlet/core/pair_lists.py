@@ -75,8 +75,9 @@ Lists = cython.struct(
     alone_room=cython.double,  # pairs of the last group
     looked=cython.pointer(int64_t),  # (groups,) pairs that were looked at to see how many
     beyond=cython.pointer(int64_t),  # (groups,) a thinner skin would not list
-    # ---- what contacts remember while the list is made anew, a chain for each particle
-    head=cython.pointer(int32_t),  # (count,) -1: none
+    # ---- what contacts remember while the list is made anew, on chains of their lower particles
+    fan=cython.Py_ssize_t,  # chains of each particle, a power of two
+    head=cython.pointer(int32_t),  # (count fan,) -1: none
     kept_next=cython.pointer(int32_t),
     kept_other=cython.pointer(uint32_t),
     kept=cython.pointer(real),  # (room, 3)

@@ -13,7 +13,7 @@ from pyverlet.core.all_pairs import list_all
 from pyverlet.core.cell_grids import fit_cells, measure_extent
 from pyverlet.core.cells import BLOCK, Cells, copy_spots, find_cells, sort_by_cell
 from pyverlet.core.list_age import WORTH_LOOKING, adapt_skin, bound_moves, find_patch, lay_patches, slack_left
-from pyverlet.core.pair_batches import count_far, give_impulses, keep_impulses, put_batches
+from pyverlet.core.pair_batches import clear_chains, count_far, give_impulses, keep_impulses, put_batches
 from pyverlet.core.pair_groups import cut_rows, has_room
 from pyverlet.core.pair_lists import Lists, list_alone, list_rows
 from pyverlet.core.pair_materials import fill_alike, fill_lanes
@@ -192,11 +192,9 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
     ls: cython.pointer(Lists) = w.lists
     blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
     s: cython.Py_ssize_t
-    i: cython.Py_ssize_t
     ls.good, ls.short = False, False
     if not ls.harvested:
-        for i in range(w.count):
-            ls.head[i] = -1
+        clear_chains(w, ls)
         if ls.listed:
             each_group(w, keep_stage)
         ls.harvested, ls.listed = True, False

@@ -42,11 +42,25 @@ class Patience:
         try:
             yield
         finally:
+            late = True
+            while late:
+                with contextlib.suppress(TooLong):
+                    late = self._stop()
+
+    def _stop(self) -> bool:
+        """Raise nothing from now on; what has been raised, and may not have arrived yet, arrives here.
+
+        To withdraw it leaves CPython 3.11 looking for it at each step, and whoever profiles such code waits for ever.
+        """
+        with self._lock:
             self._deadline = None
-            with self._lock:
-                self._armed.clear()
-                if self._thread < 0:  # raised perhaps, and not arrived yet
-                    _raise(-self._thread, None)
+            self._armed.clear()
+            if late := self._thread < 0:
+                self._thread = -self._thread
+                _raise(self._thread, TooLong)  # there is one at a time: this is the last
+        while late:
+            time.sleep(0)
+        return late
 
     def _watch(self) -> None:
         while True:
@@ -64,5 +78,5 @@ def interrupt(thread: threading.Thread) -> None:
         _raise(thread.ident, TooLong)
 
 
-def _raise(thread: int, kind: type[BaseException] | None) -> None:
-    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), None if kind is None else ctypes.py_object(kind))
+def _raise(thread: int, kind: type[BaseException]) -> None:
+    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(kind))

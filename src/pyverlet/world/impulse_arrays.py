@@ -34,7 +34,7 @@ class ImpulseArrays:
         gave, gave_spin: (slots, 2) m/s and (slots,) rad/s that contacts gave in the last substep.
         parts: threads that go through a frame.
         free: whether any particle is not pinned.
-        largest, mean_radius: m.
+        largest, mean_radius: m. unequal: whether masses differ, pinned ones aside.
         obstacle_friction: the largest of obstacles.
     """
 
@@ -206,5 +206,11 @@ class ImpulseArrays:
         self.free = bool((state.inverse_mass > 0).any())
         self.largest = float(state.radius.max(initial=0.0))
         materials = materials_of(state, world._state.radius, world.collisions)
-        self.mean_radius = materials["mean_radius"]
+        self.mean_radius, self.unequal = materials["mean_radius"], _unequal(state.inverse_mass)
         self.engine.set_materials(**materials)
+
+
+def _unequal(inverse_mass: Array) -> bool:
+    """Whether masses differ, pinned ones aside."""
+    free = inverse_mass[inverse_mass > 0]
+    return bool(len(free) and (free != free[0]).any())

@@ -37,8 +37,14 @@ STIFFNESS = 0.3125
 STIFFEST = 1.3
 """The same for a while after substeps have become longer."""
 
-STIFFENING, SOFTENING = 0.4, 1.0
-"""Octaves a second by which that frequency may rise and fall: at once, what lies on soft contacts would be thrown up, or drop."""
+STIFFENING = 0.4
+"""Octaves a second by which that frequency may rise: at once, what lies on soft contacts would be thrown up."""
+
+SOFTENING, UNEQUAL_SOFTENING = 4.0, 1.0
+"""The same of its fall: in motion, and always where masses are unequal. Equal ones at rest keep it, and sink no deeper."""
+
+MOVING = 0.1
+"""Root mean square speed over sqrt(g r) from which on particles count as moving."""
 
 DAMPING = 15.0
 """Damping ratio of the springs."""
@@ -106,7 +112,6 @@ class ImpulseFrames:
         by_core = kicks(world.integrator)
         h, half = dt / substeps, world.integrator.velocity_lag if by_core else 0.5
         before = self.held.h if self.held.kick else 0.0
-        self._stiffen(h, dt)
         own_walls = None if knows(world.boundary) else world.boundary.confine
         alone = by_core and not (forces.forces or own_walls)
         limited = bool(collisions and len(world) > 1) or bool(world.obstacles)
@@ -114,6 +119,7 @@ class ImpulseFrames:
         gravity = world.gravity
         state.h = h
         self.held.load(world, dt)
+        self._stiffen(state, h, dt, self._strongest(gravity) if alone else forces.strongest)
         self.links.load(world, self.held.engine)
         if type(world.integrator) is PositionVerlet and before not in (0.0, h):
             self._keep_way(state, before, h)
@@ -263,13 +269,19 @@ class ImpulseFrames:
             state.spin += self.held.gave_spin * state.real(half / self.held.kick)
         state.acceleration += by_contacts
 
-    def _stiffen(self, h: float, dt: float) -> None:
+    def _moves(self, state: Any, strongest: float) -> bool:
+        """Whether particles are on the way, and not at rest under an acceleration of so many m/s^2."""
+        motion = self.held.core.energies(state.position, state.velocity, state.spin, state.radius, state.mass, 0.0, 0.0)[0]
+        return bool(motion > 0.5 * MOVING**2 * strongest * self.held.mean_radius * state.total_mass)
+
+    def _stiffen(self, state: Any, h: float, dt: float, strongest: float) -> None:
         best = STIFFNESS / h
         self.held.finer = self.held.finer + dt if best > self.held.hertz else 0.0
         if not self.held.hertz:
             self.held.hertz = best
         elif best < self.held.hertz:
-            self.held.hertz = min(max(best, self.held.hertz * 2.0 ** (-SOFTENING * dt)), STIFFEST / h)
+            pace = UNEQUAL_SOFTENING if self.held.unequal else SOFTENING if self._moves(state, strongest) else 0.0
+            self.held.hertz = min(max(best, self.held.hertz * 2.0 ** (-pace * dt)), STIFFEST / h)
         elif self.held.finer > 0.5:
             self.held.hertz = min(best, self.held.hertz * 2.0 ** (STIFFENING * dt))
 

@@ -43,8 +43,8 @@ def bouncing() -> list[Number]:
     mathematics="""
         Verlet's velocity is (x - x_prev) / h: a position moved by d / 2 is a velocity of d / (2 h) more, for each of the
         two. In a pile, where weight makes new overlaps in every step, this feeds it without end: gooey heaps that boil.
-        What was put in must be taken out again: after the projection pyverlet sets the normal velocity of touching pairs
-        to that of their contact, and circles added on top of each other grow apart slowly.
+        What was put in must be taken out again: pyverlet's contacts push with a speed of their own, which is taken back at
+        the end of the substep.
     """,
     setting="Two circles of radius 0.5 m at rest, 0.05 m deep in each other, no gravity: a step of 1/60 s; in pyverlet 1 s.",
     verdict="Only half of it: by position alone it injects a velocity of overlap / h.",
@@ -57,12 +57,12 @@ def pushing() -> list[Number]:
     depth = reach - (x[1] - x[0])
     x += np.array([-depth / 2, depth / 2])
     apart = float((x[1] - x_prev[1] - x[0] + x_prev[0]) / H)
-    world = World(gravity=(0, 0), collisions=Collisions(), substeps=1, dtype=np.float64)
+    world = World(gravity=(0, 0), collisions=Collisions(), dtype=np.float64)
     pair = world.add(position=[(-(reach - overlap) / 2, 0), ((reach - overlap) / 2, 0)], radius=reach / 2)
     world.run(seconds=1.0, dt=H)
     speed = float(pair.velocity[1, 0] - pair.velocity[0, 0])
     return [
         Number("speed of parting, projection alone", apart, "m/s", overlap / H),
         Number("speed of parting in pyverlet", speed, "m/s", below=1e-12),
-        Number("overlap left in pyverlet", float(world.overlap().max), below=1e-12),
+        Number("overlap left in pyverlet", float(world.overlap().max), below=1e-9),
     ]
