@@ -13,6 +13,7 @@ import pyverlet as pv
 from pyverlet.compile import jit
 from pyverlet.kernels import bounds
 from pyverlet.kernels import cage as kernels
+from pyverlet.laws.contacts._held import circles, claims
 from pyverlet.laws.rooms import Circle
 from pyverlet.state.slots import Slots
 
@@ -45,18 +46,18 @@ def crowd(seed: int, n: int, speed: float, dtype: Any) -> Slots:
 
 def hold(slots: Slots, lag: float) -> None:
     """The smooth cage of radius 10 m about (1, 2), eight at a time."""
-    kernels.hold(slots.circles(), *slots.reals(1, 2, 10, H, lag, 0.08), 0, slots.real(0), slots.claims())
+    kernels.hold(circles(slots), *slots.reals(1, 2, 10, H, lag, 0.08), 0, slots.real(0), claims(slots))
 
 
 def meet_one_by_one(slots: Slots, lag: float, restitution: float = 0.0, friction: float = 0.0) -> None:
     """The cage of radius 10 m about (1, 2), circle after circle."""
     slots.resting[:] = 0
     for i in np.flatnonzero(slots.inverse_mass > 0):
-        seen = bounds.look(i, slots.circles())._asdict()  # Python has numbers of one size only
+        seen = bounds.look(i, circles(slots))._asdict()  # Python has numbers of one size only
         whole = ("fed", "resting", "to_impact", "to_friction")
         body = bounds.Body(**{name: value if name in whole else slots.real(value) for name, value in seen.items()})
         body = bounds.at_cage(body, *slots.reals(1, 2, 10, H, lag, restitution, friction, 0.08))
-        bounds.put(i, body, slots.circles())
+        bounds.put(i, body, circles(slots))
 
 
 @given(

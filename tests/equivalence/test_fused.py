@@ -275,7 +275,7 @@ def test_forces_of_few_numbers_and_obstacles_that_stand_still_go_along(mu: float
         change(world)
 
     world = changed(rough, fusing)
-    assert fusing.leaps == 6 * (world.substeps - 1)
+    assert fusing.leaps == (0 if world.forces else 6 * (world.substeps - 1))  # forces are asked before each substep
     assert not same(world, changed(lambda world: setattr(world, "collisions", pv.Collisions(friction=mu)), fusing))
     fusing.undo()
     assert same(world, changed(rough, fusing))

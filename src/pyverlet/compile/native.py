@@ -1,14 +1,15 @@
-"""Functions of the user's own in compiled form. Kernels call them by pointers of a fixed type: none is compiled anew for another.
+"""Functions of the user's own in compiled form, where Numba is installed: only this module imports it, and only when it is used.
 
-Of a force the pointer is not to the function but to a loop over particles around it. There the compiler puts the function in line
-and takes eight particles at once, where a call for each took five times as long.
+What is called is not the function but a loop over particles around it. There the compiler puts the function in line and takes
+eight particles at once, where a call for each took five times as long.
 """
 
 from __future__ import annotations
 
+import ctypes
 import re
 from collections.abc import Callable
-from functools import cached_property, lru_cache
+from operator import is_
 from typing import Any
 
 import numba
@@ -36,71 +37,102 @@ class Native:
 
     def __init__(self, function: Callable[..., Any], arguments: int, results: int) -> None:
         self.call = numba.njit(nogil=True, error_model="numpy")(function)
+        compiled, parts = self._compiled(arguments)
+        if any(isinstance(part, types.Array) and part.ndim == 0 for part in parts):  # of `np.where`
+            self.call = numba.njit(nogil=True, error_model="numpy")(_as_numbers(self.call, results))
+            compiled, parts = self._compiled(arguments)
+        returned = compiled.signature.return_type
+        if len(parts) != results or not all(isinstance(part, types.Integer | types.Float | types.Boolean) for part in parts):
+            raise NotCompiled(f"returns {_plain(returned)}")
+        self._attempt = _attempt(compiled, parts)
+        self._loops: dict[Any, Any] = {}
+        self._arrays: tuple[Any, ...] = (None,) * 4
+        self._addresses: tuple[int, ...] = ()
+
+    def _compiled(self, arguments: int) -> tuple[Any, list[Any]]:
+        """The compiled code, and the types of the numbers that it returns."""
         try:
             self.call.compile((_REAL,) * arguments)
         except Exception as error:  # the compiler raises all kinds
             raise NotCompiled(f"does not compile: {_reason(str(error))}") from error
         (compiled,) = self.call.overloads.values()
         returned = compiled.signature.return_type
-        parts = list(returned) if isinstance(returned, types.BaseTuple) else [returned]
-        if len(parts) != results or not all(isinstance(part, types.Integer | types.Float | types.Boolean) for part in parts):
-            raise NotCompiled(f"returns {_plain(returned)}")
-        self._attempt = _attempt(compiled, parts)
-        self._forces: dict[Any, Any] = {}
+        return compiled, list(returned) if isinstance(returned, types.BaseTuple) else [returned]
 
-    def force(self, dtype: np.dtype[Any]) -> Any:
-        """What `kernels.forces.call` takes: adds the two numbers returned for (x, y, vx, vy, mass, t) of every free particle.
+    def add(self, state: Any, position: Any, t: float) -> int:
+        """Add the two numbers returned for (x, y, vx, vy, mass, t) of every free particle to `state.force`.
 
         It returns for how many of them the function raised, or returned something that is not finite.
         """
-        if dtype not in self._forces:
-            attempt = self._attempt
+        arrays = state.force, position, state.velocity, state.mass
+        if not all(map(is_, arrays, self._arrays)):
+            self._arrays, self._addresses = arrays, tuple(array.ctypes.data for array in arrays)
+        return int(self._loop(state.dtype)(*self._addresses, len(position), t))
 
-            def loop(force, position, velocity, mass, t):  # type: ignore[no-untyped-def]
-                f, x, v, wrong = force.reshape(-1), position.reshape(-1), velocity.reshape(-1), 0
-                for k in range(mass.shape[0]):
-                    i = np.uint64(k)
-                    a = i + i
-                    b = a + _ONE
-                    m, ax, ay, vx, vy = _REAL(mass[i]), _REAL(x[a]), _REAL(x[b]), _REAL(v[a]), _REAL(v[b])
-                    fine, fx, fy = attempt((ax, ay, vx, vy, m, t))
-                    free = m < np.inf
-                    f[a] += fx if free else 0.0
-                    f[b] += fy if free else 0.0
-                    # z - z is 0 for finite numbers, NaN for others.
-                    fine &= (fx - fx) + (fy - fy) == 0.0
-                    wrong += int(free and not fine and (ax - ax) + (ay - ay) + (vx - vx) + (vy - vy) == 0.0)
-                return wrong
+    def potential(self, position: Any, mass: Any) -> float:
+        """Sum of the number returned for (x, y, mass) of every free particle; NaN where the function raises."""
+        loop = self._loop(position.dtype, potential=True)
+        return float(loop(position.ctypes.data, mass.ctypes.data, len(mass)))
 
-            self._forces[dtype] = numba.cfunc(_of(dtype), error_model="numpy")(loop)
-        return self._forces[dtype]
-
-    @cached_property
-    def potential(self) -> Any:
-        """What `kernels.forces.call_potential` takes: a function of (x, y, mass), NaN where the user's raises."""
-        attempt = self._attempt
-
-        def one(x: float, y: float, mass: float) -> Any:
-            fine, value = attempt((x, y, mass))
-            return value if fine else np.nan
-
-        return numba.cfunc(_REAL(_REAL, _REAL, _REAL), error_model="numpy")(one)
+    def _loop(self, dtype: np.dtype[Any], *, potential: bool = False) -> Any:
+        """What Python calls with the addresses of arrays; it releases the GIL."""
+        if dtype not in self._loops:
+            make, pointers = (_potential_loop, 2) if potential else (_force_loop, 4)
+            address, rest = types.CPointer(numba.from_dtype(dtype)), (types.int64,) if potential else (types.int64, _REAL)
+            returned = _REAL if potential else types.int64
+            signature = returned(*(address for _ in range(pointers)), *rest)
+            compiled = numba.cfunc(signature, error_model="numpy")(make(self._attempt))
+            back, after = (ctypes.c_double, ()) if potential else (ctypes.c_int64, (ctypes.c_double,))
+            kind = ctypes.CFUNCTYPE(back, *(ctypes.c_void_p for _ in range(pointers)), ctypes.c_int64, *after)
+            self._loops[dtype] = kind(compiled.address), compiled
+        return self._loops[dtype][0]
 
 
-def _of(dtype: np.dtype[Any]) -> Any:
-    """The type of a loop over particles: force, position, velocity, mass, t."""
-    rows, column = types.Array(numba.from_dtype(dtype), 2, "C"), types.Array(numba.from_dtype(dtype), 1, "C")
-    return types.int64(rows, rows, rows, column, _REAL)
+def _as_numbers(function: Any, results: int) -> Any:
+    """The same force or potential, whose results are numbers where they were arrays without axes."""
+
+    def one(x: float, y: float, mass: float) -> Any:
+        return np.asarray(function(x, y, mass)).item()
+
+    def pair(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> Any:
+        fx, fy = function(x, y, vx, vy, mass, t)
+        return np.asarray(fx).item(), np.asarray(fy).item()
+
+    return one if results == 1 else pair
 
 
-@lru_cache(maxsize=64)
-def both(first: Any, second: Any, dtype: np.dtype[Any]) -> Any:
-    """One loop of two, both of which `Native.force` or this have made: the first, then the second."""
+def _force_loop(attempt: Any) -> Any:
+    def loop(force, position, velocity, mass, count, t):  # type: ignore[no-untyped-def]
+        f, x = numba.carray(force, 2 * count), numba.carray(position, 2 * count)
+        v, masses, wrong = numba.carray(velocity, 2 * count), numba.carray(mass, count), 0
+        for k in range(count):
+            i = np.uint64(k)
+            a = i + i
+            b = a + _ONE
+            m, ax, ay, vx, vy = _REAL(masses[i]), _REAL(x[a]), _REAL(x[b]), _REAL(v[a]), _REAL(v[b])
+            fine, fx, fy = attempt((ax, ay, vx, vy, m, t))
+            free = m < np.inf
+            f[a] += fx if free else 0.0
+            f[b] += fy if free else 0.0
+            # z - z is 0 for finite numbers, NaN for others.
+            fine &= (fx - fx) + (fy - fy) == 0.0
+            wrong += int(free and not fine and (ax - ax) + (ay - ay) + (vx - vx) + (vy - vy) == 0.0)
+        return wrong
 
-    def loop(force, position, velocity, mass, t):  # type: ignore[no-untyped-def]
-        return first(force, position, velocity, mass, t) + second(force, position, velocity, mass, t)
+    return loop
 
-    return numba.cfunc(_of(dtype), error_model="numpy")(loop)
+
+def _potential_loop(attempt: Any) -> Any:
+    def loop(position, mass, count):  # type: ignore[no-untyped-def]
+        x, masses, total = numba.carray(position, 2 * count), numba.carray(mass, count), 0.0
+        for i in range(count):
+            m = _REAL(masses[i])
+            fine, value = attempt((_REAL(x[2 * i]), _REAL(x[2 * i + 1]), m))
+            if m < np.inf:
+                total += value if fine else np.nan
+        return total
+
+    return loop
 
 
 def _attempt(compiled: Any, parts: list[Any]) -> Any:

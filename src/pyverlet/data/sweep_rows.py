@@ -23,7 +23,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.compile import jit
+from pyverlet.core.sources import sources_hash
 from pyverlet.data.durable import replacing
 from pyverlet.data.sweep_plan import SCENE_FILE, Plan
 from pyverlet.ground import file_lock
@@ -42,7 +42,7 @@ def made_by() -> dict[str, str]:
 
     return {
         "pyverlet": pyverlet.__version__, "numpy": np.__version__, "numba": version("numba"),
-        "python": platform.python_version(), "kernels": jit.sources_hash(),
+        "python": platform.python_version(), "kernels": sources_hash(),
     }  # fmt: skip
 
 

@@ -18,6 +18,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.constants import STANDS_OUT
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import bounds, cage, frame, leaving, meetings
+from pyverlet.laws.contacts._held import circles
 from pyverlet.laws.turning import surface
 from pyverlet.state.seam import NONE, Seam
 from pyverlet.state.slots import Slots
@@ -126,7 +127,7 @@ class _Walls(Boundary):
 
     def _confine(self, kernel: Any, shape: Sequence[float], state: Slots, h: float, lag: float, rest_speed: float) -> None:
         shape, laws = self._rounded(shape, state, h, lag, rest_speed)
-        kernel(state.circles(), *shape, *laws)
+        kernel(circles(state), *shape, *laws)
 
     def leave(self, state: Slots) -> None:
         # Where there are obstacles it may be one of them that holds. Whom a wall rubs is not left all that drives it.

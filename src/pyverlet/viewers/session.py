@@ -31,7 +31,7 @@ from pyverlet.viewers.gauges import Gauges
 from pyverlet.viewers.rhythm import PICTURE_S, Rhythm
 from pyverlet.viewers.stage import Stage
 from pyverlet.world.clock import Clock, FrameBudget
-from pyverlet.world.moments import Moment, rehearse_looking
+from pyverlet.world.moments import Moment
 from pyverlet.world.warmup import warm_up_to_show
 
 if TYPE_CHECKING:
@@ -242,8 +242,6 @@ class Session(Door):
 
     def _enter(self, exhibit: Exhibit) -> None:
         self._stage = self._staged(exhibit)
-        for world in self._stage.worlds:
-            rehearse_looking(world.dtype, world.threads)
         self._fresh_start()
 
     def _put_on(self, exhibit: Exhibit) -> None:

@@ -108,7 +108,6 @@ class ImpulseFrames:
         """
         if found := self.unknown(world):
             raise InputError(f"impulses is True in a world with {found[0]}; allowed are circles, obstacles and forces in a room")
-        world._slots.rows = self.held.core
         world._slots.clear_notes()
         self.links.keep_apart(world, self.held.engine)
         if world._gather():
@@ -227,7 +226,7 @@ class ImpulseFrames:
         state = world._slots
         if watch is None and not world.forces and not world.links:
             start, (gx, gy) = world._state, world.gravity
-            gained = self.held.core.energy_gained(
+            gained = state.motion.energy_gained(
                 (start.position, start.velocity, start.spin, start.radius, start.mass),
                 (state.position, state.velocity, state.spin, state.radius, state.mass), gx, gy,
             )  # fmt: skip

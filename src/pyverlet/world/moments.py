@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.compile import jit
 from pyverlet.core import unit
 from pyverlet.state.slots import Slots
 
@@ -47,10 +46,3 @@ class Moment:
         if slots.seam:
             slots.seam.wrap(position)
         return position, velocity, slots.particle  # reordering makes a new one, and leaves this as it is
-
-
-def rehearse_looking(dtype: np.dtype[Any], threads: int) -> None:
-    """Compile what `Moment.look` needs in a world that uses so many threads: no picture waits for it in the middle of a frame."""
-    with jit.one_thread():
-        jit.use_threads(1, threads)
-        Moment(Slots(dtype), 0.0, 0.0).look()

@@ -17,11 +17,11 @@ from pyverlet.compile import clock, jit
 from pyverlet.compile.bundle import hold
 from pyverlet.ground.constants import FUSED_FROM
 from pyverlet.kernels import drive, frame, fused
+from pyverlet.laws.contacts._held import claims, first_leap
 from pyverlet.laws.contacts.broadphase import Strips
 from pyverlet.laws.contacts.collisions import ContactSolver
 from pyverlet.laws.contacts.wide import Wide
 from pyverlet.laws.ledger import Page
-from pyverlet.state.moves import first_leap
 
 Array = NDArray[Any]
 
@@ -95,7 +95,7 @@ class Substeps:
         """
         state, forces, books, substep = world._slots, world._force_sum, self._books, self.substep
         # Who looks on may turn gravity, and see what a ledger sees.
-        leaps = world.integrator.leaps and not world.onlooker and (known := forces.compiled(state)) is not None
+        leaps = world.integrator.leaps and not (world.onlooker or forces.forces)
         if opens and not (leaps and contacts.keeps(state)):
             return False
         out, self._out, self.leapt = self._out, None, False
@@ -108,7 +108,7 @@ class Substeps:
             world.profile.mark("broad phase")
         if course:
             course.set_up(state, substep * h, h)
-        if opens and not forces.forces:
+        if opens:
             forces.fall(state)
         wide = contacts.set_up(state, h, lag, forces.strongest, world.links if links else None)
         walls, shape = room.compiled(state)  # that circles rub is known by now
@@ -116,12 +116,9 @@ class Substeps:
         if smooth := walls == frame.SMOOTH_CAGE and not (links or lends):
             wide.leave_arriving()
         last = world.substeps - 1
-        rows, native = known if leaps and known else ((), None)
-        kind = "served" * bool(course or books or lends or rows or native)
+        kind = "served" * bool(course or books or lends)
         if links:
             kind = _linked(world)
-        if native:
-            kind += "_called"
         if smooth and not (kind or wide.asks) and len(state) >= FUSED_FROM and strips.in_order:
             self._strip_by_strip(world, contacts, wide, strips, shape, leaps=leaps, opens=opens)
             return True
@@ -129,16 +126,14 @@ class Substeps:
         services: Any = ()
         if kind:
             about = course.compiled(state, room), contacts.lent(), links
-            beside, services = self._services(world, books, rows, *about, h, lag)
+            beside, services = self._services(world, books, (), *about, h, lag)
         stop, sets_out = world.substeps if leaps else substep + 1, not opens and (lends or out is not wide.moved)
         begin = (wide.takes_looks(), int(sets_out), int(opens), frame.WHOLE, *state.reals(*forces.gravity))
-        reached, self.leapt, strongest = frame.frames[kind][wide.kind](
+        reached, self.leapt, _ = frame.frames[kind][wide.kind](
             substep, stop, last, wide.circles, wide.packed, wide.law, (walls, *state.reals(*shape)), beside, tuple(services),
-            native or (), wide.cut(), begin, strips.checked, state.real(strips.allowed * strips.allowed),
-            state.claims(), world.profile.spent, (clock.address(), clock.tick()),
+            (), wide.cut(), begin, strips.checked, state.real(strips.allowed * strips.allowed),
+            claims(state), world.profile.spent, (clock.address(), clock.tick()),
         )  # fmt: skip
-        if (rows or native) and (opens or self.leapt or reached > substep + 1):
-            forces.strongest, forces.t = float(strongest), world.time + (reached - (not self.leapt)) * h
         if books:
             books.read(services.energies, substep, reached, opens=opens)
         self.marked = reached > last

@@ -27,9 +27,9 @@ from pyverlet.ground.constants import (
     WORTH_THINNING,
 )
 from pyverlet.kernels import pairs as kernels
+from pyverlet.laws.contacts._held import strayed
 from pyverlet.laws.contacts.crowd import Crowd, free_skin
 from pyverlet.laws.contacts.grids import Grids
-from pyverlet.state.moves import strayed
 from pyverlet.state.slots import Slots
 
 Array = NDArray[Any]

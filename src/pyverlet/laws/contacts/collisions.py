@@ -14,6 +14,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.constants import FED, PUSHED, REST_ACCELERATIONS, UNEVEN
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import overlap
+from pyverlet.laws.contacts._held import pick_falling
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast, PairList, Strips
 from pyverlet.laws.contacts.growth import Growth
 from pyverlet.laws.contacts.loans import Lent, Loans
@@ -22,7 +23,6 @@ from pyverlet.laws.contacts.slips import Kept, Slips
 from pyverlet.laws.contacts.wide import Wide
 from pyverlet.laws.events import Events
 from pyverlet.laws.sleep import Sleep
-from pyverlet.state.moves import pick_falling
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 

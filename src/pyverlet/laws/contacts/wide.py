@@ -17,6 +17,7 @@ from pyverlet.kernels import frame, packs, sweeps, tables
 from pyverlet.kernels.bounds import CARRIES
 from pyverlet.kernels.kinds import BOUNCING, HEARD, ROUGH, SMOOTH
 from pyverlet.kernels.seam import close_gaps
+from pyverlet.laws.contacts._held import claims
 from pyverlet.laws.contacts.broadphase import PairList, rows_of
 from pyverlet.state.seam import NONE, Seam
 from pyverlet.state.slots import Slots
@@ -300,7 +301,7 @@ class Wide:
         nothing = state.reals(0, 0, 0, 0, 0, 0)
         frame.frames[kind][self.kind](
             0, 1, -1, self.circles, self.packed, self.law, (frame.OPEN, *nothing), beside, services, (), self.cut(),
-            (looks, 1, 0, part, *nothing[:2]), self.origin, nothing[0], state.claims(), _NO_TIME, (0, 0.0),
+            (looks, 1, 0, part, *nothing[:2]), self.origin, nothing[0], claims(state), _NO_TIME, (0, 0.0),
         )  # fmt: skip
 
     def mark_resting(self, state: Slots) -> None:

@@ -13,6 +13,7 @@ from pyverlet.ground.constants import OBSTACLE_LINKS
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import meetings
 from pyverlet.kernels import obstacles as kernels
+from pyverlet.laws.contacts._held import circles
 from pyverlet.laws.obstacles._base import Obstacles
 from pyverlet.laws.obstacles._tables import Tables
 from pyverlet.laws.rooms import Boundary
@@ -97,7 +98,7 @@ class Course(Tables):
         self.set_up(state, time, h)
         collide: Any = meetings.collide
         course, cells = self.compiled(state, room)
-        collide(state.circles(), course, time + h, *cells, *state.reals(h, lag, rest_speed), state.drop)
+        collide(circles(state), course, time + h, *cells, *state.reals(h, lag, rest_speed), state.drop)
 
     def set_up(self, state: Slots, time: float, h: float) -> None:
         """Place the obstacles, and make room for what is noted of those they hold; arguments: as for `collide`."""
