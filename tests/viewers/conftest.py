@@ -12,23 +12,10 @@ from playwright.sync_api import Browser, Page, Playwright, sync_playwright
 import pyverlet as pv
 from pyverlet.viewers.commands import Pause
 from pyverlet.viewers.session import Session
-from pyverlet.world import warmup
 
 from .browser import FLAGS, KINDS, Program, Serve, chromium
 
 WaitUntil = Callable[[Callable[[], bool]], None]
-
-
-@pytest.fixture(scope="session", autouse=True)
-def _compiled() -> None:
-    """Tests with clocks in them do not wait for a compiler."""
-    pv.warm_up(nine_circles())
-
-
-@pytest.fixture(autouse=True)
-def _nothing_behind_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nor is compiled meanwhile what no test asks for."""
-    monkeypatch.setattr(warmup, "MOST_HELPERS", 0)
 
 
 @pytest.fixture

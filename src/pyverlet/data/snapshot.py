@@ -8,7 +8,6 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -108,7 +107,7 @@ def _made_by() -> dict[str, str]:
     import pyverlet
 
     return {
-        "pyverlet": pyverlet.__version__, "numpy": np.__version__, "numba": version("numba"),
+        "pyverlet": pyverlet.__version__, "numpy": np.__version__,
         "python": platform.python_version(), "system": sys.platform, "machine": platform.machine(),
     }  # fmt: skip
 

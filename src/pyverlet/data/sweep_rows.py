@@ -15,7 +15,6 @@ import platform
 import socket
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from time import monotonic
 from typing import Any, BinaryIO
@@ -41,7 +40,7 @@ def made_by() -> dict[str, str]:
     import pyverlet
 
     return {
-        "pyverlet": pyverlet.__version__, "numpy": np.__version__, "numba": version("numba"),
+        "pyverlet": pyverlet.__version__, "numpy": np.__version__,
         "python": platform.python_version(), "kernels": sources_hash(),
     }  # fmt: skip
 

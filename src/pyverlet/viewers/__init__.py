@@ -108,7 +108,7 @@ def serve(
     dt: float = 1 / 60,
     **options: Any,
 ) -> None:
-    """Build a world, compile what it needs and show it on a live page until Ctrl-C. What the command line uses.
+    """Build a world and show it on a live page until Ctrl-C. What the command line uses.
 
     The port is taken before the world is built, so that a taken one is told at once.
 

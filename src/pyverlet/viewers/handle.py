@@ -28,7 +28,6 @@ class Page:
         self._held: list[contextlib.AbstractContextManager[None]] = []
         with ExitStack() as opening:
             listener = opening.enter_context(launch.take_port(host, port))
-            launch.compile_for(exhibit)
             self._session = Session(exhibit, dt=dt)
             opening.enter_context(launch.on_air(self._session, listener, only_loopback=host in LOOPBACK_NAMES))
             self.url = launch.address(host, listener)

@@ -1,4 +1,4 @@
-"""From a world to an open tab: take the port, build, compile, say where to look, serve until Ctrl-C."""
+"""From a world to an open tab: take the port, build, say where to look, serve until Ctrl-C."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ import uvicorn
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
-from pyverlet.ground.progress import Progress
 from pyverlet.viewers.artist import Artist, draws_here
 from pyverlet.viewers.exhibit import Exhibit, Repertoire
 from pyverlet.viewers.looks import Look
@@ -58,10 +57,9 @@ def serve(
     _refuse_running_loop()
     with contextlib.suppress(KeyboardInterrupt), take_port(host, port) as listener:
         exhibit = Exhibit.of(build(), title)
-        compile_for(exhibit)
         session = Session(exhibit, dt=dt, repertoire=repertoire, stage=stage)
         if draws_here(session.latest.shape):
-            Artist().jpeg(session.latest, Look())  # compiles what it needs: no tab shall wait for that
+            Artist().jpeg(session.latest, Look())  # loads what it needs: no tab shall wait for that
         with on_air(session, listener, only_loopback=host in LOOPBACK_NAMES), _ended_by_signals(session):
             url = address(host, listener)
             announce(title, url, host, open_browser)
@@ -185,15 +183,6 @@ def _why_not(error: OSError, host: str, port: int) -> str:
     if error.errno in (errno.EACCES, errno.EPERM):
         return f"port is {port}, which this user may not open; allowed are 1024 to 65535, or 0 to have one chosen"
     return f"host is {host!r}, which cannot be listened on ({error.strerror}); allowed is an address of this machine"
-
-
-def compile_for(exhibit: Exhibit) -> None:
-    """All that its worlds need."""
-    from pyverlet.world.warmup import warm_up_to_show
-
-    with Progress("compiling kernels, once") as progress:
-        for each in exhibit.panels.worlds:
-            warm_up_to_show(each, progress)
 
 
 def address(host: str, listener: socket.socket) -> str:

@@ -17,7 +17,6 @@ from pyverlet.scenes.sketch import Sketch
 from pyverlet.viewers.exhibit import Exhibit, Repertoire
 from pyverlet.viewers.session import Session
 from pyverlet.world.panels import Panel, Panels
-from pyverlet.world.warmup import warm_up_to_show
 from pyverlet.world.world import World
 
 LOOK_S = 0.05
@@ -161,12 +160,6 @@ class Watcher:
                 with self._lock:
                     self._interruptible = False
             fault = self._workshop.fault
-            if built:
-                try:
-                    for world in built.panels.worlds:
-                        warm_up_to_show(world)  # so that the world before goes on meanwhile
-                except PyverletError as error:  # such as a force that does not compile
-                    built, fault = None, str(error)
             with self._lock:
                 if turn != self._turn:
                     return

@@ -228,12 +228,6 @@ def check_extra() -> None:
 
 
 def show(build: Callable[[], World], **options: Any) -> None:
-    """Build a world, compile what it needs and show it until the window is closed. Options as for `Window`."""
-    from pyverlet.ground.progress import Progress
-    from pyverlet.world.warmup import warm_up_to_show
-
+    """Build a world and show it until the window is closed. Options as for `Window`."""
     check_extra()
-    world = build()
-    with Progress("compiling kernels, once") as progress:
-        warm_up_to_show(world, progress)
-    Window(world, **options).run()
+    Window(build(), **options).run()

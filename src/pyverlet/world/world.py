@@ -14,7 +14,7 @@ from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.ground.threads import max_threads
 from pyverlet.ground.turns import in_turn
 from pyverlet.laws.coarse import Coarse
-from pyverlet.laws.contacts._held import end
+from pyverlet.laws.contacts._held import STAGES, end, use_threads
 from pyverlet.laws.contacts.collisions import Collisions, ContactSolver
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceList, ForceSum
@@ -100,7 +100,7 @@ class World(Measures, Queries, Doors):
         self.integrator = TimeCorrectedVerlet() if integrator is None else integrator
         self.boundary = Open() if boundary is None else boundary
         self.collisions, self.substeps, self.threads = collisions, substeps, threads
-        self.time, self.frames, self.profile, self.actors = 0.0, 0, Profile(), list[Actor]()
+        self.time, self.frames, self.profile, self.actors = 0.0, 0, Profile(STAGES), list[Actor]()
         self._run, self._impulses = Substeps(), ImpulseFrames(self._state.dtype)
         self._team, self._looks = Team(), (Coarse(), Precision())
         # Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins.
@@ -131,6 +131,7 @@ class World(Measures, Queries, Doors):
 
     def _frame(self, h: float, done: Callable[[str], None]) -> bool:
         """The table of contents of the engine; `done` hears which stage has ended. True if all is known to be finite."""
+        use_threads(self._team.now, self.threads)
         state, forces, integrator = self._slots, self._force_sum, self.integrator
         contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course or None
         lag, state.drop, state.h, run = integrator.velocity_lag * h, integrator.drop, h, self._run.begin(contacts, course)

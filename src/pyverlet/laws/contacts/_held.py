@@ -6,12 +6,16 @@ from typing import Any
 
 import numpy as np
 
+from pyverlet.compile import jit
 from pyverlet.compile.bundle import hold
 from pyverlet.compile.rows import WIDTH
 from pyverlet.compile.stealing import Claims
-from pyverlet.kernels import leaving, motion, tables
+from pyverlet.kernels import frame, leaving, motion, tables
 from pyverlet.laws.integrators import Integrator, PositionVerlet
 from pyverlet.state.slots import Array, Slots
+
+STAGES = frame.STAGES
+use_threads = jit.use_threads
 
 
 def circles(state: Slots) -> Any:

@@ -131,7 +131,7 @@ class _Code:
             if not numba_is_installed():
                 self._evaluator = OnArrays(self.function, self._count, results)
                 return self._evaluator
-            from pyverlet.compile import native  # it imports Numba
+            from pyverlet.laws.forces import _native as native  # it imports Numba
 
             try:
                 self._evaluator = native.Native(self.function, self._count, results)
