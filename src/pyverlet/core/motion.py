@@ -19,6 +19,7 @@ from pyverlet.core.moves import (
     newton,
     newton_kick_drift,
 )
+from pyverlet.core.own_walls import confine_to_box, confine_to_circle
 from pyverlet.core.periodic import follow, wrap
 from pyverlet.core.resting import find_edited, find_islands, time_at_rest, touch
 from pyverlet.core.rows import any_differs, differs, put_motion, take_motion
@@ -38,6 +39,8 @@ __all__ = [
     "clamp_to_box",
     "clamp_to_circle",
     "clear_pinned",
+    "confine_to_box",
+    "confine_to_circle",
     "differs",
     "energy_gained",
     "find_edited",

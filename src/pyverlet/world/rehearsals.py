@@ -14,6 +14,7 @@ import numpy as np
 from pyverlet.compile import jit
 from pyverlet.ground.constants import FUSED_FROM, KNOWN_FROM, LINKS_ONE_THREAD_BELOW, ONE_THREAD_BELOW, UNEVEN
 from pyverlet.kernels.motion import ON_WALL
+from pyverlet.laws.contacts import _held_rooms
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.collisions import Collisions
 from pyverlet.laws.forces import Conservative, Drag, Force
@@ -161,7 +162,7 @@ def _take_back(world: World, slots: Slots, listed: tuple[Any, ...]) -> None:
 def _lean(world: World) -> None:
     """At the end of a frame somebody has come to rest on a smooth wall."""
     world._slots.resting[:1], world._slots.along = ON_WALL, world._slots.along[:0]
-    world.boundary.leave(world._slots)
+    _held_rooms.leave(world.boundary, world._slots)
 
 
 def _lattice(

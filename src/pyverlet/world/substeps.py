@@ -17,6 +17,7 @@ from pyverlet.compile import clock, jit
 from pyverlet.compile.bundle import hold
 from pyverlet.ground.constants import FUSED_FROM
 from pyverlet.kernels import drive, frame, fused
+from pyverlet.laws.contacts import _held_rooms
 from pyverlet.laws.contacts._held import claims, first_leap
 from pyverlet.laws.contacts.broadphase import Strips
 from pyverlet.laws.contacts.collisions import ContactSolver
@@ -100,7 +101,7 @@ class Substeps:
             return False
         out, self._out, self.leapt = self._out, None, False
         strips, room = contacts.steady(state), world.boundary
-        if strips is None or room.compiled(state) is None or not (course := world._course).still:
+        if strips is None or _held_rooms.compiled(room, state) is None or not (course := world._course).still:
             return False
         links: Any = world.links.compiled(state, h) if world.links else ()
         if opens:  # as far as is known now the list is good
@@ -111,7 +112,7 @@ class Substeps:
         if opens:
             forces.fall(state)
         wide = contacts.set_up(state, h, lag, forces.strongest, world.links if links else None)
-        walls, shape = room.compiled(state)  # that circles rub is known by now
+        walls, shape = _held_rooms.compiled(room, state) or (frame.OPEN, _held_rooms.NOWHERE)  # that circles rub is known by now
         lends = contacts.lends
         if smooth := walls == frame.SMOOTH_CAGE and not (links or lends):
             wide.leave_arriving()

@@ -15,6 +15,7 @@ from pyverlet.ground.threads import max_threads
 from pyverlet.ground.turns import in_turn
 from pyverlet.laws.coarse import Coarse
 from pyverlet.laws.contacts._held import STAGES, end, use_threads
+from pyverlet.laws.contacts._held_rooms import confine, leave
 from pyverlet.laws.contacts.collisions import Collisions, ContactSolver
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceList, ForceSum
@@ -131,7 +132,6 @@ class World(Measures, Queries, Doors):
 
     def _frame(self, h: float, done: Callable[[str], None]) -> bool:
         """The table of contents of the engine; `done` hears which stage has ended. True if all is known to be finite."""
-        use_threads(self._team.now, self.threads)
         state, forces, integrator = self._slots, self._force_sum, self.integrator
         contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course or None
         lag, state.drop, state.h, run = integrator.velocity_lag * h, integrator.drop, h, self._run.begin(contacts, course)
@@ -157,7 +157,7 @@ class World(Measures, Queries, Doors):
                 done("contacts")
             if links:
                 run.solve(self, contacts, h, lag, done)
-            self.boundary.confine(state, h, lag, REST_ACCELERATIONS * forces.strongest * h)
+            confine(self.boundary, state, h, lag, REST_ACCELERATIONS * forces.strongest * h)
             done("bounds")
             if course:
                 course.collide(state, self.boundary, run.substep * h, h, lag, REST_ACCELERATIONS * forces.strongest * h)
@@ -173,6 +173,7 @@ class World(Measures, Queries, Doors):
 
     def _open(self, h: float, done: Callable[[str], None]) -> bool:
         """Take up what users have set, and begin; False if nobody is awake."""
+        use_threads(self._team.now, self.threads)
         if self.links.begin() and self._contacts:
             self._contacts.broad_phase.forget()
         self._course.begin()
@@ -213,7 +214,7 @@ class World(Measures, Queries, Doors):
             self._force_sum.look_again(self._slots, self.time + self.substeps * h, lag)
         if contacts:
             contacts.end(self._slots, self._state, lag, self.substeps * h, self.gravity, marked=marked)
-        self.boundary.leave(self._slots)
+        leave(self.boundary, self._slots)
         if self._slots.seam:
             self._slots.seam.wrap(self._slots.position)
         end(self.integrator, self._slots, h)

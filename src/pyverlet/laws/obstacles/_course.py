@@ -14,6 +14,7 @@ from pyverlet.ground.errors import InputError
 from pyverlet.kernels import meetings
 from pyverlet.kernels import obstacles as kernels
 from pyverlet.laws.contacts._held import circles
+from pyverlet.laws.contacts._held_rooms import walls as walls_of
 from pyverlet.laws.obstacles._base import Obstacles
 from pyverlet.laws.obstacles._tables import Tables
 from pyverlet.laws.rooms import Boundary
@@ -169,7 +170,7 @@ class Course(Tables):
         """What `kernels.meetings.collide` takes of them, `Course`, and of their grid; empty without obstacles."""
         if not self:
             return self.nothing(state)
-        if (walls := room.walls()) != self._walled:
+        if (walls := walls_of(room)) != self._walled:
             self._walled, self._walls[:] = walls, walls
         arrays = self._segments, self._bodies, self._heads, self._links, self._walls, state.along, self._rest
         self._bundle = hold(meetings.Course, arrays, self._bundle)
