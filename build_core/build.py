@@ -14,7 +14,7 @@ from pathlib import Path
 from build_core.compiler import VARIANTS, compile_extension, signature
 from build_core.translate import CORE, ROOT, declarations, headers, joined_source, translate
 
-UNITS = ("engine", "tools")
+UNITS = ("engine", "motion", "tools")
 """Units that are compiled for each precision and variant; the processor's own is compiled once."""
 
 WORK = ROOT / "build" / "core"

@@ -76,7 +76,7 @@ def test_each_row_is_its_world(serial: Path) -> None:
         assert height(world)["height"] == table["height"][k]
     assert study.verify(rows=3).differ == []
     lines = (serial / "table.csv").read_text().splitlines()
-    assert lines[0].startswith("run,friction,seed,height,circles,start,end,error,pyverlet,numpy,numba,python,kernels")
+    assert lines[0].startswith("run,friction,seed,height,circles,start,end,error,pyverlet,numpy,python,kernels")
     assert len(lines) == 9
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 from typing import Any
 
@@ -43,8 +44,7 @@ def world(dtype: Any, *, friction: float = 0.3, restitution: float = 0.5, gravit
 def test_uncompiled_it_has_the_same_bits(dtype: Any, more: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> None:
     compiled = world(dtype, **more)
     compiled.run(seconds=0.4)
-    slow = reference.load("engine", dtype)
-    monkeypatch.setattr(core, "unit", lambda name, dtype: slow)
+    monkeypatch.setattr(core, "unit", functools.cache(reference.load))
     plain = world(dtype, **more)
     plain.run(seconds=0.4)
     assert plain.state_hash() == compiled.state_hash()

@@ -53,10 +53,10 @@ def test_what_is_no_gas_is_let_be(options: dict[str, float]) -> None:
         gas(0.9 * GAS_STEP * 0.5 * 480).run(seconds=0.3)
 
 
-def test_a_gas_presses_as_henderson_says_at_the_stated_step_and_less_beyond() -> None:
+def test_a_gas_presses_as_henderson_says_at_the_stated_step_and_beyond() -> None:
     # Some 3,000 impacts on the walls in 6 s, correlated over a few: 3 % of statistics. Walls add some more: an edge of r in 18 m.
     fine = pressure.measure(0.6, GAS_STEP, seconds=6.0)
     coarse = pressure.measure(0.6, 3 * GAS_STEP, seconds=6.0)
-    assert fine.compressibility == pytest.approx(henderson(0.6), rel=0.08)
-    assert coarse.compressibility < 0.9 * fine.compressibility
-    assert fine.overlap < 0.15 < coarse.overlap
+    for measured in (fine, coarse):
+        assert measured.compressibility == pytest.approx(henderson(0.6), rel=0.08)
+    assert fine.overlap < coarse.overlap

@@ -1,4 +1,4 @@
-"""`@pv.force`: compiled on first use without compiling the engine, and one sentence where the user's code is wrong."""
+"""`@pv.force`, compiled by Numba and called with arrays, and one sentence where the user's code is wrong."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.compile import jit
-from pyverlet.kernels import forces as kernels
+from pyverlet.laws.forces import function
 
 
 @pv.force
@@ -54,14 +54,12 @@ def test_another_force_compiles_none_of_the_engine() -> None:
     world = world_with(swirl)
     world.add(position=(1, 0))
     world.step(1 / 60)
-    before = len(kernels.call.alone.signatures)
     compiled: list[int] = []
     with jit.watch_compiling(lambda: compiled.append(1)):
         for k in (1.0, 2.0, 3.0):
             world.forces[:] = [sine(k)]
             world.step(1 / 60)
     assert compiled == []
-    assert len(kernels.call.alone.signatures) == before
 
 
 def test_a_potential_enters_the_energy() -> None:
@@ -238,3 +236,84 @@ def test_other_arguments_are_refused_at_once() -> None:
         pv.force(3)  # type: ignore[call-overload]
     with pytest.raises(pv.InputError, match=r"potential '<lambda>' .* takes \(x, y\); allowed are the arguments \(x, y, mass\)"):
         pv.force(potential=lambda x, y: x)(one_number)  # type: ignore[misc, arg-type]
+
+
+# ---- without Numba -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def without_numba(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(function, "numba_is_installed", lambda: False)
+
+
+def on_arrays(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
+    return mass * (y - 0.25 * x) - vx, np.where(x > 0.0, x * y, -t)
+
+
+def with_if(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
+    return mass * (y - 0.25 * x) - vx, x * y if x > 0.0 else -t
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("code", [on_arrays, with_if])
+def test_arrays_numbers_and_compiled_code_have_the_same_bits(code: Any, dtype: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Sums and products are rounded alike everywhere; with functions such as sine that need not be so.
+    hashes = set()
+    for compiled in (True, False):
+        monkeypatch.setattr(function, "numba_is_installed", lambda compiled=compiled: compiled)
+        world = pv.World(gravity=(0, -1), collisions=None, dtype=dtype)
+        chance = np.random.default_rng(2)
+        world.add(position=chance.normal(0, 1, (9, 2)), mass=[*chance.uniform(1, 2, 8), np.inf], radius=0.01)
+        world.forces.append(pv.force(code))
+        world.run(seconds=0.1)
+        hashes.add(world.state_hash())
+    assert len(hashes) == 1
+
+
+def test_a_function_is_called_once_for_all(without_numba: None) -> None:
+    shapes = []
+
+    @pv.force
+    def seen(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
+        shapes.append((x.shape, mass.dtype, type(t)))
+        return 0.0, mass
+
+    world = world_with(seen, integrator=pv.SemiImplicitEuler(), substeps=1)
+    world.add(position=[(0, 0), (3, 0), (6, 0)], mass=[1.0, 2.0, np.inf])
+    world.step(0.5)
+    assert shapes == [((3,), np.float64, float)]
+    assert world.velocity.tolist() == [[0, 0.5], [0, 0.5], [0, 0]]
+
+
+def test_a_potential_of_arrays_enters_the_energy(without_numba: None) -> None:
+    potentials: list[Any] = [lambda x, y, mass: 0.5 * mass * (x * x + 4 * y * y), lambda x, y, mass: mass if x > 0 else 0.0]
+    for potential in potentials:
+        well = pv.force(potential=potential)(lambda x, y, vx, vy, mass, t: (-mass * x, -4 * mass * y))
+        world = world_with(well)
+        world.add(position=[(1, 2), (0, 1), (5, 5)], mass=[3.0, 1.0, np.inf])
+        expected = sum(potential(x, y, m) for x, y, m in ((1.0, 2.0, 3.0), (0.0, 1.0, 1.0)))
+        assert world.energy().potential == pytest.approx(expected)
+
+
+LOOSE: dict[Callable[..., Any], tuple[type[pv.PyverletError], str]] = {
+    undefined: (pv.NonFiniteError, "raised NameError (name 'nowhere' is not defined) for particle 0"),
+    one_number: (pv.InputError, "returns no tuple; allowed is numeric code that returns two numbers (fx, fy)"),
+    three_numbers: (pv.InputError, "returns 3 of them"),
+    sometimes: (pv.InputError, "returns no tuple"),
+    array: (pv.InputError, "returns no tuple"),
+    imaginary: (pv.InputError, "returns "),
+    pole: (pv.NonFiniteError, "returned (inf, 0.0) for particle 1 at x = 2, y = 0, t = 0; allowed are two finite numbers"),
+    raising: (pv.NonFiniteError, "raised ValueError (too far) for particle 1"),
+}
+
+
+@pytest.mark.parametrize("code", LOOSE, ids=lambda code: code.__name__)
+def test_without_numba_too_a_wrong_function_is_named(code: Callable[..., Any], without_numba: None) -> None:
+    kind, says = LOOSE[code]
+    world = world_with(pv.force(code))
+    world.add(position=[(0, 0), (2, 0)])
+    with pytest.raises(kind) as caught:
+        world.step(1 / 60)
+    assert f"force {code.__name__!r} ({__file__}, line {code.__code__.co_firstlineno})" in str(caught.value)
+    assert says in str(caught.value)
+    assert world.position.tolist() == [[0, 0], [2, 0]]  # the last good frame

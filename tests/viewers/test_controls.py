@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 import pyverlet as pv
 from pyverlet import scenes
-from pyverlet.compile import jit
-from pyverlet.state.slots import Slots
 from pyverlet.viewers import levers
 from pyverlet.viewers.commands import (
     Build,
@@ -267,96 +264,6 @@ def test_the_way_to_a_scene_is_told(wait_until: WaitUntil) -> None:
     told = [text for text in seen if text]
     assert told[0] == "building image"
     assert any(text.endswith("%") for text in told)
-
-
-def test_all_is_compiled_before_a_scene_is_shown(wait_until: WaitUntil, monkeypatch: pytest.MonkeyPatch) -> None:
-    # Links, say, are compiled when a world has them first: half a minute, in which the page said nothing and stood still.
-    plan = repertoire()
-    seen: list[str | None] = []
-    ready: list[tuple[pv.World, int]] = []
-
-    def warm_up(world: pv.World, progress: Callable[[int, int], None]) -> None:
-        progress(1, 2)  # as of a kernel that begins to compile
-        ready.append((world, world.frames))
-
-    monkeypatch.setattr("pyverlet.viewers.session.warm_up_to_show", warm_up)
-    with Session(plan.open(), repertoire=plan) as session:
-        session.subscribe(lambda: seen.append(session.latest.status.busy))
-        session.submit(Build("box", 20))
-        wait_until(lambda: session.latest.shape.scene == "box" and session.latest.status.frames > 0)
-    assert [(len(world), frames) for world, frames in ready] == [(20, 0)]
-    assert "compiling what box needs, once" in seen
-
-
-class Compiles(pv.Actor):
-    """Acts as a frame that another process compiles just now: once, in the fifth."""
-
-    def act(self, world: pv.World, dt: float) -> None:
-        if world.frames == 4:
-            with jit._turn_or_wait("a kernel"):
-                pass
-
-
-@pytest.fixture
-def another_compiles(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another process is about what `Compiles` needs."""
-    turn = jit.turn
-
-    @contextlib.contextmanager
-    def taken(name: str, patience: float = 1.0) -> Iterator[bool]:
-        with turn(name, patience) as mine:
-            yield mine and (name != "a kernel" or patience > 0)
-
-    monkeypatch.setattr(jit, "turn", taken)
-
-
-@pytest.mark.usefixtures("another_compiles")
-def test_a_frame_that_waits_for_a_compiler_says_so(wait_until: WaitUntil) -> None:
-    world, seen = pv.World(), list[str | None]()
-    world.add(position=(0, 0))
-    world.actors.append(Compiles())
-    with Session(world) as session:
-        session.subscribe(lambda: seen.append(session.latest.status.busy))
-        wait_until(lambda: session.latest.status.frames > 8)
-        assert session.latest.status.busy is None
-    assert [text for text in seen if text] == ["compiling what this needs, once"]
-
-
-class Slow:
-    """A force of nothing by which every frame is late: on screens there are pictures between its substeps."""
-
-    velocity_dependent = False
-
-    def apply(self, state: Slots, t: float) -> None:
-        time.sleep(0.012)
-
-
-@pytest.mark.usefixtures("another_compiles")
-@pytest.mark.parametrize("long", [False, True])
-def test_a_slow_frame_that_waits_for_a_compiler_publishes_no_moment_twice_unless_it_takes_long(
-    wait_until: WaitUntil, monkeypatch: pytest.MonkeyPatch, long: bool
-) -> None:
-    monkeypatch.setattr("pyverlet.viewers.session._LONG_S", -1.0 if long else 1e9)
-    world, seen = pv.World(collisions=None), list[tuple[float, str | None]]()
-    world.add(position=(0, 0))
-    world.forces.append(Slow())
-    world.step(1 / 60)
-    world.step(1 / 60)  # all is compiled
-    world.actors.append(Compiles())
-    session = Session(world)
-
-    def take() -> None:
-        seen.append((session.latest.status.time, session.latest.status.busy))
-        session.take(session.latest, velocity=True)
-
-    session.subscribe(take)
-    with session:
-        wait_until(lambda: world.frames > 6)
-    times = [moment for moment, _ in seen]
-    told = {moment for moment, busy in seen if busy}
-    # A moment comes again only to say that it takes long; on a busy machine that may be so more than once.
-    assert {moment for moment in times if times.count(moment) > 1} <= told
-    assert bool(told) == long
 
 
 def test_a_session_that_stops_does_not_wait_for_a_scene(wait_until: WaitUntil) -> None:

@@ -134,7 +134,7 @@ def _tell(study: Study, as_json: bool, *, rows: bool = True) -> None:
         return
     if rows:
         table = study.array()
-        names = [name for name in table.dtype.names or () if name not in ("pyverlet", "numpy", "numba", "python", "kernels")]
+        names = [name for name in table.dtype.names or () if name not in ("pyverlet", "numpy", "python", "kernels")]
         shown = [[_short(row[name]) for name in names] for row in table[:_SHOWN]]
         out.write(out.columns(names, shown))
         if len(table) > _SHOWN:

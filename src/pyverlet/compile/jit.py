@@ -361,8 +361,8 @@ def use_threads(count: int, most: int | None = None) -> None:
     most: as many as the same caller may use at other times. Where that is several, a single thread runs the code for several,
     or a program that goes from one number to the other would have to compile everything twice.
     """
-    wanted = pool.usable(count), pool.usable(count if most is None else most) > 1
-    _chosen.wanted = wanted
+    count, most = (min(number, max_threads()) for number in (count, count if most is None else most))
+    _chosen.wanted = pool.usable(count), pool.usable(most) > 1
 
 
 def _in_use() -> tuple[int, bool]:

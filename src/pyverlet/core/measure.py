@@ -76,37 +76,3 @@ def pinned_move(mass, velocity, spin):
     for i in range(count):
         found |= weight[i] == INFINITY and (v[2 * i] != 0 or v[2 * i + 1] != 0 or turn[i] != 0)
     return found
-
-
-def energy_gained(start, now, gx: cython.double, gy: cython.double) -> float:
-    """How much larger the energy of motion, spin and gravity is than it was, J.
-
-    start, now: position, velocity (n, 2), spin, radius, mass (n,) each, of the same particles in any two orders.
-    """
-    return total_energy(now, gx, gy) - total_energy(start, gx, gy)
-
-
-@cython.cfunc
-def total_energy(of, gx: cython.double, gy: cython.double) -> cython.double:
-    """The sum of `energies`; of: the arrays."""
-    position, velocity, spin, radius, mass = of
-    x: cython.pointer[cython.const[real]] = const_reals(position)
-    v: cython.pointer[cython.const[real]] = const_reals(velocity)
-    turn: cython.pointer[cython.const[real]] = const_reals(spin)
-    size: cython.pointer[cython.const[real]] = const_reals(radius)
-    weight: cython.pointer[cython.const[real]] = const_reals(mass)
-    count: cython.Py_ssize_t = len(mass)
-    total: cython.double[4]  # which do not wait for each other
-    lane: cython.int
-    i: cython.Py_ssize_t
-    for lane in range(4):
-        total[lane] = 0
-    for i in range(count):
-        m: cython.double = weight[i]
-        if m < INFINITY:
-            vx: cython.double = v[2 * i]
-            vy: cython.double = v[2 * i + 1]
-            rim: cython.double = cython.cast(cython.double, size[i]) * turn[i]
-            height: cython.double = gx * x[2 * i] + gy * x[2 * i + 1]
-            total[i & 3] += m * (0.5 * (vx * vx + vy * vy) + 0.25 * rim * rim - height)
-    return (total[0] + total[1]) + (total[2] + total[3])

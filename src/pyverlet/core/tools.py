@@ -9,6 +9,7 @@ from pyverlet.core.disc_drawing import draw_discs
 from pyverlet.core.line_drawing import draw_lines
 from pyverlet.core.page_arrays import copy_moving, put_rows, quantize
 from pyverlet.core.queries import at_points, first_on_rays, in_regions, nearest_to
+from pyverlet.core.query_cells import extent, sort_into_cells
 
 __all__ = [
     "at_points",
@@ -17,12 +18,14 @@ __all__ = [
     "draw_convex",
     "draw_discs",
     "draw_lines",
+    "extent",
     "fill",
     "first_on_rays",
     "in_regions",
     "nearest_to",
     "put_rows",
     "quantize",
+    "sort_into_cells",
     "stroke",
     "tint",
 ]

@@ -8,19 +8,19 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.compile import jit
+from pyverlet.core.sources import sources_hash
 from pyverlet.data import archive, describe_links, memory
 from pyverlet.data.describe import Builder, describe
 from pyverlet.data.durable import replacing
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.threads import max_threads
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.integrators import Integrator
 from pyverlet.laws.obstacles import Obstacle
@@ -85,7 +85,7 @@ def to_table(world: World, scene: Mapping[str, Any] | None = None) -> tuple[Head
     header: Header = {
         "format": FORMAT,
         "made_by": _made_by(),
-        "kernels": jit.sources_hash(),
+        "kernels": sources_hash(),
         "particles": len(world),
         "scene": memory.pack(dict(scene)) if scene is not None else None,
         "world": memory.map_arrays(_settings(world), put_aside),
@@ -107,7 +107,7 @@ def _made_by() -> dict[str, str]:
     import pyverlet
 
     return {
-        "pyverlet": pyverlet.__version__, "numpy": np.__version__, "numba": version("numba"),
+        "pyverlet": pyverlet.__version__, "numpy": np.__version__,
         "python": platform.python_version(), "system": sys.platform, "machine": platform.machine(),
     }  # fmt: skip
 
@@ -163,11 +163,11 @@ def from_table(header: Header, arrays: dict[str, Array], *, exact: bool = False,
     """The world of what `to_table` returned; the arrays are its own from now on."""
     if _migrated(header, arrays) and exact:
         raise InputError("exact is True, and the file is of an older format; allowed is exact=False")
-    ours = header["kernels"] == jit.sources_hash()
+    ours = header["kernels"] == sources_hash()
     if exact and not ours:
         raise InputError(
             f"exact is True, and the file was written by other kernels ({header['kernels']}, pyverlet "
-            f"{header['made_by']['pyverlet']}) than these ({jit.sources_hash()}); allowed is exact=False"
+            f"{header['made_by']['pyverlet']}) than these ({sources_hash()}); allowed is exact=False"
         )
     settings = _with_arrays(header["world"], arrays)
     moving = Parts(memory.unpack(header["facts"]), _moving(arrays))
@@ -218,7 +218,7 @@ def _world(settings: dict[str, Any], moving: Parts, objects: list[Any]) -> World
         integrator=builder.build("integrator", settings["integrator"], Integrator),
         substeps=settings["substeps"],
         dtype=settings["dtype"],
-        threads=None if threads is None else min(checks.whole("threads", threads), jit.max_threads()),
+        threads=None if threads is None else min(checks.whole("threads", threads), max_threads()),
         ledger=settings["ledger"],
         events=settings["events"],
         contacts=settings.get("contacts", False),
@@ -263,7 +263,7 @@ def about(path: str | Path) -> About:
         facts = header["facts"]
         return About(
             header["format"], header["particles"], facts["time"], facts["frames"], header["state_hash"], header["kernels"],
-            header["made_by"], header["scene"], header["world"], header["kernels"] == jit.sources_hash(),
+            header["made_by"], header["scene"], header["world"], header["kernels"] == sources_hash(),
         )  # fmt: skip
     except (KeyError, TypeError) as error:
         raise InputError(f"'{path}' lacks {error}; allowed is a file that pyverlet.save wrote") from None

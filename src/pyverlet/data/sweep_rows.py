@@ -15,7 +15,6 @@ import platform
 import socket
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from time import monotonic
 from typing import Any, BinaryIO
@@ -23,7 +22,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.compile import jit
+from pyverlet.core.sources import sources_hash
 from pyverlet.data.durable import replacing
 from pyverlet.data.sweep_plan import SCENE_FILE, Plan
 from pyverlet.ground import file_lock
@@ -41,8 +40,8 @@ def made_by() -> dict[str, str]:
     import pyverlet
 
     return {
-        "pyverlet": pyverlet.__version__, "numpy": np.__version__, "numba": version("numba"),
-        "python": platform.python_version(), "kernels": jit.sources_hash(),
+        "pyverlet": pyverlet.__version__, "numpy": np.__version__,
+        "python": platform.python_version(), "kernels": sources_hash(),
     }  # fmt: skip
 
 

@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.compile import jit
 from pyverlet.data.sweep_plan import Plan, Run, bare, plain
 from pyverlet.data.sweep_rows import made_by
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, Interrupted, PyverletError
+from pyverlet.ground.threads import max_threads
 
 Row = dict[str, Any]
 Task = list[Run]
@@ -134,7 +134,7 @@ def make(
         return
     own = executor is None
     if executor is None:
-        count = checks.whole("processes", jit.max_threads() if processes is None else processes)
+        count = checks.whole("processes", max_threads() if processes is None else processes)
         makes: Any = Here if count == 1 else lambda: _Pool(count)
         workers = count
     else:

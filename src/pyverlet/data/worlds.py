@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.compile import jit
 from pyverlet.data import archive, snapshot
 from pyverlet.data.crew import Crew, Keeper, Plan
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
+from pyverlet.ground.threads import max_threads
 from pyverlet.scenes import Scene, get
 from pyverlet.world.world import World
 
@@ -69,7 +69,7 @@ class Worlds(Shown):
         self.seed = checks.whole("seed", seed, least=0)
         settings = {"threads": 1} | settings
         if processes is None:
-            processes = max(min(jit.max_threads(), self._count // _WORTH_A_PROCESS), 1)
+            processes = max(min(max_threads(), self._count // _WORTH_A_PROCESS), 1)
         processes = checks.whole("processes", processes, most=self._count, most_is=", one for each world")
         first = self.scene.world(**settings, seed=seed_of(self.seed, 0))
         plan = Plan(self.scene, settings, self.seed, self._count, len(first), first.dtype.str)

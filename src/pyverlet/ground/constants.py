@@ -225,5 +225,11 @@ FRAME_BUDGET_MS: Final = 5.0
 LEAST_DRAWN_RADIUS: Final = 0.35
 """Pixels: smaller circles are drawn as large, four tenths of a pixel, or a few of them on a large picture could not be seen."""
 
+SURFACES: Final = 8
+"""Surfaces noted of a circle in a frame at most."""
+
+FIRST_OBSTACLE: Final = 16
+"""Number of the first obstacle as a surface; walls of the room have lower ones."""
+
 OBSTACLE_LINKS: Final = 65_536
 """Links the obstacles' grid has at most for a few large obstacles, 0.8 MB with its cells; each obstacle adds 64."""

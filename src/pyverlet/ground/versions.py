@@ -1,4 +1,4 @@
-"""The versions of what the engine is compiled by and kept in: those that were tried, and one sentence for others."""
+"""The versions of what the engine keeps its arrays in: those that were tried, and one sentence for others."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Final
 
 from pyverlet.ground import loading
 
-TRIED: Final = {"numpy": ((2, 0), (2, 5)), "numba": ((0, 61), (0, 69))}
+TRIED: Final = {"numpy": ((2, 0), (2, 5))}
 """By package: the first version that will do, and the first that nobody has tried."""
 
 

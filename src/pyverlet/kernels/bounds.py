@@ -14,7 +14,7 @@ import numpy as np
 
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
 from pyverlet.compile.rounding import rounded
-from pyverlet.ground.constants import FED, PUSHED
+from pyverlet.ground.constants import FED, PUSHED, SURFACES
 from pyverlet.kernels.beyond import beyond_box
 
 _CHUNK = 1024
@@ -25,9 +25,6 @@ REFLECTIONS = 8
 
 # What is noted of a circle in `fed`: a contact at rest has fed its velocity, a wall has touched it; in this substep, or the last.
 CARRIES, AT_WALL, CARRIED, WAS_AT_WALL = 1, 2, 4, 8
-
-SURFACES, FIRST_OBSTACLE = 8, 16
-"""Surfaces noted of a circle in a frame at most, and the number of the first obstacle; walls of the room have lower ones."""
 
 BOUNCED = 256
 """Bits of `Body.fed` from here on count how often the circle has bounced; they are not kept."""

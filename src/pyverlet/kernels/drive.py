@@ -110,7 +110,7 @@ def _drive(circles, forces, period_x, period_y, gx, gy, h, ahead, reference, squ
     """What `motion.leap` does after all forces have been asked: v += h a, x += h v, moved = x - origin.
 
     ahead: s, by which velocities are kicked for forces to see. reference, square: as for `motion.leap`.
-    function: what `compile.native` makes of the user's functions, for the time t, s; nothing if there are none.
+    function: what `laws.forces._native` makes of the user's functions, for the time t, s; nothing if there are none.
 
     Returns the largest acceleration, m/s^2, and whether anyone has strayed.
     """

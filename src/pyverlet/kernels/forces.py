@@ -120,7 +120,7 @@ def gravitational_potential(position, mass, softening, period_x, period_y):
 
 @parallel_kernel
 def call(function, force, position, velocity, mass, t):
-    """Have the user's function, as `compile.native` makes it, add to `force`; for how many particles that is not finite."""
+    """Have the user's function, as `laws.forces._native` makes it, add to `force`; for how many particles that is not finite."""
     wrong = 0
     for block in prange((mass.shape[0] + _BLOCK - 1) // _BLOCK):
         a, b = block * _BLOCK, min((block + 1) * _BLOCK, mass.shape[0])

@@ -22,7 +22,8 @@ import numpy as np
 
 from pyverlet.compile.bundle import bundle
 from pyverlet.compile.jit import kernel, parallel_kernel, prange
-from pyverlet.kernels.bounds import FIRST_OBSTACLE, hit_with, look, meet, moved, note, noted, put, wide
+from pyverlet.ground.constants import FIRST_OBSTACLE
+from pyverlet.kernels.bounds import hit_with, look, meet, moved, note, noted, put, wide
 from pyverlet.kernels.obstacles import first_link, search, tolerance
 
 MEETINGS, BOUNCES = 256, 8

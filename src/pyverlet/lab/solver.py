@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.compile import jit
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.laws.integrators import Integrator, PositionVerlet
@@ -90,18 +89,17 @@ def _solve(F: Acceleration, x: Floats, v: Floats, times: Floats, integrator: Int
     slots, forces = _slots(x, v), _Accelerations(F, x.shape)
     found.positions[0], found.velocities[0] = x, v
     h_last = None
-    with jit.one_thread():
-        for k, h in enumerate(map(float, np.diff(times))):
-            integrator.begin(slots, forces, times[k], h, h_last)
-            integrator.step(slots, forces, times[k], h)
-            integrator.end(slots, h)
-            found.positions[k + 1] = forces.shaped(slots.position)
-            found.velocities[k + 1] = forces.shaped(slots.velocity)
-            h_last = h
-            if not np.isfinite(slots.position).all():
-                component = int(np.flatnonzero(~np.isfinite(slots.position.ravel()))[0])
-                says = f"x has left the finite numbers at time {times[k + 1]:.6g}; steps are {h:g} long, shorter ones may do"
-                raise NonFiniteError(component, "integrate", float(times[k + 1]), says)
+    for k, h in enumerate(map(float, np.diff(times))):
+        integrator.begin(slots, forces, times[k], h, h_last)
+        integrator.step(slots, forces, times[k], h)
+        integrator.end(slots, h)
+        found.positions[k + 1] = forces.shaped(slots.position)
+        found.velocities[k + 1] = forces.shaped(slots.velocity)
+        h_last = h
+        if not np.isfinite(slots.position).all():
+            component = int(np.flatnonzero(~np.isfinite(slots.position.ravel()))[0])
+            says = f"x has left the finite numbers at time {times[k + 1]:.6g}; steps are {h:g} long, shorter ones may do"
+            raise NonFiniteError(component, "integrate", float(times[k + 1]), says)
     return found
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.constants import FIRST_OBSTACLE, SURFACES
 from pyverlet.kernels import events as kernels
-from pyverlet.kernels.bounds import FIRST_OBSTACLE, SURFACES
 from pyverlet.laws.obstacles import Course, Obstacle
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots

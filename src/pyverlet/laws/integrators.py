@@ -16,9 +16,12 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from pyverlet.kernels import drive, motion
-from pyverlet.state.moves import advance, leave
+from pyverlet.state.moves import advance
 from pyverlet.state.slots import Slots
+
+PASSES = 4
+"""Evaluations of functions that look at the velocity: each brings the one that they see nearer to that of the middle of the kick,
+(before + after) / 2, by h / 2 times what they change by with it. With that a force across the velocity does no work (Boris)."""
 
 
 class Forces(Protocol):
@@ -163,7 +166,7 @@ class _Stormer(Integrator):
     def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
         back = -0.5 * (h if h_last is None else h_last)
         # Pinned since the frame before: what is left of its fall would move it for ever.
-        if motion.take_up(state.velocity, state.acceleration, state.inverse_mass, state.real(back)):
+        if state.motion.kick_free(state.velocity, state.acceleration, state.inverse_mass, back):
             return
         fresh = np.isnan(state.acceleration[:, 0])
         # x_prev = x - v h + a h^2 / 2 makes u = v - a h / 2: order 2. The naive x_prev = x - v h makes u = v: order 1.
@@ -173,19 +176,19 @@ class _Stormer(Integrator):
         else:
             forces(state, t)
         state.acceleration[~fresh] = known[~fresh]
-        motion.clear_pinned(state.acceleration, state.inverse_mass)
+        state.motion.clear_pinned(state.acceleration, state.inverse_mass)
         advance(state.velocity, state.velocity, state.acceleration, back)
 
     def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
         # Forces that look at the velocity get the one at time t, not the one half a substep behind.
         ahead = 0.5 * h if forces.velocity_dependent else 0.0
-        for left in range(drive.PASSES - 1 if ahead and forces.functions else 0, -1, -1):
+        for left in range(PASSES - 1 if ahead and forces.functions else 0, -1, -1):
             if ahead:
                 _kick(state, ahead)
             forces.kick_drift(state, t, h if left == 0 else 0.0, ahead)
 
     def end(self, state: Slots, h: float) -> None:
-        leave(state, h)
+        _kick(state, 0.5 * h)
 
 
 class PositionVerlet(_Stormer):
@@ -245,7 +248,7 @@ class VelocityVerlet(Integrator):
         if forces.functions:
             half = state.scratch(1)
             advance(half, state.velocity, state.acceleration, -0.5 * h)
-            for _ in range(drive.PASSES - 1):
+            for _ in range(PASSES - 1):
                 forces(state, t + h)
                 advance(state.velocity, half, state.acceleration, 0.5 * h)
 

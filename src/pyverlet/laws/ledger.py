@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyverlet.kernels import measure
 from pyverlet.laws.forces import ForceSum, has_potential, soften
 from pyverlet.laws.links import Links
 from pyverlet.state.slots import Slots
@@ -198,7 +197,7 @@ class Page:
     def _look(self, lag: float, *, moved: bool = True, works: bool = True) -> _Instant:
         """Now. moved: whether positions may have changed since `_now`. works: whether the power of forces is asked for."""
         s, held = self._state, self._now.held
-        energy: float = measure.mechanical(
+        energy: float = s.motion.total_energy(
             s.position, s.velocity, s.acceleration, lag, s.spin, s.radius, s.mass, *self._gravity
         )  # fmt: skip
         if moved:

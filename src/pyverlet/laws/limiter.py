@@ -32,7 +32,6 @@ from numpy.typing import NDArray
 
 from pyverlet.core import unit
 from pyverlet.ground.constants import ONE_THREAD_BELOW, SLEEP_NEAR, SURPLUS
-from pyverlet.kernels import clusters, measure, taking
 from pyverlet.laws.forces import Drag, ForceSum, has_potential
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course
@@ -74,7 +73,7 @@ class Watch:
 
     def _mechanical(self, now: State | Slots, gravity: tuple[float, float]) -> float:
         moving, body = (now.position, now.velocity, now.velocity, 0.0), (now.spin, now.radius, now.mass)
-        return float(measure.mechanical(*moving, *body, *gravity))
+        return float(unit("motion", now.mass.dtype).total_energy(*moving, *body, *gravity))
 
     def _holds(self, now: State | Slots) -> tuple[float, float]:
         """Energy that forces hold, and links, J."""
@@ -92,7 +91,7 @@ class Watch:
             return self._mechanical(now, self._gravity) + sum(self._holds(now)) - self._energy
         then, motion = self._start, (now.position, now.velocity, now.spin, now.radius, now.mass)
         start = (then.position, then.velocity, then.spin, then.radius, then.mass)
-        return float(measure.gained(*start, *motion, *self._gravity))
+        return float(now.motion.energy_gained(start, motion, *self._gravity))
 
     def close(self, slots: Slots, contacts: Any) -> bool:
         """The frame is over: take back what has been gained too much.
@@ -141,18 +140,18 @@ class Watch:
         """Take so many J from those who have gained in this frame. (n,) bool: who had more than could be taken of motion."""
         start = self._start
         before, pull = self._pulls(slots)
-        then = taking.Bodies(start.position, start.velocity, start.spin, start.radius, start.mass)
-        now = taking.Bodies(slots.position, slots.velocity, slots.spin, slots.radius, slots.mass)
-        limits = taking.Limits(
-            surplus, self._dt, self._gravity, *slots.seam.period, bool(self._forces.forces), bool(self._kept), _ROUNDED,
+        then = start.position, start.velocity, start.spin, start.radius, start.mass
+        now = slots.position, slots.velocity, slots.spin, slots.radius, slots.mass
+        limits = (
+            surplus, self._dt, *self._gravity, *slots.seam.period, bool(self._forces.forces), bool(self._kept), _ROUNDED,
             float(np.finfo(slots.dtype).eps) / (slots.h * _ROUNDED),
         )  # fmt: skip
         lift, part, moved, lower = np.empty(len(slots)), np.empty(len(slots)), *np.empty((2, len(slots), 2))
-        taking.raised(then, now, slots.particle, before, pull, limits, lift, moved)
+        slots.motion.raise_of(then, now, slots.particle, before, pull, limits, lift, moved)
         share = self._links.gains(start.position, slots.where()) if self._links else np.zeros(0)
         root, inside = self._clusters(slots, listed, moved), self._was_inside()
-        about = taking.About(root, pull, slots.hits, slots.particle, inside, share)
-        more = taking.take(then, now, about, limits, lift, moved, lower, part)
+        about = root, pull, slots.hits, slots.particle, inside, share
+        more = slots.motion.take_energy(then, now, about, limits, lift, moved, lower, part)
         if slots.size is not slots.radius:
             slots.grown -= (part * (slots.grown - start.grown[slots.particle])).astype(slots.dtype)
             slots.resize()
@@ -228,12 +227,11 @@ class Watch:
     def _clusters(self, slots: Slots, listed: Listed, moved: Array) -> Array:
         """(n,) lowest slot of the cluster that each slot belongs to."""
         root = np.arange(len(slots))
-        period_x, period_y = slots.reals(*slots.seam.period)
-        bodies = (slots.position, moved.astype(slots.dtype), slots.size, period_x, period_y, slots.inverse_mass)
-        clusters.join_met(*bodies, *listed, slots.real(SLEEP_NEAR), root)
+        bodies = (slots.position, moved.astype(slots.dtype), slots.size, *slots.seam.period, slots.inverse_mass)
+        slots.motion.join_near_pairs(*bodies, listed, SLEEP_NEAR, root)
         if self._links:
-            clusters.join_rows(slots.slots_of(self._links.joined()), slots.inverse_mass, root)
-        clusters.settle(root)
+            slots.motion.join_rows(slots.slots_of(self._links.joined()), slots.inverse_mass, root)
+        slots.motion.settle(root)
         return root
 
 

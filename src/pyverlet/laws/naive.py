@@ -11,7 +11,6 @@ from typing import Any
 from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import naive
 from pyverlet.laws.rooms import Boundary, Box, Circle, Extent
 from pyverlet.state.slots import Slots
 
@@ -40,14 +39,12 @@ class Naive(Boundary):
         return self.room.restitution
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
-        room, real = self.room, state.real
-        kernel: Any = naive.box if isinstance(room, Box) else naive.circle
+        room = self.room
+        clamp: Any = state.motion.clamp_to_box if isinstance(room, Box) else state.motion.clamp_to_circle
         shape = (*room.lower, *room.upper) if isinstance(room, Box) else (*room.center, room.radius)
         state.resting[:] = 0
-        kernel(
-            *map(real, shape), state.position, state.velocity, state.radius, state.inverse_mass,
-            real(h), real(room.restitution), self._flip,
-        )  # fmt: skip
+        moving = state.position, state.velocity, state.radius, state.inverse_mass
+        clamp(*shape, *moving, h, room.restitution, self._flip)
 
     def extent(self) -> Extent:
         return self.room.extent()

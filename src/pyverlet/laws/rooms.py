@@ -1,14 +1,13 @@
 """Bounds: the room the particles live in.
 
-To add one: a class here or anywhere with `confine`, `extent`, `outside` and `check`, a kernel that calls `kernels.bounds.meet`
-for each wall, and a parameter in the tests of bounds.
+To add one: a class here or anywhere with `confine`, `extent`, `outside` and `check`, and a parameter in the tests of bounds.
+Walls that are to know of contacts, as those here do, are surfaces of the core (`world.impulse_materials.walls_of`).
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
@@ -17,17 +16,11 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.constants import STANDS_OUT
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import bounds, cage, frame, leaving, meetings
-from pyverlet.laws.turning import surface
 from pyverlet.state.seam import NONE, Seam
 from pyverlet.state.slots import Slots
 
 Array = NDArray[Any]
 Extent = tuple[float, float, float, float]
-
-
-NOWHERE = (0.0,) * 6
-"""The numbers of no walls."""
 
 
 class Boundary(ABC):
@@ -41,7 +34,16 @@ class Boundary(ABC):
 
     @abstractmethod
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
-        """Bounce or hold every circle that reaches beyond a wall. `lag`: seconds the velocity is behind the position."""
+        """After a substep of h seconds, bounce or hold every circle that reaches beyond a wall.
+
+        The rooms of this module are surfaces of the core instead, unless a class derives from them and has its own `confine`.
+
+        Args:
+            state: the circles, in the engine's order.
+            h: s.
+            lag: seconds the velocity is behind the position.
+            rest_speed: m/s; slower arrivals are held.
+        """
 
     @property
     def moves(self) -> bool:
@@ -52,17 +54,6 @@ class Boundary(ABC):
     def bounces(self) -> bool:
         """Whether its walls throw circles back: it has to be known who arrives, and who rests with the weight of others."""
         return bool(getattr(self, "restitution", 0.0) > 0.0)
-
-    def compiled(self, state: Slots) -> tuple[int, tuple[float, ...]] | None:
-        """What `confine` does: of the rooms of `kernels.frame`, and the six numbers of one; None: Python has to call it."""
-        return None
-
-    def walls(self) -> Sequence[float]:
-        """Its shape as seven numbers (`kernels.meetings`), so that obstacles push nobody through it; none, if it cannot say."""
-        return (meetings.OPEN, 0, 0, 0, 0, 0, 0)
-
-    def leave(self, state: Slots) -> None:
-        """At the end of a frame: note in `state.along` the acceleration that is left to those whom a wall holds."""
 
     def facing(self, position: Array) -> tuple[Array, Array] | None:
         """(k, w) distance of centres (k, 2) from each of its walls, m, and (k, w, 2) the unit normal of each into the room."""
@@ -92,11 +83,8 @@ class Boundary(ABC):
 class Open(Boundary):
     """No walls."""
 
-    def compiled(self, state: Slots) -> tuple[int, tuple[float, ...]] | None:
-        return (frame.OPEN, NOWHERE) if type(self) is Open else None
-
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
-        state.resting[:] = 0
+        pass
 
     def extent(self) -> None:
         return None
@@ -117,32 +105,16 @@ class _Walls(Boundary):
     def __init__(self, restitution: float, friction: float) -> None:
         self.restitution = checks.fraction("restitution", restitution)
         self.friction = checks.number("friction", friction, least=0.0)
-        self._given: tuple[Any, ...] = ()
-        self._shape: list[Any] = []
-        self._laws: list[Any] = []
 
-    def __getstate__(self) -> dict[str, Any]:
-        return vars(self) | {"_given": (), "_shape": [], "_laws": []}
+    def _law(self, h: float, lag: float, rest_speed: float, belt: float = 0.0) -> tuple[float, ...]:
+        """What `core.own_walls` asks of them; belt: m/s of their surface."""
+        return h, lag, self.restitution, self.friction, belt, rest_speed
 
-    def _confine(self, kernel: Any, shape: Sequence[float], state: Slots, h: float, lag: float, rest_speed: float) -> None:
-        shape, laws = self._rounded(shape, state, h, lag, rest_speed)
-        kernel(state.circles(), *shape, *laws)
 
-    def leave(self, state: Slots) -> None:
-        # Where there are obstacles it may be one of them that holds. Whom a wall rubs is not left all that drives it.
-        if len(state.along) or not leaving.anybody_slides(state.resting, state.friction, self.friction):
-            return
-        what, x0, y0, x1, y1 = map(float, self.walls()[:5])
-        state.along = np.empty_like(state.position)
-        about = (state.position, state.radius, state.friction, state.resting, state.acceleration)
-        leaving.note_along(what, x0, y0, x1, y1, self.friction, *about, state.along)
-
-    def _rounded(self, shape: Sequence[float], state: Slots, h: float, lag: float, rest_speed: float) -> tuple[Any, Any]:
-        """The numbers of `shape`, and h, lag, e, mu and rest_speed, in the dtype of the state."""
-        given = (state.real, shape, h, lag, self.restitution, self.friction, rest_speed)
-        if given != self._given:  # the same in all substeps of a frame, and rounding takes longer than the walls of a small world
-            self._given, self._shape, self._laws = given, [*map(state.real, shape)], [*map(state.real, given[2:])]
-        return self._shape, self._laws
+def _bodies(state: Slots) -> tuple[tuple[Array, ...], Array, Array]:
+    """What `core.own_walls` asks of circles."""
+    moving = state.position, state.velocity, state.acceleration, state.spin
+    return (*moving, state.radius, state.restitution, state.friction), state.inverse_mass, state.hits
 
 
 class Circle(_Walls):
@@ -174,21 +146,9 @@ class Circle(_Walls):
     def moves(self) -> bool:
         return self.angular_velocity != 0.0 and self.friction > 0.0
 
-    def walls(self) -> Sequence[float]:
-        # Whom an obstacle pushes to a wall that turns is held there, and rubbed where the wall itself is met.
-        return (meetings.ROUND, *self.center, self.radius, 0.0, self.restitution, 0.0 if self.moves else self.friction)
-
-    def compiled(self, state: Slots) -> tuple[int, tuple[float, ...]] | None:
-        if type(self) is not Circle or self.moves:
-            return None
-        if self.restitution == 0.0 == self.friction and state.smooth:  # then its walls take nothing that an account would note
-            return frame.SMOOTH_CAGE, (*self.center, self.radius, 0.0, 0.0, 0.0)
-        return frame.CAGE, (*self.center, self.radius, 0.0, self.restitution, self.friction)
-
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
-        speed = self.angular_velocity * self.radius
-        with surface(state, speed, h) if self.moves else nullcontext():
-            self._confine(cage.confine, (*self.center, self.radius), state, h, lag, rest_speed)
+        law = self._law(h, lag, rest_speed, self.angular_velocity * self.radius)
+        state.motion.confine_to_circle(*self.center, self.radius, *_bodies(state), law)
 
     def facing(self, position: Array) -> tuple[Array, Array]:
         way = self.center - position.astype(np.float64)
@@ -241,15 +201,8 @@ class Box(_Walls):
         if not (self.lower[0] < self.upper[0] and self.lower[1] < self.upper[1]):
             raise InputError(f"upper is {self.upper}; allowed is a corner above and to the right of lower, {self.lower}")
 
-    def walls(self) -> Sequence[float]:
-        return (meetings.RECTANGLE, *self.lower, *self.upper, self.restitution, self.friction)
-
-    def compiled(self, state: Slots) -> tuple[int, tuple[float, ...]] | None:
-        shape = (*self.lower, *self.upper, self.restitution, self.friction)
-        return (frame.FOUR_WALLS, shape) if type(self) is Box else None
-
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
-        self._confine(bounds.box, (*self.lower, *self.upper), state, h, lag, rest_speed)
+        state.motion.confine_to_box(*self.lower, *self.upper, *_bodies(state), self._law(h, lag, rest_speed))
 
     def facing(self, position: Array) -> tuple[Array, Array]:
         """Its walls are, in this order, the left, the right, the floor and the ceiling."""
@@ -324,21 +277,9 @@ class Periodic(_Walls):
             *((-inf, y0, inf, y1) if self.axes == "x" else (x0, -inf, x1, inf) if self.axes == "y" else (-inf, -inf, inf, inf)),
         )
 
-    def walls(self) -> Sequence[float]:
-        return (meetings.RECTANGLE, *self._box, self.restitution, self.friction)
-
-    def compiled(self, state: Slots) -> tuple[int, tuple[float, ...]] | None:
-        if type(self) is not Periodic:
-            return None
-        if self.axes == "xy":
-            return frame.OPEN, NOWHERE
-        return frame.FOUR_WALLS, (*self._box, self.restitution, self.friction)
-
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
-        if self.axes == "xy":
-            state.resting[:] = 0
-        else:
-            self._confine(bounds.box, self._box, state, h, lag, rest_speed)
+        if self.axes != "xy":
+            state.motion.confine_to_box(*self._box, *_bodies(state), self._law(h, lag, rest_speed))
 
     def facing(self, position: Array) -> tuple[Array, Array] | None:
         """Numbered as the walls of a `Box`: left, right, floor, ceiling."""

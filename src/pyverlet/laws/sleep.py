@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.constants import SLEEP_AFTER_S, SLEEP_NEAR, SLEEP_SPEED
-from pyverlet.kernels import sleep as kernels
 from pyverlet.laws.forces import Drag
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
@@ -56,7 +55,7 @@ class Sleep:
         edited = np.zeros(len(slots), np.uint8)
         given = tuple(getattr(state, name) for name in (*ROWS[:2], "spin", *SET, *MARKS))
         held = tuple(getattr(slots, name) for name in (ROWS[0], *SET, *MARKS))
-        found = kernels.find_edited(given, held, slots.particle, slots.island, edited)
+        found = slots.motion.find_edited(given, held, slots.particle, slots.island, edited)
         if slots.is_new:  # some have been removed
             number, left = np.unique(slots.island, return_counts=True)
             fewer = [k for k, n in zip(number.tolist(), left.tolist(), strict=True) if n != self._members.get(k, n)]
@@ -79,24 +78,20 @@ class Sleep:
         if not self._members:
             return False
         touched = np.zeros(len(slots), np.uint8)
-        (period_x, period_y), which = slots.reals(*slots.seam.period), pairs.listed()
-        if not kernels.touch(slots.position, slots.size, period_x, period_y, slots.island, *which, touched):
+        about = slots.position, slots.size, *slots.seam.period, slots.island
+        if not slots.motion.touch(*about, pairs.listed(), touched):
             return False
         return self._wake(slots, np.isin(slots.island, slots.island[touched == 1]))
 
     def end(self, slots: Slots, pairs: Any, dt: float, gravity: float) -> bool:
         """At the end of a frame: let islands that have been calm long enough fall asleep. Whether there were any."""
-        real = slots.real
-        limit = real(SLEEP_SPEED**2 * gravity)
         awake = (slots.velocity, slots.spin, slots.radius, slots.inverse_mass, slots.island)
-        tired = kernels.count_calm(*awake, limit, np.float32(dt), np.float32(SLEEP_AFTER_S), slots.calm)
+        tired = slots.motion.time_at_rest(*awake, SLEEP_SPEED**2 * gravity, dt, SLEEP_AFTER_S, slots.calm)
         if self._laws is None or not tired:
             return False
         root = np.empty(len(slots), np.int64)
-        which = pairs.listed()
-        period_x, period_y = slots.reals(*slots.seam.period)
-        bodies = (slots.position, slots.size, period_x, period_y, slots.inverse_mass, slots.calm)
-        kernels.find_islands(*bodies, *which, real(SLEEP_NEAR), np.float32(SLEEP_AFTER_S), root)
+        bodies = (slots.position, slots.size, *slots.seam.period, slots.inverse_mass, slots.calm)
+        slots.motion.find_islands(*bodies, pairs.listed(), SLEEP_NEAR, SLEEP_AFTER_S, root)
         sleeper = root >= 0
         if not sleeper.any():
             return False

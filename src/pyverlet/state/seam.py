@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.kernels import seam as kernels
+from pyverlet import core
 
 Array = NDArray[Any]
 
@@ -50,12 +50,12 @@ class Seam(NamedTuple):
         if not self:
             return position
         out = np.empty_like(position)
-        kernels.wrap(position, *map(position.dtype.type, self), out)
+        core.unit("motion", position.dtype).wrap(position, *self, out)
         return out
 
     def wrap(self, position: Array) -> None:
         """Put these places (n, 2) inside the room."""
-        kernels.wrap(position, *map(position.dtype.type, self), position)
+        core.unit("motion", position.dtype).wrap(position, *self, position)
 
     def entered(self, position: Array, heading: Array) -> Array:
         """(n, 2) places at the rim of the room, m, but at the side where `heading` (n, 2) leads into it."""
@@ -76,7 +76,7 @@ class Seam(NamedTuple):
 
     def follow(self, position: Array, reference: Array) -> None:
         """These places (n, 2) become the images nearest to `reference` (n, 2)."""
-        kernels.follow(position, reference, *map(position.dtype.type, self.period))
+        core.unit("motion", position.dtype).follow(position, reference, *self.period)
 
 
 NONE = Seam()

@@ -11,12 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.compile.bundle import hold
-from pyverlet.compile.rows import WIDTH
-from pyverlet.compile.stealing import Claims
+from pyverlet import core
 from pyverlet.ground import memory
-from pyverlet.kernels import motion, tables
-from pyverlet.kernels.bounds import SURFACES
+from pyverlet.ground.constants import SURFACES
 from pyverlet.state import seam
 from pyverlet.state.state import COLUMNS, EVERYONE, MARKS, ROWS, SET, State
 from pyverlet.state.unchanged import Unchanged
@@ -34,7 +31,7 @@ class Slots:
 
     Attributes:
         real: rounds a number to the dtype; it remembers some, for NumPy takes longer to round one than a kernel to be called.
-        reals: the same of several at once. claims: for kernels whose threads claim what they do.
+        reals: the same of several at once.
         particle: (n,) the user's index of the particle in each slot.
         position, velocity, acceleration, spin, radius, mass, grown, restitution, friction: as in State.
         category, mask: as in State, or empty while every circle collides with every other.
@@ -70,13 +67,17 @@ class Slots:
         self._kept: dict[str, Array] = {}
         self.drop, self.lean, self.total_mass, self.pins, self.taken, self.worked, self.given = 1.0, 0.0, 0.0, False, 0.0, 0.0, 0
         self.h = 0.0
-        self.claims = Claims()
-        self._none = tuple(np.empty(shape, dtype) for shape in (0, (0, 2), (0, WIDTH)))
         self._circles: Any = None
+        self._claims: Any = None
         self._resize(0)
 
     def __len__(self) -> int:
         return len(self.radius)
+
+    @property
+    def motion(self) -> Any:
+        """The unit of the core that moves particles, for this dtype."""
+        return core.unit("motion", self.dtype)
 
     def _resize(self, count: int) -> None:
         """Room for `count` particles: those of `_kept`, as they stood, and behind them the new ones."""
@@ -117,7 +118,6 @@ class Slots:
     restitution: Array
     friction: Array
     inverse_mass: Array
-    rows: Any = motion  # who copies rows from and to the user's order: the old kernels or, under the law of impulses, the core
     seam = seam.NONE  # in a periodic room positions run on beyond it within a frame
     fed: Array
     island: Array
@@ -151,10 +151,10 @@ class Slots:
         self.seam = state.seam
         given = (state.position, state.velocity, state.acceleration, state.spin)
         if not self._given_back.recall(given):  # a user who has changed nothing need not wait for it to be copied again
-            self.rows.take_motion(self.position, self.velocity, self.acceleration, self.spin, *given, self.particle)
+            self.motion.take_motion(self.position, self.velocity, self.acceleration, self.spin, *given, self.particle)
         # What seldom changes is compared in the user's order, where neighbours in memory need no index.
         now = (state.radius, state.mass, state.restitution, state.friction, state.category, state.mask)
-        if self._grows or self.size is not self.radius or self.rows.any_differs(*(*self._given.values(), *now)):
+        if self._grows or self.size is not self.radius or self.motion.any_differs(*(*self._given.values(), *now)):
             return self._take_given(state)
         return False
 
@@ -164,7 +164,7 @@ class Slots:
         changed = self._changed
         for name in _GIVEN:
             given, now = self._given[name], getattr(state, name)
-            changed |= name in _LISTED and (self.rows.differs(given, now) if name not in MARKS else not _equal(given, now))
+            changed |= name in _LISTED and _differs(given, now)
             self._given[name] = (now[:1] if (now == now[:1]).all() else now).copy()
         for name in (*SET, "grown"):
             memory.take(self._given.get(name, state.grown), self.particle, getattr(self, name))  # one number, if that of all
@@ -233,10 +233,8 @@ class Slots:
 
     def scatter(self, state: State, dt: float) -> None:
         """Copy what a frame of dt seconds changes back to the user's arrays."""
-        if self.seam and self.rows is motion:
-            self.seam.wrap(self.position)
         given, moved = (state.position, state.velocity, state.acceleration, state.spin), (self.position, self.velocity)
-        self.rows.put_motion(*moved, self.acceleration, self.spin, *given, state.angle, 0.5 * dt, self.particle)
+        self.motion.put_motion(*moved, self.acceleration, self.spin, *given, state.angle, 0.5 * dt, self.particle)
         self._given_back.remember(given)
         self._grows |= self.size is not self.radius  # some may have been found on top of others since the gathering
         if self._grows:
@@ -245,7 +243,7 @@ class Slots:
     def where(self) -> Array:
         """(n, 2) the positions of now in the user's order, m."""
         position = np.empty_like(self.position)
-        motion.put_rows(position, self.position, self.particle)
+        position[self.particle] = self.position
         return position
 
     def in_users_order(self) -> State:
@@ -263,7 +261,7 @@ class Slots:
         spare = memory.empty(self.position.shape, self.dtype)
         for name in ROWS:
             old = getattr(self, name)
-            np.take(old, order, axis=0, out=spare, mode="clip")
+            np.take(old, order, axis=0, out=spare, mode="clip")  # any other mode fills a copy
             setattr(self, name, spare)
             spare = old
         alike = {name for name, given in self._given.items() if len(given) == 1}  # for all: any order is as good
@@ -278,7 +276,7 @@ class Slots:
 
     def save(self, state: State) -> dict[str, Array]:
         """What outlives a frame here, not in the user's arrays: the order, who carried weight, who sleeps; if lists are void."""
-        void = self._changed or any(motion.differs(self._given[name], getattr(state, name)) for name in _LISTED)
+        void = self._changed or any(_differs(self._given[name], getattr(state, name)) for name in _LISTED)
         columns = {name: getattr(self, name).copy() for name in ("particle", *_REMEMBERED)}
         return columns | {"void": np.array([void or len(state) != len(self)])}
 
@@ -289,17 +287,6 @@ class Slots:
         self.gather(state)
         if saved["void"][0]:  # the next frame is to find that out, too
             self._changed = self._grows = True
-
-    def circles(self) -> Any:
-        """What walls and obstacles need of the particles: `kernels.tables.Circles`, of which that for contacts is empty."""
-        none, rows, wide = self._none
-        arrays = (
-            self.position, self.velocity, self.acceleration, self.inverse_mass, rows, rows, self.resting, self.spin, none,
-            self.fed, wide, self.turn, self.lift, none, self.start, self.radius, self.restitution, self.friction, self.hits,
-            self.spent, self.impacts, rows, none, none, none, none, rows,
-        )  # fmt: skip
-        self._circles = hold(tables.Circles, arrays, self._circles)
-        return self._circles
 
     def scratch(self, number: int) -> Array:
         """An (n, 2) array for use within one substep; its contents are left over from whoever used it last."""
@@ -324,6 +311,6 @@ class Slots:
         return self._slot_of[particles]
 
 
-def _equal(given: Array, now: Array) -> bool:
-    """Whether two columns are the same; one number stands for equal ones."""
-    return len(given) in (1, len(now)) and bool((given == now).all())
+def _differs(given: Array, now: Array) -> bool:
+    """Whether two columns differ anywhere; one number stands for equal ones."""
+    return len(given) not in (1, len(now)) or bool((given != now).any())

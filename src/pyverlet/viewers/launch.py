@@ -59,7 +59,7 @@ def serve(
         exhibit = Exhibit.of(build(), title)
         session = Session(exhibit, dt=dt, repertoire=repertoire, stage=stage)
         if draws_here(session.latest.shape):
-            Artist().jpeg(session.latest, Look())  # no tab shall wait for what its libraries load
+            Artist().jpeg(session.latest, Look())  # loads what it needs: no tab shall wait for that
         with on_air(session, listener, only_loopback=host in LOOPBACK_NAMES), _ended_by_signals(session):
             url = address(host, listener)
             announce(title, url, host, open_browser)

@@ -1,8 +1,7 @@
 """The narrow door between a world and whoever watches it: commands go in, frames come out.
 
 A session owns the worlds, their clock and the one thread that steps them, the physics thread: the caller's (`run`, `turn`) or one
-of its own (`start`). The compiled kernels' workers do not stand several callers. It knows nothing of how commands arrive or where
-frames go.
+of its own (`start`). It knows nothing of how commands arrive or where frames go.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.compile import jit
 from pyverlet.ground import checks
 from pyverlet.ground.constants import FRAME_BUDGET_MS
 from pyverlet.ground.errors import PyverletError
@@ -41,11 +39,6 @@ _log = logging.getLogger(__name__)
 
 MAX_CATCH_UP = 4
 """Late frames made up for at once; more are dropped and counted. A world that is too slow runs slow, smoothly."""
-
-_COMPILING = "compiling what this needs, once"
-
-_LONG_S = 5.0
-"""Seconds after which those that wait for a picture between two substeps are told what keeps it."""
 
 IDLE_S = 0.1
 """Longest nap while nothing moves: on some systems Ctrl-C waits for it to end."""
@@ -90,7 +83,7 @@ class Session(Door):
         self._complaint: str | None = None
         self._before: list[NDArray[np.float32]] | None = None
         self._shape: Shape
-        self._seq, self._begun, self._began = 0, 0, 0.0
+        self._seq = self._begun = 0
         self._rhythm, self._last = Rhythm(), time.perf_counter()
         self._enter(Exhibit.of(world, title))
         self.latest: Frame = self._picture()
@@ -99,13 +92,9 @@ class Session(Door):
     # -- the physics thread -------------------------------------------------------------------------------------------
 
     def run(self) -> None:
-        """Run in the calling thread until somebody calls `stop`; afterwards the world is the caller's again.
-
-        Prefer this where the world has been stepped before: OpenMP keeps a team of workers for each thread that ever called
-        a parallel kernel, and with two teams alive every frame takes twice as long.
-        """
+        """Run in the calling thread until somebody calls `stop`; afterwards the world is the caller's again."""
         self._last = time.perf_counter()
-        with self._errands.by_this_thread(), jit.watch_compiling(self._wait_for_compiling):
+        with self._errands.by_this_thread():
             while not self._stopping.is_set():
                 wait = self.turn()
                 if self._held():
@@ -149,23 +138,12 @@ class Session(Door):
             return now + self._dt - time.perf_counter()
         return now + (1.0 - self._clock.alpha) * self._dt - time.perf_counter()
 
-    def _wait_for_compiling(self) -> None:
-        """In the middle of a frame, after a setting was changed: for seconds nothing moves.
-
-        It is said with the picture that viewers have. Those of a slow world, who expect the next one in the middle of this frame,
-        are told only if that takes long: a moment is not published twice for a kernel of a second.
-        """
-        waits_long = time.perf_counter() - self._began > _LONG_S
-        if self._errands.here and self._busy is None and (waits_long or not self._wanted()):
-            self._say_busy(_COMPILING)
-
     def _held(self) -> bool:
         return self._paused or self._error is not None
 
     def _advance(self) -> None:
         """One frame. An error stops the stepping, not the session: the page stays readable and Reset works."""
         began, self._begun = time.perf_counter(), self._seq
-        self._began = began
         # With the frame before in mind: what is late by more than a picture is shown on its way.
         self._late = self._gauges.budget.last_ms * self._speed > 1000.0 * max(self._dt, PICTURE_S)
         self._before = self._stage.look()[0] if self._speed < 1.0 and not self._late else None
@@ -182,8 +160,6 @@ class Session(Door):
         else:
             self._gauges.budget.record(1000.0 * (time.perf_counter() - began))
             self._gauges.passed(float(self._stage.panels.time))
-        finally:
-            self._busy = None if self._busy == _COMPILING else self._busy
 
     def _obey_next(self) -> None:
         """Wait for a command and obey it and all behind it."""

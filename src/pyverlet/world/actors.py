@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.core import unit
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
-from pyverlet.kernels import placing
 from pyverlet.laws.rooms import Boundary, Box, Circle
 
 if TYPE_CHECKING:
@@ -124,8 +124,8 @@ class Emitter(Actor):
         places, sizes, near = places[allowed], sizes[allowed], self._near(world)
         taken = np.zeros(len(places), bool)
         there = world.position[near].astype(np.float64), world.radius[near].astype(np.float64)
-        period_x, period_y = map(float, world.boundary.seam.period)
-        found = int(placing.free_places(places, sizes, *there, period_x, period_y, wanted, taken))
+        mark = unit("motion", np.float64).mark_free_places
+        found = int(mark(places, sizes, *there, *world.boundary.seam.period, wanted, taken))
         if found:
             weight = {"mass": self.mass, "density": self.density}
             world.add(position=places[taken], velocity=self.velocity, radius=sizes[taken], **weight)  # type: ignore[arg-type]

@@ -11,8 +11,8 @@ import inspect
 from functools import cache
 from typing import Any
 
-from pyverlet.compile import jit
 from pyverlet.ground import pickling
+from pyverlet.ground.threads import max_threads
 from pyverlet.laws.obstacles import Course
 from pyverlet.world import parts as apart
 from pyverlet.world.saved import INTO
@@ -65,7 +65,7 @@ def check(world: World) -> None:
 def take_up(world: World, given: dict[str, Any]) -> None:
     """Make of an object that has nothing yet the world of these `contents`, whose objects are its own from now on."""
     options, objects = given["settings"], given["objects"]
-    most = jit.max_threads()
+    most = max_threads()
     World.__init__(world, **options | {"threads": options["threads"] and min(options["threads"], most)})
     world._state = given["particles"]
     world.links, world.forces, world.obstacles = objects["links"], objects["forces"], objects["obstacles"]

@@ -27,7 +27,6 @@ class ImpulseArrays:
     """An engine of the core, and the arrays that it works on: those of the slots, and those that outlive a frame.
 
     Attributes:
-        core: the unit of the core in this precision.
         engine: steps particles; see `core.engine_object`.
         kick, h: seconds of acceleration of the last substep, and its length; 0 before the first.
         hertz, finer: frequency of the springs of contacts, and for how long, s, a higher one would have been possible.
@@ -40,8 +39,7 @@ class ImpulseArrays:
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self._dtype = dtype
-        self.core = core.unit("engine", dtype)
-        self.engine: Any = self.core.Engine(1)
+        self.engine: Any = core.unit("engine", dtype).Engine(1)
         self.parts = 1
         self._room: Any = None
         self._obstacles = ObstacleRows()

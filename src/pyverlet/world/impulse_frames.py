@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.core import unit
 from pyverlet.ground.constants import REST_ACCELERATIONS, SURPLUS
 from pyverlet.ground.errors import NonFiniteError
 from pyverlet.laws.impulse_ledger import ImpulsePage
@@ -25,6 +26,7 @@ from pyverlet.world.impulse_links import ImpulseLinks
 from pyverlet.world.impulse_materials import knows
 from pyverlet.world.impulse_memory import Memory
 from pyverlet.world.impulse_notes import ImpulseNotes
+from pyverlet.world.own_walls import OwnWalls
 
 Array = NDArray[Any]
 
@@ -94,7 +96,6 @@ class ImpulseFrames:
         Raises:
             NonFiniteError: a particle turned NaN or infinite.
         """
-        world._slots.rows = self.held.core
         world._slots.clear_notes()
         self.links.keep_apart(world, self.held.engine)
         if world._gather():
@@ -112,7 +113,7 @@ class ImpulseFrames:
         by_core = kicks(world.integrator)
         h, half = dt / substeps, world.integrator.velocity_lag if by_core else 0.5
         before = self.held.h if self.held.kick else 0.0
-        own_walls = None if knows(world.boundary) else world.boundary.confine
+        own_walls = None if knows(world.boundary) else OwnWalls(world.boundary)
         alone = by_core and not (forces.forces or own_walls)
         limited = bool(collisions and len(world) > 1) or bool(world.obstacles)
         watch = watched(world, dt / world.substeps, None) if limited and (forces.forces or world.links) else None
@@ -170,13 +171,13 @@ class ImpulseFrames:
             if not by_core:
                 self._flight.end(state, self.held.gave, self.held.gave_spin, h / self.held.kick)
             if own_walls:
-                page.confined(own_walls, h, lag, 0.0) if page else own_walls(state, h, lag, 0.0)
+                own_walls.confine(state, page, h, lag, forces.strongest)
             if page:
                 page.moved(lag, self.held.gave, self.held.kick)
             world._show(step * h, half * h if by_core else 0.0) if step < substeps else None
         self.held.h = h
         if not alone:
-            self._end(world, dt, half * h if by_core else 0.0)
+            self._end(world, dt, half * h if by_core else 0.0, own_walls)
         engine.show_links(half * h, self.held.kick)
         if (not finite or not alone) and first_non_finite(state) >= 0:
             return False
@@ -206,7 +207,7 @@ class ImpulseFrames:
         state = world._slots
         if watch is None and not world.forces and not world.links:
             start, (gx, gy) = world._state, world.gravity
-            gained = self.held.core.energy_gained(
+            gained = state.motion.energy_gained(
                 (start.position, start.velocity, start.spin, start.radius, start.mass),
                 (state.position, state.velocity, state.spin, state.radius, state.mass), gx, gy,
             )  # fmt: skip
@@ -260,18 +261,24 @@ class ImpulseFrames:
             forces(state, world.time + since)
         state.velocity[:] = velocity
 
-    def _end(self, world: Any, dt: float, half: float) -> None:
+    def _end(self, world: Any, dt: float, half: float, own_walls: OwnWalls | None) -> None:
         """Velocities that belong to the positions, and the accelerations of now."""
         state, by_contacts = world._slots, self.held.gave / self._dtype.type(self.held.kick)
         if half:
             self._evaluate(world, dt, half)
             state.velocity += state.real(half) * (state.acceleration + by_contacts)
             state.spin += self.held.gave_spin * state.real(half / self.held.kick)
+            if own_walls:
+                part = state.real(half / self.held.kick)
+                state.velocity += part * own_walls.gave
+                state.spin += part * own_walls.gave_spin
         state.acceleration += by_contacts
 
     def _moves(self, state: Any, strongest: float) -> bool:
         """Whether particles are on the way, and not at rest under an acceleration of so many m/s^2."""
-        motion = self.held.core.energies(state.position, state.velocity, state.spin, state.radius, state.mass, 0.0, 0.0)[0]
+        motion = unit("engine", self._dtype).energies(
+            state.position, state.velocity, state.spin, state.radius, state.mass, 0.0, 0.0
+        )[0]
         return bool(motion > 0.5 * MOVING**2 * strongest * self.held.mean_radius * state.total_mass)
 
     def _stiffen(self, state: Any, h: float, dt: float, strongest: float) -> None:

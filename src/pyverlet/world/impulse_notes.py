@@ -25,6 +25,8 @@ class ImpulseNotes:
         state, arrays = self._state, self._engine.arrays
         first, count, i, j = self._engine.pairs()
         lane = np.concatenate([np.zeros(0, np.int64), *(np.arange(f, f + c) for f, c in zip(first, count, strict=True))])
+        if not len(lane):  # a world of one circle has no arrays of pairs
+            return
         push, rub = weigh * arrays["impulse"][lane].astype(float), weigh * arrays["tangent_impulse"][lane].astype(float)
         struck = arrays["struck"][:, lane].astype(float)
         given = (push != 0) | (rub != 0) | struck.any(axis=0)

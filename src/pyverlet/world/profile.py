@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from time import perf_counter
 
 import numpy as np
-
-from pyverlet.kernels import frame
 
 _ROOM = 64
 """Stages that have a place at most, and one more."""
@@ -15,18 +14,20 @@ _ROOM = 64
 class Profile:
     """Milliseconds by stage, of the last frame (`stages`) and since the start (`total_ms`).
 
+    Args:
+        stages: those that compiled code notes by itself, in the first places of `spent`.
+
     `world.step` calls `begin`, then `mark(stage)` at the end of each stage, then `end`. Only seconds are summed meanwhile: frames
     of small worlds are not much longer than what it takes to make a table of them.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, stages: Sequence[str] = ()) -> None:
         self.frame_ms = 0.0
         self.frames = 0
         self.rebuilds = 0
         self._start = 0.0
         self._broken_off = False
-        # Compiled code notes its stages (`compile.clock.note`) in the first places.
-        self._places = {stage: place for place, stage in enumerate(frame.STAGES, 1)}
+        self._places = {stage: place for place, stage in enumerate(stages, 1)}
         self._spent = np.zeros(_ROOM)  # s, of the frame that is under way, by place; the first is when the last stage ended
         self._complete = np.zeros(_ROOM)  # of the last complete frame
         self._total = np.zeros(_ROOM)  # of all of them
@@ -50,7 +51,7 @@ class Profile:
 
     @property
     def spent(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-        """Where compiled code notes the time of its stages: `kernels.frame.STAGES`."""
+        """Where compiled code notes the time of its stages."""
         return self._spent
 
     def end(self) -> None:

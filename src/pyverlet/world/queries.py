@@ -13,12 +13,10 @@ from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import count
 from pyverlet.ground.turns import Shared, of_one_frame
-from pyverlet.kernels import grid, motion
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import State
 from pyverlet.world.images import PERIODS, Images, left_in_room
 
-_grid: Any = grid
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
@@ -248,10 +246,10 @@ def _pieces(start: Floats, heading: Floats, far: Floats, seam: Seam) -> Iterator
 def _sorted(position: NDArray[Any], questions: int) -> tuple[Any, ...]:
     """Cells over all centres with about one particle in each, as the kernels take them; one for all where that is cheaper."""
     member = np.arange(len(position))
-    if motion.first_non_finite(position) >= 0:
+    if unit("motion", position.dtype).first_non_finite(position) >= 0:
         member = np.flatnonzero(np.isfinite(position).all(axis=1))
         position = position[member]
-    x0, y0, x1, y1 = map(float, grid.extent(position))
+    x0, y0, x1, y1 = unit("tools", position.dtype).extent(position)
     width, height = x1 - x0, y1 - y0
     if questions <= FEW:
         return x0, y0, max(width, height) or 1.0, 1, 1, np.array([0, len(member)]), member
@@ -259,10 +257,8 @@ def _sorted(position: NDArray[Any], questions: int) -> tuple[Any, ...]:
     cell = max(np.sqrt(width * height / count), max(width, height) / count) or 1.0
     columns, rows = int(width / cell) + 1, int(height / cell) + 1
     number, start = np.empty(len(member), np.int32), np.empty(columns * rows + 2, np.int64)
-    # In float64, as the questions are: rounded another way, a particle might not be found in its cell.
-    _grid.count_cells(position.astype(np.float64), x0, y0, 1 / cell, columns, rows, number, start)
-    order = np.empty(len(member), np.int32)
-    _grid.sort_by_cell(number, start, order)
+    order = np.empty(len(member), np.int64)
+    unit("tools", position.dtype).sort_into_cells(position, x0, y0, 1 / cell, columns, rows, number, start, order)
     return x0, y0, cell, columns, rows, start, member[order]
 
 

@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections import deque
 from math import inf, sqrt
 
-from pyverlet.compile import jit
-
 _RUN = 8
 """Frames of a trial. The slowest is left out: the first one finds nothing in its caches, and a machine has its moments."""
 
@@ -64,9 +62,8 @@ class Team:
         self._now = self._other = 0  # places in `_steps`: of the number in use, and of one on trial, if another
 
     def gather(self, most: int, frame_ms: float) -> None:
-        """Have the kernels of the next frame use as many as seem best."""
+        """Have the next frame use as many as seem best."""
         self.now = self.size(most, frame_ms)
-        jit.use_threads(self.now, most)
 
     def size(self, most: int, frame_ms: float) -> int:
         """Threads for the next frame, `most` at most; frame_ms is what the last one took, 0 if there was none, or none

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from pyverlet.compile import jit
 from pyverlet.ground import checks
 from pyverlet.ground.constants import ALL_THREADS_FROM, MOST_SUBSTEPS, ONE_THREAD_BELOW, STANDARD_GRAVITY
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.threads import max_threads
 from pyverlet.ground.turns import in_turn
 from pyverlet.laws.coarse import Coarse
 from pyverlet.laws.collisions import Collisions
@@ -235,13 +235,12 @@ class World(Measures, Queries, Doors):
     def threads(self) -> int:
         """Threads the parallel stages use at most, fewer where these do not gain: the result is the same for any number."""
         if self._threads is None:
-            return jit.max_threads() if len(self) >= ALL_THREADS_FROM else 1
+            return max_threads() if len(self) >= ALL_THREADS_FROM else 1
         return self._threads if len(self) >= ONE_THREAD_BELOW else 1
 
     @threads.setter
     def threads(self, value: int | None) -> None:
-        most = jit.max_threads()
-        self._threads = None if value is None else checks.whole("threads", value, most=most, most_is=" (the cores here)")
+        self._threads = None if value is None else checks.whole("threads", value, most=max_threads(), most_is=" (the cores here)")
 
     # ---- save and restore ----------------------------------------------------------------------------------------------
 

@@ -26,9 +26,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.compile import jit
 from pyverlet.data import snapshot
 from pyverlet.ground.errors import InputError, NonFiniteError
+from pyverlet.ground.threads import max_threads
 from pyverlet.lab.fuzz.explained import of_rounding, rolled, rounded, stored
 from pyverlet.lab.fuzz.program import Build, Deed
 from pyverlet.lab.physics.energy import MOST, scale
@@ -111,7 +111,7 @@ def _check(build: Build, deed: Deed, frames: int, dt: float, made: frozenset[str
     if "contacts" in made:
         _compare_contacts(world, frames)
     if "bits" in made:
-        other = build(min(2, jit.max_threads()))
+        other = build(min(2, max_threads()))
         _run(other, deed, range(frames), dt)
         _same("bits", frames, end, other.state_hash())
     if not _silent(deed, range(half, frames)):

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from functools import reduce
-from typing import Any, NamedTuple, Protocol, TypeGuard, TypeVar, runtime_checkable
+from typing import Any, Protocol, TypeGuard, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.compile.native import both
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import listed
-from pyverlet.kernels import forces as kernels
-from pyverlet.kernels.drive import PASSES
+from pyverlet.laws.integrators import PASSES
 from pyverlet.state.moves import advance, newton, newton_kick_drift
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
@@ -37,20 +34,6 @@ class Conservative(Protocol):
 def has_potential(force: Any) -> TypeGuard[Conservative]:
     """Whether it is Conservative, by the name of its method: `isinstance` takes 7 us to say no."""
     return hasattr(force, "potential")
-
-
-Row = tuple[int, tuple[float, float], tuple[float, float]]
-"""A force by the numbers of `kernels.drive`: kind, vector, numbers."""
-
-
-class Known(NamedTuple):
-    """Forces as compiled code needs to know them: those of a few numbers, and a loop of the user's functions, if any."""
-
-    rows: tuple[Row, ...]
-    native: Any
-
-
-_GRAVITY_ALONE = Known((), None)
 
 
 @runtime_checkable
@@ -109,7 +92,7 @@ class ForceSum:
     def functions(self) -> bool:
         """Whether there are functions among those that look at the velocity, or others that say that they do."""
         return self.velocity_dependent and any(
-            hasattr(force, "native") or (not hasattr(force, "compiled") and getattr(force, "velocity_dependent", False))
+            _is_function(force) or (not hasattr(force, "is_drag") and getattr(force, "velocity_dependent", False))
             for force in self.forces
         )
 
@@ -145,22 +128,6 @@ class ForceSum:
         """Evaluate, take back a kick of `ahead` seconds, then velocity += h * acceleration, then position += h * velocity."""
         self.strongest = newton_kick_drift(state, self._summed(state, t), self.gravity, h, ahead)
 
-    def compiled(self, state: Slots) -> Known | None:
-        """All forces as compiled code adds them up by itself; None: one of them has to be asked."""
-        if not self.forces:
-            return _GRAVITY_ALONE
-        rows, natives = [], []
-        for force in self.forces:
-            if native := getattr(force, "native", None):
-                natives.append(native(state))
-            elif row := getattr(force, "compiled", None):
-                rows.append(row(state))
-            else:
-                return None
-        if None in rows or None in natives:
-            return None
-        return Known(tuple(rows), reduce(lambda a, b: both(a, b, state.dtype), natives) if natives else None)
-
     def _summed(self, state: Slots, t: float) -> NDArray[Any]:
         """The sum of all forces but gravity (n, 2), N; (0, 2) if there are none."""
         if not self.forces:
@@ -174,11 +141,11 @@ class ForceSum:
 
 
 def soften(state: Slots, gravity: tuple[float, float]) -> None:
-    """Once all have been applied: where drag is stronger than substeps are short, see `kernels.forces.soften`."""
+    """Once all have been applied: where drag is stronger than substeps are short, see `core/forces.py`."""
     if "resistance" in vars(state):
-        kernels.soften(state.force, state.resistance, state.inverse_mass, *state.reals(*gravity, state.h))
+        state.motion.soften(state.force, state.resistance, state.inverse_mass, *gravity, state.h)
 
 
 def _is_function(force: Any) -> bool:
-    """Functions of the user's own come after those that are known by numbers: compiled code, too, adds them up in this order."""
-    return hasattr(force, "native")
+    """Functions of the user's own are added up after all others."""
+    return hasattr(force, "is_function")

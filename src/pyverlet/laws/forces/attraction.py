@@ -6,11 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pyverlet.core import unit
 from pyverlet.ground import checks
 from pyverlet.ground.shown import Shown
-from pyverlet.kernels import forces
-from pyverlet.kernels.drive import ATTRACTION
-from pyverlet.laws.forces._base import Row
 from pyverlet.state.group import Group
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
@@ -37,12 +35,8 @@ class Attractor(Shown):
         self.softening = checks.number("softening", softening, least=0.0)
 
     def apply(self, state: Slots, t: float) -> None:
-        law = map(state.real, (*self.center, self.strength, self.softening, *state.seam.period))
-        forces.attract(state.force, state.position, state.inverse_mass, *law)
-
-    def compiled(self, state: Slots) -> Row | None:
-        """What `kernels.drive` needs to know of it; None: it has to be asked."""
-        return (ATTRACTION, self.center, (self.strength, self.softening)) if type(self) is Attractor else None
+        law = *self.center, self.strength, self.softening, *state.seam.period
+        state.motion.attract(state.force, state.position, state.inverse_mass, *law)
 
     def potential(self, state: State) -> float:
         distance = np.hypot(*state.seam.nearest(state.position.astype(np.float64) - self.center).T)
@@ -73,14 +67,13 @@ class Gravitation(Shown):
 
     def apply(self, state: Slots, t: float) -> None:
         members = np.arange(len(state)) if self.group is None else self.group.index
-        forces.gravitate(
+        state.motion.gravitate(
             state.force, state.position, state.mass, state.slots_of(members), self.strength, state.real(self.softening),
-            *map(float, state.seam.period),
+            *state.seam.period,
         )  # fmt: skip
 
     def potential(self, state: State) -> float:
         where = slice(None) if self.group is None else self.group.index
         position, mass = state.position[where].astype(np.float64), state.mass[where].astype(np.float64)
-        return self.strength * float(
-            forces.gravitational_potential(position, mass, self.softening, *map(float, state.seam.period))
-        )
+        energy = unit("motion", np.float64).gravitational_potential(position, mass, self.softening, *state.seam.period)
+        return self.strength * float(energy)

@@ -8,8 +8,6 @@ import numpy as np
 
 from pyverlet.ground import checks
 from pyverlet.ground.shown import Shown
-from pyverlet.kernels.drive import UNIFORM
-from pyverlet.laws.forces._base import Row
 from pyverlet.state.group import Group
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
@@ -32,12 +30,10 @@ class ConstantForce(Shown):
         self.group = group
 
     def apply(self, state: Slots, t: float) -> None:
-        where = slice(None) if self.group is None else state.slots_of(self.group.index)
-        state.force[where] += np.asarray(self.newtons, state.dtype)
-
-    def compiled(self, state: Slots) -> Row | None:
-        """What `kernels.drive` needs to know of it; None: it has to be asked."""
-        return (UNIFORM, self.newtons, (0.0, 0.0)) if type(self) is ConstantForce and self.group is None else None
+        if self.group is None:
+            state.motion.add_constant(state.force, *self.newtons)
+        else:
+            state.force[state.slots_of(self.group.index)] += np.asarray(self.newtons, state.dtype)
 
     def potential(self, state: State) -> float:
         where = slice(None) if self.group is None else self.group.index

@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
-from pyverlet.kernels import forces
-from pyverlet.kernels.drive import DRAG
-from pyverlet.laws.forces._base import Row
 from pyverlet.state.slots import Slots
 
 Field = Callable[[NDArray[Any], NDArray[Any], float], Any]
@@ -34,21 +31,14 @@ class Drag(Shown):
 
     velocity_dependent = True
     account = "drag"
+    is_drag = True  # strong drag is softened when all forces are summed
 
     def __init__(self, *, linear: float = 0.0, quadratic: float = 0.0) -> None:
         self.linear = checks.number("linear", linear, least=0.0)
         self.quadratic = checks.number("quadratic", quadratic, least=0.0)
 
     def apply(self, state: Slots, t: float) -> None:
-        wind = self._wind(state, t)
-        forces.drag(state.force, state.velocity, wind, state.resistance, *state.reals(self.linear, self.quadratic))
-
-    def compiled(self, state: Slots) -> Row | None:
-        """What `kernels.drive` needs to know of it; None: it has to be asked."""
-        return (DRAG, (0.0, 0.0), (self.linear, self.quadratic)) if type(self) is Drag else None
-
-    def _wind(self, state: Slots, t: float) -> NDArray[Any]:
-        return np.zeros((1, 2), state.dtype)
+        state.motion.add_drag(state.force, state.velocity, state.resistance, 0.0, 0.0, self.linear, self.quadratic)
 
 
 class Wind(Drag):
@@ -67,18 +57,20 @@ class Wind(Drag):
         super().__init__(linear=linear, quadratic=quadratic)
         self.velocity: Field | tuple[float, float] = velocity if callable(velocity) else checks.vector("velocity", velocity)
 
-    def compiled(self, state: Slots) -> Row | None:
-        if type(self) is not Wind or callable(self.velocity):
-            return None
-        return DRAG, self.velocity, (self.linear, self.quadratic)
+    def apply(self, state: Slots, t: float) -> None:
+        law, moving = (self.linear, self.quadratic), (state.force, state.velocity, state.resistance)
+        if callable(self.velocity):
+            state.motion.add_drag_in_field(*moving, self._field(self.velocity, state, t), *law)
+        else:
+            state.motion.add_drag(*moving, *self.velocity, *law)
 
-    def _wind(self, state: Slots, t: float) -> NDArray[Any]:
-        if not callable(self.velocity):
-            return np.array([self.velocity], state.dtype)
+    @staticmethod
+    def _field(velocity: Field, state: Slots, t: float) -> NDArray[Any]:
+        """(n, 2) m/s, of the medium at each particle."""
         wind = np.empty((len(state), 2), state.dtype)
         x, y = np.ascontiguousarray(state.position.T)
         try:
-            wind[:, 0], wind[:, 1] = self.velocity(x, y, t)
+            wind[:, 0], wind[:, 1] = velocity(x, y, t)
         except (TypeError, ValueError) as error:
             raise InputError(
                 f"velocity of the wind is a function that fails ({error}); allowed is one of (x, y, t) that returns two "

@@ -1,19 +1,19 @@
-"""A force from a function of one's own, compiled when it is first used."""
+"""A force from a function of one's own: called with arrays, or compiled when it is first used where Numba is installed."""
 
 from __future__ import annotations
 
 import dis
 import functools
+import importlib.util
 import inspect
 from collections.abc import Callable
 from typing import Any, NoReturn, overload
 
 import numpy as np
 
-from pyverlet.compile.native import Native, NotCompiled
 from pyverlet.ground import pickling
 from pyverlet.ground.errors import InputError, NonFiniteError
-from pyverlet.kernels import forces
+from pyverlet.laws.forces._arrays import NotNumbers, OnArrays
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
@@ -23,6 +23,8 @@ Potential = Callable[[float, float, float], float]
 
 class FunctionForce:
     """What `force` makes of a function. It can still be called like one."""
+
+    is_function = True
 
     def __init__(self, function: Function, *, velocity_dependent: bool | None = None) -> None:
         self._code = _Code(function, "force", "x, y, vx, vy, mass, t", "two numbers (fx, fy), newtons")
@@ -52,16 +54,11 @@ class FunctionForce:
         """Add the function's value for every free particle.
 
         Raises:
-            InputError: it does not compile, or returns something other than two numbers.
+            InputError: it does not compile, where Numba is installed, or returns something other than two numbers.
             NonFiniteError: it returned NaN or infinity.
         """
-        where, native = state.seam.wrapped(state.position), self._code.native().force(state.dtype)
-        if forces.call(native, state.force, where, state.velocity, state.mass, float(t)):
+        if self._code.run("add", state, state.seam.wrapped(state.position), float(t)):
             self._blame(state, t)
-
-    def native(self, state: Slots) -> Any:
-        """What `kernels.drive` calls, block by block; None: it has to be asked, for it sees one image of each place only."""
-        return None if state.seam else self._code.native().force(state.dtype)
 
     def _blame(self, state: Slots, t: float) -> None:
         """Find the first particle it fails for, and say what it did there."""
@@ -69,7 +66,7 @@ class FunctionForce:
             slot = state.slot_of(particle)
             given = [float(v) for v in (*state.seam.wrapped(state.position)[slot], *state.velocity[slot], state.mass[slot], t)]
             try:
-                value = tuple(map(float, self._code.native().call(*given)))
+                value = tuple(map(float, self._code.evaluator().call(*given)))
             except Exception as error:  # whatever the user's code raises
                 self._refuse(f"raised {type(error).__name__} ({error})", particle, given)
             else:
@@ -94,7 +91,7 @@ class ConservativeFunctionForce(FunctionForce):
 
     def potential(self, state: State) -> float:
         """Sum of the potential over all free particles, J."""
-        return float(forces.call_potential(self._potential.native().potential, state.position, state.mass))
+        return float(self._potential.run("potential", state.position, state.mass))
 
 
 def _again(velocity_dependent: bool, function: Function, potential: Potential | None = None) -> FunctionForce:
@@ -116,7 +113,7 @@ class _Code:
         takes = inspect.signature(self.function).parameters.values()
         if len(takes) != self._count or any(p.kind not in (p.POSITIONAL_OR_KEYWORD, p.POSITIONAL_ONLY) for p in takes):
             raise InputError(f"{self.name} takes ({', '.join(map(str, takes))}); allowed are the arguments ({arguments})")
-        self._native: Native | None = None
+        self._evaluator: Any = None
 
     def names(self, *which: int) -> bool:
         """Whether the function's code names one of these of its arguments."""
@@ -127,14 +124,33 @@ class _Code:
             if isinstance(step.argval, str | tuple)
         )
 
-    def native(self) -> Native:
-        """The compiled form, kept. Raises InputError if there is none."""
-        if self._native is None:
+    def evaluator(self) -> Any:
+        """What calls it: the compiled form, kept, where Numba is installed. Raises InputError if there is none."""
+        if self._evaluator is None:
+            results = 2 if self._returns.startswith("two") else 1
+            if not numba_is_installed():
+                self._evaluator = OnArrays(self.function, self._count, results)
+                return self._evaluator
+            from pyverlet.laws.forces import _native as native  # it imports Numba
+
             try:
-                self._native = Native(self.function, self._count, 2 if self._returns.startswith("two") else 1)
-            except NotCompiled as error:
+                self._evaluator = native.Native(self.function, self._count, results)
+            except native.NotCompiled as error:
                 raise InputError(f"{self.name} {error}; allowed is numeric code that returns {self._returns}") from None
-        return self._native
+        return self._evaluator
+
+    def run(self, method: str, *arguments: Any) -> Any:
+        """Call a method of what calls it. Raises InputError if the function returns something else than it should."""
+        try:
+            return getattr(self.evaluator(), method)(*arguments)
+        except NotNumbers as error:
+            raise InputError(f"{self.name} {error}; allowed is numeric code that returns {self._returns}") from None
+
+
+@functools.cache
+def numba_is_installed() -> bool:
+    """Whether functions are compiled."""
+    return importlib.util.find_spec("numba") is not None
 
 
 @overload
@@ -152,8 +168,10 @@ def force(
 ) -> FunctionForce | Callable[[Function], FunctionForce]:
     """Make a force of a function (x, y, vx, vy, mass, t) -> (fx, fy) of plain numbers, in SI units.
 
-    It is compiled to native code when it is first used, without compiling the engine anew, and called for every free particle at
-    every evaluation. It must be numeric code as Numba compiles it: arithmetic, `math`, `if`, loops, constants.
+    At every evaluation it is called once, with float64 arrays of all particles for x, y, vx, vy and mass, if it is written so
+    that it takes them (arithmetic, functions of NumPy, `np.where` in place of `if`); else particle by particle, which takes about
+    two microseconds for each. Where Numba is installed (`pip install pyverlet[native]`) it is compiled instead when it is first
+    used, and must be numeric code as Numba compiles it: arithmetic, `math` or NumPy, `if`, loops, constants.
 
     Args:
         function: to be decorated.

@@ -8,8 +8,6 @@ import numpy as np
 
 from pyverlet.ground import checks
 from pyverlet.ground.shown import Shown
-from pyverlet.kernels.drive import SPRING
-from pyverlet.laws.forces._base import Row
 from pyverlet.state.group import Group
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
@@ -36,13 +34,11 @@ class PointSpring(Shown):
         self.stiffness = checks.number("stiffness", stiffness, least=0.0)
 
     def apply(self, state: Slots, t: float) -> None:
-        where = slice(None) if self.group is None else state.slots_of(self.group.index)
+        if self.group is None:
+            state.motion.add_point_spring(state.force, state.position, *self.center, self.stiffness, *state.seam.period)
+            return
+        where = state.slots_of(self.group.index)
         state.force[where] -= self.stiffness * state.seam.nearest(state.position[where] - np.asarray(self.center, state.dtype))
-
-    def compiled(self, state: Slots) -> Row | None:
-        """What `kernels.drive` needs to know of it; None: it has to be asked."""
-        plain = type(self) is PointSpring and self.group is None and not state.seam
-        return (SPRING, self.center, (self.stiffness, 0.0)) if plain else None
 
     def potential(self, state: State) -> float:
         where = slice(None) if self.group is None else self.group.index

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.compile.bundle import hold
 from pyverlet.ground.constants import OBSTACLE_LINKS
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import meetings
 from pyverlet.kernels import obstacles as kernels
 from pyverlet.laws.obstacles._base import Obstacles
 from pyverlet.laws.obstacles._tables import Tables
-from pyverlet.laws.rooms import Boundary
 from pyverlet.state.seam import NONE, Seam
 from pyverlet.state.slots import Slots
 
@@ -53,9 +49,6 @@ class Course(Tables):
         self._heads, self._links = _NOWHERE[:2]
         self._order: Array | None = None
         self._cells: tuple[Any, ...] = _NO_CELLS
-        self._walls, self._walled = np.zeros(7), cast("Sequence[float]", ())
-        self._bundle: Any = None
-        self._nothing: Any = None
         self._rest = self._along = np.empty((0, 2))  # what rounding has taken from places in the substep before; `Slots.along`
 
     def covering(self, position: Array) -> NDArray[np.int64]:
@@ -84,32 +77,6 @@ class Course(Tables):
             found = int(kernels.facing(self._segments, len(self._seen), reach, *grid, *about))
         order = np.lexsort((body[:found], row[:found])) if len(row) else np.zeros(0, np.int64)
         return Facing(row[order], body[order], gap[order], normal[order] if len(row) else np.zeros((0, 2)))
-
-    def before(self, state: Slots, h: float) -> None:
-        """Before a substep: note where everybody comes from."""
-        state.note_start()
-
-    def collide(self, state: Slots, room: Boundary, time: float, h: float, lag: float, rest_speed: float) -> None:
-        """Let everybody meet what was on the way, and stay in the room.
-
-        time: seconds from the beginning of the frame to that of the substep.
-        """
-        self.set_up(state, time, h)
-        collide: Any = meetings.collide
-        course, cells = self.compiled(state, room)
-        collide(state.circles(), course, time + h, *cells, *state.reals(h, lag, rest_speed), state.drop)
-
-    def set_up(self, state: Slots, time: float, h: float) -> None:
-        """Place the obstacles, and make room for what is noted of those they hold; arguments: as for `collide`."""
-        if self._measured != (state, state.given):
-            self._measured, self._largest = (state, state.given), float(state.radius.max(initial=0.0))
-        self._place(time, h)
-        if self._rest.shape != state.position.shape or self._rest.dtype != state.dtype:
-            self._rest, self._along = np.zeros_like(state.position), np.empty_like(state.position)
-        state.along = self._along
-        if time == 0.0 or self._order is not state.particle:  # every new order is a new array
-            self._order = state.particle
-            self._rest.fill(0)
 
     def _place(self, time: float, h: float) -> None:
         """Place those that move or have changed, and list them in the grid where they are now."""
@@ -163,23 +130,6 @@ class Course(Tables):
             if self._update(np.arange(len(self._own_bodies.rows)), time, h):
                 return
             room = 2 * len(self._links)
-
-    def compiled(self, state: Slots, room: Boundary) -> tuple[Any, tuple[Any, ...]]:
-        """What `kernels.meetings.collide` takes of them, `Course`, and of their grid; empty without obstacles."""
-        if not self:
-            return self.nothing(state)
-        if (walls := room.walls()) != self._walled:
-            self._walled, self._walls[:] = walls, walls
-        arrays = self._segments, self._bodies, self._heads, self._links, self._walls, state.along, self._rest
-        self._bundle = hold(meetings.Course, arrays, self._bundle)
-        return self._bundle, self._cells
-
-    def nothing(self, state: Slots) -> tuple[Any, tuple[Any, ...]]:
-        """The same if there were none."""
-        if not self._nothing or self._nothing.arrays[-1].dtype != state.dtype:
-            rows, tables = np.empty((0, 2), state.dtype), (np.zeros(0, kernels.SEGMENT), np.zeros(0, kernels.BODY))
-            self._nothing = hold(meetings.Course, (*tables, *_NOWHERE, rows, rows))
-        return self._nothing, _NO_CELLS
 
     def end(self, dt: float) -> None:
         """At the end of a frame that went well: the obstacles are where they moved to."""

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.core import unit
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import grid
 from pyverlet.laws.links.area import signed_area
 from pyverlet.laws.obstacles import Obstacle, Polygon
 from pyverlet.laws.rooms import Boundary
@@ -19,8 +18,6 @@ from pyverlet.world.world import World
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-
-_grid: Any = grid
 
 ROUNDING = 1e-9
 """Of what is touched: a circle that just fits is not refused for the last digit."""
@@ -78,15 +75,14 @@ def overlapping(points: Floats, radius: Floats, position: Floats, size: Floats) 
     cell = max(2.0 * float(size.max()), (x1 - x0) / 2_000, (y1 - y0) / 2_000) or 1.0
     columns, rows = int((x1 - x0) / cell) + 1, int((y1 - y0) / cell) + 1
     number, start = np.empty(len(position), np.int32), np.empty(columns * rows + 2, np.int64)
-    order = np.empty(len(position), np.int32)
-    _grid.count_cells(position, x0, y0, 1 / cell, columns, rows, number, start)
-    _grid.sort_by_cell(number, start, order)
-    cells, room, found = (x0, y0, cell, columns, rows, start, order.astype(np.int64)), 8 * len(points), np.inf
+    order, tools = np.empty(len(position), np.int64), unit("tools", np.float64)
+    tools.sort_into_cells(position, x0, y0, 1 / cell, columns, rows, number, start, order)
+    cells, room, found = (x0, y0, cell, columns, rows, start, order), 8 * len(points), np.inf
     far = reach[:, None]
     while found > room:
         room = room if found == np.inf else int(found)
         query, particle = np.empty(room, np.int64), np.empty(room, np.int64)
-        found = unit("tools", np.float64).in_regions(points - far, points + far, points, reach, cells, position, query, particle)
+        found = tools.in_regions(points - far, points + far, points, reach, cells, position, query, particle)
     pairs = np.column_stack((query[: int(found)], particle[: int(found)]))
     between = np.hypot(*(points[pairs[:, 0]] - position[pairs[:, 1]]).T)
     return np.asarray(pairs[between < (radius[pairs[:, 0]] + size[pairs[:, 1]]) * (1 - ROUNDING)])

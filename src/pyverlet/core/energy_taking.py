@@ -1,0 +1,184 @@
+# mypy: ignore-errors
+"""The second half of taking energy from clusters: what they move with as a whole, and what they have been raised."""
+
+from __future__ import annotations
+
+import cython
+import numpy as np
+from cython.cimports.arrays import (
+    const_doubles,
+    const_integers,
+    const_octets,
+    const_reals,
+    const_small_integers,
+    doubles,
+    integers,
+    octets,
+)
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import sqrt
+from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t
+
+from pyverlet.core.energy_limiting import (
+    ACROSS,
+    ALONG,
+    AS_ONE,
+    COLUMNS_OF_CLUSTER,
+    DRIFT_X,
+    DRIFT_Y,
+    GAIN,
+    LEFT,
+    LIFT,
+    PUSH_X,
+    PUSH_Y,
+    PUSHED,
+    PX,
+    PY,
+    SCALE,
+    SLOWER,
+    Bodies,
+    Limits,
+    free_mass,
+    map_bodies,
+    read_limits,
+    share_out,
+    speed_left,
+    sum_clusters,
+    take_within,
+)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def find_drift(g: cython.pointer(Limits), of: cython.pointer(cython.double), clusters: cython.Py_ssize_t) -> cython.void:
+    """Where clusters drift to across what has pushed them: that is not taken, as long as there is something else."""
+    k: cython.Py_ssize_t
+    for k in range(clusters):
+        c: int64_t = COLUMNS_OF_CLUSTER * k
+        size: cython.double = sqrt(of[c + PUSH_X] * of[c + PUSH_X] + of[c + PUSH_Y] * of[c + PUSH_Y])
+        of[c + DRIFT_X], of[c + DRIFT_Y] = of[c + PX], of[c + PY]
+        if size > g.rounded * of[c + SCALE]:
+            ax: cython.double = of[c + PUSH_X] / size
+            ay: cython.double = of[c + PUSH_Y] / size
+            along: cython.double = of[c + PX] * ax + of[c + PY] * ay
+            of[c + PUSHED] = 1
+            of[c + DRIFT_X], of[c + DRIFT_Y] = of[c + PX] - along * ax, of[c + PY] - along * ay
+            if g.kept:
+                of[c + DRIFT_X] = of[c + DRIFT_Y] = 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def take_as_a_whole(
+    now: cython.pointer(Bodies),
+    g: cython.pointer(Limits),
+    hits: cython.pointer[cython.const[real]],
+    order: cython.pointer[cython.const[int32_t]],
+    inside_before: cython.pointer[cython.const[uint8_t]],
+    cluster: cython.pointer[cython.const[int64_t]],
+    count: cython.Py_ssize_t,
+    velocity: cython.pointer(cython.double),
+    lift: cython.pointer(cython.double),
+    of: cython.pointer(cython.double),
+    clusters: cython.Py_ssize_t,
+) -> cython.void:
+    """2. Slow down the rest; and, where it is not enough, what drifts."""
+    zero: cython.double = 0.0
+    k: cython.Py_ssize_t
+    c: int64_t
+    for k in range(count):
+        c = COLUMNS_OF_CLUSTER * cluster[k]
+        m: cython.double = free_mass(now, k)
+        vx: cython.double = velocity[2 * k] - of[c + DRIFT_X]
+        vy: cython.double = velocity[2 * k + 1] - of[c + DRIFT_Y]
+        rim: cython.double = cython.cast(cython.double, now.radius[k]) * now.spin[k]
+        of[c + AS_ONE] += 0.5 * m * (vx * vx + vy * vy) + 0.25 * m * rim * rim
+        of[c + ALONG] += 0.5 * m * (of[c + DRIFT_X] * of[c + DRIFT_X] + of[c + DRIFT_Y] * of[c + DRIFT_Y])
+        if hits[k] >= 0 and not inside_before[order[k]]:
+            lift[k] = 0  # a wall has raised it, and would again
+        lift[k] = max(lift[k], zero)
+        of[c + LIFT] += lift[k]
+    falls: cython.bint = g.gx != 0 or g.gy != 0
+    for k in range(clusters):
+        c = COLUMNS_OF_CLUSTER * k
+        of[c + SLOWER] = speed_left(of[c + LEFT], of[c + AS_ONE])
+        of[c + LEFT] = max(of[c + LEFT] - of[c + AS_ONE], zero)
+        rest: cython.double = max(of[c + LEFT] - of[c + LIFT], zero) if of[c + PUSHED] > 0 or falls else zero
+        of[c + ACROSS] = speed_left(rest, of[c + ALONG])
+
+
+def take_energy(then, now, about, limits, lift, moved, lower, part):
+    """Take what is too much: from velocities and spins at once, and the rest as the `part` (n,) of what particles have risen by
+    which they are to be lowered: to `lower`, (n, 2) m. (n,) bool: of which there was more than motion could give.
+
+    about: root (n,) of the cluster of each, pull as in `raise_of`, hits as in `Slots`, order; in the user's order inside (n,),
+    whether it was above the wall that gravity points to, and share (n,), J that links hold more of than at the start, or empty.
+    """
+    a: Bodies
+    b: Bodies
+    g: Limits
+    map_bodies(cython.address(a), then)
+    map_bodies(cython.address(b), now)
+    read_limits(cython.address(g), limits)
+    root: cython.pointer[cython.const[int64_t]] = const_integers(about[0])
+    pulled: cython.pointer[cython.const[cython.double]] = const_doubles(about[1])
+    hits: cython.pointer[cython.const[real]] = const_reals(about[2])
+    order: cython.pointer[cython.const[int32_t]] = const_small_integers(about[3])
+    inside_before: cython.pointer[cython.const[uint8_t]] = const_octets(about[4])
+    share: cython.pointer[cython.const[cython.double]] = const_doubles(about[5])
+    pulls: cython.bint = len(about[1]) > 0
+    work: cython.pointer(cython.double) = doubles(lift)
+    way: cython.pointer(cython.double) = doubles(moved)
+    place: cython.pointer(cython.double) = doubles(lower)
+    lowered: cython.pointer(cython.double) = doubles(part)
+    count: cython.Py_ssize_t = len(lift)
+    numbers, velocities, beyond = np.empty(count, np.int64), np.empty((count, 2)), np.zeros(count, np.bool_)
+    cluster: cython.pointer(int64_t) = integers(numbers)
+    velocity: cython.pointer(cython.double) = doubles(velocities)
+    more: cython.pointer(uint8_t) = octets(beyond)
+    clusters: cython.Py_ssize_t = 0
+    k: cython.Py_ssize_t
+    for k in range(count):  # roots are the lowest of their clusters
+        if root[k] == k:
+            cluster[k] = clusters
+            clusters += 1
+        else:
+            cluster[k] = cluster[root[k]]
+    columns = np.zeros((clusters, 24))
+    of: cython.pointer(cython.double) = doubles(columns)
+    shared: cython.bint = len(about[5]) > 0
+    sum_clusters(
+        cython.address(a), cython.address(b), cython.address(g), root, hits, order, share, shared, cluster, count, work, place, of
+    )  # fmt: skip
+    share_out(cython.address(g), of, clusters)
+    take_within(cython.address(b), cluster, count, place, velocity, of, clusters)
+    find_drift(cython.address(g), of, clusters)
+    take_as_a_whole(
+        cython.address(b), cython.address(g), hits, order, inside_before, cluster, count, velocity, work, of, clusters
+    )
+    one: cython.double = 1.0
+    for k in range(count):
+        c: int64_t = COLUMNS_OF_CLUSTER * cluster[k]
+        m: cython.double = free_mass(cython.address(b), k)
+        b.spin[k] *= cython.cast(real, of[c + SLOWER])
+        if of[c + GAIN] > 0 and m > 0:
+            dx: cython.double = of[c + DRIFT_X]
+            dy: cython.double = of[c + DRIFT_Y]
+            b.velocity[2 * k] = cython.cast(real, of[c + ACROSS] * dx + of[c + SLOWER] * (velocity[2 * k] - dx))
+            b.velocity[2 * k + 1] = cython.cast(real, of[c + ACROSS] * dy + of[c + SLOWER] * (velocity[2 * k + 1] - dy))
+        # 3. How far they are lowered, along what pulls at them.
+        fx: cython.double = m * g.gx
+        fy: cython.double = m * g.gy
+        if pulls and m > 0:
+            fx, fy = fx + pulled[2 * k], fy + pulled[2 * k + 1]
+        strength: cython.double = sqrt(fx * fx + fy * fy)
+        gone: cython.double = sqrt(way[2 * k] * way[2 * k] + way[2 * k + 1] * way[2 * k + 1])
+        lowered[k] = min(of[c + LEFT] / of[c + LIFT], one) if of[c + LIFT] > 0 else 0
+        # Near where a spring pulls to it is no further than the way.
+        drop: cython.double = lowered[k] * min(work[k] / strength, gone) / strength if strength > 0 else 0
+        place[2 * k] = b.position[2 * k] + drop * fx
+        place[2 * k + 1] = b.position[2 * k + 1] + drop * fy
+        more[k] = of[c + LEFT] > 0 and m > 0 and strength > 0
+    return beyond

@@ -1,0 +1,93 @@
+# mypy: ignore-errors
+"""Islands: sets of particles joined by pairs, by union-find. On one thread: they are rarely asked for.
+
+root[i] is a member of the set of i that is not above i; that of the lowest member is itself.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.arrays import const_indices, const_integers, const_reals, const_small_integers, integers
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import sqrt
+from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
+
+from pyverlet.core.periodic import nearest_of
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def find_root(root: cython.pointer(int64_t), i: int64_t) -> int64_t:
+    """The lowest member of the set of i, as far as it is known; the way there becomes shorter."""
+    while root[i] != i:
+        root[i] = root[root[i]]
+        i = root[i]
+    return i
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def join_sets(root: cython.pointer(int64_t), i: int64_t, j: int64_t) -> cython.void:
+    """The sets of i and j become one."""
+    if root[i] != root[j]:  # equal for most, when most are joined
+        a: int64_t = find_root(root, i)
+        b: int64_t = find_root(root, j)
+        root[max(a, b)] = min(a, b)
+
+
+def join_near_pairs(position, moved, size, period_x: real, period_y: real, inverse_mass, pairs, near: real, root):
+    """Join the listed pairs that may have touched while they moved by `moved` (n, 2), m, and both are free.
+
+    That is: whose gap, beyond `near` times their contact distance, is no longer than what they have moved against each other.
+    pairs: those of cell row s are `count[s]` from `first[s]` on: (first, count, i, j).
+    """
+    x: cython.pointer[cython.const[real]] = const_reals(position)
+    way: cython.pointer[cython.const[real]] = const_reals(moved)
+    r: cython.pointer[cython.const[real]] = const_reals(size)
+    w: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
+    first: cython.pointer[cython.const[int64_t]] = const_integers(pairs[0])
+    count: cython.pointer[cython.const[int64_t]] = const_integers(pairs[1])
+    pair_i: cython.pointer[cython.const[uint32_t]] = const_indices(pairs[2])
+    pair_j: cython.pointer[cython.const[uint32_t]] = const_indices(pairs[3])
+    to: cython.pointer(int64_t) = integers(root)
+    rows: cython.Py_ssize_t = len(pairs[0])
+    s: cython.Py_ssize_t
+    k: int64_t
+    with cython.nogil:
+        for s in range(rows):
+            for k in range(first[s], first[s] + count[s]):
+                i: int64_t = pair_i[k]
+                j: int64_t = pair_j[k]
+                if w[i] > 0 and w[j] > 0:
+                    dx: real = nearest_of(x[2 * j] - x[2 * i], period_x)
+                    dy: real = nearest_of(x[2 * j + 1] - x[2 * i + 1], period_y)
+                    mx: real = way[2 * j] - way[2 * i]
+                    my: real = way[2 * j + 1] - way[2 * i + 1]
+                    reach: real = near * (r[i] + r[j]) + cython.cast(real, sqrt(mx * mx + my * my))
+                    if dx * dx + dy * dy < reach * reach:
+                        join_sets(to, i, j)
+
+
+def join_rows(rows, inverse_mass, root):
+    """Join the two particles of each of the rows (k, 2), int32, unless one is pinned."""
+    pair: cython.pointer[cython.const[int32_t]] = const_small_integers(rows)
+    w: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
+    to: cython.pointer(int64_t) = integers(root)
+    count: cython.Py_ssize_t = len(rows)
+    k: cython.Py_ssize_t
+    with cython.nogil:
+        for k in range(count):
+            if w[pair[2 * k]] > 0 and w[pair[2 * k + 1]] > 0:
+                join_sets(to, pair[2 * k], pair[2 * k + 1])
+
+
+def settle(root):
+    """root[i] becomes the lowest member of the set of i."""
+    to: cython.pointer(int64_t) = integers(root)
+    count: cython.Py_ssize_t = len(root)
+    i: cython.Py_ssize_t
+    for i in range(count):
+        to[i] = to[to[i]]

@@ -1,0 +1,103 @@
+# mypy: ignore-errors
+"""The energy of all particles, in float64 and on one thread."""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.arrays import const_reals
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import INFINITY
+
+BLOCK_SUMMED = cython.declare(cython.Py_ssize_t, 2048)  # particles that are summed by themselves
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def block_energy(
+    x: cython.pointer[cython.const[real]],
+    v: cython.pointer[cython.const[real]],
+    a: cython.pointer[cython.const[real]],
+    lag: cython.double,
+    spin: cython.pointer[cython.const[real]],
+    radius: cython.pointer[cython.const[real]],
+    mass: cython.pointer[cython.const[real]],
+    gx: cython.double,
+    gy: cython.double,
+    first: cython.Py_ssize_t,
+    stop: cython.Py_ssize_t,
+) -> cython.double:
+    """J of the particles from `first` up to `stop`: eight sums at once, for one waits for every addition."""
+    sums: cython.double[8]
+    lane: cython.Py_ssize_t
+    k: cython.Py_ssize_t
+    whole: cython.Py_ssize_t = stop - (stop - first) % 8
+    half: cython.double = 0.5
+    quarter: cython.double = 0.25
+    for lane in range(8):
+        sums[lane] = 0
+    for k in range(first, whole, 8):
+        for lane in range(8):
+            i: cython.Py_ssize_t = k + lane
+            m: cython.double = mass[i]
+            vx: cython.double = v[2 * i]
+            vy: cython.double = v[2 * i + 1]
+            if lag != 0:
+                vx = vx + lag * a[2 * i]
+                vy = vy + lag * a[2 * i + 1]
+            height: cython.double = gx * x[2 * i] + gy * x[2 * i + 1]
+            rim: cython.double = cython.cast(cython.double, radius[i]) * spin[i]
+            m = m if m < INFINITY else 0  # a pinned particle has none
+            sums[lane] = sums[lane] + m * ((half * (vx * vx + vy * vy) + quarter * rim * rim) - height)
+    total: cython.double = 0.0
+    for lane in range(8):
+        total += sums[lane]
+    for k in range(whole, stop):
+        m = mass[k]
+        if m < INFINITY:
+            vx = v[2 * k]
+            vy = v[2 * k + 1]
+            if lag != 0:
+                vx += lag * a[2 * k]
+                vy += lag * a[2 * k + 1]
+            height = gx * x[2 * k] + gy * x[2 * k + 1]
+            rim = cython.cast(cython.double, radius[k]) * spin[k]
+            total += m * (half * (vx * vx + vy * vy) + quarter * rim * rim - height)
+    return total
+
+
+@cython.cfunc
+def energy_of(
+    position, velocity, acceleration, lag: cython.double, spin, radius, mass, gx: cython.double, gy: cython.double
+) -> cython.double:
+    """Sums of blocks of a fixed size, added in order."""
+    x: cython.pointer[cython.const[real]] = const_reals(position)
+    v: cython.pointer[cython.const[real]] = const_reals(velocity)
+    a: cython.pointer[cython.const[real]] = const_reals(acceleration)
+    w: cython.pointer[cython.const[real]] = const_reals(spin)
+    r: cython.pointer[cython.const[real]] = const_reals(radius)
+    m: cython.pointer[cython.const[real]] = const_reals(mass)
+    count: cython.Py_ssize_t = len(mass)
+    total: cython.double = 0.0
+    block: cython.Py_ssize_t
+    with cython.nogil:
+        for block in range((count + BLOCK_SUMMED - 1) // BLOCK_SUMMED):
+            first: cython.Py_ssize_t = block * BLOCK_SUMMED
+            total += block_energy(x, v, a, lag, w, r, m, gx, gy, first, min(first + BLOCK_SUMMED, count))
+    return total
+
+
+def total_energy(
+    position, velocity, acceleration, lag: cython.double, spin, radius, mass, gx: cython.double, gy: cython.double
+) -> float:
+    """Energy of motion, spin and gravity, 0 at the origin, J, with velocities moved on by `lag` s; pinned particles have none."""
+    return energy_of(position, velocity, acceleration, lag, spin, radius, mass, gx, gy)
+
+
+def energy_gained(start, now, gx: cython.double, gy: cython.double) -> float:
+    """How much larger `total_energy` is than it was, J.
+
+    start, now: position, velocity (n, 2), spin, radius, mass (n,) each, of the same particles in any two orders.
+    """
+    before: cython.double = energy_of(start[0], start[1], start[1], 0.0, start[2], start[3], start[4], gx, gy)
+    return energy_of(now[0], now[1], now[1], 0.0, now[2], now[3], now[4], gx, gy) - before

@@ -1,0 +1,25 @@
+"""How many threads, and processes, may work at a time."""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+
+from pyverlet.ground.errors import InputError
+
+
+@cache
+def max_threads() -> int:
+    """The processors that this process may use, or what the environment variable PYVERLET_THREADS says.
+
+    Raises:
+        InputError: it says something else than a whole number of at least 1.
+    """
+    said = os.environ.get("PYVERLET_THREADS") or os.environ.get("NUMBA_NUM_THREADS") or ""
+    if said:
+        if not said.isdecimal() or int(said) < 1:
+            raise InputError(f"PYVERLET_THREADS is {said!r}; allowed is a whole number of at least 1")
+        return int(said)
+    if hasattr(os, "sched_getaffinity"):
+        return max(len(os.sched_getaffinity(0)), 1)
+    return os.cpu_count() or 1

@@ -1,0 +1,97 @@
+"""Functions of the user's own without a compiler: called with arrays of all particles, or one by one where they take none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+
+class NotNumbers(Exception):  # noqa: N818  (the caller says whose code it was)
+    """A function returns something else than it should; the message says what, as the end of a sentence."""
+
+
+class OnArrays:
+    """A function of float64 numbers that returns so many: called with columns of all particles at once.
+
+    Where that fails, for the function has an `if` on one of them, say, or calls `math`, it is called particle by particle. Which
+    it is depends on nothing but the arguments, so that a run repeated has the same bits.
+    """
+
+    def __init__(self, function: Callable[..., Any], arguments: int, results: int) -> None:
+        self._function, self._results = function, results
+        self._columns = np.empty((arguments, 0))
+
+    def call(self, *given: float) -> Any:
+        """Of one particle, with the exceptions it raises."""
+        with np.errstate(all="ignore"):
+            return self._function(*map(np.float64, given))
+
+    def add(self, state: Any, position: Array, t: float) -> int:
+        """Add the two numbers returned for (x, y, vx, vy, mass, t) of every free particle to `state.force`.
+
+        It returns for how many of them the function raised, or returned something that is not finite.
+
+        Raises:
+            NotNumbers: it returned something else.
+        """
+        if not len(position):
+            return 0
+        if self._columns.shape != (5, len(position)):
+            self._columns = np.empty((5, len(position)))
+        columns = self._columns
+        state.motion.function_arguments(position, state.velocity, state.mass, columns)
+        return int(state.motion.add_values(state.force, columns, *self._values(columns, t)))
+
+    def potential(self, position: Array, mass: Array) -> float:
+        """Sum of the number returned for (x, y, mass) of every free particle; NaN where the function raises.
+
+        Raises:
+            NotNumbers: it returned something else.
+        """
+        free = np.isfinite(mass)
+        columns = np.vstack((position[free].T, mass[free])).astype(np.float64)
+        values = self._values(columns)[0] if free.any() else np.zeros(1)
+        return float(values.sum()) if len(values) > 1 else float(values[0]) * int(free.sum())
+
+    def _values(self, columns: Array, *more: float) -> list[Array]:
+        """The numbers returned: (n,) each, or (1,) if it is the same for all."""
+        with np.errstate(all="ignore"):
+            try:
+                returned = self._function(*columns, *more)
+            except Exception:  # whatever the user's code raises
+                return self._one_by_one(columns, *more)
+        parts = self._parts(returned)
+        if wrong := [part for part in parts if part.shape not in ((), columns.shape[1:])]:
+            raise NotNumbers(f"returns arrays of shape {wrong[0].shape} for {columns.shape[1]} particles")
+        return [np.ascontiguousarray(np.atleast_1d(part), np.float64) for part in parts]
+
+    def _parts(self, returned: Any) -> list[Array]:
+        parts = returned if self._results > 1 and isinstance(returned, tuple) else (returned,)
+        arrays = [np.asarray(part) for part in parts]
+        if len(arrays) != self._results:
+            raise NotNumbers(f"returns {len(arrays)} of them" if isinstance(returned, tuple) else "returns no tuple")
+        if not all(array.dtype.kind in "fiub" for array in arrays):
+            raise NotNumbers(f"returns {returned!r}")
+        return arrays
+
+    def _one_by_one(self, columns: Array, *more: float) -> list[Array]:
+        values = np.zeros((self._results, columns.shape[1]))
+        for k, (*given, mass) in enumerate(columns.T.tolist()):
+            if mass < np.inf:
+                try:
+                    returned = self._function(*given, mass, *more)
+                except Exception:  # whatever the user's code raises
+                    values[:, k] = np.nan
+                    continue
+                numbers = returned if isinstance(returned, tuple) else (returned,)
+                if len(numbers) != self._results or not all(type(number) in (float, int) for number in numbers):
+                    numbers = tuple(self._parts(returned))
+                    if any(part.shape for part in numbers):
+                        raise NotNumbers(f"returns {returned!r}")
+                values[:, k] = numbers
+        return [*values]

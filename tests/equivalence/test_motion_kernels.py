@@ -1,0 +1,285 @@
+"""Kernels of the unit `motion`, compiled and as plain Python: the same bits, in both precisions."""
+
+from __future__ import annotations
+
+import copy
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyverlet import core
+from pyverlet.core import reference
+
+N = 21
+
+Chance = np.random.Generator
+KERNELS: dict[str, Callable[[Chance, Any], tuple[Any, ...]]] = {}
+
+
+def kernel(make: Callable[[Chance, Any], tuple[Any, ...]]) -> Callable[[Chance, Any], tuple[Any, ...]]:
+    """What a kernel is called with, under its name."""
+    KERNELS[make.__name__] = make
+    return make
+
+
+def rows(chance: Chance, dtype: Any, size: float = 1.0) -> Any:
+    return chance.normal(0, size, (N, 2)).astype(dtype)
+
+
+def column(chance: Chance, dtype: Any) -> Any:
+    return chance.uniform(0.5, 2, N).astype(dtype)
+
+
+def light(chance: Chance, dtype: Any) -> Any:
+    made = column(chance, dtype)
+    made[[3, 17]] = 0
+    return made
+
+
+def masses(chance: Chance, dtype: Any) -> Any:
+    made = column(chance, dtype)
+    made[[3, 17]] = np.inf
+    return made
+
+
+def pairs(chance: Chance) -> tuple[Any, ...]:
+    i, j = np.triu_indices(N, 1)
+    half = len(i) // 2
+    first, count = np.array([0, half], np.int64), np.array([half, len(i) - half], np.int64)
+    return first, count, i.astype(np.uint32), j.astype(np.uint32)
+
+
+def bodies(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return rows(chance, dtype), rows(chance, dtype), column(chance, dtype), column(chance, dtype), masses(chance, dtype)
+
+
+LIMITS = (3.0, 0.02, 0.0, -9.81, 3.0, 0.0, True, False, 1e-5, 0.1)
+
+
+def order(chance: Chance) -> Any:
+    return chance.permutation(N).astype(np.int32)
+
+
+@kernel
+def advance(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return rows(chance, dtype), rows(chance, dtype), rows(chance, dtype), 0.013
+
+
+@kernel
+def newton(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return rows(chance, dtype), rows(chance, dtype), light(chance, dtype), 0.1, -9.81
+
+
+@kernel
+def newton_kick_drift(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return (*(rows(chance, dtype) for _ in range(4)), light(chance, dtype), 0.1, -9.81, 0.013, 0.0065)
+
+
+@kernel
+def kick_free(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return rows(chance, dtype), rows(chance, dtype), light(chance, dtype), 0.013
+
+
+@kernel
+def clear_pinned(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return rows(chance, dtype), light(chance, dtype)
+
+
+@kernel
+def all_finite(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return rows(chance, dtype), rows(chance, dtype)
+
+
+@kernel
+def first_non_finite(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    made = rows(chance, dtype)
+    made[7, 1], made[9, 0] = np.nan, np.inf
+    return (made,)
+
+
+@kernel
+def wrap(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return rows(chance, dtype, 3.0), -1.0, 0.3, 2.0, 0.0, rows(chance, dtype)
+
+
+@kernel
+def follow(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return rows(chance, dtype, 3.0), rows(chance, dtype), 2.0, 0.7
+
+
+@kernel
+def take_motion(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    one, other = ((*(rows(chance, dtype) for _ in range(3)), column(chance, dtype)) for _ in range(2))
+    return (*one, *other, order(chance))
+
+
+@kernel
+def put_motion(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    one, other = ((*(rows(chance, dtype) for _ in range(3)), column(chance, dtype)) for _ in range(2))
+    return (*one, *other, column(chance, np.float64), 0.0083, order(chance))
+
+
+@kernel
+def add_constant(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return rows(chance, dtype), 0.3, -0.7
+
+
+@kernel
+def add_point_spring(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return rows(chance, dtype), rows(chance, dtype, 3.0), 0.1, 0.2, 7.7, 2.0, 0.0
+
+
+@kernel
+def add_drag(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return rows(chance, dtype), rows(chance, dtype), column(chance, dtype), 0.1, 0.2, 0.3, 0.4
+
+
+@kernel
+def add_drag_in_field(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return rows(chance, dtype), rows(chance, dtype), column(chance, dtype), rows(chance, dtype), 0.3, 0.4
+
+
+@kernel
+def soften(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return rows(chance, dtype), 50 * column(chance, dtype), light(chance, dtype), 0.1, -9.81, 0.013
+
+
+@kernel
+def attract(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return rows(chance, dtype), rows(chance, dtype), light(chance, dtype), 0.1, 0.2, 3.3, 0.05, 2.5, 0.0
+
+
+@kernel
+def gravitate(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    where = rows(chance, dtype)
+    where[4] = where[5]  # no direction
+    return rows(chance, dtype), where, masses(chance, dtype), order(chance)[:-2].copy(), 0.7, 0.0, 0.0, 3.0
+
+
+@kernel
+def gravitational_potential(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return rows(chance, float), masses(chance, float), 0.1, 0.0, 3.0
+
+
+@kernel
+def function_arguments(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return rows(chance, dtype), rows(chance, dtype), masses(chance, dtype), np.empty((5, N))
+
+
+@kernel
+def add_values(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    columns, fx = chance.normal(0, 1, (5, N)), chance.normal(0, 1, N)
+    columns[4, 2] = columns[0, 6] = np.inf
+    fx[[2, 6, 9]] = np.nan
+    return rows(chance, dtype), columns, fx, np.array([0.3])
+
+
+@kernel
+def clamp_to_circle(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return 0.1, 0.2, 2.0, *bodies(chance, dtype)[:2], column(chance, dtype), light(chance, dtype), 0.013, 0.8, True
+
+
+@kernel
+def clamp_to_box(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return -1.0, -1.5, 0.7, 1.0, *bodies(chance, dtype)[:2], column(chance, dtype), light(chance, dtype), 0.013, 0.8, False
+
+
+@kernel
+def mark_free_places(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    there = rows(chance, float, 3.0), 0.3 * column(chance, float)
+    return rows(chance, float, 3.0), 0.3 * column(chance, float), *there, 8.0, 0.0, 5, np.zeros(N, np.bool_)
+
+
+@kernel
+def join_near_pairs(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    moved, size = rows(chance, dtype, 0.01), 0.1 * column(chance, dtype)
+    return rows(chance, dtype), moved, size, 0.0, 3.0, light(chance, dtype), pairs(chance), 1.1, np.arange(N)
+
+
+@kernel
+def join_rows(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return chance.integers(0, N, (9, 2)).astype(np.int32), light(chance, dtype), np.arange(N)
+
+
+@kernel
+def time_at_rest(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    island, calm = np.where(np.arange(N) % 5 == 0, 3, -1), chance.uniform(0, 1, N).astype(np.float32)
+    moving = rows(chance, dtype), column(chance, dtype)
+    return *moving, column(chance, dtype), light(chance, dtype), island, 1.5, 0.016, 0.5, calm
+
+
+@kernel
+def find_islands(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    size, calm = 0.1 * column(chance, dtype), chance.uniform(0.4, 1, N).astype(np.float32)
+    return rows(chance, dtype), size, 0.0, 3.0, light(chance, dtype), calm, pairs(chance), 1.1, 0.5, np.empty(N, np.int64)
+
+
+@kernel
+def touch(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    island = np.where(np.arange(N) % 3 == 0, 3, -1)
+    return rows(chance, dtype), 0.2 * column(chance, dtype), 0.0, 3.0, island, pairs(chance), np.zeros(N, np.uint8)
+
+
+@kernel
+def find_edited(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    who, ones = order(chance), np.ones(N, np.uint32)
+    columns = [column(chance, dtype) for _ in range(4)]
+    given = [rows(chance, dtype), np.zeros((N, 2), dtype), np.zeros(N, dtype), *columns, ones, ones << 3]
+    held = (given[0][who], *(each[who] for each in columns), ones[:0], (ones << 3)[who])
+    given[0][4] += 1
+    given[5][9] += 1
+    return tuple(given), held, who, np.where(np.arange(N) % 3 == 0, -1, 3), np.zeros(N, np.uint8)
+
+
+@kernel
+def total_energy(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    moving = rows(chance, dtype), rows(chance, dtype), rows(chance, dtype)
+    return *moving, 0.01, column(chance, dtype), column(chance, dtype), masses(chance, dtype), 0.1, -9.81
+
+
+@kernel
+def energy_gained(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return bodies(chance, dtype), bodies(chance, dtype), 0.1, -9.81
+
+
+@kernel
+def raise_of(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    pull = rows(chance, float), rows(chance, float)
+    return bodies(chance, dtype), bodies(chance, dtype), order(chance), *pull, LIMITS, np.empty(N), np.empty((N, 2))
+
+
+@kernel
+def take_energy(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    root = np.arange(N) // 3 * 3
+    hits, inside = chance.normal(0, 1, N).astype(dtype), chance.uniform(0, 1, N) < 0.5
+    about = root, rows(chance, float), hits, order(chance), inside, chance.normal(0, 1, N)
+    work = chance.normal(0, 1, N), rows(chance, float), np.empty((N, 2)), np.empty(N)
+    return bodies(chance, dtype), bodies(chance, dtype), about, LIMITS, *work
+
+
+LOADED = functools.cache(reference.load)
+
+
+def flat(value: Any) -> list[Any]:
+    """All arrays and numbers in nested tuples."""
+    return [each for part in value for each in flat(part)] if isinstance(value, tuple) else [value]
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("name", KERNELS)
+def test_compiled_and_uncompiled_have_the_same_bits(name: str, dtype: Any) -> None:
+    given = KERNELS[name](np.random.default_rng(11), dtype)
+    other = copy.deepcopy(given)
+    with np.errstate(all="ignore"):
+        plain = getattr(LOADED("motion", dtype), name)(*given)
+    compiled = getattr(core.unit("motion", dtype), name)(*other)
+    for one, two in zip(flat((plain, given)), flat((compiled, other)), strict=True):
+        assert np.array_equal(np.asarray(one), np.asarray(two), equal_nan=np.asarray(one).dtype.kind == "f"), name
+
+
+def test_all_kernels_are_compared() -> None:
+    missing = set(core.unit("motion").__all__) - set(KERNELS)
+    assert missing == {"any_differs", "differs", "settle"}  # comparisons, and a line
