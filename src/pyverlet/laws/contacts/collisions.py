@@ -51,7 +51,7 @@ class Collisions:
     restitution: float = 0.0
     friction: float = 0.0
     method: Fast | BruteForce = field(default_factory=Fast)
-    impulses: bool | None = False
+    impulses: bool | None = True
 
     def __post_init__(self) -> None:
         checks.fraction("restitution", self.restitution)
