@@ -213,9 +213,9 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     fastest: real = cython.cast(real, sqrt(most))
     w.far = 2 * w.h * fastest + w.near
     w.least_bounce = max(w.rest_speed, fastest * cython.cast(real, 1e-14 if cython.sizeof(real) == 8 else 2e-6))
-    if w.linked:
-        begin_links(w)
     surfaces: cython.bint = w.room != OPEN or w.segments > 0 or w.pins
+    if w.linked:
+        begin_links(w, surfaces)
     place_moving(w)
     if surfaces:
         team_stage(w.team, warm_surfaces_stage, w, blocks)

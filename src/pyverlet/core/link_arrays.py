@@ -22,6 +22,11 @@ Links = cython.struct(
     loaned=cython.pointer(cython.double),  # (count, 2) m/s of it that are taken back before rows are solved
     driven=cython.pointer(cython.double),  # (count, 2) m/s^2 that forces give it alone
     react=cython.pointer(cython.double),  # (count, 2) N s that rows have given it since, whatever its mass
+    surfaces=cython.bint,  # whether there are any
+    contact=cython.pointer(cython.double),  # of `Step`
+    begun=cython.pointer(cython.double),  # (count, 2) `u` before its chain was solved
+    had=cython.pointer(cython.double),  # (rows, 2) `given` then
+    held=cython.pointer(int32_t),  # (count,) contact with the surface that holds it, -1: none
     # ---- pins
     pins=cython.Py_ssize_t,
     pin_node=cython.pointer(int64_t),

@@ -8,9 +8,11 @@ from cython.cimports.libc.math import INFINITY, sqrt
 
 from pyverlet.core.link_arrays import DISTANCE, Links
 from pyverlet.core.link_chains import CHORDS, give, step_chain
+from pyverlet.core.link_holds import WEDGED, hold_node, mobility_along
 from pyverlet.core.link_lengths import solve_chain
 from pyverlet.core.link_shapes import LinkWay, measure_row, mobility, push, way_between
 from pyverlet.core.link_softness import Softness, averaged, before_that, kept_share, softness
+from pyverlet.core.step import Step
 
 FARTHEST = cython.declare(cython.double, 0.5)
 """Most that a link is taken to turn in a substep, rad."""
@@ -36,7 +38,7 @@ def begin_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
         square: cython.double = d.x * d.x + d.y * d.y
         turns: cython.double = 0
         if square > 0:
-            turns = k.h * ((k.u[2 * j + 1] - k.u[2 * i + 1]) * d.x - (k.u[2 * j] - k.u[2 * i]) * d.y) / square
+            turns = (2 * k.kick - k.h) * ((k.u[2 * j + 1] - k.u[2 * i + 1]) * d.x - (k.u[2 * j] - k.u[2 * i]) * d.y) / square
         k.way[2 * r], k.way[2 * r + 1] = d.x, d.y
         k.turning[r] = max(min(turns, FARTHEST), -FARTHEST)
         k.given[2 * r] = k.given[2 * r + 1] = 0
@@ -121,25 +123,47 @@ def push_row(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def solve_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
+def let_go_of_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
+    """If surfaces leave the particles of row r no motion along its slope."""
+    e: cython.Py_ssize_t
+    left: cython.double = 0
+    free: cython.double = 0
+    for e in range(k.first[r], k.first[r + 1]):
+        x: cython.double = k.slope[2 * e]
+        y: cython.double = k.slope[2 * e + 1]
+        left += mobility_along(k, k.node[e], x, y, x, y)
+        free += k.weight[k.node[e]] * (x * x + y * y)
+    if left < WEDGED * free:
+        for e in range(k.first[r], k.first[r + 1]):
+            k.held[k.node[e]] = -1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def solve_row(w: cython.pointer(Step), r: cython.Py_ssize_t) -> cython.void:
     """A single row: a step of Newton's method for what it measures after the drift, along its gradient at the start."""
+    k: cython.pointer(Links) = w.link_table
     e: cython.Py_ssize_t
     if k.intact[r] == 0 or k.soft[r] == INFINITY:
         return
     left: cython.double = k.target[r] - k.soft[r] * k.impulse[r] - measure_row(k, r, k.h)
     along: cython.double = 0
     square: cython.double = 0
+    let_go_of_row(k, r)
     for e in range(k.first[r], k.first[r + 1]):
         x: cython.double = k.slope[2 * e]
         y: cython.double = k.slope[2 * e + 1]
-        along += k.weight[k.node[e]] * (k.gradient[2 * e] * x + k.gradient[2 * e + 1] * y)
-        square += k.weight[k.node[e]] * (x * x + y * y)
+        along += mobility_along(k, k.node[e], k.gradient[2 * e], k.gradient[2 * e + 1], x, y)
+        square += mobility_along(k, k.node[e], x, y, x, y)
     turned: cython.bint = 2 * along < square  # the gradient has turned away: that of after the drift
     change: cython.double = k.soft[r] + k.h * (square if turned else along)
     if change > 0:
         change = left / change
         k.impulse[r] += change
         push_row(k, r, change, k.slope if turned else k.gradient)
+        for e in range(k.first[r], k.first[r + 1]):
+            hold_node(w, k.node[e])
 
 
 @cython.cfunc
@@ -152,12 +176,13 @@ def relax_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
     square: cython.double = 0
     if k.intact[r] == 0 or k.stiffness[r] < INFINITY:
         return
+    let_go_of_row(k, r)
     for e in range(k.first[r], k.first[r + 1]):
         i: cython.Py_ssize_t = k.node[e]
         x: cython.double = k.slope[2 * e]
         y: cython.double = k.slope[2 * e + 1]
         rate += x * k.u[2 * i] + y * k.u[2 * i + 1]
-        square += k.weight[i] * (x * x + y * y)
+        square += mobility_along(k, i, x, y, x, y)
     if square > 0:
         k.impulse[r] -= rate / square
         push_row(k, r, -rate / square, k.slope)
@@ -166,18 +191,19 @@ def relax_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def solve_block(k: cython.pointer(Links), b: cython.Py_ssize_t, drifts: cython.bint) -> cython.void:
+def solve_block(w: cython.pointer(Step), b: cython.Py_ssize_t, drifts: cython.bint) -> cython.void:
     """A chain, or a single row."""
+    k: cython.pointer(Links) = w.link_table
     r: cython.Py_ssize_t = k.block[b]
     if r == k.block[b + 1]:
         return
     if k.kind[r] == DISTANCE:
         if drifts:
-            solve_chain(k, r, k.block[b + 1], k.alone[b] != 0)
+            solve_chain(w, r, k.block[b + 1], k.alone[b] != 0)
         else:
             step_chain(k, r, k.block[b + 1], False, CHORDS)
     elif drifts:
-        solve_row(k, r)
+        solve_row(w, r)
     else:
         relax_row(k, r)
 

@@ -19,6 +19,7 @@ import cython
 from cython.cimports.libc.math import INFINITY, sqrt
 
 from pyverlet.core.link_arrays import Links
+from pyverlet.core.link_holds import Mobility, let_go_of_wedged, moved_by
 from pyverlet.core.link_shapes import LinkWay, push, way_between
 
 MOST_RELEASES = cython.declare(cython.int, 8)
@@ -89,6 +90,7 @@ def aim_at_length(k: cython.pointer(Links), r: cython.Py_ssize_t, how: cython.in
         dy /= unit
         cosine = x * dx + y * dy
     k.along[2 * r], k.along[2 * r + 1] = dx, dy
+    let_go_of_wedged(k, k.node[e], k.node[e + 1], dx, dy)
     k.impulse[r] = k.given[2 * r] * dx + k.given[2 * r + 1] * dy
     k.wanted[2 * r] = (k.target[r] - k.soft[r] * k.impulse[r] - error) / cosine
     # -P t with t = (-dy, dx)
@@ -107,6 +109,7 @@ def aim_at_rest(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
     x: cython.double = k.middle[2 * r]
     y: cython.double = k.middle[2 * r + 1]
     k.along[2 * r], k.along[2 * r + 1] = x, y
+    let_go_of_wedged(k, i, j, x, y)
     k.turned[r] = 0
     k.wanted[2 * r] = -k.h * ((k.u[2 * j] - k.u[2 * i]) * x + (k.u[2 * j + 1] - k.u[2 * i + 1]) * y)
     k.wanted[2 * r + 1] = 0
@@ -118,7 +121,7 @@ def aim_at_rest(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
 def eliminate(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, softly: cython.bint) -> cython.void:
     """Down the chain: `answer` of each row without what follows, and the `inverse` of its block."""
     r: cython.Py_ssize_t
-    before: cython.double = 0  # h times the inverse mass of the particle that r shares with the row before
+    before: Mobility  # of the particle that r shares with the row before
     fx: cython.double = 0
     fy: cython.double = 0
     gxx: cython.double = 0
@@ -126,27 +129,39 @@ def eliminate(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py
     gyy: cython.double = 0
     for r in range(first, end):
         e: cython.Py_ssize_t = k.first[r]
-        heavy: cython.double = k.h * k.weight[k.node[e]]
-        after: cython.double = k.h * k.weight[k.node[e + 1]]
-        before = heavy if r > first else 0
+        before = moved_by(k, k.node[e])
+        after: Mobility = moved_by(k, k.node[e + 1])
+        free: cython.double = k.weight[k.node[e]] + k.weight[k.node[e + 1]]
+        if r == first:
+            gxx = gxy = gyy = fx = fy = 0
         if k.acts[r] == 0:
             fx = fy = gxx = gxy = gyy = 0
         else:
             dx: cython.double = k.along[2 * r]
             dy: cython.double = k.along[2 * r + 1]
-            # The block in the frame of d and t.
-            xx: cython.double = heavy + after - before * before * gxx
-            xy: cython.double = -before * before * gxy
-            yy: cython.double = heavy + after - before * before * gyy
+            # The block less B G B, B being h times the mobility of the particle shared with the row before.
+            bxx: cython.double = k.h * before.xx
+            bxy: cython.double = k.h * before.xy
+            byy: cython.double = k.h * before.yy
+            px: cython.double = gxx * bxx + gxy * bxy
+            py: cython.double = gxx * bxy + gxy * byy
+            qx: cython.double = gxy * bxx + gyy * bxy
+            qy: cython.double = gxy * bxy + gyy * byy
+            xx: cython.double = bxx + k.h * after.xx - bxx * px - bxy * qx
+            xy: cython.double = bxy + k.h * after.xy - bxx * py - bxy * qy
+            yy: cython.double = byy + k.h * after.yy - bxy * py - byy * qy
+            # In the frame of d and t.
             dd: cython.double = xx * dx * dx + 2 * xy * dx * dy + yy * dy * dy + (k.soft[r] if softly else 0)
             dt: cython.double = (yy - xx) * dx * dy + xy * (dx * dx - dy * dy)
             tt: cython.double = xx * dy * dy - 2 * xy * dx * dy + yy * dx * dx
             b: cython.double = k.turned[r]
-            zd: cython.double = before * (fx * dx + fy * dy) + k.wanted[2 * r]
-            zt: cython.double = before * (fy * dx - fx * dy)
+            zx: cython.double = bxx * fx + bxy * fy
+            zy: cython.double = bxy * fx + byy * fy
+            zd: cython.double = zx * dx + zy * dy + k.wanted[2 * r]
+            zt: cython.double = zy * dx - zx * dy
             stiff: cython.double = b * tt + 1
             pivot: cython.double = dd * stiff - b * dt * dt
-            if pivot <= SINGULAR * (heavy + after) or heavy + after <= 0:
+            if pivot <= SINGULAR * k.h * free or free <= 0:
                 k.acts[r] = 0
                 fx = fy = gxx = gxy = gyy = 0
             else:
@@ -176,9 +191,9 @@ def substitute(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.P
     r: cython.Py_ssize_t
     for r in range(end - 1, first - 1, -1):
         if r + 1 < end:
-            shared: cython.double = k.h * k.weight[k.node[k.first[r] + 1]]
-            x: cython.double = shared * fx
-            y: cython.double = shared * fy
+            shared: Mobility = moved_by(k, k.node[k.first[r] + 1])
+            x: cython.double = k.h * (shared.xx * fx + shared.xy * fy)
+            y: cython.double = k.h * (shared.xy * fx + shared.yy * fy)
             fx = k.answer[2 * r] + k.inverse[3 * r] * x + k.inverse[3 * r + 1] * y
             fy = k.answer[2 * r + 1] + k.inverse[3 * r + 1] * x + k.inverse[3 * r + 2] * y
         else:

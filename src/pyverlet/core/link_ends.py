@@ -42,8 +42,9 @@ def turn_impulses(k: cython.pointer(Links), share: cython.double) -> cython.void
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def project(k: cython.pointer(Links)) -> cython.void:
+def project(w: cython.pointer(Step)) -> cython.void:
     """Velocities along which no rigid row changes, and no rigid pin moves; what rows remember is left as it is."""
+    k: cython.pointer(Links) = w.link_table
     r: cython.Py_ssize_t
     b: cython.Py_ssize_t
     p: cython.Py_ssize_t
@@ -54,7 +55,7 @@ def project(k: cython.pointer(Links)) -> cython.void:
             k.weight[i] = k.u[2 * i] = k.u[2 * i + 1] = 0
     for _ in range(1 if k.colours == 1 else SWEEPS):
         for b in range(k.chunk[k.colour[k.colours]]):
-            solve_block(k, b, False)
+            solve_block(w, b, False)
     for r in range(k.rows):
         k.impulse[r] = k.target[r]
 
@@ -76,8 +77,9 @@ def show_links(w: cython.pointer(Step), half: cython.double, kick: cython.double
             k.x[2 * i + axis] = w.position[2 * k.slot[i] + axis]
             k.u[2 * i + axis] = w.velocity[2 * k.slot[i] + axis]
         k.own[i] = k.weight[i] = w.inverse_mass[k.slot[i]]
+        k.held[i] = -1
     turn_impulses(k, half / kick)
-    project(k)
+    project(w)
     for i in range(k.count):
         for axis in range(2):
             at: cython.Py_ssize_t = 2 * k.slot[i] + axis

@@ -8,7 +8,9 @@ from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_chains import CHORDS, LOST_WAY, WAVES, give, step_chain
+from pyverlet.core.link_holds import hold_node, let_go_of_wedged, mobility_along, restore_node, save_node
 from pyverlet.core.link_shapes import LinkWay, way_between
+from pyverlet.core.step import Step
 
 MOST_STEPS = cython.declare(cython.int, 20)
 LENGTH_SOLVED = cython.declare(cython.double, 1e-9)
@@ -49,8 +51,12 @@ def sweep_link(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
         return
     p: LinkWay = way_between(k, k.node[e], k.node[e + 1], k.h)
     length: cython.double = sqrt(p.x * p.x + p.y * p.y)
-    gives: cython.double = k.soft[r] + k.h * (k.weight[k.node[e]] + k.weight[k.node[e + 1]])
-    if length == 0 or gives <= 0:
+    if length == 0:
+        return
+    let_go_of_wedged(k, k.node[e], k.node[e + 1], p.x / length, p.y / length)
+    moves: cython.double = mobility_along(k, k.node[e], p.x, p.y, p.x, p.y) + mobility_along(k, k.node[e + 1], p.x, p.y, p.x, p.y)
+    gives: cython.double = k.soft[r] + k.h * moves / (length * length)
+    if gives <= 0:
         return
     before: cython.double = (k.given[2 * r] * p.x + k.given[2 * r + 1] * p.y) / length
     after: cython.double = before + (k.target[r] - k.soft[r] * before - length + k.rest[r]) / gives
@@ -62,10 +68,52 @@ def sweep_link(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def sweep_chain(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
+def hold_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
+    """Surfaces hold the particles of a chain."""
+    k: cython.pointer(Links) = w.link_table
+    r: cython.Py_ssize_t
+    if not k.surfaces or first == end:
+        return
+    hold_node(w, k.node[k.first[first]])
+    for r in range(first, end):
+        hold_node(w, k.node[k.first[r] + 1])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def save_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
+    """Before a chain is solved that nothing else joins."""
+    k: cython.pointer(Links) = w.link_table
+    r: cython.Py_ssize_t
+    save_node(w, k.node[k.first[first]])
+    for r in range(first, end):
+        save_node(w, k.node[k.first[r] + 1])
+        k.had[2 * r], k.had[2 * r + 1] = k.given[2 * r], k.given[2 * r + 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def restore_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
+    """Back to that: where Newton's method has failed, numbers may be too large to be taken back one by one."""
+    k: cython.pointer(Links) = w.link_table
+    r: cython.Py_ssize_t
+    restore_node(w, k.node[k.first[first]])
+    for r in range(first, end):
+        restore_node(w, k.node[k.first[r] + 1])
+        k.given[2 * r], k.given[2 * r + 1] = k.had[2 * r], k.had[2 * r + 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def sweep_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
     """There and back, from nothing: of a light chain that is jerked or pushed together, whose links turn over in a substep."""
+    k: cython.pointer(Links) = w.link_table
     r: cython.Py_ssize_t
     _: cython.int
+    restore_chain(w, first, end)
     for r in range(first, end):
         give(k, r, -k.given[2 * r], -k.given[2 * r + 1])
     for _ in range(LINK_SWEEPS):
@@ -73,20 +121,23 @@ def sweep_chain(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.
             sweep_link(k, r)
         for r in range(end - 1, first - 1, -1):
             sweep_link(k, r)
+        hold_chain(w, first, end)
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def approach(
-    k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, good: cython.double, how: cython.int
+    w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t, good: cython.double, how: cython.int
 ) -> cython.double:
     """Newton's method, until errors are `good`; returns the largest, of lengths."""
+    k: cython.pointer(Links) = w.link_table
     tries: cython.int = 0
     missed: cython.double = INFINITY
     while tries < MOST_STEPS and not missed <= good:
         tries += 1
         step_chain(k, first, end, True, how)
+        hold_chain(w, first, end)
         missed = misses(k, first, end)
     return missed
 
@@ -94,12 +145,16 @@ def approach(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def solve_chain(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, alone: cython.bint) -> cython.void:
+def solve_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t, alone: cython.bint) -> cython.void:
     """Lengths after the drift. alone: nothing else joins these particles; in nets others undo what is more than one step."""
+    k: cython.pointer(Links) = w.link_table
     if not alone:
         step_chain(k, first, end, True, CHORDS)
-    elif not approach(k, first, end, LENGTH_SOLVED, WAVES) < LOST:
-        sweep_chain(k, first, end)
+        hold_chain(w, first, end)
+        return
+    save_chain(w, first, end)
+    if not approach(w, first, end, LENGTH_SOLVED, WAVES) < LOST:
+        sweep_chain(w, first, end)
         swept: cython.double = misses(k, first, end)
-        if swept > NEAR_ENOUGH and not approach(k, first, end, NEAR_ENOUGH, LOST_WAY) < swept:
-            sweep_chain(k, first, end)
+        if swept > NEAR_ENOUGH and not approach(w, first, end, NEAR_ENOUGH, LOST_WAY) < swept:
+            sweep_chain(w, first, end)

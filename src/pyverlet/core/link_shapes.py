@@ -7,6 +7,7 @@ import cython
 from cython.cimports.libc.math import atan2, rint, sqrt
 
 from pyverlet.core.link_arrays import ANGLE, DISTANCE, Links
+from pyverlet.core.link_holds import move
 
 TURN = cython.declare(cython.double, 6.283185307179586)
 
@@ -119,7 +120,6 @@ def push(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cy
     """Give linked particle i an impulse, N s. One of infinite mass may belong to several rows of a colour: none writes to it."""
     if k.own[i] == 0:
         return
-    k.u[2 * i] += k.weight[i] * x
-    k.u[2 * i + 1] += k.weight[i] * y
+    move(k, i, k.weight[i] * x, k.weight[i] * y)
     k.react[2 * i] += x
     k.react[2 * i + 1] += y

@@ -15,6 +15,7 @@ from cython.cimports.team import team_stage
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_blocks import AVERAGED, begin_row, end_row, finish_row, solve_block, take_back_row, warm_block
+from pyverlet.core.link_holds import find_hold, move, note_holds
 from pyverlet.core.link_pins import begin_pin, end_pin, finish_pin, hold_pin, rest_pin, settle_pin
 from pyverlet.core.step import Step
 
@@ -55,6 +56,36 @@ def put_stage(what: cython.p_void, block: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def put_held_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """And back, with what surfaces have given meanwhile."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    a: cython.Py_ssize_t = block * BLOCK
+    i: cython.Py_ssize_t
+    for i in range(a, min(a + BLOCK, k.count)):
+        note_holds(w, i, 1)
+    put_stage(what, block)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def relax_take_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """Velocities of a block after the drift, and what holds it then."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    a: cython.Py_ssize_t = block * BLOCK
+    i: cython.Py_ssize_t
+    take_stage(what, block)
+    for i in range(a, min(a + BLOCK, k.count)):
+        find_hold(w, i)
+        if w.noting:
+            note_holds(w, i, -1)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def open_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Where a block of linked particles is, and what it weighs."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -68,6 +99,7 @@ def open_stage(what: cython.p_void, block: cython.int) -> cython.void:
         k.own[i] = k.weight[i] = w.inverse_mass[at]
         k.react[2 * i] = k.react[2 * i + 1] = 0
         k.loaned[2 * i] = k.loaned[2 * i + 1] = 0
+        k.held[i] = -1
 
 
 @cython.cfunc
@@ -82,8 +114,11 @@ def take_back_stage(what: cython.p_void, block: cython.int) -> cython.void:
     axis: cython.int
     take_stage(what, block)
     for i in range(a, min(a + BLOCK, k.count)):
+        find_hold(w, i)
+        if w.noting:
+            note_holds(w, i, -1)
+        move(k, i, -k.loaned[2 * i], -k.loaned[2 * i + 1])
         for axis in range(2):
-            k.u[2 * i + axis] -= k.loaned[2 * i + axis]
             if k.own[i] > 0:
                 w.acceleration[2 * cython.cast(cython.Py_ssize_t, k.slot[i]) + axis] = cython.cast(real, k.driven[2 * i + axis])
 
@@ -168,11 +203,12 @@ def warm_chunk(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.exceptval(check=False)
 def solve_chunk(what: cython.p_void, item: cython.int) -> cython.void:
     """Where rows of a chunk are to be after the drift."""
-    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
     c: cython.Py_ssize_t = k.colour[k.now] + item
     b: cython.Py_ssize_t
     for b in range(k.chunk[c], k.chunk[c + 1]):
-        solve_block(k, b, True)
+        solve_block(w, b, True)
 
 
 @cython.cfunc
@@ -180,11 +216,12 @@ def solve_chunk(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.exceptval(check=False)
 def relax_chunk(what: cython.p_void, item: cython.int) -> cython.void:
     """How rows of a chunk change after the drift."""
-    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
     c: cython.Py_ssize_t = k.colour[k.now] + item
     b: cython.Py_ssize_t
     for b in range(k.chunk[c], k.chunk[c + 1]):
-        solve_block(k, b, False)
+        solve_block(w, b, False)
 
 
 @cython.cfunc
@@ -220,8 +257,8 @@ def blocks_of(k: cython.pointer(Links)) -> cython.int:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def begin_links(w: cython.pointer(Step)) -> cython.void:
-    """After the kick: what links gave in the last substep."""
+def begin_links(w: cython.pointer(Step), surfaces: cython.bint) -> cython.void:
+    """After the kick: what links gave in the last substep. surfaces: whether there are any."""
     k: cython.pointer(Links) = w.link_table
     p: cython.Py_ssize_t
     c: cython.int
@@ -230,6 +267,7 @@ def begin_links(w: cython.pointer(Step)) -> cython.void:
     k.kick = cython.cast(cython.double, w.h / w.weigh if opens and w.weigh > 0 else w.h)
     k.scale = cython.cast(cython.double, w.scale if opens else 1)
     k.least = cython.cast(cython.double, w.rest_speed)
+    k.contact, k.surfaces = w.contact, surfaces
     team_stage(w.team, open_stage, w, blocks_of(k))
     team_stage(w.team, begin_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
     for p in range(k.pins):
@@ -263,7 +301,7 @@ def solve_links(w: cython.pointer(Step)) -> cython.void:
     team_stage(w.team, finish_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
     for p in range(k.pins):
         finish_pin(k, p)
-    team_stage(w.team, put_stage, w, blocks_of(k))
+    team_stage(w.team, put_held_stage, w, blocks_of(k))
 
 
 @cython.cfunc
@@ -274,7 +312,7 @@ def relax_links(w: cython.pointer(Step), back: cython.bint) -> cython.void:
     k: cython.pointer(Links) = w.link_table
     p: cython.Py_ssize_t
     c: cython.int
-    team_stage(w.team, take_stage, w, blocks_of(k))
+    team_stage(w.team, relax_take_stage, w, blocks_of(k))
     for p in range(k.pins):
         rest_pin(k, p)
     for c in range(k.colours):
@@ -282,7 +320,7 @@ def relax_links(w: cython.pointer(Step), back: cython.bint) -> cython.void:
         team_stage(w.team, relax_chunk, w, cython.cast(cython.int, k.colour[k.now + 1] - k.colour[k.now]))
     for p in range(k.pins):
         settle_pin(k, p)
-    team_stage(w.team, put_stage, w, blocks_of(k))
+    team_stage(w.team, put_held_stage, w, blocks_of(k))
 
 
 @cython.cfunc

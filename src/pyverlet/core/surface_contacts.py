@@ -81,6 +81,28 @@ def ends_inside(w: cython.pointer(Step), first: cython.Py_ssize_t, ux: cython.do
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def passes_by(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, vx: cython.double, vy: cython.double
+) -> cython.bint:
+    """Whether particle i has come so fast that it has bounced if it meets the obstacle of contact k at all."""
+    row: cython.pointer(cython.double) = w.contact
+    first: cython.Py_ssize_t = CONTACT * k
+    if 0 <= w.surface[k] < SIDES:
+        return False
+    nx: cython.double = row[first + NORMAL]
+    ny: cython.double = row[first + NORMAL + 1]
+    ux: cython.double = vx - row[first + SPEED]
+    uy: cython.double = vy - row[first + SPEED + 1]
+    if ux * nx + uy * ny <= w.least_bounce:
+        return False
+    free: cython.double = (w.free[2 * i] - row[first + SPEED]) * nx + (w.free[2 * i + 1] - row[first + SPEED + 1]) * ny
+    return free > w.least_bounce and not ends_inside(w, first, ux, uy)
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def hold(
@@ -107,10 +129,8 @@ def hold(
         slide: cython.double = ux * ny - uy * nx
         speed -= 0.5 * slide * slide * row[first + BEND] * w.h
     else:
-        if before == 0 and not 0 <= w.surface[k] < SIDES and speed > w.least_bounce:
-            free: cython.double = (w.free[2 * i] - row[first + SPEED]) * nx + (w.free[2 * i + 1] - row[first + SPEED + 1]) * ny
-            if free > w.least_bounce and not ends_inside(w, first, ux, uy):  # it has bounced if it meets it at all
-                return 0.0
+        if before == 0 and passes_by(w, i, k, v[width * i], v[width * i + 1]):
+            return 0.0
         speed = excess_speed(w, first, v[width * i], v[width * i + 1])
     after: cython.double = max(before + speed - leak * before, 0.0)
     if before == 0 and after == 0:
