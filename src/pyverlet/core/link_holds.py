@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Linked particles that surfaces hold: links move them along these, and a surface takes what goes into it, as long as it presses."""
+"""Linked particles that surfaces hold: links move them along these, and a surface takes what goes into it while it presses."""
 
 from __future__ import annotations
 
