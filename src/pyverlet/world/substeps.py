@@ -19,6 +19,7 @@ from pyverlet.ground.constants import FUSED_FROM
 from pyverlet.kernels import drive, frame, fused
 from pyverlet.laws.contacts import _held_rooms
 from pyverlet.laws.contacts._held import claims, first_leap
+from pyverlet.laws.contacts._held_course import HeldCourse
 from pyverlet.laws.contacts.broadphase import Strips
 from pyverlet.laws.contacts.collisions import ContactSolver
 from pyverlet.laws.contacts.wide import Wide
@@ -67,6 +68,13 @@ class Substeps:
         self.parts: list[Any] = []  # what looks at particles before each substep
         self._forces: Any = None
         self._beside: Any = None
+        self._course: HeldCourse | None = None
+
+    def course(self, world: Any) -> HeldCourse:
+        """The obstacles of a world as kernels have them."""
+        if self._course is None or self._course.course is not world._course:
+            self._course = HeldCourse(world._course)
+        return self._course
 
     def begin(self, contacts: ContactSolver | None, course: Any) -> Substeps:
         """A frame begins. That before may have been broken off, and the user may have changed everything since."""
@@ -101,13 +109,13 @@ class Substeps:
             return False
         out, self._out, self.leapt = self._out, None, False
         strips, room = contacts.steady(state), world.boundary
-        if strips is None or _held_rooms.compiled(room, state) is None or not (course := world._course).still:
+        if strips is None or _held_rooms.compiled(room, state) is None or not (obstacles := self.course(world)).still:
             return False
         links: Any = world.links.compiled(state, h) if world.links else ()
         if opens:  # as far as is known now the list is good
             contacts.broad_phase.aged(1)
             world.profile.mark("broad phase")
-        if course:
+        if course := obstacles if world._course else None:
             course.set_up(state, substep * h, h)
         if opens:
             forces.fall(state)
@@ -126,7 +134,7 @@ class Substeps:
         beside: Any = ()
         services: Any = ()
         if kind:
-            about = course.compiled(state, room), contacts.lent(), links
+            about = obstacles.compiled(state, room), contacts.lent(), links
             beside, services = self._services(world, books, (), *about, h, lag)
         stop, sets_out = world.substeps if leaps else substep + 1, not opens and (lends or out is not wide.moved)
         begin = (wide.takes_looks(), int(sets_out), int(opens), frame.WHOLE, *state.reals(*forces.gravity))
@@ -182,7 +190,7 @@ class Substeps:
         beside: Any = ()
         services: Any = ()
         if kind := _linked(world) if links else "served" * lends:
-            about = world._course.nothing(state), contacts.lent(), links
+            about = self.course(world).nothing(state), contacts.lent(), links
             beside, services = self._services(world, None, (), *about, h, lag)
         contacts.wide.do(part, state, kind, beside, tuple(services))
 

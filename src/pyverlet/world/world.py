@@ -133,8 +133,9 @@ class World(Measures, Queries, Doors):
     def _frame(self, h: float, done: Callable[[str], None]) -> bool:
         """The table of contents of the engine; `done` hears which stage has ended. True if all is known to be finite."""
         state, forces, integrator = self._slots, self._force_sum, self.integrator
-        contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course or None
-        lag, state.drop, state.h, run = integrator.velocity_lag * h, integrator.drop, h, self._run.begin(contacts, course)
+        contacts, links, run = self._contacts if len(self) > 1 else None, self.links or None, self._run
+        course = run.course(self) if self._course else None
+        lag, state.drop, state.h, run = integrator.velocity_lag * h, integrator.drop, h, run.begin(contacts, course)
         if not self._open(h, done):
             return False
         compiled = run.tells(done, self.profile.mark)
@@ -249,7 +250,7 @@ class World(Measures, Queries, Doors):
         if self._events:
             self._events.forget()
         if self._contacts:
-            self._contacts.clear_notes(self.boundary.bounces or self._course.bounces)
+            self._contacts.clear_notes(self.boundary.bounces or any(each.restitution > 0 for each in self.obstacles))
 
     def _refuse_non_finite(self, h: float) -> None:
         """Run a bad frame again from the last good state, looking after every stage: normal frames pay nothing for it."""
