@@ -260,6 +260,23 @@ def take_energy(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     return bodies(chance, dtype), bodies(chance, dtype), about, LIMITS, *work
 
 
+def walled(chance: Chance, dtype: Any, law: tuple[float, ...]) -> tuple[Any, ...]:
+    """What walls confine."""
+    own = chance.uniform(-1, 1, (2, N)).astype(dtype)
+    circles = *(rows(chance, dtype) for _ in range(3)), column(chance, dtype), 0.2 * column(chance, dtype), *own
+    return circles, light(chance, dtype), np.full(N, -1, dtype), law
+
+
+@kernel
+def confine_to_box(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return -0.7, -0.8, 0.9, 1.0, *walled(chance, dtype, (0.01, 0.005, 0.5, 0.3, 0.0, 0.05))
+
+
+@kernel
+def confine_to_circle(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return 0.1, 0.2, 0.9, *walled(chance, dtype, (0.01, 0.0, 0.0, 0.3, 2.0, 0.05))
+
+
 LOADED = functools.cache(reference.load)
 
 

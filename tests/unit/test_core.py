@@ -85,13 +85,21 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     points, heading = np.ascontiguousarray(position[:5], float), np.tile([0.6, 0.8], (5, 1))
     tools.first_on_rays(points + 2.0, heading, np.full(5, 9.0), 1.0, cells, position, radius, index, distance)
     tools.nearest_to(points, cells, position, nearest, square)
-    arrays = (near, pixels, index, distance, nearest, square)
+    segments = np.tile([0.0, 0.0, 0.6, 0.8, 2.0, 0.5, 0.0, 0.0, 0.0, 0.0], (6, 1))
+    segments[:, :2], segments[:, 7] = np.arange(12).reshape(6, 2) % 5, np.arange(6)
+    heads, links, by = np.empty(64, np.int32), np.zeros((999, 2), np.int32), np.empty(60, np.int64)
+    where, row, gap, normal = position.astype(float), np.zeros((2, 240), np.int64), np.zeros(240), np.zeros((240, 2))
+    used = tools.list_segments(segments, 1.0, 1.0, heads, links)
+    tools.covered_by(segments, 1.0, heads, links, where, by)
+    found = tools.nearest_bodies(segments, 6, 1.0, 1.0, heads, links, where, np.full(60, 0.3), *row, gap, normal)
+    arrays = (near, pixels, index, distance, nearest, square, heads, links[:used], by, row, gap, normal)
     return [
         *engine.energies(position, velocity, spin, radius, mass, 0.5, -9.81),
         *engine.momenta(position, velocity, spin, radius, mass),
         *engine.overlaps(position, radius, 0.0, 1.5, pairs),
         engine.pinned_move(mass, velocity, spin),
         near_ones,
+        found,
         tools.checksum(np.arange(9000, dtype=np.uint64) << np.uint64(40)),
         *(array.tobytes() for array in arrays),
     ]

@@ -7,6 +7,7 @@ from pyverlet.core.area_drawing import draw_convex, fill, stroke, tint
 from pyverlet.core.checksum import checksum
 from pyverlet.core.disc_drawing import draw_discs
 from pyverlet.core.line_drawing import draw_lines
+from pyverlet.core.obstacle_queries import covered_by, list_segments, nearest_bodies
 from pyverlet.core.page_arrays import copy_moving, put_rows, quantize
 from pyverlet.core.queries import at_points, first_on_rays, in_regions, nearest_to
 from pyverlet.core.query_cells import extent, sort_into_cells
@@ -15,6 +16,7 @@ __all__ = [
     "at_points",
     "checksum",
     "copy_moving",
+    "covered_by",
     "draw_convex",
     "draw_discs",
     "draw_lines",
@@ -22,6 +24,8 @@ __all__ = [
     "fill",
     "first_on_rays",
     "in_regions",
+    "list_segments",
+    "nearest_bodies",
     "nearest_to",
     "put_rows",
     "quantize",

@@ -218,7 +218,9 @@ class _End:
         self._free[order] = state.inverse_mass > 0
         self._obstacles, self._found = course.seen(), dict[int, Array]()
         who = np.flatnonzero(given[2].any(axis=1))
-        self._beside = course.facing(self._position[who], _NEAR * self._radius[who])
+        r = self._radius[who]
+        within = (1 + 2 * _NEAR) * float(r.max(initial=0.0))
+        self._beside = course.facing(self._position[who], _NEAR * r, within=within, ahead=dt)
 
     def number_of(self, obstacle: Any) -> int:
         """Among the obstacles of then; -2 if it was none."""

@@ -8,13 +8,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.kernels import obstacles as kernels
 from pyverlet.laws.obstacles._base import Obstacle, Obstacles, journal
 from pyverlet.state.seam import NONE, Seam
 
 Array = NDArray[Any]
 
 _HERE = ((0.0, 0.0),)
+
+BODY = np.dtype([(name, np.float64) for name in ("x", "y", "angle", "vx", "vy", "spin")])
+"""Where an obstacle's pivot is at the beginning of a frame, m and rad, and how it moves, m/s and rad/s."""
+
+SEGMENT = np.dtype(
+    [
+        ("body", np.int64),
+        ("first", np.int64), ("faces", np.int64),  # the faces of its polygon; none if it is no part of one
+        ("around", np.int64),  # 1: its surface runs counter-clockwise around it; 0: along it, on both sides
+        ("lx", np.float64), ("ly", np.float64), ("lc", np.float64), ("ls", np.float64),  # start and direction, as built
+        ("length", np.float64), ("rounding", np.float64), ("inner", np.float64),  # inner: who is inside is as near as this, m
+        ("before_x", np.float64), ("before_y", np.float64),  # from its start to the neighbour's start, in its own frame; or 0
+        ("after_x", np.float64), ("after_y", np.float64),  # from its end to the neighbour's end
+        ("restitution", np.float64), ("friction", np.float64), ("belt", np.float64),
+    ]
+)  # fmt: skip
+"""A rounded segment of an obstacle. Metres."""
 
 
 class _Rows:
@@ -41,7 +57,7 @@ class _Rows:
 
 
 class Tables:
-    """Bodies and segments of all obstacles, `kernels.obstacles.BODY` and `SEGMENT`.
+    """Bodies and segments of all obstacles, `BODY` and `SEGMENT`.
 
     Args:
         obstacles: the world's list; what has changed in it is looked for at the beginning of each frame.
@@ -57,14 +73,12 @@ class Tables:
         self._seen: list[Obstacle] = []
         self._listed = self._revision = -1
         self._imaged = seam
-        self._own_bodies, self._own_segments = _Rows(kernels.BODY), _Rows(kernels.SEGMENT)
+        self._own_bodies, self._own_segments = _Rows(BODY), _Rows(SEGMENT)
         self._bodies, self._segments = self._own_bodies.rows, self._own_segments.rows
         self._first = np.zeros(1, np.int64)  # of each its first segment, and one more
         self._number: dict[int, int] | None = {}  # of each by its id
-        self._moves, self._drives, self._throws = set[int](), set[int](), set[int]()
+        self._moves, self._drives = set[int](), set[int]()
         self._moving = np.zeros(0, np.int64)
-        self._changed: set[int] = set()  # to be placed before the next substep
-        self._renumbered = True  # numbers are others: whatever keeps them is to be made anew
 
     def __reduce__(self) -> Any:
         """A copy finds out by itself."""
@@ -74,19 +88,9 @@ class Tables:
         return bool(self._obstacles)
 
     @property
-    def still(self) -> bool:
-        """Whether obstacles stay where they are, so that a substep is like the one before."""
-        return not self._moves
-
-    @property
     def drives(self) -> bool:
         """Whether any moves, or has a surface that does."""
         return bool(self._drives)
-
-    @property
-    def bounces(self) -> bool:
-        """Whether any throws circles back."""
-        return bool(self._throws)
 
     def seen(self) -> list[Obstacle]:
         """The obstacles of the last frame."""
@@ -115,7 +119,7 @@ class Tables:
 
     @property
     def segments(self) -> Array:
-        """Records `kernels.obstacles.SEGMENT`, those of images behind the others."""
+        """Records `SEGMENT`, those of images behind the others."""
         return self._segments
 
     @property
@@ -167,7 +171,6 @@ class Tables:
         else:
             for k in range(before, len(now)):
                 self._sort_in(k)
-                self._changed.add(k)
                 if self._number is not None:
                     self._number[id(now[k])] = k
         return fresh
@@ -180,14 +183,14 @@ class Tables:
         count = [len(obstacle.table) for obstacle in fresh]
         # As bytes: putting hundreds of arrays of records together takes milliseconds.
         parts = [np.zeros(0, np.uint8), *(obstacle.table.view(np.uint8) for obstacle in fresh)]
-        rows = np.concatenate(parts).view(kernels.SEGMENT)
+        rows = np.concatenate(parts).view(SEGMENT)
         first = self._first[-1] + np.cumsum([0, *count])
         rows["body"], rows["first"] = np.repeat(before + np.arange(len(fresh)), count), np.repeat(first[:-1], count)
         surfaces = [(obstacle.restitution, obstacle.friction, obstacle.surface_speed) for obstacle in fresh]
         for name, column in zip(("restitution", "friction", "belt"), zip(*surfaces, strict=True), strict=bool(surfaces)):
             rows[name] = np.repeat(column, count)
         self._own_segments.extend(rows)
-        self._own_bodies.extend(np.array([_body(obstacle) for obstacle in fresh], kernels.BODY))
+        self._own_bodies.extend(np.array([_body(obstacle) for obstacle in fresh], BODY))
         self._first = np.concatenate((self._first, first[1:]))
 
     def _put_in_order(self, order: Array) -> None:
@@ -211,29 +214,24 @@ class Tables:
             part["friction"] = obstacle.friction
             part["belt"] = obstacle.surface_speed
         self._own_bodies.rows[k] = body
-        self._changed.add(k)
         self._sort_in(k)
         self.version += 1
 
     def _sort_in(self, k: int) -> None:
         """Note what an obstacle does that only few do."""
         obstacle, moves = self._seen[k], self._seen[k].moves
-        for some, does in (
-            (self._drives, moves or obstacle.surface_speed != 0.0), (self._throws, obstacle.restitution > 0.0),
-        ):  # fmt: skip
-            (some.add if does else some.discard)(k)
+        (self._drives.add if moves or obstacle.surface_speed != 0.0 else self._drives.discard)(k)
         if moves != (k in self._moves):
             (self._moves.add if moves else self._moves.discard)(k)
             self._moving = np.array(sorted(self._moves), np.int64)
 
     def _start_anew(self) -> None:
-        """Numbers are others: the grid, and who does what, are to be found anew."""
-        self._renumbered, self._number, self._changed = True, None, set()
+        """Numbers are others: who does what is to be found anew."""
+        self._number = None
         s, b = self._own_segments.rows, self._own_bodies.rows
         self._moving = np.flatnonzero((b["vx"] != 0.0) | (b["vy"] != 0.0) | (b["spin"] != 0.0))
         self._moves = set(self._moving.tolist())
         self._drives = self._moves | set(s["body"][s["belt"] != 0.0].tolist())
-        self._throws = set(s["body"][s["restitution"] > 0.0].tolist())
 
     def _imagine(self) -> None:
         """The obstacles and, in a periodic room, their images beside it."""
@@ -260,8 +258,7 @@ def _lowered(obstacle: Obstacle) -> Array:
     starts = points if closed else points[:-1]
     if len(points) == 1:
         starts = ends = points
-    table = np.zeros(len(starts), kernels.SEGMENT)
-    table["kept_x"] = np.nan
+    table = np.zeros(len(starts), SEGMENT)
     side = ends - starts
     length = np.hypot(*side.T)
     along = np.divide(side, length[:, None], out=np.tile((1.0, 0.0), (len(side), 1)), where=length[:, None] > 0)

@@ -1,0 +1,260 @@
+# mypy: ignore-errors
+"""Questions about obstacles where they stand: which covers a point, and which are the nearest.
+
+A segment is ten numbers: start and direction, length, rounding, inner (who is inside its polygon is as near as this), its body,
+and the first and how many faces of its polygon. Segments stand in a grid of hashed cells, each in all cells within reach of it.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.arrays import const_doubles, const_small_integers, doubles, integers, small_integers
+from cython.cimports.libc.math import INFINITY, fabs, floor, hypot
+from cython.cimports.libc.stdint import int32_t, int64_t
+
+PLACED = cython.declare(cython.int, 10)
+X = cython.declare(cython.int, 0)
+Y = cython.declare(cython.int, 1)
+COSINE = cython.declare(cython.int, 2)
+SINE = cython.declare(cython.int, 3)
+LENGTH = cython.declare(cython.int, 4)
+ROUNDING = cython.declare(cython.int, 5)
+INNER = cython.declare(cython.int, 6)
+BODY = cython.declare(cython.int, 7)
+FIRST = cython.declare(cython.int, 8)
+FACES = cython.declare(cython.int, 9)
+
+FARTHEST = cython.declare(cython.double, 1125899906842624.0)
+"""Cells from the origin, 2^50, to where a point can still be looked up."""
+
+Grid = cython.struct(
+    segment=cython.pointer[cython.const[cython.double]],
+    segments=cython.Py_ssize_t,
+    cell=cython.double,
+    head=cython.pointer[cython.const[int32_t]],
+    heads=int64_t,
+    link=cython.pointer[cython.const[int32_t]],
+)
+Gap = cython.struct(gap=cython.double, x=cython.double, y=cython.double)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def head_at(column: int64_t, row: int64_t, heads: int64_t) -> int64_t:
+    """The head of a cell in a table of 2^k of them: a hash, so that the table need not cover the plane."""
+    mixed: int64_t = (column * 73856093) ^ (row * 19349663)
+    return (mixed ^ (mixed >> 15)) & (heads - 1)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def list_segment(
+    s: cython.pointer[cython.const[cython.double]],
+    k: int32_t,
+    reach: cython.double,
+    cell: cython.double,
+    head: cython.pointer(int32_t),
+    heads: int64_t,
+    link: cython.pointer(int32_t),
+    room: cython.Py_ssize_t,
+    used: cython.Py_ssize_t,
+) -> cython.Py_ssize_t:
+    """List segment k; returns how many links are used now, or -1 where there is no room."""
+    at: cython.Py_ssize_t = PLACED * k
+    x: cython.double = s[at + X]
+    y: cython.double = s[at + Y]
+    dx: cython.double = s[at + COSINE] * s[at + LENGTH]
+    dy: cython.double = s[at + SINE] * s[at + LENGTH]
+    far: cython.double = reach + s[at + ROUNDING] + s[at + INNER]
+    first: int64_t = cython.cast(int64_t, floor((min(y, y + dy) - far) / cell))
+    last: int64_t = cython.cast(int64_t, floor((max(y, y + dy) + far) / cell))
+    row: int64_t
+    column: int64_t
+    for row in range(first, last + 1):
+        s0: cython.double = 0.0  # the part of the segment that is within reach of the row
+        s1: cython.double = 1.0
+        if dy != 0.0:
+            p: cython.double = (row * cell - far - y) / dy
+            q: cython.double = ((row + 1) * cell + far - y) / dy
+            s0, s1 = max(min(p, q), 0.0), min(max(p, q), 1.0)
+        left: int64_t = cython.cast(int64_t, floor((min(x + s0 * dx, x + s1 * dx) - far) / cell))
+        right: int64_t = cython.cast(int64_t, floor((max(x + s0 * dx, x + s1 * dx) + far) / cell))
+        for column in range(left, right + 1):
+            if used == room:
+                return -1
+            to: int64_t = head_at(column, row, heads)
+            link[2 * used], link[2 * used + 1] = k, head[to]
+            head[to] = cython.cast(int32_t, used)
+            used += 1
+    return used
+
+
+def list_segments(segments, reach: cython.double, cell: cython.double, heads, links) -> int:
+    """List segments in the cells within `reach` m of them; returns how many links that takes, or -1 where there is no room.
+
+    heads: (2^k,) int32, becomes the first link of each, or -1. links: (room, 2) int32, become segment and next link.
+    """
+    s: cython.pointer[cython.const[cython.double]] = const_doubles(segments)
+    head: cython.pointer(int32_t) = small_integers(heads)
+    link: cython.pointer(int32_t) = small_integers(links)
+    count: cython.Py_ssize_t = len(segments)
+    table: int64_t = len(heads)
+    room: cython.Py_ssize_t = len(links)
+    used: cython.Py_ssize_t = 0
+    k: cython.Py_ssize_t
+    with cython.nogil:
+        for k in range(table):
+            head[k] = -1
+        for k in range(count):
+            if used >= 0:
+                used = list_segment(s, cython.cast(int32_t, k), reach, cell, head, table, link, room, used)
+    return used
+
+
+@cython.cfunc
+def grid_of(segments, cell: cython.double, heads, links) -> Grid:
+    """As a struct."""
+    g: Grid
+    g.segment, g.segments, g.cell = const_doubles(segments), len(segments), cell
+    g.head, g.heads, g.link = const_small_integers(heads), len(heads), const_small_integers(links)
+    return g
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def first_link(g: cython.pointer(Grid), x: cython.double, y: cython.double) -> int32_t:
+    """Of the cell at (x, y), or -1."""
+    return g.head[head_at(cython.cast(int64_t, floor(x / g.cell)), cython.cast(int64_t, floor(y / g.cell)), g.heads)]
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def gap_to(g: cython.pointer(Grid), k: cython.Py_ssize_t, x: cython.double, y: cython.double) -> Gap:
+    """Distance of (x, y) from the surface of segment k, m, and the unit normal out of it."""
+    at: cython.Py_ssize_t = PLACED * k
+    found: Gap
+    ox: cython.double = x - g.segment[at + X]
+    oy: cython.double = y - g.segment[at + Y]
+    along: cython.double = g.segment[at + COSINE] * ox + g.segment[at + SINE] * oy
+    along = min(max(along, 0.0), g.segment[at + LENGTH])
+    ox -= along * g.segment[at + COSINE]
+    oy -= along * g.segment[at + SINE]
+    far: cython.double = hypot(ox, oy)
+    found.gap = far - g.segment[at + ROUNDING]
+    found.x = ox / max(far, 1e-300)
+    found.y = oy / max(far, 1e-300)
+    return found
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def is_covered(g: cython.pointer(Grid), k: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.bint:
+    """Whether (x, y) is in segment k, or in the polygon of which it is a face; faces run counter-clockwise."""
+    at: cython.Py_ssize_t = PLACED * k
+    if g.segment[at + ROUNDING] > 0.0 and gap_to(g, k, x, y).gap < 0.0:
+        return True
+    faces: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, g.segment[at + FACES])
+    first: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, g.segment[at + FIRST])
+    n: cython.Py_ssize_t
+    for n in range(first, first + faces):
+        at = PLACED * n
+        across: cython.double = g.segment[at + COSINE] * (y - g.segment[at + Y]) - g.segment[at + SINE] * (x - g.segment[at + X])
+        if across <= 0.0:
+            return False
+    return faces > 0
+
+
+def covered_by(segments, cell: cython.double, heads, links, position, by):
+    """by[i]: the body that has point i of (n, 2) in it, of several the first; -1 for none. Lines have no inside."""
+    grid: Grid = grid_of(segments, cell, heads, links)
+    g: cython.pointer(Grid) = cython.address(grid)
+    x: cython.pointer[cython.const[cython.double]] = const_doubles(position)
+    to: cython.pointer(int64_t) = integers(by)
+    count: cython.Py_ssize_t = len(position)
+    i: cython.Py_ssize_t
+    with cython.nogil:
+        for i in range(count):
+            to[i] = -1
+            if not fabs(x[2 * i]) + fabs(x[2 * i + 1]) < FARTHEST * g.cell:
+                continue
+            link: int32_t = first_link(g, x[2 * i], x[2 * i + 1])
+            while link >= 0:
+                k: cython.Py_ssize_t = g.link[2 * link]
+                body: int64_t = cython.cast(int64_t, g.segment[PLACED * k + BODY])
+                if (to[i] < 0 or body < to[i]) and is_covered(g, k, x[2 * i], x[2 * i + 1]):
+                    to[i] = body
+                link = g.link[2 * link + 1]
+
+
+def nearest_bodies(
+    segments, bodies: int64_t, reach: cython.double, cell: cython.double, heads, links, position, beyond, row, body, gap, normal
+) -> int:
+    """The bodies nearest to each of the points (n, 2), and those at most `beyond` (n,) m farther away.
+
+    bodies: how many, without images. reach: m, up to which a cell knows all segments near it; who is farther from all is compared
+    with each. Fills row, body, gap and normal, and returns how many there are, also beyond their room.
+    """
+    grid: Grid = grid_of(segments, cell, heads, links)
+    g: cython.pointer(Grid) = cython.address(grid)
+    place: cython.pointer[cython.const[cython.double]] = const_doubles(position)
+    extra: cython.pointer[cython.const[cython.double]] = const_doubles(beyond)
+    to_row: cython.pointer(int64_t) = integers(row)
+    to_body: cython.pointer(int64_t) = integers(body)
+    to_gap: cython.pointer(cython.double) = doubles(gap)
+    to_normal: cython.pointer(cython.double) = doubles(normal)
+    room: cython.Py_ssize_t = len(row)
+    count: cython.Py_ssize_t = len(position)
+    found: cython.Py_ssize_t = 0
+    i: cython.Py_ssize_t
+    with cython.nogil:
+        for i in range(count):
+            x: cython.double = place[2 * i]
+            y: cython.double = place[2 * i + 1]
+            each: cython.bint = not fabs(x) + fabs(y) < FARTHEST * g.cell
+            least: cython.double = least_gap(g, x, y, each)
+            if not each and least + extra[i] > reach:
+                each = True
+                least = least_gap(g, x, y, each)
+            begun: cython.Py_ssize_t = found
+            link: int64_t = 0 if each else first_link(g, x, y)
+            while link >= 0 and link < (g.segments if each else link + 1):
+                k: cython.Py_ssize_t = link if each else g.link[2 * link]
+                link = link + 1 if each else g.link[2 * link + 1]
+                there: Gap = gap_to(g, k, x, y)
+                if not there.gap <= least + extra[i]:
+                    continue
+                which: int64_t = cython.cast(int64_t, g.segment[PLACED * k + BODY]) % bodies
+                at: cython.Py_ssize_t = begun
+                while at < found and (at >= room or to_body[at] != which):
+                    at += 1
+                if at < room and (at == found or there.gap < to_gap[at]):
+                    to_row[at], to_body[at], to_gap[at] = i, which, there.gap
+                    to_normal[2 * at], to_normal[2 * at + 1] = there.x, there.y
+                found += at == found
+    return found
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def least_gap(g: cython.pointer(Grid), x: cython.double, y: cython.double, each: cython.bint) -> cython.double:
+    """Distance of (x, y) from the nearest segment of its cell, or of all."""
+    least: cython.double = INFINITY
+    k: cython.Py_ssize_t
+    if each:
+        for k in range(g.segments):
+            least = min(least, gap_to(g, k, x, y).gap)
+        return least
+    link: int32_t = first_link(g, x, y)
+    while link >= 0:
+        least = min(least, gap_to(g, g.link[2 * link], x, y).gap)
+        link = g.link[2 * link + 1]
+    return least
