@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.kernels import events as kernels
 
 METHODS: list[Any] = [pv.Fast(), pv.BruteForce()]
 
@@ -29,15 +28,6 @@ def follow(world: pv.World, frames: int) -> list[tuple[str, int, int]]:
         told += [("begin", int(a), int(b)) for a, b in world.events.begin[["a", "b"]].tolist()]
         told += [("end", int(a), int(b)) for a, b in world.events.end[["a", "b"]].tolist()]
     return told
-
-
-@pytest.mark.parametrize(("gone", "new"), [(0, 0), (0, 5), (5, 0), (40, 60), (100, 3)])
-def test_keys_are_replaced_in_order(gone: int, new: int) -> None:
-    # The same by NumPy's sets; 100 are all there are.
-    numbers = np.random.default_rng(gone).permutation(1_000)
-    keys, come = np.sort(numbers[:100]), np.sort(numbers[100 : 100 + new])
-    left = np.sort(numbers[:gone])
-    assert kernels.replaced(keys, left, come).tolist() == np.union1d(np.setdiff1d(keys, left), come).tolist()
 
 
 ENDED = [([0], [(-1, 0)]), ([1], [(0, -1), (-1, 1)]), ([2], [(1, -1)]), ([0, 1], [(-1, -1), (-1, 0)])]
@@ -288,37 +278,6 @@ def test_to_listen_changes_no_bit(room: pv.Boundary, collisions: pv.Collisions) 
         world.run(seconds=3)
         hashes.add(world.state_hash())
     assert len(hashes) == 1
-
-
-@pytest.mark.parametrize("options", [{}, {"sleep": True}, {"boundary": pv.Periodic((-6, -6), (6, 6))}])
-@pytest.mark.parametrize("dtype", ["float32", pytest.param("float64", marks=pytest.mark.slow)])
-def test_marked_in_the_list_or_by_key_the_same_events(options: dict[str, Any], dtype: str) -> None:
-    # Where the list of pairs stays, only what has changed in it is sorted; without the marks all that touch is, in every frame.
-    def world() -> pv.World:
-        now = pv.World(events=True, dtype=dtype, **{"boundary": pv.Box((-6, -6), (6, 6)), **options})
-        rng = np.random.default_rng(5)
-        now.add(position=rng.uniform(-5, 5, (150, 2)), radius=rng.uniform(0.1, 0.4, 150), velocity=rng.normal(0, 3, (150, 2)))
-        return now
-
-    marked, by_key = world(), world()
-    begun, by_marks = 0, 0
-    for frame in range(240):
-        assert by_key._events
-        assert marked._events
-        by_key._events._known = None
-        known = marked._events._known
-        for each in (marked, by_key):
-            if frame == 80:
-                each.add(position=(0, 5.0), radius=0.2)
-            if frame == 120:
-                each.remove(np.arange(len(each)) % 17 == 3)
-            each.step(1 / 60)
-        by_marks += known is not None and marked._events._known is known
-        for name in ("begin", "end", "hit"):
-            np.testing.assert_array_equal(getattr(marked.events, name), getattr(by_key.events, name))
-        begun += len(marked.events.begin)
-    assert begun > 500
-    assert by_marks > 60 or "sleep" in options
 
 
 def test_a_loop_over_broken_links_may_remove_particles() -> None:

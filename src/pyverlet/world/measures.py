@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -171,16 +171,6 @@ class Measures(Particles):
             yield self._touches
         finally:
             self._touches = before
-
-    def _listen(self, h: float, told: Callable[[str], None]) -> Callable[[str], None]:
-        """Who is told of the stages of a frame: `told`, and before it those who note contacts."""
-        if self._touches is None:
-            return told
-        listed = virial = None
-        if self._contacts and len(self) > 1:
-            self._contacts.weigh(bool(self.boundary.seam) and self.boundary.perimeter() is None)
-            listed, virial = self._contacts.listed, self._contacts.virial
-        return self._touches.frame(self._slots, self._state, h, self.boundary, self._course, listed, virial, told)
 
     def _open_books(self, h: float, by_impulses: bool) -> Any:
         """The books of a frame with steps of h seconds, if there are any."""

@@ -14,6 +14,7 @@ from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.ground.threads import max_threads
 from pyverlet.ground.turns import in_turn
 from pyverlet.laws.coarse import Coarse
+from pyverlet.laws.contacts import _held_events
 from pyverlet.laws.contacts._held import STAGES, end, use_threads
 from pyverlet.laws.contacts._held_rooms import confine, leave
 from pyverlet.laws.contacts.collisions import Collisions, ContactSolver
@@ -125,7 +126,7 @@ class World(Measures, Queries, Doors):
             books = self._open_books(h, by_impulses := self._impulses.takes(self))
             if by_impulses:
                 self._impulses.step(self, dt, books or self.profile.mark)
-            elif not self._frame(h, self._listen(h, books or self.profile.mark)):
+            elif not self._frame(h, books or self.profile.mark):
                 self._refuse_non_finite(h)
             self._accept(dt, h, books)
         act_after(self, dt)
@@ -231,8 +232,9 @@ class World(Measures, Queries, Doors):
         self._course.end(dt)
         self._impulses.links.end(self) if self._impulses.steps else self.links.scatter()
         if self._events:
-            pairs = self._contacts.packed(self._slots) if self._contacts and len(self) > 1 else None
-            self._events.close(self._slots, self._state, None if self._impulses.steps else pairs, self._place())
+            if not self._impulses.steps:
+                _held_events.close(self)
+            self._events.close(self._slots, self._state, self._place())
         self.profile.mark("scatter")
         self.time, self.frames, self._h_last = self.time + dt, self.frames + 1, h
         for each in self._looks:

@@ -14,6 +14,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.constants import FED, PUSHED, REST_ACCELERATIONS, UNEVEN
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import overlap
+from pyverlet.laws.contacts import _held_events
 from pyverlet.laws.contacts._held import pick_falling
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast, PairList, Strips
 from pyverlet.laws.contacts.growth import Growth
@@ -142,7 +143,7 @@ class ContactSolver:
     def _collect(self, state: Slots, events: Events) -> None:
         """Tell the events who has met, and how fast."""
         if self._packed:
-            events.collect(state, self.wide)
+            _held_events.collect(events, state, self.wide)
 
     def packed(self, state: Slots) -> Wide | None:
         """The pairs in packs, if there are any about the circles of now. In them is noted who has met since they were made."""
