@@ -86,3 +86,15 @@ def test_own_numbers_of_circles_count() -> None:
     assert world.velocity[0, 0] == pytest.approx(5.0 - 0.5 * 0.2 * G, abs=1e-9)
     (_, y), (_, v) = world.position[1], world.velocity[1]
     assert y - RADIUS + v * v / (2 * G) == pytest.approx(0.49, rel=1e-9)
+
+
+def test_events_tell_who_meets_the_walls() -> None:
+    # Dropped from 1 m it meets the floor with sqrt(2 g), and stays: one begin, no end.
+    world = pv.World(boundary=room("box"), events=True, dtype=np.float64)
+    world.add(position=(0, RADIUS + 1.0), radius=RADIUS)
+    begun: list[tuple[Any, ...]] = []
+    for _ in range(60):
+        world.step(1 / 60)
+        begun += [tuple(row) for row in world.events.begin[["a", "b", "wall", "speed"]].tolist()]
+        assert len(world.events.end) == 0
+    assert begun == [(0, -1, 2, pytest.approx(np.sqrt(2 * G), rel=1e-9))]

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.kernels import events as kernels
 
 METHODS: list[Any] = [pv.Fast(), pv.BruteForce()]
 
@@ -29,15 +28,6 @@ def follow(world: pv.World, frames: int) -> list[tuple[str, int, int]]:
         told += [("begin", int(a), int(b)) for a, b in world.events.begin[["a", "b"]].tolist()]
         told += [("end", int(a), int(b)) for a, b in world.events.end[["a", "b"]].tolist()]
     return told
-
-
-@pytest.mark.parametrize(("gone", "new"), [(0, 0), (0, 5), (5, 0), (40, 60), (100, 3)])
-def test_keys_are_replaced_in_order(gone: int, new: int) -> None:
-    # The same by NumPy's sets; 100 are all there are.
-    numbers = np.random.default_rng(gone).permutation(1_000)
-    keys, come = np.sort(numbers[:100]), np.sort(numbers[100 : 100 + new])
-    left = np.sort(numbers[:gone])
-    assert kernels.replaced(keys, left, come).tolist() == np.union1d(np.setdiff1d(keys, left), come).tolist()
 
 
 ENDED = [([0], [(-1, 0)]), ([1], [(0, -1), (-1, 1)]), ([2], [(1, -1)]), ([0, 1], [(-1, -1), (-1, 0)])]

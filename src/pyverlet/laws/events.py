@@ -9,16 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
-from pyverlet.ground.constants import FIRST_OBSTACLE, SURFACES
-from pyverlet.kernels import events as kernels
+from pyverlet.ground.constants import FIRST_OBSTACLE
 from pyverlet.laws.obstacles import Course, Obstacle
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
 Array = NDArray[Any]
-Compared = tuple[Array, Array, Array]
-"""Keys, sorted, of contacts that have ended in a frame, that have begun, and that touch."""
 
 WALL = -1
 """In the place of b: a wall of the bounds, or an obstacle."""
@@ -79,7 +76,6 @@ class Events:
         self.begin = self.hit = np.empty(0, HIT)
         self.end = np.empty(0, CONTACT)
         self._touching = np.empty(0, np.int64)  # keys, sorted
-        self._at_wall = self._touching  # those of them that are about walls; known where the next is
         self._obstacles: list[Obstacle] | None = None  # that the keys number; None: those of now
         self._told: list[Told] = []
 
@@ -103,8 +99,7 @@ class Events:
 
     def take(self, other: Events) -> None:
         """Remember what the other does."""
-        self._hit_speed, self._touching = other._hit_speed, other._touching
-        self._at_wall, self._obstacles = other._at_wall, other._obstacles
+        self._hit_speed, self._touching, self._obstacles = other._hit_speed, other._touching, other._obstacles
         self.begin, self.end, self.hit = other.begin.copy(), other.end.copy(), other.hit.copy()
 
     def renumber(self, now: Array) -> None:
@@ -115,25 +110,29 @@ class Events:
     # ---- what the engine tells ---------------------------------------------------------------------------------------
 
     def hear(self, told: list[Told]) -> None:
-        """All that was noted of a frame that ends, but for walls of a room of the user's own."""
-        self._told = told
+        """What was noted of this frame, but for walls of a room of the user's own."""
+        self._told += told
 
     def forget(self) -> None:
         """A frame begins, or begins again."""
         self._told = []
 
     def close(self, slots: Slots, state: State, place: Place) -> None:
-        """The frame has gone well: what was told is what happened; `place`: what they met."""
+        """The frame has gone well: what was told is what happened; `place`: what circles met."""
         lost = self._number_obstacles(place.course.seen())
-        walls = place.walls(slots)
-        told, (gone, new, now) = self._compare_keys(slots, state, walls)
+        told = Told.of([*self._told, place.walls(slots)])
+        told = told._replace(keys=_numbered(told.keys, state))
+        # Those who sleep are not listed, but go on. To sort keys alone takes a third of what it takes to know their order.
+        now = np.sort(np.concatenate((told.keys, self._sleeping(slots, state))))
+        now = now[np.diff(now, prepend=-1) > 0]
+        gone, new = self._touching[~_among(self._touching, now)], now[~_among(now, self._touching)]
         # Bounces: each is a beginning, and but for the last an end; another one, if they touched before, ends what went on.
         again, bounces = _counted(told)
         begun = np.unique(np.concatenate((new, again)))
         times = np.ones(len(begun), np.int64)
         times[np.searchsorted(begun, again)] = bounces
         ended = np.concatenate((lost, gone, np.repeat(again, bounces - 1 + _among(again, self._touching))))
-        speeds = kernels.largest(begun, *told[:2])
+        speeds = _largest(begun, told)
         self._touching = now
         self.end = _contacts(np.sort(ended ^ _SURFACE) ^ _SURFACE, state)  # walls and obstacles before particles
         order = np.argsort(begun ^ _SURFACE)
@@ -141,17 +140,6 @@ class Events:
         self.begin = place.hits(_contacts(begun, state), speeds, state)
         self.hit = self.begin[speeds >= self._hit_speed]
         self.forget()
-
-    def _compare_keys(self, slots: Slots, state: State, walls: Told) -> tuple[Told, Compared]:
-        """All that touch are sorted and compared with those before."""
-        told = Told.of([*self._told, walls])
-        told = told._replace(keys=_numbered(told.keys, state))
-        # Those who sleep are not listed, but go on. To sort keys alone takes a third of what it takes to know their order.
-        now = np.sort(np.concatenate((told.keys, self._sleeping(slots, state))))
-        now = now[np.diff(now, prepend=-1) > 0]
-        self._at_wall = now[(now & _SURFACE) != 0]
-        gone, new = self._touching[kernels.absent(self._touching, now)], now[kernels.absent(now, self._touching)]
-        return told, (gone, new, now)
 
     def _number_obstacles(self, obstacles: list[Obstacle]) -> Array:
         """Number obstacles in the keys as they are numbered now; returns the keys of contacts with those that were removed."""
@@ -165,8 +153,7 @@ class Events:
         which = now[keys & _LOST]
         kept = which < _LOST
         lost: Array = keys[~kept] | _LOST
-        self._at_wall = np.sort((keys[kept] & ~_LOST) | which[kept])
-        self._touching = np.sort(np.concatenate((self._touching[~at_wall], self._at_wall)))
+        self._touching = np.sort(np.concatenate((self._touching[~at_wall], (keys[kept] & ~_LOST) | which[kept])))
         return lost
 
     def _sleeping(self, slots: Slots, state: State) -> Array:
@@ -219,24 +206,12 @@ class Place(NamedTuple):
         found["impulse"][rows] = (1 + e) * found["speed"][rows] / np.where(weight > 0, weight, np.inf)
 
     def walls(self, slots: Slots) -> Told:
-        """What was noted of walls and obstacles in this frame."""
+        """What a room of the user's own has noted in this frame: who met the nearest of its walls."""
         at = np.flatnonzero(slots.hits >= 0)
-        rows, hits = slots.impacts[at].astype(float), slots.hits[at].astype(float)
-        noted = rows[:, 1:].reshape(len(at), SURFACES, 3)
-        is_noted = np.arange(SURFACES) < rows[:, :1]
-        who, which = np.nonzero(is_noted)
-        surface, bounces, speeds = noted[who, which].T
-        number = surface.astype(np.int64)
-        obstacle = number >= FIRST_OBSTACLE  # with images in a periodic room
-        number[obstacle] = FIRST_OBSTACLE + (number[obstacle] - FIRST_OBSTACLE) % max(len(self.course.seen()), 1)
-        # A room of the user's own notes in `hits` alone.
-        bare = np.flatnonzero(hits > np.where(is_noted, noted[:, :, 2], -1.0).max(axis=1, initial=-1.0))
-        facing = self.room.facing(slots.position[at[bare]]) if len(bare) else None
-        nearest = np.zeros(len(bare), np.int64) if facing is None else np.argmin(facing[0], axis=1)
-        number, who = np.concatenate((number, nearest)), np.concatenate((who, bare))
-        keys = (slots.particle[at[who]].astype(np.int64) << 32) + _SURFACE + number
-        none = np.zeros(len(bare), np.int64)
-        return Told(keys, np.concatenate((speeds, hits[bare])), np.concatenate((bounces.astype(np.int64), none)))
+        facing = self.room.facing(slots.position[at]) if len(at) else None
+        nearest = np.zeros(len(at), np.int64) if facing is None else np.argmin(facing[0], axis=1)
+        keys = (slots.particle[at].astype(np.int64) << 32) + _SURFACE + nearest
+        return Told(keys, slots.hits[at].astype(float), np.zeros(len(at), np.int64))
 
     def _surface(self, x: Array, wall: Array, obstacle: Array) -> tuple[Array, Array, Array]:
         """Distance of walls or obstacles from centres x, m, their normals and restitutions; NaN where that is not known."""
@@ -302,6 +277,14 @@ def _among(keys: Array, others: Array) -> Array:
         return np.zeros(len(keys), bool)
     where = np.searchsorted(others, keys).clip(max=len(others) - 1)
     return np.asarray(others[where] == keys)
+
+
+def _largest(keys: Array, told: Told) -> Array:
+    """The largest of the speeds that were told of each of the keys, which are sorted; -1 if there is none."""
+    out = np.full(len(keys), -1.0)
+    which = _among(told.keys, keys)
+    np.maximum.at(out, np.searchsorted(keys, told.keys[which]), told.speeds[which])
+    return out
 
 
 def _contacts(keys: Array, state: State) -> Array:

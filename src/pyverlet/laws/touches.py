@@ -1,20 +1,16 @@
-"""Who touched whom in the last frame, where, and how hard: `Touches` notes what each stage gives to every circle.
+"""Who touched whom in the last frame, where, and how hard: `Touches` keeps what the law of impulses says of it.
 
-What walls, obstacles and other circles have given a circle is what its momentum changed by in their stages: true whatever solves
-them. Of one wall or obstacle that is all there is to know. Between several, and between circles, it is shared out along the
-lines of contact: pushes only, the smallest that explain what each has got. A solver that knows the impulses of its pairs says so
-(`hear`), and nothing has to be found.
+Of circles it tells what each pair has given each other. Of walls and obstacles it tells what all walls, and all obstacles, have
+given each circle: between several it is shared out along the lines of contact.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.kernels.impulses import least
 from pyverlet.laws.events import WALL, renumber
 from pyverlet.laws.obstacles import Course, Facing
 from pyverlet.laws.rooms import Boundary
@@ -41,47 +37,22 @@ _NEAR = 0.02
 _PARALLEL = 1e-10
 """Added to the squares of normals, so that walls that face each other are told apart."""
 
-_FEW = 1e-7
-"""Of the largest impulse: less is none."""
 
-_STEPS, _PAIR_STEPS = 60, 250_000
-"""Of conjugate gradients, all together: so many, and so many more divided by the number of contacts: less than a step takes."""
+class Pushes(NamedTuple):
+    """What pushes circles, on the average of a frame."""
 
-_LEFT = 1e-4
-"""Part of the gradient that may be left."""
-
-_FEW_PAIRS, _EXACT = 200, 1e-10
-"""The same for so few pairs, where it costs next to nothing."""
-
-_STAGES = {"contacts": 0, "velocities": 0, "bounds": 1, "obstacles": 2}
-"""Whose doing it is when a stage has changed velocities: circles', the room's, obstacles'."""
-
-
-class Noted(NamedTuple):
-    """What is known of a frame, by the order of the user's particles in it."""
-
-    number: Array
-    """(n,) what each is called."""
-    position: Floats
-    """(n, 2) m."""
-    radius: Floats
-    """(n,) m."""
-    free: NDArray[np.bool_]
-    """(n,) not pinned."""
-    got: Floats
-    """(3, n, 2) N s, what circles, walls and obstacles have given to each."""
     pairs: Array
-    """(k, 2) that may touch."""
-    dt: float
-    """s, of the frame."""
+    """(m, 2) numbers of the circles; twice the same where a circle leans on walls, or on obstacles."""
+    force: Floats
+    """(m,) N, what pushes them apart."""
+    angle: Floats
+    """(m,) rad, of the normal out of the first."""
 
 
 class Touches:
     """The contacts of the last frame. Indices are those of its end."""
 
     def __init__(self) -> None:
-        none, nobody = np.zeros(0), np.zeros((0, 2))
-        least(np.zeros(0, np.int64), np.zeros(0, np.int64), nobody, nobody, none, none, 0, 0.0)  # compiled before it is asked
         self._given = np.zeros((3, 0, 2))
         self._heard: list[tuple[Array, Array, Floats]] = []
         self._found: Array | None = None
@@ -89,40 +60,6 @@ class Touches:
         self._shown: list[Array] = []  # what `array` has returned of this frame; the last is that of now, if `_is_shown`
         self._is_shown = False
         self._virial = 0.0
-
-    def frame(
-        self, state: Slots, users: State, h: float, room: Boundary, course: Course,
-        listed: Callable[[], tuple[Array, Array, Array, Array]] | None, virial: Callable[[], float] | None,
-        done: Callable[[str], None],
-    ) -> Callable[[str], None]:  # fmt: skip
-        """A frame of substeps of h seconds, to be told of each stage; it passes on what it is told to `done`.
-
-        Args:
-            state, users: the engine's arrays, and the user's.
-            h: s.
-            room, course: walls and obstacles.
-            listed: says which pairs may touch, as first, count, pair_i, pair_j; None if there are no collisions.
-            virial: says what contacts between circles come to, N s m; None where that is not known.
-            done: told of each stage.
-        """
-        before, steps = state.velocity, 0
-
-        def told(stage: str) -> None:
-            nonlocal before, steps
-            done(stage)
-            if stage == "gather":
-                self.open(len(state))
-                steps = 0
-            elif stage in _STAGES:
-                self._note(_STAGES[stage], state, before)
-            elif stage == "integrate":
-                steps += 1
-            elif stage == "finish":
-                pairs = np.empty((0, 2), np.int64) if listed is None else _rows(*listed(), state.particle)
-                self.close(state, users, room, course, pairs, steps * h, virial() if virial else 0.0)
-            before = state.velocity.copy()
-
-        return told
 
     def open(self, count: int) -> None:
         """A frame of so many particles begins."""
@@ -134,27 +71,16 @@ class Touches:
             self._given[whose, :, axis] += np.bincount(particle, impulse[:, axis], self._given.shape[1])
 
     def close(
-        self, state: Slots, users: State, room: Boundary, course: Course, pairs: Array, dt: float, virial: float
+        self, state: Slots, users: State, room: Boundary, course: Course, dt: float, virial: float
     ) -> None:  # fmt: skip
-        """The frame of dt seconds is over. pairs: (k, 2) that may have touched; virial: of contacts between circles, N s m."""
-        self._end = _End(state, users.number.copy(), self._given, self._heard, room, course, pairs, dt)
+        """The frame of dt seconds is over. virial: of contacts between circles, N s m."""
+        self._end = _End(state, users.number.copy(), self._given, self._heard, room, course, dt)
         self._found, self._shown, self._is_shown = None, [], False
         self._virial = virial
 
-    def _note(self, whose: int, state: Slots, before: Array) -> None:
-        now = state.velocity
-        moved = np.flatnonzero(((now[:, 0] != before[:, 0]) | (now[:, 1] != before[:, 1])) & (state.inverse_mass > 0))
-        change = state.velocity[moved].astype(float) - before[moved]
-        self._given[whose, state.particle[moved]] += state.mass[moved, None] * change
-
     def hear(self, state: Slots, i: Array, j: Array, impulse: Floats) -> None:
-        """A contact solver's word, in any substep: what slots i (k,) have given slots j, (k, 2) N s; it need not come sorted."""
+        """In any substep: what slots i (k,) have given slots j, (k, 2) N s; it need not come sorted."""
         self._heard.append((state.particle[i].astype(np.int64), state.particle[j].astype(np.int64), np.array(impulse, float)))
-
-    def pairs_heard(self) -> Array:
-        """(k, 2) user's indices, sorted, of those that have given each other something in this frame."""
-        rows = [np.sort(np.column_stack((i, j)), axis=1) for i, j, _ in self._heard]
-        return np.unique(np.concatenate([np.empty((0, 2), np.int64), *rows]), axis=0)
 
     def array(self, state: State) -> Array:
         """TOUCH, sorted by a, then b; without removed particles. It is renumbered when particles are removed later."""
@@ -183,12 +109,9 @@ class Touches:
         mine = found[found["obstacle"] == self._end.number_of(what)]
         return np.asarray(vectors(mine).sum(axis=0) / self._end.dt)
 
-    def noted(self) -> Noted | None:
-        """What was noted of the last frame, before anything is made of it; None if there was no frame."""
-        end = self._end
-        if end is None:
-            return None
-        return Noted(end._numbers, end._position, end._radius, end._free, end.given, end._pairs, end.dt)
+    def pushes(self) -> Pushes | None:
+        """What circles were pushed with in the last frame; None if there was none."""
+        return None if self._end is None else self._end.pushes()
 
     def pushed(self) -> float:
         """N, the sum of what walls of the room were pushed with along their normals, averaged over the frame."""
@@ -206,15 +129,15 @@ class _End:
 
     def __init__(
         self, state: Slots, numbers: Array, given: Floats, heard: list[tuple[Array, Array, Floats]], room: Boundary,
-        course: Course, pairs: Array, dt: float,
+        course: Course, dt: float,
     ) -> None:  # fmt: skip
         count = len(state)
         self.given, self._heard, self._room, self.dt = given, heard, room, dt
-        self._numbers, self._pairs = numbers, pairs
-        self._position, self._velocity, self._radius = np.empty((count, 2)), np.empty((count, 2)), np.empty(count)
+        self._numbers = numbers
+        self._position, self._radius = np.empty((count, 2)), np.empty(count)
         self._free = np.empty(count, bool)
         order = state.particle
-        self._position[order], self._velocity[order], self._radius[order] = state.position, state.velocity, state.size
+        self._position[order], self._radius[order] = state.position, state.size
         self._free[order] = state.inverse_mass > 0
         self._obstacles, self._found = course.seen(), dict[int, Array]()
         who = np.flatnonzero(given[2].any(axis=1))
@@ -244,6 +167,19 @@ class _End:
         both = np.concatenate(rows)
         return both[np.lexsort((both["obstacle"], both["wall"], both["b"], both["a"]))]
 
+    def pushes(self) -> Pushes:
+        """All contacts, those with walls and those with obstacles each as one."""
+        between = self._between_circles()
+        pairs, force = [np.column_stack((between["a"], between["b"]))], [between["impulse"]]
+        angle = [np.arctan2(between["normal"][:, 1], between["normal"][:, 0])]
+        for given in self.given[1:]:
+            who = np.flatnonzero(given.any(axis=1) & self._free)
+            x, y = -given[who].T  # out of the circle, against what pushes it
+            pairs.append(np.column_stack((who, who)))
+            force.append(np.hypot(x, y))
+            angle.append(np.arctan2(y, x))
+        return Pushes(self._numbers[np.concatenate(pairs)], np.concatenate(force) / self.dt, np.concatenate(angle))
+
     # ---- walls and obstacles -------------------------------------------------------------------------------------------
 
     def at(self, whose: int) -> Array:
@@ -271,25 +207,22 @@ class _End:
     # ---- circles -------------------------------------------------------------------------------------------------------
 
     def _between_circles(self) -> Array:
-        pairs, impulse = self._told() if self._heard else self._solved()
+        pairs, impulse = self._told()
         found = np.zeros(len(pairs), TOUCH)
-        if len(pairs):
-            a, b = pairs.T
-            way = self._way(a, b)
-            far = np.hypot(way[:, 0], way[:, 1])
-            normal = way / np.maximum(far, 1e-300)[:, None]
-            found["a"], found["b"], found["wall"], found["obstacle"], found["normal"] = a, b, NOBODY, NOBODY, normal
-            half = self._radius[a] + 0.5 * (far - self._radius[a] - self._radius[b])
-            found["point"] = self._room.seam.wrapped(self._position[a] + half[:, None] * normal)
-            _write(found, -impulse)
+        a, b = pairs.T
+        way = self._room.seam.nearest(self._position[b] - self._position[a])
+        far = np.hypot(way[:, 0], way[:, 1])
+        normal = way / np.maximum(far, 1e-300)[:, None]
+        found["a"], found["b"], found["wall"], found["obstacle"], found["normal"] = a, b, NOBODY, NOBODY, normal
+        half = self._radius[a] + 0.5 * (far - self._radius[a] - self._radius[b])
+        found["point"] = self._room.seam.wrapped(self._position[a] + half[:, None] * normal)
+        _write(found, -impulse)
         return found
 
-    def _way(self, a: Array, b: Array) -> Floats:
-        """(k, 2) from a to b, m."""
-        return np.asarray(self._room.seam.nearest(self._position[b] - self._position[a]))
-
     def _told(self) -> tuple[Array, Floats]:
-        """(k, 2) a < b, and (k, 2) what a has given b, as the solver says."""
+        """(k, 2) a < b, and (k, 2) what a has given b."""
+        if not self._heard:
+            return np.empty((0, 2), np.int64), np.empty((0, 2))
         i, j, given = (np.concatenate(parts) for parts in zip(*self._heard, strict=True))
         swap = i > j
         low, high = np.where(swap, j, i), np.where(swap, i, j)
@@ -297,32 +230,6 @@ class _End:
         key, where = np.unique(low * (len(self._radius) + 1) + high, return_inverse=True)
         total = np.column_stack([np.bincount(where, column, len(key)) for column in given.T])
         return np.column_stack(np.divmod(key, len(self._radius) + 1)), total.astype(float)
-
-    def _solved(self) -> tuple[Array, Floats]:
-        """The same from what each circle has got: pushes along the normals, the smallest that explain it."""
-        got, free, (a, b) = self.given[0], self._free, np.ascontiguousarray(self._pairs.T)
-        touched = (got[:, 0] != 0) | (got[:, 1] != 0) | ~free
-        may = touched[a] & touched[b] & (free[a] | free[b])
-        a, b = a[may], b[may]
-        way, speed, reach = self._way(a, b), self._velocity[b] - self._velocity[a], self._radius[a] + self._radius[b]
-        far = np.hypot(way[:, 0], way[:, 1])
-        which = np.flatnonzero(far - reach <= self.dt * np.hypot(speed[:, 0], speed[:, 1]) + 0.01 * reach)
-        which = which[np.argsort(a[which] % 7, kind="stable")]  # neighbours in the list have no circle in common
-        a, b, normal = a[which], b[which], way[which] / np.maximum(far[which], 1e-300)[:, None]
-        push, steps = np.zeros(len(a)), _STEPS + _PAIR_STEPS // max(len(a), 1)
-        last, hold = _EXACT if len(a) <= _FEW_PAIRS else _LEFT, free.astype(float)
-        tolerance = last if last == _EXACT else 10 * _LEFT  # good enough to see who would pull
-        while len(a) and steps > 0:
-            steps -= int(least(a, b, normal, got, hold, push, steps, tolerance))
-            kept = push >= 0
-            if kept.all():
-                if tolerance == last:
-                    break
-                tolerance = last
-            a, b, normal, push = a[kept], b[kept], normal[kept], push[kept]
-        kept = push > _FEW * push.max(initial=0.0)
-        a, b, normal, push = a[kept], b[kept], normal[kept], push[kept]
-        return np.column_stack((a, b)), push[:, None] * normal
 
 
 def vectors(found: Array) -> Floats:
@@ -364,13 +271,3 @@ def _shared(push: Floats, row: Array, into: Floats) -> Floats:
         weight = np.divide(part, total, out=np.full_like(part, 1 / number), where=total > 0)
         share[mine] = along + weight[:, :, None] * (got - along.sum(axis=1))[:, None]
     return share
-
-
-def _rows(first: Array, count: Array, pair_i: Array, pair_j: Array, order: Array) -> Array:
-    """(k, 2) the user's a < b of each listed pair, once."""
-    which = np.concatenate([np.zeros(0, np.int64), *(np.arange(f, f + c) for f, c in zip(first, count, strict=True))])
-    i, j = order[pair_i[which]].astype(np.int64), order[pair_j[which]].astype(np.int64)
-    keys = np.sort(np.minimum(i, j) * len(order) + np.maximum(i, j))
-    once = np.ones(len(keys), bool)
-    np.not_equal(keys[1:], keys[:-1], out=once[1:])
-    return np.column_stack(np.divmod(keys[once], max(len(order), 1)))

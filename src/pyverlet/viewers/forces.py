@@ -1,18 +1,16 @@
-"""What circles push each other with, for pages that look: some frames a second are noted, and worked out in a thread."""
+"""What circles push each other with, for pages that look: some frames a second are noted."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.laws.network import Network, Pushes
-from pyverlet.laws.touches import Noted
+from pyverlet.laws.touches import Pushes
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
@@ -50,17 +48,14 @@ class Forces:
 
     def __init__(self, worlds: Sequence[World]) -> None:
         self._worlds = worlds
-        self._networks = [Network() for _ in worlds]
-        self._thread: ThreadPoolExecutor | None = None
-        self._work: Future[list[Pushes]] | None = None
-        self._found: list[Pushes] = []
+        self._found: list[Pushes | None] = []
         self._due = 0.0
         self.wanted = False
 
     @contextmanager
     def look(self) -> Iterator[None]:
         """A frame is made; if it is time, what touches in it is noted."""
-        if not self.wanted or time.monotonic() < self._due or sum(map(len, self._worlds)) > MOST or not self._idle():
+        if not self.wanted or time.monotonic() < self._due or sum(map(len, self._worlds)) > MOST:
             yield
             return
         began = time.monotonic()
@@ -69,28 +64,18 @@ class Forces:
             yield
         now = time.monotonic()
         self._due = now + max(AGAIN_S, SHARE * (now - began))
-        self._thread = self._thread or ThreadPoolExecutor(1, thread_name_prefix="pyverlet-forces")
-        self._work = self._thread.submit(self._solve, [each.noted() for each in noting])
-
-    def _idle(self) -> bool:
-        if self._work is not None and self._work.done():
-            self._found, self._work = self._work.result(), None
-        return self._work is None
-
-    def _solve(self, noted: list[Noted | None]) -> list[Pushes]:
-        return [network.look(each) for network, each in zip(self._networks, noted, strict=True) if each is not None]
+        self._found = [each.pushes() for each in noting]
 
     def now(self) -> Contacts:
         """The contacts that were found last, between circles that are still there."""
         if not self.wanted:
             return NONE
-        self._idle()
         if len(self._found) != len(self._worlds):
             return NONE
         pairs, force, angle, first = [], [], [], 0
         for world, found in zip(self._worlds, self._found, strict=True):
             number = world.number
-            if len(number) and len(found.pairs):
+            if found is not None and len(number) and len(found.pairs):
                 row = np.searchsorted(number, found.pairs).clip(max=len(number) - 1)
                 there = (number[row] == found.pairs).all(axis=1) & (found.force > 0)
                 pairs.append(row[there] + first)

@@ -50,4 +50,4 @@ class ImpulseNotes:
         for whose, given in ((1, self._by_walls), (2, self._by_obstacles)):
             free = np.flatnonzero(given.any(axis=1) & (state.inverse_mass > 0))
             self._touches.give(whose, state.particle[free], state.mass[free, None] * given[free].astype(float))
-        self._touches.close(state, world._state, world.boundary, world._course, self._touches.pairs_heard(), dt, self._virial)
+        self._touches.close(state, world._state, world.boundary, world._course, dt, self._virial)
