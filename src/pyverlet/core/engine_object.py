@@ -207,8 +207,10 @@ class Engine:
         return [*self.heard, hear(cython.address(self.w), self.arrays)]
 
     def set_skin(self, diameters: cython.double, adapts: cython.bint):
-        """How thick the skin is, in mean diameters, or begins with."""
+        """How thick the skin is, in mean diameters, or begins with; it adapts as if no list had been made."""
         self.ls.diameters, self.ls.adapts = diameters, adapts
+        self.ls.age = self.ls.hold = 0
+        self.ls.excess = 0
 
     def set_law(
         self, h: real, rate: real, stiff: real, leak: real, push: real, near: real, rest_speed: real, restless: cython.bint,

@@ -100,8 +100,9 @@ class ImpulseFrames:
         self.links.keep_apart(world, self.held.engine)
         if world._gather():
             self.held.forget_list()
-        if not self.run(world, dt, done):
-            self._refuse_non_finite(world, dt)
+        with np.errstate(over="ignore", invalid="ignore"):  # what becomes infinite is told of as such
+            if not self.run(world, dt, done):
+                self._refuse_non_finite(world, dt)
 
     def run(self, world: Any, dt: float, done: Callable[[str], None]) -> bool:
         """Advance the gathered slots by a frame of dt seconds. False if a particle turned NaN or infinite."""
