@@ -46,40 +46,6 @@ def test_bad_input_in_a_real_process() -> None:
     assert done.stderr.count("\n") == 1
 
 
-ONE_KERNEL = """
-import numpy as np
-from pyverlet import World
-from pyverlet.cli._app import compile_kernels
-from pyverlet.kernels import motion
-from pyverlet.world import warmup
-from pyverlet.ground import progress
-progress.QUIET_S = 0.0
-warmup.MOST_HELPERS = 0
-warmup.rehearse = lambda world: motion.differs(np.zeros(1, world.dtype), np.zeros(1, world.dtype))
-print(compile_kernels(World()))
-"""
-
-
-@pytest.mark.slow
-def test_compiling_is_announced(tmp_path: Path) -> None:
-    for announced in (True, False):
-        done = subprocess.run(
-            [sys.executable, "-c", ONE_KERNEL], env=os.environ | {"PYVERLET_CACHE_DIR": str(tmp_path)},
-            capture_output=True, text=True, timeout=120, check=True,
-        )  # fmt: skip
-        assert ("compiling kernels, once: " in done.stderr) is announced  # the second time it is on disk
-        assert float(done.stdout) > 0
-
-
-@pytest.mark.slow
-def test_compiling_is_announced_on_standard_error(tmp_path: Path) -> None:
-    # An empty cache: everything has to be compiled.
-    done = call("run", "fall", "--frames", "2", "--json", env=os.environ | {"PYVERLET_CACHE_DIR": str(tmp_path)})
-    assert done.returncode == 0, done.stderr
-    assert "compiling kernels, once: " in done.stderr
-    assert json.loads(done.stdout)["compile_s"] > 0
-
-
 @pytest.fixture
 def interruptible() -> Iterator[None]:
     """Children take SIGINT even if this process was started to ignore it, as a shell starts its background jobs."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.compile import jit
+from pyverlet.ground.threads import max_threads
 from pyverlet.laws.collisions import find_contacts
 
 
@@ -58,7 +58,7 @@ def _stream(threads: int, axes: str, spread: float, **laws: Any) -> pv.World:
 def test_same_bits(axes: str, spread: float, laws: dict[str, Any]) -> None:
     """Of one thread and several; and of a world that is taken back and goes on anew."""
     hashes = []
-    for threads in sorted({1, min(2, jit.max_threads())}):
+    for threads in sorted({1, min(2, max_threads())}):
         world = _stream(threads, axes, spread, **laws)
         for _ in range(8):
             world.step(1 / 60)

@@ -236,7 +236,7 @@ def test_the_same_bits_when_saved_and_for_any_threads() -> None:
         world.run(seconds=0.4)
         return world
 
-    one, many = big(1), big(pv.compile.jit.max_threads())
+    one, many = big(1), big(pv.ground.threads.max_threads())
     assert one.state_hash() == many.state_hash()
     saved = one.save()
     one.run(seconds=0.2)

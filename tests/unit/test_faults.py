@@ -16,126 +16,24 @@ import pytest
 import pyverlet as pv
 from pyverlet.world.clock import Clock
 
-# A kernel that is soon compiled, and calls another one.
-CALL = """
-import os, signal, sys, numpy as np, pyverlet
-from pyverlet.compile import jit
-from pyverlet.kernels import motion
-def call():
-    x = np.ones((4, 2))
-    motion.clear_pinned(x, np.array([1.0, 0.0, 1.0, 1.0]))
-    print(x.sum(), bool(motion.any_non_finite(x)), flush=True)
-"""
-SAID = "6.0 False"
-
 posix = pytest.mark.skipif(os.name == "nt", reason="signals and limits of POSIX")
 
 
-def start(code: str, cache: Path, **environment: str) -> subprocess.Popen[str]:
-    env = {**os.environ, "PYVERLET_CACHE_DIR": str(cache), **environment}
-    return subprocess.Popen(
-        [sys.executable, "-c", CALL + code], env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+def said(code: str, **environment: str) -> str:
+    env = {**os.environ, **environment}
+    return subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True, timeout=120).stdout
 
 
-def said(code: str, cache: Path, **environment: str) -> str:
-    with start(code, cache, **environment) as process:
-        out, err = process.communicate(timeout=120)
-    assert process.returncode == 0, err
-    return out.strip()
-
-
-@posix
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "when",
-    [
-        pytest.param(
-            "with jit.watch_compiling(lambda: os.kill(os.getpid(), signal.SIGKILL)): call()",
-            id="compiling",
-            marks=pytest.mark.slow,
-        ),
-        pytest.param(
-            "os.replace = lambda *a: os.kill(os.getpid(), signal.SIGKILL); call()",
-            id="before a file is there",
-            marks=pytest.mark.slow,
-        ),
-        pytest.param(
-            "real = os.replace\nos.replace = lambda a, b: (real(a, b), os.kill(os.getpid(), signal.SIGKILL)); call()",
-            id="after the first file",
-        ),
-    ],
-)
-def test_killed_while_compiling_the_next_start_compiles(when: str, tmp_path: Path) -> None:
-    with start(when, tmp_path) as process:
-        process.communicate(timeout=120)
-    assert process.returncode == -signal.SIGKILL
-    assert said("call()", tmp_path) == SAID
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("harm", ["cut", *(pytest.param(each, marks=pytest.mark.slow) for each in ("empty", "flipped"))])
-def test_half_a_file_is_compiled_anew(harm: str, tmp_path: Path) -> None:
-    assert said("call()", tmp_path) == SAID
-    kept = [path for path in tmp_path.rglob("*") if path.suffix in (".nbi", ".nbc")]
-    assert kept
-    for path in kept:
-        data = bytearray(path.read_bytes())
-        if harm == "flipped":  # where Python's pickle sees it
-            data[: min(64, len(data))] = bytes(255 - byte for byte in data[:64])
-        path.write_bytes(b"" if harm == "empty" else data[: len(data) // 2] if harm == "cut" else data)
-    assert said("call()", tmp_path) == SAID
-    counted = "seen = []\nwith jit.watch_compiling(lambda: seen.append(1)): call()\nprint(len(seen))"
-    assert said(counted, tmp_path).split() == [*SAID.split(), "0"]  # and is whole again
-
-
-def test_a_full_disk_keeps_nothing_and_runs(tmp_path: Path) -> None:
-    full = "import shutil; from collections import namedtuple\nshutil.disk_usage = lambda p: namedtuple('U', 'free')(1000)\n"
-    assert said(full + "call(); print(jit.cache_dir())", tmp_path).split() == [*SAID.split(), "None"]
-    assert not list(tmp_path.rglob("*.nb?"))
-
-
-@posix
-@pytest.mark.slow
-def test_a_folder_that_may_only_be_read_runs(tmp_path: Path) -> None:
-    assert said("call()", tmp_path) == SAID
-    folders = [path for path in tmp_path.rglob("*") if path.is_dir()] + [tmp_path]
-    for folder in folders:
-        folder.chmod(0o555)
-    try:
-        assert said("call()", tmp_path, TMPDIR=str(tmp_path)) == SAID
-    finally:
-        for folder in folders:
-            folder.chmod(0o755)
-
-
-@pytest.mark.slow
-def test_two_versions_share_a_folder(tmp_path: Path) -> None:
-    other = "real = jit.sources_hash\njit.sources_hash = lambda root=None: 'f' * 16\njit.cache_dir.cache_clear()\n"
-    assert said("call()", tmp_path) == said(other + "call()", tmp_path) == said("call()", tmp_path) == SAID
-    assert len([path for path in tmp_path.iterdir() if path.is_dir()]) == 2
-
-
-@pytest.mark.slow  # test_two_processes_share_the_work has two
-@pytest.mark.parametrize("count", [2, 8])
-def test_first_starts_at_once(count: int, tmp_path: Path) -> None:
-    processes = [start("call()", tmp_path) for _ in range(count)]
-    told = [process.communicate(timeout=300) for process in processes]
-    assert [process.returncode for process in processes] == [0] * count, told
-    assert {out.strip() for out, _ in told} == {SAID}
-
-
-@pytest.mark.slow
-def test_no_shared_memory_is_needed(tmp_path: Path) -> None:
-    # As if /dev/shm was not there: whatever asks for it fails.
-    code = "import multiprocessing.synchronize as s\ndef no(*a, **k): raise OSError(38, 'no')\ns.SemLock.__init__ = no\ncall()"
-    assert said(code, tmp_path) == SAID
-
-
-@pytest.mark.slow
-def test_one_core(tmp_path: Path) -> None:
-    code = "import pyverlet as pv; call(); world = pv.World(); world.add(position=np.zeros((20000, 2))); print(world.threads)"
-    assert said(code, tmp_path, NUMBA_NUM_THREADS="1").split() == [*SAID.split(), "1"]
+@pytest.mark.parametrize("asked", ["1", "3"])
+def test_the_environment_says_how_many_threads(asked: str) -> None:
+    code = """
+import numpy as np, pyverlet as pv
+world = pv.World()
+world.add(position=np.stack(np.divmod(np.arange(20000), 200), axis=-1) * 1.1)
+world.step(1 / 60)
+print(world.threads)
+"""
+    assert said(code, PYVERLET_THREADS=asked).split() == [asked]
 
 
 def test_more_threads_than_cores_is_a_sentence() -> None:

@@ -1,4 +1,4 @@
-"""`@pv.force`, compiled by Numba and called with arrays, and one sentence where the user's code is wrong."""
+"""`@pv.force`, called with arrays or particle by particle, and one sentence where the user's code is wrong."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.compile import jit
-from pyverlet.laws.forces import function
 
 
 @pv.force
@@ -44,22 +42,6 @@ def test_all_arguments_arrive() -> None:
     assert ball.velocity[0].tolist() == [3 + 0.5 * 21, 4 + 0.5 * 43]
     world.step(0.5)  # from (2.5, 4), with t = 0.5
     assert ball.velocity[0, 1] == 25.5 + 0.5 * (13.5 + 255 + 50)
-
-
-def sine(k: float) -> Any:
-    return pv.force(lambda x, y, vx, vy, mass, t: (k * math.sin(x), -vy))
-
-
-def test_another_force_compiles_none_of_the_engine() -> None:
-    world = world_with(swirl)
-    world.add(position=(1, 0))
-    world.step(1 / 60)
-    compiled: list[int] = []
-    with jit.watch_compiling(lambda: compiled.append(1)):
-        for k in (1.0, 2.0, 3.0):
-            world.forces[:] = [sine(k)]
-            world.step(1 / 60)
-    assert compiled == []
 
 
 def test_a_potential_enters_the_energy() -> None:
@@ -100,7 +82,6 @@ def test_float32_worlds_take_them_too() -> None:
     assert ball.velocity[0, 1] == pytest.approx(0.5 / 60, rel=1e-3)
 
 
-@pytest.mark.slow  # it compiles what many threads need
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_many_particles_give_the_same_bits_on_all_threads(dtype: Any) -> None:
     rng = np.random.default_rng(0)
@@ -175,13 +156,12 @@ def raising(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
 
 
 WRONG: dict[Callable[..., Any], tuple[type[pv.PyverletError], str]] = {
-    undefined: (pv.InputError, "does not compile: NameError: name 'nowhere' is not defined"),
-    text: (pv.InputError, "does not compile: No implementation of function"),
-    one_number: (pv.InputError, "returns one number, float64; allowed is numeric code that returns two numbers (fx, fy)"),
-    three_numbers: (pv.InputError, "returns a tuple of 3"),
-    sometimes: (pv.InputError, "returns None on some of its ways"),
-    array: (pv.InputError, "returns array(float64"),
-    imaginary: (pv.InputError, "returns a tuple of 2, "),
+    undefined: (pv.NonFiniteError, "raised NameError (name 'nowhere' is not defined) for particle 0"),
+    one_number: (pv.InputError, "returns no tuple; allowed is numeric code that returns two numbers (fx, fy)"),
+    three_numbers: (pv.InputError, "returns 3 of them"),
+    sometimes: (pv.InputError, "returns no tuple"),
+    array: (pv.InputError, "returns no tuple"),
+    imaginary: (pv.InputError, "returns "),
     pole: (pv.NonFiniteError, "returned (inf, 0.0) for particle 1 at x = 2, y = 0, t = 0; allowed are two finite numbers"),
     raising: (pv.NonFiniteError, "raised ValueError (too far) for particle 1"),
 }
@@ -210,7 +190,7 @@ def late(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
 
 
 def test_a_function_that_fails_in_the_midst_of_a_frame_loses_nothing() -> None:
-    # Compiled code has called it for substeps on end: the frame is gone through again, one by one, to say where and when.
+    # The frame is gone through again, one by one, to say where and when.
     world = pv.World(boundary=pv.Circle(radius=5))
     world.forces += [pv.Drag(linear=0.1), pv.force(late)]
     world.add(position=[(-2, 0), (0, 0), (2, 0)], radius=0.5)
@@ -238,12 +218,7 @@ def test_other_arguments_are_refused_at_once() -> None:
         pv.force(potential=lambda x, y: x)(one_number)  # type: ignore[misc, arg-type]
 
 
-# ---- without Numba -----------------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def without_numba(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(function, "numba_is_installed", lambda: False)
+# ---- with arrays, or particle by particle ------------------------------------------------------------------------------------
 
 
 def on_arrays(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
@@ -255,12 +230,10 @@ def with_if(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("code", [on_arrays, with_if])
-def test_arrays_numbers_and_compiled_code_have_the_same_bits(code: Any, dtype: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_with_arrays_or_one_by_one_the_same_bits(dtype: Any) -> None:
     # Sums and products are rounded alike everywhere; with functions such as sine that need not be so.
     hashes = set()
-    for compiled in (True, False):
-        monkeypatch.setattr(function, "numba_is_installed", lambda compiled=compiled: compiled)
+    for code in (on_arrays, with_if):
         world = pv.World(gravity=(0, -1), collisions=None, dtype=dtype)
         chance = np.random.default_rng(2)
         world.add(position=chance.normal(0, 1, (9, 2)), mass=[*chance.uniform(1, 2, 8), np.inf], radius=0.01)
@@ -270,7 +243,7 @@ def test_arrays_numbers_and_compiled_code_have_the_same_bits(code: Any, dtype: A
     assert len(hashes) == 1
 
 
-def test_a_function_is_called_once_for_all(without_numba: None) -> None:
+def test_a_function_is_called_once_for_all() -> None:
     shapes = []
 
     @pv.force
@@ -285,7 +258,7 @@ def test_a_function_is_called_once_for_all(without_numba: None) -> None:
     assert world.velocity.tolist() == [[0, 0.5], [0, 0.5], [0, 0]]
 
 
-def test_a_potential_of_arrays_enters_the_energy(without_numba: None) -> None:
+def test_a_potential_of_arrays_enters_the_energy() -> None:
     potentials: list[Any] = [lambda x, y, mass: 0.5 * mass * (x * x + 4 * y * y), lambda x, y, mass: mass if x > 0 else 0.0]
     for potential in potentials:
         well = pv.force(potential=potential)(lambda x, y, vx, vy, mass, t: (-mass * x, -4 * mass * y))
@@ -293,27 +266,3 @@ def test_a_potential_of_arrays_enters_the_energy(without_numba: None) -> None:
         world.add(position=[(1, 2), (0, 1), (5, 5)], mass=[3.0, 1.0, np.inf])
         expected = sum(potential(x, y, m) for x, y, m in ((1.0, 2.0, 3.0), (0.0, 1.0, 1.0)))
         assert world.energy().potential == pytest.approx(expected)
-
-
-LOOSE: dict[Callable[..., Any], tuple[type[pv.PyverletError], str]] = {
-    undefined: (pv.NonFiniteError, "raised NameError (name 'nowhere' is not defined) for particle 0"),
-    one_number: (pv.InputError, "returns no tuple; allowed is numeric code that returns two numbers (fx, fy)"),
-    three_numbers: (pv.InputError, "returns 3 of them"),
-    sometimes: (pv.InputError, "returns no tuple"),
-    array: (pv.InputError, "returns no tuple"),
-    imaginary: (pv.InputError, "returns "),
-    pole: (pv.NonFiniteError, "returned (inf, 0.0) for particle 1 at x = 2, y = 0, t = 0; allowed are two finite numbers"),
-    raising: (pv.NonFiniteError, "raised ValueError (too far) for particle 1"),
-}
-
-
-@pytest.mark.parametrize("code", LOOSE, ids=lambda code: code.__name__)
-def test_without_numba_too_a_wrong_function_is_named(code: Callable[..., Any], without_numba: None) -> None:
-    kind, says = LOOSE[code]
-    world = world_with(pv.force(code))
-    world.add(position=[(0, 0), (2, 0)])
-    with pytest.raises(kind) as caught:
-        world.step(1 / 60)
-    assert f"force {code.__name__!r} ({__file__}, line {code.__code__.co_firstlineno})" in str(caught.value)
-    assert says in str(caught.value)
-    assert world.position.tolist() == [[0, 0], [2, 0]]  # the last good frame

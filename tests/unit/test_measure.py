@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from pyverlet import core
-from pyverlet.kernels import measure
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -19,7 +18,7 @@ def test_mechanical_energy_is_the_sum_of_all_three(dtype: Any, count: int, lag: 
     position, velocity, acceleration = rng.normal(0, 10, (3, count, 2)).astype(dtype)
     spin, radius, mass = rng.uniform(0.5, 2, (3, count)).astype(dtype)
     mass[rng.random(count) < 0.1] = np.inf
-    total = measure.mechanical(position, velocity, acceleration, lag, spin, radius, mass, 1.0, -9.81)
+    total = core.unit("motion", dtype).total_energy(position, velocity, acceleration, lag, spin, radius, mass, 1.0, -9.81)
     moved = velocity.astype(float) + lag * acceleration.astype(float)
     arrays = (array.astype(float) for array in (position, moved, spin, radius, mass))
     parts = core.unit("engine", float).energies(*arrays, 1.0, -9.81)

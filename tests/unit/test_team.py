@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.compile import jit
+from pyverlet.ground.threads import max_threads
 from pyverlet.world.team import Team, ladder
 
 Machine = Callable[[int, np.random.Generator], float]
@@ -115,7 +115,7 @@ def test_numbers_that_are_tried() -> None:
     assert {n: ladder(n) for n in tried} == tried
 
 
-@pytest.mark.skipif(jit.max_threads() < 2, reason="one core")
+@pytest.mark.skipif(max_threads() < 2, reason="one core")
 def test_bits_do_not_depend_on_the_team(monkeypatch: pytest.MonkeyPatch) -> None:
     def heap(threads: int) -> pv.World:
         world = pv.World(boundary=pv.Circle(radius=43.2), threads=threads)

@@ -1,4 +1,4 @@
-"""Functions of the user's own without a compiler: called with arrays of all particles, or one by one where they take none."""
+"""Functions of the user's own, called with arrays of all particles, or one by one where they take none."""
 
 from __future__ import annotations
 

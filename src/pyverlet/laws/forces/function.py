@@ -1,10 +1,9 @@
-"""A force from a function of one's own: called with arrays, or compiled when it is first used where Numba is installed."""
+"""A force from a function of one's own, called with arrays, or particle by particle where it cannot take them."""
 
 from __future__ import annotations
 
 import dis
 import functools
-import importlib.util
 import inspect
 from collections.abc import Callable
 from typing import Any, NoReturn, overload
@@ -54,7 +53,7 @@ class FunctionForce:
         """Add the function's value for every free particle.
 
         Raises:
-            InputError: it does not compile, where Numba is installed, or returns something other than two numbers.
+            InputError: it returns something other than two numbers.
             NonFiniteError: it returned NaN or infinity.
         """
         if self._code.run("add", state, state.seam.wrapped(state.position), float(t)):
@@ -100,10 +99,10 @@ def _again(velocity_dependent: bool, function: Function, potential: Potential | 
 
 
 class _Code:
-    """A user's function: where it stands, and its compiled form once that is asked for."""
+    """A user's function: where it stands, and what calls it."""
 
     def __init__(self, function: Any, kind: str, arguments: str, returns: str) -> None:
-        self.function = getattr(function, "py_func", function)  # of one that was compiled already
+        self.function = function
         self._arguments, self._returns = arguments, returns
         if not inspect.isfunction(self.function):
             raise InputError(f"{kind} is {function!r}; allowed is a function of ({arguments}) that returns {returns}")
@@ -113,7 +112,7 @@ class _Code:
         takes = inspect.signature(self.function).parameters.values()
         if len(takes) != self._count or any(p.kind not in (p.POSITIONAL_OR_KEYWORD, p.POSITIONAL_ONLY) for p in takes):
             raise InputError(f"{self.name} takes ({', '.join(map(str, takes))}); allowed are the arguments ({arguments})")
-        self._evaluator: Any = None
+        self._evaluator: OnArrays | None = None
 
     def names(self, *which: int) -> bool:
         """Whether the function's code names one of these of its arguments."""
@@ -124,19 +123,10 @@ class _Code:
             if isinstance(step.argval, str | tuple)
         )
 
-    def evaluator(self) -> Any:
-        """What calls it: the compiled form, kept, where Numba is installed. Raises InputError if there is none."""
+    def evaluator(self) -> OnArrays:
+        """What calls it, kept."""
         if self._evaluator is None:
-            results = 2 if self._returns.startswith("two") else 1
-            if not numba_is_installed():
-                self._evaluator = OnArrays(self.function, self._count, results)
-                return self._evaluator
-            from pyverlet.laws.forces import _native as native  # it imports Numba
-
-            try:
-                self._evaluator = native.Native(self.function, self._count, results)
-            except native.NotCompiled as error:
-                raise InputError(f"{self.name} {error}; allowed is numeric code that returns {self._returns}") from None
+            self._evaluator = OnArrays(self.function, self._count, 2 if self._returns.startswith("two") else 1)
         return self._evaluator
 
     def run(self, method: str, *arguments: Any) -> Any:
@@ -145,12 +135,6 @@ class _Code:
             return getattr(self.evaluator(), method)(*arguments)
         except NotNumbers as error:
             raise InputError(f"{self.name} {error}; allowed is numeric code that returns {self._returns}") from None
-
-
-@functools.cache
-def numba_is_installed() -> bool:
-    """Whether functions are compiled."""
-    return importlib.util.find_spec("numba") is not None
 
 
 @overload
@@ -170,8 +154,7 @@ def force(
 
     At every evaluation it is called once, with float64 arrays of all particles for x, y, vx, vy and mass, if it is written so
     that it takes them (arithmetic, functions of NumPy, `np.where` in place of `if`); else particle by particle, which takes about
-    two microseconds for each. Where Numba is installed (`pip install pyverlet[native]`) it is compiled instead when it is first
-    used, and must be numeric code as Numba compiles it: arithmetic, `math` or NumPy, `if`, loops, constants.
+    two microseconds for each.
 
     Args:
         function: to be decorated.
