@@ -233,17 +233,6 @@ def test_a_drum_takes_discs_along() -> None:
     assert abs(world.spin[0]) > 1.0
 
 
-@pytest.mark.parametrize(
-    ("what", "more"),
-    [("sleep=True", {"sleep": True})],
-)
-def test_what_it_does_not_know_is_refused(what: str, more: dict[str, Any]) -> None:
-    world = pv.World(collisions=law(), **more)
-    world.add(position=[(0, 0), (3, 0)])
-    with pytest.raises(pv.InputError, match=what):
-        world.step(FRAME)
-
-
 INTEGRATORS = [pv.VelocityVerlet(), pv.RK4(), pv.Yoshida4(), pv.ExplicitEuler(), pv.SemiImplicitEuler(), pv.TimeCorrectedVerlet()]
 
 

@@ -83,12 +83,27 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     points, heading = np.ascontiguousarray(position[:5], float), np.tile([0.6, 0.8], (5, 1))
     tools.first_on_rays(points + 2.0, heading, np.full(5, 9.0), 1.0, cells, position, radius, index, distance)
     tools.nearest_to(points, cells, position, nearest, square)
-    arrays = (grown, pixels, index, distance, nearest, square)
+    island, calm, root, edited = (
+        np.arange(60) % 4 - 1,
+        np.arange(60, dtype=np.float32) / 60,
+        np.empty(60, np.int64),
+        np.zeros(60, np.uint8),
+    )
+    order, marks = np.arange(59, -1, -1, dtype=np.int32), np.arange(60, dtype=np.uint32) % 3
+    tired = tools.time_at_rest(velocity, spin, radius, 1 / mass, island, 20.0, 0.1, 0.5, calm)
+    tools.find_islands(position, radius, 0.0, 9.5, 1 / mass, calm, pairs, 1.5, 0.3, root)
+    every, heavier = np.full(60, 0xFFFFFFFF, np.uint32), np.where(np.arange(60) % 7 == 5, 9, mass).astype(dtype)
+    given = (position, 0 * velocity, 0 * spin, radius, heavier, spin, radius, marks, every)
+    held = tuple(column[::-1].copy() for column in (position, radius, mass, spin, radius, marks, every[:0]))
+    found = tools.find_edited(given, held, order, island, edited)
+    arrays = (grown, pixels, index, distance, nearest, square, calm, root, edited)
     return [
         *engine.energies(position, velocity, spin, radius, mass, 0.5, -9.81),
         *engine.momenta(position, velocity, spin, radius, mass),
         *engine.overlaps(position, radius, 0.0, 1.5, pairs),
         engine.pinned_move(mass, velocity, spin),
+        tired,
+        found,
         tools.checksum(np.arange(9000, dtype=np.uint64) << np.uint64(40)),
         *(array.tobytes() for array in arrays),
     ]

@@ -9,6 +9,7 @@ from pyverlet.core.disc_drawing import draw_discs
 from pyverlet.core.line_drawing import draw_lines
 from pyverlet.core.page_arrays import copy_moving, put_rows, quantize
 from pyverlet.core.queries import at_points, first_on_rays, in_regions, nearest_to
+from pyverlet.core.sleepers import find_edited, find_islands, time_at_rest
 
 __all__ = [
     "at_points",
@@ -18,11 +19,14 @@ __all__ = [
     "draw_discs",
     "draw_lines",
     "fill",
+    "find_edited",
+    "find_islands",
     "first_on_rays",
     "in_regions",
     "nearest_to",
     "put_rows",
     "quantize",
     "stroke",
+    "time_at_rest",
     "tint",
 ]

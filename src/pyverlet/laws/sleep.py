@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet import core
 from pyverlet.ground.constants import SLEEP_AFTER_S, SLEEP_NEAR, SLEEP_SPEED
-from pyverlet.kernels import sleep as kernels
-from pyverlet.laws.contacts.broadphase import PairList
 from pyverlet.laws.forces import Drag
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
@@ -57,14 +56,14 @@ class Sleep:
         edited = np.zeros(len(slots), np.uint8)
         given = tuple(getattr(state, name) for name in (*ROWS[:2], "spin", *SET, *MARKS))
         held = tuple(getattr(slots, name) for name in (ROWS[0], *SET, *MARKS))
-        found = kernels.find_edited(given, held, slots.particle, slots.island, edited)
+        found = core.unit("tools", slots.dtype).find_edited(given, held, slots.particle, slots.island, edited)
         if slots.is_new:  # some have been removed
             number, left = np.unique(slots.island, return_counts=True)
             fewer = [k for k, n in zip(number.tolist(), left.tolist(), strict=True) if n != self._members.get(k, n)]
             edited[np.isin(slots.island, fewer)] = 1
         elif not found:
             return False
-        return self._wake(slots, np.isin(slots.island, slots.island[(edited == 1) & (slots.island >= 0)]))
+        return self.wake(slots, edited)
 
     @property
     def anyone(self) -> bool:
@@ -75,29 +74,25 @@ class Sleep:
         """Whether nothing can move."""
         return self.anyone and not slots.inverse_mass.any()
 
-    def touched(self, slots: Slots, pairs: PairList) -> bool:
-        """Wake islands that somebody awake overlaps. Whether there were any: then the list lacks pairs."""
-        if not self._members:
-            return False
-        touched = np.zeros(len(slots), np.uint8)
-        (period_x, period_y), which = slots.reals(*slots.seam.period), pairs.listed()
-        if not kernels.touch(slots.position, slots.size, period_x, period_y, slots.island, *which, touched):
-            return False
-        return self._wake(slots, np.isin(slots.island, slots.island[touched == 1]))
+    def wake(self, slots: Slots, touched: Array) -> bool:
+        """Wake islands in which somebody is touched: (n,) 1. Whether there were any: then the list lacks pairs."""
+        return self._wake(slots, np.isin(slots.island, slots.island[(touched == 1) & (slots.island >= 0)]))
 
-    def end(self, slots: Slots, pairs: PairList, dt: float, gravity: float) -> bool:
-        """At the end of a frame: let islands that have been calm long enough fall asleep. Whether there were any."""
-        real = slots.real
+    def end(self, slots: Slots, pairs: tuple[Array, ...], dt: float, gravity: float) -> bool:
+        """At the end of a frame of dt seconds: let islands that have been calm long enough fall asleep. Whether there were any.
+
+        pairs: (first, count, i, j), those nearer than a skin; those of row s are count[s] from first[s] on.
+        """
+        real, kernels = slots.real, core.unit("tools", slots.dtype)
         limit = real(SLEEP_SPEED**2 * gravity)
         awake = (slots.velocity, slots.spin, slots.radius, slots.inverse_mass, slots.island)
-        tired = kernels.count_calm(*awake, limit, np.float32(dt), np.float32(SLEEP_AFTER_S), slots.calm)
+        tired = kernels.time_at_rest(*awake, limit, dt, SLEEP_AFTER_S, slots.calm)
         if self._laws is None or not tired:
             return False
         root = np.empty(len(slots), np.int64)
-        which = pairs.listed()
         period_x, period_y = slots.reals(*slots.seam.period)
         bodies = (slots.position, slots.size, period_x, period_y, slots.inverse_mass, slots.calm)
-        kernels.find_islands(*bodies, *which, real(SLEEP_NEAR), np.float32(SLEEP_AFTER_S), root)
+        kernels.find_islands(*bodies, pairs, real(SLEEP_NEAR), SLEEP_AFTER_S, root)
         sleeper = root >= 0
         if not sleeper.any():
             return False

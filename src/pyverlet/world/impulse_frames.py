@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.constants import REST_ACCELERATIONS, SURPLUS
-from pyverlet.ground.errors import InputError, NonFiniteError
+from pyverlet.ground.errors import NonFiniteError
 from pyverlet.laws.contacts.collisions import Collisions
 from pyverlet.laws.contacts.growth import Growth
 from pyverlet.laws.impulse_ledger import ImpulsePage
@@ -89,7 +89,7 @@ class ImpulseFrames:
         """Whether the frame that begins is one of this law. Another one forgets what contacts have remembered."""
         law = world.collisions
         wanted = Collisions.impulses if law is None else law.impulses
-        steps = not self.unknown(world) if wanted is None else wanted
+        steps = wanted is None or wanted
         if steps != self.steps:
             self.steps = steps
             self.forget()
@@ -103,25 +103,17 @@ class ImpulseFrames:
         done: is told of each stage, and may be the page of a ledger.
 
         Raises:
-            InputError: there is something in the world that this law does not know yet.
             NonFiniteError: a particle turned NaN or infinite.
         """
-        if found := self.unknown(world):
-            raise InputError(f"impulses is True in a world with {found[0]}; allowed are circles, obstacles and forces in a room")
         world._slots.rows = self.held.core
         world._slots.clear_notes()
         self.links.keep_apart(world, self.held.engine)
         if world._gather():
             self.held.forget_list()
-        if not self.run(world, dt, done):
+        if world._sleep and world._sleep.all_asleep(world._slots):
+            self._sleep_on(world, dt, done)
+        elif not self.run(world, dt, done):
             self._refuse_non_finite(world, dt)
-
-    def unknown(self, world: Any) -> list[str]:
-        """What there is in a world that this law does not know yet."""
-        found = []
-        if world._sleep:
-            found.append("sleep=True")
-        return found
 
     def run(self, world: Any, dt: float, done: Callable[[str], None]) -> bool:
         """Advance the gathered slots by a frame of dt seconds. False if a particle turned NaN or infinite."""
@@ -133,7 +125,6 @@ class ImpulseFrames:
         by_core = kicks(world.integrator)
         h, half = dt / substeps, world.integrator.velocity_lag if by_core else 0.5
         before = self.held.h if self.held.kick else 0.0
-        self._stiffen(h, dt)
         own_walls = None if knows(world.boundary) else world.boundary.confine
         alone = by_core and not (forces.forces or own_walls)
         limited = bool(collisions and len(world) > 1) or bool(world.obstacles)
@@ -141,6 +132,7 @@ class ImpulseFrames:
         gravity = world.gravity
         state.h = h
         self.held.load(world, dt)
+        self._stiffen(h, dt)
         self.links.load(world, self.held.engine)
         if type(world.integrator) is PositionVerlet and before not in (0.0, h):
             self._keep_way(state, before, h)
@@ -158,6 +150,8 @@ class ImpulseFrames:
         step, finite = 0, True
         while step < substeps:
             opens, known = step == 0 or not by_core, self.held.kick > 0.0  # opens: from velocities that belong to the positions
+            if world._sleep and world._sleep.anyone:
+                self._wake_met(world, step, h, alone=alone, rough=rough)
             kick = half * (h + before) if half and opens else h
             opening = 0.0 if not by_core else half * h if half and opens else h
             if not by_core:
@@ -169,7 +163,8 @@ class ImpulseFrames:
                 opening = h
             done("integrate")
             # The first substep may have a kick of its own; whoever looks or acts in each has a call for each.
-            stop = step + 1 if not alone or notes or world.onlooker or kick != h else substeps
+            watched_on = notes or world.onlooker or (world._sleep and world._sleep.anyone)
+            stop = step + 1 if not alone or watched_on or kick != h else substeps
             last_kick = kick if stop == step + 1 else h
             self._set_law(self._strongest(world.gravity) if alone else forces.strongest, h, kick, rough=rough)
             engine.set_frame(
@@ -210,10 +205,30 @@ class ImpulseFrames:
         if listens:
             world._events.hear(told_of(engine, state, world._course))
             engine.listen(False)
+        if world._sleep and world._sleep.end(state, self.listed(), dt, float(np.hypot(*gravity))):
+            self.held.set_aside(state)
         done("finish")
         if state.seam:
             engine.wrap_seam()
         return True
+
+    def _wake_met(self, world: Any, step: int, h: float, *, alone: bool, rough: bool) -> None:
+        """Wake islands that are met in the substep that comes, and those that they may be thrown at."""
+        state, strongest = world._slots, self._strongest(world.gravity) if alone else world._force_sum.strongest
+        self._set_law(strongest, h, h, rough=rough)
+        nearer = REST_ACCELERATIONS * strongest * h * h
+        while (met := self.held.engine.find_met(step, state.island, nearer, self.held.parts)) is not None:
+            world._sleep.wake(state, met)
+            self.held.wake(world)
+            self.held.hertz = min(self.held.hertz, STIFFEST / h)
+            self._set_law(strongest, h, h, rough=rough)
+
+    def _sleep_on(self, world: Any, dt: float, done: Callable[[str], None]) -> None:
+        """A frame of dt seconds in which everybody sleeps, and nothing moves."""
+        done("gather")
+        if world._touches is not None:
+            ImpulseNotes(world._touches, self.held.engine, world._slots).close(world, dt)
+        done("finish")
 
     def _strongest(self, gravity: tuple[float, float]) -> float:
         """The largest acceleration by gravity alone, m/s^2."""

@@ -14,6 +14,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.constants import FED, PUSHED, REST_ACCELERATIONS, UNEVEN
 from pyverlet.ground.errors import InputError
 from pyverlet.kernels import overlap
+from pyverlet.kernels.sleep import touch
 from pyverlet.laws.contacts.broadphase import BruteForce, Fast, PairList, Strips
 from pyverlet.laws.contacts.growth import Growth
 from pyverlet.laws.contacts.loans import Lent, Loans
@@ -44,8 +45,7 @@ class Collisions:
         friction: mu of Coulomb, 0 or more. 0 leaves spin alone.
         method: how pairs are found, Fast() or the O(n^2) reference BruteForce(). Both find the same contacts.
         impulses: contacts remember impulses (docs/design/impulses.md): heaps stay at rest when the length of frames or the number
-            of substeps changes, in the room or on unequal masses. So far in worlds of circles, obstacles, forces and a room,
-            without links or sleep. None: where it knows all that there is in the world.
+            of substeps changes, in the room or on unequal masses. None: as if True.
     """
 
     restitution: float = 0.0
@@ -135,7 +135,12 @@ class ContactSolver:
     def find(self, state: Slots, lag: float) -> None:
         """Broad phase: bring the list of candidate pairs up to date, and note events before contacts change a velocity."""
         self._list(state)
-        while self._sleep and self._sleep.touched(state, self.broad_phase.list):
+        while self._sleep and self._sleep.anyone:
+            touched, (period_x, period_y) = np.zeros(len(state), np.uint8), state.reals(*state.seam.period)
+            which = self.broad_phase.list.listed()
+            touch(state.position, state.size, period_x, period_y, state.island, *which, touched)
+            if not self._sleep.wake(state, touched):
+                break
             self.broad_phase.renew(state)
             self._list(state)
 
@@ -260,7 +265,7 @@ class ContactSolver:
             self._loans.let_fall(state)
         else:
             pick_falling(state, before.velocity, lag, dt)
-        if self._sleep and self._sleep.end(state, self.broad_phase.list, dt, float(np.hypot(*gravity))):
+        if self._sleep and self._sleep.end(state, self.broad_phase.list.listed(), dt, float(np.hypot(*gravity))):
             self.broad_phase.forget()  # it has no use for pairs among sleepers
 
 

@@ -1,0 +1,149 @@
+# mypy: ignore-errors
+"""How long particles have been at rest, which islands may fall asleep, and which sleepers have been edited. On one thread."""
+
+from __future__ import annotations
+
+import cython
+import numpy as np
+from cython.cimports.arrays import (
+    const_indices,
+    const_integers,
+    const_reals,
+    const_singles,
+    const_small_integers,
+    integers,
+    octets,
+    singles,
+)
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import rint
+from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t, uint32_t
+
+from pyverlet.core.islands import find_root, join_sets
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def nearest_of(difference: real, period: real) -> real:
+    """The image of a difference that is nearest to 0; the difference itself where the period is 0."""
+    return difference - period * cython.cast(real, rint(difference / period)) if period > 0 else difference
+
+
+def time_at_rest(velocity, spin, radius, inverse_mass, island, limit: real, dt: cython.float, after: cython.float, calm) -> bool:
+    """calm[i] += dt where awake and the speed, that of the rim included, is at most sqrt(limit radius); else it becomes 0.
+
+    Returns whether any particle that is awake, and not pinned, has been at rest for `after` seconds.
+    """
+    v: cython.pointer[cython.const[real]] = const_reals(velocity)
+    w: cython.pointer[cython.const[real]] = const_reals(spin)
+    r: cython.pointer[cython.const[real]] = const_reals(radius)
+    light: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
+    asleep: cython.pointer[cython.const[int64_t]] = const_integers(island)
+    timer: cython.p_float = singles(calm)
+    count: cython.Py_ssize_t = len(calm)
+    zero: cython.float = 0
+    found: cython.bint = False
+    i: cython.Py_ssize_t
+    for i in range(count):
+        rim: real = w[i] * r[i]
+        square: real = v[2 * i] * v[2 * i] + v[2 * i + 1] * v[2 * i + 1] + rim * rim
+        longer: cython.float = timer[i] + dt
+        longer = longer if square <= limit * r[i] else zero
+        if asleep[i] < 0:
+            timer[i] = longer
+            found |= longer >= after and light[i] > 0
+    return found != 0
+
+
+def find_islands(
+    position, size, period_x: real, period_y: real, inverse_mass, calm, pairs, near: real, after: cython.float, root
+):
+    """root[i]: the lowest slot of the island of i, if all of it has been at rest for `after` seconds; else -1.
+
+    An island is what hangs together by pairs nearer than `near` times their contact distance. Pinned circles and sleepers
+    (inverse mass 0) belong to none. pairs: (first, count, i, j), those of row s are count[s] from first[s] on.
+    """
+    x: cython.pointer[cython.const[real]] = const_reals(position)
+    r: cython.pointer[cython.const[real]] = const_reals(size)
+    w: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
+    timer: cython.pointer[cython.const[cython.float]] = const_singles(calm)
+    first: cython.pointer[cython.const[int64_t]] = const_integers(pairs[0])
+    number: cython.pointer[cython.const[int64_t]] = const_integers(pairs[1])
+    pair_i: cython.pointer[cython.const[uint32_t]] = const_indices(pairs[2])
+    pair_j: cython.pointer[cython.const[uint32_t]] = const_indices(pairs[3])
+    to: cython.pointer(int64_t) = integers(root)
+    rows: cython.Py_ssize_t = len(pairs[0])
+    count: cython.Py_ssize_t = len(root)
+    marks = np.zeros(count, np.uint8)
+    restless: cython.pointer(uint8_t) = octets(marks)
+    s: cython.Py_ssize_t
+    k: int64_t
+    n: cython.Py_ssize_t
+    for n in range(count):
+        to[n] = n
+    for s in range(rows):
+        for k in range(first[s], first[s] + number[s]):
+            i: int64_t = pair_i[k]
+            j: int64_t = pair_j[k]
+            if w[i] > 0 and w[j] > 0:
+                dx: real = nearest_of(x[2 * j] - x[2 * i], period_x)
+                dy: real = nearest_of(x[2 * j + 1] - x[2 * i + 1], period_y)
+                reach: real = near * (r[i] + r[j])
+                if dx * dx + dy * dy < reach * reach:
+                    join_sets(to, i, j)
+    for n in range(count):
+        if timer[n] < after or w[n] <= 0:
+            restless[find_root(to, n)] = 1
+    for k in range(count):  # from above: roots are below what they are the roots of
+        n = count - 1 - k
+        i = find_root(to, n)
+        to[n] = -1 if restless[i] else i
+
+
+def find_edited(given, held, particle, island, edited) -> int:
+    """Set edited[k] = 1 for sleepers that the user has written to; returns how many there are.
+
+    given: what the user has, in the user's order: position, velocity, spin, radius, mass, restitution, friction, category, mask.
+    held: what the slots hold of it, without velocity and spin, which are 0; categories and masks are empty where all are default.
+    """
+    x: cython.pointer[cython.const[real]] = const_reals(given[0])
+    v: cython.pointer[cython.const[real]] = const_reals(given[1])
+    spin: cython.pointer[cython.const[real]] = const_reals(given[2])
+    radius: cython.pointer[cython.const[real]] = const_reals(given[3])
+    mass: cython.pointer[cython.const[real]] = const_reals(given[4])
+    bounce: cython.pointer[cython.const[real]] = const_reals(given[5])
+    rub: cython.pointer[cython.const[real]] = const_reals(given[6])
+    category: cython.pointer[cython.const[uint32_t]] = const_indices(given[7])
+    mask: cython.pointer[cython.const[uint32_t]] = const_indices(given[8])
+    was_x: cython.pointer[cython.const[real]] = const_reals(held[0])
+    was_radius: cython.pointer[cython.const[real]] = const_reals(held[1])
+    was_mass: cython.pointer[cython.const[real]] = const_reals(held[2])
+    was_bounce: cython.pointer[cython.const[real]] = const_reals(held[3])
+    was_rub: cython.pointer[cython.const[real]] = const_reals(held[4])
+    was_category: cython.pointer[cython.const[uint32_t]] = const_indices(held[5])
+    was_mask: cython.pointer[cython.const[uint32_t]] = const_indices(held[6])
+    order: cython.pointer[cython.const[int32_t]] = const_small_integers(particle)
+    asleep: cython.pointer[cython.const[int64_t]] = const_integers(island)
+    to: cython.pointer(uint8_t) = octets(edited)
+    sorted_out: cython.bint = len(held[5]) > 0
+    masked: cython.bint = len(held[6]) > 0
+    one: uint32_t = 1
+    every: uint32_t = 0xFFFFFFFF
+    count: cython.Py_ssize_t = len(island)
+    found: cython.Py_ssize_t = 0
+    k: cython.Py_ssize_t
+    for k in range(count):
+        if asleep[k] < 0:
+            continue
+        i: int32_t = order[k]
+        differs: cython.bint = x[2 * i] != was_x[2 * k] or x[2 * i + 1] != was_x[2 * k + 1]
+        differs |= v[2 * i] != 0 or v[2 * i + 1] != 0 or spin[i] != 0
+        differs |= radius[i] != was_radius[k] or mass[i] != was_mass[k]
+        differs |= bounce[i] != was_bounce[k] or rub[i] != was_rub[k]
+        differs |= category[i] != (was_category[k] if sorted_out else one) or mask[i] != (was_mask[k] if masked else every)
+        if differs:
+            to[k] = 1
+            found += 1
+    return found
