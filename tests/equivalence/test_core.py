@@ -50,6 +50,32 @@ def test_uncompiled_it_has_the_same_bits(dtype: Any, more: dict[str, float], mon
     assert plain.state_hash() == compiled.state_hash()
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_uncompiled_sleepers_wake_with_the_same_bits(dtype: Any, friction: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    def row() -> tuple[pv.World, list[int]]:
+        """Four at rest in a row, two of them on the floor of a room without gravity; hit after they have fallen asleep."""
+        law = pv.Collisions(restitution=0.7, friction=friction)
+        made = pv.World(gravity=(0, 0), boundary=pv.Box((0, 0), (9, 3)), collisions=law, dtype=dtype, sleep=True, substeps=2)
+        made.add(position=[(2, 0.5), (3, 0.5), (4.2, 0.6), (5.3, 0.7)], radius=0.5)
+        made.run(seconds=0.55)
+        asleep = [int(made.asleep.sum())]
+        made.add(position=(0.6, 1.0), velocity=(15, -1.0), radius=0.4)
+        for _ in range(12):
+            made.step(1 / 60)
+            asleep.append(int(made.asleep.sum()))
+        return made, asleep
+
+    compiled, asleep = row()
+    assert asleep[0] == 4
+    assert asleep[-1] == 0
+    slow = {name: reference.load(name, dtype) for name in ("engine", "tools")}
+    monkeypatch.setattr(core, "unit", lambda name, dtype: slow[name])
+    plain, same = row()
+    assert same == asleep
+    assert plain.state_hash() == compiled.state_hash()
+
+
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_any_number_of_threads_has_the_same_bits(friction: float, monkeypatch: pytest.MonkeyPatch) -> None:
     hashes = set()

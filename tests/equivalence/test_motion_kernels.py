@@ -218,12 +218,6 @@ def find_islands(chance: Chance, dtype: Any) -> tuple[Any, ...]:
 
 
 @kernel
-def touch(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    island = np.where(np.arange(N) % 3 == 0, 3, -1)
-    return rows(chance, dtype), 0.2 * column(chance, dtype), 0.0, 3.0, island, pairs(chance), np.zeros(N, np.uint8)
-
-
-@kernel
 def find_edited(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     who, ones = order(chance), np.ones(N, np.uint32)
     columns = [column(chance, dtype) for _ in range(4)]

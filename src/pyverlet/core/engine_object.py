@@ -7,7 +7,7 @@ import cython
 import numpy as np
 from cython.cimports.arrays import doubles, indices, integers, reals, small_integers
 from cython.cimports.lanes import real
-from cython.cimports.team import team_free, team_new, team_run
+from cython.cimports.team import team_free, team_function, team_new, team_run
 
 from pyverlet.core.cells import BLOCK, Cells
 from pyverlet.core.engine_arrays import (
@@ -27,9 +27,10 @@ from pyverlet.core.engine_work import energy_of_last, friction_of_last
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_ends import show_links
 from pyverlet.core.pair_lists import Lists
-from pyverlet.core.running import remake_list, run_substeps
+from pyverlet.core.running import refresh_lists, remake_list, run_substeps
 from pyverlet.core.seams import follow_seam, wrap_seam
 from pyverlet.core.step import Step
+from pyverlet.core.waking import find_met
 
 
 @cython.cclass
@@ -254,6 +255,35 @@ class Engine:
         if blocks and w.contact_count[0] > w.contact_room:
             make_surface_arrays(w, self.arrays, w.contact_count[0] * 5 // 4)
 
+    @cython.cfunc
+    def run_team(self, function: team_function, parts: cython.int):
+        """Call a function in `parts` threads, again and again until arrays are large enough for it."""
+        w: cython.pointer(Step) = cython.address(self.w)
+        while True:
+            with cython.nogil:
+                team_run(w.team, function, w, parts)
+            if not self.ls.short:
+                break
+            self.ls.short = False
+            if w.waiting:
+                self.keep_heard()
+            else:
+                self.make_room()
+
+    @cython.cfunc
+    def keep_heard(self):
+        """Lists will be made anew: take what was heard of those of now."""
+        w: cython.pointer(Step) = cython.address(self.w)
+        w.waiting, w.collected = False, True
+        self.heard.append(hear(w, self.arrays))
+
+    def find_met(self, substep: cython.int, island, margin: cython.double, parts: cython.int):
+        """(count,) uint8, 1 for sleepers that somebody awake meets in the substep that comes, see `core.waking`; or None."""
+        w: cython.pointer(Step) = cython.address(self.w)
+        w.first = w.substep = substep
+        self.run_team(refresh_lists, parts)
+        return find_met(w, island, margin)
+
     def run(self, substep: cython.int, substeps: cython.int, parts: cython.int):
         """Substeps from `substep` on by `parts` threads, with lists of pairs that are good in each.
 
@@ -261,17 +291,7 @@ class Engine:
         """
         w: cython.pointer(Step) = cython.address(self.w)
         w.first, w.substep, w.substeps = substep, substep, substeps
-        while True:
-            with cython.nogil:
-                team_run(w.team, run_substeps, w, parts)
-            if not self.ls.short:
-                break
-            self.ls.short = False
-            if w.waiting:
-                w.waiting, w.collected = False, True
-                self.heard.append(hear(w, self.arrays))
-            else:
-                self.make_room()
+        self.run_team(run_substeps, parts)
         finite: cython.bint = True
         b: cython.Py_ssize_t
         for b in range((w.count + BLOCK - 1) // BLOCK):
@@ -329,6 +349,8 @@ class Engine:
 
     def give_impulses(self, pairs, values):
         """Find them again in the next list; pairs: slots (k, 2). All others carry none."""
+        if self.w.listening and not self.w.collected:
+            self.keep_heard()
         room = max(len(pairs), self.ls.lanes_room, 8)
         make_kept_arrays(cython.address(self.ls), self.arrays, room, self.dtype)
         self.ls.harvested = False
@@ -352,13 +374,7 @@ class Engine:
         if len(listed) != w.count or not w.collides:
             return
         self.c.position = reals(listed)
-        while True:
-            with cython.nogil:
-                team_run(w.team, remake_list, w, 1)
-            if not ls.short:
-                break
-            ls.short = False
-            self.make_room()
+        self.run_team(remake_list, 1)
         self.c.position = w.position
         self.arrays["checked"][:] = checked
         w.allowed = numbers[3]

@@ -21,7 +21,7 @@ from pyverlet.core.moves import (
 )
 from pyverlet.core.own_walls import confine_to_box, confine_to_circle
 from pyverlet.core.periodic import follow, wrap
-from pyverlet.core.resting import find_edited, find_islands, time_at_rest, touch
+from pyverlet.core.resting import find_edited, find_islands, time_at_rest
 from pyverlet.core.rows import any_differs, differs, put_motion, take_motion
 from pyverlet.core.textbook_walls import clamp_to_box, clamp_to_circle
 from pyverlet.core.total_energy import energy_gained, total_energy
@@ -64,6 +64,5 @@ __all__ = [
     "take_motion",
     "time_at_rest",
     "total_energy",
-    "touch",
     "wrap",
 ]

@@ -95,35 +95,6 @@ def find_islands(
             to[n] = -1 if restless[i] else i
 
 
-def touch(position, size, period_x: real, period_y: real, island, pairs, touched) -> int:
-    """Set touched[i] = 1 for sleepers that overlap a particle that is awake; returns how many such pairs there are."""
-    x: cython.pointer[cython.const[real]] = const_reals(position)
-    r: cython.pointer[cython.const[real]] = const_reals(size)
-    asleep: cython.pointer[cython.const[int64_t]] = const_integers(island)
-    first: cython.pointer[cython.const[int64_t]] = const_integers(pairs[0])
-    number: cython.pointer[cython.const[int64_t]] = const_integers(pairs[1])
-    pair_i: cython.pointer[cython.const[uint32_t]] = const_indices(pairs[2])
-    pair_j: cython.pointer[cython.const[uint32_t]] = const_indices(pairs[3])
-    to: cython.pointer(uint8_t) = octets(touched)
-    rows: cython.Py_ssize_t = len(pairs[0])
-    found: cython.Py_ssize_t = 0
-    s: cython.Py_ssize_t
-    k: int64_t
-    with cython.nogil:
-        for s in range(rows):
-            for k in range(first[s], first[s] + number[s]):
-                i: int64_t = pair_i[k]
-                j: int64_t = pair_j[k]
-                if (asleep[i] < 0) != (asleep[j] < 0):
-                    dx: real = nearest_of(x[2 * j] - x[2 * i], period_x)
-                    dy: real = nearest_of(x[2 * j + 1] - x[2 * i + 1], period_y)
-                    reach: real = r[i] + r[j]
-                    if dx * dx + dy * dy < reach * reach:
-                        to[j if asleep[i] < 0 else i] = 1
-                        found += 1
-    return found
-
-
 def find_edited(given, held, particle, island, edited) -> int:
     """Set edited[k] = 1 for sleepers that the user has written to; returns how many there are.
 

@@ -93,6 +93,19 @@ def refresh(w: cython.pointer(Step)) -> cython.bint:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def refresh_lists(what: cython.p_void, item: cython.int) -> cython.void:
+    """Lists that are good for the substep that comes, unless arrays are too small for them."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    i: cython.Py_ssize_t
+    if w.rough:
+        for i in range(w.count):
+            w.motion[4 * i], w.motion[4 * i + 1] = w.velocity[2 * i], w.velocity[2 * i + 1]
+    refresh(w)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def run_substeps(what: cython.p_void, item: cython.int) -> cython.void:
     """Substeps until all are done, or arrays are too small for a list."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)

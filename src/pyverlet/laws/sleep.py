@@ -62,7 +62,7 @@ class Sleep:
             edited[np.isin(slots.island, fewer)] = 1
         elif not found:
             return False
-        return self._wake(slots, np.isin(slots.island, slots.island[(edited == 1) & (slots.island >= 0)]))
+        return self.wake(slots, edited)
 
     @property
     def anyone(self) -> bool:
@@ -73,25 +73,22 @@ class Sleep:
         """Whether nothing can move."""
         return self.anyone and not slots.inverse_mass.any()
 
-    def touched(self, slots: Slots, pairs: Any) -> bool:
-        """Wake islands that somebody awake overlaps. Whether there were any: then the list lacks pairs."""
-        if not self._members:
-            return False
-        touched = np.zeros(len(slots), np.uint8)
-        about = slots.position, slots.size, *slots.seam.period, slots.island
-        if not slots.motion.touch(*about, pairs.listed(), touched):
-            return False
-        return self._wake(slots, np.isin(slots.island, slots.island[touched == 1]))
+    def wake(self, slots: Slots, touched: Array) -> bool:
+        """Wake islands in which somebody is touched: (n,) 1. Whether there were any: then the list lacks pairs."""
+        return self._wake(slots, np.isin(slots.island, slots.island[(touched == 1) & (slots.island >= 0)]))
 
-    def end(self, slots: Slots, pairs: Any, dt: float, gravity: float) -> bool:
-        """At the end of a frame: let islands that have been calm long enough fall asleep. Whether there were any."""
+    def end(self, slots: Slots, pairs: tuple[Array, ...], dt: float, gravity: float) -> bool:
+        """At the end of a frame of dt seconds: let islands that have been calm long enough fall asleep. Whether there were any.
+
+        pairs: (first, count, i, j), those nearer than a skin; those of row s are count[s] from first[s] on.
+        """
         awake = (slots.velocity, slots.spin, slots.radius, slots.inverse_mass, slots.island)
         tired = slots.motion.time_at_rest(*awake, SLEEP_SPEED**2 * gravity, dt, SLEEP_AFTER_S, slots.calm)
         if self._laws is None or not tired:
             return False
         root = np.empty(len(slots), np.int64)
         bodies = (slots.position, slots.size, *slots.seam.period, slots.inverse_mass, slots.calm)
-        slots.motion.find_islands(*bodies, pairs.listed(), SLEEP_NEAR, SLEEP_AFTER_S, root)
+        slots.motion.find_islands(*bodies, pairs, SLEEP_NEAR, SLEEP_AFTER_S, root)
         sleeper = root >= 0
         if not sleeper.any():
             return False

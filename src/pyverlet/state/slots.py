@@ -36,7 +36,7 @@ class Slots:
         position, velocity, acceleration, spin, radius, mass, grown, restitution, friction: as in State.
         category, mask: as in State, or empty while every circle collides with every other.
         most_restitution, most_friction: the largest of their columns; negative if no circle has values of its own.
-        given: how often what users set was taken up anew.
+        given: how often what users set was taken up anew, or others slept.
         size: (n,) grown * radius, m: what contacts between particles take as the radius.
         inverse_mass: (n,) 1/kg; 0 for a pinned particle: whether one `pins`. total_mass: of others, kg.
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
@@ -160,7 +160,6 @@ class Slots:
 
     def _take_given(self, state: State) -> bool:
         """Copy in what users set and engines leave alone."""
-        self.given += 1
         changed = self._changed
         for name in _GIVEN:
             given, now = self._given[name], getattr(state, name)
@@ -185,6 +184,7 @@ class Slots:
         with np.errstate(divide="ignore"):  # a mass of 0 is refused by the world, with a sentence
             np.divide(1, self.mass, out=self.inverse_mass)
         self.inverse_mass[self.asleep] = 0
+        self.given += 1
 
     def _keep(self, slots: Any) -> None:
         """Remember what outlives a change of size, of these slots."""

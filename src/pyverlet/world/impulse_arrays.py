@@ -14,6 +14,7 @@ from pyverlet.state.slots import Slots
 from pyverlet.world.impulse_materials import materials_of, skin_of, walls_of
 from pyverlet.world.impulse_memory import Memory, columns_of
 from pyverlet.world.impulse_obstacles import ObstacleRows
+from pyverlet.world.impulse_sleepers import Remembered
 
 Array = NDArray[Any]
 
@@ -34,6 +35,7 @@ class ImpulseArrays:
         parts: threads that go through a frame.
         free: whether any particle is not pinned.
         largest, mean_radius: m. unequal: whether masses differ, pinned ones aside.
+        asleep: what contacts of sleepers remember, in rates.
         obstacle_friction: the largest of obstacles.
     """
 
@@ -56,18 +58,21 @@ class ImpulseArrays:
         given[particle, :2], given[particle, 2] = self.gave, self.gave_spin
         pairs, values = (array.copy() for array in self._impulses())
         surfaces, pushes = (array.copy() for array in self._at_surfaces())
+        asleep = self.asleep
         if course is not None and not self._named_anew and (now := self._obstacles.renamed(course)) is not None:
             surfaces[:, 1] = now[surfaces[:, 1]]
             surfaces, pushes = surfaces[surfaces[:, 1] >= 0], pushes[surfaces[:, 1] >= 0]
+            asleep = asleep.at_surfaces(now)
         kept = self._kept_list or (self.engine.save_list() if self.kick else None)
+        step = self.kick, self.h, self.hertz, self.finer
         if kept is None:
             none = np.empty((0, 2), self._dtype)
-            return Memory(pairs, values, surfaces, pushes, given, self.kick, self.h, self.hertz, self.finer, none, none)
+            return Memory(pairs, values, surfaces, pushes, given, *step, asleep, none, none)
         listed, checked = (np.zeros((count if len(rows) else 0, 2), self._dtype) for rows in kept[:2])
         if len(listed):
             listed[particle], checked[particle] = kept[:2]
         skin = kept[2]
-        return Memory(pairs, values, surfaces, pushes, given, self.kick, self.h, self.hertz, self.finer, listed, checked, skin)
+        return Memory(pairs, values, surfaces, pushes, given, *step, asleep, listed, checked, skin)
 
     def restore(self, memory: Memory, *, named_anew: bool = True) -> None:
         """Back to what `save` returned. named_anew: its surfaces are numbered after the obstacles of now."""
@@ -77,6 +82,7 @@ class ImpulseArrays:
         self._kept_list: Any = (memory.listed, memory.checked, memory.skin) if memory.skin else None
         self._particle = np.arange(len(memory.given), dtype=np.int32)
         self.gave, self.gave_spin = columns_of(memory.given)
+        self.asleep = memory.asleep
         self.kick, self.h, self.hertz, self.finer = memory.kick, memory.h, memory.hertz, memory.finer
         self._made = -1  # of `Slots.given`, what the engine holds; -1: nothing
         self._collisions: Any = None
@@ -111,6 +117,7 @@ class ImpulseArrays:
         if engine.threads < parts:
             engine.set_threads(parts)
         self.parts = parts
+        self._wake(state)
         if self._particle is not state.particle or self._kept is not None:
             self._follow(state)
         if state.given != self._made or collisions is not self._collisions:
@@ -133,6 +140,42 @@ class ImpulseArrays:
             self._sort(state)
         if state.seam:
             engine.follow_seam()
+
+    def set_aside(self, state: Slots) -> None:
+        """Some have fallen asleep: keep what their contacts remember."""
+        at_rest, asleep = _at_rest(state)
+        asleep[self.asleep.particle] = False  # what these remember is known
+        left, rest = self._remembered().split(at_rest, asleep)
+        self.asleep = self.asleep.joined(left.times(1.0 / self.kick))
+        self._remember(rest)
+
+    def wake(self, world: Any) -> None:
+        """Some have woken in the middle of a frame."""
+        self._wake(world._slots)
+        self._follow(world._slots)
+        self._set_materials(world)
+
+    def _wake(self, state: Slots) -> None:
+        """Have contacts remember again what those have left that are awake now."""
+        if not len(self.asleep.particle) or len(self.asleep.particle) == len(state.asleep):
+            return
+        self.asleep, awake = self.asleep.split(*_at_rest(state))
+        self._remember(self._remembered().joined(awake.times(self.kick)))
+        if 2 * len(awake.particle) > np.count_nonzero(state.inverse_mass):  # on other springs most would be thrown, or drop
+            self.hertz = float(np.median(awake.hertz))
+
+    def _remembered(self) -> Remembered:
+        """What contacts remember of all that the engine moves."""
+        given, hertz = np.column_stack((self.gave, self.gave_spin)), np.full(len(self.gave), self.hertz)
+        return Remembered(*self._impulses(), *self._at_surfaces(), self._particle, given, hertz)
+
+    def _remember(self, what: Remembered) -> None:
+        """Have contacts remember this, and nothing else; of a particle that is there twice the last counts."""
+        slot = _places(self._particle)[what.particle]
+        self.gave[:], self.gave_spin[:] = 0, 0
+        self.gave[slot], self.gave_spin[slot] = what.given[:, :2], what.given[:, 2]
+        self._kept, self._kept_surfaces = (what.pairs, what.values), (what.surfaces, what.pushes)
+        self.engine.forget_list()
 
     def _sort(self, state: Slots) -> None:
         """Put slots in the order of the cells if many are not; the list of pairs stays what it is."""
@@ -166,9 +209,7 @@ class ImpulseArrays:
 
     def _give_surfaces(self, surfaces: Array, pushes: Array) -> None:
         """Have the engine remember contacts with surfaces, by particles and numbers of now."""
-        place = np.zeros(len(self._particle), np.int32)
-        place[self._particle] = np.arange(len(self._particle), dtype=np.int32)
-        slot = place[surfaces[:, 0]]
+        slot = _places(self._particle)[surfaces[:, 0]]
         order = np.argsort(slot, kind="stable")
         self.engine.give_surfaces(slot[order], surfaces[order, 1], pushes[order])
         self._kept_surfaces = None
@@ -212,3 +253,17 @@ def _unequal(inverse_mass: Array) -> bool:
     """Whether masses differ, pinned ones aside."""
     free = inverse_mass[inverse_mass > 0]
     return bool(len(free) and (free != free[0]).any())
+
+
+def _places(particle: Array) -> Array:
+    """The slot of each of the user's particles."""
+    place = np.zeros(len(particle), np.int32)
+    place[particle] = np.arange(len(particle), dtype=np.int32)
+    return place
+
+
+def _at_rest(state: Slots) -> tuple[Array, Array]:
+    """By the user's index: who cannot move, and who of these sleeps."""
+    rest, asleep = np.zeros((2, len(state)), bool)
+    rest[state.particle], asleep[state.particle] = state.inverse_mass == 0, state.island >= 0
+    return rest, asleep

@@ -101,7 +101,9 @@ class ImpulseFrames:
         if world._gather():
             self.held.forget_list()
         with np.errstate(over="ignore", invalid="ignore"):  # what becomes infinite is told of as such
-            if not self.run(world, dt, done):
+            if world._sleep and world._sleep.all_asleep(world._slots):
+                self._sleep_on(world, dt, done)
+            elif not self.run(world, dt, done):
                 self._refuse_non_finite(world, dt)
 
     def run(self, world: Any, dt: float, done: Callable[[str], None]) -> bool:
@@ -139,6 +141,8 @@ class ImpulseFrames:
         step, finite = 0, True
         while step < substeps:
             opens, known = step == 0 or not by_core, self.held.kick > 0.0  # opens: from velocities that belong to the positions
+            if world._sleep and world._sleep.anyone:
+                self._wake_met(world, step, h, alone=alone, rough=rough)
             kick = half * (h + before) if half and opens else h
             opening = 0.0 if not by_core else half * h if half and opens else h
             if not by_core:
@@ -150,7 +154,8 @@ class ImpulseFrames:
                 opening = h
             done("integrate")
             # The first substep may have a kick of its own; whoever looks or acts in each has a call for each.
-            stop = step + 1 if not alone or notes or world.onlooker or kick != h else substeps
+            watched_on = notes or world.onlooker or (world._sleep and world._sleep.anyone)
+            stop = step + 1 if not alone or watched_on or kick != h else substeps
             last_kick = kick if stop == step + 1 else h
             self._set_law(self._strongest(world.gravity) if alone else forces.strongest, h, kick, rough=rough)
             engine.set_frame(
@@ -191,10 +196,30 @@ class ImpulseFrames:
         if listens:
             world._events.hear(told_of(engine, state, world._course))
             engine.listen(False)
+        if world._sleep and world._sleep.end(state, self.listed(), dt, float(np.hypot(*gravity))):
+            self.held.set_aside(state)
         done("finish")
         if state.seam:
             engine.wrap_seam()
         return True
+
+    def _wake_met(self, world: Any, step: int, h: float, *, alone: bool, rough: bool) -> None:
+        """Wake islands that are met in the substep that comes, and those that they may be thrown at."""
+        state, strongest = world._slots, self._strongest(world.gravity) if alone else world._force_sum.strongest
+        self._set_law(strongest, h, h, rough=rough)
+        nearer = REST_ACCELERATIONS * strongest * h * h
+        while (met := self.held.engine.find_met(step, state.island, nearer, self.held.parts)) is not None:
+            world._sleep.wake(state, met)
+            self.held.wake(world)
+            self.held.hertz = min(self.held.hertz, STIFFEST / h)
+            self._set_law(strongest, h, h, rough=rough)
+
+    def _sleep_on(self, world: Any, dt: float, done: Callable[[str], None]) -> None:
+        """A frame of dt seconds in which everybody sleeps, and nothing moves."""
+        done("gather")
+        if world._touches is not None:
+            ImpulseNotes(world._touches, self.held.engine, world._slots).close(world, dt)
+        done("finish")
 
     def _strongest(self, gravity: tuple[float, float]) -> float:
         """The largest acceleration by gravity alone, m/s^2."""

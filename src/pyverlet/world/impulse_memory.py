@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.world.impulse_sleepers import Remembered
+
 Array = NDArray[Any]
 
 
@@ -16,8 +18,8 @@ class Memory(NamedTuple):
     pairs (k, 2) and values (k, 3): see `Engine.take_impulses`. surfaces (k, 2): particles and which surface, as the core numbers
     them; pushes (k, 2): their impulses along the normals and the tangents, m/s. given: (n, 3) velocity and spin that contacts
     gave in the last substep, over `kick` seconds. h: length of the last substep, s. hertz: frequency of the springs; finer: for
-    how long, s, a higher one would have been possible. listed, checked: (n, 2) of the list of pairs, and skin: its numbers, as of
-    `Engine.save_list`. Empty without one.
+    how long, s, a higher one would have been possible. asleep: what contacts of sleepers remember. listed, checked: (n, 2) of the
+    list of pairs, and skin: its numbers, as of `Engine.save_list`. Empty without one.
     """
 
     pairs: Array
@@ -29,6 +31,7 @@ class Memory(NamedTuple):
     h: float
     hertz: float
     finer: float
+    asleep: Remembered
     listed: Array
     checked: Array
     skin: tuple[float, ...] = ()
@@ -37,7 +40,7 @@ class Memory(NamedTuple):
     def empty(cls, dtype: np.dtype[Any]) -> Memory:
         """No contact remembers anything."""
         rows, none, nobody = np.empty((0, 2), dtype), np.empty((0, 3), dtype), np.empty((0, 2), np.int32)
-        return cls(nobody, none, nobody, np.empty((0, 2)), none, 0.0, 0.0, 0.0, 0.0, rows, rows)
+        return cls(nobody, none, nobody, np.empty((0, 2)), none, 0.0, 0.0, 0.0, 0.0, Remembered.nothing(dtype), rows, rows)
 
     def renumbered(self, now: Array) -> Memory:
         """Of the particles that are now at `now` (n,), or no more (-1). There is no list of pairs."""
@@ -49,7 +52,7 @@ class Memory(NamedTuple):
         kept, held = (pairs >= 0).all(axis=1), surfaces[:, 0] >= 0
         return self._replace(
             pairs=pairs[kept], values=self.values[kept], surfaces=surfaces[held], pushes=self.pushes[held], given=given,
-            listed=none, checked=none,
+            asleep=self.asleep.renumbered(now), listed=none, checked=none,
         )  # fmt: skip
 
 

@@ -21,6 +21,7 @@ from pyverlet.laws.links._set import BROKEN
 from pyverlet.laws.links._work import Past
 from pyverlet.laws.sleep import Sleep, laws
 from pyverlet.world.impulse_memory import Memory
+from pyverlet.world.impulse_sleepers import ASLEEP, Remembered
 from pyverlet.world.saved import Saved
 from pyverlet.world.world import World
 
@@ -101,6 +102,7 @@ FIELDS = {
         ("news", NEWS),
         ("linked", LINKED),
         ("impulses", IMPULSES),
+        ("asleep", ASLEEP),
     )
     for name, field in fields.items()
 }
@@ -128,6 +130,8 @@ def take_apart(world: World) -> Parts:
     if memory.kick:
         facts["impulses"]["skin"] = list(memory.skin)
         arrays |= {f"impulses.{name}": getattr(memory, name) for name in IMPULSES}
+        if len(memory.asleep.particle):
+            arrays |= {f"asleep.{name}": getattr(memory.asleep, name) for name in ASLEEP}
     if saved.books:
         facts["books"] = {
             "energy": saved.books._energy, "resting": saved.books._resting, "ledger": saved.books.ledger.as_dict(),
@@ -245,6 +249,7 @@ def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
         pushes.copy(),
         given.copy(),
         **numbers,
+        asleep=Remembered.taken_up(arrays, len(world), world.dtype),
         listed=listed,
         checked=checked,
         skin=skin,

@@ -1,0 +1,164 @@
+# mypy: ignore-errors
+"""Who wakes: sleepers that would be met in the substep that comes.
+
+Sleepers are pinned to all else: who met one would bounce off it as off a wall. So they wake before, if somebody awake gets there
+by the velocity of now, or is in a row of such that may hit each other within the substep: then by twice that of the fastest.
+"""
+
+from __future__ import annotations
+
+import cython
+import numpy as np
+from cython.cimports.arrays import const_integers, doubles, octets
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import sqrt
+from cython.cimports.libc.stdint import int64_t, uint8_t
+
+from pyverlet.core.step import Step
+
+MOST_HITS = cython.declare(cython.int, 100)
+"""In a row, one after the other."""
+
+THROWN = cython.declare(cython.double, 2.0)
+"""Times as fast as what hits it a light circle may leave."""
+
+NEARER = cython.declare(cython.double, 0.005)
+"""Of the contact distance: nobody who stays farther off has met a sleeper. Less than what islands are told apart by."""
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def way_in_lane(w: cython.pointer(Step), k: int64_t, axis: cython.int) -> cython.double:
+    """From the one circle of lane k to the other, m."""
+    i: int64_t = w.i[k]
+    j: int64_t = w.j[k]
+    begun: cython.double = w.gap_x[k] if axis == 0 else w.gap_y[k]
+    moved: real = (w.position[2 * j + axis] - w.listed[2 * j + axis]) - (w.position[2 * i + axis] - w.listed[2 * i + axis])
+    return begun + moved
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def spread_speeds(w: cython.pointer(Step), margin: cython.double, speed: cython.p_double) -> cython.void:
+    """Who may be hit within the substep becomes as fast as what hits it."""
+    s: cython.Py_ssize_t
+    k: int64_t
+    hits: cython.int = 0
+    again: cython.bint = True
+    while again and hits < MOST_HITS:
+        again = False
+        hits += 1
+        for s in range(w.groups):
+            for k in range(w.begin[s], w.begin[s] + w.swept[s]):
+                a: cython.double = speed[w.i[k]]
+                b: cython.double = speed[w.j[k]]
+                x: cython.double = way_in_lane(w, k, 0)
+                y: cython.double = way_in_lane(w, k, 1)
+                reach: cython.double = w.radius[w.i[k]]
+                reach += w.radius[w.j[k]] + (a + b) * w.h + margin
+                if a != b and x * x + y * y < reach * reach:
+                    speed[w.i[k]] = speed[w.j[k]] = max(a, b)
+                    again = True
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def comes_to(
+    w: cython.pointer(Step), k: int64_t, awake: int64_t, sign: cython.double, speed: cython.double, margin: cython.double
+) -> cython.bint:
+    """Whether `awake` may meet the other circle of lane k in this substep, sign (1 or -1) times the way in the lane off."""
+    x: cython.double = sign * way_in_lane(w, k, 0)
+    y: cython.double = sign * way_in_lane(w, k, 1)
+    u: cython.double = w.velocity[2 * awake]
+    v: cython.double = w.velocity[2 * awake + 1]
+    reach: cython.double = w.radius[w.i[k]]
+    reach += w.radius[w.j[k]]
+    reach += min(margin, NEARER * reach)
+    square: cython.double = u * u + v * v
+    if speed * speed > square * 1.000001:  # somebody may hit it first
+        far: cython.double = reach + THROWN * speed * w.h
+        if x * x + y * y < far * far:
+            return True
+    time: cython.double = 0
+    if square > 0:
+        time = min(max((x * u + y * v) / square, 0.0), cython.cast(cython.double, w.h))
+    x -= u * time
+    y -= v * time
+    return x * x + y * y < reach * reach
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def awake_of(w: cython.pointer(Step), asleep: cython.pointer[cython.const[int64_t]], k: int64_t) -> int64_t:
+    """Of the two circles of lane k the one that is awake and free, if the other one sleeps; else -1."""
+    i: int64_t = w.i[k]
+    j: int64_t = w.j[k]
+    if asleep[i] >= 0:
+        return j if w.inverse_mass[j] > 0 else -1
+    return i if asleep[j] >= 0 and w.inverse_mass[i] > 0 else -1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def anyone_near(
+    w: cython.pointer(Step),
+    asleep: cython.pointer[cython.const[int64_t]],
+    speed: cython.p_double,
+    margin: cython.double,
+) -> cython.bint:
+    """Note the speeds of all; whether somebody awake is so near to a sleeper that the fastest could get there."""
+    i: cython.Py_ssize_t
+    s: cython.Py_ssize_t
+    k: int64_t
+    fastest: cython.double = 0
+    for i in range(w.count):
+        x: cython.double = w.velocity[2 * i]
+        y: cython.double = w.velocity[2 * i + 1]
+        speed[i] = sqrt(x * x + y * y)
+        fastest = max(fastest, speed[i])
+    for s in range(w.groups):
+        for k in range(w.begin[s] + w.swept[s], w.begin[s] + w.lanes[s]):
+            if awake_of(w, asleep, k) >= 0:
+                x = way_in_lane(w, k, 0)
+                y = way_in_lane(w, k, 1)
+                reach: cython.double = w.radius[w.i[k]]
+                reach += w.radius[w.j[k]] + margin + THROWN * fastest * w.h
+                if x * x + y * y < reach * reach:
+                    return True
+    return False
+
+
+@cython.cfunc
+def find_met(w: cython.pointer(Step), island, margin: cython.double):
+    """(count,) uint8, 1 for sleepers that are met in the substep that comes; None: there are none.
+
+    Lists are good. island: (count,) -1 for those that are awake. margin: m, by which accelerations may bring circles nearer.
+    """
+    asleep: cython.pointer[cython.const[int64_t]] = const_integers(island)
+    if not w.pins:
+        return None
+    speeds = np.empty(w.count)
+    speed: cython.p_double = doubles(speeds)
+    if not anyone_near(w, asleep, speed, margin):
+        return None
+    met = np.zeros(w.count, np.uint8)
+    to: cython.pointer(uint8_t) = octets(met)
+    found: cython.bint = False
+    s: cython.Py_ssize_t
+    k: int64_t
+    spread_speeds(w, margin, speed)
+    for s in range(w.groups):
+        for k in range(w.begin[s] + w.swept[s], w.begin[s] + w.lanes[s]):
+            i: int64_t = awake_of(w, asleep, k)
+            if i >= 0:
+                sleeper: int64_t = w.j[k] if i == w.i[k] else w.i[k]
+                if comes_to(w, k, i, 1.0 if i == w.i[k] else -1.0, speed[i], margin):
+                    to[sleeper] = 1
+                    found = True
+    return met if found else None
