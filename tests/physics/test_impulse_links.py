@@ -250,7 +250,8 @@ def test_touching_discs_of_a_chain_that_hit_each_other_gain_nothing() -> None:
     for _ in range(300):
         world.step(FRAME)
         assert world.energy().total < 1.001 * energy
-    assert world.angular_momentum() == pytest.approx(turn, rel=1e-2)
+    # What is taken after the drift is along directions of its middle: half a substep's turn off, of each blow.
+    assert world.angular_momentum() == pytest.approx(turn, rel=0.1)
     assert stretch(group, 0.1) < 1e-5
 
 
@@ -292,7 +293,7 @@ def test_a_cloth_stretches_less_than_a_thousandth() -> None:
 # ---- rest --------------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", ["dumb-bells", "ropes"])
+@pytest.mark.parametrize("kind", ["dumb-bells", "ropes", "chains"])
 def test_heaps_of_linked_circles_rest_whatever_the_length_of_frames(kind: str) -> None:
     world, chance = (
         made(collisions=pv.Collisions(friction=0.3), boundary=pv.Box((0, 0), (6, 9))),
@@ -303,15 +304,18 @@ def test_heaps_of_linked_circles_rest_whatever_the_length_of_frames(kind: str) -
     group, k = world.add(position=place, radius=0.2, mass=1.0), np.arange(144).reshape(12, 12)
     if kind == "ropes":
         world.links.append(pv.Rope(group, k[:, :-1][:, ::2].ravel(), k[:, 1:][:, ::2].ravel(), length=0.55))
+    elif kind == "chains":
+        world.links.append(pv.Stick(group, k[:, :-1].ravel(), k[:, 1:].ravel()))
     else:
         world.links.append(pv.Stick(group, k[:, ::2].ravel(), k[:, 1::2].ravel()))
     world.run(seconds=10.0)
-    assert np.abs(world.velocity).max() < 1e-3
+    assert np.abs(world.velocity[:, 1]).max() < 1e-3  # along the smooth floor a circle by itself slides on
+    assert 0.5 * (world.velocity**2).sum() < 1e-4
     scale, before = 144 * G * 0.2, world.energy().total
     for dt in np.random.default_rng(2).choice([1 / 240, FRAME], 200):
         world.step(dt)
         after = world.energy().total
-        assert after - before < 1e-4 * scale
+        assert after - before < 1e-5 * scale
         before = after
 
 

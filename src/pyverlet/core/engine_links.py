@@ -17,12 +17,14 @@ def fill_links(k: cython.pointer(Links), a, passes: cython.int, period_x: cython
     k.count, k.rows, k.pins, k.colours, k.passes = particles, rows, pins, len(a["colour"]) - 1, passes
     k.period_x, k.period_y = period_x, period_y
     if "x" not in a:
-        a |= {name: np.zeros((particles, 2)) for name in ("x", "u", "warm", "loaned", "driven", "react", "begun")}
-        a |= {name: np.zeros(particles) for name in ("own", "weight")}
+        a |= {name: np.zeros((particles, 2)) for name in ("x", "u", "warm", "loaned", "driven", "react")}
+        a |= {name: np.zeros(particles) for name in ("own", "weight", "rim")}
+        a["begun"] = np.zeros((particles, 3))
         a |= {name: np.zeros((len(a["node"]), 2)) for name in ("gradient", "slope")}
         a |= {name: np.zeros(rows) for name in ("soft", "target", "turned", "turning", "keeps")}
         a |= {name: np.zeros((rows, 2)) for name in ("way", "middle", "given", "along", "wanted", "answer", "had")}
         a |= {"inverse": np.zeros((rows, 3)), "acts": np.zeros(rows, np.int32)}
+        a["rubs"] = np.ones(particles, np.int32)
         a["held"] = np.full(particles, -1, np.int32)
         a |= {"pin_soft": np.zeros(pins), "pin_target": np.zeros((pins, 2))}
     k.slot, k.x, k.u, k.warm, k.react = (
@@ -44,6 +46,7 @@ def fill_links(k: cython.pointer(Links), a, passes: cython.int, period_x: cython
     k.impulse, k.load, k.pull, k.value = doubles(a["impulse"]), doubles(a["load"]), doubles(a["pull"]), doubles(a["value"])
     k.next, k.soft, k.target, k.turned = doubles(a["next"]), doubles(a["soft"]), doubles(a["target"]), doubles(a["turned"])
     k.begun, k.had = doubles(a["begun"]), doubles(a["had"])
+    k.rubs, k.rim = small_integers(a["rubs"]), doubles(a["rim"])
     k.held = small_integers(a["held"])
     k.driven = doubles(a["driven"])
     k.loaned, k.keeps = doubles(a["loaned"]), doubles(a["keeps"])

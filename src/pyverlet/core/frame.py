@@ -6,7 +6,7 @@ Per substep of length h:
  2. warm start: so do contacts, along the normals of now.
  3. surfaces: what comes fast bounces, the rest is held.
  4. contacts: one sweep over the pairs, with springs; pairs that meet fast bounce, in closed form.
- 5. drift: surfaces once more, then x += v h.
+ 5. drift: surfaces once more, then x += v h. With links: surfaces, links, and all that again, links the other way round.
  6. relax: sweeps without the springs.
  7. remember what contacts gave.
 
@@ -227,7 +227,12 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     if w.linked:
         if surfaces:
             team_stage(w.team, hold_on_stage, w, blocks)
-        solve_links(w)
+        solve_links(w, False)
+        each_group(w, solve_stage)
+        bounce_on(w)
+        if surfaces:
+            team_stage(w.team, hold_on_stage, w, blocks)
+        solve_links(w, True)
     team_stage(w.team, drift_stage, w, blocks)
     for sweep in range(w.relaxes):
         if sweep > 0 and surfaces:

@@ -24,7 +24,10 @@ Links = cython.struct(
     react=cython.pointer(cython.double),  # (count, 2) N s that rows have given it since, whatever its mass
     surfaces=cython.bint,  # whether there are any
     contact=cython.pointer(cython.double),  # of `Step`
-    begun=cython.pointer(cython.double),  # (count, 2) `u` before its chain was solved
+    rough=cython.bint,
+    rubs=cython.pointer(int32_t),  # (count,) whether what holds it rubs it
+    rim=cython.pointer(cython.double),  # (count,) spin times radius, m/s
+    begun=cython.pointer(cython.double),  # (count, 3) `u` and `rim` before its chain was solved
     had=cython.pointer(cython.double),  # (rows, 2) `given` then
     held=cython.pointer(int32_t),  # (count,) contact with the surface that holds it, -1: none
     # ---- pins

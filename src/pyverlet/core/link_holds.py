@@ -1,21 +1,34 @@
 # mypy: ignore-errors
-"""Linked particles that surfaces hold: links move them along these, and a surface takes what goes into it while it presses."""
+"""Linked particles that surfaces hold: links move them along these, and a surface takes what goes into it."""
 
 from __future__ import annotations
 
 import cython
+from cython.cimports.libc.math import fabs
 from cython.cimports.libc.stdint import int32_t
 
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.step import Step
 from pyverlet.core.surface_contacts import excess_speed, keep_with_pair, passes_by
-from pyverlet.core.surface_rows import BEFORE_CHAIN, CONTACT, GAP, NORMAL, PUSH
+from pyverlet.core.surface_rows import BEFORE_CHAIN, CONTACT, DRAG, GAP, NORMAL, PUSH, RUB, SPEED
 from pyverlet.core.surfaces import note_surface
 
 WEDGED = cython.declare(cython.double, 1e-3)
 """Of its mobility: where surfaces leave less of it to a row, it is solved as if there were none, and they follow."""
 
+ROLLING = cython.declare(cython.double, 2.0 / 3.0)
+
 Mobility = cython.struct(xx=cython.double, xy=cython.double, yy=cython.double)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def share_along(k: cython.pointer(Links), i: cython.Py_ssize_t, c: cython.Py_ssize_t) -> cython.double:
+    """Of what linked particle i gets along the surface: a disc that grips it begins to turn, and keeps two thirds."""
+    grips: cython.bint = fabs(k.contact[CONTACT * c + DRAG]) < k.contact[CONTACT * c + RUB] * k.contact[CONTACT * c + PUSH]
+    return ROLLING if k.rough and k.rubs[i] and grips else 1.0
 
 
 @cython.cfunc
@@ -31,6 +44,7 @@ def moved_by(k: cython.pointer(Links), i: cython.Py_ssize_t) -> Mobility:
     if c >= 0:
         x: cython.double = k.contact[CONTACT * c + NORMAL]
         y: cython.double = k.contact[CONTACT * c + NORMAL + 1]
+        own *= share_along(k, i, c)
         found.xx, found.xy, found.yy = own * y * y, -own * x * y, own * x * x
     return found
 
@@ -43,13 +57,32 @@ def mobility_along(
     k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cython.double, a: cython.double, b: cython.double
 ) -> cython.double:
     """How much an impulse (x, y) on linked particle i changes its velocity along (a, b)."""
-    along: cython.double = x * a + y * b
-    c: cython.Py_ssize_t = k.held[i]
-    if c >= 0:
-        nx: cython.double = k.contact[CONTACT * c + NORMAL]
-        ny: cython.double = k.contact[CONTACT * c + NORMAL + 1]
-        along -= (x * nx + y * ny) * (a * nx + b * ny)
-    return k.weight[i] * along
+    m: Mobility = moved_by(k, i)
+    return (m.xx * x + m.xy * y) * a + (m.xy * x + m.yy * y) * b
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def press(
+    k: cython.pointer(Links), i: cython.Py_ssize_t, c: cython.Py_ssize_t, into: cython.double, slip: cython.double
+) -> cython.void:
+    """The surface of contact c takes the velocity `into` it from linked particle i, and rubs it, within Coulomb's cone."""
+    at: cython.Py_ssize_t = CONTACT * c
+    nx: cython.double = k.contact[at + NORMAL]
+    ny: cython.double = k.contact[at + NORMAL + 1]
+    into = max(into, -k.contact[at + PUSH])
+    k.contact[at + PUSH] += into
+    k.u[2 * i] -= into * nx
+    k.u[2 * i + 1] -= into * ny
+    if k.rough and k.rubs[i]:
+        most: cython.double = k.contact[at + RUB] * k.contact[at + PUSH]
+        rubbed: cython.double = min(max(k.contact[at + DRAG] - slip / 3, -most), most) - k.contact[at + DRAG]
+        k.contact[at + DRAG] += rubbed
+        k.u[2 * i] += rubbed * ny
+        k.u[2 * i + 1] -= rubbed * nx
+        k.rim[i] -= 2 * rubbed
 
 
 @cython.cfunc
@@ -59,15 +92,12 @@ def mobility_along(
 def move(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
     """Change the velocity of linked particle i, but for what its surface takes."""
     c: cython.Py_ssize_t = k.held[i]
+    k.u[2 * i] += x
+    k.u[2 * i + 1] += y
     if c >= 0:
         nx: cython.double = k.contact[CONTACT * c + NORMAL]
         ny: cython.double = k.contact[CONTACT * c + NORMAL + 1]
-        into: cython.double = max(x * nx + y * ny, -k.contact[CONTACT * c + PUSH])
-        k.contact[CONTACT * c + PUSH] += into
-        x -= into * nx
-        y -= into * ny
-    k.u[2 * i] += x
-    k.u[2 * i + 1] += y
+        press(k, i, c, x * nx + y * ny, x * ny - y * nx)
 
 
 @cython.cfunc
@@ -105,10 +135,11 @@ def save_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """Before linked particle i is moved by its chain."""
     k: cython.pointer(Links) = w.link_table
     c: cython.Py_ssize_t
-    k.begun[2 * i], k.begun[2 * i + 1] = k.u[2 * i], k.u[2 * i + 1]
+    k.begun[3 * i], k.begun[3 * i + 1], k.begun[3 * i + 2] = k.u[2 * i], k.u[2 * i + 1], k.rim[i]
     if k.surfaces:
         for c in range(w.contact_begin[k.slot[i]], w.contact_end[k.slot[i]]):
             w.contact[CONTACT * c + BEFORE_CHAIN] = w.contact[CONTACT * c + PUSH]
+            w.contact[CONTACT * c + BEFORE_CHAIN + 1] = w.contact[CONTACT * c + DRAG]
 
 
 @cython.cfunc
@@ -118,10 +149,11 @@ def restore_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """Back to that."""
     k: cython.pointer(Links) = w.link_table
     c: cython.Py_ssize_t
-    k.u[2 * i], k.u[2 * i + 1] = k.begun[2 * i], k.begun[2 * i + 1]
+    k.u[2 * i], k.u[2 * i + 1], k.rim[i] = k.begun[3 * i], k.begun[3 * i + 1], k.begun[3 * i + 2]
     if k.surfaces:
         for c in range(w.contact_begin[k.slot[i]], w.contact_end[k.slot[i]]):
             w.contact[CONTACT * c + PUSH] = w.contact[CONTACT * c + BEFORE_CHAIN]
+            w.contact[CONTACT * c + DRAG] = w.contact[CONTACT * c + BEFORE_CHAIN + 1]
     find_hold(w, i)
 
 
@@ -129,7 +161,7 @@ def restore_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def hold_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
-    """Linked particle i comes to its surfaces in this substep, and no farther; as `hold`, without friction."""
+    """Linked particle i comes to its surfaces in this substep, and no farther; as `hold`."""
     k: cython.pointer(Links) = w.link_table
     c: cython.Py_ssize_t
     if k.own[i] == 0 or k.weight[i] == 0 or not k.surfaces:
@@ -138,10 +170,10 @@ def hold_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
         first: cython.Py_ssize_t = CONTACT * c
         before: cython.double = w.contact[first + PUSH]
         if before > 0 or (w.contact[first + GAP] < w.far and not passes_by(w, k.slot[i], c, k.u[2 * i], k.u[2 * i + 1])):
-            after: cython.double = max(before + excess_speed(w, first, k.u[2 * i], k.u[2 * i + 1]), 0.0)
-            w.contact[first + PUSH] = after
-            k.u[2 * i] -= (after - before) * w.contact[first + NORMAL]
-            k.u[2 * i + 1] -= (after - before) * w.contact[first + NORMAL + 1]
+            x: cython.double = k.u[2 * i] - w.contact[first + SPEED]
+            y: cython.double = k.u[2 * i + 1] - w.contact[first + SPEED + 1]
+            slip: cython.double = x * w.contact[first + NORMAL + 1] - y * w.contact[first + NORMAL] - k.rim[i]
+            press(k, i, c, excess_speed(w, first, k.u[2 * i], k.u[2 * i + 1]), slip)
     find_hold(w, i)
 
 
@@ -156,8 +188,10 @@ def note_holds(w: cython.pointer(Step), i: cython.Py_ssize_t, share: cython.doub
         return
     for c in range(w.contact_begin[k.slot[i]], w.contact_end[k.slot[i]]):
         first: cython.Py_ssize_t = CONTACT * c
-        gives: cython.double = share * w.weigh * w.contact[first + PUSH]
-        if gives != 0:
-            note_surface(w, k.slot[i], c, -gives * w.contact[first + NORMAL], -gives * w.contact[first + NORMAL + 1], False)
+        jn: cython.double = share * w.weigh * w.contact[first + PUSH]
+        jt: cython.double = share * w.weigh * w.contact[first + DRAG]
+        nx: cython.double = w.contact[first + NORMAL]
+        ny: cython.double = w.contact[first + NORMAL + 1]
+        note_surface(w, k.slot[i], c, jt * ny - jn * nx, -jt * nx - jn * ny, False)
         if w.surface[c] < 0:
             keep_with_pair(w, c)

@@ -82,6 +82,17 @@ def hold_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def let_rub(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, rubs: cython.bint) -> cython.void:
+    """Whether surfaces rub the particles of a chain."""
+    r: cython.Py_ssize_t
+    k.rubs[k.node[k.first[first]]] = rubs
+    for r in range(first, end):
+        k.rubs[k.node[k.first[r] + 1]] = rubs
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def save_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
     """Before a chain is solved that nothing else joins."""
     k: cython.pointer(Links) = w.link_table
@@ -146,15 +157,27 @@ def approach(
 @cython.nogil
 @cython.exceptval(check=False)
 def solve_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t, alone: cython.bint) -> cython.void:
-    """Lengths after the drift. alone: nothing else joins these particles; in nets others undo what is more than one step."""
+    """Lengths after the drift. alone: nothing else joins these particles; in nets others undo what is more than one step.
+
+    Where Newton's method fails because of friction, this is taken as given, and follows.
+    """
     k: cython.pointer(Links) = w.link_table
     if not alone:
         step_chain(k, first, end, True, CHORDS)
         hold_chain(w, first, end)
         return
+    if misses(k, first, end) <= LENGTH_SOLVED:  # as it has been solved before
+        return
     save_chain(w, first, end)
-    if not approach(w, first, end, LENGTH_SOLVED, WAVES) < LOST:
+    if approach(w, first, end, LENGTH_SOLVED, WAVES) <= LENGTH_SOLVED:
+        return
+    if k.rough and k.surfaces:
+        restore_chain(w, first, end)
+        let_rub(k, first, end, False)
+        approach(w, first, end, LENGTH_SOLVED, WAVES)
+    if not misses(k, first, end) < LOST:
         sweep_chain(w, first, end)
         swept: cython.double = misses(k, first, end)
         if swept > NEAR_ENOUGH and not approach(w, first, end, NEAR_ENOUGH, LOST_WAY) < swept:
             sweep_chain(w, first, end)
+    let_rub(k, first, end, True)

@@ -34,6 +34,8 @@ def take_stage(what: cython.p_void, block: cython.int) -> cython.void:
     for i in range(a, min(a + BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
         k.u[2 * i], k.u[2 * i + 1] = v[width * at], v[width * at + 1]
+        if w.rough:
+            k.rim[i] = v[4 * at + 2] * cython.cast(cython.double, w.radius[at])
 
 
 @cython.cfunc
@@ -51,6 +53,8 @@ def put_stage(what: cython.p_void, block: cython.int) -> cython.void:
         at: cython.Py_ssize_t = k.slot[i]
         if k.own[i] > 0:
             v[width * at], v[width * at + 1] = cython.cast(real, k.u[2 * i]), cython.cast(real, k.u[2 * i + 1])
+            if w.rough and k.surfaces and w.contact_begin[at] < w.contact_end[at]:
+                v[4 * at + 2] = cython.cast(real, k.rim[i] / w.radius[at])
 
 
 @cython.cfunc
@@ -70,8 +74,8 @@ def put_held_stage(what: cython.p_void, block: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def relax_take_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """Velocities of a block after the drift, and what holds it then."""
+def take_held_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """Velocities of a block, and what holds it."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
@@ -267,7 +271,7 @@ def begin_links(w: cython.pointer(Step), surfaces: cython.bint) -> cython.void:
     k.kick = cython.cast(cython.double, w.h / w.weigh if opens and w.weigh > 0 else w.h)
     k.scale = cython.cast(cython.double, w.scale if opens else 1)
     k.least = cython.cast(cython.double, w.rest_speed)
-    k.contact, k.surfaces = w.contact, surfaces
+    k.contact, k.surfaces, k.rough = w.contact, surfaces, w.rough
     team_stage(w.team, open_stage, w, blocks_of(k))
     team_stage(w.team, begin_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
     for p in range(k.pins):
@@ -281,23 +285,25 @@ def begin_links(w: cython.pointer(Step), surfaces: cython.bint) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def solve_links(w: cython.pointer(Step)) -> cython.void:
-    """Before the drift: where rows are to be after it. There and back, if blocks share particles."""
+def solve_links(w: cython.pointer(Step), again: cython.bint) -> cython.void:
+    """Before the drift: where rows are to be after it, the first colour first. again: the last one first, and rows go on from
+    what they have given.
+    """
     k: cython.pointer(Links) = w.link_table
     p: cython.Py_ssize_t
     c: cython.int
     _: cython.int
-    team_stage(w.team, take_back_stage, w, blocks_of(k))
-    team_stage(w.team, take_back_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
+    if again:
+        team_stage(w.team, take_held_stage, w, blocks_of(k))
+    else:
+        team_stage(w.team, take_back_stage, w, blocks_of(k))
+        team_stage(w.team, take_back_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
     for p in range(k.pins):
         hold_pin(k, p)
     for _ in range(k.passes):
         for c in range(k.colours):
-            k.now = c
-            team_stage(w.team, solve_chunk, w, cython.cast(cython.int, k.colour[c + 1] - k.colour[c]))
-        for c in range(k.colours - 1 if k.colours > 1 else -1, -1, -1):
-            k.now = c
-            team_stage(w.team, solve_chunk, w, cython.cast(cython.int, k.colour[c + 1] - k.colour[c]))
+            k.now = k.colours - 1 - c if again else c
+            team_stage(w.team, solve_chunk, w, cython.cast(cython.int, k.colour[k.now + 1] - k.colour[k.now]))
     team_stage(w.team, finish_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
     for p in range(k.pins):
         finish_pin(k, p)
@@ -312,7 +318,7 @@ def relax_links(w: cython.pointer(Step), back: cython.bint) -> cython.void:
     k: cython.pointer(Links) = w.link_table
     p: cython.Py_ssize_t
     c: cython.int
-    team_stage(w.team, relax_take_stage, w, blocks_of(k))
+    team_stage(w.team, take_held_stage, w, blocks_of(k))
     for p in range(k.pins):
         rest_pin(k, p)
     for c in range(k.colours):

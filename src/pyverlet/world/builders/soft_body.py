@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
-from pyverlet.laws.links import Area, Link, Spring, Stick
+from pyverlet.laws.links import Angle, Area, Link, Spring, Stick
 from pyverlet.world.builders._built import RIM, Built, add, weight
 from pyverlet.world.builders.outline import Floats, inside, simple_polygon, walk
 
@@ -18,6 +18,12 @@ if TYPE_CHECKING:
 
 FIRMNESS = 40.0
 """Weights that strain 1 of a skin, or of the inside across the width, takes unless said; its own is some hundredths."""
+
+BENDING = 0.1
+"""Damping of the angle between two springs of a skin, over that of a spring and the square of their spacing."""
+
+LIMP = 1e9
+"""rad/(N m), compliance of such an angle: a skin that is bent stays so."""
 
 
 def soft_body(
@@ -43,7 +49,8 @@ def soft_body(
         mass: of the body, kg.
         stiffness: of each spring, N/m; infinity makes them sticks. None takes 40 weights over the spacing, or over
             the width if filled.
-        damping: of each spring, N s/m. None takes a tenth of what would stop the whole from swinging.
+        damping: of each spring, N s/m, and of the angles of a skin, in proportion. None takes a tenth of what would stop the whole
+            from swinging.
         bulk: resistance of the area, N/m: a pressure of a hundredth of it takes a hundredth of the area. None takes 40 weights
             over the width; 0 leaves the area alone. Hollow bodies only.
         filled: a lattice instead of a skin.
@@ -73,6 +80,8 @@ def soft_body(
         links.append(Stick(group, pairs[:, 0], pairs[:, 1], damping=0.0, collide=False))
     else:
         links.append(Spring(group, pairs[:, 0], pairs[:, 1], stiffness=k, damping=damping, collide=False))
+    if not filled and damping > 0.0:  # waves that bend the skin do not stretch it, and nothing else would end them
+        links.append(Angle(group, np.roll(n, 1), n, np.roll(n, -1), compliance=LIMP, damping=BENDING * damping * apart**2))
     if not filled and resistance > 0.0:
         area = Area(group)
         links.append(Area(group, compliance=float(area.area[0]) / resistance))
