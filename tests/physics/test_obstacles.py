@@ -357,17 +357,3 @@ def test_an_obstacle_that_flies_off_the_end_of_all_numbers_is_named() -> None:
     with pytest.raises(pv.InputError, match=r"obstacles\[1\] is farther away than numbers reach"):
         world.step(1e9)
     assert world.frames == 0
-
-
-def test_obstacles_that_were_taken_away_are_gone_from_the_compiled_frame_too() -> None:
-    """One with a ledger goes through the kernels for worlds with more than circles: without obstacles they are handed none.
-
-    Handed the old ones, they noted who leans on them in an array that there is none of, and the process died, much later.
-    """
-    world = world_with(pv.Segment((-2, -2), (2, -2)), ledger=True)
-    world.add(position=[(-1, -1.7), (1, -1.7)], radius=0.3)
-    world.step(DT)
-    assert world.profile.stages["obstacles"] > 0
-    world.obstacles.clear()
-    world.step(DT)
-    assert "obstacles" not in world.profile.stages

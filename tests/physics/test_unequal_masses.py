@@ -1,6 +1,4 @@
-"""Circles of unequal masses at rest lend each other inertia (kernels.loans, kernels.lending), linked or not: what must not change
-by that.
-"""
+"""Circles of unequal masses, linked or not: they come to rest, weigh what they weigh, and keep momentum."""
 
 from __future__ import annotations
 
@@ -8,7 +6,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.ground.constants import FED, LENT
+from pyverlet.world.impulse_frames import STIFFNESS
 
 G = 9.81
 H = 1 / 480
@@ -24,17 +22,14 @@ def column(count: int, heavy: float, **options: object) -> tuple[pv.World, pv.Gr
 @pytest.mark.parametrize("times", [50.0, 1000.0])
 @pytest.mark.parametrize("substeps", [4, 8, 16])
 def test_a_heavy_circle_on_a_column_of_light_ones_soon_rests(times: float, substeps: int) -> None:
-    # Without loans the column is a spring: 10 contacts, each compressed by times g h^2 / FED for masses of 1 kg, 4 cm at
-    # 1000 kg and 8 substeps, on which the heavy circle bounced for minutes. Evened out, masses are as in a column of equal ones.
+    # At rest a contact is a spring of frequency f = STIFFNESS / h on the reduced mass M: depth = F / (M (2 pi f)^2). The lowest
+    # one between circles of 1 kg, M = 1/2, carries all above it.
     world, circles = column(10, times, substeps=substeps)
-    world.run(seconds=5)
+    world.run(seconds=12)
     h = 1 / 60 / substeps
-    weight = (times + 10) * G
-    # The heavy one lends the part LENT, and 10 light ones share it: depth = weight h^2 W / FED with W = 2 / m'.
-    depth = weight * h * h * 2 / (1 + LENT * times / 10) / FED
-    assert world.overlap().max < 2 * depth
-    # What remains of the velocity carries the weight: at most g h upwards.
-    assert np.abs(circles.velocity).max() < 2 * G * h
+    deepest = 2 * (times + 9) * G / (2 * np.pi * STIFFNESS / h) ** 2
+    assert world.overlap().max == pytest.approx(deepest, rel=0.02)
+    assert np.abs(circles.velocity).max() < G * h
 
 
 def test_who_rests_on_a_scale_weighs_what_it_weighs() -> None:
@@ -61,7 +56,6 @@ class Scale:
 
 
 def test_unequal_circles_that_bounce_come_to_rest() -> None:
-    # What falls on each other while nobody lends met fast enough to bounce, and so lent nothing: 5e-3 to 1e-2 m g R for ever.
     # Beside the whole heap's swing in the smooth room, which nothing stops: a turn about the centre.
     def restless(seed: int) -> float:
         world = pv.scenes.get("cage").world(particles=150, threads=1)
@@ -83,7 +77,7 @@ def test_unequal_circles_that_bounce_come_to_rest() -> None:
 
 
 @pytest.mark.parametrize("speed", [0.3, 1.0])
-def test_who_lends_nothing_bounces_however_slowly(speed: float) -> None:
+def test_without_weight_they_bounce_however_slowly(speed: float) -> None:
     # In a fall together, above what is a contact at rest (4 g h = 0.08 m/s): they part with e times the speed they met with.
     world = pv.World(collisions=pv.Collisions(restitution=0.5))
     world.add(position=[(0, 0), (1.02, 0)], velocity=[(speed, 0), (0, 0)], radius=0.5, mass=[1.0, 100.0])
@@ -93,7 +87,7 @@ def test_who_lends_nothing_bounces_however_slowly(speed: float) -> None:
 
 
 @pytest.mark.parametrize("which", [0, 10])
-def test_who_has_lent_or_borrowed_falls_like_everybody(which: int) -> None:
+def test_who_is_let_go_falls_like_everybody(which: int) -> None:
     # Taken off the column, the heavy circle and a light one fall by g t^2 / 2 from the first substep on.
     world, circles = column(10, 1000.0, dtype=np.float64)
     world.run(seconds=2)
@@ -105,7 +99,7 @@ def test_who_has_lent_or_borrowed_falls_like_everybody(which: int) -> None:
 
 @pytest.mark.parametrize("friction", [0.0, 0.4])
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
-def test_loans_survive_saving_and_removal(restitution: float, friction: float) -> None:
+def test_they_survive_saving_and_removal(restitution: float, friction: float) -> None:
     world, circles = heap(pv.Collisions(restitution=restitution, friction=friction))
     world.run(seconds=1.5)
     world.remove(circles.index[3:20])
@@ -127,7 +121,7 @@ def heap(collisions: pv.Collisions) -> tuple[pv.World, pv.Group]:
     return world, world.add(position=position, radius=radius, mass=1000 ** rng.random(x.size))
 
 
-def test_without_weight_nothing_is_lent() -> None:
+def test_without_weight_they_are_still() -> None:
     # Momentum and energy of collisions without gravity are exact, however unequal the masses: sum of m v, and e = 0 only loses.
     world = pv.World(gravity=(0, 0), dtype=np.float64)
     rng = np.random.default_rng(0)
@@ -141,7 +135,7 @@ def test_without_weight_nothing_is_lent() -> None:
 
 
 def two_heaps(side: int, seed: int, friction: float, gravity: tuple[float, float]) -> tuple[pv.World, pv.Group]:
-    """Twice side x side touching circles of masses 1:1000, which have lent each other inertia and now run into each other."""
+    """Twice side x side touching circles of masses 1:1000 that run into each other."""
     rng = np.random.default_rng(seed)
     row, column = np.divmod(np.arange(side * side), side)
     heap = np.column_stack((0.999 * column + 0.499 * (row % 2), 0.866 * row + 0.5))
@@ -171,7 +165,7 @@ def test_struck_while_they_touch_unequal_circles_keep_momentum(gravity: tuple[fl
 @pytest.mark.parametrize("friction", [0.0, pytest.param(0.4, marks=pytest.mark.slow)])
 def test_struck_while_they_touch_unequal_circles_keep_angular_momentum_and_energy(friction: float, seed: int) -> None:
     # About the centre of mass. Parting overlaps moves circles across their velocities: e = 0 parts what v h = 6 mm overlaps in
-    # contacts 1 m long. Without the balance of kernels.balance it was off by 0.2 to 1.6, and energy doubled.
+    # contacts 1 m long.
     world, group = two_heaps(4, seed, friction, (0.0, -G))
     mass = group.mass / group.mass.sum()
 
@@ -203,23 +197,11 @@ def test_sliding_on_a_floor_unequal_circles_keep_what_momentum_is_along_it(frict
         assert world.momentum()[0] == pytest.approx(start, abs=(1e-3 if friction else 1e-11) * scale)
 
 
-def test_who_lends_no_more_rests_as_others_do() -> None:
-    # Unequal ones have met in the air, where nothing holds them; equal ones then stand on a floor, and nobody among them falls.
-    world = pv.World(boundary=pv.Box((0, 0), (1, 20)))
-    circles = world.add(position=[(0.5, 15), (0.5, 15.999)], radius=0.5, mass=[1.0, 1000.0])
-    world.run(seconds=0.2)
-    circles.mass[:] = 1.0
-    world.add(position=[(0.5, 2), (0.5, 4), (0.5, 6)], radius=0.5)
-    world.run(seconds=20)
-    assert world._slots.resting.all()
-
-
-def test_a_floor_does_not_feel_what_a_heavy_circle_has_lent() -> None:
-    # Light ones between it and the floor would have their own small inertia against contacts as stiff as a large one's.
+def test_a_heavy_circle_that_falls_with_its_column_does_not_bounce() -> None:
     world, circles = column(10, 1000.0)
     circles.velocity[:] = (0.0, -1.0)
     highest = 0.0
-    for _ in range(300):
+    for _ in range(600):
         world.step(1 / 60)
         highest = max(highest, float(circles.position[-1, 1]))
     assert highest < 10.6
@@ -242,10 +224,8 @@ def hammock(ball: float) -> tuple[pv.World, pv.Stick]:
 
 @pytest.mark.parametrize("ball", [15.0, 30.0, 100.0, 300.0])
 def test_a_rope_carries_what_lies_on_it(ball: float) -> None:
-    # Statics: the pulls at both ends add up to the weight of all between them, (m + 39) g upwards. Under a ball of more than 20
-    # times a circle's mass, which lends inertia to the rope, they came to 0.67, 0.30 and 0.1 of it: rounding in what links had
-    # done was taken for the push of a wall, and momentum that contacts lacked not given back. The mean over a second differs by
-    # what the momentum changes in it: at most 0.05 m/s, 0.005 of g.
+    # Statics: the pulls at both ends add up to the weight of all between them, (m + 39) g upwards. The mean over a
+    # second differs by what the momentum changes in it: at most 0.05 m/s, 0.005 of g.
     world, sticks = hammock(ball)
     world.run(seconds=12)
     upwards = []
@@ -268,8 +248,7 @@ def test_a_rope_carries_what_lies_on_it(ball: float) -> None:
     ],
 )
 def test_linked_circles_of_unequal_masses_rest(link: str, friction: float) -> None:
-    # 24 rows of 33, some of them linked. Contacts that went by lent inertia, and links that did not, passed on each other's
-    # pushes up to 50 times as hard: smooth heaps of chains boiled with a third of m g r a circle, 50,000 J, for ever.
+    # 24 rows of 33, some of them linked. Light ones between heavy dumb-bells are pressed in farther than in heaps without links.
     rng, n = np.random.default_rng(0), np.arange(24 * 33).reshape(24, 33)
     x, y = np.meshgrid(0.88 * (np.arange(33) - 16), 0.5 + 0.88 * np.arange(24))
     place = np.column_stack((x.ravel(), y.ravel())) + rng.uniform(-0.03, 0.03, (n.size, 2))
@@ -282,7 +261,7 @@ def test_linked_circles_of_unequal_masses_rest(link: str, friction: float) -> No
     world.run(seconds=12)
     weight = float(world.mass.sum()) * G
     assert world.energy().kinetic < 1e-3 * weight * 0.392
-    assert world.overlap().mean < 0.002
+    assert world.overlap().mean < (0.006 if link == "dumb-bells" else 0.002)
 
 
 @pytest.mark.parametrize("seed", range(4))
