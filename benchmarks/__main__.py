@@ -25,7 +25,7 @@ import numpy as np
 import pyverlet as pv
 from benchmarks import beside, busy, data, linked_frames, links, materials, own, page, physics, soak
 from benchmarks.engines import CAREFUL, DT, ENGINES, RADIUS, Array, Engine
-from pyverlet.compile import jit
+from pyverlet.ground.threads import max_threads
 from pyverlet.scenes import report
 
 SETTLE_SECONDS = 10.0
@@ -108,7 +108,7 @@ def installed(engine: type[Engine]) -> bool:
 def machine() -> str:
     """What this was measured on."""
     versions = []
-    for name in ("pyverlet", "numpy", "numba", "pymunk", "pyb2d3"):
+    for name in ("pyverlet", "numpy", "pymunk", "pyb2d3"):
         try:
             versions.append(f"{name} {importlib.metadata.version(name)}")
         except importlib.metadata.PackageNotFoundError:
@@ -165,7 +165,7 @@ def main() -> None:
     if arguments.table == "beside":
         if arguments.checkout is None:
             parser.error("beside needs --checkout FOLDER: which version to run beside this one")
-        threads = [arguments.threads] if arguments.threads else sorted({1, jit.max_threads()})
+        threads = [arguments.threads] if arguments.threads else sorted({1, max_threads()})
         try:
             beside.main(arguments.checkout, arguments.particles or [20_000, 100_000], threads, arguments.turns)
         except pv.InputError as error:

@@ -17,7 +17,7 @@ import numpy as np
 
 import pyverlet as pv
 from benchmarks.engines import DT
-from pyverlet.compile import jit
+from pyverlet.ground.threads import max_threads
 
 TURNS = 8
 """Of each world; a turn is long enough for the threads of the other to have gone to sleep."""
@@ -103,7 +103,7 @@ def measure(name: str, build: Callable[[], pv.World], counts: tuple[int, ...], f
 
 def main(particles: int, frames: int) -> bool:
     """Print a line for each; whether all hold."""
-    cores = jit.max_threads()
+    cores = max_threads()
     counts = tuple(sorted({0, max(cores - 1, 1), cores}))
     print(f"ms a frame, median / 95th percentile / largest; default at most {MEDIAN:g} and {LATE:g} times one thread's")
     print(f"{'world':<16}{'busy':>5}  {'one thread':<24}{'default':<24}{'ratio':<14}")

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import pyverlet as pv
-from pyverlet.compile import jit
 from pyverlet.data import sweep_run
+from pyverlet.ground.threads import max_threads
 
 DT = 1 / 60
 ROUNDS = 5
@@ -124,7 +124,7 @@ def worlds(count: int) -> list[Line]:
     start = alone.save()
     alone.step(DT)
     each = (resident() - before) / count
-    cores = jit.max_threads()
+    cores = max_threads()
     with pv.Worlds("cage", count, particles=100, processes=cores) as together:
         for _ in range(3):
             alone.step(DT)
