@@ -5,7 +5,7 @@ is tested is what a user gets: a data file missing from the wheel shows.
 
 What runs is meant to take five minutes on two cores and looks at everything: every module, every scene, equal bits on any number
 of threads, the physics at small sizes, the live page in a browser if there is one. `--all` adds the tests marked `slow`: larger
-worlds, every combination, compiling from nothing. `--setup` stops before the tests. Three processes share them, two with `--all`;
+worlds, every combination. `--setup` stops before the tests. Three processes share them, two with `--all`;
 with `-n0` one does all.
 """
 
@@ -75,7 +75,7 @@ def main(arguments: list[str]) -> None:
     if WITH_ARCADE.exists():
         os.environ["PYVERLET_TEST_ARCADE"] = str(WITH_ARCADE)
     everything = ["-m", "not full"] if "--all" in arguments else []
-    # With two, half a core was idle while the page, or a compiler, was waited for. For all tests three would need 6 GB.
+    # With two, half a core was idle while the page was waited for. For all tests three would need more memory.
     processes = "-n2" if everything else "-n3"
     chosen = [each for each in arguments if each != "--all"]
     if not chosen:

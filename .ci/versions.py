@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """The suite on other versions: `python3 .ci/versions.py [--python 3.12] [--only oldest|newest|generic] [pytest arguments]`.
 
-On every Python from 3.11 on that is found, with the oldest and the newest NumPy and Numba that pyproject.toml allows, and once
-compiled for a generic processor: without browsers, and the bits are the same. Not part of `.ci/run`: each takes as long as the
-suite, and compiles everything anew. Needs the network.
+On every Python from 3.11 on that is found, with the oldest and the newest NumPy that pyproject.toml allows, and once with the
+core for any processor: without browsers, and the bits are the same. Not part of `.ci/run`: each takes as long as the suite. Needs
+the network.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ TESTED = ["unit", "equivalence", "physics", "data", "cli", "scenes", "picture", 
 
 NEEDED = ["pytest>=8.3", "hypothesis>=6.100", "scipy>=1.13", "pytest-xdist>=3.6", "httpx>=0.27", "ase>=3.23", "cython>=3.1"]
 
-GENERIC = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "PYVERLET_CORE": "baseline"}
+GENERIC = {"PYVERLET_CORE": "baseline"}
 
 HASHES = """
 import numpy as np, pyverlet as pv
@@ -38,7 +38,7 @@ for name in ("cage", "box", "cloth", "soft-bodies"):
 
 
 def bounds(name: str) -> tuple[str, str]:
-    """(oldest, newest) of a dependency as requirements: `numpy>=2.0,<2.5` is 2.0.* and the newest below 2.5."""
+    """(oldest, newest) of a dependency as requirements: `numpy>=2.0,<3.0` is 2.0.* and the newest below 3.0."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     (wanted,) = (line for line in project["dependencies"] if re.match(rf"{name}\b", line))
     (least,) = re.findall(r">=([\d.]+)", wanted)
@@ -56,8 +56,8 @@ def pythons(only: str | None) -> list[tuple[str, str]]:
     return found
 
 
-def environment(folder: Path, python: str, requirements: list[str]) -> Path | None:
-    """An interpreter with these, and this project; None if there are no such releases for it."""
+def environment(folder: Path, python: str, requirement: str) -> Path | None:
+    """An interpreter with this NumPy, and this project; None if there is no such release for it."""
     subprocess.run([python, "-m", "venv", folder], check=True)
     inside = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     pip: list[str | Path] = [
@@ -67,27 +67,26 @@ def environment(folder: Path, python: str, requirements: list[str]) -> Path | No
         "--disable-pip-version-check",
         "-q",
         "install",
-        "--only-binary=numpy,numba,llvmlite",
+        "--only-binary=numpy",
     ]
     extras = f"{ROOT}[record,data,page,plot]"
-    done = subprocess.run([*pip, *requirements, *NEEDED, extras], capture_output=True, text=True)
+    done = subprocess.run([*pip, requirement, *NEEDED, extras], capture_output=True, text=True)
     if done.returncode:
         print("   ", done.stderr.strip().splitlines()[-1])
         return None
     return inside
 
 
-def hashes(python: Path, cache: str, extra: dict[str, str]) -> str:
-    """State hashes of some scenes, compiled for this processor or another."""
-    env = {**os.environ, "PYVERLET_CACHE_DIR": cache, **extra}
+def hashes(python: Path, extra: dict[str, str]) -> str:
+    """State hashes of some scenes, by the core for this processor or for any."""
+    env = {**os.environ, **extra}
     env.pop("PYTHONPATH", None)
     return subprocess.run([python, "-c", HASHES], env=env, capture_output=True, text=True, check=True).stdout
 
 
-def suite(python: Path, cache: str, arguments: list[str]) -> tuple[bool, str]:
+def suite(python: Path, arguments: list[str]) -> tuple[bool, str]:
     """Run the tests; whether they pass, and what pytest says last."""
-    env = {**os.environ, "PYVERLET_CACHE_DIR": cache}
-    env.pop("PYTHONPATH", None)
+    env = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     tests = arguments or [f"tests/{folder}" for folder in TESTED]
     done = subprocess.run([python, "-m", "pytest", "-q", "-n2", *tests], cwd=ROOT, env=env, capture_output=True, text=True)
     failed = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
@@ -100,25 +99,23 @@ def main() -> None:
     parser.add_argument("--python", help="only this version, such as 3.12")
     parser.add_argument("--only", choices=("oldest", "newest", "generic"))
     options, arguments = parser.parse_known_args()
-    (numpy_old, numpy_new), (numba_old, numba_new) = bounds("numpy"), bounds("numba")
-    ages = {"oldest": [numpy_old, numba_old], "newest": [numpy_new, numba_new]}
+    oldest, newest = bounds("numpy")
     good, told = True, dict[str, str]()
     for version, command in pythons(options.python):
-        for age, requirements in ages.items():
+        for age, requirement in (("oldest", oldest), ("newest", newest)):
             if options.only not in (None, "generic", age) or (options.only == "generic" and age == "oldest"):
                 continue
             with tempfile.TemporaryDirectory() as folder:
-                print(f"== Python {version}, {age}: {', '.join(requirements)}", flush=True)
-                start, inside = time.monotonic(), environment(Path(folder, "venv"), command, requirements)
+                print(f"== Python {version}, {age}: {requirement}", flush=True)
+                start, inside = time.monotonic(), environment(Path(folder, "venv"), command, requirement)
                 if inside is None:
-                    print("    no such releases for this Python: left out", flush=True)
+                    print("    no such release for this Python: left out", flush=True)
                     continue
-                cache = str(Path(folder, "cache"))
-                told[f"{version} {age}"] = hashes(inside, cache, {})
+                told[f"{version} {age}"] = hashes(inside, {})
                 if age == "newest":
-                    told[f"{version} generic"] = hashes(inside, str(Path(folder, "generic")), GENERIC)
+                    told[f"{version} generic"] = hashes(inside, GENERIC)
                 if options.only != "generic":
-                    passed, last = suite(inside, cache, arguments)
+                    passed, last = suite(inside, arguments)
                     good &= passed
                     print(f"    {last}", flush=True)
                 print(f"    {time.monotonic() - start:.0f} s", flush=True)

@@ -108,7 +108,7 @@ def installed(engine: type[Engine]) -> bool:
 def machine() -> str:
     """What this was measured on."""
     versions = []
-    for name in ("pyverlet", "numpy", "numba", "pymunk", "pyb2d3"):
+    for name in ("pyverlet", "numpy", "pymunk", "pyb2d3"):
         try:
             versions.append(f"{name} {importlib.metadata.version(name)}")
         except importlib.metadata.PackageNotFoundError:

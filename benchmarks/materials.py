@@ -171,11 +171,10 @@ def gas(particles: int, threads: int) -> list[Row]:
     angle = rng.uniform(0, 2 * np.pi, particles)
     worlds, rows = [], []
     for e in (0.0, 1.0):
-        for _ in range(2):  # the first compiles
-            box, law = pv.Box((0, 0), (side, side), restitution=e), pv.Collisions(restitution=e)
-            world = pv.World(boundary=box, gravity=(0, 0), collisions=law, substeps=8, threads=threads)
-            world.add(position=place, velocity=3 * np.column_stack((np.cos(angle), np.sin(angle))), radius=RADIUS, mass=1.0)
-            world.step(DT)
+        box, law = pv.Box((0, 0), (side, side), restitution=e), pv.Collisions(restitution=e)
+        world = pv.World(boundary=box, gravity=(0, 0), collisions=law, substeps=8, threads=threads)
+        world.add(position=place, velocity=3 * np.column_stack((np.cos(angle), np.sin(angle))), radius=RADIUS, mass=1.0)
+        world.step(DT)
         worlds.append(world)
     times: list[list[float]] = [[], []]
     for _ in range(GAS_FRAMES):

@@ -62,7 +62,7 @@ def cage(particles: int, seconds: float = SETTLE_SECONDS, ratio: float = 1.0, **
 
 
 def place(world: pv.World, rng: np.random.Generator, radius: Any, size: float) -> None:
-    """Circles at random places of a cage of this size: they start small, and grow as they part."""
+    """Circles at random places of a cage of this size; many overlap."""
     angle, out = rng.uniform(0, 2 * np.pi, len(radius)), (size - radius.max()) * np.sqrt(rng.uniform(0, 1, len(radius)))
     world.add(position=out[:, None] * np.column_stack((np.cos(angle), np.sin(angle))), radius=radius)
 

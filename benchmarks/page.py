@@ -33,7 +33,7 @@ POLL_S = 0.02
 """Between two looks at how far a world is."""
 
 OPENING_S = 2.0
-"""The page gets this long to be loaded and compiled."""
+"""The page gets this long to be loaded."""
 
 INPUTS = 12
 """How often gravity is turned to see when a picture says so."""

@@ -202,7 +202,7 @@ def main(minutes: float) -> bool:
         with tempfile.TemporaryDirectory() as folder:
             begin, before = time.monotonic(), served.ask()["frames"]
             for minute in range(1, max(round(minutes), 1) + 1):
-                # All of them at first: the kernels of a scene stay in memory, and are read when it is first built.
+                # All of them at first: what a scene loads stays in memory.
                 scenes = list(SCENES[2 * minute - 2 : 2 * minute])
                 if not scenes and minute % 3 == 0:
                     scenes = [rng.choice(SCENES)]

@@ -9,7 +9,7 @@ STANDARD_GRAVITY: Final = (0.0, -9.81)
 
 SKIN: Final = 0.4
 """Skin of the neighbour list to begin with, in mean diameters: the list stays valid until neighbours have moved against each
-other by as much. It adapts; docs/design/broad-phase.md says what to."""
+other by as much. It adapts; docs/design/pair-lists.md says what to."""
 
 CELLS_PER_PARTICLE: Final = 4
 """The grid never has more cells than this many per particle; beyond it the cells grow. Memory stays linear in n."""
@@ -117,8 +117,7 @@ SLEEP_NEAR: Final = 1.01
 PUSHED: Final = 0.6
 FED: Final = 1.6
 """Parts of an overlap that a substep takes from the positions, and feeds, divided by h, into the velocities. Less than all of
-it keeps neighbours from undoing each other's push, more than all of it is stiffer: it holds the same weight with less overlap.
-docs/design/contacts.md has the comparison."""
+it keeps neighbours from undoing each other's push, more than all of it is stiffer: it holds the same weight with less overlap."""
 
 CARRIED_WEIGHT: Final = 0.25
 """Of |a| h: a circle whose velocity a substep feeds by more than this carries weight. One that rests on others is fed 1 at least;

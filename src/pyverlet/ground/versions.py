@@ -1,4 +1,4 @@
-"""The versions of what the engine keeps its arrays in: those that were tried, and one sentence for others."""
+"""The versions of what the engine keeps its arrays in: those that will do, and one sentence for others."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Final
 
 from pyverlet.ground import loading
 
-TRIED: Final = {"numpy": ((2, 0), (2, 5))}
-"""By package: the first version that will do, and the first that nobody has tried."""
+ALLOWED: Final = {"numpy": ((2, 0), (3, 0))}
+"""By package: the first version that will do, and the first that may be incompatible."""
 
 
 def _plain(version: tuple[int, ...]) -> str:
@@ -18,7 +18,7 @@ def _plain(version: tuple[int, ...]) -> str:
 
 def complaint(package: str, version: str) -> str | None:
     """What is wrong with this version; None if nothing is, or nobody could tell."""
-    least, below = TRIED[package]
+    least, below = ALLOWED[package]
     number = tuple(int(part) for part in version.split(".")[:2] if part.isdigit())
     if len(number) < 2 or least <= number < below:
         return None
@@ -30,9 +30,9 @@ def check() -> None:
     """Look at what is installed, without importing it.
 
     Raises:
-        ImportError: a version that was never tried.
+        ImportError: another version.
     """
-    for package in TRIED:
+    for package in ALLOWED:
         try:
             wrong = complaint(package, metadata.version(package))
         except metadata.PackageNotFoundError:  # its import will say so, or it came another way

@@ -1,6 +1,6 @@
-"""Frames under the law of impulses (`Collisions(impulses=True)`): what the compiled core is given, and what it remembers.
+"""Frames under the contact law: what the compiled core is given, and what it remembers.
 
-The law, its sources and its measurements: docs/design/impulses.md.
+The law, its sources and its measurements: docs/design/contact-law.md.
 """
 
 from __future__ import annotations

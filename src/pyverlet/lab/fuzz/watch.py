@@ -216,7 +216,7 @@ def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str]
 
     Velocities are of half a step before, so the frame after a deed knows of it too; and overlap that a coarse step has left
     holds more energy when steps become shorter, until it is gone. So do links that an obstacle has stretched by pushing out who
-    was in it at the beginning (docs/design/links.md, Energy), or that who moved their circles has.
+    was in it at the beginning, or that who moved their circles has.
     """
     before_deed, forces, places = (world.version, world.substeps), tuple(world.forces), world.position.copy()
     energy_then, linked = world.energy().total, bool(world.links)
