@@ -18,8 +18,8 @@ from pyverlet.ground import errors
 from pyverlet.ground.errors import CoarseCoordinatesWarning, CoarseStepWarning, InputError, NonFiniteError, PyverletError
 from pyverlet.ground.submodules import lazily
 from pyverlet.laws import forces, integrators
-from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.collisions import Collisions, Overlap
+from pyverlet.laws.contacts.methods import BruteForce, Fast
 from pyverlet.laws.energy import Energy
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import Attractor, ConstantForce, Drag, Gravitation, PointSpring, Wind, force

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.laws.contacts.collisions import ContactSolver
+from pyverlet.laws.contacts.solver import ContactSolver
 from pyverlet.laws.integrators import BY_NAME
 from pyverlet.state.group import Group
 from pyverlet.world.substeps import Substeps

@@ -15,7 +15,8 @@ from pyverlet.ground.constants import DEEP, DEEP_PART, DEEP_SWEEPS, FED, GRIP, L
 from pyverlet.kernels import frame
 from pyverlet.kernels.bounds import impact_time
 from pyverlet.kernels.tables import Law
-from pyverlet.laws.contacts.broadphase import BruteForce, Fast
+from pyverlet.laws.contacts.broadphase import start
+from pyverlet.laws.contacts.methods import BruteForce, Fast
 from pyverlet.laws.contacts.wide import Wide
 from pyverlet.state.slots import Slots
 
@@ -42,7 +43,7 @@ def crowd(seed: int, n: int, spread: float, dtype: Any, *, varied: bool = False)
 
 
 def packed(slots: Slots, method: Fast | BruteForce, restitution: float = 0.0, friction: float = 0.0) -> tuple[Any, Wide]:
-    phase = method.start(slots.dtype)
+    phase = start(method, slots.dtype)
     phase.update(slots)
     wide = Wide(slots.dtype, restitution, friction)
     wide.take(phase.list, phase.built, slots.radius)

@@ -12,7 +12,7 @@ import pytest
 import pyverlet as pv
 from pyverlet.compile import jit
 from pyverlet.laws.contacts import broadphase, grids
-from pyverlet.laws.contacts.collisions import ContactSolver
+from pyverlet.laws.contacts.solver import ContactSolver
 from pyverlet.world import substeps
 
 SECONDS = 1.5

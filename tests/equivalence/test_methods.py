@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 import pyverlet as pv
 from pyverlet.ground.constants import SKIN_MOST, WORTH_THINNING
-from pyverlet.laws.contacts.broadphase import BruteForce, Fast
-from pyverlet.laws.contacts.collisions import find_contacts
+from pyverlet.laws.contacts.broadphase import start
+from pyverlet.laws.contacts.methods import BruteForce, Fast
+from pyverlet.laws.contacts.solver import find_contacts
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
@@ -58,7 +59,7 @@ def listed(state: State, skin: float) -> Any:
     """A fast broad phase that has just listed the pairs of a state, and the slots it has put the state into."""
     slots = Slots(state.dtype)
     slots.gather(state)
-    phase: Any = Fast(skin=skin).start(state.dtype)
+    phase: Any = start(Fast(skin=skin), state.dtype)
     phase.update(slots)
     return phase, slots
 
@@ -93,7 +94,7 @@ def test_a_list_that_lasts_is_thinned() -> None:
     state = random_state(3, 3000, 20.0, 1.0, np.dtype(np.float32))
     slots = Slots(state.dtype)
     slots.gather(state)
-    phase: Any = Fast().start(state.dtype)
+    phase: Any = start(Fast(), state.dtype)
     phase.skin_diameters = SKIN_MOST
     counts: list[int] = []
     for _ in range(2000):

@@ -277,6 +277,15 @@ def confine_to_circle(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     return 0.1, 0.2, 0.9, *walled(chance, dtype, (0.01, 0.0, 0.0, 0.3, 2.0, 0.05))
 
 
+@kernel
+def touching(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    ones, shift = np.ones(N, np.uint32), np.array([(0.0, 0.0), (3.0, 0.0), (-3.0, 0.0)])
+    radius = (column(chance, dtype) * 2.0 ** -chance.integers(0, 4, N)).astype(dtype)
+    work = np.zeros(64, np.int32), np.zeros(N, np.int32), np.zeros(N, np.int32)
+    found = np.zeros((2, 400), np.uint32)
+    return rows(chance, dtype), radius, np.arange(N) % 5 == 0, ones, ones << (np.arange(N) % 7 == 0), shift, work, *found
+
+
 LOADED = functools.cache(reference.load)
 
 

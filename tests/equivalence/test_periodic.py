@@ -9,7 +9,7 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.compile import jit
-from pyverlet.laws.contacts.collisions import find_contacts
+from pyverlet.laws.contacts.solver import find_contacts
 
 
 def _crowd(seed: int) -> pv.World:

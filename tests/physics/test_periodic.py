@@ -9,7 +9,7 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.lab.physics import endless
-from pyverlet.laws.contacts.collisions import find_contacts
+from pyverlet.laws.contacts.solver import find_contacts
 
 LOWER, PERIOD = np.array([-4.0, 1.0]), np.array([12.0, 9.0])
 MIDDLE = LOWER + PERIOD / 2

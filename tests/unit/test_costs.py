@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.laws.contacts.broadphase import BruteForce
-from pyverlet.laws.contacts.collisions import find_contacts
+from pyverlet.laws.contacts.methods import BruteForce
+from pyverlet.laws.contacts.solver import find_contacts
 from pyverlet.world import queries
 
 DT = 1 / 60

@@ -11,7 +11,7 @@ import typer
 
 from pyverlet.ground.errors import InputError
 from pyverlet.laws import integrators
-from pyverlet.laws.contacts.broadphase import BruteForce, Fast
+from pyverlet.laws.contacts.methods import BruteForce, Fast
 from pyverlet.picture import DARK, LIGHT, ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Groups, Theme
 
 DType = Literal["float32", "float64"]

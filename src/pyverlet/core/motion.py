@@ -25,6 +25,7 @@ from pyverlet.core.resting import find_edited, find_islands, time_at_rest, touch
 from pyverlet.core.rows import any_differs, differs, put_motion, take_motion
 from pyverlet.core.textbook_walls import clamp_to_box, clamp_to_circle
 from pyverlet.core.total_energy import energy_gained, total_energy
+from pyverlet.core.touching import touching
 
 __all__ = [
     "add_constant",
@@ -65,5 +66,6 @@ __all__ = [
     "time_at_rest",
     "total_energy",
     "touch",
+    "touching",
     "wrap",
 ]

@@ -148,7 +148,7 @@ def _math() -> dict[str, Any]:
         ("ceil", np.ceil),
     ):  # rounded alike everywhere
         made |= {name: partial(_call, function, np.float64), f"{name}f": partial(_call, function, np.float32)}
-    for name in ("hypot", "sin", "cos", "atan2", "log", "exp", "pow"):
+    for name in ("hypot", "sin", "cos", "atan2", "log", "log2", "exp", "pow"):
         made[name] = partial(_call, getattr(math, name), np.float64)
     return made
 

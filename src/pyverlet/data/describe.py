@@ -21,8 +21,8 @@ from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.fields import Field
 from pyverlet.laws import forces, integrators, naive, obstacles, rooms
-from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.contacts.methods import BruteForce, Fast
 from pyverlet.state.group import Group, Picked
 from pyverlet.world.actors import Actor, Emitter, Sink
 from pyverlet.world.world import World

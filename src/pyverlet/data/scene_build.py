@@ -17,8 +17,8 @@ from pyverlet.data import describe_links, memory
 from pyverlet.data.describe import Builder, describe
 from pyverlet.data.durable import replacing
 from pyverlet.ground.errors import InputError
-from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.contacts.methods import BruteForce, Fast
 from pyverlet.laws.integrators import Integrator, PositionVerlet
 from pyverlet.laws.links import Angle, Area, Pin, Rope, Spring, Stick
 from pyverlet.laws.obstacles import Obstacle

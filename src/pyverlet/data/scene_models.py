@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, create_model
 from pyverlet.data.describe import KINDS, SURFACE
 from pyverlet.ground.constants import MOST_SUBSTEPS, STANDARD_GRAVITY
 from pyverlet.laws import naive, rooms
-from pyverlet.laws.contacts.broadphase import BruteForce, Fast
+from pyverlet.laws.contacts.methods import BruteForce, Fast
 from pyverlet.laws.forces import Force
 from pyverlet.laws.integrators import Integrator
 from pyverlet.laws.links import Angle, Area, Pin, Rope, Spring, Stick

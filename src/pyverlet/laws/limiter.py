@@ -25,14 +25,14 @@ that has raised is no gain.
 from __future__ import annotations
 
 from copy import copy
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.core import unit
 from pyverlet.ground.constants import ONE_THREAD_BELOW, SLEEP_NEAR, SURPLUS
-from pyverlet.laws.contacts.collisions import ContactSolver
+from pyverlet.laws.contacts.growth import Growth
 from pyverlet.laws.forces import Drag, ForceSum, has_potential
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course
@@ -56,6 +56,15 @@ _NEARLY = 1.01
 
 _INSIDE = 0.99
 """Of its radius: a circle was inside the room if the point so far below its centre was, the way gravity points."""
+
+
+class Contacts(Protocol):
+    """What is asked of whoever solves contacts."""
+
+    growth: Growth
+
+    def listed(self) -> Listed:
+        """first, count, i, j: where the pairs of the list are, by slot; some may come twice."""
 
 
 class Watch:
@@ -94,7 +103,7 @@ class Watch:
         start = (then.position, then.velocity, then.spin, then.radius, then.mass)
         return float(now.motion.energy_gained(start, motion, *self._gravity))
 
-    def close(self, slots: Slots, contacts: ContactSolver | None) -> bool:
+    def close(self, slots: Slots, contacts: Contacts | None) -> bool:
         """The frame is over: take back what has been gained too much, and let circles grow at a pace that gains less.
 
         Returns whether all positions and velocities are known to be finite: so they are if their energy is.

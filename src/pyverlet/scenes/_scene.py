@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
-from pyverlet.laws.contacts.broadphase import BruteForce, Fast
 from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.contacts.methods import BruteForce, Fast
 from pyverlet.laws.integrators import Integrator, PositionVerlet
 from pyverlet.scenes._graph import Gauge
 from pyverlet.world.panels import Pace, Panel, Panels, every_frame

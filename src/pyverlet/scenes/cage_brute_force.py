@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pyverlet.laws.contacts.broadphase import BruteForce
+from pyverlet.laws.contacts.methods import BruteForce
 from pyverlet.scenes import cage
 from pyverlet.scenes._scene import Scene, Settings, Variant
 from pyverlet.world.world import World

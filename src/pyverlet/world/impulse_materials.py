@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.laws.contacts.broadphase import BruteForce
 from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.contacts.methods import BruteForce
 from pyverlet.laws.rooms import Box, Circle, Open, Periodic
 from pyverlet.state.slots import Slots
 

@@ -14,7 +14,8 @@ from pyverlet.core import unit
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Records
 from pyverlet.ground.turns import of_one_frame
-from pyverlet.laws.contacts.collisions import Collisions, ContactSolver, Overlap, measure_overlap
+from pyverlet.laws.contacts.collisions import Collisions, Overlap, measure_overlap
+from pyverlet.laws.contacts.solver import ContactSolver
 from pyverlet.laws.energy import Energy, energy
 from pyverlet.laws.events import Events, Place
 from pyverlet.laws.forces import ForceSum
@@ -205,7 +206,7 @@ class Measures(Particles):
     @of_one_frame
     def overlap(self) -> Overlap:
         """Mean and largest overlap of the touching pairs, as fractions of their contact distance, and how many there are."""
-        return measure_overlap(self._state, self.links.unlist)
+        return measure_overlap(self._state, self.links.known_apart())
 
     @of_one_frame
     def escaped(self) -> int:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.turns import Shared, in_turn, of_one_frame
-from pyverlet.laws.contacts.collisions import ContactSolver
+from pyverlet.laws.contacts.solver import ContactSolver
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceList, Numbered
 from pyverlet.laws.links import Links

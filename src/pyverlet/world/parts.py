@@ -17,8 +17,8 @@ from pyverlet.ground import checks
 from pyverlet.ground.constants import SKIN_LEAST, SKIN_MOST
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.fields import Field
-from pyverlet.laws.contacts.broadphase import Fast
 from pyverlet.laws.contacts.loans import Lent
+from pyverlet.laws.contacts.methods import Fast
 from pyverlet.laws.contacts.slips import Kept
 from pyverlet.laws.events import CONTACT, HIT, Events
 from pyverlet.laws.ledger import Bookkeeper, Ledger

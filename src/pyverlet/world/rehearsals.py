@@ -15,8 +15,9 @@ from pyverlet.compile import jit
 from pyverlet.ground.constants import FUSED_FROM, KNOWN_FROM, LINKS_ONE_THREAD_BELOW, ONE_THREAD_BELOW, UNEVEN
 from pyverlet.kernels.motion import ON_WALL
 from pyverlet.laws.contacts import _held_rooms
-from pyverlet.laws.contacts.broadphase import BruteForce, Fast
+from pyverlet.laws.contacts.broadphase import start
 from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.contacts.methods import BruteForce, Fast
 from pyverlet.laws.forces import Conservative, Drag, Force
 from pyverlet.laws.limiter import Watch
 from pyverlet.laws.links import Angle, Area, Link, Pin, Rope, Spring, Stick
@@ -199,7 +200,7 @@ def _lists(dtype: np.dtype[Any], threads: int) -> None:
     world = _lattice(_enough(threads), dtype, Open, 0.0, None, threads=threads)
     jit.use_threads(world.threads)
     world.overlap()
-    slots, phase = Slots(dtype), Fast().start(dtype)
+    slots, phase = Slots(dtype), start(Fast(), dtype)
     slots.gather(world._state)
     slots.h = 1e-3
     for _ in range(2):

@@ -21,7 +21,7 @@ from pyverlet.laws.contacts import _held_rooms
 from pyverlet.laws.contacts._held import claims, first_leap
 from pyverlet.laws.contacts._held_course import HeldCourse
 from pyverlet.laws.contacts.broadphase import Strips
-from pyverlet.laws.contacts.collisions import ContactSolver
+from pyverlet.laws.contacts.solver import ContactSolver
 from pyverlet.laws.contacts.wide import Wide
 from pyverlet.laws.ledger import Page
 

@@ -14,10 +14,9 @@ from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.ground.threads import max_threads
 from pyverlet.ground.turns import in_turn
 from pyverlet.laws.coarse import Coarse
-from pyverlet.laws.contacts import _held_events
-from pyverlet.laws.contacts._held import STAGES, end, use_threads
-from pyverlet.laws.contacts._held_rooms import confine, leave
-from pyverlet.laws.contacts.collisions import Collisions, ContactSolver
+from pyverlet.laws.contacts import _held, _held_events, _held_rooms
+from pyverlet.laws.contacts.collisions import Collisions
+from pyverlet.laws.contacts.solver import ContactSolver
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceList, ForceSum
 from pyverlet.laws.integrators import Integrator, TimeCorrectedVerlet
@@ -102,7 +101,7 @@ class World(Measures, Queries, Doors):
         self.integrator = TimeCorrectedVerlet() if integrator is None else integrator
         self.boundary = Open() if boundary is None else boundary
         self.collisions, self.substeps, self.threads = collisions, substeps, threads
-        self.time, self.frames, self.profile, self.actors = 0.0, 0, Profile(STAGES), list[Actor]()
+        self.time, self.frames, self.profile, self.actors = 0.0, 0, Profile(_held.STAGES), list[Actor]()
         self._run, self._impulses = Substeps(), ImpulseFrames(self._state.dtype)
         self._team, self._looks = Team(), (Coarse(), Precision())
         # Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins.
@@ -133,9 +132,8 @@ class World(Measures, Queries, Doors):
 
     def _frame(self, h: float, done: Callable[[str], None]) -> bool:
         """The table of contents of the engine; `done` hears which stage has ended. True if all is known to be finite."""
-        state, forces, integrator = self._slots, self._force_sum, self.integrator
-        contacts, links, run = self._contacts if len(self) > 1 else None, self.links or None, self._run
-        course = run.course(self) if self._course else None
+        state, forces, integrator, run = self._slots, self._force_sum, self.integrator, self._run
+        contacts, links, course = self._contacts if len(self) > 1 else None, self.links or None, self._course and run.course(self)
         lag, state.drop, state.h, run = integrator.velocity_lag * h, integrator.drop, h, run.begin(contacts, course)
         if not self._open(h, done):
             return False
@@ -159,7 +157,7 @@ class World(Measures, Queries, Doors):
                 done("contacts")
             if links:
                 run.solve(self, contacts, h, lag, done)
-            confine(self.boundary, state, h, lag, REST_ACCELERATIONS * forces.strongest * h)
+            _held_rooms.confine(self.boundary, state, h, lag, REST_ACCELERATIONS * forces.strongest * h)
             done("bounds")
             if course:
                 course.collide(state, self.boundary, run.substep * h, h, lag, REST_ACCELERATIONS * forces.strongest * h)
@@ -175,7 +173,7 @@ class World(Measures, Queries, Doors):
 
     def _open(self, h: float, done: Callable[[str], None]) -> bool:
         """Take up what users have set, and begin; False if nobody is awake."""
-        use_threads(self._team.now, self.threads)
+        _held.use_threads(self._team.now, self.threads)
         if self.links.begin() and self._contacts:
             self._contacts.broad_phase.forget()
         self._course.begin()
@@ -216,10 +214,10 @@ class World(Measures, Queries, Doors):
             self._force_sum.look_again(self._slots, self.time + self.substeps * h, lag)
         if contacts:
             contacts.end(self._slots, self._state, lag, self.substeps * h, self.gravity, marked=marked)
-        leave(self.boundary, self._slots)
+        _held_rooms.leave(self.boundary, self._slots)
         if self._slots.seam:
             self._slots.seam.wrap(self._slots.position)
-        end(self.integrator, self._slots, h)
+        _held.end(self.integrator, self._slots, h)
         finite = watch is not None and watch.close(self._slots, contacts)
         done("finish")
         return finite

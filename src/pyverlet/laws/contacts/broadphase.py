@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.compile.lanes import LANES
-from pyverlet.ground import checks, memory
+from pyverlet.ground import memory
 from pyverlet.ground.constants import (
     FUSED_FROM,
     REBUILD_CALL,
@@ -30,6 +29,7 @@ from pyverlet.kernels import pairs as kernels
 from pyverlet.laws.contacts._held import strayed
 from pyverlet.laws.contacts.crowd import Crowd, free_skin
 from pyverlet.laws.contacts.grids import Grids
+from pyverlet.laws.contacts.methods import BruteForce, Fast
 from pyverlet.state.slots import Slots
 
 Array = NDArray[Any]
@@ -129,13 +129,9 @@ class BroadPhase(ABC):
         self.forget()
 
 
-@dataclass(frozen=True)
-class BruteForce:
-    """All pairs against all, every substep: O(n^2). The reference the fast way is tested against; natural order, one thread."""
-
-    def start(self, dtype: np.dtype[Any]) -> BroadPhase:
-        """The working part of one world."""
-        return _AllPairs(dtype)
+def start(method: Fast | BruteForce, dtype: np.dtype[Any]) -> BroadPhase:
+    """The working part of one world."""
+    return _SortedCells(dtype, method.skin) if isinstance(method, Fast) else _AllPairs(dtype)
 
 
 class _AllPairs(BroadPhase):
@@ -165,25 +161,6 @@ class _AllPairs(BroadPhase):
 
     def forget(self) -> None:
         pass
-
-
-@dataclass(frozen=True)
-class Fast:
-    """Nested grids, coloured pairs in strips, kept until neighbours have moved against each other by the skin.
-
-    Args:
-        skin: extra distance, in mean diameters, within which pairs are listed. None adapts it to the motion.
-    """
-
-    skin: float | None = None
-
-    def __post_init__(self) -> None:
-        if self.skin is not None:
-            checks.number("skin", self.skin, least=0.0)
-
-    def start(self, dtype: np.dtype[Any]) -> BroadPhase:
-        """The working part of one world."""
-        return _SortedCells(dtype, self.skin)
 
 
 class _SortedCells(BroadPhase):

@@ -8,7 +8,6 @@ import numpy as np
 
 from pyverlet.core import unit
 from pyverlet.ground.constants import GROWTH, PACE_FRAMES, SMALLEST, SURPLUS_SOUGHT
-from pyverlet.laws.contacts.broadphase import PairList
 from pyverlet.state.slots import Slots
 
 
@@ -22,10 +21,10 @@ class Growth:
     def __init__(self) -> None:
         self.pace, self._risen = 1.0, 0.0
 
-    def fit(self, state: Slots, pairs: PairList, fresh: np.ndarray) -> None:
-        """Shrink those marked in `fresh` (n,), and whom they overlap, until they just touch."""
+    def fit(self, state: Slots, listed: tuple[np.ndarray, ...], fresh: np.ndarray) -> None:
+        """Shrink those marked in `fresh` (n,), and whom they overlap, until they just touch; listed: pairs, by cell rows."""
         shrink_to_fit = unit("engine", state.position.dtype).shrink_to_fit
-        shrink_to_fit(state.position, state.radius, *state.seam.period, pairs.listed(), fresh, SMALLEST, state.grown)
+        shrink_to_fit(state.position, state.radius, *state.seam.period, listed, fresh, SMALLEST, state.grown)
         state.resize()
 
     def grow(self, state: Slots, h: float) -> None:
