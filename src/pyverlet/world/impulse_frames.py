@@ -113,8 +113,13 @@ class ImpulseFrames:
         self.links.keep_apart(world, self.held.engine)
         if world._gather():
             self.held.forget_list()
+        before = self.held.note()
         if not self.run(world, dt, done):
-            self._refuse_non_finite(world, dt)
+            try:
+                self._refuse_non_finite(world, dt)
+            finally:
+                self.links.forget()
+                self.held.go_back(before)
 
     def unknown(self, world: Any) -> list[str]:
         """What there is in a world that this law does not know yet."""
@@ -244,7 +249,6 @@ class ImpulseFrames:
         def look(stage: str) -> None:
             bad = ~np.isfinite(state.acceleration).all(axis=1) if stage == "integrate" and world.forces else np.zeros(1, bool)
             if (particle := int(state.particle[bad.argmax()]) if bad.any() else first_non_finite(state)) >= 0:
-                self.forget()
                 raise NonFiniteError(particle, stage, world.time)
 
         self.forget()

@@ -12,22 +12,19 @@ from pyverlet.compile.stealing import Claims
 from pyverlet.ground.constants import LINK_COLOURS, LINKS_ONE_THREAD_BELOW
 from pyverlet.kernels import chain_rows, chains, runs
 from pyverlet.laws.links._link import MOVING, Array
-from pyverlet.laws.links._pool import Pool, held
+from pyverlet.laws.links._packed import Packed
+from pyverlet.laws.links._pool import Pool
 from pyverlet.laws.links._work import Work
-from pyverlet.state.seam import Seam
 
 GIVEN = ("rest", "stiffness", "damping", "upper", "strength")
 """Columns that frames leave alone."""
 
-ABOUT = ("rest", "upper", "stiffness")
-"""What the energy of a row depends on."""
 
-
-class ChainPool(Pool):
+class PackedChains(Packed):
     """Runs in packs of eight that share no particle, as `kernels.chains` wants them, whose rows have the world's dtype."""
 
-    def __init__(self, dtype: np.dtype[Any]) -> None:
-        super().__init__(rest=np.float64, upper=np.float64)
+    def __init__(self, pool: Pool, dtype: np.dtype[Any]) -> None:
+        super().__init__(pool)
         self.dtype = dtype
         self._claims = Claims()
         self._taken_up = self._under_way = False
@@ -74,7 +71,6 @@ class ChainPool(Pool):
         if self.changed:
             self.changed = False
             chain_rows.lay(source, self._start, self._row, self._more, self._holds, *(rows[name] for name in GIVEN))
-            self.gives = bool((self._holds & chain_rows.SOFTS).any())
         if not self._taken_up:
             chain_rows.take_up(source, self._row, *(rows[name] for name in MOVING))
             chain_rows.keep(self._row, self._kept)
@@ -109,29 +105,6 @@ class ChainPool(Pool):
 
     def _write(self) -> None:
         chain_rows.hand_over(self._place, self._kept, *(self.rows[name] for name in MOVING))
-
-    def stored(self, position: Array, seam: Seam) -> float:
-        return self._energy(position, seam, self._ends, chain_rows.intact(self._place, self._row))
-
-    def energy(self, position: Array, seam: Seam) -> float:
-        return self._energy(position, seam, self.entries["particle"].reshape(-1, 2), self.rows["intact"])
-
-    def energies(self, position: Array, seam: Seam) -> Array:
-        rows, ends = self.rows, self.entries["particle"].reshape(-1, 2)
-        way = position[ends[:, 1]].astype(float) - position[ends[:, 0]]
-        return held(rows["stiffness"], rows["upper"], rows["intact"], np.hypot(*seam.nearest(way).T) - rows["rest"])
-
-    def share_gain(self, before: Array, now: Array, seam: Seam, mass: Array, share: Array) -> None:
-        ends, (rest, upper, stiffness) = self.entries["particle"].reshape(-1, 2), (self.rows[name] for name in ABOUT)
-        about = rest, upper, stiffness, self.rows["intact"]
-        chain_rows.share_gain(before, now, *seam.period, ends, *about, mass, share)
-
-    def lines(self) -> tuple[Array, Array]:
-        pairs, intact = self.entries["particle"].reshape(-1, 2), self.rows["intact"]
-        return (pairs, np.arange(len(pairs))) if intact.all() else (pairs[row := np.flatnonzero(intact)], row)
-
-    def _energy(self, position: Array, seam: Seam, ends: Array, intact: Array) -> float:
-        return float(chain_rows.energy(position, *seam.period, ends, *(self.rows[name] for name in ABOUT), intact))
 
 
 def _place(order: Array, opens: Array) -> Array:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from pyverlet.ground.constants import LINK_COLOURS
 from pyverlet.kernels import link_rows, runs
 from pyverlet.laws.links._link import MOVING, Array
-from pyverlet.laws.links._pool import Pool, held
+from pyverlet.laws.links._packed import Packed
 from pyverlet.laws.links._work import Work
-from pyverlet.state.seam import Seam
 
 _NUMBERS = {
     "rest": link_rows.REST, "stiffness": link_rows.STIFFNESS, "damping": link_rows.DAMPING, "upper": link_rows.UPPER,
@@ -20,13 +17,8 @@ _NUMBERS = {
 """Columns of the table, and where the solver has them."""
 
 
-class RowPool(Pool):
+class PackedRows(Packed):
     """A row for each link, coloured: those of one kind and colour share no particle and are solved beside each other."""
-
-    drawn = False
-
-    def __init__(self) -> None:
-        super().__init__(rest=np.float64, upper=np.float64, kind=np.int64)
 
     def pack(self, work: Work) -> None:
         """By kind, then by colour, and within a colour in the order added."""
@@ -53,7 +45,7 @@ class RowPool(Pool):
             self._number[:, _NUMBERS[name]] = self.rows[name][self._order]
         self._intact[:] = self.rows["intact"][self._order]
         if self.changed:
-            self.changed, self.gives = False, bool(np.isfinite(self.rows["stiffness"]).any())
+            self.changed = False
 
     def arrays(self) -> tuple[Array, ...]:
         """As `kernels.link_rows.Rows` has them."""
@@ -75,41 +67,9 @@ class RowPool(Pool):
         for name in MOVING[1:]:
             self.rows[name][self._order] = np.where(self._intact, self._number[:, _NUMBERS[name]], 0.0)
 
-    def stored(self, position: Array, seam: Seam) -> float:
-        number = self._number.T
-        value, _ = _measured(self._first, self._kind, number[link_rows.REST], position[self._particle], seam)
-        return float(held(number[link_rows.STIFFNESS], number[link_rows.UPPER], self._intact, value).sum())
-
-    def energy(self, position: Array, seam: Seam) -> float:
-        return float(self.energies(position, seam).sum())
-
-    def energies(self, position: Array, seam: Seam) -> Array:
-        rows, (value, _) = self.rows, self._measured(position, seam)
-        return held(rows["stiffness"], rows["upper"], rows["intact"], value)
-
-    def slope(self, position: Array, seam: Seam) -> Array:
-        _, gradient = self._measured(position, seam)
-        return np.asarray(np.maximum.reduceat((gradient**2).sum(axis=1), self.first[:-1]))
-
-    def mobility(self, position: Array, inverse_mass: Array, seam: Seam) -> Array:
-        _, gradient = self._measured(position, seam)
-        moved = inverse_mass[self.entries["particle"]] * (gradient**2).sum(axis=1)
-        return np.asarray(np.add.reduceat(moved, self.first[:-1]))
-
-    def _measured(self, position: Array, seam: Seam) -> tuple[Array, Array]:
-        return _measured(self.first, self.rows["kind"], self.rows["rest"], position[self.entries["particle"]], seam)
-
 
 def _entries(first: Array, arity: Array, rows: Array) -> Array:
     """The entries of these rows, one row after the other."""
     count = arity[rows]
     within = np.arange(int(count.sum())) - np.repeat(np.cumsum(count) - count, count)
     return np.asarray(np.repeat(first[rows], count) + within)
-
-
-def _measured(first: Array, kind: Array, rest: Any, corner: Array, seam: Seam) -> tuple[Array, Array]:
-    """(k,) what each row measures, with its particles in `corner`, and (entries, 2) its gradients."""
-    value, gradient = np.empty(len(kind)), np.empty((len(corner), 2))
-    rest = np.ascontiguousarray(rest)
-    link_rows.measure_rows(first, kind, rest, corner.astype(np.float64), *seam.period, gradient, value)
-    return value, gradient
