@@ -88,6 +88,20 @@ class ImpulseArrays:
         self._collisions: Any = None
         self._skin: float | None = -1.0
 
+    def note(self) -> Any:
+        """What a frame that is refused takes from `go_back`: all but the impulses of contacts."""
+        return self._particle, self.gave.copy(), self.gave_spin.copy(), self.kick, self.h, self.hertz, self.finer
+
+    def go_back(self, note: Any) -> None:
+        """Forget contacts, and remember else what `note` returned."""
+        particle, gave, gave_spin, *numbers = note
+        self.forget()
+        given = np.zeros((int(particle.max(initial=-1)) + 1, 3), self._dtype)
+        given[particle, :2], given[particle, 2] = gave, gave_spin
+        self._particle = np.arange(len(given), dtype=np.int32)
+        self.gave, self.gave_spin = columns_of(given)
+        self.kick, self.h, self.hertz, self.finer = numbers
+
     def forget_list(self) -> None:
         """The list of pairs is no longer about the particles of now."""
         self.engine.forget_list()

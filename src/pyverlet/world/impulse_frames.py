@@ -100,11 +100,16 @@ class ImpulseFrames:
         self.links.keep_apart(world, self.held.engine)
         if world._gather():
             self.held.forget_list()
+        before = self.held.note()
         with np.errstate(over="ignore", invalid="ignore"):  # what becomes infinite is told of as such
             if world._sleep and world._sleep.all_asleep(world._slots):
                 self._sleep_on(world, dt, done)
             elif not self.run(world, dt, done):
-                self._refuse_non_finite(world, dt)
+                try:
+                    self._refuse_non_finite(world, dt)
+                finally:
+                    self.links.forget()
+                    self.held.go_back(before)
 
     def run(self, world: Any, dt: float, done: Callable[[str], None]) -> bool:
         """Advance the gathered slots by a frame of dt seconds. False if a particle turned NaN or infinite."""
@@ -250,7 +255,6 @@ class ImpulseFrames:
         def look(stage: str) -> None:
             bad = ~np.isfinite(state.acceleration).all(axis=1) if stage == "integrate" and world.forces else np.zeros(1, bool)
             if (particle := int(state.particle[bad.argmax()]) if bad.any() else first_non_finite(state)) >= 0:
-                self.forget()
                 raise NonFiniteError(particle, stage, world.time)
 
         self.forget()

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.kernels.runs import partners
+from pyverlet.laws.links._set import partners
 from pyverlet.world.link_rows import LinkRows
 
 

@@ -7,10 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.laws.links._chains import ChainPool
 from pyverlet.laws.links._link import REMEMBERED
-from pyverlet.laws.links._pool import Pool
-from pyverlet.laws.links.pin import PinPool
+from pyverlet.laws.links._pool import DistancePool, PinPool, Pool
 from pyverlet.state.slots import Slots
 from pyverlet.world.link_blocks import Block, by_colour, follow
 
@@ -53,6 +51,8 @@ class LinkRows:
             self._pack(pools, mass)
             same = False
         assert self.rows is not None
+        for pool, row, here in self._sources:
+            pool.live = row, self.rows["pin_intact" if isinstance(pool, PinPool) else "intact"], here
         if self._order is not state.particle:
             self._order = state.particle
             slot_of = np.empty(len(state.particle), np.uint32)
@@ -68,12 +68,11 @@ class LinkRows:
         where: list[tuple[int, int, int]] = []  # pool, its row, kind
         parts: list[tuple[int, ...]] = []
         for number, pool in enumerate(pools):
-            pool.gives = bool(np.isfinite(pool.rows["stiffness"]).any())
             if isinstance(pool, PinPool):
                 continue
             first, node = pool.first.tolist(), compact[pool.entries["particle"]].tolist()
             for row in np.flatnonzero(pool.rows["intact"]).tolist():
-                kind = DISTANCE if isinstance(pool, ChainPool) else ANGLE + int(pool.rows["kind"][row])
+                kind = DISTANCE if isinstance(pool, DistancePool) else ANGLE + int(pool.rows["kind"][row])
                 where.append((number, row, kind))
                 parts.append(tuple(node[first[row] : first[row + 1]]))
         found = self._blocks([kind for *_, kind in where], parts)
@@ -131,7 +130,7 @@ class LinkRows:
             for name in REMEMBERED:
                 table[name][row] = mine[name] if pins else mine[name][:, None]
             pull, intact = np.hypot(*mine["pull"].T) if pins else mine["pull"], mine["intact"] != 0
-            table["intact"][row] = intact
+            table["intact"][row], pool.live = intact, None
             table["force"][row] = np.where(intact, pull, 0.0)
             if not intact.all():
                 torn.append((pool, row[~intact], pull[~intact]))

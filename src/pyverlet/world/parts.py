@@ -18,7 +18,6 @@ from pyverlet.ground.fields import Field
 from pyverlet.laws.events import CONTACT, HIT, Events
 from pyverlet.laws.ledger import Bookkeeper, Ledger
 from pyverlet.laws.links._set import BROKEN
-from pyverlet.laws.links._work import Past
 from pyverlet.laws.sleep import Sleep, laws
 from pyverlet.world.impulse_memory import Memory
 from pyverlet.world.impulse_sleepers import ASLEEP, Remembered
@@ -75,14 +74,6 @@ NEWS = {
 """What happened in the last frame, and who sleeps. Of `begin` a, b, wall and obstacle; speed, point (2), normal (2), impulse. Of
 `end` a and b; wall and obstacle, which files of older versions lack."""
 
-LINKED = {
-    "number": Field(np.int64, "linked", least=0, most=2**31, order="ascending"),
-    "start": Field(np.float64, "linked", 2),
-    "left": Field(None, "linked", 2),
-    "calm": Field(np.float64, "linked", nan=True),
-}
-"""What links remember of the particles they join."""
-
 IMPULSES = {
     "pairs": Field(np.int32, "impulses", 2, least=0, below="particles"),
     "values": Field(None, "impulses", 3),
@@ -100,7 +91,6 @@ FIELDS = {
         ("particles", PARTICLES),
         ("slots", SLOTS),
         ("news", NEWS),
-        ("linked", LINKED),
         ("impulses", IMPULSES),
         ("asleep", ASLEEP),
     )
@@ -120,7 +110,6 @@ def take_apart(world: World) -> Parts:
     saved = world.save()
     facts: dict[str, Any] = {
         "time": float(saved.time), "frames": saved.frames, "numbers": world._state.numbers,
-        "apart_changed": bool(saved.links[3]),
     }  # fmt: skip
     arrays = {f"particles.{name}": array for name, array in saved.arrays.items()}
     arrays["particles.begun"] = np.array(world._state.begun, np.int64)
@@ -149,8 +138,6 @@ def take_apart(world: World) -> Parts:
     if len(broken):
         arrays["news.broken"] = np.column_stack([broken[name] for name in ("link", "row", "i", "j")])
         arrays["news.broken_force"] = broken["force"].copy()
-    if (past := saved.links[4]) is not None:
-        arrays |= {f"linked.{name}": column.copy() for name, column in past._asdict().items()}
     return Parts(facts, arrays)
 
 
@@ -192,7 +179,6 @@ def put_together(world: World, parts: Parts) -> Saved:
     """
     facts = parts.facts
     links, pools, *_ = world.links.save()
-    past = Past(*(parts.arrays[f"linked.{name}"] for name in LINKED)) if "linked.number" in parts.arrays else None
     return Saved(
         world=world._state,
         arrays={name: parts.arrays[f"particles.{name}"] for name, _ in world._state.arrays()},
@@ -205,7 +191,7 @@ def put_together(world: World, parts: Parts) -> Saved:
         sleep=_sleep(world, facts["sleep"], parts.arrays) if world._sleep else None,
         obstacles=world.obstacles.save(),
         actors=[(actor, actor.save()) for actor in world.actors],
-        links=(links, pools, _broken(parts.arrays), bool(facts.get("apart_changed")), past),
+        links=(links, pools, _broken(parts.arrays)),
     )
 
 

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pyverlet.ground.errors import InputError
-from pyverlet.laws.links._chains import ChainPool
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import Floats, Link, several, stiffness_of
-from pyverlet.laws.links._pool import Pool
+from pyverlet.laws.links._pool import DistancePool, Pool
 from pyverlet.state.seam import NONE, Seam
 
 
@@ -73,10 +72,10 @@ class Distance(Link):
 
     @property
     def _family(self) -> Any:
-        return ChainPool
+        return DistancePool
 
     def _new_pool(self) -> Pool:
-        return ChainPool(self._state.dtype)
+        return DistancePool()
 
     def _columns(self) -> dict[str, Any]:
         return {

@@ -1,4 +1,4 @@
-"""Where the numbers of links live: one pool for each family, in the order they were added, and packed for the solver."""
+"""Where the numbers of links live: one pool for each family, in the order they were added."""
 
 from __future__ import annotations
 
@@ -8,12 +8,15 @@ from typing import Any
 import numpy as np
 
 from pyverlet.laws.links._link import REMEMBERED, Array
+from pyverlet.laws.links._measured import measured, stretches
 from pyverlet.laws.links._table import Table
-from pyverlet.laws.links._work import Work
 from pyverlet.state.seam import Seam
 
 NEVER = 1e300
 """What a row that has not been solved yet would measure next."""
+
+UNSURE = 8.0
+"""Times the rounding of coordinates: a smaller value of a row is mostly rounding."""
 
 
 class Pool(ABC):
@@ -23,14 +26,13 @@ class Pool(ABC):
         rows: a row for each link, in the order added.
         entries: `particle`, the user's indices of the particles, row after row.
         drawn: whether its rows are lines between their particles.
-        stale: rows have come or gone since `pack`.
-        changed: numbers of rows have changed since `begin`.
+        stale: rows have come or gone since somebody has made a copy for a solver.
+        changed: numbers of rows have changed since then.
         edits: how often rows have come, gone or been given other numbers.
-        gives: whether any row stores energy, once a frame has begun.
+        live: within a frame, rows, and an array of which are intact, with the places of these in it.
     """
 
     drawn = True
-    gives = False
 
     def __init__(self, **columns: Any) -> None:
         self.rows = Table(
@@ -41,11 +43,12 @@ class Pool(ABC):
         self.entries = Table(particle=np.int64)
         self.stale = self.changed = True
         self.edits = 0
+        self.live: tuple[Array, Array, Array] | None = None
+        self._gives = -1, False  # the same, as of so many edits
 
     def append(self, owner: int, particles: Array, columns: dict[str, Any]) -> slice:
         """Add a row for each of the (k, p) particles, given in the user's indices."""
-        self.stale = True
-        self.edits += 1
+        self._edit()
         count, arity = particles.shape
         self.entries.append(particles.size, particle=particles.ravel())
         return self.rows.append(
@@ -65,35 +68,25 @@ class Pool(ABC):
 
     def keep(self, mask: Array) -> None:
         """Remove all other rows."""
-        self.stale = True
-        self.edits += 1
+        self._edit()
         self.entries.keep(np.repeat(mask, self.rows["arity"]))
         self.rows.keep(mask)
+
+    def _edit(self) -> None:
+        self.stale, self.live = True, None
+        self.edits += 1
+
+    @property
+    def gives(self) -> bool:
+        """Whether any row stores energy."""
+        if self._gives[0] != self.edits:
+            self._gives = self.edits, bool(np.isfinite(self.rows["stiffness"]).any())
+        return self._gives[1]
 
     @property
     def first(self) -> Array:
         """(k + 1,) where the entries of each row begin."""
         return np.concatenate((np.zeros(1, np.int64), np.cumsum(self.rows["arity"])))
-
-    @abstractmethod
-    def pack(self, work: Work) -> None:
-        """Rows have come or gone, or `work` is new: make the solver's copy."""
-
-    @abstractmethod
-    def begin(self) -> None:
-        """A frame begins: take up who is intact."""
-
-    @abstractmethod
-    def arrays(self) -> tuple[Array, ...]:
-        """What `kernels.linked` is handed of it."""
-
-    @abstractmethod
-    def broken(self) -> Array:
-        """The rows that have broken in this frame, until its `end`."""
-
-    @abstractmethod
-    def pulled(self) -> Array:
-        """(k,) what each row pulls with now, N; of those that have broken, what they broke with."""
 
     def lines(self) -> tuple[Array, Array]:
         """(m, 2) the particles that follow each other in rows that are intact, and (m,) which row that is."""
@@ -104,57 +97,102 @@ class Pool(ABC):
         inner = np.flatnonzero(follows)
         return np.column_stack((particle[inner], particle[inner + 1])), row[inner]
 
-    @abstractmethod
-    def end(self) -> None:
-        """The frame is good: write force and who is intact into the table."""
+    # ---- what it measures ----------------------------------------------------------------------------------------------
 
     @abstractmethod
-    def energy(self, position: Array, seam: Seam) -> float:
-        """Energy stored in soft links at (n, 2) positions in the user's order, J."""
+    def values(self, position: Array, seam: Seam) -> Array:
+        """(k,) what each row measures beyond that at rest, with the particles at (n, 2) positions in the user's order."""
 
-    @abstractmethod
+    def gradients(self, position: Array, seam: Seam) -> Array:
+        """(entries,) |grad C|^2; 1 for distances."""
+        return np.ones(len(self.entries))
+
     def energies(self, position: Array, seam: Seam) -> Array:
-        """(k,) the same, row by row."""
+        """(k,) J stored in each row: none in the rigid, in the broken, nor in slack ropes."""
+        stiffness, value, intact = self.rows["stiffness"], self.values(position, seam), self.rows["intact"].copy()
+        if self.live:
+            rows, now, where = self.live
+            intact[rows] = now[where]
+        pulled = np.isfinite(stiffness) & (intact != 0) & ~((self._upper() <= 0.0) & (value < 0.0))
+        return np.asarray(0.5 * np.where(pulled, stiffness, 0.0) * value * value)
+
+    def _upper(self) -> Any:
+        return self.rows["upper"]
+
+    def energy(self, position: Array, seam: Seam) -> float:
+        """Energy stored in soft links, J."""
+        return float(self.energies(position, seam).sum()) if self.gives else 0.0
 
     def energy_by_pull(self, position: Array, seam: Seam) -> float:
         """As `energy`, but F^2 / 2 k of rows whose value is mostly rounding: no more than what that may hide."""
         rows = self.rows
-        if not np.isfinite(rows["stiffness"]).any():
+        if not self.gives:
             return 0.0
         energies = self.energies(position, seam)
         stiffness = np.where(np.isfinite(rows["stiffness"]) & (rows["stiffness"] > 0), rows["stiffness"], np.inf)
         size = np.abs(position[self.entries["particle"]]).max(axis=1, initial=0.0).astype(float)
         coarse = float(np.finfo(position.dtype).eps) * np.maximum.reduceat(size, self.first[:-1])
-        coarse *= np.sqrt(self.slope(position, seam))
+        coarse *= np.sqrt(np.maximum.reduceat(self.gradients(position, seam), self.first[:-1]))
         most = 0.5 * stiffness * (UNSURE * coarse) ** 2
         hidden = (rows["intact"] != 0) & (energies < most) & np.isfinite(stiffness)
         return float(np.where(hidden, np.minimum(0.5 * rows["force"] ** 2 / stiffness, most), energies).sum())
 
-    def slope(self, position: Array, seam: Seam) -> Array:
-        """(k,) the largest |grad C|^2 of the particles of each row; 1 for distances."""
-        return np.ones(len(self.rows))
-
     def share_gain(self, before: Array, now: Array, seam: Seam, mass: Array, share: Array) -> None:
         """Add what each row holds at the positions of `now` beyond that `before` to the (n,) share of its first free particle."""
-        if len(particle := self.entries["particle"]):
+        if len(particle := self.entries["particle"]) and self.gives:
             entry = np.arange(len(particle)) + np.where(np.isfinite(mass[particle]), 0, len(particle))
             whose = particle[np.minimum.reduceat(entry, self.first[:-1]) % len(particle)]
             share += np.bincount(whose, self.energies(now, seam) - self.energies(before, seam), len(share))
 
     def mobility(self, position: Array, inverse_mass: Array, seam: Seam) -> Array:
-        """(k,) sum of w |grad C|^2 over the particles of each row, C being what it measures; gradients of distances are 1."""
-        return np.asarray(np.add.reduceat(inverse_mass[self.entries["particle"]], self.first[:-1]))
-
-    @abstractmethod
-    def stored(self, position: Array, seam: Seam) -> float:
-        """The same in the middle of a frame, of the rows that are intact then, at (m, 2) positions in the order of `Work`."""
+        """(k,) sum of w |grad C|^2 over the particles of each row, C being what it measures."""
+        moved = inverse_mass[self.entries["particle"]] * self.gradients(position, seam)
+        return np.asarray(np.add.reduceat(moved, self.first[:-1]))
 
 
-UNSURE = 8.0
-"""Times the rounding of coordinates: a smaller value of a row is mostly rounding."""
+class DistancePool(Pool):
+    """Sticks, ropes and springs."""
+
+    def __init__(self) -> None:
+        super().__init__(rest=np.float64, upper=np.float64)
+
+    def values(self, position: Array, seam: Seam) -> Array:
+        return stretches(position[self.entries["particle"]], self.rows["rest"], seam)
+
+    def lines(self) -> tuple[Array, Array]:
+        pairs, intact = self.entries["particle"].reshape(-1, 2), self.rows["intact"]
+        return (pairs, np.arange(len(pairs))) if intact.all() else (pairs[row := np.flatnonzero(intact)], row)
 
 
-def held(stiffness: Array, upper: Array | float, intact: Array, value: Array) -> Array:
-    """(k,) energy of rows, J: none of the rigid, of the broken, nor of slack ropes."""
-    pulled = np.isfinite(stiffness) & (intact != 0) & ~((upper <= 0.0) & (value < 0.0))
-    return 0.5 * np.where(pulled, stiffness, 0.0) * value * value
+class RowPool(Pool):
+    """Angles and areas."""
+
+    drawn = False
+
+    def __init__(self) -> None:
+        super().__init__(rest=np.float64, upper=np.float64, kind=np.int64)
+
+    def values(self, position: Array, seam: Seam) -> Array:
+        return self._measured(position, seam)[0]
+
+    def gradients(self, position: Array, seam: Seam) -> Array:
+        return np.asarray((self._measured(position, seam)[1] ** 2).sum(axis=1))
+
+    def _measured(self, position: Array, seam: Seam) -> tuple[Array, Array]:
+        return measured(self.first, self.rows["kind"], self.rows["rest"], position[self.entries["particle"]], seam)
+
+
+class PinPool(Pool):
+    """Pins: what they measure is how far their particle is away."""
+
+    drawn = False
+
+    def __init__(self) -> None:
+        super().__init__(point=(np.float64, (2,)))
+
+    def values(self, position: Array, seam: Seam) -> Array:
+        away = seam.nearest(position[self.entries["particle"]].astype(float) - self.rows["point"])
+        return np.asarray(np.hypot(*away.T))
+
+    def _upper(self) -> Any:
+        return np.inf

@@ -1,28 +1,19 @@
-"""The links of a world: a list for the user, the stages of a substep for the engine."""
+"""The links of a world: a list for the user, and what is measured of them."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
-from contextlib import AbstractContextManager, nullcontext
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.compile import jit
-from pyverlet.compile.bundle import hold
 from pyverlet.ground import checks
-from pyverlet.ground.constants import LINKS_ONE_THREAD_BELOW, REST_ACCELERATIONS
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import listed
 from pyverlet.ground.turns import Shared, in_turn, of_one_frame
-from pyverlet.kernels import link_rows, linked, runs
-from pyverlet.laws.links._chains import ChainPool
 from pyverlet.laws.links._link import Array, Link
 from pyverlet.laws.links._pool import Pool
-from pyverlet.laws.links._rows import RowPool
-from pyverlet.laws.links._work import Past, Work
-from pyverlet.laws.links.pin import PinPool
 from pyverlet.state.seam import Seam
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
@@ -47,17 +38,9 @@ class Links(Shared):
         self._pools: dict[Any, Pool] = {}
         self._leaving: dict[Pool, list[int]] = {}
         self._next_owner, self._iterations = 0, 1
-        self._few = True
-        self._work = Work(np.empty(0, np.int64), state.mass[:0], state.dtype)
-        self._past: Past | None = None
         self._apart, self._apart_stale = np.empty((0, 2), np.int64), False
-        self._partners = np.zeros(1, np.int64), np.empty(0, np.int64)
-        self._apart_changed = False
+        self._apart_among = 0  # so many particles
         self.broken = np.empty(0, BROKEN)
-        self._packed: dict[type[Pool], Pool] = {}
-        self._linked: Any = None
-        self._rows: Any = None
-        self._bundled = False  # whether these two are of the arrays of now
 
     # ---- a list --------------------------------------------------------------------------------------------------------
 
@@ -163,116 +146,14 @@ class Links(Shared):
 
     # ---- a frame -------------------------------------------------------------------------------------------------------
 
-    def begin(self) -> bool:
-        """A frame begins. True if other pairs than before are no contacts (`unlist`)."""
-        if not self._kept:
-            return False
-        if any(pool.stale for pool in self._kept) or not self._work.good(self._state):
-            among = np.zeros(len(self._state), bool)
-            for pool in self._kept:
-                among[pool.entries["particle"]] = True
-            self._work = Work(np.flatnonzero(among), self._state.mass, self._state.dtype)
-            for pool in self._kept:
-                pool.pack(self._work)
-            self._few = len(self._work) < LINKS_ONE_THREAD_BELOW
-            self._join()
-        self._work.begin(self._state, self._past)
-        for pool in self._kept:
-            pool.begin()
-        self._bundled = False
-        return self.begin_apart()
-
-    def begin_apart(self) -> bool:
-        """A frame begins. True if other pairs than before are no contacts (`unlist`)."""
-        self._know_apart()
-        changed, self._apart_changed = self._apart_changed, False
-        return changed
-
-    def _join(self) -> None:
-        """Note what compiled code is handed: those that are not there are empty."""
-        kinds = {type(pool): pool for pool in self._kept}
-        empty = [pool for pool in (ChainPool(self._state.dtype), RowPool(), PinPool()) if type(pool) not in kinds]
-        for pool in empty:
-            pool.pack(self._work)
-            pool.begin()
-        self._packed = kinds | {type(pool): pool for pool in empty}
-
-    def compiled(self, state: Slots, h: float) -> tuple[Any, Any, Any]:
-        """What `kernels.linked` is handed in the substeps of a frame: `Linked`, `Rows`, and the numbers of `Linking`.
-
-        Good as long as the order of the slots is.
-        """
-        self._work.slots(state)
-        if not self._bundled:
-            chains, rows, pins = (self._packed[kind].arrays() for kind in (ChainPool, RowPool, PinPool))
-            self._linked = hold(linked.Linked, (*self._work.arrays(), *chains, *pins), self._linked)
-            self._rows, self._bundled = hold(link_rows.Rows, rows, self._rows), True
-        numbers = (h, *self._work.seam.period, len(self._work), self._iterations, REST_ACCELERATIONS * h)
-        return self._linked, self._rows, numbers
-
-    def together(self, state: Slots) -> Array:
-        """Slots of those they join, as long as the order of the slots is; from then on kernels know with whom."""
-        if not self._work.assembled:
-            self._work.assemble(self.joined())
-        return self._work.slots(state)
-
-    def _know_apart(self) -> None:
-        """Bring the pairs that are no contacts up to date, and note if they are others than before."""
-        if not self._apart_stale and (not self._links or len(self._partners[0]) == len(self._state) + 1):
-            return
-        before, self._apart, self._apart_stale = self._apart, self.apart(), False
-        self._partners = runs.partners(self._apart, len(self._state))
-        self._apart_changed |= not np.array_equal(before, self._apart)
-
     def known_apart(self) -> Array:
-        """As `apart`; the same object as long as nothing has changed."""
-        self._know_apart()
+        """As `apart`; the same object as long as neither these pairs nor the number of particles have changed."""
+        if self._apart_stale or (self._links and self._apart_among != len(self._state)):
+            now = self.apart()
+            if self._apart_among != len(self._state) or not np.array_equal(now, self._apart):
+                self._apart = now
+            self._apart_stale, self._apart_among = False, len(self._state)
         return self._apart
-
-    def unlist(self, pairs: Any, particle: Array) -> None:
-        """Take the pairs of `apart` from a list of candidates; particle: the user's index in each slot."""
-        self._know_apart()
-        if len(self._apart):
-            runs.drop_pairs(pairs.first, pairs.count, pairs.pair_i, pairs.pair_j, particle, *self._partners)
-
-    @property
-    def stand_back(self) -> bool:
-        """Whether they had better be solved on one thread while others use several: each colour is a meeting of theirs."""
-        return self._few and jit.threads_in_use() > 1
-
-    def _threads(self) -> AbstractContextManager[None]:
-        return jit.one_thread() if self.stand_back else nullcontext()
-
-    def before(self, state: Slots, h: float) -> None:
-        """Before the integrator: remember where the substep starts."""
-        links, _, numbers = self.compiled(state, h)
-        with self._threads():
-            linked.look(links, linked.Linking(*numbers), state.position, state.velocity, state.inverse_mass)
-
-    def solve(self, state: Slots, h: float) -> None:
-        """Move the linked particles to where their links allow, and break those that pull too hard."""
-        links, rows, numbers = self.compiled(state, h)
-        with self._threads():
-            linked.solve(links, rows, linked.Linking(*numbers), state.position, state.velocity)
-
-    def lay_down(self, state: Slots, h: float) -> None:
-        """Before walls, where there are contacts: velocities are without what carries the pull of links."""
-        links, _, numbers = self.compiled(state, h)
-        with self._threads():
-            linked.lay_down(links, linked.Linking(*numbers), state.velocity)
-
-    def after(self, state: Slots, h: float) -> None:
-        """After the contacts: what the links did is part of the acceleration, for integrators that remember it."""
-        links, _, numbers = self.compiled(state, h)
-        with self._threads():
-            linked.note_pull(links, linked.Linking(*numbers), state.acceleration)
-
-    def scatter(self) -> None:
-        """The frame is good: what it did to the links holds."""
-        self._past = self._work.end(self._state) if self._kept else None
-        self.accept([(pool, rows, pool.pulled()[rows]) for pool in self._kept if len(rows := pool.broken())])
-        for pool in self._kept:
-            pool.end()
 
     def accept(self, torn: list[tuple[Pool, Array, Array]]) -> None:
         """A frame is good: of each pool the rows that broke, and what they pulled with, N. What is left is packed anew."""
@@ -315,11 +196,7 @@ class Links(Shared):
 
     def stored(self, state: Slots) -> float:
         """The same in the middle of a frame, J, where the particles are now, without those that have broken in it."""
-        if not self.give:
-            return 0.0
-        with self._threads():
-            position = self._work.where(state)
-            return sum(pool.stored(position, state.seam) for pool in self._kept if pool.gives)
+        return sum(pool.energy(state.where(), state.seam) for pool in self._kept) if self.give else 0.0
 
     @of_one_frame
     def segments(self) -> tuple[Array, Array]:
@@ -356,9 +233,10 @@ class Links(Shared):
         for pool in self._kept:
             here, row = pool.lines()
             pairs.append(here[pool.rows["collide"][row] == 0])
+        low, high = np.sort(np.concatenate(pairs), axis=1).T
         count = max(len(self._state), 1)
-        number = np.sort(runs.number_pairs(np.concatenate(pairs), count))  # one for each pair: sorted twenty times as fast
-        return np.asarray(runs.numbered_pairs(number, count))
+        number = np.unique(low * count + high)  # one for each pair: sorted twenty times as fast
+        return np.column_stack((number // count, number % count))
 
     # ---- save and restore ----------------------------------------------------------------------------------------------
 
@@ -374,12 +252,11 @@ class Links(Shared):
         """A copy of all there is about links."""
         pools = [(family, pool.rows.copy(), pool.entries.copy()) for family, pool in zip(self._pools, self._kept, strict=True)]
         links = [(owner, link, link.particles) for owner, link in self._links.items()]
-        past = self._past and Past(*(array.copy() for array in self._past))
-        return links, pools, self.broken.copy(), self._apart_changed, past
+        return links, pools, self.broken.copy()
 
     def restore(self, saved: Any) -> None:
         """Go back to what `save` returned, with the links of then."""
-        links, pools, broken, apart_changed, self._past = saved
+        links, pools, broken = saved
         self.broken = broken.copy()
         for link in self:
             link._pool = None
@@ -395,5 +272,11 @@ class Links(Shared):
         for owner, link, particles in links:
             link.particles, link._id, link._pool = particles, owner, self._pools[link._family]
         self._apart_stale = True
-        self._know_apart()
-        self._apart_changed = apart_changed
+
+
+def partners(pairs: Array, particles: int) -> tuple[Array, Array]:
+    """(begin, partner): partner[begin[i] : begin[i + 1]] stand in one of the (k, 2) pairs with particle i."""
+    both = np.concatenate((pairs, pairs[:, ::-1]))
+    begin = np.zeros(particles + 1, np.int64)
+    np.cumsum(np.bincount(both[:, 0], minlength=particles), out=begin[1:])
+    return begin, both[np.argsort(both[:, 0], kind="stable"), 1]

@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import shapes
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import Floats, Link, several, stiffness_of
-from pyverlet.laws.links._rows import RowPool
+from pyverlet.laws.links._measured import ANGLE
+from pyverlet.laws.links._pool import RowPool
 
 
 class Angle(Link):
@@ -75,6 +75,6 @@ class Angle(Link):
 
     def _columns(self) -> dict[str, Any]:
         return {
-            "kind": shapes.ANGLE, "rest": self._angle, "stiffness": self._stiffness, "damping": self._damping, "upper": np.inf,
+            "kind": ANGLE, "rest": self._angle, "stiffness": self._stiffness, "damping": self._damping, "upper": np.inf,
             "strength": self._strength, "collide": 1,
         }  # fmt: skip

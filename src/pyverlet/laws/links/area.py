@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground.errors import InputError
-from pyverlet.kernels import shapes
 from pyverlet.laws.links._ends import parse_ring
 from pyverlet.laws.links._link import Floats, Link, several, stiffness_of
-from pyverlet.laws.links._rows import RowPool
+from pyverlet.laws.links._measured import AREA
+from pyverlet.laws.links._pool import RowPool
 
 
 class Area(Link):
@@ -73,7 +73,7 @@ class Area(Link):
 
     def _columns(self) -> dict[str, Any]:
         return {
-            "kind": shapes.AREA, "rest": self._area, "stiffness": self._stiffness, "damping": self._damping, "upper": np.inf,
+            "kind": AREA, "rest": self._area, "stiffness": self._stiffness, "damping": self._damping, "upper": np.inf,
             "strength": np.inf, "collide": 1,
         }  # fmt: skip
 

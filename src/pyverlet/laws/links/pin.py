@@ -9,10 +9,8 @@ from numpy.typing import ArrayLike
 
 from pyverlet.ground import checks
 from pyverlet.laws.links._ends import parse
-from pyverlet.laws.links._link import Array, Floats, Link, several, stiffness_of
-from pyverlet.laws.links._pool import Pool, held
-from pyverlet.laws.links._work import Work
-from pyverlet.state.seam import Seam
+from pyverlet.laws.links._link import Floats, Link, several, stiffness_of
+from pyverlet.laws.links._pool import PinPool, Pool
 
 
 class Pin(Link):
@@ -63,7 +61,7 @@ class Pin(Link):
 
     @property
     def _family(self) -> Any:
-        return Pin
+        return PinPool
 
     def _new_pool(self) -> Pool:
         return PinPool()
@@ -73,56 +71,3 @@ class Pin(Link):
             "point": self._point, "stiffness": self._stiffness, "damping": self._damping, "strength": self._strength,
             "collide": 1,
         }  # fmt: skip
-
-
-class PinPool(Pool):
-    """Pins act on their particles alone, before the rows, which then feel a particle as heavy as its pin is stiff."""
-
-    drawn = False
-
-    def __init__(self) -> None:
-        super().__init__(point=(np.float64, (2,)))
-
-    def pack(self, work: Work) -> None:
-        self.stale, self.changed = False, True
-        self._particle = work.compact[self.entries["particle"]]
-        self._give, self._lam, self._last, self._force = np.zeros((4, len(self.rows)))
-        self._left, self._way, self._kept = np.zeros((3, len(self.rows), 2))
-        self._intact = np.zeros(len(self.rows), np.uint8)
-        self._given = tuple(self.rows[name] for name in ("point", "stiffness", "damping", "strength"))
-
-    def begin(self) -> None:
-        if self.changed:
-            self.gives, self.changed = bool(np.isfinite(self.rows["stiffness"]).any()), False
-        self._intact[:] = self.rows["intact"]
-        self._force[:] = self.rows["force"]
-
-    def arrays(self) -> tuple[Array, ...]:
-        """As `kernels.linked.Linked` has them."""
-        return (
-            self._particle, *self._given, self._intact, self._give, self._left, self._way, self._kept, self._lam, self._last,
-            self._force,
-        )  # fmt: skip
-
-    def broken(self) -> Array:
-        return np.flatnonzero(self._intact != self.rows["intact"])
-
-    def pulled(self) -> Array:
-        return self._force
-
-    def end(self) -> None:
-        self.rows["intact"][:] = self._intact
-        self.rows["force"][:] = np.where(self._intact, self._force, 0.0)
-
-    def stored(self, position: Array, seam: Seam) -> float:
-        return float(self._energies(position, self._particle, self._intact, seam).sum())
-
-    def energy(self, position: Array, seam: Seam) -> float:
-        return float(self.energies(position, seam).sum())
-
-    def energies(self, position: Array, seam: Seam) -> Array:
-        return self._energies(position, self.entries["particle"], self.rows["intact"], seam)
-
-    def _energies(self, position: Array, particle: Array, intact: Array, seam: Seam) -> Array:
-        away = np.hypot(*seam.nearest(position[particle].astype(float) - self.rows["point"]).T)
-        return held(self.rows["stiffness"], np.inf, intact, away)

@@ -49,7 +49,7 @@ def soft_body(
         mass: of the body, kg.
         stiffness: of each spring, N/m; infinity makes them sticks. None takes 40 weights over the spacing, or over
             the width if filled.
-        damping: of each spring, N s/m, and of the angles of a skin, in proportion. None takes a tenth of what would stop the
+        damping: of each spring, N s/m, and in proportion of the angles of a skin. None takes a tenth of what would stop the
             whole from swinging.
         bulk: resistance of the area, N/m: a pressure of a hundredth of it takes a hundredth of the area. None takes 40 weights
             over the width; 0 leaves the area alone. Hollow bodies only.

@@ -1,1 +1,0 @@
-"""The only place that calls Numba: flags, cache, threads, lanes."""
