@@ -84,6 +84,7 @@ class Events:
         self._obstacles: list[Obstacle] | None = None  # that the keys number; None: those of now
         self._known: Array | None = None  # `touched` of the list in which those of the frame before are marked
         self._told: list[Told] = []
+        self._slept = np.zeros(0, np.int64)  # contacts of those who slept when the frame began, and have woken in it
 
     def __repr__(self) -> str:
         return f"Events of the last frame: {len(self.begin)} begin, {len(self.end)} end, {len(self.hit)} hit"
@@ -127,9 +128,13 @@ class Events:
         """All that was noted of a frame that ends, but for walls of a room of the user's own."""
         self._told = told
 
+    def wake(self, slots: Slots, state: State) -> None:
+        """Sleepers are about to wake in the middle of a frame: their contacts went on until then."""
+        self._slept = np.concatenate((self._slept, self._sleeping(slots, state)))
+
     def forget(self) -> None:
         """A frame begins, or begins again."""
-        self._told = []
+        self._told, self._slept = [], self._slept[:0]
 
     def close(self, slots: Slots, state: State, pairs: Wide | None, place: Place) -> None:
         """The frame has gone well: what was told is what happened; `pairs`: the list of now; `place`: what they met."""
@@ -182,7 +187,7 @@ class Events:
         told = Told.of([*self._told, walls])
         told = told._replace(keys=_numbered(told.keys, state))
         # Those who sleep are not listed, but go on. To sort keys alone takes a third of what it takes to know their order.
-        now = np.sort(np.concatenate((told.keys, self._sleeping(slots, state))))
+        now = np.sort(np.concatenate((told.keys, self._slept, self._sleeping(slots, state))))
         now = now[np.diff(now, prepend=-1) > 0]
         self._at_wall = now[(now & _SURFACE) != 0]
         gone, new = self._touching[kernels.absent(self._touching, now)], now[kernels.absent(now, self._touching)]

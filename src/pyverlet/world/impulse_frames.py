@@ -218,6 +218,8 @@ class ImpulseFrames:
         self._set_law(strongest, h, h, rough=rough)
         nearer = REST_ACCELERATIONS * strongest * h * h
         while (met := self.held.engine.find_met(step, state.island, nearer, self.held.parts)) is not None:
+            if world._events:
+                world._events.wake(state, world._state)
             world._sleep.wake(state, met)
             self.held.wake(world)
             self.held.hertz = min(self.held.hertz, STIFFEST / h)
