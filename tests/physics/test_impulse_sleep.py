@@ -220,6 +220,17 @@ def test_contacts_go_on_until_sleepers_wake() -> None:
         ball.remove()
 
 
+def test_the_weight_of_sleepers_is_reported() -> None:
+    # The floor bears m g of eight discs of 2 kg that fall asleep together: to rounding at rest.
+    world = pv.World(boundary=pv.Box((0, 0), (9, 9)), collisions=pv.Collisions(impulses=True), sleep=True, contacts=True)
+    world.add(position=[(2 * k + 1, 0.5 + j) for j in range(2) for k in range(4)], radius=0.5, mass=2.0)
+    fall_asleep(world, FRAME)
+    world.run(seconds=0.5, dt=1 / 240)
+    floor = world.contacts[world.contacts["b"] == -1]
+    assert len(floor) == 4
+    assert floor["impulse"].sum() / FRAME == pytest.approx(8 * 2.0 * 9.81, rel=1e-5)
+
+
 def test_who_is_left_over_when_others_go_wakes_with_its_contacts() -> None:
     # Three stacks; one of the second goes, and its island wakes: what is below stays where it is, what was above falls.
     world = pv.World(boundary=pv.Box((0, 0), (20, 20)), collisions=pv.Collisions(impulses=True), sleep=True, dtype=np.float64)

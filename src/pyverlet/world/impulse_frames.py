@@ -111,7 +111,8 @@ class ImpulseFrames:
         if world._gather():
             self.held.forget_list()
         if world._sleep and world._sleep.all_asleep(world._slots):
-            self._sleep_on(world, dt, done)
+            done("gather")  # nothing moves; what contacts gave when all fell asleep they go on to give
+            done("finish")
         elif not self.run(world, dt, done):
             self._refuse_non_finite(world, dt)
 
@@ -224,13 +225,6 @@ class ImpulseFrames:
             self.held.wake(world)
             self.held.hertz = min(self.held.hertz, STIFFEST / h)
             self._set_law(strongest, h, h, rough=rough)
-
-    def _sleep_on(self, world: Any, dt: float, done: Callable[[str], None]) -> None:
-        """A frame of dt seconds in which everybody sleeps, and nothing moves."""
-        done("gather")
-        if world._touches is not None:
-            ImpulseNotes(world._touches, self.held.engine, world._slots).close(world, dt)
-        done("finish")
 
     def _strongest(self, gravity: tuple[float, float]) -> float:
         """The largest acceleration by gravity alone, m/s^2."""
