@@ -202,6 +202,35 @@ def test_threads_saves_and_copies_keep_the_bits(name: str) -> None:
     assert found[0] == found[1]
 
 
+def test_contacts_go_on_until_sleepers_wake() -> None:
+    # A ball meets the heap in any substep of a frame: contacts are heard only in what is left of it.
+    law = pv.Collisions(impulses=True, friction=0.3)
+    room = pv.Box((4.5, 0), (8.5, 20), friction=0.3)
+    world = pv.World(boundary=room, collisions=law, sleep=True, events=True, dtype=np.float64)
+    world.add(position=[(5 + k, 0.5) for k in range(4)] + [(5.5 + k, 0.5 + 0.75**0.5) for k in range(3)], radius=0.5)
+    fall_asleep(world, FRAME)
+    saved = world.save()
+    for higher in np.linspace(0, 0.16, 9):
+        world.restore(saved)
+        ball = world.add(position=(6.5, 3.0 + higher), radius=0.5)
+        while world.asleep[5]:
+            world.step(FRAME)
+            assert len(world.events.end) == 0
+        assert (5, 7) in zip(world.events.begin["a"].tolist(), world.events.begin["b"].tolist(), strict=True)
+        ball.remove()
+
+
+def test_the_weight_of_sleepers_is_reported() -> None:
+    # The floor bears m g of eight discs of 2 kg that fall asleep together: to rounding at rest.
+    world = pv.World(boundary=pv.Box((0, 0), (9, 9)), collisions=pv.Collisions(impulses=True), sleep=True, contacts=True)
+    world.add(position=[(2 * k + 1, 0.5 + j) for j in range(2) for k in range(4)], radius=0.5, mass=2.0)
+    fall_asleep(world, FRAME)
+    world.run(seconds=0.5, dt=1 / 240)
+    floor = world.contacts[world.contacts["b"] == -1]
+    assert len(floor) == 4
+    assert floor["impulse"].sum() / FRAME == pytest.approx(8 * 2.0 * 9.81, rel=1e-5)
+
+
 def test_who_is_left_over_when_others_go_wakes_with_its_contacts() -> None:
     # Three stacks; one of the second goes, and its island wakes: what is below stays where it is, what was above falls.
     world = pv.World(boundary=pv.Box((0, 0), (20, 20)), collisions=pv.Collisions(), sleep=True, dtype=np.float64)

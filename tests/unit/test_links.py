@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pyverlet.kernels import runs
 
 import pyverlet as pv
 from pyverlet.viewers.hands import Hands
@@ -309,16 +308,10 @@ def test_groups_pin() -> None:
 
 
 @pytest.mark.parametrize("count", [3, 70, 200])
-def test_runs_and_colours_share_nothing(count: int) -> None:
-    # A star with `count` arms of two links: more arms than there are colours share the hub.
+def test_a_star_of_many_arms_keeps_its_lengths(count: int) -> None:
+    # `count` arms of two links turn about a hub: more than may be solved at a time, for all share it.
     arm = np.arange(count)
     pairs = np.concatenate((np.column_stack((np.zeros(count, int), 1 + arm)), np.column_stack((1 + arm, 1 + count + arm))))
-    _, ends, run_of = found_runs(pairs)
-    colour, found = np.zeros(2 * count, np.int64), run_of.max() + 1
-    runs.colour_runs(2 * np.arange(2 * count + 1), ends.ravel(), run_of, 1 + 2 * count, 64, colour)
-    for c in range(63):  # the last one is solved one after the other
-        members = [set(ends[run_of == run].ravel()) for run in range(found) if colour[run] == c]
-        assert sum(map(len, members)) == len(set().union(*members)) if members else True
     world = pv.World(collisions=None, gravity=(0, 0))
     angle = 2 * np.pi * arm / count
     ring = np.column_stack((np.cos(angle), np.sin(angle)))
@@ -329,45 +322,6 @@ def test_runs_and_colours_share_nothing(count: int) -> None:
     world.run(seconds=1.0)
     ends, _ = world.links.segments()
     assert np.hypot(*(ends[:, 1] - ends[:, 0]).T) == pytest.approx(np.ones(2 * count), abs=0.02)
-
-
-def test_chains_are_found_whichever_way_their_links_are_given() -> None:
-    for pairs in ([(0, 1), (1, 2), (2, 3)], [(1, 0), (2, 1), (3, 2)], [(1, 0), (1, 2), (3, 2)], [(2, 3), (0, 1), (2, 1)]):
-        _, ends, run_of = found_runs(np.array(pairs))
-        assert run_of.tolist() == [0, 0, 0]
-        assert (ends[1:, 0] == ends[:-1, 1]).all()
-    *_, run_of = found_runs(np.array([(0, 1), (1, 2), (2, 3), (3, 0)]))  # a ring ends where it began: its last link stands alone
-    assert run_of.tolist() == [0, 0, 0, 1]
-
-
-def test_rows_columns_and_diagonals_of_a_grid_are_runs_in_any_order() -> None:
-    columns, rows = 7, 5
-    n = np.arange(columns * rows).reshape(rows, columns)
-    across, down, one, other = (n[:, :-1], n[:, 1:]), (n[:-1], n[1:]), (n[:-1, :-1], n[1:, 1:]), (n[:-1, 1:], n[1:, :-1])
-    pairs = np.concatenate([np.column_stack((a.ravel(), b.ravel())) for a, b in (across, down, one, other)])
-    # Of each direction every line is a run; two of four at a corner, and along the rim, may go on in one another.
-    lines = rows + columns + 2 * (rows + columns - 3)
-    for seed in range(5):
-        given = np.random.default_rng(seed).permutation(pairs)
-        order, ends, run_of = found_runs(given)
-        assert lines // 2 <= run_of.max() + 1 <= lines
-        assert sorted(order.tolist()) == list(range(len(pairs)))
-        assert (np.sort(ends, axis=1) == np.sort(given[order], axis=1)).all()
-        for run in range(run_of.max() + 1):
-            here = ends[run_of == run]
-            assert (here[1:, 0] == here[:-1, 1]).all()
-            met = [*here[:, 0], here[-1, 1]]
-            assert len(set(met)) == len(met)  # it never comes back
-    *_, run_of = found_runs(np.stack((pairs, pairs[:, ::-1]), axis=1)[np.arange(len(pairs)), np.arange(len(pairs)) % 2])
-    assert run_of.max() + 1 <= lines
-
-
-def found_runs(pairs: Any) -> tuple[Any, Any, Any]:
-    """The rows, run after run; their particles; the run of each."""
-    order, ends, run_of = np.empty(len(pairs), np.int64), np.empty_like(pairs), np.empty(len(pairs), np.int64)
-    count = runs.find_runs(pairs, np.ones(len(pairs), np.uint8), int(pairs.max()) + 1, order, ends, run_of)
-    assert count == run_of.max() + 1
-    return order, ends, run_of
 
 
 # ---- the mouse -----------------------------------------------------------------------------------------------------------

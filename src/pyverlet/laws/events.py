@@ -78,6 +78,7 @@ class Events:
         self._touching = np.empty(0, np.int64)  # keys, sorted
         self._obstacles: list[Obstacle] | None = None  # that the keys number; None: those of now
         self._told: list[Told] = []
+        self._slept = np.zeros(0, np.int64)  # contacts of those who slept when the frame began, and have woken in it
 
     def __repr__(self) -> str:
         return f"Events of the last frame: {len(self.begin)} begin, {len(self.end)} end, {len(self.hit)} hit"
@@ -113,9 +114,13 @@ class Events:
         """What was noted of this frame, but for walls of a room of the user's own."""
         self._told += told
 
+    def wake(self, slots: Slots, state: State) -> None:
+        """Sleepers are about to wake in the middle of a frame: their contacts went on until then."""
+        self._slept = np.concatenate((self._slept, self._sleeping(slots, state)))
+
     def forget(self) -> None:
         """A frame begins, or begins again."""
-        self._told = []
+        self._told, self._slept = [], self._slept[:0]
 
     def close(self, slots: Slots, state: State, place: Place) -> None:
         """The frame has gone well: what was told is what happened; `place`: what circles met."""
@@ -123,7 +128,7 @@ class Events:
         told = Told.of([*self._told, place.walls(slots)])
         told = told._replace(keys=_numbered(told.keys, state))
         # Those who sleep are not listed, but go on. To sort keys alone takes a third of what it takes to know their order.
-        now = np.sort(np.concatenate((told.keys, self._sleeping(slots, state))))
+        now = np.sort(np.concatenate((told.keys, self._slept, self._sleeping(slots, state))))
         now = now[np.diff(now, prepend=-1) > 0]
         gone, new = self._touching[~_among(self._touching, now)], now[~_among(now, self._touching)]
         # Bounces: each is a beginning, and but for the last an end; another one, if they touched before, ends what went on.

@@ -103,7 +103,8 @@ class ImpulseFrames:
         before = self.held.note()
         with np.errstate(over="ignore", invalid="ignore"):  # what becomes infinite is told of as such
             if world._sleep and world._sleep.all_asleep(world._slots):
-                self._sleep_on(world, dt, done)
+                done("gather")  # nothing moves; what contacts gave when all fell asleep they go on to give
+                done("finish")
             elif not self.run(world, dt, done):
                 try:
                     self._refuse_non_finite(world, dt)
@@ -214,17 +215,12 @@ class ImpulseFrames:
         self._set_law(strongest, h, h, rough=rough)
         nearer = REST_ACCELERATIONS * strongest * h * h
         while (met := self.held.engine.find_met(step, state.island, nearer, self.held.parts)) is not None:
+            if world._events:
+                world._events.wake(state, world._state)
             world._sleep.wake(state, met)
             self.held.wake(world)
             self.held.hertz = min(self.held.hertz, STIFFEST / h)
             self._set_law(strongest, h, h, rough=rough)
-
-    def _sleep_on(self, world: Any, dt: float, done: Callable[[str], None]) -> None:
-        """A frame of dt seconds in which everybody sleeps, and nothing moves."""
-        done("gather")
-        if world._touches is not None:
-            ImpulseNotes(world._touches, self.held.engine, world._slots).close(world, dt)
-        done("finish")
 
     def _strongest(self, gravity: tuple[float, float]) -> float:
         """The largest acceleration by gravity alone, m/s^2."""
