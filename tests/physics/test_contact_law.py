@@ -95,7 +95,7 @@ def test_what_one_circle_is_made_of_is_nothing_to_the_others(walls: float) -> No
 
 @pytest.mark.parametrize("obstacle", [False, True])
 def test_smooth_circles_come_to_rest_on_walls_that_bounce(obstacle: bool) -> None:
-    # Who carries weight does not arrive at the wall below: it kept 1e-5 m g H for ever, and 6 times the overlap.
+    # Smooth ones may slip to a better place once more, as late as after 15 s.
     room = pv.Box((-7, 0), (7, 30), restitution=0.0 if obstacle else 0.5)
     world = pv.World(boundary=room)
     if obstacle:
@@ -103,6 +103,6 @@ def test_smooth_circles_come_to_rest_on_walls_that_bounce(obstacle: bool) -> Non
     row, column = np.divmod(np.arange(400), 20)
     start = np.column_stack((column * 0.5 - 4.75, row * 0.5 + 1))
     world.add(position=start + np.random.default_rng(1).uniform(-0.02, 0.02, (400, 2)), radius=0.22)
-    world.run(seconds=15)
+    world.run(seconds=25)
     assert world.energy().kinetic < 2e-6 * world.mass.sum() * 9.81 * 7
     assert world.overlap().max < 0.01

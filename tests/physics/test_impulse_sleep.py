@@ -204,7 +204,7 @@ def test_threads_saves_and_copies_keep_the_bits(name: str) -> None:
 
 def test_contacts_go_on_until_sleepers_wake() -> None:
     # A ball meets the heap in any substep of a frame: contacts are heard only in what is left of it.
-    law = pv.Collisions(impulses=True, friction=0.3)
+    law = pv.Collisions(friction=0.3)
     room = pv.Box((4.5, 0), (8.5, 20), friction=0.3)
     world = pv.World(boundary=room, collisions=law, sleep=True, events=True, dtype=np.float64)
     world.add(position=[(5 + k, 0.5) for k in range(4)] + [(5.5 + k, 0.5 + 0.75**0.5) for k in range(3)], radius=0.5)
@@ -222,7 +222,7 @@ def test_contacts_go_on_until_sleepers_wake() -> None:
 
 def test_the_weight_of_sleepers_is_reported() -> None:
     # The floor bears m g of eight discs of 2 kg that fall asleep together: to rounding at rest.
-    world = pv.World(boundary=pv.Box((0, 0), (9, 9)), collisions=pv.Collisions(impulses=True), sleep=True, contacts=True)
+    world = pv.World(boundary=pv.Box((0, 0), (9, 9)), collisions=pv.Collisions(), sleep=True, contacts=True)
     world.add(position=[(2 * k + 1, 0.5 + j) for j in range(2) for k in range(4)], radius=0.5, mass=2.0)
     fall_asleep(world, FRAME)
     world.run(seconds=0.5, dt=1 / 240)

@@ -171,7 +171,8 @@ def test_a_squeezed_disc_stays_in_the_room_and_calm() -> None:
     for _ in range(240):
         world.step(DT)
         assert beyond(world) < 1e-6
-        assert np.hypot(*disc.velocity[0]) <= 2 * (1 + 1e-3)  # its coordinates are spaced by 5e-7 m: 2e-4 m/s in a substep
+        # Its coordinates are spaced by 5e-7 m: 2e-4 m/s in a substep. Wall and piston hold it by turns.
+        assert np.hypot(*disc.velocity[0]) <= 2 * (1 + 5e-3)
     assert disc.velocity[0] == pytest.approx([0, 0], abs=1e-6)  # the piston has left
 
 

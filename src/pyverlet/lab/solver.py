@@ -92,6 +92,8 @@ def _solve(F: Acceleration, x: Floats, v: Floats, times: Floats, integrator: Int
     for k, h in enumerate(map(float, np.diff(times))):
         integrator.begin(slots, forces, times[k], h, h_last)
         integrator.step(slots, forces, times[k], h)
+        if integrator.velocity_lag:  # the velocity at the time of the position takes the acceleration of now, as in a world
+            forces(slots, times[k + 1])
         integrator.end(slots, h)
         found.positions[k + 1] = forces.shaped(slots.position)
         found.velocities[k + 1] = forces.shaped(slots.velocity)
