@@ -35,7 +35,7 @@ json.dump(hashes, sys.stdout)
 
 def in_another_process(paths: list[str], threads: int) -> dict[str, str]:
     """Hashes ten frames after what these files hold."""
-    environment = {**os.environ, "NUMBA_NUM_THREADS": "2"}
+    environment = {**os.environ, "PYVERLET_THREADS": "2"}
     command = [sys.executable, "-c", GO_ON, str(threads), *paths]
     run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=600, check=False)
     assert run.returncode == 0, run.stderr

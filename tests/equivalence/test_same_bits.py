@@ -15,7 +15,7 @@ import pyverlet as pv
 from pyverlet.compile import jit
 from pyverlet.ground.constants import DEEP
 
-# Threads of the pool are fixed when Numba starts, so a process of its own gets eight, whatever this machine has.
+# A process of its own gets eight threads, whatever this machine has.
 RUN_WITH_THREADS = """
 import json, sys
 import numpy as np
@@ -50,7 +50,7 @@ def test_threads_do_not_change_a_bit(seconds: float, numbers: list[int], kinds: 
     # The lowest meet the wall after a quarter of a second.
     run = subprocess.run(
         [sys.executable, "-c", RUN_WITH_THREADS, json.dumps([seconds, numbers, kinds])],
-        env={**os.environ, "NUMBA_NUM_THREADS": "8"},
+        env={**os.environ, "PYVERLET_THREADS": "8"},
         capture_output=True,
         text=True,
         check=True,

@@ -181,7 +181,7 @@ json.dump(hashes, sys.stdout)
 def test_gravitation_has_the_same_bits_on_any_number_of_threads() -> None:
     run = subprocess.run(
         [sys.executable, "-c", THREADS, os.path.dirname(os.path.dirname(pv.__file__))],  # noqa: PTH120
-        env={**os.environ, "NUMBA_NUM_THREADS": "8"}, capture_output=True, text=True, check=True, timeout=300,
+        env={**os.environ, "PYVERLET_THREADS": "8"}, capture_output=True, text=True, check=True, timeout=300,
     )  # fmt: skip
     hashes = json.loads(run.stdout)
     assert len(hashes) == 3

@@ -264,7 +264,7 @@ json.dump(hashes, sys.stdout)
 def test_threads_do_not_change_a_bit() -> None:
     run = subprocess.run(
         [sys.executable, "-c", RUN_WITH_THREADS, os.path.dirname(os.path.dirname(pv.__file__))],  # noqa: PTH120
-        env={**os.environ, "NUMBA_NUM_THREADS": "8"}, capture_output=True, text=True, check=True, timeout=300,
+        env={**os.environ, "PYVERLET_THREADS": "8"}, capture_output=True, text=True, check=True, timeout=300,
     )  # fmt: skip
     hashes = json.loads(run.stdout)
     assert len(hashes) == 3

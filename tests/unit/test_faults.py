@@ -135,7 +135,7 @@ def test_no_shared_memory_is_needed(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_one_core(tmp_path: Path) -> None:
     code = "import pyverlet as pv; call(); world = pv.World(); world.add(position=np.zeros((20000, 2))); print(world.threads)"
-    assert said(code, tmp_path, NUMBA_NUM_THREADS="1").split() == [*SAID.split(), "1"]
+    assert said(code, tmp_path, PYVERLET_THREADS="1").split() == [*SAID.split(), "1"]
 
 
 def test_more_threads_than_cores_is_a_sentence() -> None:

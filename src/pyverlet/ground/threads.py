@@ -15,7 +15,7 @@ def max_threads() -> int:
     Raises:
         InputError: it says something else than a whole number of at least 1.
     """
-    said = os.environ.get("PYVERLET_THREADS") or os.environ.get("NUMBA_NUM_THREADS") or ""
+    said = os.environ.get("PYVERLET_THREADS", "")
     if said:
         if not said.isdecimal() or int(said) < 1:
             raise InputError(f"PYVERLET_THREADS is {said!r}; allowed is a whole number of at least 1")
