@@ -288,11 +288,11 @@ def memory(particles: int = 200_000) -> Iterator[Row]:
 
 
 def start() -> Iterator[Row]:
-    """Import, and the second start of a command."""
+    """Import, and a start up to the first frame."""
     for name, code, most in (
         ("import pyverlet", "import pyverlet", 0.6),
         (
-            "second start to first frame",
+            "start to first frame",
             "import pyverlet as pv\nw = pv.scenes.get('cage').world(particles=5000); w.step(1 / 60)",
             2.5,
         ),

@@ -13,7 +13,7 @@ import pytest
 
 import pyverlet as pv
 
-# In a process of its own, with eight threads whatever this machine has.
+# A process of its own gets eight threads, whatever this machine has.
 RUN_WITH_THREADS = """
 import json, sys
 import numpy as np

@@ -210,7 +210,7 @@ LARGEST_PUSH: Final = 0.3
 
 GAS_STEP: Final = 0.1
 """Radii, root mean square, that circles of an elastic gas may move by in a substep without a word: at an area fraction of 0.6 it
-then has 2 % less pressure, at twice that 10 % (docs/physics.md has the table)."""
+then has 2 % less pressure, at twice that 10 % (`pyverlet check pressure` measures it)."""
 
 GAS_FROM: Final = 100
 """Circles that make a gas: the pressure of fewer is a matter of each of them."""

@@ -1,4 +1,4 @@
-"""The books of one frame under the law of impulses: what contacts change is summed by the core, the rest is the integrator's."""
+"""The books of one frame under the contact law: what contacts change is summed by the core, the rest is the integrator's."""
 
 from __future__ import annotations
 

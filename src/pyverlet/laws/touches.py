@@ -1,4 +1,4 @@
-"""Who touched whom in the last frame, where, and how hard: `Touches` keeps what the law of impulses says of it.
+"""Who touched whom in the last frame, where, and how hard: `Touches` keeps what the contact law says of it.
 
 Of circles it tells what each pair has given each other. Of walls and obstacles it tells what all walls, and all obstacles, have
 given each circle: between several it is shared out along the lines of contact.

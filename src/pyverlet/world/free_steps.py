@@ -1,4 +1,4 @@
-"""Substeps of any integrator, in the form in which the law of impulses takes them.
+"""Substeps of any integrator, in the form in which the contact law takes them.
 
 The law works on the mean velocity u of a substep. A step of an integrator from (x, v) to (x*, v*) has u* = (x* - x) / h and
 the mean acceleration a = (v* - v) / h. Contacts that give c h in a substep, as they did in the last, change u by c h / 2, as

@@ -1,4 +1,4 @@
-"""What the compiled core holds of one world under the law of impulses: its arrays, and what contacts remember."""
+"""What the compiled core holds of one world under the contact law: its arrays, and what contacts remember."""
 
 from __future__ import annotations
 

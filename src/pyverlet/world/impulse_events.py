@@ -1,4 +1,4 @@
-"""Who has touched and bounced in a frame of the law of impulses, in the form in which events take it."""
+"""Who has touched and bounced in a frame of the contact law, in the form in which events take it."""
 
 from __future__ import annotations
 

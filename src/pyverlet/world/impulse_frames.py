@@ -64,7 +64,7 @@ NEAR = 0.05
 
 
 class ImpulseFrames:
-    """The law of impulses in one world."""
+    """The contact law in one world."""
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self._dtype = dtype

@@ -1,4 +1,4 @@
-"""Links under the law of impulses: what the engine is given of them, and what they make of a frame."""
+"""Links under the contact law: what the engine is given of them, and what they make of a frame."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What contacts remember from frame to frame under the law of impulses, by the user's index of particles."""
+"""What contacts remember from frame to frame under the contact law, by the user's index of particles."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ MOVING = ("intact", "force", "last")
 """Columns that a frame changes."""
 
 REMEMBERED = "impulse", "load", "pull", "value", "next"
-"""Of the law of impulses: accumulated impulse, N s, its mean as a force, N, what the row measured a substep ago, and what it
+"""Of the contact law: accumulated impulse, N s, its mean as a force, N, what the row measured a substep ago, and what it
 would measure next; two each, for x and y of pins.
 """
 
