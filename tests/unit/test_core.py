@@ -92,7 +92,9 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     used = tools.list_segments(segments, 1.0, 1.0, heads, links)
     tools.covered_by(segments, 1.0, heads, links, where, by)
     found = tools.nearest_bodies(segments, 6, 1.0, 1.0, heads, links, where, np.full(60, 0.3), *row, gap, normal)
-    arrays = (near, pixels, index, distance, nearest, square, heads, links[:used], by, row, gap, normal)
+    absent = np.empty(60, bool)
+    tools.mark_absent(np.arange(0, 180, 3), np.arange(0, 180, 2), absent)
+    arrays = (absent, near, pixels, index, distance, nearest, square, heads, links[:used], by, row, gap, normal)
     return [
         *engine.energies(position, velocity, spin, radius, mass, 0.5, -9.81),
         *engine.momenta(position, velocity, spin, radius, mass),

@@ -11,6 +11,7 @@ from pyverlet.core.obstacle_queries import covered_by, list_segments, nearest_bo
 from pyverlet.core.page_arrays import copy_moving, put_rows, quantize
 from pyverlet.core.queries import at_points, first_on_rays, in_regions, nearest_to
 from pyverlet.core.query_cells import extent, sort_into_cells
+from pyverlet.core.sorted_keys import mark_absent
 
 __all__ = [
     "at_points",
@@ -25,6 +26,7 @@ __all__ = [
     "first_on_rays",
     "in_regions",
     "list_segments",
+    "mark_absent",
     "nearest_bodies",
     "nearest_to",
     "put_rows",

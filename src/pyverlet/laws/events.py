@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.core import unit
 from pyverlet.ground import checks
 from pyverlet.ground.constants import FIRST_OBSTACLE
 from pyverlet.laws.obstacles import Course, Obstacle
@@ -130,7 +131,7 @@ class Events:
         # Those who sleep are not listed, but go on. To sort keys alone takes a third of what it takes to know their order.
         now = np.sort(np.concatenate((told.keys, self._slept, self._sleeping(slots, state))))
         now = now[np.diff(now, prepend=-1) > 0]
-        gone, new = self._touching[~_among(self._touching, now)], now[~_among(now, self._touching)]
+        gone, new = _absent(self._touching, now), _absent(now, self._touching)
         # Bounces: each is a beginning, and but for the last an end; another one, if they touched before, ends what went on.
         again, bounces = _counted(told)
         begun = np.unique(np.concatenate((new, again)))
@@ -274,6 +275,13 @@ def _numbered(keys: Array, state: State) -> Array:
     at_wall = (lower & _SURFACE) != 0
     other = np.where(at_wall, lower, state.number[np.where(at_wall, 0, lower - 1)] + 1)
     return np.asarray((state.number[keys >> 32] << 32) + other)
+
+
+def _absent(keys: Array, others: Array) -> Array:
+    """Those of the keys that are not among the others; both are sorted."""
+    absent = np.empty(len(keys), bool)
+    unit("tools", np.float64).mark_absent(keys, others, absent)
+    return keys[absent]
 
 
 def _among(keys: Array, others: Array) -> Array:

@@ -30,6 +30,7 @@ class Slots:
     """The engine's working copy, in an order of its own: what forces, integrators, contacts and bounds see during a frame.
 
     Attributes:
+        motion: the unit of the core that moves particles, for this dtype.
         real: rounds a number to the dtype; it remembers some, for NumPy takes longer to round one than a kernel to be called.
         reals: the same of several at once.
         particle: (n,) the user's index of the particle in each slot.
@@ -62,6 +63,7 @@ class Slots:
 
     def __init__(self, dtype: np.dtype[Any], *, sleeps: bool = False, events: bool = False) -> None:
         self.dtype, self._sleeps, self._events = dtype, sleeps, events
+        self.motion: Any = core.unit("motion", dtype)
         self.real = lru_cache(64)(dtype.type)
         self.reals = lru_cache(64)(lambda *numbers: tuple(map(dtype.type, numbers)))
         self._kept: dict[str, Array] = {}
@@ -73,11 +75,6 @@ class Slots:
 
     def __len__(self) -> int:
         return len(self.radius)
-
-    @property
-    def motion(self) -> Any:
-        """The unit of the core that moves particles, for this dtype."""
-        return core.unit("motion", self.dtype)
 
     def _resize(self, count: int) -> None:
         """Room for `count` particles: those of `_kept`, as they stood, and behind them the new ones."""

@@ -18,7 +18,7 @@ from pyverlet.laws.impulse_ledger import ImpulsePage
 from pyverlet.laws.integrators import PositionVerlet
 from pyverlet.laws.limiter import fall, watched
 from pyverlet.laws.rooms import Open
-from pyverlet.state.moves import first_non_finite
+from pyverlet.state.moves import advance, first_non_finite
 from pyverlet.world.free_steps import FreeSteps, kicks
 from pyverlet.world.impulse_arrays import ImpulseArrays
 from pyverlet.world.impulse_events import told_of
@@ -156,7 +156,7 @@ class ImpulseFrames:
             elif not alone:
                 self._evaluate(world, step * h, half * h if step else 0.0)
                 # Rounded as the method that keeps u, back by half a substep and on by a whole one: x' = 2 x - x_prev + a h^2.
-                state.velocity -= state.real(h - opening) * state.acceleration
+                advance(state.velocity, state.velocity, state.acceleration, opening - h)
                 opening = h
             done("integrate")
             # The first substep may have a kick of its own; whoever looks or acts in each has a call for each.

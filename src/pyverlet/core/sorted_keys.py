@@ -1,0 +1,24 @@
+# mypy: ignore-errors
+"""Keys of contacts in ascending order, compared with others."""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.arrays import const_integers, octets
+from cython.cimports.libc.stdint import int64_t, uint8_t
+
+
+def mark_absent(keys, others, absent):
+    """absent (n,) bool: which of the keys are not among the others; both ascend."""
+    a: cython.pointer[cython.const[int64_t]] = const_integers(keys)
+    b: cython.pointer[cython.const[int64_t]] = const_integers(others)
+    to: cython.pointer(uint8_t) = octets(absent)
+    count: cython.Py_ssize_t = len(keys)
+    stop: cython.Py_ssize_t = len(others)
+    at: cython.Py_ssize_t = 0
+    k: cython.Py_ssize_t
+    with cython.nogil:
+        for k in range(count):
+            while at < stop and b[at] < a[k]:
+                at += 1
+            to[k] = at == stop or b[at] != a[k]
