@@ -20,12 +20,10 @@ from cython.cimports.libc.math import INFINITY, sqrt
 
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_holds import Mobility, let_go_of_wedged, moved_by
+from pyverlet.core.link_lines import SINGULAR, eliminate_line, substitute_line
 from pyverlet.core.link_shapes import LinkWay, push, way_between
 
 MOST_RELEASES = cython.declare(cython.int, 8)
-SINGULAR = cython.declare(cython.double, 1e-12)
-"""Of what a link adds to its own block: a pivot below is one of a link whose length others have settled."""
-
 WAVES = cython.declare(cython.int, 0)
 CHORDS = cython.declare(cython.int, 1)
 LOST_WAY = cython.declare(cython.int, 2)
@@ -227,6 +225,7 @@ def step_chain(
 ) -> cython.void:
     """One step of Newton's method: lengths after the drift; afterwards (not drifts) their rates. Ropes do not push."""
     r: cython.Py_ssize_t
+    pushes: cython.bint
     tries: cython.int = 0
     for r in range(first, end):
         if drifts:
@@ -237,9 +236,14 @@ def step_chain(
         else:
             aim_at_rest(k, r)
     while True:
-        eliminate(k, first, end, drifts)
         tries += 1
-        if not substitute(k, first, end) or tries > MOST_RELEASES:
+        if how == CHORDS:
+            eliminate_line(k, first, end, drifts)
+            pushes = substitute_line(k, first, end)
+        else:
+            eliminate(k, first, end, drifts)
+            pushes = substitute(k, first, end)
+        if not pushes or tries > MOST_RELEASES:
             break
         if drifts:
             for r in range(first, end):  # what is let go of gives nothing at all

@@ -107,6 +107,8 @@ def let_go_of_wedged(
     k: cython.pointer(Links), i: cython.Py_ssize_t, j: cython.Py_ssize_t, x: cython.double, y: cython.double
 ) -> cython.void:
     """Two particles that surfaces leave no motion along the unit vector (x, y) between them."""
+    if k.held[i] < 0 and k.held[j] < 0:
+        return
     left: cython.double = mobility_along(k, i, x, y, x, y) + mobility_along(k, j, x, y, x, y)
     if left < WEDGED * (k.weight[i] + k.weight[j]):
         k.held[i] = k.held[j] = -1

@@ -304,7 +304,8 @@ def solve_links(w: cython.pointer(Step), again: cython.bint) -> cython.void:
         for c in range(k.colours):
             k.now = k.colours - 1 - c if again else c
             team_stage(w.team, solve_chunk, w, cython.cast(cython.int, k.colour[k.now + 1] - k.colour[k.now]))
-    team_stage(w.team, finish_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
+    if again:
+        team_stage(w.team, finish_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
     for p in range(k.pins):
         finish_pin(k, p)
     team_stage(w.team, put_held_stage, w, blocks_of(k))
