@@ -1,4 +1,4 @@
-"""The ledger under the law of impulses: what contacts take and give, against closed forms."""
+"""The ledger under the contact law: what contacts take and give, against closed forms."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Links under the law of impulses: pendulums, springs, chains and nets against closed forms and conservation laws."""
+"""Links under the contact law: pendulums, springs, chains and nets against closed forms and conservation laws."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Contacts, forces and pressure under the law of impulses: read from the impulses, not found afterwards."""
+"""Contacts, forces and pressure under the contact law: read from the impulses, not found afterwards."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Obstacles and pinned circles under the law of impulses, against closed forms and conservation laws."""
+"""Obstacles and pinned circles under the contact law, against closed forms and conservation laws."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sleep under the law of impulses: what contacts remember is there again when sleepers wake, and nobody meets one as a wall."""
+"""Sleep under the contact law: what contacts remember is there again when sleepers wake, and nobody meets one as a wall."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The law of impulses: frames of any length, heaps at rest, unequal masses, impacts in closed form."""
+"""The contact law: frames of any length, heaps at rest, unequal masses, impacts in closed form."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The house: each module imports only from lower layers, kernels from next to nothing, and `import pyverlet` stays light."""
+"""The house: each module imports only from lower layers, and `import pyverlet` stays light."""
 
 from __future__ import annotations
 
@@ -17,8 +17,6 @@ ROOT = Path(pyverlet.__file__).parent
 LAYERS = (
     "ground",
     "core",
-    "compile",
-    "kernels",
     "state",
     "laws",
     "world",
@@ -86,19 +84,6 @@ def test_nothing_is_imported_in_a_circle() -> None:
 
     for name in graph:
         visit(name, ())
-
-
-@pytest.mark.parametrize("path", sorted((ROOT / "kernels").glob("*.py")), ids=lambda path: path.stem)
-def test_kernels_stand_on_the_compiler_alone(path: Path) -> None:
-    # The cache of compiled kernels is keyed by these sources; one more import and it would miss edits.
-    rooms = {name.split(".")[0] for name in imported(path) if name != "ground.constants"}
-    assert rooms <= {"compile", "kernels"}
-
-
-@pytest.mark.parametrize("path", MODULES, ids=lambda p: p.relative_to(ROOT).as_posix())
-def test_one_room_compiles(path: Path) -> None:
-    if path.relative_to(ROOT) != Path("laws/forces/_native.py"):  # of the user's own functions, where Numba is installed
-        assert "import numba" not in path.read_text(encoding="utf-8") or path.parent.name == "compile"
 
 
 def test_doors_open_only_when_called() -> None:

@@ -21,7 +21,6 @@ from .browser import FLAGS, chromium
 
 CELL = """import pyverlet as pv
 world = pv.scenes.get("cage").world(particles=300)
-pv.warm_up(world)
 pv.widget(world, title="cage", height=420)"""
 
 MARIMO = f"""import marimo

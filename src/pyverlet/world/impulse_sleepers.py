@@ -1,4 +1,4 @@
-"""What contacts of sleepers remember under the law of impulses: set aside while they sleep, and given back when they wake."""
+"""What contacts of sleepers remember under the contact law: set aside while they sleep, and given back when they wake."""
 
 from __future__ import annotations
 
