@@ -114,7 +114,9 @@ def heap(**options: Any) -> pv.World:
 
 
 def rubbing() -> pv.World:
-    return heap(collisions=pv.Collisions(friction=0.5), walls=0.5, ledger=True)
+    world = heap(collisions=pv.Collisions(friction=0.5), walls=0.5, ledger=True)
+    world.velocity[::3, 0] = 0.5
+    return world
 
 
 def told() -> pv.World:

@@ -206,7 +206,6 @@ def test_pins_break_too() -> None:
 # ---- contacts ------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.xfail(reason="of three discs in a row without gravity, contacts leave two overlapped once they have met the third")
 @pytest.mark.parametrize("method", [pv.Fast(), pv.BruteForce()])
 def test_linked_neighbours_need_not_collide(method: Any) -> None:
     for collide in (False, True):
