@@ -23,7 +23,6 @@ from pyverlet.laws.contacts._held_course import HeldCourse
 from pyverlet.laws.contacts.broadphase import Strips
 from pyverlet.laws.contacts.solver import ContactSolver
 from pyverlet.laws.contacts.wide import Wide
-from pyverlet.laws.ledger import Page
 
 Array = NDArray[Any]
 
@@ -62,7 +61,7 @@ class Substeps:
         self._held: Array | None = None
         self._cut = self._place = np.zeros(0, np.int64)
         self._normal = np.empty((2, 0))
-        self._books: Page | None = None
+        self._books: Any = None
         self._rows: Any = None  # forces, as numbers, and the dtype of the table made of them
         self._table: tuple[Array, ...] = ()
         self.parts: list[Any] = []  # what looks at particles before each substep
@@ -86,8 +85,7 @@ class Substeps:
 
     def tells(self, done: Callable[[str], None], mark: Callable[[str], None]) -> bool:
         """Whether who is told of the stages of a frame can be told later: it is but the clock, `mark`, or sums of energies."""
-        self._books = done if isinstance(done, Page) and done.plain else None
-        return self._books is not None or done == mark
+        return done == mark
 
     def open(self, world: Any, contacts: ContactSolver | None, h: float, lag: float) -> bool:
         """Go from before the integration of `substep`, if there are contacts and that may be; else links note where it starts."""

@@ -122,10 +122,10 @@ class World(Measures, Queries, Doors):
         with self._state.turn.frame():
             self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
             self.profile.begin()
-            books = self._open_books(h, by_impulses := self._impulses.takes(self))
+            books = self._open_books() if (by_impulses := self._impulses.takes(self)) else None
             if by_impulses:
                 self._impulses.step(self, dt, books or self.profile.mark)
-            elif not self._frame(h, books or self.profile.mark):
+            elif not self._frame(h, self.profile.mark):
                 self._refuse_non_finite(h)
             self._accept(dt, h, books)
         act_after(self, dt)
@@ -226,7 +226,7 @@ class World(Measures, Queries, Doors):
         """The frame has gone well: what it made of the state is the truth now."""
         self._slots.scatter(self._state, dt)
         if books:
-            books.close(self._spent())
+            books.close(-self._slots.taken)
         self._course.end(dt)
         self._impulses.links.end(self) if self._impulses.steps else self.links.scatter()
         if self._events:
