@@ -98,3 +98,13 @@ def test_events_tell_who_meets_the_walls() -> None:
         begun += [tuple(row) for row in world.events.begin[["a", "b", "wall", "speed"]].tolist()]
         assert len(world.events.end) == 0
     assert begun == [(0, -1, 2, pytest.approx(np.sqrt(2 * G), rel=1e-9))]
+
+
+def test_a_ledger_explains_what_walls_take() -> None:
+    # It falls 1 m and stays: m g H, all of it taken by the impact with e = 0, which such walls do not tell from pushing.
+    world = pv.World(boundary=room("box"), ledger=True, dtype=np.float64)
+    world.add(position=(0, RADIUS + 1.0), radius=RADIUS, mass=2.0)
+    world.run(seconds=3.0)
+    assert world.ledger.restitution == pytest.approx(-2.0 * G, abs=1e-9)
+    assert world.ledger.residual == pytest.approx(0.0, abs=1e-9)
+    assert world.ledger.total == pytest.approx(world.energy().total, abs=1e-9)

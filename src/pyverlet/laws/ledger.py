@@ -58,24 +58,19 @@ class Ledger:
 
 
 class _Instant(NamedTuple):
-    """Energy of the world, J; the part of it that links and forces hold; power of forces without potential by account, W."""
+    """Energy of the world, J; power of forces without potential by account, W."""
 
     energy: float
-    held: float
     power: dict[str, float]
 
 
 class Bookkeeper:
-    """Keeps a ledger: looks at the energy after each integration and after the contacts of each substep.
-
-    What the integration changes is the work of forces, the rest its error; what contacts change is told by their kernels, as far
-    as impacts and friction go, and the rest is restitution where it is a loss, projection where it is a gain.
-    """
+    """Keeps a ledger from frame to frame."""
 
     def __init__(self) -> None:
         self.ledger = Ledger()
         self._energy = 0.0  # at the end of the last frame
-        self._resting = 0.0  # what it lacked then of that between substeps: users see who rests without what carries its weight
+        self._resting = 0.0  # J of friction that velocities shown then held of the last substep
 
     def copy(self) -> Bookkeeper:
         """Another one with the same accounts."""
@@ -85,104 +80,91 @@ class Bookkeeper:
 
 
 class Page:
-    """The books of one frame, to be told of each stage; it passes on what it is told to `done`."""
+    """The books of one frame, to be told of each stage; it passes on what it is told to `done`.
+
+    What contacts change is what the core has noted of them (`core.work`); the work of forces without a potential is summed by the
+    trapezoidal rule; the rest is the integrator's. At the end of a frame velocities hold half of what contacts gave in the last
+    substep, as if evenly: what that is worth is counted when a frame ends, and taken back when the next one begins.
+    """
 
     def __init__(
-        self, books: Bookkeeper, state: Slots, forces: ForceSum, links: Links, t: float, h: float, lag: float,
-        done: Callable[[str], None],
+        self, books: Bookkeeper, state: Slots, forces: ForceSum, links: Links, t: float, done: Callable[[str], None],
     ) -> None:  # fmt: skip
         self._books, self._state, self._links, self._done = books, state, links or None, done
-        self._gravity, self._t, self._h, self._lag = forces.gravity, t, h, lag
+        self._gravity, self._t = forces.gravity, t
         self._holding = [force for force in forces.forces if has_potential(force)]
         self._working = [force for force in forces.forces if not has_potential(force)]
-        self._open = replace(books.ledger)
-        self._contacts, self._resting = 0.0, books._resting
-        self._now = _Instant(0.0, 0.0, {})
-        self._settled = False  # whether positions are final in this substep
-        self._risen = 0.0
+        self._open, self._resting = replace(books.ledger), books._resting
+        self._now = _Instant(0.0, {})
+        self._begun = self._risen = 0.0  # J when the frame began; of those at its end, of who is beyond the seam
+        self._engine: Any = None
+        self._sums = (0.0, 0.0, 0.0, 0.0)  # J by impacts, by friction, by walls, and by all contacts in this frame
 
     def __call__(self, stage: str) -> None:
         self._done(stage)
-        self._book(stage)
-
-    @property
-    def plain(self) -> bool:
-        """Whether energies are all there is to know after each stage."""
-        return not (self._working or self._holding or (self._links and self._links.give))
-
-    def read(self, energies: Any, substep: int, reached: int, *, opens: bool) -> None:
-        """Stages have gone by since the integration of `substep`, with it if it `opens`, up to the end of that before `reached`.
-
-        energies: (substeps, LOOKS) J, as in `kernels.frame.Services`.
-        """
-        page, contacts, now = self._open, self._contacts, self._now.energy
-        for k, (integrated, touched, joined, stilled, pulled) in enumerate(energies[substep:reached].tolist()):
-            if opens or k > 0:
-                self._t += self._h
-                # The first integration gives back what the last frame has left out.
-                page.residual += integrated - now + self._resting
-                contacts -= self._resting
-                self._resting, now = 0.0, integrated
-            if self._links:
-                contacts += touched - now
-                page.links += joined - touched
-                now = joined
-            contacts += stilled - now
-            now = stilled
-            if self._links:
-                page.links += pulled - now
-                now = pulled
-        self._contacts, self._now, self._settled = contacts, _Instant(now, 0.0, {}), True
-
-    def _book(self, stage: str) -> None:
         if stage == "gather":
-            self._state.keep_account()
             self._now = self._look(0.0)
-            risen = self._beyond_seam()
-            self._open.outside += self._now.energy - risen - self._books._energy
+            self._begun, risen = self._now.energy, self._beyond_seam()
+            self._open.outside += self._begun - risen - self._books._energy
             self._open.seam += risen
-        elif stage == "integrate":
-            self._t += self._h
-            self._settled = False
-            before, self._now = self._now, self._look(self._lag)
-            gained = self._now.energy - before.energy
-            for account, power in self._now.power.items():
-                work = 0.5 * self._h * (before.power[account] + power)
-                setattr(self._open, account, getattr(self._open, account) + work)
-                gained -= work
-            # The first integration gives back what the last frame has left out.
-            self._open.residual += gained + self._resting
-            self._contacts -= self._resting
-            self._resting = 0.0
-        elif stage == "links":
-            # Before the contacts they move what they join; after them they are but part of the acceleration.
-            before, self._now = self._now, self._look(self._lag, moved=not self._settled, works=self._settled)
-            self._open.links += self._now.energy - before.energy
-        elif stage == "velocities" or (stage == "contacts" and self._links):
-            self._settled = stage == "velocities"
-            before, self._now = self._now, self._look(self._lag, works=self._settled and not self._links)
-            self._contacts += self._now.energy - before.energy
         elif stage == "finish":
-            # Velocities as users see them: those of circles at rest without what carries their weight.
-            before, self._now = self._now, self._look(0.0)
-            self._resting = self._now.energy - before.energy
-            self._contacts += self._resting
-            self._risen = self._beyond_seam()
+            self._now, self._risen = self._look(0.0, works=False), self._beyond_seam()
+            self._open.residual += self._now.energy - self._begun
         else:
             return
         self._done("ledger")
 
-    def close(self, spent: tuple[float, float, float, float]) -> None:
-        """The frame has gone well; `spent` is what impacts, friction, the energy limiter and the room say they have given, J."""
-        restitution, friction, limiter, walls = spent
-        rest = self._contacts - restitution - friction - limiter - walls
-        self._open.restitution += restitution + min(rest, 0.0)
-        self._open.friction += friction
-        self._open.projection += max(rest, 0.0)
-        self._open.limiter += limiter
-        self._open.seam -= self._risen
-        self._open.walls += walls
-        self._books.ledger, self._books._resting = self._open, self._resting - limiter
+    def begin(self, engine: Any, share: float) -> None:
+        """Substeps begin; of what contacts gave in the last one, velocities hold `share`."""
+        engine.book(True)
+        # Along tangents as the last frame has found it: lists of contacts may be made anew since.
+        self._engine, self._sums = engine, (0.0, -self._resting if share else 0.0, 0.0, -engine.energy_of_last(share)[0])
+
+    def moved(self, lag: float, gave: Any, kick: float) -> None:
+        """A substep is over, and velocities are those of `lag` s ago; contacts gave `gave` (n, 2) m/s in it."""
+        self._t += self._state.h
+        if not self._working:
+            return
+        acceleration = self._state.acceleration.copy()
+        self._state.acceleration += gave * self._state.real(1.0 / kick)
+        self._work(self._power(lag))
+        self._state.acceleration[:] = acceleration
+
+    def _work(self, power: dict[str, float]) -> None:
+        for account, now in power.items():
+            work = 0.5 * self._state.h * (self._now.power[account] + now)
+            setattr(self._open, account, getattr(self._open, account) + work)
+            self._open.residual -= work
+        self._now = self._now._replace(power=power)
+
+    def confined(self, confine: Any, *about: float) -> None:
+        """Let walls that the core does not know confine particles."""
+        before = self._look(about[1], works=False).energy
+        confine(self._state, *about)
+        self._add(0.0, 0.0, 0.0, self._look(about[1], works=False).energy - before)
+
+    def end(self, share: float) -> None:
+        """Substeps are over, and velocities those of now, with `share` of what contacts gave in the last one."""
+        whole, self._resting = self._engine.energy_of_last(share)
+        self._engine.book(False)
+        impacts, friction, walls, places = self._engine.arrays["work"].sum(axis=0).tolist()
+        self._add(impacts, friction + self._resting, walls, float(self._engine.arrays["gained"].sum()) + places + whole)
+
+    def _add(self, *more: float) -> None:
+        self._sums = tuple(a + b for a, b in zip(self._sums, more, strict=True))  # type: ignore[assignment]
+
+    def close(self, limiter: float) -> None:
+        """The frame has gone well; limiter: J that the energy limiter has given, negative."""
+        impacts, friction, walls, contacts = self._sums
+        rest, page = contacts - impacts - friction - walls, self._open
+        page.restitution += impacts + min(rest, 0.0)
+        page.friction += friction
+        page.projection += max(rest, 0.0)
+        page.walls += walls
+        page.limiter += limiter
+        page.residual -= contacts + limiter
+        page.seam -= self._risen
+        self._books.ledger, self._books._resting = page, self._resting
         self._books._energy = self._now.energy - self._risen
 
     def _beyond_seam(self) -> float:
@@ -194,18 +176,17 @@ class Page:
         beyond = s.position[free].astype(float) - s.seam.wrapped(s.position[free])
         return -float(s.mass[free].astype(float) @ (beyond @ g))
 
-    def _look(self, lag: float, *, moved: bool = True, works: bool = True) -> _Instant:
-        """Now. moved: whether positions may have changed since `_now`. works: whether the power of forces is asked for."""
-        s, held = self._state, self._now.held
+    def _look(self, lag: float, *, works: bool = True) -> _Instant:
+        """Now, with velocities that are `lag` seconds behind. works: whether the power of forces is asked for."""
+        s = self._state
         energy: float = s.motion.total_energy(
             s.position, s.velocity, s.acceleration, lag, s.spin, s.radius, s.mass, *self._gravity
         )  # fmt: skip
-        if moved:
-            held = self._links.stored(s) if self._links else 0.0
-            if self._holding:
-                state = s.in_users_order()
-                held += sum(force.potential(state) for force in self._holding)
-        return _Instant(energy + held, held, self._power(lag) if works and self._working else {})
+        held = self._links.energy(s.where()) if self._links and self._links.give else 0.0
+        if self._holding:
+            state = s.in_users_order()
+            held += sum(force.potential(state) for force in self._holding)
+        return _Instant(energy + held, self._power(lag) if works and self._working else {})
 
     def _power(self, lag: float) -> dict[str, float]:
         """Power by account, at velocities of the time of the positions."""

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from pyverlet.core import unit
 from pyverlet.ground.constants import REST_ACCELERATIONS, SURPLUS
 from pyverlet.ground.errors import NonFiniteError
-from pyverlet.laws.impulse_ledger import ImpulsePage
 from pyverlet.laws.integrators import PositionVerlet
+from pyverlet.laws.ledger import Page
 from pyverlet.laws.limiter import fall, watched
 from pyverlet.laws.rooms import Open
 from pyverlet.state.moves import advance, first_non_finite
@@ -138,8 +138,9 @@ class ImpulseFrames:
         frictions = collisions.friction if collisions else 0.0, getattr(world.boundary, "friction", 0.0)
         rough = max(*frictions, state.most_friction, self.held.obstacle_friction) > 0.0
         done("gather")
-        page = done if isinstance(done, ImpulsePage) else None
-        if page:
+        page = done if isinstance(done, Page) else None
+        if page:  # of a world that was loaded the core does not know yet whether it is rough
+            self._set_law(self._strongest(gravity) if alone else forces.strongest, h, h, rough=rough)
             page.begin(engine, half * before / self.held.kick if self.held.kick else 0.0)
         notes = None if world._touches is None else ImpulseNotes(world._touches, engine, state)
         if listens := world._events is not None:
@@ -189,7 +190,7 @@ class ImpulseFrames:
             world._show(step * h, half * h if by_core else 0.0) if step < substeps else None
         self.held.h = h
         if not alone:
-            self._end(world, dt, half * h if by_core else 0.0, own_walls)
+            self._end(world, dt, half * h if by_core else 0.0, own_walls, page)
         engine.show_links(half * h, self.held.kick)
         if (not finite or not alone) and first_non_finite(state) >= 0:
             return False
@@ -287,7 +288,7 @@ class ImpulseFrames:
             forces(state, world.time + since)
         state.velocity[:] = velocity
 
-    def _end(self, world: Any, dt: float, half: float, own_walls: OwnWalls | None) -> None:
+    def _end(self, world: Any, dt: float, half: float, own_walls: OwnWalls | None, page: Page | None) -> None:
         """Velocities that belong to the positions, and the accelerations of now."""
         state, by_contacts = world._slots, self.held.gave / self._dtype.type(self.held.kick)
         if half:
@@ -295,9 +296,7 @@ class ImpulseFrames:
             state.velocity += state.real(half) * (state.acceleration + by_contacts)
             state.spin += self.held.gave_spin * state.real(half / self.held.kick)
             if own_walls:
-                part = state.real(half / self.held.kick)
-                state.velocity += part * own_walls.gave
-                state.spin += part * own_walls.gave_spin
+                own_walls.go_on(state, page, half / self.held.kick)
         state.acceleration += by_contacts
 
     def _moves(self, state: Any, strongest: float) -> bool:

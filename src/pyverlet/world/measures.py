@@ -18,9 +18,8 @@ from pyverlet.laws.collisions import Collisions, Overlap, measure_overlap
 from pyverlet.laws.energy import Energy, energy
 from pyverlet.laws.events import Events, Place
 from pyverlet.laws.forces import ForceSum
-from pyverlet.laws.impulse_ledger import ImpulsePage
 from pyverlet.laws.integrators import Integrator
-from pyverlet.laws.ledger import Bookkeeper, Ledger
+from pyverlet.laws.ledger import Bookkeeper, Ledger, Page
 from pyverlet.laws.obstacles import Course, Obstacle, Obstacles
 from pyverlet.laws.rooms import Boundary
 from pyverlet.laws.touches import Touches
@@ -168,16 +167,11 @@ class Measures(Particles):
         finally:
             self._touches = before
 
-    def _open_books(self, h: float) -> Any:
-        """The books of a frame with steps of h seconds, if there are any."""
-        lag = self.integrator.velocity_lag * h
-        about = self._slots, self._force_sum, self.links, self.time, h, lag, self.profile.mark
-        return self._books and ImpulsePage(self._books, *about)
-
-    def _spent(self) -> tuple[float, float, float, float]:
-        """What impacts, friction, the energy limiter and the room have given in this frame, J, as they have noted."""
-        spent = np.array([column.sum() for column in self._slots.spent.T])  # along the rows it takes NumPy ten times as long
-        return float(spent[0]), float(spent[1]), -self._slots.taken, self._slots.worked
+    def _open_books(self) -> Page | None:
+        """The books of a frame, if there are any."""
+        if self._books is None:
+            return None
+        return Page(self._books, self._slots, self._force_sum, self.links, self.time, self.profile.mark)
 
     def momentum(self) -> Array:
         """(2,) sum of m v over all free particles, kg m/s."""

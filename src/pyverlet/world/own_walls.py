@@ -36,3 +36,15 @@ class OwnWalls:
         others = np.hypot(*self.gave.T) > about[2]
         others |= self._room.facing(state.position[:1]) is None
         self.gave[others] = self.gave_spin[others] = 0
+
+    def go_on(self, state: Slots, page: Any, part: float) -> None:
+        """The frame ends: of what was given in the last substep, `part` is still to come."""
+
+        def give(state: Slots, part: float, lag: float) -> None:
+            state.velocity += state.real(part) * self.gave
+            state.spin += state.real(part) * self.gave_spin
+
+        if page:
+            page.confined(give, part, 0.0)
+        else:
+            give(state, part, 0.0)

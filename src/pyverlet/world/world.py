@@ -116,7 +116,7 @@ class World(Measures, Queries, Doors):
         with self._state.turn.frame():
             self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
             self.profile.begin()
-            books = self._open_books(h)
+            books = self._open_books()
             self._impulses.step(self, dt, books or self.profile.mark)
             self._accept(dt, h, books)
         act_after(self, dt)
@@ -144,7 +144,7 @@ class World(Measures, Queries, Doors):
         """The frame has gone well: what it made of the state is the truth now."""
         self._slots.scatter(self._state, dt)
         if books:
-            books.close(self._spent())
+            books.close(-self._slots.taken)
         self._course.end(dt)
         self._impulses.links.end(self)
         if self._events:
