@@ -34,7 +34,7 @@ NO_WAY = cython.declare(real, 1e-12 if cython.sizeof(real) == 8 else 1e-5)
 """Of the contact distance: less is rounding of places."""
 
 SLOW = cython.declare(real, 0.1)
-"""Of the speed at which springs would push out what overlaps."""
+"""Of the speed at which springs would push out what overlaps, where nothing else brings such pairs together again."""
 
 MOST_PASSES = cython.declare(cython.int, 100)
 """Over a group of cell rows, until no pair in it bounces any more: a row of discs that touch needs one for each of them."""
@@ -162,7 +162,7 @@ def solve(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint
             apart: lanes = before - (speed - depth * spread(1 / w.h))
             after = larger(choose(above(depth, zero), inside, apart), zero)
             # What parts without load is left alone, unless only by rounding, or so slowly that it would overlap for long.
-            parts: lanes = larger(spread(NO_WAY / w.h) * load(w.reach, k * w.sized), spread(SLOW) * -bias)
+            parts: lanes = larger(spread(NO_WAY / w.h) * load(w.reach, k * w.sized), spread(SLOW * w.restless) * -bias)
             after = choose(loaded, after, choose(above(speed, parts), zero, after))
             fast: mask = fast_ones(w, k, speed, depth, nx, ny)
             if any_lane(fast):

@@ -3,8 +3,9 @@
 Pushing circles apart lifts them and throws them: in a crash that a substep sees as deep overlap, and where circles grow that were
 added on top of each other. So the energy at the end of a frame is compared with that at its start. What it has gained beyond
 SURPLUS of the world's scale is taken back, cluster by cluster, in proportion to what each has gained, never more than that. A
-cluster is what hangs together by contacts in this frame, and by links. What it has gained is its kinetic energy and that of its
-links, less the work of gravity and of the forces with a potential, by the trapezoidal rule: exact for springs. In this order:
+cluster is what hangs together by contacts in this frame, by links, and by forces that add up to nothing, such as gravitation.
+What it has gained is its kinetic energy and that of its links, less the work of gravity and of the forces with a potential, by
+the trapezoidal rule: exact for springs. In this order:
 
 1. The velocities within the cluster, beside those with which it moves and turns as a whole: that keeps its momentum and its
    angular momentum. Kinetic energy goes with the square, so all are multiplied by sqrt(1 - taken / energy).
@@ -231,6 +232,10 @@ class Watch:
         slots.motion.join_near_pairs(*bodies, listed, SLEEP_NEAR, root)
         if self._links:
             slots.motion.join_rows(slots.slots_of(self._links.joined()), slots.inverse_mass, root)
+        for force in self._kept:
+            if among := getattr(force, "among", None):
+                members = among(slots)[slots.inverse_mass[among(slots)] > 0].astype(np.int32)
+                slots.motion.join_rows(np.column_stack((members, np.roll(members, 1))), slots.inverse_mass, root)
         slots.motion.settle(root)
         return root
 

@@ -39,7 +39,7 @@ STIFFNESS = 0.3125
 STIFFEST = 1.3
 """The same for a while after substeps have become longer."""
 
-STIFFENING = 0.4
+STIFFENING, STIFFENING_AT_REST = 0.4, 0.1
 """Octaves a second by which that frequency may rise: at once, what lies on soft contacts would be thrown up."""
 
 SOFTENING, UNEQUAL_SOFTENING = 4.0, 1.0
@@ -51,7 +51,7 @@ MOVING = 0.1
 DAMPING = 15.0
 """Damping ratio of the springs."""
 
-PUSH_OUT = 15.0
+PUSH_OUT = 8.0
 """Fastest pushing out of overlaps, in mean radii a second."""
 
 RELAXING_SWEEPS = 2
@@ -307,15 +307,17 @@ class ImpulseFrames:
         return bool(motion > 0.5 * MOVING**2 * strongest * self.held.mean_radius * state.total_mass)
 
     def _stiffen(self, state: Any, h: float, dt: float, strongest: float) -> None:
-        best = STIFFNESS / h
-        self.held.finer = self.held.finer + dt if best > self.held.hertz else 0.0
-        if not self.held.hertz:
+        """Let the frequency of the springs of contacts follow the length of substeps."""
+        best, hertz = STIFFNESS / h, self.held.hertz
+        self.held.finer = self.held.finer + dt if best > hertz else 0.0
+        if not hertz:
             self.held.hertz = best
-        elif best < self.held.hertz:
+        elif best < hertz:
             pace = UNEQUAL_SOFTENING if self.held.unequal else SOFTENING if self._moves(state, strongest) else 0.0
-            self.held.hertz = min(max(best, self.held.hertz * 2.0 ** (-pace * dt)), STIFFEST / h)
+            self.held.hertz = min(max(best, hertz * 2.0 ** (-pace * dt)), STIFFEST / h)
         elif self.held.finer > 0.5:
-            self.held.hertz = min(best, self.held.hertz * 2.0 ** (STIFFENING * dt))
+            pace = STIFFENING if self._moves(state, strongest) else STIFFENING_AT_REST
+            self.held.hertz = min(best, hertz * 2.0 ** (pace * dt))
 
     def _set_law(self, strongest: float, h: float, kick: float, *, rough: bool) -> None:
         omega = 2.0 * np.pi * self.held.hertz

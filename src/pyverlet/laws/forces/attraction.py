@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pyverlet.core import unit
 from pyverlet.ground import checks
@@ -65,10 +67,13 @@ class Gravitation(Shown):
         self.strength = checks.number("strength", strength)
         self.softening = checks.number("softening", softening, least=0.0)
 
+    def among(self, state: Slots) -> NDArray[Any]:
+        """Slots of those whose forces on each other add up to nothing."""
+        return np.asarray(state.slots_of(np.arange(len(state)) if self.group is None else self.group.index))
+
     def apply(self, state: Slots, t: float) -> None:
-        members = np.arange(len(state)) if self.group is None else self.group.index
         state.motion.gravitate(
-            state.force, state.position, state.mass, state.slots_of(members), self.strength, state.real(self.softening),
+            state.force, state.position, state.mass, self.among(state), self.strength, state.real(self.softening),
             *state.seam.period,
         )  # fmt: skip
 
