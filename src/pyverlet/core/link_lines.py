@@ -18,7 +18,9 @@ SINGULAR = cython.declare(cython.double, 1e-12)
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def eliminate_line(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, softly: cython.bint) -> cython.void:
+def eliminate_line(
+    k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, softly: cython.bint
+) -> cython.void:
     """Down the chain: `answer` of each row without what follows, and the share of the one that follows in it, as `inverse`."""
     r: cython.Py_ssize_t
     answer: cython.double = 0
