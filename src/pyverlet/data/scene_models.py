@@ -136,7 +136,7 @@ class Collisions(Part):
     restitution: Annotated[float, Field(ge=0, le=1)] = 0.0
     friction: Annotated[float, Field(ge=0)] = 0.0
     method: Method = Field(default_factory=lambda: MODELS["Fast"](type="Fast"))
-    impulses: bool | None = False
+    impulses: bool | None = True
 
 
 # ---- groups ------------------------------------------------------------------------------------------------------------
