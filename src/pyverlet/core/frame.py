@@ -207,6 +207,7 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     """One substep; returns whether particles may leave where the list of pairs is good in the next one."""
     b: cython.Py_ssize_t
     sweep: cython.int
+    _: cython.int
     most: real = 0
     stale: cython.bint = False
     team_stage(w.team, kick_stage, w, blocks)
@@ -232,7 +233,7 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
         if surfaces:
             team_stage(w.team, hold_on_stage, w, blocks)
         solve_links(w, False)
-        for sweep in range(1, ROUGH_ROUNDS if w.rough else ROUNDS):
+        for _ in range(1, ROUGH_ROUNDS if w.rough else ROUNDS):
             each_group(w, solve_stage)
             bounce_on(w)
             if surfaces:
