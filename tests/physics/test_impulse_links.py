@@ -61,7 +61,8 @@ def test_a_pendulum_keeps_its_energy_and_length(dtype: Any, steady: bool) -> Non
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("steady", [True, False])
 def test_a_damped_spring_follows_its_closed_form(dtype: Any, steady: bool) -> None:
-    # x = A exp(-d t) (cos w t + d / w sin w t), d = c / (2 m*), w^2 = k / m* - d^2, m* = 1/2 kg; (w h)^2 / 12 w t = 7e-4.
+    # x = A exp(-d t) (cos w t + d / w sin w t), d = c / (2 m*), w^2 = k / m* - d^2, m* = 1/2 kg. The method is of fourth
+    # order in periods, of second order in damping: d h w h w t = 2e-4 at the longest substep.
     world = made(dtype=dtype, gravity=(0, 0))
     group = world.add(position=np.array([[0, 0], [1.1, 0]]), radius=0.02, mass=1.0)
     stiffness, damping = 0.5 * (2 * np.pi) ** 2, 0.1
@@ -71,7 +72,7 @@ def test_a_damped_spring_follows_its_closed_form(dtype: Any, steady: bool) -> No
         world.step(dt)
         time += dt
         x = 0.1 * np.exp(-damping * time) * (np.cos(omega * time) + damping / omega * np.sin(omega * time))
-        assert group.position[1, 0] - group.position[0, 0] - 1 == pytest.approx(x, abs=1e-3 * 0.1)
+        assert group.position[1, 0] - group.position[0, 0] - 1 == pytest.approx(x, abs=2e-4 * 0.1)
 
 
 def test_a_double_pendulum_keeps_its_energy() -> None:
@@ -393,7 +394,7 @@ def test_removed_particles_and_links_leave_the_rest_as_it_is() -> None:
 
 def test_any_number_of_threads_has_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
     hashes = set()
-    for threads in (1, 2, 3):
+    for threads in (1, 2, 3, 8):
         monkeypatch.setattr(Team, "size", lambda team, most, frame_ms, threads=threads: threads)
         world = made(boundary=pv.Box((0, 0), (30, 40)), dtype=np.float32)
         y, x = np.mgrid[0:30, 0:25]

@@ -6,7 +6,7 @@ Per substep of length h:
  2. warm start: so do contacts, along the normals of now.
  3. surfaces: what comes fast bounces, the rest is held.
  4. contacts: one sweep over the pairs, with springs; pairs that meet fast bounce, in closed form.
- 5. drift: surfaces once more, then x += v h. With links: surfaces, links, and all that again, links the other way round.
+ 5. drift: surfaces once more, then x += v h. With links: surfaces, links, and all that again.
  6. relax: sweeps without the springs.
  7. remember what contacts gave.
 
@@ -35,6 +35,10 @@ from pyverlet.core.surface_sides import keep_sides
 from pyverlet.core.surfaces import bounce_surfaces
 from pyverlet.core.warm_start import warm_start
 from pyverlet.core.work import book_drift, book_end, book_grips, book_rubbing, book_start
+
+ROUNDS = cython.declare(cython.int, 2)
+ROUGH_ROUNDS = cython.declare(cython.int, 4)
+"""Over contacts and links, one after the other: friction takes longer."""
 
 MOST_ROUNDS = cython.declare(cython.int, 100)  # over the groups in which pairs have bounced
 
@@ -203,6 +207,7 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     """One substep; returns whether particles may leave where the list of pairs is good in the next one."""
     b: cython.Py_ssize_t
     sweep: cython.int
+    _: cython.int
     most: real = 0
     stale: cython.bint = False
     team_stage(w.team, kick_stage, w, blocks)
@@ -228,11 +233,12 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
         if surfaces:
             team_stage(w.team, hold_on_stage, w, blocks)
         solve_links(w, False)
-        each_group(w, solve_stage)
-        bounce_on(w)
-        if surfaces:
-            team_stage(w.team, hold_on_stage, w, blocks)
-        solve_links(w, True)
+        for _ in range(1, ROUGH_ROUNDS if w.rough else ROUNDS):
+            each_group(w, solve_stage)
+            bounce_on(w)
+            if surfaces:
+                team_stage(w.team, hold_on_stage, w, blocks)
+            solve_links(w, True)
     team_stage(w.team, drift_stage, w, blocks)
     for sweep in range(w.relaxes):
         if sweep > 0 and surfaces:

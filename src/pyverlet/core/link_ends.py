@@ -10,7 +10,8 @@ from cython.cimports.libc.math import INFINITY, sqrt
 from pyverlet.core.link_arrays import DISTANCE, Links
 from pyverlet.core.link_blocks import push_row, solve_block
 from pyverlet.core.link_chains import give
-from pyverlet.core.link_shapes import LinkWay, measure_row, way_between
+from pyverlet.core.link_shapes import LinkWay, measure_row, mobility, way_between
+from pyverlet.core.link_softness import force_gained
 from pyverlet.core.step import Step
 
 SWEEPS = cython.declare(cython.int, 3)
@@ -19,13 +20,17 @@ SWEEPS = cython.declare(cython.int, 3)
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def turn_impulses(k: cython.pointer(Links), share: cython.double) -> cython.void:
-    """So much of what rows gave in the last substep was along the directions at its start: it is along those of now."""
+def turn_impulses(k: cython.pointer(Links), share: cython.double, half: cython.double) -> cython.void:
+    """So much of what rows gave in the last substep was along the directions at its start: it is along those of now, and springs
+    have changed their force since. half: seconds for which it counts.
+    """
     r: cython.Py_ssize_t
     for r in range(k.rows):
-        measure_row(k, r, 0)
+        now: cython.double = measure_row(k, r, 0)
         k.target[r] = k.impulse[r]
         given: cython.double = share * k.impulse[r]
+        if k.impulse[r] != 0:
+            given += half * force_gained(k, k.stiffness[r], mobility(k, r), k.value[r], now)
         if k.kind[r] == DISTANCE:
             d: LinkWay = way_between(k, k.node[k.first[r]], k.node[k.first[r] + 1], 0)
             length: cython.double = sqrt(d.x * d.x + d.y * d.y)
@@ -35,7 +40,7 @@ def turn_impulses(k: cython.pointer(Links), share: cython.double) -> cython.void
             if k.intact[r]:
                 give(k, r, given * x - share * k.given[2 * r], given * y - share * k.given[2 * r + 1])
         elif k.intact[r]:
-            push_row(k, r, -given, k.gradient)
+            push_row(k, r, -share * k.impulse[r], k.gradient)
             push_row(k, r, given, k.slope)
 
 
@@ -78,7 +83,7 @@ def show_links(w: cython.pointer(Step), half: cython.double, kick: cython.double
             k.u[2 * i + axis] = w.velocity[2 * k.slot[i] + axis]
         k.own[i] = k.weight[i] = w.inverse_mass[k.slot[i]]
         k.held[i] = -1
-    turn_impulses(k, half / kick)
+    turn_impulses(k, half / kick, half)
     project(w)
     for i in range(k.count):
         for axis in range(2):
