@@ -248,9 +248,8 @@ def raise_of(chance: Chance, dtype: Any) -> tuple[Any, ...]:
 @kernel
 def take_energy(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     root = np.arange(N) // 3 * 3
-    hits, inside = chance.normal(0, 1, N).astype(dtype), chance.uniform(0, 1, N) < 0.5
-    about = root, rows(chance, float), hits, order(chance), inside, chance.normal(0, 1, N)
-    work = chance.normal(0, 1, N), rows(chance, float), np.empty((N, 2)), np.empty(N)
+    about = root, rows(chance, float), order(chance), chance.normal(0, 1, N)
+    work = chance.normal(0, 1, N), rows(chance, float), np.empty((N, 2))
     return bodies(chance, dtype), bodies(chance, dtype), about, LIMITS, *work
 
 

@@ -141,8 +141,8 @@ def test_an_elastic_gas_in_float32_is_neither_heated_nor_cooled(radius: float, h
     # 3 <v^2>^2: that is 4 u^2 T^2. Those who meet are faster than others, which makes at most twice as much of it. If the errors
     # prefer no sign, N impacts of n circles, whose energy is n T, change it by 3 u sqrt(N) / n of it, a random walk. Normals
     # that are rounded to float32 change it by some ten times as much, always one way. The farther circles go before the list is
-    # made anew, the coarser it is rounded how far they have come: that, too, once fed them. Where masses are unequal it loses up to
-    # four times as much, always one way.
+    # made anew, the coarser it is rounded how far they have come. Where masses are unequal it loses up to four times as
+    # much, always one way.
     n = 300
     cage = radius * np.sqrt(n / 0.3)
     axis = np.arange(-cage, cage, 2.6 * radius)

@@ -270,6 +270,17 @@ def test_without_gravity_what_there_is_is_the_scale(taken: list[float]) -> None:
     assert taken
 
 
+def test_what_a_method_gains_by_itself_is_not_taken(taken: list[float]) -> None:
+    # x' = 2 x - x_prev + a h^2 keeps x - x_prev when h is halved: the velocity doubles. TimeCorrectedVerlet keeps the velocity.
+    for integrator, faster in ((pv.PositionVerlet(), 2.0), (pv.integrators.TimeCorrectedVerlet(), 1.0)):
+        world = pv.World(gravity=(0, 0), integrator=integrator, dtype=np.float64)
+        balls = world.add(position=[(0, 0), (9, 0)], velocity=[(1, 0), (0, 1)], radius=0.5)
+        world.step(1 / 60)
+        world.step(1 / 120)
+        assert balls.velocity.tolist() == [[faster, 0], [0, faster]]
+    assert not taken
+
+
 def test_links_alone_are_not_watched(monkeypatch: pytest.MonkeyPatch) -> None:
     # They keep their energy, and show some that they never give: a limiter would take that from the motion.
     monkeypatch.setattr(limiter.Watch, "close", lambda *about: pytest.fail("watched"))

@@ -170,7 +170,8 @@ def from_table(header: Header, arrays: dict[str, Array], *, exact: bool = False,
             f"{header['made_by']['pyverlet']}) than these ({sources_hash()}); allowed is exact=False"
         )
     settings = _with_arrays(header["world"], arrays)
-    moving = Parts(memory.unpack(header["facts"]), _moving(arrays))
+    known = {name: array for name, array in _moving(arrays).items() if name not in apart.RETIRED}
+    moving = Parts(memory.unpack(header["facts"]), known)
     if unknown := set(moving.arrays) - set(apart.FIELDS):
         raise InputError(f"there is an array {min(unknown)!r}; allowed are those pyverlet knows")
     with ThreadPoolExecutor(1) as beside:

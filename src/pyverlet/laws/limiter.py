@@ -1,7 +1,7 @@
 """Contacts and links give no energy: what a world has gained too much in a frame is taken back from those who have it.
 
-Pushing circles apart lifts them and throws them: in a crash that a substep sees as deep overlap, and where circles grow that were
-added on top of each other. So the energy at the end of a frame is compared with that at its start. What it has gained beyond
+Pushing circles apart lifts them and throws them: in a crash that a substep sees as deep overlap, and where circles were added on
+top of each other. So the energy at the end of a frame is compared with that at its start. What it has gained beyond
 SURPLUS of the world's scale is taken back, cluster by cluster, in proportion to what each has gained, never more than that. A
 cluster is what hangs together by contacts in this frame, and by links. What it has gained is its kinetic energy and that of its
 links, less the work of gravity and of the forces with a potential, by the trapezoidal rule: exact for springs. In this order:
@@ -12,8 +12,7 @@ links, less the work of gravity and of the forces with a potential, by the trape
    along what has changed its momentum beside gravity: there it was not alone, for nothing thrusts itself off nothing. A smooth
    floor leaves the momentum along it as it is. Forces that depend on the place leave none: then it is all of it. So it is, too,
    under gravity, where what follows is not enough: in a crowd that is wedged in, or among masses of 1:1000 in free fall.
-3. What circles have been raised against these forces in this frame: they are lowered by a part of that, and have grown by that
-   part less. Not those that a wall has raised because they were partly beyond it: it would do so again.
+3. What circles have been raised against these forces in this frame: they are lowered by a part of that.
 4. Their way. Where lowering pushes circles into walls, or forces hold them elsewhere, it may not do: those that could not give
    enough of their motion have come only a part of the way that they have come in this frame. If they are where they were and have
    gained all the same, it is what they move with as a whole: that is taken, too.
@@ -24,6 +23,7 @@ that has raised is no gain.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import copy
 from typing import Any
 
@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.core import unit
-from pyverlet.ground.constants import ONE_THREAD_BELOW, SLEEP_NEAR, SURPLUS
+from pyverlet.ground.constants import SLEEP_NEAR, SURPLUS
 from pyverlet.laws.forces import Drag, ForceSum, has_potential
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course
@@ -43,18 +43,12 @@ Array = NDArray[Any]
 Listed = tuple[Array, Array, Array, Array]
 Extent = tuple[float, float, float, float]
 
-_NOBODY: Listed = (np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.uint32), np.zeros(0, np.uint32))
-"""No pairs."""
-
 _ROUNDED = 1e-5
 """Of what momenta come to without their signs: less is rounding, in float32 by eight substeps of a thousand circles or so. Beside
 it what contacts make of rounded places: velocities, over h."""
 
 _NEARLY = 1.01
 """Times what may be gained: more is too much, which lowering could not take back."""
-
-_INSIDE = 0.99
-"""Of its radius: a circle was inside the room if the point so far below its centre was, the way gravity points."""
 
 
 class Watch:
@@ -64,7 +58,7 @@ class Watch:
         self._start, self._forces, self._links, self._room, self._course, self._dt = start, forces, links, room, course, dt
         self._gravity = forces.gravity
         self._kept: list[Any] = [force for force in forces.forces if has_potential(force)] if forces.forces else []
-        self._plain = len(start) < ONE_THREAD_BELOW and not (self._kept or links.give)
+        self._plain = not (self._kept or links.give)
         # What links hold is not known any more when the frame is over.
         by_forces, self._by_links = (0.0, 0.0) if self._plain else self._holds(start)
         # A potential is known but for a constant, so that under gravity, which has a scale, it is none.
@@ -93,26 +87,17 @@ class Watch:
         start = (then.position, then.velocity, then.spin, then.radius, then.mass)
         return float(now.motion.energy_gained(start, motion, *self._gravity))
 
-    def close(self, slots: Slots, contacts: Any) -> bool:
-        """The frame is over: take back what has been gained too much.
-
-        Returns whether all positions and velocities are known to be finite: so they are if their energy is.
-        """
-        finite = False
-        if self._forces.gravity == self._gravity:  # else it has turned on the way, and drove the world
+    def close(self, slots: Slots, listed: Callable[[], Listed]) -> None:
+        """The frame is over: take back what has been gained too much. listed: the pairs of the list, as first, count, i, j."""
+        gained = self._gained(slots)
+        room = SURPLUS * fall(slots.total_mass, self._gravity, self._room.extent())
+        surplus = self._surplus(gained, room, slots)
+        if surplus > 0.0 and self._pardon_mislaid(slots):
             gained = self._gained(slots)
-            finite = not slots.pins and abs(gained) < np.inf  # what is pinned has none
-            room = SURPLUS * fall(slots.total_mass, self._gravity, self._room.extent())
             surplus = self._surplus(gained, room, slots)
-            if surplus > 0.0 and self._pardon_mislaid(slots):
-                gained = self._gained(slots)
-                surplus = self._surplus(gained, room, slots)
-            if surplus > 0.0:
-                finite = False
-                raised = self.take_back(slots, contacts.listed() if contacts else _NOBODY, surplus)
-                left = self._put_back(slots, raised, gained - surplus)
-                slots.taken = gained - left
-        return finite
+        if surplus > 0.0:
+            raised = self.take_back(slots, listed(), surplus)
+            slots.taken = gained - self._put_back(slots, raised, gained - surplus)
 
     def _surplus(self, gained: float, room: float, slots: Slots) -> float:
         """What of this gain is too much, J. room: what a fall leaves room for."""
@@ -146,15 +131,11 @@ class Watch:
             surplus, self._dt, *self._gravity, *slots.seam.period, bool(self._forces.forces), bool(self._kept), _ROUNDED,
             float(np.finfo(slots.dtype).eps) / (slots.h * _ROUNDED),
         )  # fmt: skip
-        lift, part, moved, lower = np.empty(len(slots)), np.empty(len(slots)), *np.empty((2, len(slots), 2))
+        lift, moved, lower = np.empty(len(slots)), *np.empty((2, len(slots), 2))
         slots.motion.raise_of(then, now, slots.particle, before, pull, limits, lift, moved)
         share = self._links.gains(start.position, slots.where()) if self._links else np.zeros(0)
-        root, inside = self._clusters(slots, listed, moved), self._was_inside()
-        about = root, pull, slots.hits, slots.particle, inside, share
-        more = slots.motion.take_energy(then, now, about, limits, lift, moved, lower, part)
-        if slots.size is not slots.radius:
-            slots.grown -= (part * (slots.grown - start.grown[slots.particle])).astype(slots.dtype)
-            slots.resize()
+        about = self._clusters(slots, listed, moved), pull, slots.particle, share
+        more = slots.motion.take_energy(then, now, about, limits, lift, moved, lower)
         slots.position[:] = self._within_room(slots.position.astype(float), lower, slots.radius)
         return np.asarray(more)
 
@@ -167,13 +148,11 @@ class Watch:
         if left <= allowed * _NEARLY or not raised.any():
             return left
         start, order = self._start, slots.particle[raised]
-        begin, small = start.position[order].astype(float), start.grown[order]
-        way, growth = slots.seam.nearest(slots.position[raised].astype(float) - begin), slots.grown[raised] - small
+        begin = start.position[order].astype(float)
+        way = slots.seam.nearest(slots.position[raised].astype(float) - begin)
 
         def come(part: float) -> float:
             slots.position[raised] = begin + part * way
-            slots.grown[raised] = small + slots.real(part) * growth
-            slots.resize()
             return self._gained(slots)
 
         none = come(0.0)
@@ -218,16 +197,10 @@ class Watch:
             lower = lower + np.maximum(np.minimum(radius, before) - gap, 0)[:, None] * normal
         return lower
 
-    def _was_inside(self) -> Array:
-        """(n,) bool, who was above the wall when the frame began, in the user's order."""
-        g, start = np.array(self._forces.gravity), self._start
-        down = g / max(float(np.hypot(*g)), 1e-300)
-        return ~self._room.outside(start.position.astype(float) + _INSIDE * start.radius[:, None] * down)
-
     def _clusters(self, slots: Slots, listed: Listed, moved: Array) -> Array:
         """(n,) lowest slot of the cluster that each slot belongs to."""
         root = np.arange(len(slots))
-        bodies = (slots.position, moved.astype(slots.dtype), slots.size, *slots.seam.period, slots.inverse_mass)
+        bodies = (slots.position, moved.astype(slots.dtype), slots.radius, *slots.seam.period, slots.inverse_mass)
         slots.motion.join_near_pairs(*bodies, listed, SLEEP_NEAR, root)
         if self._links:
             slots.motion.join_rows(slots.slots_of(self._links.joined()), slots.inverse_mass, root)
@@ -249,15 +222,14 @@ def _rounding(slots: Slots) -> float:
     return 0.5 * slots.total_mass * speed * speed
 
 
-def undriven(world: Any, h: float, h_last: float | None) -> bool:
+def undriven(world: Any) -> bool:
     """Whether nothing but contacts and links could raise the energy of a world.
 
     Forces have a potential or are drag, which wind is not, no obstacle, wall or pinned circle moves, gravity does not point along
-    a period, and the integrator does not raise it either: of order 2 or more, and with a constant step, which `PositionVerlet`
-    needs.
+    a period, and the integrator does not raise it either: it is of order 2 or more.
     """
     room = world.boundary
-    if world.integrator.order < 2 or h_last not in (None, h) or room.moves:
+    if world.integrator.order < 2 or room.moves:
         return False
     if world._slots.pins and pinned_move(world._slots):
         return False
@@ -269,10 +241,10 @@ def undriven(world: Any, h: float, h_last: float | None) -> bool:
     return not world._course.drives
 
 
-def watched(world: Any, h: float, h_last: float | None) -> Watch | None:
+def watched(world: Any, dt: float) -> Watch | None:
     """What looks after the energy of a frame, if nothing but contacts, links and obstacles could raise it."""
     about = world._state, world._force_sum, world.links, world.boundary, world._course
-    return Watch(*about, world.substeps * h) if undriven(world, h, h_last) else None
+    return Watch(*about, dt) if undriven(world) else None
 
 
 def pinned_move(state: State | Slots) -> bool:

@@ -87,7 +87,7 @@ class Sleep:
         if self._laws is None or not tired:
             return False
         root = np.empty(len(slots), np.int64)
-        bodies = (slots.position, slots.size, *slots.seam.period, slots.inverse_mass, slots.calm)
+        bodies = (slots.position, slots.radius, *slots.seam.period, slots.inverse_mass, slots.calm)
         slots.motion.find_islands(*bodies, pairs, SLEEP_NEAR, SLEEP_AFTER_S, root)
         sleeper = root >= 0
         if not sleeper.any():

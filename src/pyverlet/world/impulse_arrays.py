@@ -254,8 +254,6 @@ class ImpulseArrays:
         """What circles are made of has changed."""
         state = world._slots
         self._made, self._collisions = state.given, world.collisions
-        state.grown.fill(1)
-        state.resize()
         self.free = bool((state.inverse_mass > 0).any())
         self.largest = float(state.radius.max(initial=0.0))
         materials = materials_of(state, world._state.radius, world.collisions)

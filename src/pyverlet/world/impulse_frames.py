@@ -124,14 +124,16 @@ class ImpulseFrames:
         before = self.held.h if self.held.kick else 0.0
         own_walls = None if knows(world.boundary) else OwnWalls(world.boundary)
         alone = by_core and not (forces.forces or own_walls)
-        limited = bool(collisions and len(world) > 1) or bool(world.obstacles)
-        watch = watched(world, dt / world.substeps, None) if limited and (forces.forces or world.links) else None
+        keeps_way = isinstance(world.integrator, PositionVerlet) and before not in (0.0, h)
+        # Where the method raises the energy by itself, nothing can be said of contacts.
+        limited = (bool(collisions and len(world) > 1) or bool(world.obstacles)) and not keeps_way
+        watch = watched(world, dt) if limited and (forces.forces or world.links) else None
         gravity = world.gravity
         state.h = h
         self.held.load(world, dt)
         self._stiffen(state, h, dt, self._strongest(gravity) if alone else forces.strongest)
         self.links.load(world, self.held.engine)
-        if type(world.integrator) is PositionVerlet and before not in (0.0, h):
+        if keeps_way:
             self._keep_way(state, before, h)
         if getattr(world.integrator, "naive_start", False):
             self._start_naively(world, (1.0 - half) * h)
@@ -240,9 +242,9 @@ class ImpulseFrames:
                 (state.position, state.velocity, state.spin, state.radius, state.mass), gx, gy,
             )  # fmt: skip
             if gained > SURPLUS * fall(state.total_mass, world.gravity, world.boundary.extent()):
-                watch = watched(world, dt / world.substeps, None)
+                watch = watched(world, dt)
         if watch is not None:
-            watch.close(state, self)
+            watch.close(state, self.listed)
 
     def _refuse_non_finite(self, world: Any, dt: float) -> None:
         """Run a bad frame again from the last good state, looking after every stage: normal frames pay nothing for it."""

@@ -87,7 +87,7 @@ class World(Measures, Queries, Doors):
         sleep: bool = False,
     ) -> None:
         self._state = State(checks.floating("dtype", dtype))
-        self._slots = Slots(self._state.dtype, sleeps=sleep, events=events)
+        self._slots = Slots(self._state.dtype, sleeps=sleep)
         self.links, self.forces, self.obstacles = Links(self._state), ForceList(), Obstacles()
         self._events, self._touches = Events() if events else None, Touches() if contacts else None
         self._sleep, self._books = Sleep() if sleep else None, Bookkeeper() if ledger else None
@@ -136,7 +136,7 @@ class World(Measures, Queries, Doors):
                 self.boundary.check(self._state.radius)
             except InputError:
                 # New to the next frame, which refuses them again.
-                self._slots = Slots(self.dtype, sleeps=self._sleep is not None, events=self._events is not None)
+                self._slots = Slots(self.dtype, sleeps=self._sleep is not None)
                 raise
         return changed
 
