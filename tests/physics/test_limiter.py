@@ -226,7 +226,6 @@ def test_gravity_that_turns_within_a_frame_is_no_gain(taken: list[float]) -> Non
     assert balls.velocity[:, 1] == pytest.approx(np.full(2, 1 - 6 * G / 480), abs=2 * G / 480)
 
 
-@pytest.mark.filterwarnings("ignore::pyverlet.ground.errors.CoarseStepWarning")
 @pytest.mark.parametrize("substeps", [2, 8])
 @pytest.mark.parametrize("law", [{"restitution": 0.0}, {"restitution": 0.5, "friction": 0.5}])
 def test_what_a_spring_draws_together_gains_no_more_than_allowed(

@@ -13,7 +13,6 @@ from pyverlet.ground.constants import ALL_THREADS_FROM, MOST_SUBSTEPS, ONE_THREA
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.threads import max_threads
 from pyverlet.ground.turns import in_turn
-from pyverlet.laws.coarse import Coarse
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceList, ForceSum
@@ -97,7 +96,7 @@ class World(Measures, Queries, Doors):
         self.collisions, self.substeps, self.threads = collisions, substeps, threads
         self.time, self.frames, self.profile, self.actors = 0.0, 0, Profile(), list[Actor]()
         self._impulses = ImpulseFrames(self._state.dtype)
-        self._team, self._looks = Team(), (Coarse(), Precision())
+        self._team, self._precision = Team(), Precision()
         # Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins.
         self.onlooker: Callable[[Moment], None] | None = None
 
@@ -151,8 +150,7 @@ class World(Measures, Queries, Doors):
             self._events.close(self._slots, self._state, self._place())
         self.profile.mark("scatter")
         self.time, self.frames = self.time + dt, self.frames + 1
-        for each in self._looks:
-            each.look(self, h)
+        self._precision.look(self, h)
         self.profile.end()
 
     def _show(self, since: float, lag: float) -> None:

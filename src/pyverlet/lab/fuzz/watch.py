@@ -91,7 +91,7 @@ def check(build: Build, deed: Deed, *, frames: int, dt: float, only: str | None 
         InputError: the program asks for what is not allowed.
     """
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a gas too coarse is meant
+        warnings.simplefilter("ignore")  # coordinates too coarse are meant
         with suppress(_Refused):
             _check(build, deed, frames, dt, frozenset(CHECKS if only is None else [only]) - set(without))
 
