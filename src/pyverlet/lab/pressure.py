@@ -1,4 +1,4 @@
-"""What a coarse step costs an elastic gas: circles that move by much of their radius in a substep meet late, deep in each other."""
+"""What a coarse step costs an elastic gas: circles that move by much of their radius in a substep meet late and deep."""
 
 from __future__ import annotations
 
