@@ -96,7 +96,7 @@ class ImpulseFrames:
         Raises:
             NonFiniteError: a particle turned NaN or infinite.
         """
-        world._slots.clear_notes()
+        world._clear_notes()
         self.links.keep_apart(world, self.held.engine)
         if world._gather():
             self.held.forget_list()

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import listed
-from pyverlet.state.moves import newton, newton_kick_drift
+from pyverlet.state.moves import newton
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
@@ -108,10 +108,6 @@ class ForceSum:
 
     def __call__(self, state: Slots, t: float) -> None:
         self.strongest = newton(state, self._summed(state, t), self.gravity)
-
-    def kick_drift(self, state: Slots, t: float, h: float, ahead: float = 0.0) -> None:
-        """Evaluate, take back a kick of `ahead` seconds, then velocity += h * acceleration, then position += h * velocity."""
-        self.strongest = newton_kick_drift(state, self._summed(state, t), self.gravity, h, ahead)
 
     def _summed(self, state: Slots, t: float) -> NDArray[Any]:
         """The sum of all forces but gravity (n, 2), N; (0, 2) if there are none."""
