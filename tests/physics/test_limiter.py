@@ -19,13 +19,13 @@ G = 9.81
 def taken(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """J that were taken back, frame by frame."""
     amounts: list[float] = []
-    real = limiter.Watch.take_back
+    real = limiter.EnergyLimiter.take_back
 
-    def noted(self: limiter.Watch, slots: object, pairs: object, surplus: float) -> object:
+    def noted(self: limiter.EnergyLimiter, slots: object, pairs: object, surplus: float) -> object:
         amounts.append(surplus)
         return real(self, slots, pairs, surplus)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(limiter.Watch, "take_back", noted)
+    monkeypatch.setattr(limiter.EnergyLimiter, "take_back", noted)
     return amounts
 
 
@@ -153,13 +153,13 @@ def test_momentum_and_angular_momentum_stay(monkeypatch: pytest.MonkeyPatch) -> 
     rng = np.random.default_rng(2)
     circles = world.add(position=rng.uniform(-0.3, 0.3, (60, 2)), velocity=(3.0, -1.0), radius=0.5, mass=rng.uniform(1, 5, 60))
     circles.velocity += 0.5 * np.column_stack((-circles.position[:, 1], circles.position[:, 0]))
-    real, times = limiter.Watch.take_back, 0
+    real, times = limiter.EnergyLimiter.take_back, 0
 
     def momenta(slots: Slots) -> np.ndarray:
         (x, y), (vx, vy), m = slots.position.T, slots.velocity.T, slots.mass
         return np.array([m @ vx, m @ vy, m @ (x * vy - y * vx)])
 
-    def compared(self: limiter.Watch, slots: Slots, pairs: object, surplus: float) -> None:
+    def compared(self: limiter.EnergyLimiter, slots: Slots, pairs: object, surplus: float) -> None:
         nonlocal times
         before, velocity = momenta(slots), slots.velocity.copy()
         real(self, slots, pairs, surplus)  # type: ignore[arg-type]
@@ -168,7 +168,7 @@ def test_momentum_and_angular_momentum_stay(monkeypatch: pytest.MonkeyPatch) -> 
         assert momenta(slots)[:2] == pytest.approx(before[:2], abs=1e-14 * size)
         assert momenta(slots)[2] == pytest.approx(before[2], abs=1e-7 * size)
 
-    monkeypatch.setattr(limiter.Watch, "take_back", compared)
+    monkeypatch.setattr(limiter.EnergyLimiter, "take_back", compared)
     world.run(seconds=1)
     assert times > 10
 
@@ -280,9 +280,9 @@ def test_what_a_method_gains_by_itself_is_not_taken(taken: list[float]) -> None:
     assert not taken
 
 
-def test_links_alone_are_not_watched(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_links_alone_are_not_limited(monkeypatch: pytest.MonkeyPatch) -> None:
     # They keep their energy, and show some that they never give: a limiter would take that from the motion.
-    monkeypatch.setattr(limiter.Watch, "close", lambda *about: pytest.fail("watched"))
+    monkeypatch.setattr(limiter.EnergyLimiter, "limit", lambda *about: pytest.fail("limited"))
     world = pv.World(collisions=None)
     group = world.add(position=[(0, 0), (1, 0)])
     world.links.append(pv.Stick(group, 0, 1))

@@ -1,4 +1,4 @@
-"""Contacts and links give no energy: what a world has gained too much in a frame is taken back from those who have it.
+"""Contacts and links give no energy: what a world has gained too much in a frame is taken back from those that have it.
 
 Pushing circles apart lifts them and throws them: in a crash that a substep sees as deep overlap, and where circles were added on
 top of each other. So the energy at the end of a frame is compared with that at its start. What it has gained beyond
@@ -51,8 +51,8 @@ _NEARLY = 1.01
 """Times what may be gained: more is too much, which lowering could not take back."""
 
 
-class Watch:
-    """Looks after the energy of a frame of dt seconds. `start`: the user's arrays, as they are until the frame is accepted."""
+class EnergyLimiter:
+    """Limits what a frame of dt seconds may gain. `start`: the user's arrays, as they are until the frame is accepted."""
 
     def __init__(self, start: State, forces: ForceSum, links: Links, room: Boundary, course: Course, dt: float) -> None:
         self._start, self._forces, self._links, self._room, self._course, self._dt = start, forces, links, room, course, dt
@@ -87,12 +87,12 @@ class Watch:
         start = (then.position, then.velocity, then.spin, then.radius, then.mass)
         return float(now.motion.energy_gained(start, motion, *self._gravity))
 
-    def close(self, slots: Slots, listed: Callable[[], Listed]) -> None:
+    def limit(self, slots: Slots, listed: Callable[[], Listed]) -> None:
         """The frame is over: take back what has been gained too much. listed: the pairs of the list, as first, count, i, j."""
         gained = self._gained(slots)
         room = SURPLUS * fall(slots.total_mass, self._gravity, self._room.extent())
         surplus = self._surplus(gained, room, slots)
-        if surplus > 0.0 and self._pardon_mislaid(slots):
+        if surplus > 0.0 and self._excuse_misplaced(slots):
             gained = self._gained(slots)
             surplus = self._surplus(gained, room, slots)
         if surplus > 0.0:
@@ -107,22 +107,22 @@ class Watch:
         there = self._mechanical(self._start, (0.0, 0.0)) + abs(self._held)
         return gained - max(room, SURPLUS * there)
 
-    def _pardon_mislaid(self, slots: Slots) -> bool:
-        """Let who was where nobody can be begin where it is now. False: there was nobody."""
+    def _excuse_misplaced(self, slots: Slots) -> bool:
+        """Particles that were outside the room or inside an obstacle begin where they are now. False: there were none."""
         start = self._start
-        mislaid = self._room.outside(start.position) | (self._course.covering(start.position) >= 0)
-        who = (mislaid & np.isfinite(start.mass))[slots.particle]
-        if not who.any():
+        misplaced = self._room.outside(start.position) | (self._course.covering(start.position) >= 0)
+        moved = (misplaced & np.isfinite(start.mass))[slots.particle]
+        if not moved.any():
             return False
         self._start = copy(start)
         self._start.position = start.position.copy()
-        self._start.position[slots.particle[who]] = slots.position[who]
+        self._start.position[slots.particle[moved]] = slots.position[moved]
         if not self._plain:
             self._energy = self._by_forces(self._start) + self._by_links + self._mechanical(self._start, self._gravity)
         return True
 
     def take_back(self, slots: Slots, listed: Listed, surplus: float) -> Array:
-        """Take so many J from those who have gained in this frame. (n,) bool: who had more than could be taken of motion."""
+        """Take so many J from those that have gained. (n,) bool: those that had more than their motion could give."""
         start = self._start
         before, pull = self._pulls(slots)
         then = start.position, start.velocity, start.spin, start.radius, start.mass
@@ -142,7 +142,7 @@ class Watch:
     def _put_back(self, slots: Slots, raised: Array, allowed: float) -> float:
         """Let `raised` have come only so much of their way in this frame that no more than `allowed` J are gained; return that.
 
-        Ways are straight and rooms convex, so nobody leaves one. Of gravity's work each part of the way has the same part.
+        Ways are straight and rooms convex: none leads out. Of gravity's work each part of the way has the same part.
         """
         left = self._gained(slots)
         if left <= allowed * _NEARLY or not raised.any():
@@ -165,13 +165,13 @@ class Watch:
             self._slow(slots, raised, none - allowed)
         return self._gained(slots)
 
-    def _slow(self, slots: Slots, who: Array, surplus: float) -> None:
-        """Take so many J of the motion of `who`, or all of it."""
-        m, rim = slots.mass[who].astype(float), (slots.radius[who] * slots.spin[who]).astype(float)
-        motion = 0.5 * float(m @ (slots.velocity[who].astype(float) ** 2).sum(axis=1)) + 0.25 * float(m @ rim**2)
+    def _slow(self, slots: Slots, which: Array, surplus: float) -> None:
+        """Take so many J of the motion of `which`, or all of it."""
+        m, rim = slots.mass[which].astype(float), (slots.radius[which] * slots.spin[which]).astype(float)
+        motion = 0.5 * float(m @ (slots.velocity[which].astype(float) ** 2).sum(axis=1)) + 0.25 * float(m @ rim**2)
         part = slots.real(np.sqrt(max(1.0 - surplus / motion, 0.0)) if motion > 0.0 else 1.0)
-        slots.velocity[who] *= part
-        slots.spin[who] *= part
+        slots.velocity[which] *= part
+        slots.spin[which] *= part
 
     def _pulls(self, slots: Slots) -> tuple[Array, Array]:
         """(n, 2) N, what forces with a potential do to each beside gravity, at the start of the frame and now; empty: nothing."""
@@ -217,7 +217,7 @@ def fall(mass: float, gravity: tuple[float, float], extent: Extent | None) -> fl
 
 
 def _rounding(slots: Slots) -> float:
-    """J that are not worth looking for: the energy of who moves by a rounding error of the largest coordinate in 1/60 s."""
+    """J that are not worth looking for: energy of motion by a rounding error of the largest coordinate in 1/60 s."""
     speed = 60.0 * float(np.finfo(slots.dtype).eps) * float(np.abs(slots.position).max(initial=0.0))
     return 0.5 * slots.total_mass * speed * speed
 
@@ -235,18 +235,18 @@ def undriven(world: Any) -> bool:
         return False
     seam = room.seam
     if seam and any(g != 0 and period > 0 for g, period in zip(world.gravity, seam.period, strict=True)):
-        return False  # who falls for ever gains for ever
+        return False  # what falls for ever gains for ever
     if world.forces and not all(type(force) is Drag or has_potential(force) for force in world.forces):
         return False
     return not world._course.drives
 
 
-def watched(world: Any, dt: float) -> Watch | None:
-    """What looks after the energy of a frame, if nothing but contacts, links and obstacles could raise it."""
+def limiter_for(world: Any, dt: float) -> EnergyLimiter | None:
+    """The limiter of a frame, if nothing but contacts, links and obstacles could raise it."""
     about = world._state, world._force_sum, world.links, world.boundary, world._course
-    return Watch(*about, dt) if undriven(world) else None
+    return EnergyLimiter(*about, dt) if undriven(world) else None
 
 
 def pinned_move(state: State | Slots) -> bool:
-    """Whether somebody pinned pushes others about: with infinite mass one goes on at its velocity, and nothing stops it."""
+    """Whether pinned particles push others about: they go on at their velocity, and nothing stops them."""
     return bool(unit("engine", state.mass.dtype).pinned_move(state.mass, state.velocity, state.spin))

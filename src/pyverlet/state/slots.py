@@ -1,6 +1,6 @@
 """What the engine sees: `Slots`, the same particles in an order of its own.
 
-Sorted so that neighbours in space are neighbours in memory; nobody outside ever sees that order.
+Sorted so that neighbours in space are neighbours in memory; that order is not seen outside.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ class Slots:
         position, velocity, acceleration, spin, radius, mass, restitution, friction: as in State.
         category, mask: as in State, or empty while every circle collides with every other.
         most_restitution, most_friction: the largest of their columns; negative if no circle has values of its own.
-        given: how often what users set was taken up anew, or others slept.
+        revision: how often what users set was taken up anew, or others slept.
         inverse_mass: (n,) 1/kg; 0 for a pinned particle: whether one `pins`. total_mass: of others, kg.
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
         h: length of a substep of this frame, s.
-        island, calm: (n,) number of a sleeper's island, -1 if awake, and s it has been calm; empty where nobody may sleep.
-        hits: (n,) largest speed with which the circle met a wall of a user's own room in this frame, m/s; negative: none.
+        island, calm: (n,) number of a sleeper's island, -1 if awake, and s it has been calm; empty unless particles may sleep.
+        wall_hits: (n,) largest speed with which the circle met a wall of a user's own room in this frame, m/s; negative: none.
         taken: J that the energy limiter has taken in this frame.
 
     Args:
@@ -52,7 +52,7 @@ class Slots:
         self.motion: Any = core.unit("motion", dtype)
         self.real = lru_cache(64)(dtype.type)
         self._kept: dict[str, Array] = {}
-        self.total_mass, self.pins, self.taken, self.given, self.h = 0.0, False, 0.0, 0, 0.0
+        self.total_mass, self.pins, self.taken, self.revision, self.h = 0.0, False, 0.0, 0, 0.0
         self._resize(0)
 
     def __len__(self) -> int:
@@ -75,7 +75,7 @@ class Slots:
             self.__dict__.pop(scratch, None)
         self._given: dict[str, Any] = {name: np.zeros(0, np.uint32 if name in MARKS else self.dtype) for name in _GIVEN}
         self._changed = True
-        self.hits = np.full(count, -1, self.dtype)
+        self.wall_hits = np.full(count, -1, self.dtype)
         self.category = self.mask = np.empty(0, np.uint32)
         self.most_restitution = self.most_friction = -1.0
         self._scratch: list[Array] = []
@@ -121,7 +121,7 @@ class Slots:
             self._resize(len(state))
         self.seam = state.seam
         given = (state.position, state.velocity, state.acceleration, state.spin)
-        if not self._given_back.recall(given):  # a user who has changed nothing need not wait for it to be copied again
+        if not self._given_back.recall(given):  # what the user has not changed is not copied again
             self.motion.take_motion(self.position, self.velocity, self.acceleration, self.spin, *given, self.particle)
         # What seldom changes is compared in the user's order, where neighbours in memory need no index.
         now = (state.radius, state.mass, state.restitution, state.friction, state.category, state.mask)
@@ -138,7 +138,7 @@ class Slots:
             self._given[name] = (now[:1] if (now == now[:1]).all() else now).copy()
         for name in SET:
             memory.take(self._given[name], self.particle, getattr(self, name))  # one number, if that of all
-        self.weigh()
+        self.update_inverse_mass()
         # Summed in the user's order: that of slots, and with it the last bit, is another when a saved world is taken up.
         self.total_mass = float(state.mass.sum(dtype=float, where=(free := np.isfinite(state.mass))))
         self.pins = not free.all()
@@ -149,12 +149,12 @@ class Slots:
         self._changed = False
         return bool(changed)
 
-    def weigh(self) -> None:
+    def update_inverse_mass(self) -> None:
         """Bring `inverse_mass` up to date with `mass` and who sleeps."""
         with np.errstate(divide="ignore"):  # a mass of 0 is refused by the world, with a sentence
             np.divide(1, self.mass, out=self.inverse_mass)
         self.inverse_mass[self.asleep] = 0
-        self.given += 1
+        self.revision += 1
 
     def _keep(self, slots: Any) -> None:
         """Remember what outlives a change of size, of these slots."""
@@ -163,7 +163,7 @@ class Slots:
 
     def clear_notes(self) -> None:
         """Forget what walls and the energy limiter have noted in the last frame."""
-        self.hits.fill(-1)
+        self.wall_hits.fill(-1)
         self.taken = 0.0
 
     def forget(self, now: Array) -> None:
@@ -210,7 +210,7 @@ class Slots:
             spare = old
         alike = {name for name, given in self._given.items() if len(given) == 1}  # for all: any order is as good
         alike |= {"inverse_mass"} if "mass" in alike and not len(self.island) else set()
-        for name in (*COLUMNS, *MARKS, "inverse_mass", "particle", *_REMEMBERED, "hits"):
+        for name in (*COLUMNS, *MARKS, "inverse_mass", "particle", *_REMEMBERED, "wall_hits"):
             if name not in alike and len(column := getattr(self, name)):
                 setattr(self, name, memory.taken(column, order))
         self._slot_of = None
