@@ -15,7 +15,7 @@ from pyverlet import core  # noqa: F401  (next: it may be missing, or made for a
 # isort: split
 from pyverlet import scenes
 from pyverlet.ground import errors
-from pyverlet.ground.errors import CoarseCoordinatesWarning, CoarseStepWarning, InputError, NonFiniteError, PyverletError
+from pyverlet.ground.errors import CoarseCoordinatesWarning, InputError, NonFiniteError, PyverletError
 from pyverlet.ground.submodules import lazily
 from pyverlet.laws import forces, integrators
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast, Overlap
@@ -65,7 +65,7 @@ _LATER = {
 
 __all__ = [
     "RK4", "Actor", "Angle", "Area", "Attractor", "Boundary", "Box", "BruteForce", "Capsule", "Chain", "Circle",
-    "ClampAndFlip", "Clock", "CoarseCoordinatesWarning", "CoarseStepWarning",
+    "ClampAndFlip", "Clock", "CoarseCoordinatesWarning",
     "Collisions", "ConstantForce", "Disc", "Drag", "Emitter", "Energy",
     "Events", "ExplicitEuler", "Fast", "FrameBudget", "Gravitation", "Group", "InputError", "Integrator", "Ledger",
     "NonFiniteError", "Obstacle", "Open", "Overlap", "Panel", "Panels", "Particle", "Periodic", "Pin", "PointSpring", "Polygon",

@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 
-@pytest.mark.slow  # it compiles for several threads, and with and without a room
+@pytest.mark.slow
 def test_the_comparison_runs_and_writes_its_rows(tmp_path: Path) -> None:
     table = tmp_path / "rows.csv"
     command = [sys.executable, "-m", "benchmarks", "--particles", "60", "--frames", "3", "--csv", str(table)]

@@ -342,6 +342,31 @@ def test_other_kernels_are_told(saved: Path, tmp_path: Path) -> None:
         pv.load(path, exact=True)
 
 
+def test_arrays_of_the_law_of_projection_are_ignored(tmp_path: Path) -> None:
+    world = rubbing()
+    world.run(seconds=0.3)
+    pv.save(world, tmp_path / "new.pvsnap")
+    table, arrays = archive.read(tmp_path / "new.pvsnap")
+    count, real = len(world), world.dtype
+    arrays["particles.grown"], arrays["slots.fed"] = np.full(count, 0.5, real), np.full(count, 3, np.uint8)
+    arrays |= {f"contacts.{name}": np.zeros((count, 2), real) for name in ("built", "checked")}
+    arrays |= {f"contacts.{name}": np.zeros(2, np.int32) for name in ("low", "high", "lent_particle")}
+    arrays |= {f"contacts.{name}": np.zeros(2, real) for name in ("slip", "lent", "busy")}
+    arrays |= {"contacts.held": np.zeros(2, np.uint8), "linked.number": np.arange(2), "linked.calm": np.zeros(2)}
+    arrays |= {"linked.start": np.zeros((2, 2)), "linked.left": np.zeros((2, 2), real)}
+    with (tmp_path / "old.pvsnap").open("wb") as file:
+        archive.write(file, lambda: table, arrays)
+    old = pv.load(tmp_path / "old.pvsnap")
+    for each in (world, old):
+        each.run(seconds=0.1)
+    assert old.state_hash() == world.state_hash()
+    arrays["linked.other"] = np.zeros(2)
+    with (tmp_path / "bad.pvsnap").open("wb") as file:
+        archive.write(file, lambda: table, arrays)
+    with pytest.raises(pv.InputError, match=r"linked\.other"):
+        pv.load(tmp_path / "bad.pvsnap")
+
+
 def test_formats(saved: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "newer.pvsnap"
     table, arrays = archive.read(saved)

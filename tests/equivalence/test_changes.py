@@ -33,7 +33,7 @@ def pour(count: int = 40, **options: Any) -> pv.World:
 def told(w: pv.World) -> list[Any]:
     """All that a frame leaves behind, as bytes."""
     arrays = [array.tobytes() for _, array in w._state.arrays()]
-    return [w.time, *arrays, w._slots.resting.tobytes(), w._slots.hits.tobytes(), w.energy()]
+    return [w.time, *arrays, w._slots.wall_hits.tobytes(), w.energy()]
 
 
 def take_the_long_way(w: pv.World) -> None:

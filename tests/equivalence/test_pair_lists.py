@@ -224,7 +224,6 @@ def test_an_empty_world_and_a_lone_disc_have_no_pairs() -> None:
     assert listed(world)[0] == set()
 
 
-@pytest.mark.filterwarnings("ignore::pyverlet.ground.errors.CoarseStepWarning")
 @pytest.mark.parametrize(("kind", "sizes"), [("box", "giants"), ("periodic", "1:50"), ("tube", "1:5"), ("open", "equal")])
 def test_who_touches_is_always_listed(kind: str, sizes: str) -> None:
     # While particles move, come, go, grow, and change whom they collide with.

@@ -21,17 +21,16 @@ def slot(count: int, **options: object) -> tuple[pv.World, pv.Group]:
 @pytest.mark.parametrize("settings", [{}, {"friction": 0.5}, {"restitution": 0.5}, {"restitution": 0.5, "friction": 0.5}])
 @pytest.mark.parametrize("count", [1, 5, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_column_at_rest_reports_no_velocity(count: int, settings: dict[str, float], integrator: pv.Integrator) -> None:
-    # Inside, a substep ends with (1 - PUSHED / FED) g h upwards, 0.6 or 0.7 g h, which the next one's gravity takes. A floor
-    # without friction leaves the lowest circle with 0, so that the one above has up to 0.17 g h less.
+    # Contacts give each circle its weight, so that it does not move, but for the rounding of places in a substep: eps `count` m.
     world, circles = slot(count, collisions=pv.Collisions(**settings), integrator=integrator)  # type: ignore[arg-type]
     world.run(seconds=10)
     speed = []
     for _ in range(60):
         world.step(1 / 60)
         speed.append(np.hypot(*circles.velocity.T))
-    least = 0.05 if "friction" in settings else 0.2
-    assert np.mean(speed, axis=0).max() < least * G * H
-    assert world.energy().kinetic < 0.5 * count * (least * G * H) ** 2
+    least = float(np.finfo(np.float32).eps) * count / H
+    assert np.mean(speed, axis=0).max() < least
+    assert world.energy().kinetic < 0.5 * circles.mass.sum() * least**2
 
 
 def test_light_circles_under_a_heavy_one_report_no_velocity() -> None:

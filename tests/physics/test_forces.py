@@ -177,7 +177,6 @@ json.dump(hashes, sys.stdout)
 """
 
 
-@pytest.mark.slow  # it compiles what many threads need
 def test_gravitation_has_the_same_bits_on_any_number_of_threads() -> None:
     run = subprocess.run(
         [sys.executable, "-c", THREADS, os.path.dirname(os.path.dirname(pv.__file__))],  # noqa: PTH120

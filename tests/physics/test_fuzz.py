@@ -39,7 +39,7 @@ def test_some_random_worlds(seed: int) -> None:
     [
         *(41, 168, 1522, 2167, 61, 92, 100904, 105154, 105428, 116757, 400023, 410579, 411737),
         *(700313, 700585, 702781, 960983, 961085),
-        # These compile a kind of frame that no other quick test has, or take long.
+        # These take long.
         *(pytest.param(each, marks=pytest.mark.slow) for each in (75, 256, 100674, 411340, 702660, 704622)),
         *(pytest.param(each, marks=pytest.mark.slow) for each in (2146, 102853, 103593, 104756, 104863, 106417, 106603, 107129)),
     ],

@@ -19,13 +19,9 @@ def undamped(**options: object) -> pv.World:
 
 
 def scenes_in_both() -> list[Any]:
-    """Names and dtypes; another than the scene's own, which compiles much anew, with `--all` only."""
+    """Names and dtypes."""
     return [
-        pytest.param(
-            name, dtype, marks=[] if dtype == scene.defaults.dtype else [pytest.mark.slow], id=f"{name}-{dtype.__name__}"
-        )
-        for name, scene in scenes.SCENES.items()
-        for dtype in (np.float32, np.float64)
+        pytest.param(name, dtype, id=f"{name}-{dtype.__name__}") for name in scenes.SCENES for dtype in (np.float32, np.float64)
     ]
 
 
@@ -55,7 +51,6 @@ def test_inelastic_impacts_are_booked_as_restitution() -> None:
     assert world.ledger.restitution == pytest.approx(-2 * G * 2, rel=1e-3)  # it ends within 1e-3 of the drop
 
 
-@pytest.mark.slow  # it compiles what only it needs
 def test_impacts_between_circles_are_booked_as_restitution() -> None:
     # Equal masses, relative speed u: (1 - e^2) m u^2 / 4.
     world = undamped(gravity=(0, 0), collisions=pv.Collisions(restitution=0.8))

@@ -260,7 +260,6 @@ json.dump(hashes, sys.stdout)
 """
 
 
-@pytest.mark.slow  # it compiles what many threads need
 def test_threads_do_not_change_a_bit() -> None:
     run = subprocess.run(
         [sys.executable, "-c", RUN_WITH_THREADS, os.path.dirname(os.path.dirname(pv.__file__))],  # noqa: PTH120

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -51,6 +53,26 @@ def test_the_orbit_is_an_ellipse() -> None:
 def test_declared_order_is_measured(name: str, problem: Problem) -> None:
     cls = pv.integrators.BY_NAME[name]
     assert order.measure(cls(), problem).order == pytest.approx(cls.order, abs=order.WITHIN)
+
+
+class Derived(pv.PositionVerlet):
+    pass
+
+
+class Counted(pv.PositionVerlet):
+    steps = 0
+
+    def step(self, state: Any, forces: Any, t: float, h: float) -> None:
+        super().step(state, forces, t, h)
+        self.steps += 1
+
+
+@EVERY_PROBLEM
+def test_what_is_derived_from_a_method_has_its_order(problem: Problem) -> None:
+    expected, counted = order.measure(pv.PositionVerlet(), problem), Counted()
+    assert order.measure(Derived(), problem).error.tolist() == expected.error.tolist()
+    assert order.measure(counted, problem).order == pytest.approx(2, abs=order.WITHIN)
+    assert counted.steps > 0
 
 
 @EVERY_PROBLEM

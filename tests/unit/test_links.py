@@ -211,7 +211,6 @@ def test_linked_neighbours_need_not_collide(method: Any) -> None:
     for collide in (False, True):
         world = pv.World(gravity=(0, 0), collisions=pv.Collisions(method=method))
         group = world.add(position=[(0, 0), (0.5, 0), (1.55, 0)], radius=0.5, mass=1.0)
-        world._state.grown[:] = 1.0  # as if they had always been there
         stick = world.links.append(pv.Stick(group, 0, 1, length=0.5, collide=collide))
         world._state.acceleration[:] = 0.0
         world.run(seconds=0.5)

@@ -235,8 +235,7 @@ for thread in threads:
 assert world.frames == 12 + 360
 """
 
-# Ctrl-C, again and again: the world stands between two frames, and goes on with the bits of one that was left alone. While
-# something compiles Ctrl-C does not wait for the end of a frame, so that all is compiled before.
+# Ctrl-C, again and again: the world stands between two frames, and goes on with the bits of one that was left alone.
 CTRL_C = """
 import os, signal, threading, time
 import numpy as np
@@ -248,7 +247,6 @@ def built():
     world.actors.append(pv.Emitter(pv.Box((1, 8), (11, 11)), rate=60, radius=0.1, most=50))
     return world
 
-built().run(seconds=4)
 world, alone = built(), built()
 caught = 0
 for pause in np.linspace(0.01, 0.03, 12):

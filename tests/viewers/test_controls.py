@@ -173,7 +173,7 @@ def test_colours_belong_to_their_circles(wait_until: WaitUntil, world: pv.World)
 def test_obstacles_are_on_show_and_those_that_move_move(wait_until: WaitUntil, world: pv.World) -> None:
     world.obstacles.append(pv.Disc(center=(0, 10), radius=1))
     world.obstacles.append(pv.Segment((-5, 8), (-3, 8), velocity=(1, 0)))
-    world.step(1 / 60)  # compiles what obstacles need
+    world.step(1 / 60)
     with Session(world) as session:
         session.submit(Pause(True))
         wait_until(lambda: session.latest.status.paused)

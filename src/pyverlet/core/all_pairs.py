@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
-from cython.cimports.libc.math import rint
 from cython.cimports.libc.stdint import int64_t, uint32_t
 
 from pyverlet.core.cells import Cells
 from pyverlet.core.pair_lists import Lists, may_touch
+from pyverlet.core.periodic import nearest_of
 
 
 @cython.cfunc
@@ -18,12 +18,8 @@ from pyverlet.core.pair_lists import Lists, may_touch
 @cython.exceptval(check=False)
 def has_nearest(c: cython.pointer(Cells), a: int64_t, b: int64_t) -> cython.bint:
     """Whether of the images of place b one is so much nearer to place a that it stays the nearest as long as the list lasts."""
-    du: real = c.spot_u[b] - c.spot_u[a]
-    dv: real = c.spot_v[b] - c.spot_v[a]
-    if c.wraps_u:
-        du = du - c.period_u * cython.cast(real, rint(du / c.period_u))
-    if c.wraps_v:
-        dv = dv - c.period_v * cython.cast(real, rint(dv / c.period_v))
+    du: real = nearest_of(c.spot_u[b] - c.spot_u[a], c.period_u)
+    dv: real = nearest_of(c.spot_v[b] - c.spot_v[a], c.period_v)
     wide: real = c.spot_r[a] + c.spot_r[b] + c.skin
     return du * du + dv * dv < wide * wide
 

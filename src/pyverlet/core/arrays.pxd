@@ -21,4 +21,3 @@ cdef extern from "arrays.h":
     uint8_t *octets(object array) except NULL
     const uint8_t *const_octets(object array) except NULL
     uint16_t *shorts(object array) except NULL
-    const uint16_t *const_shorts(object array) except NULL

@@ -22,31 +22,30 @@ from pyverlet.core.periodic import nearest_in_double
 
 # What is known of a cluster: of momenta and places first sums, then means. WITHIN: J of its motion beside that as a whole;
 # AS_ONE: J of that but for its drift across what has pushed it; ALONG: J of that. LEFT: J still to be taken.
-COLUMNS_OF_CLUSTER = cython.declare(cython.int, 24)
+COLUMNS_OF_CLUSTER = cython.declare(cython.int, 23)
 COUNT = cython.declare(cython.int, 0)
-HIT = cython.declare(cython.int, 1)
-GAIN = cython.declare(cython.int, 2)
-MASS = cython.declare(cython.int, 3)
-X = cython.declare(cython.int, 4)
-Y = cython.declare(cython.int, 5)
-PX = cython.declare(cython.int, 6)
-PY = cython.declare(cython.int, 7)
-PUSH_X = cython.declare(cython.int, 8)
-PUSH_Y = cython.declare(cython.int, 9)
-SCALE = cython.declare(cython.int, 10)
-TURN = cython.declare(cython.int, 11)
-INERTIA = cython.declare(cython.int, 12)
-WITHIN = cython.declare(cython.int, 13)
-AS_ONE = cython.declare(cython.int, 14)
-ALONG = cython.declare(cython.int, 15)
-LIFT = cython.declare(cython.int, 16)
-DRIFT_X = cython.declare(cython.int, 17)
-DRIFT_Y = cython.declare(cython.int, 18)
-SLOW_WITHIN = cython.declare(cython.int, 19)
-SLOWER = cython.declare(cython.int, 20)
-ACROSS = cython.declare(cython.int, 21)
-LEFT = cython.declare(cython.int, 22)
-PUSHED = cython.declare(cython.int, 23)
+GAIN = cython.declare(cython.int, 1)
+MASS = cython.declare(cython.int, 2)
+X = cython.declare(cython.int, 3)
+Y = cython.declare(cython.int, 4)
+PX = cython.declare(cython.int, 5)
+PY = cython.declare(cython.int, 6)
+PUSH_X = cython.declare(cython.int, 7)
+PUSH_Y = cython.declare(cython.int, 8)
+SCALE = cython.declare(cython.int, 9)
+TURN = cython.declare(cython.int, 10)
+INERTIA = cython.declare(cython.int, 11)
+WITHIN = cython.declare(cython.int, 12)
+AS_ONE = cython.declare(cython.int, 13)
+ALONG = cython.declare(cython.int, 14)
+LIFT = cython.declare(cython.int, 15)
+DRIFT_X = cython.declare(cython.int, 16)
+DRIFT_Y = cython.declare(cython.int, 17)
+SLOW_WITHIN = cython.declare(cython.int, 18)
+SLOWER = cython.declare(cython.int, 19)
+ACROSS = cython.declare(cython.int, 20)
+LEFT = cython.declare(cython.int, 21)
+PUSHED = cython.declare(cython.int, 22)
 
 Bodies = cython.struct(
     position=cython.pointer[cython.const[real]],
@@ -165,7 +164,6 @@ def sum_clusters(
     now: cython.pointer(Bodies),
     g: cython.pointer(Limits),
     root: cython.pointer[cython.const[int64_t]],
-    hits: cython.pointer[cython.const[real]],
     order: cython.pointer[cython.const[int32_t]],
     share: cython.pointer[cython.const[cython.double]],
     shared: cython.bint,
@@ -188,7 +186,6 @@ def sum_clusters(
         place[2 * k] = x0 + nearest_in_double(x - x0, g.period_x)
         place[2 * k + 1] = y0 + nearest_in_double(y - y0, g.period_y)
         of[c + COUNT] += 1
-        of[c + HIT] += 1 if hits[k] >= 0 else 0
         of[c + GAIN] += kinetic_energy(now, k, m) - kinetic_energy(then, i, free_mass(then, i)) + lift[k]
         if shared:
             of[c + GAIN] += share[i]
@@ -215,9 +212,9 @@ def share_out(g: cython.pointer(Limits), of: cython.pointer(cython.double), clus
     total: cython.double = 0.0
     zero: cython.double = 0.0
     c: cython.Py_ssize_t
-    for c in range(0, COLUMNS_OF_CLUSTER * clusters, 24):
+    for c in range(0, COLUMNS_OF_CLUSTER * clusters, 23):
         of[c + GAIN] = max(of[c + GAIN], zero)
-        if g.forced and of[c + COUNT] <= 1 and of[c + HIT] == 0:
+        if g.forced and of[c + COUNT] <= 1:
             of[c + GAIN] = 0  # what has touched nothing has its gain from the integrator
         total += of[c + GAIN]
         if of[c + MASS] > 0:
@@ -229,7 +226,7 @@ def share_out(g: cython.pointer(Limits), of: cython.pointer(cython.double), clus
     two: cython.double = 2.0
     # Energy that forces and links hold may be more than they ever give: it is not answered alone.
     part: cython.double = min(g.surplus / max(total, least), two)
-    for c in range(0, COLUMNS_OF_CLUSTER * clusters, 24):
+    for c in range(0, COLUMNS_OF_CLUSTER * clusters, 23):
         of[c + LEFT] = of[c + GAIN] * part
 
 

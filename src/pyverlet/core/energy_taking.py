@@ -8,8 +8,6 @@ import numpy as np
 from cython.cimports.arrays import (
     const_doubles,
     const_integers,
-    const_octets,
-    const_reals,
     const_small_integers,
     doubles,
     integers,
@@ -74,9 +72,6 @@ def find_drift(g: cython.pointer(Limits), of: cython.pointer(cython.double), clu
 def take_as_a_whole(
     now: cython.pointer(Bodies),
     g: cython.pointer(Limits),
-    hits: cython.pointer[cython.const[real]],
-    order: cython.pointer[cython.const[int32_t]],
-    inside_before: cython.pointer[cython.const[uint8_t]],
     cluster: cython.pointer[cython.const[int64_t]],
     count: cython.Py_ssize_t,
     velocity: cython.pointer(cython.double),
@@ -96,8 +91,6 @@ def take_as_a_whole(
         rim: cython.double = cython.cast(cython.double, now.radius[k]) * now.spin[k]
         of[c + AS_ONE] += 0.5 * m * (vx * vx + vy * vy) + 0.25 * m * rim * rim
         of[c + ALONG] += 0.5 * m * (of[c + DRIFT_X] * of[c + DRIFT_X] + of[c + DRIFT_Y] * of[c + DRIFT_Y])
-        if hits[k] >= 0 and not inside_before[order[k]]:
-            lift[k] = 0  # a wall has raised it, and would again
         lift[k] = max(lift[k], zero)
         of[c + LIFT] += lift[k]
     falls: cython.bint = g.gx != 0 or g.gy != 0
@@ -109,12 +102,12 @@ def take_as_a_whole(
         of[c + ACROSS] = speed_left(rest, of[c + ALONG])
 
 
-def take_energy(then, now, about, limits, lift, moved, lower, part):
-    """Take what is too much: from velocities and spins at once, and the rest as the `part` (n,) of what particles have risen by
-    which they are to be lowered: to `lower`, (n, 2) m. (n,) bool: of which there was more than motion could give.
+def take_energy(then, now, about, limits, lift, moved, lower):
+    """Take what is too much: from velocities and spins at once, and the rest by what particles are to be lowered to: `lower`,
+    (n, 2) m. (n,) bool: of which there was more than motion could give.
 
-    about: root (n,) of the cluster of each, pull as in `raise_of`, hits as in `Slots`, order; in the user's order inside (n,),
-    whether it was above the wall that gravity points to, and share (n,), J that links hold more of than at the start, or empty.
+    about: root (n,) of the cluster of each, pull as in `raise_of`, order; share (n,) in the user's order, J that links hold more
+    of than at the start, or empty.
     """
     a: Bodies
     b: Bodies
@@ -124,15 +117,12 @@ def take_energy(then, now, about, limits, lift, moved, lower, part):
     read_limits(cython.address(g), limits)
     root: cython.pointer[cython.const[int64_t]] = const_integers(about[0])
     pulled: cython.pointer[cython.const[cython.double]] = const_doubles(about[1])
-    hits: cython.pointer[cython.const[real]] = const_reals(about[2])
-    order: cython.pointer[cython.const[int32_t]] = const_small_integers(about[3])
-    inside_before: cython.pointer[cython.const[uint8_t]] = const_octets(about[4])
-    share: cython.pointer[cython.const[cython.double]] = const_doubles(about[5])
+    order: cython.pointer[cython.const[int32_t]] = const_small_integers(about[2])
+    share: cython.pointer[cython.const[cython.double]] = const_doubles(about[3])
     pulls: cython.bint = len(about[1]) > 0
     work: cython.pointer(cython.double) = doubles(lift)
     way: cython.pointer(cython.double) = doubles(moved)
     place: cython.pointer(cython.double) = doubles(lower)
-    lowered: cython.pointer(cython.double) = doubles(part)
     count: cython.Py_ssize_t = len(lift)
     numbers, velocities, beyond = np.empty(count, np.int64), np.empty((count, 2)), np.zeros(count, np.bool_)
     cluster: cython.pointer(int64_t) = integers(numbers)
@@ -146,18 +136,16 @@ def take_energy(then, now, about, limits, lift, moved, lower, part):
             clusters += 1
         else:
             cluster[k] = cluster[root[k]]
-    columns = np.zeros((clusters, 24))
+    columns = np.zeros((clusters, 23))
     of: cython.pointer(cython.double) = doubles(columns)
-    shared: cython.bint = len(about[5]) > 0
+    shared: cython.bint = len(about[3]) > 0
     sum_clusters(
-        cython.address(a), cython.address(b), cython.address(g), root, hits, order, share, shared, cluster, count, work, place, of
-    )  # fmt: skip
+        cython.address(a), cython.address(b), cython.address(g), root, order, share, shared, cluster, count, work, place, of
+    )
     share_out(cython.address(g), of, clusters)
     take_within(cython.address(b), cluster, count, place, velocity, of, clusters)
     find_drift(cython.address(g), of, clusters)
-    take_as_a_whole(
-        cython.address(b), cython.address(g), hits, order, inside_before, cluster, count, velocity, work, of, clusters
-    )
+    take_as_a_whole(cython.address(b), cython.address(g), cluster, count, velocity, work, of, clusters)
     one: cython.double = 1.0
     for k in range(count):
         c: int64_t = COLUMNS_OF_CLUSTER * cluster[k]
@@ -175,9 +163,9 @@ def take_energy(then, now, about, limits, lift, moved, lower, part):
             fx, fy = fx + pulled[2 * k], fy + pulled[2 * k + 1]
         strength: cython.double = sqrt(fx * fx + fy * fy)
         gone: cython.double = sqrt(way[2 * k] * way[2 * k] + way[2 * k + 1] * way[2 * k + 1])
-        lowered[k] = min(of[c + LEFT] / of[c + LIFT], one) if of[c + LIFT] > 0 else 0
+        lowered: cython.double = min(of[c + LEFT] / of[c + LIFT], one) if of[c + LIFT] > 0 else 0
         # Near where a spring pulls to it is no further than the way.
-        drop: cython.double = lowered[k] * min(work[k] / strength, gone) / strength if strength > 0 else 0
+        drop: cython.double = lowered * min(work[k] / strength, gone) / strength if strength > 0 else 0
         place[2 * k] = b.position[2 * k] + drop * fx
         place[2 * k + 1] = b.position[2 * k + 1] + drop * fy
         more[k] = of[c + LEFT] > 0 and m > 0 and strength > 0

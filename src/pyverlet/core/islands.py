@@ -38,21 +38,20 @@ def join_sets(root: cython.pointer(int64_t), i: int64_t, j: int64_t) -> cython.v
         root[max(a, b)] = min(a, b)
 
 
-def join_near_pairs(position, moved, size, period_x: real, period_y: real, inverse_mass, pairs, near: real, root):
-    """Join the listed pairs that may have touched while they moved by `moved` (n, 2), m, and both are free.
-
-    That is: whose gap, beyond `near` times their contact distance, is no longer than what they have moved against each other.
-    pairs: those of cell row s are `count[s]` from `first[s]` on: (first, count, i, j).
-    """
+@cython.cfunc
+def join_listed(
+    position, moved, radius, period_x: real, period_y: real, inverse_mass, pairs, near: real, root: cython.pointer(int64_t)
+) -> cython.int:
+    """Join the listed pairs of `join_near_pairs`; moved: None where nothing has."""
     x: cython.pointer[cython.const[real]] = const_reals(position)
-    way: cython.pointer[cython.const[real]] = const_reals(moved)
-    r: cython.pointer[cython.const[real]] = const_reals(size)
+    moves: cython.bint = moved is not None
+    way: cython.pointer[cython.const[real]] = const_reals(moved) if moves else x
+    r: cython.pointer[cython.const[real]] = const_reals(radius)
     w: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
     first: cython.pointer[cython.const[int64_t]] = const_integers(pairs[0])
     count: cython.pointer[cython.const[int64_t]] = const_integers(pairs[1])
     pair_i: cython.pointer[cython.const[uint32_t]] = const_indices(pairs[2])
     pair_j: cython.pointer[cython.const[uint32_t]] = const_indices(pairs[3])
-    to: cython.pointer(int64_t) = integers(root)
     rows: cython.Py_ssize_t = len(pairs[0])
     s: cython.Py_ssize_t
     k: int64_t
@@ -64,11 +63,23 @@ def join_near_pairs(position, moved, size, period_x: real, period_y: real, inver
                 if w[i] > 0 and w[j] > 0:
                     dx: real = nearest_of(x[2 * j] - x[2 * i], period_x)
                     dy: real = nearest_of(x[2 * j + 1] - x[2 * i + 1], period_y)
-                    mx: real = way[2 * j] - way[2 * i]
-                    my: real = way[2 * j + 1] - way[2 * i + 1]
-                    reach: real = near * (r[i] + r[j]) + cython.cast(real, sqrt(mx * mx + my * my))
+                    reach: real = near * (r[i] + r[j])
+                    if moves:
+                        mx: real = way[2 * j] - way[2 * i]
+                        my: real = way[2 * j + 1] - way[2 * i + 1]
+                        reach = reach + cython.cast(real, sqrt(mx * mx + my * my))
                     if dx * dx + dy * dy < reach * reach:
-                        join_sets(to, i, j)
+                        join_sets(root, i, j)
+    return 0
+
+
+def join_near_pairs(position, moved, radius, period_x: real, period_y: real, inverse_mass, pairs, near: real, root):
+    """Join the listed pairs that may have touched while they moved by `moved` (n, 2), m, and both are free.
+
+    That is: whose gap, beyond `near` times their contact distance, is no longer than what they have moved against each other.
+    pairs: those of cell row s are `count[s]` from `first[s]` on: (first, count, i, j).
+    """
+    join_listed(position, moved, radius, period_x, period_y, inverse_mass, pairs, near, integers(root))
 
 
 def join_rows(rows, inverse_mass, root):

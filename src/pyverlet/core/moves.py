@@ -112,32 +112,6 @@ def newton(acceleration, force, inverse_mass, gx: real, gy: real) -> float:
     return cython.cast(real, sqrt(square))
 
 
-def newton_kick_drift(position, velocity, acceleration, force, inverse_mass, gx: real, gy: real, h: real, ahead: real) -> float:
-    """v -= ahead a with the a of before, `newton`, v += h a, x += h v: part by part, for the caches' sake."""
-    x: cython.pointer(real) = reals(position)
-    v: cython.pointer(real) = reals(velocity)
-    a: cython.pointer(real) = reals(acceleration)
-    f: cython.pointer[cython.const[real]] = const_reals(force)
-    w: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
-    count: cython.Py_ssize_t = len(inverse_mass)
-    forced: cython.bint = len(force) > 0
-    largest: real = 0
-    part: cython.Py_ssize_t
-    k: cython.Py_ssize_t
-    with cython.nogil:
-        for part in range((count + PART - 1) // PART):
-            first: cython.Py_ssize_t = part * PART
-            stop: cython.Py_ssize_t = min(first + PART, count)
-            if ahead != 0:
-                add_scaled(v, a, -ahead, 2 * first, 2 * stop)
-            largest = max(largest, accelerate(a, f, w, gx, gy, forced, first, stop))
-            for k in range(2 * first, 2 * stop):
-                kicked: real = v[k] + h * a[k]
-                v[k] = kicked
-                x[k] = x[k] + h * kicked
-    return cython.cast(real, sqrt(largest))
-
-
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
@@ -152,40 +126,6 @@ def are_finite(x: cython.pointer[cython.const[real]], count: cython.Py_ssize_t) 
         if found > 0:
             return False
     return True
-
-
-def kick_free(velocity, acceleration, inverse_mass, h: real) -> bool:
-    """v += h a, and a = 0 of pinned particles; or False, and nothing is done, if an acceleration is NaN or infinite."""
-    v: cython.pointer(real) = reals(velocity)
-    a: cython.pointer(real) = reals(acceleration)
-    w: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
-    count: cython.Py_ssize_t = len(inverse_mass)
-    zero: real = 0
-    finite: cython.bint
-    i: cython.Py_ssize_t
-    with cython.nogil:
-        finite = are_finite(a, 2 * count)
-        if finite:
-            for i in range(count):
-                pinned: cython.bint = w[i] == zero
-                ax: real = zero if pinned else a[2 * i]
-                ay: real = zero if pinned else a[2 * i + 1]
-                a[2 * i] = ax
-                a[2 * i + 1] = ay
-                v[2 * i] = v[2 * i] + h * ax
-                v[2 * i + 1] = v[2 * i + 1] + h * ay
-    return finite != 0
-
-
-def clear_pinned(vectors, inverse_mass):
-    """Set the rows of pinned particles to 0."""
-    x: cython.pointer(real) = reals(vectors)
-    w: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
-    count: cython.Py_ssize_t = len(inverse_mass)
-    i: cython.Py_ssize_t
-    for i in range(count):
-        if w[i] == 0:
-            x[2 * i] = x[2 * i + 1] = 0
 
 
 def all_finite(position, velocity) -> bool:

@@ -6,21 +6,14 @@ from __future__ import annotations
 import cython
 from cython.cimports.arrays import const_doubles, const_indices, const_integers, const_octets, const_reals, integers
 from cython.cimports.lanes import real
-from cython.cimports.libc.math import INFINITY, ceil, floor, isfinite, ldexp, log2, rint, sqrt
+from cython.cimports.libc.math import INFINITY, ceil, floor, isfinite, ldexp, log2, sqrt
 from cython.cimports.libc.stdint import int64_t, uint8_t, uint32_t, uint64_t
+
+from pyverlet.core.periodic import nearest_in_double
 
 FINEST_CELL = cython.declare(int64_t, -100)
 CELL_LEVELS = cython.declare(int64_t, 200)
 """Exponents of the smallest cells of `touching`, whose width is a power of two, m, and how many there are."""
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def nearest_image(difference: cython.double, period: cython.double) -> cython.double:
-    """The image of a difference that is nearest to 0; the difference itself where the period is 0."""
-    return difference - period * rint(difference / period) if period > 0 else difference
 
 
 def overlaps(position, radius, period_x: cython.double, period_y: cython.double, pairs):
@@ -36,8 +29,8 @@ def overlaps(position, radius, period_x: cython.double, period_y: cython.double,
     for k in range(count):
         i: int64_t = pair[2 * k]
         j: int64_t = pair[2 * k + 1]
-        dx: cython.double = nearest_image(cython.cast(cython.double, x[2 * j]) - x[2 * i], period_x)
-        dy: cython.double = nearest_image(cython.cast(cython.double, x[2 * j + 1]) - x[2 * i + 1], period_y)
+        dx: cython.double = nearest_in_double(cython.cast(cython.double, x[2 * j]) - x[2 * i], period_x)
+        dy: cython.double = nearest_in_double(cython.cast(cython.double, x[2 * j + 1]) - x[2 * i + 1], period_y)
         depth: cython.double = 1.0 - sqrt(dx * dx + dy * dy) / (cython.cast(cython.double, r[i]) + r[j])
         if depth > 0.0:
             number += 1

@@ -4,28 +4,26 @@
 from __future__ import annotations
 
 import cython
-from cython.cimports.arrays import const_octets, const_reals, const_singles, const_small_integers, shorts, singles
+from cython.cimports.arrays import const_reals, const_singles, const_small_integers, shorts, singles
 from cython.cimports.lanes import real
-from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t, uint16_t
+from cython.cimports.libc.stdint import int32_t, int64_t, uint16_t
 
 
-def copy_moving(position, velocity, acceleration, resting, lag: real, to_position, to_velocity):
-    """Copy (n, 2) positions, and velocities brought forward by `lag` seconds but for particles that contacts hold, to float32."""
+def copy_moving(position, velocity, acceleration, lag: real, to_position, to_velocity):
+    """Copy (n, 2) positions, and velocities brought forward by `lag` seconds, to float32."""
     p: cython.pointer[cython.const[real]] = const_reals(position)
     v: cython.pointer[cython.const[real]] = const_reals(velocity)
     a: cython.pointer[cython.const[real]] = const_reals(acceleration)
-    held: cython.pointer[cython.const[uint8_t]] = const_octets(resting)
     to_p: cython.p_float = singles(to_position)
     to_v: cython.p_float = singles(to_velocity)
-    count: int64_t = len(resting)
+    count: int64_t = len(position)
     k: int64_t
     with cython.nogil:
         for k in range(count):
-            ahead: real = lag if held[k] == 0 else lag - lag
             to_p[2 * k] = p[2 * k]
             to_p[2 * k + 1] = p[2 * k + 1]
-            to_v[2 * k] = v[2 * k] + ahead * a[2 * k]
-            to_v[2 * k + 1] = v[2 * k + 1] + ahead * a[2 * k + 1]
+            to_v[2 * k] = v[2 * k] + lag * a[2 * k]
+            to_v[2 * k + 1] = v[2 * k + 1] + lag * a[2 * k + 1]
 
 
 def put_rows(out, rows, index):

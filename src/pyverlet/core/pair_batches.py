@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import lowest_bit, real
-from cython.cimports.libc.math import rint
 from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t, uint32_t
 
 from pyverlet.core.cells import Cells
 from pyverlet.core.pair_lists import CLOSE_BIT, PLACE_BITS, Lists
+from pyverlet.core.periodic import nearest_of
 from pyverlet.core.step import TOUCHED, Step
 
 COLOURS = cython.declare(cython.int, 16)
@@ -58,12 +58,8 @@ def forget_colours(c: cython.pointer(Cells), ls: cython.pointer(Lists), s: cytho
 def put_pair(w: cython.pointer(Step), c: cython.pointer(Cells), k: int64_t, a: int64_t, b: int64_t) -> cython.void:
     """Places a and b, with the way from a to b, in lane k."""
     w.i[k], w.j[k] = c.order[a], c.order[b]
-    du: real = c.spot_u[b] - c.spot_u[a]
-    dv: real = c.spot_v[b] - c.spot_v[a]
-    if c.wraps_u:
-        du = du - c.period_u * cython.cast(real, rint(du / c.period_u))
-    if c.wraps_v:
-        dv = dv - c.period_v * cython.cast(real, rint(dv / c.period_v))
+    du: real = nearest_of(c.spot_u[b] - c.spot_u[a], c.period_u)
+    dv: real = nearest_of(c.spot_v[b] - c.spot_v[a], c.period_v)
     if du == 0 and dv == 0:  # a direction of the pair's own, all around
         p: int64_t = w.lists.particle[w.i[k]]
         q: int64_t = w.lists.particle[w.j[k]]

@@ -57,7 +57,6 @@ Lists = cython.struct(
     # ---- groups of rows
     rows=cython.Py_ssize_t,  # groups of rows of cells; one more if there are circles in no cell
     row=cython.pointer(int64_t),  # (groups + 1,)
-    groups_room=cython.Py_ssize_t,
     # ---- pairs as they are found: places in the order of the cells
     found=cython.pointer(int64_t),  # (groups,)
     raw_begin=cython.pointer(int64_t),  # (groups + 1,)

@@ -64,15 +64,3 @@ def wrap(position, low_x: real, low_y: real, period_x: real, period_y: real, out
 def image_near(x: real, reference: real, period: real) -> real:
     """The image of x that is nearest to `reference`; x itself where the period is 0."""
     return x + period * cython.cast(real, rint((reference - x) / period)) if period > 0 else x
-
-
-def follow(position, reference, period_x: real, period_y: real):
-    """Positions become the images nearest to `reference` (n, 2)."""
-    x: cython.pointer(real) = reals(position)
-    there: cython.pointer[cython.const[real]] = const_reals(reference)
-    count: cython.Py_ssize_t = len(position)
-    i: cython.Py_ssize_t
-    with cython.nogil:
-        for i in range(count):
-            x[2 * i] = image_near(x[2 * i], there[2 * i], period_x)
-            x[2 * i + 1] = image_near(x[2 * i + 1], there[2 * i + 1], period_y)

@@ -15,6 +15,8 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, sqrt
 from cython.cimports.libc.stdint import int64_t
 
+from pyverlet.core.query_cells import cell_at
+
 Cells = cython.struct(
     x0=cython.double, y0=cython.double, cell=cython.double, per=cython.double, columns=int64_t, rows=int64_t,
     start=cython.pointer[cython.const[int64_t]], member=cython.pointer[cython.const[int64_t]],
@@ -35,20 +37,9 @@ def cells_of(cells) -> Cells:
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def clamped(value: cython.double, cells: int64_t) -> int64_t:
-    """The cell along one axis, the first or last if it is beyond."""
-    if value >= cells - 1:
-        return cells - 1
-    return cython.cast(int64_t, value) if value > 0 else 0
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
 def column_of(c: cython.pointer(Cells), x: cython.double) -> int64_t:
     """The column of cells that x is in, m."""
-    return clamped((x - c.x0) * c.per, c.columns)
+    return cell_at((x - c.x0) * c.per, c.columns)
 
 
 @cython.cfunc
@@ -57,7 +48,7 @@ def column_of(c: cython.pointer(Cells), x: cython.double) -> int64_t:
 @cython.exceptval(check=False)
 def row_of(c: cython.pointer(Cells), y: cython.double) -> int64_t:
     """The row of cells that y is in, m."""
-    return clamped((y - c.y0) * c.per, c.rows)
+    return cell_at((y - c.y0) * c.per, c.rows)
 
 
 def at_points(points, reach: cython.double, cells, position, radius, found):

@@ -18,8 +18,7 @@ from cython.cimports.arrays import (
 from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t, uint32_t
 
-from pyverlet.core.islands import find_root, join_sets
-from pyverlet.core.periodic import nearest_of
+from pyverlet.core.islands import find_root, join_listed
 
 
 def time_at_rest(velocity, spin, radius, inverse_mass, island, limit: real, dt: cython.float, after: cython.float, calm) -> bool:
@@ -50,48 +49,31 @@ def time_at_rest(velocity, spin, radius, inverse_mass, island, limit: real, dt: 
 
 
 def find_islands(
-    position, size, period_x: real, period_y: real, inverse_mass, calm, pairs, near: real, after: cython.float, root
+    position, radius, period_x: real, period_y: real, inverse_mass, calm, pairs, near: real, after: cython.float, root
 ):
     """root[i]: the lowest slot of the island of i, if all of it has been at rest for `after` seconds; else -1.
 
     An island is what hangs together by pairs nearer than `near` times their contact distance. Pinned circles and sleepers
     (inverse mass 0) belong to none. pairs: as in `join_near_pairs`.
     """
-    x: cython.pointer[cython.const[real]] = const_reals(position)
-    r: cython.pointer[cython.const[real]] = const_reals(size)
     w: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
     timer: cython.pointer[cython.const[cython.float]] = const_singles(calm)
-    first: cython.pointer[cython.const[int64_t]] = const_integers(pairs[0])
-    number: cython.pointer[cython.const[int64_t]] = const_integers(pairs[1])
-    pair_i: cython.pointer[cython.const[uint32_t]] = const_indices(pairs[2])
-    pair_j: cython.pointer[cython.const[uint32_t]] = const_indices(pairs[3])
     to: cython.pointer(int64_t) = integers(root)
-    rows: cython.Py_ssize_t = len(pairs[0])
     count: cython.Py_ssize_t = len(root)
     marks = np.zeros(count, np.uint8)
     restless: cython.pointer(uint8_t) = octets(marks)
-    s: cython.Py_ssize_t
     k: int64_t
     n: cython.Py_ssize_t
+    for n in range(count):
+        to[n] = n
+    join_listed(position, None, radius, period_x, period_y, inverse_mass, pairs, near, to)
     with cython.nogil:
-        for n in range(count):
-            to[n] = n
-        for s in range(rows):
-            for k in range(first[s], first[s] + number[s]):
-                i: int64_t = pair_i[k]
-                j: int64_t = pair_j[k]
-                if w[i] > 0 and w[j] > 0:
-                    dx: real = nearest_of(x[2 * j] - x[2 * i], period_x)
-                    dy: real = nearest_of(x[2 * j + 1] - x[2 * i + 1], period_y)
-                    reach: real = near * (r[i] + r[j])
-                    if dx * dx + dy * dy < reach * reach:
-                        join_sets(to, i, j)
         for n in range(count):
             if timer[n] < after or w[n] <= 0:
                 restless[find_root(to, n)] = 1
         for k in range(count):  # from above: roots are below what they are the roots of
             n = count - 1 - k
-            i = find_root(to, n)
+            i: int64_t = find_root(to, n)
             to[n] = -1 if restless[i] else i
 
 

@@ -97,11 +97,6 @@ def marks_differ(one, other) -> cython.bint:
     return found
 
 
-def differs(one, other) -> bool:
-    """Whether two columns of numbers differ anywhere."""
-    return reals_differ(one, other) != 0
-
-
 def any_differs(a, b, c, d, e, f, a_now, b_now, c_now, d_now, e_now, f_now) -> bool:
     """Whether any of four columns of numbers and two of marks differs from what it is now."""
     numbers: cython.bint = reals_differ(a, a_now) or reals_differ(b, b_now) or reals_differ(c, c_now) or reals_differ(d, d_now)

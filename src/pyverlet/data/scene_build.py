@@ -247,7 +247,7 @@ class Recipe:
                 world.links.append(_link(table, named))
         with self._told():
             if document.get("joined"):
-                describe_links.build(world, [_columns(world, table) for table in document["joined"]])
+                describe_links.build(world, [_columns(table) for table in document["joined"]])
             builder = Builder(world=world)
             kinds: tuple[tuple[str, Any, Any], ...] = (
                 ("forces", world.forces, object), ("obstacles", world.obstacles, Obstacle), ("actors", world.actors, Actor),
@@ -335,7 +335,7 @@ def _named(named: dict[str, Group], key: str, name: str) -> Group:
     return named[name]
 
 
-def _columns(world: World, table: Table) -> Table:
+def _columns(table: Table) -> Table:
     """The lists of a frozen link as arrays again."""
     state = {
         key: np.array(value, np.uint8 if key == "intact" else float)

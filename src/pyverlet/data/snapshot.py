@@ -51,7 +51,7 @@ class OtherBits(UserWarning):
 def save(world: World, path: str | Path, *, scene: Mapping[str, Any] | None = None) -> None:
     """Write a world to a file, from which `load` goes on with the same bits: all at once, or not at all.
 
-    Everything that moves, remembers or acts is kept; compiled code, the profile and the onlooker are not. Objects of classes of
+    Everything that moves, remembers or acts is kept; the profile and the onlooker are not. Objects of classes of
     your own are kept by name, and with what their `save` returns if they are actors.
 
     Args:
@@ -170,7 +170,8 @@ def from_table(header: Header, arrays: dict[str, Array], *, exact: bool = False,
             f"{header['made_by']['pyverlet']}) than these ({sources_hash()}); allowed is exact=False"
         )
     settings = _with_arrays(header["world"], arrays)
-    moving = Parts(memory.unpack(header["facts"]), _moving(arrays))
+    known = {name: array for name, array in _moving(arrays).items() if name not in apart.RETIRED}
+    moving = Parts(memory.unpack(header["facts"]), known)
     if unknown := set(moving.arrays) - set(apart.FIELDS):
         raise InputError(f"there is an array {min(unknown)!r}; allowed are those pyverlet knows")
     with ThreadPoolExecutor(1) as beside:

@@ -30,8 +30,6 @@ Array = NDArray[Any]
 _WORTH_A_PROCESS = 8
 """Worlds that a process should have, for it takes a second to start."""
 
-_ARRAYS = ("position", "velocity", "spin", "radius", "mass")
-
 _tokens = itertools.count()
 
 

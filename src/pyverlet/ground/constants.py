@@ -44,37 +44,14 @@ SLEEP_AFTER_S: Final = 0.5
 SLEEP_NEAR: Final = 1.01
 """Circles nearer than this times their contact distance belong to one island."""
 
-PUSHED: Final = 0.6
-FED: Final = 1.6
-"""Parts of an overlap that a substep takes from the positions, and feeds, divided by h, into the velocities. Less than all of
-it keeps neighbours from undoing each other's push, more than all of it is stiffer: it holds the same weight with less overlap."""
-
-GROWTH: Final = 0.2
-"""1/s: circles added on top of each other count as smaller at first, so that they just touch, and grow by this part of their
-radius a second, at most. That bounds the speed they part with: pushed out in a frame they flew apart at hundreds of metres a
-second."""
-
 SURPLUS: Final = 8e-5
 """Part of the scale of a world's energy, that of a fall through its room, that contacts may add in a frame. Promised is 1e-4."""
-
-GAS_STEP: Final = 0.1
-"""Radii, root mean square, that circles of an elastic gas may move by in a substep without a word: at an area fraction of 0.6 it
-then has 2 % less pressure, at twice that 10 % (`pyverlet check pressure` measures it)."""
-
-GAS_FROM: Final = 100
-"""Circles that make a gas: the pressure of fewer is a matter of each of them."""
-
-GAS_LOOK_FRAMES: Final = 8
-"""Frames after which that is looked at again: in each of them it took a fiftieth of the frame of 1,000 circles."""
 
 FRAME_BUDGET_MS: Final = 5.0
 """Milliseconds of physics a frame may take, of the 16.7 ms at 60 Hz: the rest belongs to drawing and the user's own code."""
 
 LEAST_DRAWN_RADIUS: Final = 0.35
 """Pixels: smaller circles are drawn as large, four tenths of a pixel, or a few of them on a large picture could not be seen."""
-
-SURFACES: Final = 8
-"""Surfaces noted of a circle in a frame at most."""
 
 FIRST_OBSTACLE: Final = 16
 """Number of the first obstacle as a surface; walls of the room have lower ones."""

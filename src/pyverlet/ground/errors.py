@@ -19,10 +19,6 @@ class Interrupted(PyverletError):  # noqa: N818  (like KeyboardInterrupt, it is 
     """A person ended long work early (Ctrl-C); the message says what is kept of it."""
 
 
-class CoarseStepWarning(UserWarning):
-    """The step is too coarse for what moves; the message names a particle and the substeps that would do."""
-
-
 class CoarseCoordinatesWarning(UserWarning):
     """Coordinates of float32 are too coarse so far from the origin; the message says up to where they are not."""
 

@@ -18,7 +18,7 @@ from pathlib import Path
 _LOOK_AGAIN_S = 0.005
 
 PATIENCE_S = 60.0
-"""After so long somebody who still has a turn is taken to be stuck; nothing that is compiled takes as long."""
+"""After so long somebody who still has a turn is taken to be stuck: what is read or written in a turn takes far less."""
 
 _TAKEN = (errno.EAGAIN, errno.EACCES, errno.EDEADLK)
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib import import_module
 from types import FrameType
 from typing import Any
@@ -21,7 +19,7 @@ class _Whole:
     """The context in which Ctrl-C waits; in itself it is no further step. Threads other than the main one see no signals."""
 
     def __init__(self) -> None:
-        self._depth = self._long = 0
+        self._depth = 0
         self._before: Any = None
         self._pressed: tuple[int, FrameType | None] | None = None
 
@@ -47,20 +45,11 @@ class _Whole:
 
     def _note(self, number: int, frame: FrameType | None) -> None:
         # While it is set up or taken down, an exception would leave this in place of what was there.
-        if self._depth and (self._pressed or self._long):
+        if self._depth and self._pressed:
             self._pressed = None
             self._before(number, frame)
         else:
             self._pressed = number, frame
-
-    @contextmanager
-    def long(self) -> Iterator[None]:
-        """Meanwhile Ctrl-C does not wait: compiling takes many seconds."""
-        self._long += 1
-        try:
-            yield
-        finally:
-            self._long -= 1
 
 
 whole = _Whole()

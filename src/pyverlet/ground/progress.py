@@ -38,7 +38,7 @@ class Progress:
     def __call__(self, done: int, total: int) -> None:
         """Say that `done` of `total` are done."""
         now = monotonic()
-        # Measured from the first call: what came before it, such as compiling, says nothing about the rest.
+        # Measured from the first call: what came before it, such as building worlds, says nothing about the rest.
         then, before = self._first = self._first or (now, done)
         if now < self._next:
             return

@@ -90,11 +90,7 @@ def _solve(F: Acceleration, x: Floats, v: Floats, times: Floats, integrator: Int
     found.positions[0], found.velocities[0] = x, v
     h_last = None
     for k, h in enumerate(map(float, np.diff(times))):
-        integrator.begin(slots, forces, times[k], h, h_last)
-        integrator.step(slots, forces, times[k], h)
-        if integrator.velocity_lag:  # the velocity at the time of the position takes the acceleration of now, as in a world
-            forces(slots, times[k + 1])
-        integrator.end(slots, h)
+        integrator.full_step(slots, forces, times[k], h, h_last)
         found.positions[k + 1] = forces.shaped(slots.position)
         found.velocities[k + 1] = forces.shaped(slots.velocity)
         h_last = h
@@ -176,11 +172,3 @@ class _Accelerations:
             raise InputError(f"F returns an array of shape {a.shape} at time {t:g}; allowed is the shape of x0, {self._shape}")
         state.acceleration.fill(0)
         state.acceleration.reshape(-1)[: self._size] = a.reshape(-1)
-
-    def kick_drift(self, state: Slots, t: float, h: float, ahead: float = 0.0) -> None:
-        before = state.acceleration.copy() if ahead else None
-        self(state, t)
-        if before is not None:
-            state.velocity -= ahead * before
-        state.velocity += h * state.acceleration
-        state.position += h * state.velocity

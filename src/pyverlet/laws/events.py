@@ -213,11 +213,11 @@ class Place(NamedTuple):
 
     def walls(self, slots: Slots) -> Told:
         """What a room of the user's own has noted in this frame: who met the nearest of its walls."""
-        at = np.flatnonzero(slots.hits >= 0)
+        at = np.flatnonzero(slots.wall_hits >= 0)
         facing = self.room.facing(slots.position[at]) if len(at) else None
         nearest = np.zeros(len(at), np.int64) if facing is None else np.argmin(facing[0], axis=1)
         keys = (slots.particle[at].astype(np.int64) << 32) + _SURFACE + nearest
-        return Told(keys, slots.hits[at].astype(float), np.zeros(len(at), np.int64))
+        return Told(keys, slots.wall_hits[at].astype(float), np.zeros(len(at), np.int64))
 
     def _surface(self, x: Array, wall: Array, obstacle: Array) -> tuple[Array, Array, Array]:
         """Distance of walls or obstacles from centres x, m, their normals and restitutions; NaN where that is not known."""

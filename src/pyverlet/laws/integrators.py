@@ -14,8 +14,6 @@ import re
 from abc import ABC, abstractmethod
 from typing import ClassVar, Protocol
 
-import numpy as np
-
 from pyverlet.state.moves import advance
 from pyverlet.state.slots import Slots
 
@@ -38,43 +36,37 @@ class Forces(Protocol):
     def __call__(self, state: Slots, t: float) -> None:
         """Evaluate."""
 
-    def kick_drift(self, state: Slots, t: float, h: float, ahead: float = 0.0) -> None:
-        """Evaluate, then velocity += h * acceleration, then position += h * velocity.
-
-        `ahead`: seconds by which the velocity has been kicked for the forces to see; what that was is taken back first.
-        """
-
 
 class Integrator(ABC):
     """One substep at a time; stateless, so that one object may serve many worlds (memory lives in the state).
 
+    Worlds do not call `step` of methods that are a kick and a drift: these the core makes itself.
+
     Attributes:
         order: global order in h for unconstrained motion.
         symplectic: whether the map preserves phase space volume (for forces that do not depend on velocity).
-        velocity_lag: the velocity seen by contacts during a frame belongs to this fraction of h before the position.
-        drop: from rest, under a constant acceleration a, a step moves a particle by drop * a h^2.
-        leaps: whether `step` is v += h a, x += h v, and no more, if no force is but gravity. A class with a `step` of its own
-            says so anew.
+        velocity_lag: between steps the velocity belongs to this fraction of h before the position.
     """
 
     order: ClassVar[int]
     symplectic: ClassVar[bool]
     velocity_lag: ClassVar[float] = 0.0
-    drop: ClassVar[float] = 0.5
-    leaps: ClassVar[bool] = False
-
-    def __init_subclass__(cls) -> None:
-        cls.leaps = vars(cls).get("leaps", "step" not in vars(cls) and cls.leaps)
 
     def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
-        """Before the substeps of a frame. `h_last`: the substep of the frame before, None after a restart."""
+        """Before a step of h seconds; the velocity is at the time of the position. `h_last`: of the step before, or None."""
 
     @abstractmethod
     def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
         """Advance `state.position` and `state.velocity` from t to t + h."""
 
-    def end(self, state: Slots, h: float) -> None:
-        """After the substeps of a frame: leave `state.velocity` as the velocity at the time of the position."""
+    def end(self, state: Slots, forces: Forces, t: float, h: float) -> None:
+        """After it, at time t: leave the velocity at the time of the position."""
+
+    def full_step(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None = None) -> None:
+        """From a velocity at the time of the position to one at the time of the position."""
+        self.begin(state, forces, t, h, h_last)
+        self.step(state, forces, t, h)
+        self.end(state, forces, t + h, h)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}()"
@@ -112,7 +104,6 @@ class ExplicitEuler(Integrator):
 
     order = 1
     symplectic = False
-    drop = 0.0
 
     def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
         forces(state, t)
@@ -129,11 +120,11 @@ class SemiImplicitEuler(Integrator):
 
     order = 1
     symplectic = True
-    drop = 1.0
-    leaps = True
 
     def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
-        forces.kick_drift(state, t, h)
+        forces(state, t)
+        _kick(state, h)
+        _drift(state, h)
 
 
 class _Stormer(Integrator):
@@ -141,17 +132,13 @@ class _Stormer(Integrator):
 
     The method's memory is x - x_prev. Kept as a velocity u = (x - x_prev) / h it never subtracts large positions, and contacts
     may change it. The user sees v = u + a h / 2, the velocity at the time of x; between frames that is what is stored.
-    A particle held by a wall has no such a: its u is its velocity, and its remembered acceleration is 0. Among others at rest
-    its u is what carries their weight, -lean a h, and its velocity is 0: the acceleration remembered is 2 lean a.
     Forces of the user's own that depend on the velocity see v, the mean of u before and after the kick, by fixed-point iteration:
     a force across the velocity does no work. That converges while h times their derivative by the velocity is below 2 m.
     """
 
     order = 2
     symplectic = True
-    drop = 1.0
     velocity_lag = 0.5
-    leaps = True
 
     def __init__(self, *, naive_start: bool = False) -> None:
         self.naive_start = naive_start
@@ -164,31 +151,34 @@ class _Stormer(Integrator):
         return self.name() + (", naive start" if self.naive_start else "")
 
     def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
-        back = -0.5 * (h if h_last is None else h_last)
-        # Pinned since the frame before: what is left of its fall would move it for ever.
-        if state.motion.kick_free(state.velocity, state.acceleration, state.inverse_mass, back):
-            return
-        fresh = np.isnan(state.acceleration[:, 0])
         # x_prev = x - v h + a h^2 / 2 makes u = v - a h / 2: order 2. The naive x_prev = x - v h makes u = v: order 1.
-        known = state.acceleration.copy()
-        if self.naive_start:
-            state.acceleration[fresh] = 0
-        else:
+        if h_last is None and not self.naive_start:
             forces(state, t)
-        state.acceleration[~fresh] = known[~fresh]
-        state.motion.clear_pinned(state.acceleration, state.inverse_mass)
-        advance(state.velocity, state.velocity, state.acceleration, back)
+        elif h_last is None:
+            state.acceleration.fill(0)
+        advance(state.velocity, state.velocity, state.acceleration, -0.5 * (h if h_last is None else h_last))
 
     def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
-        # Forces that look at the velocity get the one at time t, not the one half a substep behind.
-        ahead = 0.5 * h if forces.velocity_dependent else 0.0
-        for left in range(PASSES - 1 if ahead and forces.functions else 0, -1, -1):
-            if ahead:
-                _kick(state, ahead)
-            forces.kick_drift(state, t, h if left == 0 else 0.0, ahead)
+        self._evaluate(state, forces, t, h)
+        _kick(state, h)
+        _drift(state, h)
 
-    def end(self, state: Slots, h: float) -> None:
+    def end(self, state: Slots, forces: Forces, t: float, h: float) -> None:
+        self._evaluate(state, forces, t, h)
         _kick(state, 0.5 * h)
+
+    @staticmethod
+    def _evaluate(state: Slots, forces: Forces, t: float, h: float) -> None:
+        """Forces that look at the velocity get the one at time t, not the one half a substep behind."""
+        if not forces.velocity_dependent:
+            forces(state, t)
+            return
+        before = state.velocity
+        state.velocity = state.scratch(0)
+        for _ in range(PASSES if forces.functions else 1):
+            advance(state.velocity, before, state.acceleration, 0.5 * h)
+            forces(state, t)
+        state.velocity = before
 
 
 class PositionVerlet(_Stormer):
@@ -214,16 +204,16 @@ class TimeCorrectedVerlet(_Stormer):
     """
 
     def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
-        varies = h_last is not None and h_last != h
-        if varies:
-            # u' = u + a (h + h_prev) / 2 differs from the constant step's u + a h by a (h_prev - h) / 2, with the a of time t.
-            kept, state.acceleration = state.acceleration, np.empty_like(state.acceleration)
-            forces(state, t)
-            now, state.acceleration = state.acceleration, kept
+        if h_last in (None, h):
+            super().begin(state, forces, t, h, h_last)
+            return
+        # u' = u + a (h + h_prev) / 2 differs from the constant step's u + a h by a (h_prev - h) / 2, with the a of time t.
+        kept, state.acceleration = state.acceleration, state.scratch(0)
+        forces(state, t)
+        now, state.acceleration = state.acceleration, kept
         super().begin(state, forces, t, h, h_last)
-        if varies:
-            assert h_last is not None
-            advance(state.velocity, state.velocity, now, 0.5 * (h_last - h))
+        assert h_last is not None
+        advance(state.velocity, state.velocity, now, 0.5 * (h_last - h))
 
 
 class VelocityVerlet(Integrator):

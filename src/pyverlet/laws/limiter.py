@@ -1,7 +1,7 @@
-"""Contacts and links give no energy: what a world has gained too much in a frame is taken back from those who have it.
+"""Contacts and links give no energy: what a world has gained too much in a frame is taken back from those that have it.
 
-Pushing circles apart lifts them and throws them: in a crash that a substep sees as deep overlap, and where circles grow that were
-added on top of each other. So the energy at the end of a frame is compared with that at its start. What it has gained beyond
+Pushing circles apart lifts them and throws them: in a crash that a substep sees as deep overlap, and where circles were added on
+top of each other. So the energy at the end of a frame is compared with that at its start. What it has gained beyond
 SURPLUS of the world's scale is taken back, cluster by cluster, in proportion to what each has gained, never more than that. A
 cluster is what hangs together by contacts in this frame, by links, and by forces that add up to nothing, such as gravitation.
 What it has gained is its kinetic energy and that of its links, less the work of gravity and of the forces with a potential, by
@@ -13,8 +13,7 @@ the trapezoidal rule: exact for springs. In this order:
    along what has changed its momentum beside gravity: there it was not alone, for nothing thrusts itself off nothing. A smooth
    floor leaves the momentum along it as it is. Forces that depend on the place leave none: then it is all of it. So it is, too,
    under gravity, where what follows is not enough: in a crowd that is wedged in, or among masses of 1:1000 in free fall.
-3. What circles have been raised against these forces in this frame: they are lowered by a part of that, and have grown by that
-   part less. Not those that a wall has raised because they were partly beyond it: it would do so again.
+3. What circles have been raised against these forces in this frame: they are lowered by a part of that.
 4. Their way. Where lowering pushes circles into walls, or forces hold them elsewhere, it may not do: those that could not give
    enough of their motion have come only a part of the way that they have come in this frame. If they are where they were and have
    gained all the same, it is what they move with as a whole: that is taken, too.
@@ -25,6 +24,7 @@ that has raised is no gain.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import copy
 from typing import Any
 
@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.core import unit
-from pyverlet.ground.constants import ONE_THREAD_BELOW, SLEEP_NEAR, SURPLUS
+from pyverlet.ground.constants import SLEEP_NEAR, SURPLUS
 from pyverlet.laws.forces import Drag, ForceSum, has_potential
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course
@@ -44,9 +44,6 @@ Array = NDArray[Any]
 Listed = tuple[Array, Array, Array, Array]
 Extent = tuple[float, float, float, float]
 
-_NOBODY: Listed = (np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.uint32), np.zeros(0, np.uint32))
-"""No pairs."""
-
 _ROUNDED = 1e-5
 """Of what momenta come to without their signs: less is rounding, in float32 by eight substeps of a thousand circles or so. Beside
 it what contacts make of rounded places: velocities, over h."""
@@ -54,18 +51,15 @@ it what contacts make of rounded places: velocities, over h."""
 _NEARLY = 1.01
 """Times what may be gained: more is too much, which lowering could not take back."""
 
-_INSIDE = 0.99
-"""Of its radius: a circle was inside the room if the point so far below its centre was, the way gravity points."""
 
-
-class Watch:
-    """Looks after the energy of a frame of dt seconds. `start`: the user's arrays, as they are until the frame is accepted."""
+class EnergyLimiter:
+    """Limits what a frame of dt seconds may gain. `start`: the user's arrays, as they are until the frame is accepted."""
 
     def __init__(self, start: State, forces: ForceSum, links: Links, room: Boundary, course: Course, dt: float) -> None:
         self._start, self._forces, self._links, self._room, self._course, self._dt = start, forces, links, room, course, dt
         self._gravity = forces.gravity
         self._kept: list[Any] = [force for force in forces.forces if has_potential(force)] if forces.forces else []
-        self._plain = len(start) < ONE_THREAD_BELOW and not (self._kept or links.give)
+        self._plain = not (self._kept or links.give)
         # What links hold is not known any more when the frame is over.
         by_forces, self._by_links = (0.0, 0.0) if self._plain else self._holds(start)
         # A potential is known but for a constant, so that under gravity, which has a scale, it is none.
@@ -94,26 +88,17 @@ class Watch:
         start = (then.position, then.velocity, then.spin, then.radius, then.mass)
         return float(now.motion.energy_gained(start, motion, *self._gravity))
 
-    def close(self, slots: Slots, contacts: Any) -> bool:
-        """The frame is over: take back what has been gained too much.
-
-        Returns whether all positions and velocities are known to be finite: so they are if their energy is.
-        """
-        finite = False
-        if self._forces.gravity == self._gravity:  # else it has turned on the way, and drove the world
+    def limit(self, slots: Slots, listed: Callable[[], Listed]) -> None:
+        """The frame is over: take back what has been gained too much. listed: the pairs of the list, as first, count, i, j."""
+        gained = self._gained(slots)
+        room = SURPLUS * fall(slots.total_mass, self._gravity, self._room.extent())
+        surplus = self._surplus(gained, room, slots)
+        if surplus > 0.0 and self._excuse_misplaced(slots):
             gained = self._gained(slots)
-            finite = not slots.pins and abs(gained) < np.inf  # what is pinned has none
-            room = SURPLUS * fall(slots.total_mass, self._gravity, self._room.extent())
             surplus = self._surplus(gained, room, slots)
-            if surplus > 0.0 and self._pardon_mislaid(slots):
-                gained = self._gained(slots)
-                surplus = self._surplus(gained, room, slots)
-            if surplus > 0.0:
-                finite = False
-                raised = self.take_back(slots, contacts.listed() if contacts else _NOBODY, surplus)
-                left = self._put_back(slots, raised, gained - surplus)
-                slots.taken = gained - left
-        return finite
+        if surplus > 0.0:
+            raised = self.take_back(slots, listed(), surplus)
+            slots.taken = gained - self._put_back(slots, raised, gained - surplus)
 
     def _surplus(self, gained: float, room: float, slots: Slots) -> float:
         """What of this gain is too much, J. room: what a fall leaves room for."""
@@ -123,22 +108,22 @@ class Watch:
         there = self._mechanical(self._start, (0.0, 0.0)) + abs(self._held)
         return gained - max(room, SURPLUS * there)
 
-    def _pardon_mislaid(self, slots: Slots) -> bool:
-        """Let who was where nobody can be begin where it is now. False: there was nobody."""
+    def _excuse_misplaced(self, slots: Slots) -> bool:
+        """Particles that were outside the room or inside an obstacle begin where they are now. False: there were none."""
         start = self._start
-        mislaid = self._room.outside(start.position) | (self._course.covering(start.position) >= 0)
-        who = (mislaid & np.isfinite(start.mass))[slots.particle]
-        if not who.any():
+        misplaced = self._room.outside(start.position) | (self._course.covering(start.position) >= 0)
+        moved = (misplaced & np.isfinite(start.mass))[slots.particle]
+        if not moved.any():
             return False
         self._start = copy(start)
         self._start.position = start.position.copy()
-        self._start.position[slots.particle[who]] = slots.position[who]
+        self._start.position[slots.particle[moved]] = slots.position[moved]
         if not self._plain:
             self._energy = self._by_forces(self._start) + self._by_links + self._mechanical(self._start, self._gravity)
         return True
 
     def take_back(self, slots: Slots, listed: Listed, surplus: float) -> Array:
-        """Take so many J from those who have gained in this frame. (n,) bool: who had more than could be taken of motion."""
+        """Take so many J from those that have gained. (n,) bool: those that had more than their motion could give."""
         start = self._start
         before, pull = self._pulls(slots)
         then = start.position, start.velocity, start.spin, start.radius, start.mass
@@ -147,34 +132,28 @@ class Watch:
             surplus, self._dt, *self._gravity, *slots.seam.period, bool(self._forces.forces), bool(self._kept), _ROUNDED,
             float(np.finfo(slots.dtype).eps) / (slots.h * _ROUNDED),
         )  # fmt: skip
-        lift, part, moved, lower = np.empty(len(slots)), np.empty(len(slots)), *np.empty((2, len(slots), 2))
+        lift, moved, lower = np.empty(len(slots)), *np.empty((2, len(slots), 2))
         slots.motion.raise_of(then, now, slots.particle, before, pull, limits, lift, moved)
         share = self._links.gains(start.position, slots.where()) if self._links else np.zeros(0)
-        root, inside = self._clusters(slots, listed, moved), self._was_inside()
-        about = root, pull, slots.hits, slots.particle, inside, share
-        more = slots.motion.take_energy(then, now, about, limits, lift, moved, lower, part)
-        if slots.size is not slots.radius:
-            slots.grown -= (part * (slots.grown - start.grown[slots.particle])).astype(slots.dtype)
-            slots.resize()
+        about = self._clusters(slots, listed, moved), pull, slots.particle, share
+        more = slots.motion.take_energy(then, now, about, limits, lift, moved, lower)
         slots.position[:] = self._within_room(slots.position.astype(float), lower, slots.radius)
         return np.asarray(more)
 
     def _put_back(self, slots: Slots, raised: Array, allowed: float) -> float:
         """Let `raised` have come only so much of their way in this frame that no more than `allowed` J are gained; return that.
 
-        Ways are straight and rooms convex, so nobody leaves one. Of gravity's work each part of the way has the same part.
+        Ways are straight and rooms convex: none leads out. Of gravity's work each part of the way has the same part.
         """
         left = self._gained(slots)
         if left <= allowed * _NEARLY or not raised.any():
             return left
         start, order = self._start, slots.particle[raised]
-        begin, small = start.position[order].astype(float), start.grown[order]
-        way, growth = slots.seam.nearest(slots.position[raised].astype(float) - begin), slots.grown[raised] - small
+        begin = start.position[order].astype(float)
+        way = slots.seam.nearest(slots.position[raised].astype(float) - begin)
 
         def come(part: float) -> float:
             slots.position[raised] = begin + part * way
-            slots.grown[raised] = small + slots.real(part) * growth
-            slots.resize()
             return self._gained(slots)
 
         none = come(0.0)
@@ -187,13 +166,13 @@ class Watch:
             self._slow(slots, raised, none - allowed)
         return self._gained(slots)
 
-    def _slow(self, slots: Slots, who: Array, surplus: float) -> None:
-        """Take so many J of the motion of `who`, or all of it."""
-        m, rim = slots.mass[who].astype(float), (slots.radius[who] * slots.spin[who]).astype(float)
-        motion = 0.5 * float(m @ (slots.velocity[who].astype(float) ** 2).sum(axis=1)) + 0.25 * float(m @ rim**2)
+    def _slow(self, slots: Slots, which: Array, surplus: float) -> None:
+        """Take so many J of the motion of `which`, or all of it."""
+        m, rim = slots.mass[which].astype(float), (slots.radius[which] * slots.spin[which]).astype(float)
+        motion = 0.5 * float(m @ (slots.velocity[which].astype(float) ** 2).sum(axis=1)) + 0.25 * float(m @ rim**2)
         part = slots.real(np.sqrt(max(1.0 - surplus / motion, 0.0)) if motion > 0.0 else 1.0)
-        slots.velocity[who] *= part
-        slots.spin[who] *= part
+        slots.velocity[which] *= part
+        slots.spin[which] *= part
 
     def _pulls(self, slots: Slots) -> tuple[Array, Array]:
         """(n, 2) N, what forces with a potential do to each beside gravity, at the start of the frame and now; empty: nothing."""
@@ -219,16 +198,10 @@ class Watch:
             lower = lower + np.maximum(np.minimum(radius, before) - gap, 0)[:, None] * normal
         return lower
 
-    def _was_inside(self) -> Array:
-        """(n,) bool, who was above the wall when the frame began, in the user's order."""
-        g, start = np.array(self._forces.gravity), self._start
-        down = g / max(float(np.hypot(*g)), 1e-300)
-        return ~self._room.outside(start.position.astype(float) + _INSIDE * start.radius[:, None] * down)
-
     def _clusters(self, slots: Slots, listed: Listed, moved: Array) -> Array:
         """(n,) lowest slot of the cluster that each slot belongs to."""
         root = np.arange(len(slots))
-        bodies = (slots.position, moved.astype(slots.dtype), slots.size, *slots.seam.period, slots.inverse_mass)
+        bodies = (slots.position, moved.astype(slots.dtype), slots.radius, *slots.seam.period, slots.inverse_mass)
         slots.motion.join_near_pairs(*bodies, listed, SLEEP_NEAR, root)
         if self._links:
             slots.motion.join_rows(slots.slots_of(self._links.joined()), slots.inverse_mass, root)
@@ -249,37 +222,36 @@ def fall(mass: float, gravity: tuple[float, float], extent: Extent | None) -> fl
 
 
 def _rounding(slots: Slots) -> float:
-    """J that are not worth looking for: the energy of who moves by a rounding error of the largest coordinate in 1/60 s."""
+    """J that are not worth looking for: energy of motion by a rounding error of the largest coordinate in 1/60 s."""
     speed = 60.0 * float(np.finfo(slots.dtype).eps) * float(np.abs(slots.position).max(initial=0.0))
     return 0.5 * slots.total_mass * speed * speed
 
 
-def undriven(world: Any, h: float, h_last: float | None) -> bool:
+def undriven(world: Any) -> bool:
     """Whether nothing but contacts and links could raise the energy of a world.
 
     Forces have a potential or are drag, which wind is not, no obstacle, wall or pinned circle moves, gravity does not point along
-    a period, and the integrator does not raise it either: of order 2 or more, and with a constant step, which `PositionVerlet`
-    needs.
+    a period, and the integrator does not raise it either: it is of order 2 or more.
     """
     room = world.boundary
-    if world.integrator.order < 2 or h_last not in (None, h) or room.moves:
+    if world.integrator.order < 2 or room.moves:
         return False
     if world._slots.pins and pinned_move(world._slots):
         return False
     seam = room.seam
     if seam and any(g != 0 and period > 0 for g, period in zip(world.gravity, seam.period, strict=True)):
-        return False  # who falls for ever gains for ever
+        return False  # what falls for ever gains for ever
     if world.forces and not all(type(force) is Drag or has_potential(force) for force in world.forces):
         return False
     return not world._course.drives
 
 
-def watched(world: Any, h: float, h_last: float | None) -> Watch | None:
-    """What looks after the energy of a frame, if nothing but contacts, links and obstacles could raise it."""
+def limiter_for(world: Any, dt: float) -> EnergyLimiter | None:
+    """The limiter of a frame, if nothing but contacts, links and obstacles could raise it."""
     about = world._state, world._force_sum, world.links, world.boundary, world._course
-    return Watch(*about, world.substeps * h) if undriven(world, h, h_last) else None
+    return EnergyLimiter(*about, dt) if undriven(world) else None
 
 
 def pinned_move(state: State | Slots) -> bool:
-    """Whether somebody pinned pushes others about: with infinite mass one goes on at its velocity, and nothing stops it."""
+    """Whether pinned particles push others about: they go on at their velocity, and nothing stops them."""
     return bool(unit("engine", state.mass.dtype).pinned_move(state.mass, state.velocity, state.spin))

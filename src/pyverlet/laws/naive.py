@@ -42,7 +42,6 @@ class Naive(Boundary):
         room = self.room
         clamp: Any = state.motion.clamp_to_box if isinstance(room, Box) else state.motion.clamp_to_circle
         shape = (*room.lower, *room.upper) if isinstance(room, Box) else (*room.center, room.radius)
-        state.resting[:] = 0
         moving = state.position, state.velocity, state.radius, state.inverse_mass
         clamp(*shape, *moving, h, room.restitution, self._flip)
 

@@ -114,7 +114,7 @@ class _Walls(Boundary):
 def _bodies(state: Slots) -> tuple[tuple[Array, ...], Array, Array]:
     """What `core.own_walls` asks of circles."""
     moving = state.position, state.velocity, state.acceleration, state.spin
-    return (*moving, state.radius, state.restitution, state.friction), state.inverse_mass, state.hits
+    return (*moving, state.radius, state.restitution, state.friction), state.inverse_mass, state.wall_hits
 
 
 class Circle(_Walls):

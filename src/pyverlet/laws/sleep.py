@@ -87,7 +87,7 @@ class Sleep:
         if self._laws is None or not tired:
             return False
         root = np.empty(len(slots), np.int64)
-        bodies = (slots.position, slots.size, *slots.seam.period, slots.inverse_mass, slots.calm)
+        bodies = (slots.position, slots.radius, *slots.seam.period, slots.inverse_mass, slots.calm)
         slots.motion.find_islands(*bodies, pairs, SLEEP_NEAR, SLEEP_AFTER_S, root)
         sleeper = root >= 0
         if not sleeper.any():
@@ -98,7 +98,7 @@ class Sleep:
         self._members |= dict(zip(number.tolist(), members.tolist(), strict=True))
         for array in (slots.velocity, slots.acceleration, slots.spin):
             array[sleeper] = 0
-        slots.weigh()
+        slots.update_inverse_mass()
         return True
 
     def _wake(self, slots: Slots, who: Array) -> bool:
@@ -108,7 +108,7 @@ class Sleep:
             del self._members[int(island)]
         slots.island[who] = -1
         slots.calm[who] = 0
-        slots.weigh()
+        slots.update_inverse_mass()
         return True
 
 

@@ -137,7 +137,7 @@ class _End:
         self._position, self._radius = np.empty((count, 2)), np.empty(count)
         self._free = np.empty(count, bool)
         order = state.particle
-        self._position[order], self._radius[order] = state.position, state.size
+        self._position[order], self._radius[order] = state.position, state.radius
         self._free[order] = state.inverse_mass > 0
         self._obstacles, self._found = course.seen(), dict[int, Array]()
         who = np.flatnonzero(given[2].any(axis=1))

@@ -22,12 +22,6 @@ def newton(state: Slots, force: Array, gravity: tuple[float, float]) -> float:
     return float(state.motion.newton(state.acceleration, force, state.inverse_mass, *gravity))
 
 
-def newton_kick_drift(state: Slots, force: Array, gravity: tuple[float, float], h: float, ahead: float) -> float:
-    """Take back a kick of `ahead` seconds; `newton`; velocity += h * acceleration; position += h * velocity."""
-    where = state.position, state.velocity, state.acceleration, force, state.inverse_mass
-    return float(state.motion.newton_kick_drift(*where, *gravity, h, ahead))
-
-
 def first_non_finite(state: Slots) -> int:
     """The user's index of a particle whose position or velocity is NaN or infinite; -1 if all are finite."""
     if state.motion.all_finite(state.position, state.velocity):

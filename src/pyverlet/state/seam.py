@@ -68,16 +68,6 @@ class Seam(NamedTuple):
                 out[leaves, axis] = low + period
         return out
 
-    def strays(self, position: Array) -> bool:
-        """Whether any of these places (n, 2) is farther than a period from the middle of the room."""
-        low = np.array((self.low_x, self.low_y), position.dtype)
-        away = np.abs(position - low - 0.5 * np.asarray(self.period, position.dtype))
-        return bool(((away > self.period) & (np.asarray(self.period) > 0)).any())
-
-    def follow(self, position: Array, reference: Array) -> None:
-        """These places (n, 2) become the images nearest to `reference` (n, 2)."""
-        core.unit("motion", position.dtype).follow(position, reference, *self.period)
-
 
 NONE = Seam()
 """Of rooms that do not join on to themselves."""

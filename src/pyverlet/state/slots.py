@@ -1,6 +1,6 @@
 """What the engine sees: `Slots`, the same particles in an order of its own.
 
-Sorted so that neighbours in space are neighbours in memory; nobody outside ever sees that order.
+Sorted so that neighbours in space are neighbours in memory; that order is not seen outside.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from pyverlet import core
 from pyverlet.ground import memory
-from pyverlet.ground.constants import SURFACES
 from pyverlet.state import seam
 from pyverlet.state.state import COLUMNS, EVERYONE, MARKS, ROWS, SET, State
 from pyverlet.state.unchanged import Unchanged
@@ -22,8 +21,8 @@ Array = NDArray[Any]
 
 _GIVEN, _LISTED = (*SET, *MARKS), ("radius", "mass", *MARKS)
 
-# What a slot remembers from frame to frame beside the user's arrays: dtype, and value for a new particle.
-_REMEMBERED: dict[str, tuple[Any, Any]] = {"fed": (np.uint8, 0), "island": (np.int64, -1), "calm": (np.float32, 0)}
+# What sleepers remember from frame to frame beside the user's arrays: dtype, and value for a new particle.
+_REMEMBERED: dict[str, tuple[Any, Any]] = {"island": (np.int64, -1), "calm": (np.float32, 0)}
 
 
 class Slots:
@@ -32,45 +31,28 @@ class Slots:
     Attributes:
         motion: the unit of the core that moves particles, for this dtype.
         real: rounds a number to the dtype; it remembers some, for NumPy takes longer to round one than a kernel to be called.
-        reals: the same of several at once.
         particle: (n,) the user's index of the particle in each slot.
-        position, velocity, acceleration, spin, radius, mass, grown, restitution, friction: as in State.
+        position, velocity, acceleration, spin, radius, mass, restitution, friction: as in State.
         category, mask: as in State, or empty while every circle collides with every other.
         most_restitution, most_friction: the largest of their columns; negative if no circle has values of its own.
-        given: how often what users set was taken up anew, or others slept.
-        size: (n,) grown * radius, m: what contacts between particles take as the radius.
+        revision: how often what users set was taken up anew, or others slept.
         inverse_mass: (n,) 1/kg; 0 for a pinned particle: whether one `pins`. total_mass: of others, kg.
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
-        start: (n, 2) positions before the integration of this substep, m; empty unless circles rub each other, or meet obstacles.
-        turn, lift: empty unless circles rub each other: (n,) rad by which each turns in this substep, and (n,) s; times -a that
-            is the velocity with which circles at rest against others end a substep, for others 0.
-        along: (n, 2) m/s^2, the acceleration left to circles that an obstacle or a smooth wall holds, for others 0; or empty.
-        drop: a circle at rest falls drop * a h^2 in a substep of h seconds; depends on the integrator.
-        fed: (n,) bits: CARRIES where a contact at rest fed the velocity in the last substep, AT_WALL where a wall was touched
-            in it, CARRIED and WAS_AT_WALL the same in the one before. Kept only if circles bounce.
-        island, calm: (n,) number of a sleeper's island, -1 if awake, and s it has been calm; empty where nobody may sleep.
-        lean: times -a h it is the velocity with which circles at rest against others end a substep; 0 until contacts say so.
-        resting: (n,) bits of `kernels.motion`: who held it in the last substep, a wall or, after a frame, another particle.
-        hits: (n,) largest speed with which the circle met a wall in this frame, m/s; negative: none.
-        impacts: (n, 1 + 3 SURFACES), of each circle in this frame: how many surfaces it has met, and of each of these its number,
-            how often it bounced, and the largest speed, m/s; empty unless events are recorded.
-        spent: (n, 2) J that impacts on walls, and friction there, have taken in this frame, negative: to be summed, for rows stay
-            where they are; empty unless somebody keeps account. taken: J, by the energy limiter. worked: J, brought by the room.
+        h: length of a substep of this frame, s.
+        island, calm: (n,) number of a sleeper's island, -1 if awake, and s it has been calm; empty unless particles may sleep.
+        wall_hits: (n,) largest speed with which the circle met a wall of a user's own room in this frame, m/s; negative: none.
+        taken: J that the energy limiter has taken in this frame.
 
     Args:
-        sleeps: whether particles may sleep. events: whether events are recorded.
+        sleeps: whether particles may sleep.
     """
 
-    def __init__(self, dtype: np.dtype[Any], *, sleeps: bool = False, events: bool = False) -> None:
-        self.dtype, self._sleeps, self._events = dtype, sleeps, events
+    def __init__(self, dtype: np.dtype[Any], *, sleeps: bool = False) -> None:
+        self.dtype, self._sleeps = dtype, sleeps
         self.motion: Any = core.unit("motion", dtype)
         self.real = lru_cache(64)(dtype.type)
-        self.reals = lru_cache(64)(lambda *numbers: tuple(map(dtype.type, numbers)))
         self._kept: dict[str, Array] = {}
-        self.drop, self.lean, self.total_mass, self.pins, self.taken, self.worked, self.given = 1.0, 0.0, 0.0, False, 0.0, 0.0, 0
-        self.h = 0.0
-        self._circles: Any = None
-        self._claims: Any = None
+        self.total_mass, self.pins, self.taken, self.revision, self.h = 0.0, False, 0.0, 0, 0.0
         self._resize(0)
 
     def __len__(self) -> int:
@@ -82,7 +64,7 @@ class Slots:
         order = self._kept.pop("particle", np.zeros(0, np.int32))
         self.particle = np.concatenate((order, np.arange(len(order), count, dtype=np.int32)))
         for name, (dtype, value) in _REMEMBERED.items():
-            column = np.full(count if self._sleeps or name == "fed" else 0, value, dtype)
+            column = np.full(count if self._sleeps else 0, value, dtype)
             column[: len(order)] = self._kept.pop(name, column[: len(order)])
             setattr(self, name, column)
         for name in ROWS:
@@ -91,15 +73,9 @@ class Slots:
             setattr(self, name, memory.zeros(count, self.dtype))
         for scratch in ("force", "resistance"):
             self.__dict__.pop(scratch, None)
-        self.start = self.along = np.empty((0, 2), self.dtype)
-        self.turn = self.lift = np.empty(0, self.dtype)
-        self.size = self.radius
-        self.resting = np.zeros(count, np.uint8)
         self._given: dict[str, Any] = {name: np.zeros(0, np.uint32 if name in MARKS else self.dtype) for name in _GIVEN}
-        self._changed = self._grows = True
-        self.hits = np.full(count, -1, self.dtype)
-        self.impacts = np.zeros((count if self._events else 0, 1 + 3 * SURFACES), self.dtype)
-        self.spent = np.empty((0, 2))
+        self._changed = True
+        self.wall_hits = np.full(count, -1, self.dtype)
         self.category = self.mask = np.empty(0, np.uint32)
         self.most_restitution = self.most_friction = -1.0
         self._scratch: list[Array] = []
@@ -111,12 +87,10 @@ class Slots:
     spin: Array
     radius: Array
     mass: Array
-    grown: Array
     restitution: Array
     friction: Array
     inverse_mass: Array
     seam = seam.NONE  # in a periodic room positions run on beyond it within a frame
-    fed: Array
     island: Array
     calm: Array
 
@@ -147,11 +121,11 @@ class Slots:
             self._resize(len(state))
         self.seam = state.seam
         given = (state.position, state.velocity, state.acceleration, state.spin)
-        if not self._given_back.recall(given):  # a user who has changed nothing need not wait for it to be copied again
+        if not self._given_back.recall(given):  # what the user has not changed is not copied again
             self.motion.take_motion(self.position, self.velocity, self.acceleration, self.spin, *given, self.particle)
         # What seldom changes is compared in the user's order, where neighbours in memory need no index.
         now = (state.radius, state.mass, state.restitution, state.friction, state.category, state.mask)
-        if self._grows or self.size is not self.radius or self.motion.any_differs(*(*self._given.values(), *now)):
+        if self._changed or self.motion.any_differs(*(*self._given.values(), *now)):
             return self._take_given(state)
         return False
 
@@ -162,9 +136,9 @@ class Slots:
             given, now = self._given[name], getattr(state, name)
             changed |= name in _LISTED and _differs(given, now)
             self._given[name] = (now[:1] if (now == now[:1]).all() else now).copy()
-        for name in (*SET, "grown"):
-            memory.take(self._given.get(name, state.grown), self.particle, getattr(self, name))  # one number, if that of all
-        self.weigh()
+        for name in SET:
+            memory.take(self._given[name], self.particle, getattr(self, name))  # one number, if that of all
+        self.update_inverse_mass()
         # Summed in the user's order: that of slots, and with it the last bit, is another when a saved world is taken up.
         self.total_mass = float(state.mass.sum(dtype=float, where=(free := np.isfinite(state.mass))))
         self.pins = not free.all()
@@ -172,44 +146,25 @@ class Slots:
         filters = (state.category != 1).any() or (state.mask != EVERYONE).any()
         order = self.particle if filters else self.particle[:0]
         self.category, self.mask = state.category[order], state.mask[order]
-        self.resize()
-        self._grows, self._changed = self.size is not self.radius, False
+        self._changed = False
         return bool(changed)
 
-    def weigh(self) -> None:
+    def update_inverse_mass(self) -> None:
         """Bring `inverse_mass` up to date with `mass` and who sleeps."""
         with np.errstate(divide="ignore"):  # a mass of 0 is refused by the world, with a sentence
             np.divide(1, self.mass, out=self.inverse_mass)
         self.inverse_mass[self.asleep] = 0
-        self.given += 1
+        self.revision += 1
 
     def _keep(self, slots: Any) -> None:
         """Remember what outlives a change of size, of these slots."""
         kept = ((name, getattr(self, name)) for name in ("particle", *_REMEMBERED))
         self._kept = {name: column[slots] for name, column in kept if len(column)}
 
-    def note_start(self) -> None:
-        """Keep the positions of now as `start`."""
-        if len(self.start) != len(self):
-            self.start = np.empty_like(self.position)
-        self.start[:] = self.position
-
-    def keep_account(self) -> None:
-        """From now on walls are to note what they take."""
-        self.spent = self.spent if len(self.spent) == len(self) else np.zeros((len(self), 2))
-
     def clear_notes(self) -> None:
-        """Forget what walls and friction have noted in the last frame."""
-        self.hits.fill(-1)
-        self.impacts[:, 0] = 0
-        self.taken = self.worked = 0.0
-        if len(self.spent):
-            self.spent.fill(0)
-        if len(self.along):
-            self.along = self.along[:0]
-        if len(self.turn):
-            self.lift.fill(0)
-            self.turn = self.turn[:0]
+        """Forget what walls and the energy limiter have noted in the last frame."""
+        self.wall_hits.fill(-1)
+        self.taken = 0.0
 
     def forget(self, now: Array) -> None:
         """The user's particles are now at `now` (n,), or no more (-1): let those go, keep the order of the others."""
@@ -222,20 +177,12 @@ class Slots:
         self._resize(int(np.count_nonzero(kept)))
         for name, column in held.items():
             setattr(self, name, column)
-        self.size = self.radius
-
-    def resize(self) -> None:
-        """Bring `size` up to date with `grown`."""
-        self.size = self.radius if (self.grown >= 1).all() else self.radius * self.grown
 
     def scatter(self, state: State, dt: float) -> None:
         """Copy what a frame of dt seconds changes back to the user's arrays."""
         given, moved = (state.position, state.velocity, state.acceleration, state.spin), (self.position, self.velocity)
         self.motion.put_motion(*moved, self.acceleration, self.spin, *given, state.angle, 0.5 * dt, self.particle)
         self._given_back.remember(given)
-        self._grows |= self.size is not self.radius  # some may have been found on top of others since the gathering
-        if self._grows:
-            state.grown[self.particle] = self.grown
 
     def where(self) -> Array:
         """(n, 2) the positions of now in the user's order, m."""
@@ -263,16 +210,13 @@ class Slots:
             spare = old
         alike = {name for name, given in self._given.items() if len(given) == 1}  # for all: any order is as good
         alike |= {"inverse_mass"} if "mass" in alike and not len(self.island) else set()
-        for name in (*COLUMNS, *MARKS, "inverse_mass", "particle", "resting", *_REMEMBERED, "start", "hits"):
+        for name in (*COLUMNS, *MARKS, "inverse_mass", "particle", *_REMEMBERED, "wall_hits"):
             if name not in alike and len(column := getattr(self, name)):
                 setattr(self, name, memory.taken(column, order))
-        if len(self.impacts):
-            self.impacts = self.impacts[order]
-        self.resize()
         self._slot_of = None
 
     def save(self, state: State) -> dict[str, Array]:
-        """What outlives a frame here, not in the user's arrays: the order, who carried weight, who sleeps; if lists are void."""
+        """What outlives a frame here, not in the user's arrays: the order, who sleeps; if lists are void."""
         void = self._changed or any(_differs(self._given[name], getattr(state, name)) for name in _LISTED)
         columns = {name: getattr(self, name).copy() for name in ("particle", *_REMEMBERED)}
         return columns | {"void": np.array([void or len(state) != len(self)])}
@@ -283,18 +227,13 @@ class Slots:
         self._resize(len(saved["particle"]))
         self.gather(state)
         if saved["void"][0]:  # the next frame is to find that out, too
-            self._changed = self._grows = True
+            self._changed = True
 
     def scratch(self, number: int) -> Array:
         """An (n, 2) array for use within one substep; its contents are left over from whoever used it last."""
         while len(self._scratch) <= number:
             self._scratch.append(np.empty_like(self.position))
         return self._scratch[number]
-
-    @property
-    def smooth(self) -> bool:
-        """Whether circles neither bounce nor rub by themselves, nor rub each other."""
-        return self.most_restitution <= 0.0 and not len(self.turn)
 
     def slot_of(self, particle: int) -> int:
         """The slot that holds the user's particle."""

@@ -20,12 +20,12 @@ Array = NDArray[Any]
 
 ROWS = ("position", "velocity", "acceleration")
 SET = ("radius", "mass", "restitution", "friction")
-COLUMNS = ("spin", "grown", *SET)
+COLUMNS = ("spin", *SET)
 MARKS = ("category", "mask")
 
 EVERYONE = 0xFFFFFFFF  # a mask of 32 bits that takes every category
 
-_DEFAULTS: dict[str, Any] = {"angle": 0, "grown": 1, "restitution": -1, "friction": -1, "category": 1, "mask": EVERYONE}
+_DEFAULTS: dict[str, Any] = {"angle": 0, "restitution": -1, "friction": -1, "category": 1, "mask": EVERYONE}
 
 
 class State:
@@ -37,7 +37,6 @@ class State:
         acceleration: (n, 2) m/s^2, of the last substep; the memory of the Verlet methods, scaled at rest. NaN: none yet.
         spin: (n,) angular velocity, rad/s, counter-clockwise. angle: (n,) rad it has turned; float64, for it grows and grows.
         radius, mass: (n,) m, and (n,) kg: infinity pins the particle.
-        grown: (n,) part of the radius that other circles feel; less than 1 for those that were added on top of another.
         restitution, friction: (n,) of circles that have values of their own; negative: as `Collisions` and the bounds say.
         category, mask: (n,) 32 bits each; two circles collide if each has a bit of its category in the other's mask.
         number: (n,) of each particle, in ascending order; no two particles of a world ever have the same.
@@ -54,7 +53,6 @@ class State:
     spin: Array
     radius: Array
     mass: Array
-    grown: Array
     restitution: Array
     friction: Array
     category: Array

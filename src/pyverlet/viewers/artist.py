@@ -72,13 +72,6 @@ class Artist:
         self._sketched: tuple[Sketch, Sketch, tuple[Outline, ...]] = (NOTHING, NOTHING, ())
         self._done: dict[Look, bytes] = {}
         self._frame: Frame | None = None
-        self._ready = False
-
-    def expect(self, frame: Frame) -> None:
-        """Get ready, in the artist's thread, if the circles are half as many as it draws: compiling may take seconds, once."""
-        if not self._ready and 2 * len(frame.shape.radius) >= PICTURES_FROM and _can_draw():
-            self._ready = True
-            self.thread.submit(self.jpeg, frame, Look(width=16, height=16))
 
     def jpeg(self, frame: Frame, look: Look) -> bytes:
         """The frame as this look has it. Runs in the artist's thread."""

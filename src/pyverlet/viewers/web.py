@@ -220,7 +220,6 @@ class Tab:
 
     async def _encode(self, frame: Frame, look: Look) -> bytes:
         if not draws_here(frame.shape):
-            self._artist.expect(frame)
             return self._encoder.frame(frame, look)
         loop = asyncio.get_running_loop()
         jpeg = await loop.run_in_executor(self._artist.thread, self._artist.jpeg, frame, look)

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.laws.integrators import Forces, Integrator, PositionVerlet, SemiImplicitEuler, TimeCorrectedVerlet
+from pyverlet.laws.integrators import Forces, Integrator, PositionVerlet, SemiImplicitEuler
 from pyverlet.state.slots import Slots
 
 
 def kicks(integrator: Integrator) -> bool:
     """Whether a substep is a kick and a drift, which the core does itself."""
-    return type(integrator) in (PositionVerlet, TimeCorrectedVerlet, SemiImplicitEuler)
+    return type(integrator).step in (PositionVerlet.step, SemiImplicitEuler.step)
 
 
 class FreeSteps:
@@ -31,7 +31,7 @@ class FreeSteps:
     def take(self, integrator: Integrator, state: Slots, forces: Forces, t: float, h: float) -> None:
         """Leave positions, and have the mean velocity and acceleration of the substep from t on."""
         position, before, acceleration = state.position.copy(), state.velocity.copy(), state.acceleration
-        integrator.step(state, forces, t, h)
+        integrator.full_step(state, forces, t, h)
         if state.acceleration is not acceleration:  # the core holds that array
             state._scratch[0], state.acceleration = state.acceleration, acceleration
         after = state.velocity.copy()

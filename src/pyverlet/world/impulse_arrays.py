@@ -84,7 +84,7 @@ class ImpulseArrays:
         self.gave, self.gave_spin = columns_of(memory.given)
         self.asleep = memory.asleep
         self.kick, self.h, self.hertz, self.finer = memory.kick, memory.h, memory.hertz, memory.finer
-        self._made = -1  # of `Slots.given`, what the engine holds; -1: nothing
+        self._made = -1  # of `Slots.revision`, what the engine holds; -1: nothing
         self._collisions: Any = None
         self._skin: float | None = -1.0
 
@@ -134,7 +134,7 @@ class ImpulseArrays:
         self._wake(state)
         if self._particle is not state.particle or self._kept is not None:
             self._follow(state)
-        if state.given != self._made or collisions is not self._collisions:
+        if state.revision != self._made or collisions is not self._collisions:
             self._hold(state)
             self._set_materials(world)
         if (skin := skin_of(collisions)) != self._skin:
@@ -253,9 +253,7 @@ class ImpulseArrays:
     def _set_materials(self, world: Any) -> None:
         """What circles are made of has changed."""
         state = world._slots
-        self._made, self._collisions = state.given, world.collisions
-        state.grown.fill(1)
-        state.resize()
+        self._made, self._collisions = state.revision, world.collisions
         self.free = bool((state.inverse_mass > 0).any())
         self.largest = float(state.radius.max(initial=0.0))
         materials = materials_of(state, world._state.radius, world.collisions)

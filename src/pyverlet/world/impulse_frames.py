@@ -16,7 +16,7 @@ from pyverlet.ground.constants import REST_ACCELERATIONS, SURPLUS
 from pyverlet.ground.errors import NonFiniteError
 from pyverlet.laws.integrators import PositionVerlet
 from pyverlet.laws.ledger import Page
-from pyverlet.laws.limiter import fall, watched
+from pyverlet.laws.limiter import fall, limiter_for
 from pyverlet.laws.rooms import Open
 from pyverlet.state.moves import advance, first_non_finite
 from pyverlet.world.free_steps import FreeSteps, kicks
@@ -96,7 +96,7 @@ class ImpulseFrames:
         Raises:
             NonFiniteError: a particle turned NaN or infinite.
         """
-        world._slots.clear_notes()
+        world._clear_notes()
         self.links.keep_apart(world, self.held.engine)
         if world._gather():
             self.held.forget_list()
@@ -124,14 +124,16 @@ class ImpulseFrames:
         before = self.held.h if self.held.kick else 0.0
         own_walls = None if knows(world.boundary) else OwnWalls(world.boundary)
         alone = by_core and not (forces.forces or own_walls)
-        limited = bool(collisions and len(world) > 1) or bool(world.obstacles)
-        watch = watched(world, dt / world.substeps, None) if limited and (forces.forces or world.links) else None
+        keeps_way = isinstance(world.integrator, PositionVerlet) and before not in (0.0, h)
+        # Where the method raises the energy by itself, nothing can be said of contacts.
+        limited = (bool(collisions and len(world) > 1) or bool(world.obstacles)) and not keeps_way
+        limiter = limiter_for(world, dt) if limited and (forces.forces or world.links) else None
         gravity = world.gravity
         state.h = h
         self.held.load(world, dt)
         self._stiffen(state, h, dt, self._strongest(gravity) if alone else forces.strongest)
         self.links.load(world, self.held.engine)
-        if type(world.integrator) is PositionVerlet and before not in (0.0, h):
+        if keeps_way:
             self._keep_way(state, before, h)
         if getattr(world.integrator, "naive_start", False):
             self._start_naively(world, (1.0 - half) * h)
@@ -197,7 +199,7 @@ class ImpulseFrames:
         if page:
             page.end(half * h / self.held.kick)
         if limited and gravity == world.gravity:
-            self._limit(world, watch, dt)
+            self._limit(world, limiter, dt)
         if notes:
             notes.close(world, dt)
         if listens:
@@ -230,19 +232,19 @@ class ImpulseFrames:
             self._pull = gravity, float(np.sqrt(x * x + y * y))
         return self._pull[1] if self.held.free else 0.0
 
-    def _limit(self, world: Any, watch: Any, dt: float) -> None:
+    def _limit(self, world: Any, limiter: Any, dt: float) -> None:
         """Take back what energy a frame of dt seconds has gained, if it is too much."""
         state = world._slots
-        if watch is None and not world.forces and not world.links:
+        if limiter is None and not world.forces and not world.links:
             start, (gx, gy) = world._state, world.gravity
             gained = state.motion.energy_gained(
                 (start.position, start.velocity, start.spin, start.radius, start.mass),
                 (state.position, state.velocity, state.spin, state.radius, state.mass), gx, gy,
             )  # fmt: skip
             if gained > SURPLUS * fall(state.total_mass, world.gravity, world.boundary.extent()):
-                watch = watched(world, dt / world.substeps, None)
-        if watch is not None:
-            watch.close(state, self)
+                limiter = limiter_for(world, dt)
+        if limiter is not None:
+            limiter.limit(state, self.listed)
 
     def _refuse_non_finite(self, world: Any, dt: float) -> None:
         """Run a bad frame again from the last good state, looking after every stage: normal frames pay nothing for it."""

@@ -42,7 +42,7 @@ class Moment:
         position, velocity = np.empty((2, len(slots), 2), np.float32)
         lag = slots.real(self._lag)
         copy = unit("tools", slots.position.dtype).copy_moving
-        copy(slots.position, slots.velocity, slots.acceleration, slots.resting, lag, position, velocity)
+        copy(slots.position, slots.velocity, slots.acceleration, lag, position, velocity)
         if slots.seam:
             slots.seam.wrap(position)
         return position, velocity, slots.particle  # reordering makes a new one, and leaves this as it is

@@ -106,7 +106,6 @@ class Particles(Shared):
             "angle": checks.column("angle", angle, np.dtype(np.float64), count),
             "radius": size,
             "mass": _mass(mass, density, size),
-            "grown": np.ones(count, dtype),
             "restitution": checks.column("restitution", -1.0 if restitution is None else restitution, dtype, count),
             "friction": checks.column("friction", -1.0 if friction is None else friction, dtype, count),
             "category": checks.bits("category", category, count),

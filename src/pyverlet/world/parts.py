@@ -39,7 +39,6 @@ PARTICLES = {
     "acceleration": Field(None, "particles", 2, nan=True),
     "spin": Field(None, "particles"),
     "angle": Field(np.float64, "particles"),
-    "grown": Field(None, "particles", above=0, most=1),
     "radius": Field(None, "particles", above=0),
     "mass": Field(None, "particles", above=0, infinite=True),
     "restitution": Field(None, "particles", most=1),
@@ -53,7 +52,6 @@ PARTICLES = {
 
 SLOTS = {
     "particle": Field(np.int32, "slots", least=0, below="slots", order="permutation"),
-    "fed": Field(np.uint8, "slots"),
     "island": Field(np.int64, "sleepers", least=-1),
     "calm": Field(np.float32, "sleepers", least=0),
     "void": Field(np.bool_, "one"),
@@ -96,6 +94,13 @@ FIELDS = {
     )
     for name, field in fields.items()
 }
+
+RETIRED = frozenset({
+    "particles.grown", "slots.fed",
+    *(f"contacts.{name}" for name in ("built", "checked", "low", "high", "slip", "lent_particle", "lent", "busy", "held")),
+    *(f"linked.{name}" for name in ("number", "start", "left", "calm")),
+})  # fmt: skip
+"""Arrays of files of the law of projection, which are ignored."""
 
 
 class Parts(NamedTuple):

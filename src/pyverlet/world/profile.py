@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from time import perf_counter
 
 import numpy as np
@@ -14,20 +13,17 @@ _ROOM = 64
 class Profile:
     """Milliseconds by stage, of the last frame (`stages`) and since the start (`total_ms`).
 
-    Args:
-        stages: those that compiled code notes by itself, in the first places of `spent`.
-
     `world.step` calls `begin`, then `mark(stage)` at the end of each stage, then `end`. Only seconds are summed meanwhile: frames
     of small worlds are not much longer than what it takes to make a table of them.
     """
 
-    def __init__(self, stages: Sequence[str] = ()) -> None:
+    def __init__(self) -> None:
         self.frame_ms = 0.0
         self.frames = 0
         self.rebuilds = 0
         self._start = 0.0
         self._broken_off = False
-        self._places = {stage: place for place, stage in enumerate(stages, 1)}
+        self._places: dict[str, int] = {}
         self._spent = np.zeros(_ROOM)  # s, of the frame that is under way, by place; the first is when the last stage ended
         self._complete = np.zeros(_ROOM)  # of the last complete frame
         self._total = np.zeros(_ROOM)  # of all of them
@@ -48,11 +44,6 @@ class Profile:
         now, spent = perf_counter(), self._spent
         spent[self._places.get(stage) or self._places.setdefault(stage, len(self._places) + 1)] += now - spent[0]
         spent[0] = now
-
-    @property
-    def spent(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-        """Where compiled code notes the time of its stages."""
-        return self._spent
 
     def end(self) -> None:
         """The frame is complete."""

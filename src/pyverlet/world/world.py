@@ -13,7 +13,6 @@ from pyverlet.ground.constants import ALL_THREADS_FROM, MOST_SUBSTEPS, ONE_THREA
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.threads import max_threads
 from pyverlet.ground.turns import in_turn
-from pyverlet.laws.coarse import Coarse
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceList, ForceSum
@@ -87,7 +86,7 @@ class World(Measures, Queries, Doors):
         sleep: bool = False,
     ) -> None:
         self._state = State(checks.floating("dtype", dtype))
-        self._slots = Slots(self._state.dtype, sleeps=sleep, events=events)
+        self._slots = Slots(self._state.dtype, sleeps=sleep)
         self.links, self.forces, self.obstacles = Links(self._state), ForceList(), Obstacles()
         self._events, self._touches = Events() if events else None, Touches() if contacts else None
         self._sleep, self._books = Sleep() if sleep else None, Bookkeeper() if ledger else None
@@ -97,7 +96,7 @@ class World(Measures, Queries, Doors):
         self.collisions, self.substeps, self.threads = collisions, substeps, threads
         self.time, self.frames, self.profile, self.actors = 0.0, 0, Profile(), list[Actor]()
         self._impulses = ImpulseFrames(self._state.dtype)
-        self._team, self._looks = Team(), (Coarse(), Precision())
+        self._team, self._precision = Team(), Precision()
         # Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins.
         self.onlooker: Callable[[Moment], None] | None = None
 
@@ -136,7 +135,7 @@ class World(Measures, Queries, Doors):
                 self.boundary.check(self._state.radius)
             except InputError:
                 # New to the next frame, which refuses them again.
-                self._slots = Slots(self.dtype, sleeps=self._sleep is not None, events=self._events is not None)
+                self._slots = Slots(self.dtype, sleeps=self._sleep is not None)
                 raise
         return changed
 
@@ -151,8 +150,7 @@ class World(Measures, Queries, Doors):
             self._events.close(self._slots, self._state, self._place())
         self.profile.mark("scatter")
         self.time, self.frames = self.time + dt, self.frames + 1
-        for each in self._looks:
-            each.look(self, h)
+        self._precision.look(self, h)
         self.profile.end()
 
     def _show(self, since: float, lag: float) -> None:

@@ -91,7 +91,7 @@ def check(build: Build, deed: Deed, *, frames: int, dt: float, only: str | None 
         InputError: the program asks for what is not allowed.
     """
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a gas too coarse is meant
+        warnings.simplefilter("ignore")  # coordinates too coarse are meant
         with suppress(_Refused):
             _check(build, deed, frames, dt, frozenset(CHECKS if only is None else [only]) - set(without))
 
@@ -231,7 +231,7 @@ def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str]
     eases |= bool(frame == 0 and world.links and _in_obstacles(world))
     h = dt / world.substeps
     about_energy = "links" if world.links else "energy"
-    is_driven = not undriven(world, h, world._impulses.held.h or None)
+    is_driven = world._impulses.held.h not in (0.0, h) or not undriven(world)  # some methods need a constant step
     driven = world.actors or touched or unsettled or pinned_move(world._state) or is_driven
     driven = driven or not _uniform(world) or bool(world.links and world.overlap().max > _APART)
     if driven:

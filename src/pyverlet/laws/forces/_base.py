@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import listed
-from pyverlet.laws.integrators import PASSES
-from pyverlet.state.moves import advance, newton, newton_kick_drift
+from pyverlet.state.moves import newton
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
@@ -81,7 +80,6 @@ class ForceSum:
         self.gravity = gravity
         self.forces = forces
         self.strongest = self.t = 0.0
-        self._pull: tuple[Any, float] = None, 0.0
 
     @property
     def velocity_dependent(self) -> bool:
@@ -96,12 +94,6 @@ class ForceSum:
             for force in self.forces
         )
 
-    def look_again(self, state: Slots, t: float, ahead: float) -> None:
-        """Accelerations become those of now, of the velocity `ahead` seconds later that they lead to."""
-        for _ in range(PASSES):
-            advance(state.velocity, state.velocity, state.acceleration, ahead)
-            self.kick_drift(state, t, 0.0, ahead)
-
     def turn(self, gravity: tuple[float, float], state: State) -> None:
         """Gravity is another from now on.
 
@@ -114,19 +106,8 @@ class ForceSum:
             flies = state.acceleration.any(axis=1) & np.isfinite(state.mass)
             state.acceleration[flies] += change.astype(state.dtype)
 
-    def fall(self, state: Slots) -> None:
-        """Gravity alone is to act in the next evaluation, which somebody else makes."""
-        pull = state.reals(*self.gravity)
-        if self._pull[0] is not pull:  # `reals` remembers what it has rounded
-            self._pull = pull, float(np.sqrt(pull[0] * pull[0] + pull[1] * pull[1]))
-        self.strongest = self._pull[1]
-
     def __call__(self, state: Slots, t: float) -> None:
         self.strongest = newton(state, self._summed(state, t), self.gravity)
-
-    def kick_drift(self, state: Slots, t: float, h: float, ahead: float = 0.0) -> None:
-        """Evaluate, take back a kick of `ahead` seconds, then velocity += h * acceleration, then position += h * velocity."""
-        self.strongest = newton_kick_drift(state, self._summed(state, t), self.gravity, h, ahead)
 
     def _summed(self, state: Slots, t: float) -> NDArray[Any]:
         """The sum of all forces but gravity (n, 2), N; (0, 2) if there are none."""

@@ -103,7 +103,7 @@ class _Code:
 
     def __init__(self, function: Any, kind: str, arguments: str, returns: str) -> None:
         self.function = function
-        self._arguments, self._returns = arguments, returns
+        self._returns = returns
         if not inspect.isfunction(self.function):
             raise InputError(f"{kind} is {function!r}; allowed is a function of ({arguments}) that returns {returns}")
         code = self.function.__code__

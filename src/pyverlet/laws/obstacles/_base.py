@@ -33,12 +33,11 @@ class _Journal:
         self._entries: deque[tuple[int, int]] = deque(maxlen=4096)
         self._lock = threading.Lock()
 
-    def note(self, obstacle: object) -> int:
-        """An obstacle has changed; returns the number of the change."""
+    def note(self, obstacle: object) -> None:
+        """An obstacle has changed."""
         with self._lock:
             self.latest += 1
             self._entries.append((self.latest, id(obstacle)))
-            return self.latest
 
     def since(self, number: int) -> tuple[int, set[int] | None]:
         """The latest change, and the ids of what has changed after that number; None: more than is remembered."""
@@ -91,7 +90,7 @@ class _Checked(Generic[Value]):
 
     def __set__(self, obstacle: Obstacle, value: Any) -> None:
         obstacle.__dict__[self._name] = self._check(self._name, value)
-        obstacle.revision = journal.note(obstacle)
+        journal.note(obstacle)
 
 
 class Obstacle(ABC):
@@ -118,7 +117,6 @@ class Obstacle(ABC):
     angular_velocity = _Checked(checks.number)
     pivot = _Checked(checks.vector)
     angle = _Checked(checks.number)
-    revision: int
     table: Any = None
     """Its segments as the engine has them, made when it first meets a world."""
 
@@ -145,12 +143,12 @@ class Obstacle(ABC):
         self._drawn: list[Outline] = []
 
     def __getstate__(self) -> dict[str, Any]:
-        left = ("table", "revision", "_drawn_at", "_drawn")  # what is made of it, by this process
+        left = ("table", "_drawn_at", "_drawn")  # what is made of it, by this process
         return {name: value for name, value in vars(self).items() if name not in left}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state, _drawn_at=None, _drawn=[])
-        self.revision = journal.note(self)
+        journal.note(self)
 
     @property
     def points(self) -> Points:
