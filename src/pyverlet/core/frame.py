@@ -38,7 +38,7 @@ from pyverlet.core.work import book_drift, book_end, book_grips, book_rubbing, b
 
 ROUNDS = cython.declare(cython.int, 2)
 ROUGH_ROUNDS = cython.declare(cython.int, 4)
-"""Over contacts and links, one after the other: friction takes longer."""
+"""Over contacts and links, one after the other, while all are at rest: friction takes longer. In motion one round is stable."""
 
 MOST_ROUNDS = cython.declare(cython.int, 100)  # over the groups in which pairs have bounced
 
@@ -207,7 +207,7 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     """One substep; returns whether particles may leave where the list of pairs is good in the next one."""
     b: cython.Py_ssize_t
     sweep: cython.int
-    _: cython.int
+    turn: cython.int
     most: real = 0
     stale: cython.bint = False
     team_stage(w.team, kick_stage, w, blocks)
@@ -232,13 +232,15 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     if w.linked:
         if surfaces:
             team_stage(w.team, hold_on_stage, w, blocks)
-        solve_links(w, False)
-        for _ in range(1, ROUGH_ROUNDS if w.rough else ROUNDS):
-            each_group(w, solve_stage)
-            bounce_on(w)
-            if surfaces:
-                team_stage(w.team, hold_on_stage, w, blocks)
-            solve_links(w, True)
+        rests: cython.bint = fastest < w.rest_speed
+        rounds: cython.int = ROUGH_ROUNDS if rests and w.rough else ROUNDS
+        for turn in range(rounds):
+            if turn > 0 and rests:
+                each_group(w, solve_stage)
+                bounce_on(w)
+                if surfaces:
+                    team_stage(w.team, hold_on_stage, w, blocks)
+            solve_links(w, turn > 0, turn + 1 == rounds)
     team_stage(w.team, drift_stage, w, blocks)
     for sweep in range(w.relaxes):
         if sweep > 0 and surfaces:

@@ -90,6 +90,7 @@ Links = cython.struct(
     kick=cython.double,  # s of acceleration that impulses stand for
     scale=cython.double,  # by which they are worth more than in the last substep
     least=cython.double,  # m/s: impulses that change speeds by less may be given again whole
+    deepest=cython.double,  # m: who is farther beyond a surface is put out by it, and links do not see it
     period_x=cython.double,  # m, 0: none
     period_y=cython.double,
 )

@@ -125,7 +125,7 @@ def find_hold(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     k.held[i] = -1
     if k.own[i] > 0 and k.surfaces:
         for c in range(w.contact_begin[k.slot[i]], w.contact_end[k.slot[i]]):
-            if w.contact[CONTACT * c + PUSH] > most:
+            if w.contact[CONTACT * c + PUSH] > most and w.contact[CONTACT * c + GAP] > -k.deepest:
                 most = w.contact[CONTACT * c + PUSH]
                 k.held[i] = cython.cast(int32_t, c)
 
@@ -170,6 +170,8 @@ def hold_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
         return
     for c in range(w.contact_begin[k.slot[i]], w.contact_end[k.slot[i]]):
         first: cython.Py_ssize_t = CONTACT * c
+        if w.contact[first + GAP] < -k.deepest:
+            continue
         before: cython.double = w.contact[first + PUSH]
         if before > 0 or (w.contact[first + GAP] < w.far and not passes_by(w, k.slot[i], c, k.u[2 * i], k.u[2 * i + 1])):
             x: cython.double = k.u[2 * i] - w.contact[first + SPEED]

@@ -19,6 +19,9 @@ from pyverlet.core.link_holds import find_hold, move, note_holds
 from pyverlet.core.link_pins import begin_pin, end_pin, finish_pin, hold_pin, rest_pin, settle_pin
 from pyverlet.core.step import Step
 
+PUT_OUT = cython.declare(cython.double, 4)
+"""Times the way on which overlaps are pushed out in a substep."""
+
 
 @cython.cfunc
 @cython.nogil
@@ -272,6 +275,7 @@ def begin_links(w: cython.pointer(Step), surfaces: cython.bint) -> cython.void:
     k.scale = cython.cast(cython.double, w.scale if opens else 1)
     k.least = cython.cast(cython.double, w.rest_speed)
     k.contact, k.surfaces, k.rough = w.contact, surfaces, w.rough
+    k.deepest = PUT_OUT * k.h * w.push
     team_stage(w.team, open_stage, w, blocks_of(k))
     team_stage(w.team, begin_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
     for p in range(k.pins):
@@ -285,9 +289,9 @@ def begin_links(w: cython.pointer(Step), surfaces: cython.bint) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def solve_links(w: cython.pointer(Step), again: cython.bint) -> cython.void:
+def solve_links(w: cython.pointer(Step), again: cython.bint, last: cython.bint) -> cython.void:
     """Before the drift: where rows are to be after it, the first colour first. again: the last one first, and rows go on from
-    what they have given.
+    what they have given. last: they will not be solved any more.
     """
     k: cython.pointer(Links) = w.link_table
     p: cython.Py_ssize_t
@@ -304,7 +308,7 @@ def solve_links(w: cython.pointer(Step), again: cython.bint) -> cython.void:
         for c in range(k.colours):
             k.now = k.colours - 1 - c if again else c
             team_stage(w.team, solve_chunk, w, cython.cast(cython.int, k.colour[k.now + 1] - k.colour[k.now]))
-    if again:
+    if last:
         team_stage(w.team, finish_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
     for p in range(k.pins):
         finish_pin(k, p)
