@@ -92,7 +92,7 @@ def test_any_number_of_threads_has_the_same_bits(friction: float, monkeypatch: p
             radius=chance.uniform(0.2, 0.45, 900),
         )
         made.run(seconds=0.5)
-        assert made._impulses.held.parts == threads
+        assert made._frames.held.parts == threads
         hashes.add(made.state_hash())
     assert len(hashes) == 1
 

@@ -79,7 +79,7 @@ def test_no_contact_is_missed_while_the_list_is_kept(spread: float) -> None:
     world.add(position=position, velocity=rng.normal(0, 30, position.shape), radius=radius)
     for _ in range(60):
         world.step(1 / 60)
-        first, count, i, j = world._impulses.listed()
+        first, count, i, j = world._frames.listed()
         lanes = np.concatenate([np.arange(a, a + n) for a, n in zip(first, count, strict=True)])
         known = set(map(tuple, np.sort(world._slots.particle[np.column_stack((i[lanes], j[lanes]))], axis=1).tolist()))
         assert set(map(tuple, find_contacts(world._state).tolist())) <= known

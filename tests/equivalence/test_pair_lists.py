@@ -38,8 +38,8 @@ def listed(world: pv.World) -> tuple[set[tuple[int, int]], Array]:
 
     Behind the batches of a group are pairs of which one is pinned: they are no part of the sweeps.
     """
-    first, count, i, j = world._impulses.listed()
-    swept, free = world._impulses.held.engine.arrays["swept"], world._slots.inverse_mass > 0
+    first, count, i, j = world._frames.listed()
+    swept, free = world._frames.held.engine.arrays["swept"], world._slots.inverse_mass > 0
     pairs: list[tuple[int, int]] = []
     for a, n, whole in zip(first.tolist(), swept[: len(first)].tolist(), count.tolist(), strict=True):
         assert n % 8 == 0
@@ -96,11 +96,11 @@ def test_the_list_is_that_of_all_pairs_against_all(kind: str, sizes: str, dtype:
         if seed == 3:
             world.category[: n // 3], world.mask[: n // 2] = 2, 1
         world.step(1e-9)
-        slots, skin = world._slots, world._impulses.held.engine.save_list()[2][1] * 2
+        slots, skin = world._slots, world._frames.held.engine.save_list()[2][1] * 2
         found, _ = listed(world)
         # Rounding of coordinates, and of periods, decides about pairs at the very rim of the skin.
         slack = 1e-5 if dtype == np.float32 else 1e-12
-        then = world._impulses.held.engine.arrays["listed"]
+        then = world._frames.held.engine.arrays["listed"]
         assert brute_force(slots, then, skin - slack) <= found <= brute_force(slots, then, skin + 30 * slack), (kind, sizes, n)
 
 
@@ -191,11 +191,11 @@ def test_impulses_survive_new_lists() -> None:
         before = world.rebuilds
         for _ in range(60):
             if anew:
-                world._impulses.held.engine.forget_list()
+                world._frames.held.engine.forget_list()
             world.step(1 / 60)
             assert np.hypot(*world.velocity.T).max() < 1e-6
         assert world.rebuilds - before == (60 if anew else 0)
-        memory = world._impulses.save()
+        memory = world._frames.save()
         loads.append(dict(zip(map(tuple, memory.pairs.tolist()), memory.values[:, 0].tolist(), strict=True)))
     carried = {pair: load for pair, load in loads[0].items() if load > 0.1}
     assert len(carried) > 300
@@ -209,7 +209,7 @@ def test_pairs_that_links_keep_apart_are_not_listed() -> None:
     pairs = np.sort(particle[listed(world)[1]], axis=1)[::3]
     pairs = pairs[np.lexsort(pairs.T[::-1])]
     begin = np.searchsorted(pairs[:, 0], np.arange(len(world) + 1))
-    world._impulses.held.engine.set_linked(begin, np.ascontiguousarray(pairs[:, 1], np.int32))
+    world._frames.held.engine.set_linked(begin, np.ascontiguousarray(pairs[:, 1], np.int32))
     world.step(1 / 60)
     left = {tuple(pair) for pair in np.sort(world._slots.particle[listed(world)[1]], axis=1).tolist()}
     assert left

@@ -29,7 +29,7 @@ def world_of(method: Any, room: Any, dtype: Any = np.float64, **law: float) -> p
 
 def pairs_of(world: pv.World) -> list[tuple[int, int]]:
     """The listed pairs of user's indices, each once."""
-    first, count, i, j = world._impulses.listed()
+    first, count, i, j = world._frames.listed()
     lane = np.concatenate([np.arange(f, f + n) for f, n in zip(first, count, strict=True)])
     particle = world._slots.particle
     both = np.sort(np.column_stack((particle[i[lane]], particle[j[lane]])), axis=1)
@@ -43,7 +43,7 @@ def test_every_pair_is_listed_once_and_for_all(room: Any, dtype: Any) -> None:
     for _ in range(60):
         world.step(1 / 60)
     assert pairs_of(world) == list(combinations(range(40), 2))
-    assert world._impulses.rebuilds == 1
+    assert world._frames.rebuilds == 1
 
 
 @pytest.mark.parametrize("room", ROOMS)

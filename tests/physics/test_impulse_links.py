@@ -405,6 +405,6 @@ def test_any_number_of_threads_has_the_same_bits(monkeypatch: pytest.MonkeyPatch
         world.links.append(pv.Rope(group, k[:, 1::5].ravel(), k[:, 2::5].ravel()))
         world.links.append(pv.Spring(group, k[:-1, ::2].ravel(), k[1:, ::2].ravel(), stiffness=100.0))
         world.run(seconds=0.3)
-        assert world._impulses.held.parts == threads
+        assert world._frames.held.parts == threads
         hashes.add(world.state_hash())
     assert len(hashes) == 1

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import pyverlet as pv
 from pyverlet.laws.integrators import BY_NAME
-from pyverlet.world import impulse_arrays
+from pyverlet.world import core_arrays
 from pyverlet.world.moments import Moment
 
 DT = 1 / 60
@@ -109,7 +109,7 @@ def test_a_look_is_what_a_shorter_frame_would_end_with() -> None:
 
 def test_what_was_seen_stays_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nobody writes later into what a look returned, though circles are sorted anew."""
-    monkeypatch.setattr(impulse_arrays, "SORTED_FROM", 2)
+    monkeypatch.setattr(core_arrays, "SORTED_FROM", 2)
     world = falling_heap()
     kept: list[tuple[tuple[NDArray[Any], ...], list[NDArray[Any]]]] = []
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.world.impulse_frames import PUSH_OUT
+from pyverlet.world.frames import PUSH_OUT
 
 G = 9.81
 RADIUS = 0.5

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.world.impulse_frames import STIFFNESS
+from pyverlet.world.frames import STIFFNESS
 
 G = 9.81
 H = 1 / 480

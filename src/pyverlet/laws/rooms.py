@@ -1,7 +1,7 @@
 """Bounds: the room the particles live in.
 
 To add one: a class here or anywhere with `confine`, `extent`, `outside` and `check`, and a parameter in the tests of bounds.
-Walls that are to know of contacts, as those here do, are surfaces of the core (`world.impulse_materials.walls_of`).
+Walls that are to know of contacts, as those here do, are surfaces of the core (`world.materials.walls_of`).
 """
 
 from __future__ import annotations

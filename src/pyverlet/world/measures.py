@@ -45,7 +45,7 @@ class Measures(Particles):
     _course: Course
     obstacles: Obstacles
     collisions: Collisions | None
-    _impulses: Any
+    _frames: Any
     _force_sum: ForceSum
     integrator: Integrator
     profile: Any
@@ -207,4 +207,4 @@ class Measures(Particles):
     @property
     def rebuilds(self) -> int:
         """How often the neighbour list has been built."""
-        return int(self._impulses.rebuilds)
+        return int(self._frames.rebuilds)

@@ -30,7 +30,7 @@ class Particles(Shared):
 
     _state: State
     _slots: Slots
-    _impulses: Any
+    _frames: Any
     _events: Events | None
     _touches: Touches | None
     forces: ForceList
@@ -170,7 +170,7 @@ class Particles(Shared):
 
     def _renumber(self, now: Array) -> None:
         """Tell those who hold a particle by its index where it is now, or that it is no more (-1)."""
-        for holder in (self.links, self._impulses, self._events, self._touches, *self.forces):
+        for holder in (self.links, self._frames, self._events, self._touches, *self.forces):
             if isinstance(holder, Numbered):
                 holder.renumber(now)
 

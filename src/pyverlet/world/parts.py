@@ -19,9 +19,9 @@ from pyverlet.laws.events import CONTACT, HIT, Events
 from pyverlet.laws.ledger import Bookkeeper, Ledger
 from pyverlet.laws.links._set import BROKEN
 from pyverlet.laws.sleep import Sleep, laws
-from pyverlet.world.impulse_memory import Memory
-from pyverlet.world.impulse_sleepers import ASLEEP, Remembered
+from pyverlet.world.contact_memory import Memory
 from pyverlet.world.saved import Saved
+from pyverlet.world.sleepers import ASLEEP, Remembered
 from pyverlet.world.world import World
 
 Array = NDArray[Any]
@@ -81,7 +81,7 @@ IMPULSES = {
     "listed": Field(None, "neighbours", 2),
     "checked": Field(None, "neighbours", 2),
 }
-"""What contacts gave in the last substep: `world.impulse_memory.Memory`; where their list was made."""
+"""What contacts gave in the last substep: `world.contact_memory.Memory`; where their list was made."""
 
 FIELDS = {
     f"{room}.{name}": field

@@ -28,7 +28,7 @@ from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 from pyverlet.world.actors import Actor, act_after, act_once
 from pyverlet.world.convenience import Doors
-from pyverlet.world.impulse_frames import ImpulseFrames
+from pyverlet.world.frames import Frames
 from pyverlet.world.measures import Measures
 from pyverlet.world.moments import Moment
 from pyverlet.world.profile import Profile
@@ -95,7 +95,7 @@ class World(Measures, Queries, Doors):
         self.boundary = Open() if boundary is None else boundary
         self.collisions, self.substeps, self.threads = collisions, substeps, threads
         self.time, self.frames, self.profile, self.actors = 0.0, 0, Profile(), list[Actor]()
-        self._impulses = ImpulseFrames(self._state.dtype)
+        self._frames = Frames(self._state.dtype)
         self._team, self._precision = Team(), Precision()
         # Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins.
         self.onlooker: Callable[[Moment], None] | None = None
@@ -116,7 +116,7 @@ class World(Measures, Queries, Doors):
             self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
             self.profile.begin()
             books = self._open_books()
-            self._impulses.step(self, dt, books or self.profile.mark)
+            self._frames.step(self, dt, books or self.profile.mark)
             self._accept(dt, h, books)
         act_after(self, dt)
 
@@ -145,7 +145,7 @@ class World(Measures, Queries, Doors):
         if books:
             books.close(-self._slots.taken)
         self._course.end(dt)
-        self._impulses.links.end(self)
+        self._frames.links.end(self)
         if self._events:
             self._events.close(self._slots, self._state, self._place())
         self.profile.mark("scatter")
@@ -251,7 +251,7 @@ class World(Measures, Queries, Doors):
             time=self.time,
             frames=self.frames,
             slots=self._slots.save(self._state),
-            impulses=self._impulses.save(self._course),
+            impulses=self._frames.save(self._course),
             books=self._books and self._books.copy(),
             events=self._events and self._events.copy(),
             sleep=self._sleep and self._sleep.copy(),
@@ -285,4 +285,4 @@ class World(Measures, Queries, Doors):
             self._sleep.take(saved.sleep, laws(self))
         if self._events and saved.events:
             self._events.take(saved.events)
-        self._impulses.restore(saved.impulses)
+        self._frames.restore(saved.impulses)

@@ -231,7 +231,7 @@ def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str]
     eases |= bool(frame == 0 and world.links and _in_obstacles(world))
     h = dt / world.substeps
     about_energy = "links" if world.links else "energy"
-    is_driven = world._impulses.held.h not in (0.0, h) or not undriven(world)  # some methods need a constant step
+    is_driven = world._frames.held.h not in (0.0, h) or not undriven(world)  # some methods need a constant step
     driven = world.actors or touched or unsettled or pinned_move(world._state) or is_driven
     driven = driven or not _uniform(world) or bool(world.links and world.overlap().max > _APART)
     if driven:

@@ -19,13 +19,13 @@ from pyverlet.laws.ledger import Page
 from pyverlet.laws.limiter import fall, limiter_for
 from pyverlet.laws.rooms import Open
 from pyverlet.state.moves import advance, first_non_finite
+from pyverlet.world.contact_memory import Memory
+from pyverlet.world.contact_notes import ContactNotes
+from pyverlet.world.core_arrays import CoreArrays
+from pyverlet.world.core_links import CoreLinks
 from pyverlet.world.free_steps import FreeSteps, kicks
-from pyverlet.world.impulse_arrays import ImpulseArrays
-from pyverlet.world.impulse_events import told_of
-from pyverlet.world.impulse_links import ImpulseLinks
-from pyverlet.world.impulse_materials import knows
-from pyverlet.world.impulse_memory import Memory
-from pyverlet.world.impulse_notes import ImpulseNotes
+from pyverlet.world.heard import told_of
+from pyverlet.world.materials import knows
 from pyverlet.world.own_walls import OwnWalls
 
 Array = NDArray[Any]
@@ -63,14 +63,14 @@ NEAR = 0.05
 """Of the largest radius: pairs and walls with larger gaps carry no load."""
 
 
-class ImpulseFrames:
+class Frames:
     """The contact law in one world."""
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self._dtype = dtype
-        self.held = ImpulseArrays(dtype)
+        self.held = CoreArrays(dtype)
         self._flight = FreeSteps()
-        self.links = ImpulseLinks()
+        self.links = CoreLinks()
         self._law: Any = None  # numbers that the engine holds
         self._pull: tuple[Any, float] = None, 0.0  # gravity, and how strong it is, m/s^2
         # What contacts remember between frames.
@@ -144,7 +144,7 @@ class ImpulseFrames:
         if page:  # of a world that was loaded the core does not know yet whether it is rough
             self._set_law(self._strongest(gravity) if alone else forces.strongest, h, h, rough=rough)
             page.begin(engine, half * before / self.held.kick if self.held.kick else 0.0)
-        notes = None if world._touches is None else ImpulseNotes(world._touches, engine, state)
+        notes = None if world._touches is None else ContactNotes(world._touches, engine, state)
         if listens := world._events is not None:
             engine.listen(True)
         step, finite = 0, True

@@ -11,10 +11,10 @@ from pyverlet import core
 from pyverlet.ground.constants import SKIN
 from pyverlet.laws.obstacles import Course
 from pyverlet.state.slots import Slots
-from pyverlet.world.impulse_materials import materials_of, skin_of, walls_of
-from pyverlet.world.impulse_memory import Memory, columns_of
-from pyverlet.world.impulse_obstacles import ObstacleRows
-from pyverlet.world.impulse_sleepers import Remembered
+from pyverlet.world.contact_memory import Memory, columns_of
+from pyverlet.world.materials import materials_of, skin_of, walls_of
+from pyverlet.world.obstacle_rows import ObstacleRows
+from pyverlet.world.sleepers import Remembered
 
 Array = NDArray[Any]
 
@@ -24,7 +24,7 @@ UNSORTED = 0.2
 belongs before."""
 
 
-class ImpulseArrays:
+class CoreArrays:
     """An engine of the core, and the arrays that it works on: those of the slots, and those that outlive a frame.
 
     Attributes:

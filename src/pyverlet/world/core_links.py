@@ -10,7 +10,7 @@ from pyverlet.laws.links._set import partners
 from pyverlet.world.link_rows import LinkRows
 
 
-class ImpulseLinks:
+class CoreLinks:
     """The links of one world, as its engine has them."""
 
     def __init__(self) -> None:

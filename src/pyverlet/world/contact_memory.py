@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.world.impulse_sleepers import Remembered
+from pyverlet.world.sleepers import Remembered
 
 Array = NDArray[Any]
 

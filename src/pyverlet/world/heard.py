@@ -9,7 +9,7 @@ import numpy as np
 from pyverlet.laws.events import Told, key_of_pair, key_of_surface
 from pyverlet.laws.obstacles import Course
 from pyverlet.state.slots import Slots
-from pyverlet.world.impulse_obstacles import SIDES
+from pyverlet.world.obstacle_rows import SIDES
 
 
 def told_of(engine: Any, state: Slots, course: Course) -> list[Told]:

@@ -10,7 +10,7 @@ from pyverlet.laws.touches import Touches
 from pyverlet.state.slots import Slots
 
 
-class ImpulseNotes:
+class ContactNotes:
     """The notes of one frame. Impulses of contacts at rest count as for h, whatever kick the first substep has."""
 
     def __init__(self, touches: Touches, engine: Any, state: Slots) -> None:
