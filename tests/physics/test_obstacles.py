@@ -356,3 +356,18 @@ def test_an_obstacle_that_flies_off_the_end_of_all_numbers_is_named() -> None:
     with pytest.raises(pv.InputError, match=r"obstacles\[1\] is farther away than numbers reach"):
         world.step(1e9)
     assert world.frames == 0
+
+
+def test_who_asks_before_the_first_frame_changes_no_bit() -> None:
+    # A moving obstacle drives its world from the first frame on, whether or not somebody has asked where it is.
+    hashes = set()
+    for asks in (False, True):
+        world = pv.World()
+        circles = world.add(position=np.random.default_rng(253).uniform(-6.9, 6.9, (7, 2)))
+        world.links.append(pv.Spring(circles, range(6), range(1, 7), stiffness=1.43))
+        world.obstacles += [pv.Disc((3.58, 3.01), 1.72), pv.Segment((3.06, 2.16), (-4.7, -4.26), velocity=(-0.413, 0.793))]
+        if asks:
+            world.is_free((0.0, 0.0))
+        world.step(1 / 60)
+        hashes.add(world.state_hash())
+    assert len(hashes) == 1

@@ -50,13 +50,19 @@ def keep_with_pair(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.void
 @cython.nogil
 @cython.exceptval(check=False)
 def excess_speed(w: cython.pointer(Step), first: cython.Py_ssize_t, vx: cython.double, vy: cython.double) -> cython.double:
-    """How much faster into a surface than to just come to it in this substep, m/s."""
+    """How much faster into a surface than to just come to it in this substep, m/s.
+
+    Out of a pinned circle particles are pushed no faster than out of others.
+    """
     row: cython.pointer(cython.double) = w.contact
     nx: cython.double = row[first + NORMAL]
     ny: cython.double = row[first + NORMAL + 1]
     ux: cython.double = vx - row[first + SPEED]
     uy: cython.double = vy - row[first + SPEED + 1]
-    speed: cython.double = ux * nx + uy * ny - row[first + GAP] / w.h
+    nearer: cython.double = row[first + GAP] / w.h
+    if w.surface[first // CONTACT] < 0:
+        nearer = max(nearer, -cython.cast(cython.double, w.push))
+    speed: cython.double = ux * nx + uy * ny - nearer
     bend: cython.double = row[first + BEND]
     if bend != 0:  # the surface bends away from the tangent, by 1 - cos of what is gone along it
         slide: cython.double = (ux * ny - uy * nx) * w.h * bend

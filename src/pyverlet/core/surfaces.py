@@ -155,4 +155,8 @@ def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bin
         if which < 0:
             return n > 0
         bounce_at(w, i, which, cython.address(first))
+    # Between surfaces that close in, it would become ever faster: it stays where it was last.
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    strike(w, i, -v[width * i], -v[width * i + 1], 0, w.since[i])
     return True

@@ -97,6 +97,7 @@ class Frames:
             NonFiniteError: a particle turned NaN or infinite.
         """
         world._clear_notes()
+        world._course.begin()
         self.links.keep_apart(world, self.held.engine)
         if world._gather():
             self.held.forget_list()

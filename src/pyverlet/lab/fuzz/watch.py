@@ -46,7 +46,7 @@ _CLOSED = 1e-6
 _FALL_S = 1.0
 """s: without walls the scale of the energy is that of a fall of a second."""
 
-_MOMENTUM = 16.0
+_MOMENTUM = 32.0
 """Rounding errors of each velocity in a substep: one for each pair a circle is in, and it is in six, two sweeps and a few."""
 
 _EASED = 60
@@ -338,7 +338,7 @@ def _momentum(world: World, frame: int, dt: float) -> Callable[[], None]:
     moved, tension, asleep = size(world.velocity), _tension(world), world.asleep
 
     def look() -> None:
-        if (world.asleep != asleep).any():  # who falls asleep keeps nothing of what it hardly moved with, and was in the way
+        if world.asleep.any() or asleep.any():  # sleepers are in the way of who hardly moves, and keep nothing of it
             return
         change = float(np.hypot(*(world.momentum() - before)))
         pulled = dt * max(tension, _tension(world))  # N s, which are rounded too
