@@ -145,9 +145,7 @@ def beyond(world: pv.World) -> float:
     return float(((np.maximum(low, high).max(axis=1) + r) / r).max())
 
 
-THROWN = pytest.mark.xfail(
-    reason="not mended yet: elastic obstacles that close in throw one at 3,000 m/s, a pair of them through the wall"
-)
+THROWN = pytest.mark.xfail(reason="not mended yet: obstacles that close in, e = 1, throw one through the wall at 3,000 m/s")
 
 
 @pytest.mark.parametrize(

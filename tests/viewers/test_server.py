@@ -28,7 +28,6 @@ from websockets.typing import Origin
 import pyverlet as pv
 from pyverlet.state.slots import Slots
 from pyverlet.viewers.launch import server_config
-from pyverlet.viewers.looks import Look
 from pyverlet.viewers.protocol import MAX_MESSAGE
 from pyverlet.viewers.session import Session
 from pyverlet.viewers.web import MAX_IN_FLIGHT, welcome
@@ -466,20 +465,6 @@ def test_pictures_are_of_the_size_and_the_part_that_were_asked_for(monkeypatch: 
         assert wanted.size == (320, 160)  # 20 x 10 m in 320 x 240 pixels
         pixel = np.asarray(wanted.convert("RGB"))[152, 160]  # the middle one, 8 pixels above the floor
         assert int(pixel.max()) - int(pixel.min()) > 40
-
-
-@pytest.mark.parametrize(("pictures_from", "ready"), [(18, True), (19, False)])
-def test_the_artist_gets_ready_half_way(monkeypatch: pytest.MonkeyPatch, server: Server, pictures_from: int, ready: bool) -> None:
-    monkeypatch.setattr("pyverlet.viewers.artist.PICTURES_FROM", pictures_from)
-    drawn: list[tuple[int, Look]] = []
-    monkeypatch.setattr("pyverlet.viewers.artist.Artist.jpeg", lambda artist, frame, look: drawn.append((frame.seq, look)))
-    with dial(server) as connection:
-        tab = Tab(connection)
-        for _ in range(4):  # of nine circles
-            frame = tab.frame()
-            assert frame["kind"] == "frame"
-            tab.ack(frame)
-    assert len(drawn) == ready  # once
 
 
 def test_without_pillow_a_large_world_says_what_would_help(monkeypatch: pytest.MonkeyPatch, server: Server) -> None:
