@@ -145,16 +145,13 @@ def beyond(world: pv.World) -> float:
     return float(((np.maximum(low, high).max(axis=1) + r) / r).max())
 
 
-THROWN = pytest.mark.xfail(reason="not mended yet: obstacles that close in, e = 1, throw one through the wall at 3,000 m/s")
-
-
 @pytest.mark.parametrize(
     ("room", "e"),
     [
         (pv.Box((-5, -5), (5, 5)), 0.0),
         (pv.Circle(radius=5), 0.0),
         pytest.param(pv.Box((-5, -5), (5, 5)), 1.0, marks=pytest.mark.slow),
-        pytest.param(pv.Circle(radius=5), 1.0, marks=(pytest.mark.slow, THROWN)),
+        pytest.param(pv.Circle(radius=5), 1.0, marks=pytest.mark.slow),
     ],
 )
 def test_obstacles_that_move_push_nobody_through_the_wall(room: pv.Boundary, e: float) -> None:

@@ -140,12 +140,13 @@ def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bin
     """Let particle i bounce from surfaces that it meets fast in this substep; not from those that carry its load."""
     n: cython.int
     k: cython.Py_ssize_t
+    which: cython.Py_ssize_t = -1
     if w.inverse_mass[i] == 0:
         return False
     for n in range(MOST_BOUNCES):
         first: Hit
         first.time, first.nx, first.ny = NEVER, 0.0, 0.0
-        which: cython.Py_ssize_t = -1
+        which = -1
         for k in range(w.contact_begin[i], w.contact_end[i]):
             if w.restless or w.contact[CONTACT * k + PUSH] == 0:
                 measure_surface(w, i, k, False)
@@ -155,8 +156,10 @@ def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bin
         if which < 0:
             return n > 0
         bounce_at(w, i, which, cython.address(first))
-    # Between surfaces that close in, it would become ever faster: it stays where it was last.
-    width: cython.Py_ssize_t = 4 if w.rough else 2
-    v: cython.pointer(real) = w.motion if w.rough else w.velocity
-    strike(w, i, -v[width * i], -v[width * i + 1], 0, w.since[i])
+    # Between elastic surfaces that close in, it becomes ever faster: it stays where it was last.
+    # Between others its speed has a limit.
+    if w.contact[CONTACT * which + BOUNCE] >= 1:
+        width: cython.Py_ssize_t = 4 if w.rough else 2
+        v: cython.pointer(real) = w.motion if w.rough else w.velocity
+        strike(w, i, -v[width * i], -v[width * i + 1], 0, w.since[i])
     return True
