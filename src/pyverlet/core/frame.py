@@ -71,12 +71,9 @@ def hold_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def hold_on_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """Surfaces once more hold particles of a block."""
+    """Surfaces once more hold particles of a block: pairs may have thrown them there."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    n: cython.Py_ssize_t
-    for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
-        bounce_surfaces(w, w.at_surface[n])  # pairs may have thrown it there
-        hold_surfaces(w, w.at_surface[n])
+    hold_surfaces_stage(what, block)
     if w.segments > 0:
         keep_sides(w, block)
 

@@ -95,7 +95,7 @@ def join_rows(rows, inverse_mass, root):
                 join_sets(to, pair[2 * k], pair[2 * k + 1])
 
 
-def settle(root):
+def compress_paths(root):
     """root[i] becomes the lowest member of the set of i."""
     to: cython.pointer(int64_t) = integers(root)
     count: cython.Py_ssize_t = len(root)

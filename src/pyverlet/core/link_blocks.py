@@ -36,11 +36,11 @@ def begin_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
         j: cython.Py_ssize_t = k.node[e + 1]
         d: LinkWay = way_between(k, i, j, 0)
         square: cython.double = d.x * d.x + d.y * d.y
-        turns: cython.double = 0
+        turning: cython.double = 0
         if square > 0:
-            turns = (2 * k.kick - k.h) * ((k.u[2 * j + 1] - k.u[2 * i + 1]) * d.x - (k.u[2 * j] - k.u[2 * i]) * d.y) / square
+            turning = (2 * k.kick - k.h) * ((k.u[2 * j + 1] - k.u[2 * i + 1]) * d.x - (k.u[2 * j] - k.u[2 * i]) * d.y) / square
         k.way[2 * r], k.way[2 * r + 1] = d.x, d.y
-        k.turning[r] = max(min(turns, FARTHEST), -FARTHEST)
+        k.turning[r] = max(min(turning, FARTHEST), -FARTHEST)
         k.given[2 * r] = k.given[2 * r + 1] = 0
     else:
         for e in range(k.first[r], k.first[r + 1]):

@@ -7,8 +7,8 @@ import cython
 from cython.cimports.libc.math import INFINITY
 
 from pyverlet.core.link_arrays import Links
-from pyverlet.core.link_shapes import unwrapped
 from pyverlet.core.link_softness import Softness, averaged, before_that, kept_share, softness
+from pyverlet.core.periodic import nearest_in_double
 
 
 @cython.cfunc
@@ -18,7 +18,7 @@ def pin_value(k: cython.pointer(Links), p: cython.Py_ssize_t, axis: cython.int, 
     """A coordinate of its particle beyond that of the pin, m."""
     i: cython.Py_ssize_t = k.pin_node[p]
     away: cython.double = k.x[2 * i + axis] - k.pin_point[2 * p + axis]
-    return unwrapped(away, k.period_y if axis else k.period_x) + ahead * k.u[2 * i + axis]
+    return nearest_in_double(away, k.period_y if axis else k.period_x) + ahead * k.u[2 * i + axis]
 
 
 @cython.cfunc
@@ -83,7 +83,7 @@ def finish_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def rest_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
+def hold_rigid_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
     """After the drift: what rigid pins hold does not move."""
     i: cython.Py_ssize_t = k.pin_node[p]
     axis: cython.int
@@ -98,8 +98,8 @@ def rest_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def settle_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
-    """After that: what rigid pins have given against rows."""
+def finish_rigid_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
+    """Rows are solved after the drift: what rigid pins have given against them."""
     i: cython.Py_ssize_t = k.pin_node[p]
     if k.pin_intact[p] != 0 and k.own[i] > 0 and k.weight[i] == 0:
         k.pin_impulse[2 * p] -= k.react[2 * i]

@@ -8,6 +8,7 @@ from cython.cimports.libc.math import atan2, rint, sqrt
 
 from pyverlet.core.link_arrays import ANGLE, DISTANCE, Links
 from pyverlet.core.link_holds import move
+from pyverlet.core.periodic import nearest_in_double
 
 TURN = cython.declare(cython.double, 6.283185307179586)
 
@@ -18,20 +19,11 @@ LinkWay = cython.struct(x=cython.double, y=cython.double)
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def unwrapped(way: cython.double, period: cython.double) -> cython.double:
-    """Across the seam of a periodic room."""
-    return way - period * rint(way / period) if period > 0 else way
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
 def way_between(k: cython.pointer(Links), i: cython.Py_ssize_t, j: cython.Py_ssize_t, ahead: cython.double) -> LinkWay:
     """From linked particle i to the nearest image of j, m, `ahead` seconds from now at the velocities of now."""
     found: LinkWay
-    found.x = unwrapped(k.x[2 * j] - k.x[2 * i], k.period_x) + ahead * (k.u[2 * j] - k.u[2 * i])
-    found.y = unwrapped(k.x[2 * j + 1] - k.x[2 * i + 1], k.period_y) + ahead * (k.u[2 * j + 1] - k.u[2 * i + 1])
+    found.x = nearest_in_double(k.x[2 * j] - k.x[2 * i], k.period_x) + ahead * (k.u[2 * j] - k.u[2 * i])
+    found.y = nearest_in_double(k.x[2 * j + 1] - k.x[2 * i + 1], k.period_y) + ahead * (k.u[2 * j + 1] - k.u[2 * i + 1])
     return found
 
 

@@ -16,7 +16,7 @@ from pyverlet.core.cells import BLOCK
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_blocks import AVERAGED, begin_row, end_row, finish_row, solve_block, take_back_row, warm_block
 from pyverlet.core.link_holds import find_hold, move, note_holds
-from pyverlet.core.link_pins import begin_pin, end_pin, finish_pin, hold_pin, rest_pin, settle_pin
+from pyverlet.core.link_pins import begin_pin, end_pin, finish_pin, finish_rigid_pin, hold_pin, hold_rigid_pin
 from pyverlet.core.step import Step
 
 PUT_OUT = cython.declare(cython.double, 4)
@@ -119,11 +119,8 @@ def take_back_stage(what: cython.p_void, block: cython.int) -> cython.void:
     a: cython.Py_ssize_t = block * BLOCK
     i: cython.Py_ssize_t
     axis: cython.int
-    take_stage(what, block)
+    take_held_stage(what, block)
     for i in range(a, min(a + BLOCK, k.count)):
-        find_hold(w, i)
-        if w.noting:
-            note_holds(w, i, -1)
         move(k, i, -k.loaned[2 * i], -k.loaned[2 * i + 1])
         for axis in range(2):
             if k.own[i] > 0:
@@ -325,12 +322,12 @@ def relax_links(w: cython.pointer(Step), back: cython.bint) -> cython.void:
     c: cython.int
     team_stage(w.team, take_held_stage, w, blocks_of(k))
     for p in range(k.pins):
-        rest_pin(k, p)
+        hold_rigid_pin(k, p)
     for c in range(k.colours):
         k.now = k.colours - 1 - c if back else c
         team_stage(w.team, relax_chunk, w, cython.cast(cython.int, k.colour[k.now + 1] - k.colour[k.now]))
     for p in range(k.pins):
-        settle_pin(k, p)
+        finish_rigid_pin(k, p)
     team_stage(w.team, put_held_stage, w, blocks_of(k))
 
 

@@ -92,7 +92,7 @@ def touching(position, radius, fixed, category, mask, shift, level, heads, follo
     y1: cython.double = -INFINITY
     i: int64_t
     s: int64_t
-    coarse: int64_t
+    at_level: int64_t
     around: int64_t
     with cython.nogil:
         for i in range(CELL_LEVELS):
@@ -126,25 +126,25 @@ def touching(position, radius, fixed, category, mask, shift, level, heads, follo
                 far: cython.double = r[i] + widest
                 if x < x0 - far or x > x1 + far or y < y0 - far or y > y1 + far:
                     continue
-                for coarse in range(own[i], highest + 1):
-                    if not used[coarse]:
+                for at_level in range(own[i], highest + 1):
+                    if not used[at_level]:
                         continue
-                    half: cython.bint = s == 0 and coarse == own[i]
+                    half: cython.bint = s == 0 and at_level == own[i]
                     for around in range(4 if half else 0, 9):
-                        c: int64_t = cell_along(x, coarse) + around % 3 - 1
-                        row: int64_t = cell_along(y, coarse) + around // 3 - 1
-                        j: int64_t = head[place_of(c, row, coarse, size)]
+                        c: int64_t = cell_along(x, at_level) + around % 3 - 1
+                        row: int64_t = cell_along(y, at_level) + around // 3 - 1
+                        j: int64_t = head[place_of(c, row, at_level, size)]
                         while j >= 0:
                             there: int64_t = j
                             j = next_in[j]
-                            if own[there] != coarse or (there <= i and coarse == own[i] and (around == 4 or not half)):
+                            if own[there] != at_level or (there <= i and at_level == own[i] and (around == 4 or not half)):
                                 continue
                             dx: cython.double = x - p[2 * there]
                             dy: cython.double = y - p[2 * there + 1]
                             reach: cython.double = cython.cast(cython.double, r[i]) + r[there]
                             if not dx * dx + dy * dy < reach * reach:
                                 continue
-                            if cell_along(p[2 * there], coarse) != c or cell_along(p[2 * there + 1], coarse) != row:
+                            if cell_along(p[2 * there], at_level) != c or cell_along(p[2 * there + 1], at_level) != row:
                                 continue  # of another cell with the same place in the table
                             if (is_fixed[i] and is_fixed[there]) or not (kind[i] & sees[there] and kind[there] & sees[i]):
                                 continue

@@ -55,12 +55,3 @@ def wrap(position, low_x: real, low_y: real, period_x: real, period_y: real, out
         for i in range(count):
             to[2 * i] = inside(x[2 * i], low_x, period_x)
             to[2 * i + 1] = inside(x[2 * i + 1], low_y, period_y)
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def image_near(x: real, reference: real, period: real) -> real:
-    """The image of x that is nearest to `reference`; x itself where the period is 0."""
-    return x + period * cython.cast(real, rint((reference - x) / period)) if period > 0 else x

@@ -58,9 +58,9 @@ def put_motion(
     k: cython.Py_ssize_t
     for k in range(count):
         i: cython.Py_ssize_t = order[k]
-        turns: cython.double = cython.cast(cython.double, s_to[i]) + cython.cast(cython.double, s[k])
-        if turns != 0:
-            turned[i] += half_dt * turns
+        spins: cython.double = cython.cast(cython.double, s_to[i]) + cython.cast(cython.double, s[k])
+        if spins != 0:
+            turned[i] += half_dt * spins
         x_to[2 * i], x_to[2 * i + 1] = x[2 * k], x[2 * k + 1]
         v_to[2 * i], v_to[2 * i + 1] = v[2 * k], v[2 * k + 1]
         a_to[2 * i], a_to[2 * i + 1] = a[2 * k], a[2 * k + 1]

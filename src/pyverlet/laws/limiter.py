@@ -209,7 +209,7 @@ class EnergyLimiter:
             if among := getattr(force, "among", None):
                 members = among(slots)[slots.inverse_mass[among(slots)] > 0].astype(np.int32)
                 slots.motion.join_rows(np.column_stack((members, np.roll(members, 1))), slots.inverse_mass, root)
-        slots.motion.settle(root)
+        slots.motion.compress_paths(root)
         return root
 
 

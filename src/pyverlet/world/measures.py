@@ -167,8 +167,8 @@ class Measures(Particles):
         finally:
             self._touches = before
 
-    def _open_books(self) -> Page | None:
-        """The books of a frame, if there are any."""
+    def _frame_ledger(self) -> Page | None:
+        """What a frame is entered in, if this world keeps a ledger."""
         if self._books is None:
             return None
         return Page(self._books, self._slots, self._force_sum, self.links, self.time, self.profile.mark)

@@ -115,9 +115,9 @@ class World(Measures, Queries, Doors):
         with self._state.turn.frame():
             self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
             self.profile.begin()
-            books = self._open_books()
-            self._frames.step(self, dt, books or self.profile.mark)
-            self._accept(dt, h, books)
+            ledger = self._frame_ledger()
+            self._frames.step(self, dt, ledger or self.profile.mark)
+            self._accept(dt, h, ledger)
         act_after(self, dt)
 
     def _gather(self) -> bool:
@@ -139,11 +139,11 @@ class World(Measures, Queries, Doors):
                 raise
         return changed
 
-    def _accept(self, dt: float, h: float, books: Any) -> None:
+    def _accept(self, dt: float, h: float, ledger: Any) -> None:
         """The frame has gone well: what it made of the state is the truth now."""
         self._slots.scatter(self._state, dt)
-        if books:
-            books.close(-self._slots.taken)
+        if ledger:
+            ledger.close(-self._slots.taken)
         self._course.end(dt)
         self._frames.links.end(self)
         if self._events:

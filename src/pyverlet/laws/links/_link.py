@@ -135,7 +135,6 @@ class Link(metaclass=_InTurn):
         """Write a column of the pool, if these are in a world."""
         if self._pool is not None:
             self._pool.rows[column][self._where] = value
-            self._pool.changed = True
             self._pool.edits += 1
 
     @property

@@ -26,8 +26,6 @@ class Pool(ABC):
         rows: a row for each link, in the order added.
         entries: `particle`, the user's indices of the particles, row after row.
         drawn: whether its rows are lines between their particles.
-        stale: rows have come or gone since somebody has made a copy for a solver.
-        changed: numbers of rows have changed since then.
         edits: how often rows have come, gone or been given other numbers.
         live: within a frame, rows, and an array of which are intact, with the places of these in it.
     """
@@ -41,7 +39,6 @@ class Pool(ABC):
             **dict.fromkeys(REMEMBERED, (np.float64, (2,))), **columns,
         )  # fmt: skip
         self.entries = Table(particle=np.int64)
-        self.stale = self.changed = True
         self.edits = 0
         self.live: tuple[Array, Array, Array] | None = None
         self._gives = -1, False  # the same, as of so many edits
@@ -73,7 +70,7 @@ class Pool(ABC):
         self.rows.keep(mask)
 
     def _edit(self) -> None:
-        self.stale, self.live = True, None
+        self.live = None
         self.edits += 1
 
     @property

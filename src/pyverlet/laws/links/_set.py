@@ -159,7 +159,7 @@ class Links(Shared):
         """A frame is good: of each pool the rows that broke, and what they pulled with, N. What is left is packed anew."""
         self.broken = np.concatenate((self.broken[:0], *(self._note(*each) for each in torn)))
         for pool, *_ in torn:
-            pool.edits, pool.stale, self._apart_stale = pool.edits + 1, True, True
+            pool.edits, self._apart_stale = pool.edits + 1, True
 
     def _note(self, pool: Pool, snapped: Array, pull: Array) -> Array:
         """The BROKEN entries of these rows of a pool."""
@@ -267,7 +267,7 @@ class Links(Shared):
             if family not in self._pools:
                 self._pools[family] = new[family]()
             pool = self._pools[family]
-            pool.rows, pool.entries, pool.stale = rows.copy(), entries.copy(), True
+            pool.rows, pool.entries = rows.copy(), entries.copy()
         self._links, self._listed = {owner: link for owner, link, _ in links}, None
         for owner, link, particles in links:
             link.particles, link._id, link._pool = particles, owner, self._pools[link._family]

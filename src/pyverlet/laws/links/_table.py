@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,6 @@ class Table:
 
     def __init__(self, **columns: DTypeLike | tuple[DTypeLike, tuple[int, ...]]) -> None:
         self._length = 0
-        self._late: tuple[Collection[str], Callable[[], None]] = (), lambda: None
         self._store: dict[str, Array] = {}
         for name, kind in columns.items():
             dtype, shape = kind if isinstance(kind, tuple) else (kind, ())
@@ -30,24 +28,11 @@ class Table:
         return self._length
 
     def __getitem__(self, name: str) -> Array:
-        if name in self._late[0]:
-            self.write()
         return self._store[name][: self._length]
-
-    def write_late(self, names: Collection[str], write: Callable[[], None]) -> None:
-        """These columns are not up to date: `write` sees to that when somebody asks for one of them."""
-        self._late = names, write
-
-    def write(self) -> None:
-        """Bring all columns up to date."""
-        (names, write), self._late = self._late, ((), lambda: None)
-        if names:
-            write()
 
     def append(self, count: int, **values: Any) -> slice:
         """Add `count` rows; a value is an entry for each, or one for all. Returns where they stand."""
         where = slice(self._length, self._length + count)
-        self.write()  # before there are other rows
         for name, old in self._store.items():
             if where.stop > len(old):  # doubling: adding one by one costs O(1) each on average
                 self._store[name] = np.empty((max(where.stop, 2 * len(old)), *old.shape[1:]), old.dtype)
