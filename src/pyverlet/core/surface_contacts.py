@@ -10,7 +10,7 @@ from cython.cimports.libc.math import fabs, sqrt
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import BEND, CONTACT, DRAG, GAP, NORMAL, PUSH, RUB, SIDES, SPEED, pinned_lane
 from pyverlet.core.surface_shapes import measure_surface
-from pyverlet.core.surfaces import push_off
+from pyverlet.core.surfaces import MOST_FASTER, length, push_off, speed_limit
 
 MOST_TURNS_AROUND = cython.declare(cython.int, 64)
 """Over the contacts of a particle that lies between several: in a narrow wedge each gives what the other takes."""
@@ -132,8 +132,9 @@ def hold(
     uy: cython.double = v[width * i + 1] - row[first + SPEED + 1]
     speed: cython.double = ux * nx + uy * ny
     if relax:  # a velocity of the middle of the substep, along the chord of a round path
-        slide: cython.double = ux * ny - uy * nx
-        speed -= 0.5 * slide * slide * row[first + BEND] * w.h
+        if row[first + BEND] != 0:
+            turned: cython.double = (ux * ny - uy * nx) * row[first + BEND] * w.h
+            speed -= 0.5 * min(turned * turned, 1.0) / (row[first + BEND] * w.h)
     else:
         if before == 0 and passes_by(w, i, k, v[width * i], v[width * i + 1]):
             return 0.0
@@ -160,7 +161,9 @@ def hold(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def hold_two(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, o: cython.Py_ssize_t) -> cython.void:
+def hold_two(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, o: cython.Py_ssize_t, limit: cython.double
+) -> cython.void:
     """Two surfaces that carry load, of a corner: what each is to give, solved for at once; one after the other takes long."""
     a: cython.Py_ssize_t = CONTACT * k
     b: cython.Py_ssize_t = CONTACT * o
@@ -175,7 +178,9 @@ def hold_two(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t
     second: cython.double = excess_speed(w, b, v[width * i], v[width * i + 1])
     more: cython.double = (first - along * second) / (across * across)
     other: cython.double = (second - along * first) / (across * across)
-    if row[a + PUSH] + more > 0 and row[b + PUSH] + other > 0:
+    ux: cython.double = v[width * i] - more * row[a + NORMAL] - other * row[b + NORMAL]
+    uy: cython.double = v[width * i + 1] - more * row[a + NORMAL + 1] - other * row[b + NORMAL + 1]
+    if row[a + PUSH] + more > 0 and row[b + PUSH] + other > 0 and ux * ux + uy * uy <= limit * limit:
         row[a + PUSH] += more
         row[b + PUSH] += other
         if w.surface[k] < 0:
@@ -189,12 +194,17 @@ def hold_two(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def hold_all(w: cython.pointer(Step), i: cython.Py_ssize_t, rubs: cython.bint) -> cython.bint:
-    """One after the other, until none changes any more. False: no impulses hold particle i at all surfaces."""
+def hold_all(w: cython.pointer(Step), i: cython.Py_ssize_t, rubs: cython.bint, limit: cython.double) -> cython.bint:
+    """One after the other, until none changes any more. False: none that leave it slower than `limit` hold particle i at all surfaces."""
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
     turn: cython.int
     k: cython.Py_ssize_t
     change: cython.double = 0
     halfway: cython.double = 0
+    bound: cython.double = limit
+    for k in range(w.contact_begin[i], w.contact_end[i]):
+        bound = max(bound, limit + MOST_FASTER * w.contact[CONTACT * k + PUSH])  # on the way, while one gives what another takes
     for turn in range(MOST_TURNS_AROUND):
         most: cython.double = 0
         loaded: cython.int = 0
@@ -209,13 +219,15 @@ def hold_all(w: cython.pointer(Step), i: cython.Py_ssize_t, rubs: cython.bint) -
                     loaded += 1
                     bends |= rubs and w.contact[CONTACT * k + BEND] != 0  # friction changes what the bend asks for
                     if loaded == 2 and turn % TOGETHER == 8:
-                        hold_two(w, i, one, k)
+                        hold_two(w, i, one, k, bound)
                     one = k
         if (loaded < 2 and not bends) or change <= SETTLED * most:
-            return True
+            return length(v[width * i], v[width * i + 1]) <= limit
+        if length(v[width * i], v[width * i + 1]) > bound:
+            return False
         if 2 * turn == MOST_TURNS_AROUND:
             halfway = change
-    return change <= JAMMED * halfway
+    return change <= JAMMED * halfway and length(v[width * i], v[width * i + 1]) <= limit
 
 
 @cython.cfunc
@@ -229,7 +241,8 @@ def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     k: cython.Py_ssize_t
     for k in range(w.contact_begin[i], w.contact_end[i]):
         measure_surface(w, i, k, False)
-    if hold_all(w, i, w.rough):
+    limit: cython.double = speed_limit(w, i)
+    if hold_all(w, i, w.rough, limit):
         return
     for k in range(w.contact_begin[i], w.contact_end[i]):
         first: cython.Py_ssize_t = CONTACT * k
@@ -238,7 +251,7 @@ def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
             w.contact[first + DRAG] = 0
             if w.surface[k] < 0:
                 keep_with_pair(w, k)
-    if not (w.rough and hold_all(w, i, False)):
+    if not (w.rough and hold_all(w, i, False, limit)):
         squeeze(w, i)
 
 

@@ -26,6 +26,33 @@ from pyverlet.core.work import book_belt, book_place
 MOST_BOUNCES = cython.declare(cython.int, 256)
 """Of one particle in a substep, one after the other."""
 
+MOST_FASTER = cython.declare(cython.double, 8)
+"""Than a particle came, a surface moves, or puts it out: surfaces that close in on it throw it out of their wedge no faster."""
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def length(x: cython.double, y: cython.double) -> cython.double:
+    """Of a vector. Unlike `hypot` it is rounded alike by all libraries."""
+    return sqrt(x * x + y * y)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def speed_limit(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
+    """How fast its surfaces, as measured, may make particle i, m/s."""
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    fast: cython.double = max(length(v[width * i], v[width * i + 1]), w.rest_speed)
+    k: cython.Py_ssize_t
+    for k in range(w.contact_begin[i], w.contact_end[i]):
+        at: cython.Py_ssize_t = CONTACT * k
+        fast = max(fast, max(length(w.contact[at + SPEED], w.contact[at + SPEED + 1]), -w.contact[at + GAP] / w.h))
+    return MOST_FASTER * fast
+
 
 @cython.cfunc
 @cython.inline
@@ -143,6 +170,9 @@ def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bin
     which: cython.Py_ssize_t = -1
     if w.inverse_mass[i] == 0:
         return False
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    limit: cython.double = 0
     for n in range(MOST_BOUNCES):
         first: Hit
         first.time, first.nx, first.ny = NEVER, 0.0, 0.0
@@ -155,11 +185,13 @@ def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bin
                     first, which = hit, k
         if which < 0:
             return n > 0
+        if n == 0:
+            limit = speed_limit(w, i)
         bounce_at(w, i, which, cython.address(first))
-    # Between elastic surfaces that close in, it becomes ever faster: it stays where it was last.
-    # Between others its speed has a limit.
-    if w.contact[CONTACT * which + BOUNCE] >= 1:
-        width: cython.Py_ssize_t = 4 if w.rough else 2
-        v: cython.pointer(real) = w.motion if w.rough else w.velocity
+        if length(v[width * i], v[width * i + 1]) > limit:
+            break
+    # Between surfaces that close in it would become ever faster: it stays where it was last.
+    # In a corner that does not, all but elastic ones slow it down.
+    if n + 1 < MOST_BOUNCES or w.contact[CONTACT * which + BOUNCE] >= 1:
         strike(w, i, -v[width * i], -v[width * i + 1], 0, w.since[i])
     return True
