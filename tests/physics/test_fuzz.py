@@ -18,14 +18,10 @@ from pyverlet.world.world import World
 
 QUICK, ALL = 24, 300
 
-KNOWN = {5, 18, 41, 88, 168, 2146}
-"""Not mended yet: crowds that start on top of each other, with masses up to 1:1000, and cloths, ropes or moving pinned circles in
-them, or two walls that are nearer than a circle is wide, may throw one out of the room, or become infinite and be refused."""
-
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(each, marks=pytest.mark.slow) for each in range(3, QUICK, 3))])
 def test_some_random_worlds(seed: int) -> None:
-    for each in {*range(seed, seed + 3)} - KNOWN:
+    for each in range(seed, seed + 3):
         (finding,) = fuzz.fuzz(1, each, small=False)
         assert finding.check is None, f"seed {each}: {finding.check}"
 
@@ -42,12 +38,11 @@ def test_some_random_worlds(seed: int) -> None:
 @pytest.mark.parametrize(
     "seed",
     [
-        *(pytest.param(each, marks=pytest.mark.xfail(reason="see KNOWN")) for each in (41, 168)),
+        *(18, 41, 88, 168, 192),
         *(1522, 2167, 61, 92, 100904, 105154, 105428, 116757, 400023, 410579, 411737),
         *(700313, 700585, 702781, 960983, 961085),
         # These take long.
-        pytest.param(2146, marks=(pytest.mark.slow, pytest.mark.xfail(reason="see KNOWN"))),
-        *(pytest.param(each, marks=pytest.mark.slow) for each in (75, 256, 100674, 411340, 702660, 704622)),
+        *(pytest.param(each, marks=pytest.mark.slow) for each in (2146, 75, 256, 100674, 411340, 702660, 704622)),
         *(pytest.param(each, marks=pytest.mark.slow) for each in (102853, 103593, 104756, 104863, 106417, 106603, 107129)),
     ],
 )
@@ -59,7 +54,7 @@ def test_seeds_that_once_failed(seed: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(QUICK, ALL, 12))
 def test_random_worlds(seed: int) -> None:
-    for each in {*range(seed, seed + 12)} - KNOWN:
+    for each in range(seed, seed + 12):
         (finding,) = fuzz.fuzz(1, each)
         assert finding.check is None, f"seed {each}: {finding.check}\n{finding.program}"
 

@@ -31,7 +31,7 @@ from pyverlet.core.particle_stages import drift, kick_stage, remember_stage
 from pyverlet.core.relisting import each_group
 from pyverlet.core.step import OPEN, Step
 from pyverlet.core.surface_contacts import hold_surfaces, relax_surfaces, warm_surfaces
-from pyverlet.core.surface_sides import keep_sides
+from pyverlet.core.surface_sides import keep_inside, keep_sides
 from pyverlet.core.surfaces import bounce_surfaces
 from pyverlet.core.warm_start import warm_start
 from pyverlet.core.work import book_drift, book_end, book_grips, book_rubbing, book_start
@@ -98,6 +98,8 @@ def drift_stage(what: cython.p_void, block: cython.int) -> cython.void:
     a: cython.Py_ssize_t = block * BLOCK
     if not w.linked:
         hold_on_stage(what, block)
+    elif w.room != OPEN:
+        keep_inside(w, block)
     drift(w, a, min(a + BLOCK, w.count), block)
     if w.booking:
         book_drift(w, block)
@@ -229,7 +231,7 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     if w.linked:
         if surfaces:
             team_stage(w.team, hold_on_stage, w, blocks)
-        rests: cython.bint = fastest < w.rest_speed
+        rests: cython.bint = fastest < min(w.rest_speed, w.push)
         rounds: cython.int = ROUGH_ROUNDS if rests and w.rough else ROUNDS
         for turn in range(rounds):
             if turn > 0 and rests:

@@ -213,6 +213,7 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
         each_group(w, list_stage)
         if has_room(w, ls):
             break
+        team_stage(w.team, spots_stage, w, blocks)  # in no batch any more
     fill_alike(w, ls)
     team_stage(w.team, listed_stage, w, blocks)
     looked: int64_t = 0

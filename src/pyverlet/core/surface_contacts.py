@@ -195,7 +195,7 @@ def hold_two(
 @cython.nogil
 @cython.exceptval(check=False)
 def hold_all(w: cython.pointer(Step), i: cython.Py_ssize_t, rubs: cython.bint, limit: cython.double) -> cython.bint:
-    """One after the other, until none changes any more. False: none that leave it slower than `limit` hold particle i at all surfaces."""
+    """One after the other, until none changes any more. False: no impulses that leave it slower than `limit` hold particle i."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     turn: cython.int

@@ -2,20 +2,20 @@
 """Lines have two sides: nobody gets to the other one by impacts that were not resolved in the order of their times.
 
 A pair may meet before one of the two has met a line, and be solved after: its path is then another than that which bounced. And
-what is thrown much faster than it was may get to lines that are in none of its contacts.
+what is thrown much faster than it was may get to lines that are in none of its contacts. So may what links pull out of the room.
 """
 
 from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
-from cython.cimports.libc.math import fabs, floor
+from cython.cimports.libc.math import fabs, floor, sqrt
 from cython.cimports.libc.stdint import int32_t, int64_t
 
 from pyverlet.core.cells import BLOCK, wrapped
-from pyverlet.core.impacts import NEVER
+from pyverlet.core.impacts import NEVER, strike
 from pyverlet.core.obstacles import BODY_OF, FACES, LENGTH, PLACE, ROUNDING, SEGMENT, head_of
-from pyverlet.core.step import Step
+from pyverlet.core.step import CAGE, Step
 from pyverlet.core.work import book_place
 
 Way = cython.struct(x=cython.double, y=cython.double, dx=cython.double, dy=cython.double)
@@ -83,6 +83,23 @@ def first_crossing(w: cython.pointer(Step), way: cython.pointer(Way)) -> cython.
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def move_to(w: cython.pointer(Step), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
+    """Put particle i where it gets to (x, y) in this substep."""
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    dx: cython.double = x - v[width * i] * cython.cast(cython.double, w.h) - w.position[2 * i]
+    dy: cython.double = y - v[width * i + 1] * cython.cast(cython.double, w.h) - w.position[2 * i + 1]
+    w.position[2 * i] += cython.cast(real, dx)
+    w.position[2 * i + 1] += cython.cast(real, dy)
+    w.moved[2 * i] += cython.cast(real, dx)
+    w.moved[2 * i + 1] += cython.cast(real, dy)
+    if w.booking:
+        book_place(w, i, dx, dy)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def keep_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """If the way of particle i in this substep crosses lines, it ends at the first of them, on its own side."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
@@ -116,14 +133,7 @@ def keep_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
         w.free[2 * i] += cython.cast(real, rate * s)
         w.free[2 * i + 1] -= cython.cast(real, rate * c)
     rest: cython.double = (1 - part) * h
-    from_x += part * way.dx + rest * w.body[b + 3] - v[width * i] * h - w.position[2 * i]
-    from_y += part * way.dy + rest * w.body[b + 4] - v[width * i + 1] * h - w.position[2 * i + 1]
-    w.position[2 * i] += cython.cast(real, from_x)
-    w.position[2 * i + 1] += cython.cast(real, from_y)
-    w.moved[2 * i] += cython.cast(real, from_x)
-    w.moved[2 * i + 1] += cython.cast(real, from_y)
-    if w.booking:
-        book_place(w, i, from_x, from_y)
+    move_to(w, i, from_x + part * way.dx + rest * w.body[b + 3], from_y + part * way.dy + rest * w.body[b + 4])
 
 
 @cython.cfunc
@@ -140,3 +150,35 @@ def keep_sides(w: cython.pointer(Step), block: cython.int) -> cython.void:
     for i in range(block * BLOCK, min((block + 1) * BLOCK, w.count)):
         if w.inverse_mass[i] > 0:
             keep_side(w, i)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def keep_inside(w: cython.pointer(Step), block: cython.int) -> cython.void:
+    """The free particles of a block whose links would pull them out of the room, by half a radius or more, end at its side."""
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    h: cython.double = w.h
+    i: cython.Py_ssize_t
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, w.count)):
+        r: cython.double = w.radius[i]
+        x: cython.double = w.position[2 * i] + v[width * i] * h
+        y: cython.double = w.position[2 * i + 1] + v[width * i + 1] * h
+        to_x: cython.double = min(max(x, w.x0 + r), w.x1 - r)
+        to_y: cython.double = min(max(y, w.y0 + r), w.y1 - r)
+        if w.room == CAGE:
+            d: cython.double = sqrt((x - w.x0) * (x - w.x0) + (y - w.y0) * (y - w.y0))
+            part: cython.double = min((w.x1 - r) / d, 1.0) if d > 0 else 1.0
+            to_x, to_y = w.x0 + part * (x - w.x0), w.y0 + part * (y - w.y0)
+        beyond: cython.double = sqrt((x - to_x) * (x - to_x) + (y - to_y) * (y - to_y))
+        if beyond < 0.5 * r or w.inverse_mass[i] == 0:
+            continue
+        nx: cython.double = (x - to_x) / beyond
+        ny: cython.double = (y - to_y) / beyond
+        out: cython.double = max(v[width * i] * nx + v[width * i + 1] * ny, 0.0)
+        strike(w, i, -out * nx, -out * ny, 0, 0)
+        if w.noting:
+            w.wall_given[2 * i] -= cython.cast(real, out * nx)
+            w.wall_given[2 * i + 1] -= cython.cast(real, out * ny)
+        move_to(w, i, to_x, to_y)

@@ -27,7 +27,8 @@ MOST_BOUNCES = cython.declare(cython.int, 256)
 """Of one particle in a substep, one after the other."""
 
 MOST_FASTER = cython.declare(cython.double, 8)
-"""Than a particle came, a surface moves, or puts it out: surfaces that close in on it throw it out of their wedge no faster."""
+"""Times the speed at which surfaces move, or put a particle out, on top of its own: those that close in on a particle make it
+no faster, though in a narrow wedge they would have to, to let it out."""
 
 
 @cython.cfunc
@@ -46,12 +47,15 @@ def speed_limit(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
     """How fast its surfaces, as measured, may make particle i, m/s."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
-    fast: cython.double = max(length(v[width * i], v[width * i + 1]), w.rest_speed)
+    fast: cython.double = max(w.rest_speed, w.h * length(w.acceleration[2 * i], w.acceleration[2 * i + 1]))
     k: cython.Py_ssize_t
     for k in range(w.contact_begin[i], w.contact_end[i]):
         at: cython.Py_ssize_t = CONTACT * k
-        fast = max(fast, max(length(w.contact[at + SPEED], w.contact[at + SPEED + 1]), -w.contact[at + GAP] / w.h))
-    return MOST_FASTER * fast
+        out: cython.double = -w.contact[at + GAP] / w.h
+        if w.surface[k] < 0:
+            out = min(out, cython.cast(cython.double, w.push))
+        fast = max(fast, max(length(w.contact[at + SPEED], w.contact[at + SPEED + 1]), out))
+    return 1.01 * length(v[width * i], v[width * i + 1]) + MOST_FASTER * fast  # some for rounding
 
 
 @cython.cfunc
