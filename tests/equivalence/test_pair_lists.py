@@ -183,7 +183,7 @@ def test_impulses_survive_new_lists() -> None:
     # is the rounding of places, 1e-16 / 1e-9 of depths of that many metres; without its impulses all of it would fall by g h =
     # 0.04 m/s in a substep.
     worlds = [crowd("box", "equal", 300, np.float64, restitution=0.5) for _ in range(2)]
-    for _ in range(480):
+    for _ in range(900):
         for world in worlds:
             world.step(1 / 60)
     loads = []

@@ -169,6 +169,10 @@ def solve(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint
                 count += note_hits(shared, k, bits_of(fast), first + count)
                 after = choose(fast, before, after)
         else:
+            if own.turned:  # a velocity of the middle of the substep, along the chord of the way around each other
+                slide: lanes = (m.vx - m.ux) * ny - (m.vy - m.uy) * nx
+                reach: lanes = load(w.reach, k * w.sized) * spread(1 / w.h)
+                speed = speed - smaller(slide * slide, reach * reach) / reach
             after = choose(loaded, larger(before - speed, zero), zero)
             after = choose(fast_ones(w, k, speed, depth, nx, ny), before, after)  # it bounces in the next substep
         store(w.impulse, k, after)

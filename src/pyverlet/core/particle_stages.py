@@ -11,6 +11,20 @@ from pyverlet.core.step import Step
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def note_moves(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t) -> cython.void:
+    """How far particles have moved since they were listed."""
+    moved: cython.pointer(real) = w.moved
+    position: cython.pointer(real) = w.position
+    listed: cython.pointer(real) = w.listed
+    i: cython.Py_ssize_t
+    for i in range(2 * a, 2 * b):
+        moved[i] = position[i] - listed[i]
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def kick(shared: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t, part: cython.int) -> cython.void:
@@ -46,11 +60,7 @@ def kick(shared: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_
             w.velocity[2 * i], w.velocity[2 * i + 1], w.free[2 * i], w.free[2 * i + 1] = x, y, x, y
             square = x * x + y * y
             most = square if square > most else most
-    moved: cython.pointer(real) = w.moved
-    position: cython.pointer(real) = w.position
-    listed: cython.pointer(real) = w.listed
-    for i in range(2 * a, 2 * b):
-        moved[i] = position[i] - listed[i]
+    note_moves(w, a, b)
     since: cython.pointer(cython.double) = w.since
     for i in range(a, b):
         since[i] = 0
@@ -120,6 +130,15 @@ def kick_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Forces on a block of particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     kick(w, block * BLOCK, min((block + 1) * BLOCK, w.count), block)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def moves_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """How far the particles of a block have moved."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    note_moves(w, block * BLOCK, min((block + 1) * BLOCK, w.count))
 
 
 @cython.cfunc

@@ -147,6 +147,7 @@ Step = cython.struct(
     opening=real,  # s of acceleration that come first in the first substep of a call, instead of h
     taken_back=real,  # share of `given` that the velocity at the start of a frame already holds, else 0
     scale=real,  # by which impulses are worth more in the first substep of a call than in the last one
+    turned=cython.bint,  # whether `moved` and normals are those after the drift
     rest_speed=real,  # contacts that meet more slowly rest, m/s
     least_bounce=real,  # the same, or what speeds are rounded by if that is more: slower ones do not bounce
     restless=cython.bint,  # nothing accelerates: nothing rests

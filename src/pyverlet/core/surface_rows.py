@@ -112,8 +112,9 @@ def measure_pinned(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_s
     x: cython.double = sign * w.gap_x[lane] + w.moved[2 * j]
     y: cython.double = sign * w.gap_y[lane] + w.moved[2 * j + 1]
     if late:  # the other may have moved already or not
-        x += v[width * j] * cython.cast(cython.double, w.h) - (w.position[2 * i] - cython.cast(cython.double, w.listed[2 * i]))
-        y += v[width * j + 1] * cython.cast(cython.double, w.h)
+        way: cython.double = 0.0 if w.turned else w.h
+        x += v[width * j] * way - (w.position[2 * i] - cython.cast(cython.double, w.listed[2 * i]))
+        y += v[width * j + 1] * way
         y -= w.position[2 * i + 1] - cython.cast(cython.double, w.listed[2 * i + 1])
     else:
         x -= w.moved[2 * i]

@@ -108,3 +108,28 @@ def warm_start(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
         measure(w, s, True, True)
     else:
         measure(w, s, False, True)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def turn_normals(shared: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
+    """Normals of the pairs of group s that carry load, after the drift: impulses along those of before it would turn the pair."""
+    own: Step = shared[0]
+    w: cython.pointer(Step) = cython.address(own)
+    zero: lanes = spread(0)
+    first: cython.Py_ssize_t = w.begin[s]
+    k: cython.Py_ssize_t
+    for k in range(first, first + w.swept[s], 8):
+        if not any_above(load(w.impulse, k), zero):
+            continue
+        p: lanes2 = take(w.moved, w.i, k)
+        q: lanes2 = take(w.moved, w.j, k)
+        dx: lanes = load(w.gap_x, k) + (q.x - p.x)
+        dy: lanes = load(w.gap_y, k) + (q.y - p.y)
+        distance: lanes = square_root(dx * dx + dy * dy)
+        reach: lanes = load(w.reach, k * w.sized)
+        dx = where_zero(distance, reach, dx)
+        per_metre: lanes = spread(1) / where_zero(distance, reach, distance)
+        store(w.normal_x, k, dx * per_metre)
+        store(w.normal_y, k, dy * per_metre)
