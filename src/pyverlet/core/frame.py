@@ -40,9 +40,9 @@ ROUNDS = cython.declare(cython.int, 2)
 ROUGH_ROUNDS = cython.declare(cython.int, 4)
 """Over contacts and links, one after the other, while all are at rest: friction takes longer. In motion one round is stable."""
 
-TURNING = cython.declare(real, 3e-4)
+TURNING = cython.declare(real, 1e-4)
 """Seconds: who moves farther in a substep than in this time at the speed at which overlaps are pushed out, turns its contacts.
-That is a four hundredth of a mean radius."""
+That is about a thousandth of a mean radius."""
 
 MOST_ROUNDS = cython.declare(cython.int, 100)  # over the groups in which pairs have bounced
 

@@ -14,6 +14,7 @@ from cython.cimports.lanes import (
     load,
     magnitude,
     mask,
+    put,
     real,
     smaller,
     spread,
@@ -114,14 +115,18 @@ def warm_start(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def turn_normals(shared: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
-    """Normals of the pairs of group s that carry load, after the drift: impulses along those of before it would turn the pair."""
+    """Normals of the pairs of group s that carry load, after the drift: impulses along those of before it would turn the pair.
+
+    So does the half of what they gave that velocities at the end of a frame have: it is told as if given along these.
+    """
     own: Step = shared[0]
     w: cython.pointer(Step) = cython.address(own)
     zero: lanes = spread(0)
     first: cython.Py_ssize_t = w.begin[s]
     k: cython.Py_ssize_t
     for k in range(first, first + w.swept[s], 8):
-        if not any_above(load(w.impulse, k), zero):
+        impulse: lanes = load(w.impulse, k)
+        if not any_above(impulse, zero):
             continue
         p: lanes2 = take(w.moved, w.i, k)
         q: lanes2 = take(w.moved, w.j, k)
@@ -131,5 +136,15 @@ def turn_normals(shared: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.v
         reach: lanes = load(w.reach, k * w.sized)
         dx = where_zero(distance, reach, dx)
         per_metre: lanes = spread(1) / where_zero(distance, reach, distance)
-        store(w.normal_x, k, dx * per_metre)
-        store(w.normal_y, k, dy * per_metre)
+        nx: lanes = dx * per_metre
+        ny: lanes = dy * per_metre
+        x: lanes = impulse * (nx - load(w.normal_x, k))
+        y: lanes = impulse * (ny - load(w.normal_y, k))
+        store(w.normal_x, k, nx)
+        store(w.normal_y, k, ny)
+        part: lanes = load(w.share, k * w.varied)
+        other: lanes = spread(1) - part
+        u: lanes2 = take(w.free, w.i, k)
+        v: lanes2 = take(w.free, w.j, k)
+        put(w.free, w.i, k, u.x + x * part, u.y + y * part)
+        put(w.free, w.j, k, v.x - x * other, v.y - y * other)

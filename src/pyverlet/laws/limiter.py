@@ -19,7 +19,8 @@ the trapezoidal rule: exact for springs. In this order:
    gained all the same, it is what they move with as a whole: that is taken, too.
 
 Whose centre was outside the room or inside an obstacle when the frame began has been put there, and is brought back at once: what
-that has raised is no gain.
+that has raised is no gain. Nor is what it takes to part circles that have been put on top of each other and attract each other:
+to pay for it, all that attract them would have to stand still.
 """
 
 from __future__ import annotations
@@ -47,6 +48,9 @@ Extent = tuple[float, float, float, float]
 _ROUNDED = 1e-5
 """Of what momenta come to without their signs: less is rounding, in float32 by eight substeps of a thousand circles or so. Beside
 it what contacts make of rounded places: velocities, over h."""
+
+DEEP = 0.1
+"""Of the contact distance: circles that overlap by more are where nobody can be."""
 
 _NEARLY = 1.01
 """Times what may be gained: more is too much, which lowering could not take back."""
@@ -93,7 +97,7 @@ class EnergyLimiter:
         gained = self._gained(slots)
         room = SURPLUS * fall(slots.total_mass, self._gravity, self._room.extent())
         surplus = self._surplus(gained, room, slots)
-        if surplus > 0.0 and self._excuse_misplaced(slots):
+        if surplus > 0.0 and self._excuse_misplaced(slots, listed):
             gained = self._gained(slots)
             surplus = self._surplus(gained, room, slots)
         if surplus > 0.0:
@@ -108,11 +112,13 @@ class EnergyLimiter:
         there = self._mechanical(self._start, (0.0, 0.0)) + abs(self._held)
         return gained - max(room, SURPLUS * there)
 
-    def _excuse_misplaced(self, slots: Slots) -> bool:
-        """Particles that were outside the room or inside an obstacle begin where they are now. False: there were none."""
+    def _excuse_misplaced(self, slots: Slots, listed: Callable[[], Listed]) -> bool:
+        """Particles that were where nobody can be begin where they are now. False: there were none."""
         start = self._start
         misplaced = self._room.outside(start.position) | (self._course.covering(start.position) >= 0)
         moved = (misplaced & np.isfinite(start.mass))[slots.particle]
+        if any(hasattr(force, "among") for force in self._kept):
+            moved |= self._overlapped(slots, listed())
         if not moved.any():
             return False
         self._start = copy(start)
@@ -121,6 +127,14 @@ class EnergyLimiter:
         if not self._plain:
             self._energy = self._by_forces(self._start) + self._by_links + self._mechanical(self._start, self._gravity)
         return True
+
+    def _overlapped(self, slots: Slots, listed: Listed) -> Array:
+        """(n,) bool: circles that overlapped another one, by more than contacts let them, when the frame began."""
+        root, begin = np.arange(len(slots)), self._start.position[slots.particle]
+        bodies = (begin, np.zeros_like(begin), slots.radius, *slots.seam.period, slots.inverse_mass)
+        slots.motion.join_near_pairs(*bodies, listed, 1.0 - DEEP, root)
+        slots.motion.compress_paths(root)
+        return np.asarray(np.bincount(root, minlength=len(root))[root] > 1)
 
     def take_back(self, slots: Slots, listed: Listed, surplus: float) -> Array:
         """Take so many J from those that have gained. (n,) bool: those that had more than their motion could give."""
