@@ -59,7 +59,7 @@ def fastest(world: pv.World) -> float:
 @pytest.mark.parametrize("lengths", [(1 / 240, FRAME), (FRAME, 1 / 30), (FRAME, 0.25)])
 def test_a_settled_heap_rests_however_long_frames_are(lengths: tuple[float, float]) -> None:
     world, scale = heap(300, restitution=0.5, friction=0.3)
-    world.run(seconds=5.0)
+    world.run(seconds=10.0)  # after 5 s, one in fourteen heaps still has somebody who falls
     clock = np.random.default_rng(3).choice(lengths, 150)
     # No closed form: the bars are those of the issue, 1e-5 m g R (1e-3 with frames of 0.25 s) and 5 mm/s.
     assert worst_rise(world, clock) < (1e-3 if max(lengths) > 0.1 else 1e-5) * scale

@@ -160,9 +160,11 @@ def solve(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint
             bias: lanes = -smaller(spread(w.rate) * depth, spread(w.push))
             inside: lanes = before - spread(w.stiff) * (speed + bias) - spread(w.leak) * before
             apart: lanes = before - (speed - depth * spread(1 / w.h))
-            after = larger(choose(above(depth, zero), inside, apart), zero)
+            # Who carries load at a gap of rounding is on a spring, too: else it would carry until it sinks in all at once.
+            rounding: lanes = spread(NO_WAY) * load(w.reach, k * w.sized)
+            after = larger(choose(above(depth, choose(loaded, -rounding, zero)), inside, apart), zero)
             # What parts without load is left alone, unless only by rounding, or so slowly that it would overlap for long.
-            parts: lanes = larger(spread(NO_WAY / w.h) * load(w.reach, k * w.sized), spread(SLOW * w.restless) * -bias)
+            parts: lanes = larger(spread(1 / w.h) * rounding, spread(SLOW * w.restless) * -bias)
             after = choose(loaded, after, choose(above(speed, parts), zero, after))
             fast: mask = fast_ones(w, k, speed, depth, nx, ny)
             if any_lane(fast):
