@@ -60,8 +60,8 @@ def test_a_heap_falls_asleep_at_any_step_and_wakes_without_a_jump(dtype: Any, fr
     hit = np.hypot(*(before - world.position[400]).T) < world.radius[:400] + 0.25 + 0.004
     assert 1 <= hit.sum() <= 2
     assert world.asleep.sum() <= 2  # in voids, where they touch no one but the floor or a wall
-    # It has stopped at speeds below 0.02 sqrt(g r) = 0.03 m/s, 2e-3 radii a frame, and goes on so, half as much again by the blow:
-    # with nothing remembered, layers fall by g t^2 / 2.
+    # It has stopped at speeds below 0.02 sqrt(g r) = 0.03 m/s, 2e-3 radii a frame, and goes on so, half as much again by the
+    # blow: with nothing remembered, layers fall by g t^2 / 2.
     assert moved(world, before)[~hit].max() < 3e-3
     world.boundary = pv.Box((0, 0), (12, 400), friction=friction, restitution=0.5)
     for dt in (1 / 240, 1 / 60, 1 / 60):
