@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from build_core.build import build, targets
+from build_core.build import build, chosen_variants, targets
 from build_core.compiler import CompilerError
 from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
@@ -16,7 +16,8 @@ class BuildCore(build_ext):  # type: ignore[misc]
     def run(self) -> None:
         """Put all extension modules into the wheel's folder, or into src/ for an editable install."""
         try:
-            build(Path("src") if self.inplace or self.editable_mode else Path(self.build_lib))
+            to = Path("src") if self.inplace or self.editable_mode else Path(self.build_lib)
+            build(to, targets(variants=chosen_variants()))
         except CompilerError as error:
             raise SystemExit(str(error)) from None
 

@@ -54,6 +54,7 @@ def setup() -> None:
     """Build the wheel and put it, with everything the tests need, into the environment."""
     if not PYTHON.exists():
         venv.create(PYTHON.parent.parent, with_pip=True, clear=True)
+    os.environ["PYVERLET_VARIANTS"] = "all"  # tests compare them
     with tempfile.TemporaryDirectory() as folder:
         run(PYTHON, "-m", "pip", "--disable-pip-version-check", "-q", "wheel", "--no-deps", "--wheel-dir", folder, ".")
         (wheel,) = Path(folder).glob("*.whl")

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import os
 import shutil
 import sysconfig
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import metadata
+from importlib.machinery import ExtensionFileLoader
 from pathlib import Path
 
-from build_core.compiler import VARIANTS, compile_extension, signature
+from build_core.compiler import VARIANTS, CompilerError, compile_extension, signature
 from build_core.translate import CORE, ROOT, declarations, headers, joined_source, translate
 
 UNITS = ("engine", "motion", "tools")
@@ -45,6 +47,27 @@ def targets(units: tuple[str, ...] = UNITS, variants: tuple[str, ...] = tuple(VA
         for real64 in (False, True):
             made += [Target(unit, f"{unit}_f{64 if real64 else 32}", variant, real64) for variant in variants]
     return made
+
+
+def chosen_variants() -> tuple[str, ...]:
+    """The variants to install: the one for this processor; all of them if PYVERLET_VARIANTS is `all`, for wheels that go elsewhere.
+
+    Raises:
+        CompilerError: there is no C compiler, or it fails; PYVERLET_VARIANTS is something else.
+    """
+    if (wanted := os.environ.get("PYVERLET_VARIANTS", "")) not in ("", "all"):
+        raise CompilerError(f"PYVERLET_VARIANTS is {wanted!r}; allowed is 'all', or nothing for the processor of this machine")
+    if wanted or len(VARIANTS) == 1:
+        return tuple(VARIANTS)
+    (processor,) = targets(())
+    signature()
+    path = _compiled(processor, *_translated(processor))
+    loader = ExtensionFileLoader(processor.module, str(path))
+    spec = importlib.util.spec_from_file_location(processor.module, path, loader=loader)
+    assert spec is not None
+    module = importlib.util.module_from_spec(spec)
+    loader.exec_module(module)
+    return tuple(VARIANTS)[-1:] if module.supports_x86_64_v3() else ("baseline",)
 
 
 def _translated(target: Target) -> tuple[Path, str]:
