@@ -50,7 +50,7 @@ def targets(units: tuple[str, ...] = UNITS, variants: tuple[str, ...] = tuple(VA
 
 
 def chosen_variants() -> tuple[str, ...]:
-    """The variants to install: the one for this processor; all of them if PYVERLET_VARIANTS is `all`, for wheels that go elsewhere.
+    """The variants to install: the one for this processor; all if PYVERLET_VARIANTS is `all`, for wheels that go elsewhere.
 
     Raises:
         CompilerError: there is no C compiler, or it fails; PYVERLET_VARIANTS is something else.
