@@ -251,9 +251,9 @@ def test_touching_discs_of_a_chain_that_hit_each_other_gain_nothing() -> None:
     energy, turn = world.energy().total, world.angular_momentum()
     for _ in range(300):
         world.step(FRAME)
-        assert world.energy().total < 1.001 * energy
-    # What contacts take after the drift is along the normals of then; impacts are in closed form at their times.
-    assert world.angular_momentum() == pytest.approx(turn, rel=5e-3)
+        assert world.energy().total < 1.002 * energy  # the limiter lets 8e-5 a frame pass
+    # What contacts and links take after the drift is along the directions of then; impacts are in closed form at their times.
+    assert world.angular_momentum() == pytest.approx(turn, rel=1e-5)
     assert stretch(group, 0.1) < 1e-5
 
 
@@ -408,3 +408,22 @@ def test_any_number_of_threads_has_the_same_bits(monkeypatch: pytest.MonkeyPatch
         assert world._frames.held.parts == threads
         hashes.add(world.state_hash())
     assert len(hashes) == 1
+
+
+@pytest.mark.parametrize("mass", [5.0, 20.0])
+def test_a_taut_chain_with_a_heavy_end_does_not_go_through_what_it_hits(mass: float) -> None:
+    # A ball of 200 kg sweeps a chain through a tower of discs of 1 kg. What drives a bead comes from its neighbours: a contact
+    # that is solved before links only sees the bead. Solved once more between them, overlaps are half as deep: 4 % on average in
+    # the worst tenth of the frames; they were 6 to 10 %.
+    world = pv.World(boundary=pv.Box((-12, 0), (16, 20), friction=0.6), collisions=pv.Collisions(friction=0.6))
+    chain = pv.chain(world, (-1.5, 11), (-9.5, 11), links=24, mass=mass, radius=0.1)
+    chain.group.pin(0)
+    ball = world.add(position=(-10.5, 11), radius=1.0, mass=200.0)
+    world.links.append(pv.Stick((chain.group, -1), (ball, 0), collide=False))
+    row, column = np.divmod(np.arange(270), 12)
+    world.add(position=0.25 * np.column_stack((2.01 * column + 1.005 * (row % 2), 1 + 1.75 * row)), radius=0.25)
+    overlaps = []
+    for _ in range(240):
+        world.step(FRAME)
+        overlaps.append(world.overlap().max)
+    assert np.mean(sorted(overlaps)[-24:]) < 0.055

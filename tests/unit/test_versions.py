@@ -31,9 +31,8 @@ def test_which_versions_will_do(version: str, fine: bool) -> None:
 
 
 def test_a_version_that_is_too_new_is_one_sentence(tmp_path: Path) -> None:
-    info = tmp_path / "numpy-99.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: numpy\nVersion: 99.0\n")
+    (tmp_path / "numpy").mkdir()
+    (tmp_path / "numpy" / "__init__.py").write_text("__version__ = '99.0'\n")
     path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
 
     def run(*command: str) -> subprocess.CompletedProcess[str]:

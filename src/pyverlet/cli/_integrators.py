@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 import inspect
 
 from pyverlet.cli._imported import imported, what
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.guess import did_you_mean
 from pyverlet.laws.integrators import BY_NAME, Integrator
 
 
@@ -35,9 +35,8 @@ def integrator(name: str) -> Integrator:
         return _imported(name)
     if name in BY_NAME:
         return BY_NAME[name]()
-    near = difflib.get_close_matches(name.lower().replace("_", "-"), BY_NAME, n=1, cutoff=0.5)
-    suggestion = f" (did you mean {near[0]!r}?)" if near else ""
-    raise InputError(f"unknown integrator {name!r}{suggestion}; known: {', '.join(BY_NAME)}, or your own as module:Class")
+    hint = did_you_mean(name.lower().replace("_", "-"), BY_NAME, alike=0.5)
+    raise InputError(f"unknown integrator {name!r}{hint}; known: {', '.join(BY_NAME)}, or your own as module:Class")
 
 
 def _imported(path: str) -> Integrator:

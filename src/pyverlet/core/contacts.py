@@ -130,11 +130,15 @@ def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, hits: cython.Py_
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def solve(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint, soft: cython.bint) -> cython.Py_ssize_t:
+def solve(
+    shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint, soft: cython.bint, pushes: cython.bint
+) -> cython.Py_ssize_t:
     """One sweep over the contacts of group s; returns how many pairs meet so fast that they bounce, noted in `hit`.
 
     soft: springs push out what overlaps, and what is apart may close the gap and no more. Without, where contacts carry load,
     it takes back the speed of pushing out.
+    pushes: without, soft contacts only keep pairs from coming nearer than they are. That is for what links have made of
+    velocities: they would give on what springs put out.
     """
     own: Step = shared[0]  # which no store to an array can change: its fields stay in registers
     w: cython.pointer(Step) = cython.address(own)
@@ -157,9 +161,12 @@ def solve(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint
         speed: lanes = (m.vx - m.ux) * nx + (m.vy - m.uy) * ny
         after: lanes
         if soft:
-            bias: lanes = -smaller(spread(w.rate) * depth, spread(w.push))
+            bias: lanes = -smaller(spread(w.rate) * depth, spread(w.push)) if pushes else zero
             inside: lanes = before - spread(w.stiff) * (speed + bias) - spread(w.leak) * before
-            apart: lanes = before - (speed - depth * spread(1 / w.h))
+            nearer: lanes = speed - depth * spread(1 / w.h)
+            if not pushes:
+                inside, nearer = before - smaller(speed, zero), smaller(nearer, zero)
+            apart: lanes = before - nearer
             # Who carries load at a gap of rounding is on a spring, too: else it would carry until it sinks in all at once.
             rounding: lanes = spread(NO_WAY) * load(w.reach, k * w.sized)
             after = larger(choose(above(depth, choose(loaded, -rounding, zero)), inside, apart), zero)
@@ -193,7 +200,7 @@ def solve(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint
 @cython.exceptval(check=False)
 def solve_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.int) -> cython.bint:
     """Soft contacts of group s; then pairs that meet fast bounce. Whether any did."""
-    hits: cython.Py_ssize_t = solve(w, s, True, True) if w.rough else solve(w, s, False, True)
+    hits: cython.Py_ssize_t = solve(w, s, True, True, True) if w.rough else solve(w, s, False, True, True)
     bounced: cython.bint = hits > 0 and bounce_pairs(w, s, hits)
     w.bounced[s] = stage if bounced else 0
     w.searched[s] = stage
@@ -241,6 +248,17 @@ def bounce_again(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.in
 def relax_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
     """Contacts of group s without their springs."""
     if w.rough:
-        solve(w, s, True, False)
+        solve(w, s, True, False, False)
     else:
-        solve(w, s, False, False)
+        solve(w, s, False, False, False)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def hold_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
+    """Contacts of group s keep pairs from coming nearer."""
+    if w.rough:
+        solve(w, s, True, True, False)
+    else:
+        solve(w, s, False, True, False)

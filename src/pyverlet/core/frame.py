@@ -6,8 +6,8 @@ Per substep of length h:
  2. warm start: so do contacts, along the normals of now.
  3. surfaces: what comes fast bounces, the rest is held.
  4. contacts: one sweep over the pairs, with springs; pairs that meet fast bounce, in closed form.
- 5. drift: surfaces once more, then x += v h. With links: surfaces, links, and all that again.
- 6. relax: sweeps without the springs.
+ 5. drift: surfaces once more, then x += v h. With links: surfaces, links, and all that again, in motion without the springs.
+ 6. relax: sweeps without the springs, along the normals of after the drift.
  7. remember what contacts gave.
 
 Velocities within a frame are those of the middle of a substep (Stormer and Verlet). With v, a and c the velocity, the
@@ -23,7 +23,7 @@ from cython.cimports.libc.math import sqrt
 from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK
-from pyverlet.core.contacts import bounce_again, relax_contacts, solve_contacts
+from pyverlet.core.contacts import bounce_again, hold_contacts, relax_contacts, solve_contacts
 from pyverlet.core.hearing import hear_loads, hear_surface_loads
 from pyverlet.core.links import begin_links, end_links, relax_links, remember_links_stage, solve_links
 from pyverlet.core.obstacles import place_moving
@@ -38,7 +38,8 @@ from pyverlet.core.work import book_drift, book_end, book_grips, book_rubbing, b
 
 ROUNDS = cython.declare(cython.int, 2)
 ROUGH_ROUNDS = cython.declare(cython.int, 4)
-"""Over contacts and links, one after the other, while all are at rest: friction takes longer. In motion one round is stable."""
+"""Over contacts and links, one after the other: friction takes longer while all are at rest. In motion contacts after the first
+round do not push out what overlaps, as links would give that on."""
 
 TURNING = cython.declare(real, 1e-4)
 """Seconds: who moves farther in a substep than in this time at the speed at which overlaps are pushed out, turns its contacts.
@@ -186,6 +187,15 @@ def relax_stage(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def hold_stage(what: cython.p_void, item: cython.int) -> cython.void:
+    """The contacts of a group keep pairs from coming nearer."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    hold_contacts(w, 2 * item + w.parity)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def rubbing_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """What the pairs of a group have rubbed."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -247,9 +257,12 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
         rests: cython.bint = fastest < min(w.rest_speed, w.push)
         rounds: cython.int = ROUGH_ROUNDS if rests and w.rough else ROUNDS
         for turn in range(rounds):
-            if turn > 0 and rests:
-                each_group(w, solve_stage)
-                bounce_on(w)
+            if turn > 0:
+                if rests:
+                    each_group(w, solve_stage)
+                    bounce_on(w)
+                else:
+                    each_group(w, hold_stage)
                 if surfaces:
                     team_stage(w.team, hold_on_stage, w, blocks)
             solve_links(w, turn > 0, turn + 1 == rounds)

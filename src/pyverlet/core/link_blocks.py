@@ -212,18 +212,25 @@ def solve_block(w: cython.pointer(Step), b: cython.Py_ssize_t, drifts: cython.bi
 @cython.nogil
 @cython.exceptval(check=False)
 def finish_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
-    """Before the drift: what row r will measure after it, and its gradient in the middle of the two."""
+    """Before the drift: what row r will measure after it, and which way it will point; of others, the mean of their gradients.
+
+    With m along the mean of the ways before and after the drift, one that has only turned has the velocity s, across m.
+    """
     e: cython.Py_ssize_t = k.first[r]
     if k.intact[r] == 0:
         return
     k.next[r] = measure_row(k, r, k.h)
     if k.kind[r] == DISTANCE:
         p: LinkWay = way_between(k, k.node[e], k.node[e + 1], k.h)
-        p.x += k.way[2 * r]
-        p.y += k.way[2 * r + 1]
         length: cython.double = sqrt(p.x * p.x + p.y * p.y)
-        k.middle[2 * r] = p.x / length if length > 0 else 0
-        k.middle[2 * r + 1] = p.y / length if length > 0 else 0
+        x: cython.double = p.x / length if length > 0 else 0
+        y: cython.double = p.y / length if length > 0 else 0
+        mx: cython.double = p.x + k.way[2 * r]
+        my: cython.double = p.y + k.way[2 * r + 1]
+        square: cython.double = mx * mx + my * my
+        s: cython.double = (p.y - k.way[2 * r + 1]) * mx - (p.x - k.way[2 * r]) * my
+        k.ended[2 * r], k.ended[2 * r + 1] = x, y
+        k.round[r] = s * (y * mx - x * my) / (square * k.h) if square > 0 else 0
     else:
         for e in range(k.first[r], k.first[r + 1]):
             k.slope[2 * e] = (k.slope[2 * e] + k.gradient[2 * e]) / 2

@@ -99,17 +99,17 @@ def aim_at_length(k: cython.pointer(Links), r: cython.Py_ssize_t, how: cython.in
 @cython.nogil
 @cython.exceptval(check=False)
 def aim_at_rest(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
-    """After the drift: rigid links change their length no more, along the mean of the ways before and after it."""
+    """After the drift: rigid links only turn any more. Along the ways of then, their impulses turn nothing as a whole."""
     e: cython.Py_ssize_t = k.first[r]
     i: cython.Py_ssize_t = k.node[e]
     j: cython.Py_ssize_t = k.node[e + 1]
     k.acts[r] = k.intact[r] != 0 and k.stiffness[r] == INFINITY and (k.upper[r] > 0 or k.impulse[r] < 0)
-    x: cython.double = k.middle[2 * r]
-    y: cython.double = k.middle[2 * r + 1]
+    x: cython.double = k.ended[2 * r]
+    y: cython.double = k.ended[2 * r + 1]
     k.along[2 * r], k.along[2 * r + 1] = x, y
     let_go_of_wedged(k, i, j, x, y)
     k.turned[r] = 0
-    k.wanted[2 * r] = -k.h * ((k.u[2 * j] - k.u[2 * i]) * x + (k.u[2 * j + 1] - k.u[2 * i + 1]) * y)
+    k.wanted[2 * r] = k.h * (k.round[r] - (k.u[2 * j] - k.u[2 * i]) * x - (k.u[2 * j + 1] - k.u[2 * i + 1]) * y)
     k.wanted[2 * r + 1] = 0
 
 

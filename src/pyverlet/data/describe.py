@@ -8,7 +8,6 @@ imported because a file says so.
 
 from __future__ import annotations
 
-import difflib
 import inspect
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -20,6 +19,7 @@ from pyverlet.data import memory
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.fields import Field
+from pyverlet.ground.guess import did_you_mean
 from pyverlet.laws import forces, integrators, naive, obstacles, rooms
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
 from pyverlet.state.group import Group, Picked
@@ -337,8 +337,7 @@ def _known(name: str, kind: Any) -> Kind:
 
 
 def _nearest(name: str, known: tuple[str, ...]) -> str:
-    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-    return f" (did you mean {near[0]!r}?)" if near else f"; known: {', '.join(known)}"
+    return did_you_mean(name, known, alike=0.5) or f"; known: {', '.join(known)}"
 
 
 def _brief(value: Any) -> str:

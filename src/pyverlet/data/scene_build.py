@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import difflib
 import hashlib
 import io
 from collections.abc import Iterator
@@ -17,6 +16,7 @@ from pyverlet.data import describe_links, memory
 from pyverlet.data.describe import Builder, describe
 from pyverlet.data.durable import replacing
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.guess import did_you_mean
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
 from pyverlet.laws.integrators import Integrator, PositionVerlet
 from pyverlet.laws.links import Angle, Area, Pin, Rope, Spring, Stick
@@ -327,8 +327,7 @@ def _link(table: Table, named: dict[str, Group]) -> Any:
 
 def _named(named: dict[str, Group], key: str, name: str) -> Group:
     if name not in named:
-        near = difflib.get_close_matches(name, named, n=1)
-        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        hint = did_you_mean(name, named)
         raise InputError(
             f"{key} is {name!r}{hint}; allowed are the groups and builders with a name: {', '.join(named) or 'none'}"
         )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib.util
 import json
 import tomllib
@@ -16,6 +15,7 @@ from pyverlet.data.durable import replacing
 from pyverlet.data.scene_build import Recipe
 from pyverlet.data.scene_freeze import freeze
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.guess import did_you_mean
 from pyverlet.scenes import Scene, Settings
 from pyverlet.scenes._scene import Show
 
@@ -170,16 +170,14 @@ def _sentence(errors: list[Any], models: Any) -> str:
     if error["type"] == "extra_forbidden":
         holder = _holder(error["loc"][:-1], models)
         key = str(error["loc"][-1])
-        near = difflib.get_close_matches(key, holder.model_fields, n=1, cutoff=0.5)
-        known = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(holder.model_fields)}"
+        hint = did_you_mean(key, holder.model_fields, alike=0.5) or f" (known: {', '.join(holder.model_fields)})"
         at = _path(error["loc"][:-1], models)
-        return f"{at + ' ' if at else ''}has no key {key!r} ({known})"
+        return f"{at + ' ' if at else ''}has no key {key!r}{hint}"
     if error["type"] == "missing":
         return f"{_path(error['loc'][:-1], models) or 'the file'} lacks {error['loc'][-1]!r}"
     if error["type"] == "union_tag_invalid":
         given, tags = error["ctx"]["tag"], [tag.strip(" '") for tag in error["ctx"]["expected_tags"].split(",")]
-        near = difflib.get_close_matches(given, tags, n=1, cutoff=0.4)
-        return f"{where} has the type {given!r}{f' (did you mean {near[0]!r}?)' if near else ''}; allowed are {', '.join(tags)}"
+        return f"{where} has the type {given!r}{did_you_mean(given, tags, alike=0.4)}; allowed are {', '.join(tags)}"
     if error["type"] == "union_tag_not_found":
         return f"{where} lacks 'type'"
     given = repr(error["input"])

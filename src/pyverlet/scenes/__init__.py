@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 from pathlib import Path
 
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.guess import did_you_mean
 from pyverlet.scenes import (
     bounce_euler,
     bounce_order,
@@ -90,6 +90,4 @@ def get(name: str) -> Scene:
         return read(name)
     if name in SCENES:
         return SCENES[name]
-    near = difflib.get_close_matches(name.lower(), SCENES, n=1)
-    suggestion = f" (did you mean {near[0]!r}?)" if near else ""
-    raise InputError(f"unknown scene {name!r}{suggestion}; known: {', '.join(SCENES)}")
+    raise InputError(f"unknown scene {name!r}{did_you_mean(name.lower(), SCENES)}; known: {', '.join(SCENES)}")

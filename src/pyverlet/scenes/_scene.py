@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.guess import did_you_mean
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
 from pyverlet.laws.integrators import Integrator, PositionVerlet
@@ -174,9 +174,8 @@ class Scene(Shown):
         """
         known = {f.name for f in dataclasses.fields(Settings)}
         if unknown := sorted(set(overrides) - known):
-            near = difflib.get_close_matches(unknown[0], known, n=1)
-            suggestion = f" (did you mean {near[0]!r}?)" if near else ""
-            raise InputError(f"a scene has no setting {unknown[0]!r}{suggestion}; known: {', '.join(sorted(known))}")
+            hint = did_you_mean(unknown[0], known)
+            raise InputError(f"a scene has no setting {unknown[0]!r}{hint}; known: {', '.join(sorted(known))}")
         changes = {name: value for name, value in overrides.items() if value is not None}
         if changes.get("collisions") is False:
             changes["collisions"] = None

@@ -7,7 +7,6 @@ A sketch has `build()`, which returns a world, or a `SCENE`. It may have `update
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import hashlib
 import importlib
 import importlib.util
@@ -23,6 +22,7 @@ from types import ModuleType
 from typing import Any
 
 from pyverlet.ground.errors import InputError, Interrupted
+from pyverlet.ground.guess import did_you_mean
 from pyverlet.ground.patience import Patience, TooLong
 from pyverlet.ground.shown import Shown
 from pyverlet.scenes._scene import Scene, Settings
@@ -174,8 +174,7 @@ class Sketch(Shown):
                 raise SketchError(f"{self.name}: SCENE is {scene!r}; allowed is a pyverlet.scenes.Scene")
             return dataclasses.replace(scene, build=self.build, sketch=self)
         if not callable(getattr(module, "build", None)):
-            near = difflib.get_close_matches("build", [name for name in vars(module) if callable(getattr(module, name))], n=1)
-            hint = f" (did you mean {near[0]!r}?)" if near else ""
+            hint = did_you_mean("build", [name for name in vars(module) if callable(getattr(module, name))])
             raise SketchError(
                 f"{self.name} has no build(){hint}; allowed is a function `def build():` that returns a pyverlet.World"
             )

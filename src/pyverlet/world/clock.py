@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from statistics import median, quantiles
+
+import numpy as np
 
 from pyverlet.ground import checks
 from pyverlet.ground.constants import FRAME_BUDGET_MS
@@ -77,9 +78,9 @@ class FrameBudget(Shown):
     @property
     def median_ms(self) -> float:
         """Median of the last frames, ms."""
-        return median(self._recent) if self._recent else 0.0
+        return float(np.median(self._recent)) if self._recent else 0.0
 
     @property
     def p95_ms(self) -> float:
         """The time that 95 % of the last frames kept, ms."""
-        return quantiles(self._recent, n=20)[-1] if len(self._recent) > 1 else self.last_ms
+        return float(np.percentile(self._recent, 95)) if self._recent else 0.0

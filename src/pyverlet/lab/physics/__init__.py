@@ -5,9 +5,8 @@ To add one: a function that returns a `Result`, with the equation in its docstri
 
 from __future__ import annotations
 
-import difflib
-
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.guess import did_you_mean
 from pyverlet.lab.physics import bounce, endless, energy, friction, gas, lost, rest, sizes
 from pyverlet.lab.physics._check import Check, Result, Row
 
@@ -62,6 +61,4 @@ def named(name: str) -> Check:
     known = {check.name: check for check in CHECKS}
     if name in known:
         return known[name]
-    near = difflib.get_close_matches(name.lower(), known, n=1)
-    suggestion = f" (did you mean {near[0]!r}?)" if near else ""
-    raise InputError(f"unknown check {name!r}{suggestion}; known: {', '.join(known)}")
+    raise InputError(f"unknown check {name!r}{did_you_mean(name.lower(), known)}; known: {', '.join(known)}")
