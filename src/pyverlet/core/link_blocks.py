@@ -20,6 +20,9 @@ FARTHEST = cython.declare(cython.double, 0.5)
 AVERAGED = cython.declare(cython.double, 120.0)
 """1/s: rate of the mean of the pull that is shown, and that breaks."""
 
+STRAIGHT = cython.declare(cython.double, 0.96)
+"""Square of the cosine of half the angle that a link may turn by in a substep: 0.4 in all."""
+
 
 @cython.cfunc
 @cython.nogil
@@ -214,7 +217,8 @@ def solve_block(w: cython.pointer(Step), b: cython.Py_ssize_t, drifts: cython.bi
 def finish_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
     """Before the drift: what row r will measure after it, and which way it will point; of others, the mean of their gradients.
 
-    With m along the mean of the ways before and after the drift, one that has only turned has the velocity s, across m.
+    With m along the mean of the ways before and after the drift, one that has only turned has the velocity s, across m. Where it
+    turns far, as in a chain that cracks, contacts change s afterwards, and m is what stands for it.
     """
     e: cython.Py_ssize_t = k.first[r]
     if k.intact[r] == 0:
@@ -231,6 +235,11 @@ def finish_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
         s: cython.double = (p.y - k.way[2 * r + 1]) * mx - (p.x - k.way[2 * r]) * my
         k.ended[2 * r], k.ended[2 * r + 1] = x, y
         k.round[r] = s * (y * mx - x * my) / (square * k.h) if square > 0 else 0
+        along: cython.double = x * mx + y * my
+        if not (along > 0 and along * along > STRAIGHT * square):
+            length = sqrt(square)
+            k.ended[2 * r], k.ended[2 * r + 1] = mx / length if length > 0 else 0, my / length if length > 0 else 0
+            k.round[r] = 0
     else:
         for e in range(k.first[r], k.first[r + 1]):
             k.slope[2 * e] = (k.slope[2 * e] + k.gradient[2 * e]) / 2

@@ -21,6 +21,9 @@ TOGETHER = cython.declare(cython.int, 16)
 JAMMED = cython.declare(cython.double, 0.9)
 """Of the change halfway through these turns: where the last one still changes as much, no impulses hold it at all surfaces."""
 
+MOST_OUT = cython.declare(cython.double, 2)
+"""Times the speed at which one surface puts a particle out: several do so no faster."""
+
 SQUEEZED = cython.declare(cython.double, 0.5)
 """Of its impulse: how fast a surface then lets a particle into it."""
 
@@ -239,9 +242,12 @@ def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     Out of a wedge narrower than the angle of friction no impulses push it, as friction grows with them: then without.
     """
     k: cython.Py_ssize_t
+    out: cython.double = 0
     for k in range(w.contact_begin[i], w.contact_end[i]):
         measure_surface(w, i, k, False)
-    limit: cython.double = speed_limit(w, i)
+        deep: cython.double = -w.contact[CONTACT * k + GAP] / w.h
+        out = max(out, min(deep, cython.cast(cython.double, w.push)) if w.surface[k] < 0 else deep)
+    limit: cython.double = speed_limit(w, i) + MOST_OUT * out
     if hold_all(w, i, w.rough, limit):
         return
     for k in range(w.contact_begin[i], w.contact_end[i]):

@@ -27,8 +27,8 @@ MOST_BOUNCES = cython.declare(cython.int, 256)
 """Of one particle in a substep, one after the other."""
 
 MOST_FASTER = cython.declare(cython.double, 8)
-"""Times the speed at which surfaces move, or put a particle out, on top of its own: those that close in on a particle make it
-no faster, though in a narrow wedge they would have to, to let it out."""
+"""Times the speed at which surfaces move, on top of its own: those that close in on a particle make it no faster, though in a
+narrow wedge they would have to, to let it out."""
 
 
 @cython.cfunc
@@ -51,10 +51,7 @@ def speed_limit(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
     k: cython.Py_ssize_t
     for k in range(w.contact_begin[i], w.contact_end[i]):
         at: cython.Py_ssize_t = CONTACT * k
-        out: cython.double = -w.contact[at + GAP] / w.h
-        if w.surface[k] < 0:
-            out = min(out, cython.cast(cython.double, w.push))
-        fast = max(fast, max(length(w.contact[at + SPEED], w.contact[at + SPEED + 1]), out))
+        fast = max(fast, length(w.contact[at + SPEED], w.contact[at + SPEED + 1]))
     return 1.01 * length(v[width * i], v[width * i + 1]) + MOST_FASTER * fast  # some for rounding
 
 

@@ -212,11 +212,18 @@ class EnergyLimiter:
             lower = lower + np.maximum(np.minimum(radius, before) - gap, 0)[:, None] * normal
         return lower
 
+    def _since_thrown(self, slots: Slots) -> Array:
+        """(n, 2) m: how far each has come at most since it met somebody: a pair that bounces may be where it was before."""
+        kick = slots.velocity - self._start.velocity[slots.particle] - self._dt * np.asarray(self._gravity)
+        met = np.abs(kick).max(axis=1) > _ROUNDED * np.abs(slots.velocity).max(axis=1)
+        return np.where(met[:, None], self._dt * slots.velocity, 0.0)
+
     def _clusters(self, slots: Slots, listed: Listed, moved: Array) -> Array:
         """(n,) lowest slot of the cluster that each slot belongs to."""
         root = np.arange(len(slots))
-        bodies = (slots.position, moved.astype(slots.dtype), slots.radius, *slots.seam.period, slots.inverse_mass)
-        slots.motion.join_near_pairs(*bodies, listed, SLEEP_NEAR, root)
+        for way in (moved, self._since_thrown(slots)):
+            bodies = (slots.position, way.astype(slots.dtype), slots.radius, *slots.seam.period, slots.inverse_mass)
+            slots.motion.join_near_pairs(*bodies, listed, SLEEP_NEAR, root)
         if self._links:
             slots.motion.join_rows(slots.slots_of(self._links.joined()), slots.inverse_mass, root)
         for force in self._kept:
