@@ -41,9 +41,9 @@ ROUGH_ROUNDS = cython.declare(cython.int, 4)
 """Over contacts and links, one after the other: friction takes longer while all are at rest. In motion contacts after the first
 round do not push out what overlaps, as links would give that on."""
 
-TURNING = cython.declare(real, 1e-4)
+TURNING = cython.declare(real, 3e-4)
 """Seconds: who moves farther in a substep than in this time at the speed at which overlaps are pushed out, turns its contacts.
-That is about a thousandth of a mean radius."""
+That is a four hundredth of a mean radius."""
 
 MOST_ROUNDS = cython.declare(cython.int, 100)  # over the groups in which pairs have bounced
 
