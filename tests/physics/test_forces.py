@@ -288,8 +288,8 @@ def test_what_is_appended_comes_back() -> None:
 @pytest.mark.parametrize("seed", range(6))
 def test_a_cloud_that_falls_together_does_not_begin_to_turn(seed: int) -> None:
     # Its angular momentum is 0, and forces and contacts act along lines of centres. Some begin on top of each other, up to 94 %:
-    # they part, while all others go on falling. Contacts relax along the normals of after the drift where particles move by a four
-    # hundredth of a radius in a substep; below it, along those of before: so much of what they give turns the cloud, back and forth.
+    # they part, while all others go on falling. Contacts relax along the normals of after the drift where particles move by a
+    # four hundredth of a radius in a substep; below it, along those of before, which turns the cloud to and fro.
     place = np.random.default_rng(seed).uniform(-4, 4, (150, 2))
     world = pv.World(gravity=(0, 0), dtype=np.float64)
     cloud = world.add(position=place[np.hypot(*place.T) < 4], radius=0.15)

@@ -27,7 +27,8 @@ def pile(
     """Unequal circles settle in one pile: radii and masses uniform in their logarithm.
 
     The larger is the heavier, unless they are drawn independently: then small heavy ones lie on large light ones.
-    most: overlap, of the contact distance. One that is caught under another of a thousand times its mass is pressed in by as much as its load.
+    most: overlap, of the contact distance. One that is caught under another of a thousand times its mass is pressed in by as
+    much as its load.
     """
     rng = np.random.default_rng(seed)
     size = rng.uniform(0, 1, particles)
