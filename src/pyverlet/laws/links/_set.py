@@ -157,7 +157,7 @@ class Links(Shared):
 
     def accept(self, torn: list[tuple[Pool, Array, Array]]) -> None:
         """A frame is good: of each pool the rows that broke, and what they pulled with, N. What is left is packed anew."""
-        self.broken = np.concatenate((self.broken[:0], *(self._note(*each) for each in torn)))
+        self.broken = np.concatenate([self._note(*each) for each in torn]) if torn else self.broken[:0]
         for pool, *_ in torn:
             pool.edits, self._apart_stale = pool.edits + 1, True
 
