@@ -61,7 +61,7 @@ def test_substeps_restitution_friction_and_integrator(page: Page, program: Serve
     assert reads(page, "restitution", 1)
     page.get_by_test_id("friction").fill("0")
     assert reads(page, "friction", 0)
-    # Elastic and smooth: while all fall and bounce for the first time, no energy is lost; with e = 0.5 a third would be. Later, who
+    # Elastic and smooth: while all fall and bounce for the first time, no energy is lost; with e = 0.5, six tenths. Later on, who
     # lies on others when it is hit loses some.
     start = pv.scenes.get("box").world(particles=60).energy().total
     page.get_by_test_id("reset").click()
