@@ -6,7 +6,7 @@ import argparse
 import sys
 import time
 
-from build_core.build import UNITS, build, targets
+from build_core.build import UNITS, build, native_variant, targets
 from build_core.compiler import VARIANTS, CompilerError, compiler
 from build_core.translate import CORE, ROOT, TranslationError
 
@@ -25,8 +25,8 @@ def main() -> None:
     if unknown := set(options.units) - set(UNITS):
         parser.error(f"unit is {', '.join(sorted(unknown))}; allowed is {' or '.join(UNITS)}")
     start = time.monotonic()
-    variants = tuple(VARIANTS)[-1:] if options.native else tuple(VARIANTS)
     try:
+        variants = (native_variant(),) if options.native else tuple(VARIANTS)
         wanted = targets(tuple(options.units), variants)
         made = build(ROOT / "src", [each for each in wanted if options.precision in (None, 64 if each.real64 else 32)])
     except (TranslationError, CompilerError) as error:

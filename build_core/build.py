@@ -57,8 +57,17 @@ def chosen_variants() -> tuple[str, ...]:
     """
     if (wanted := os.environ.get("PYVERLET_VARIANTS", "")) not in ("", "all"):
         raise CompilerError(f"PYVERLET_VARIANTS is {wanted!r}; allowed is 'all', or nothing for the processor of this machine")
-    if wanted or len(VARIANTS) == 1:
-        return tuple(VARIANTS)
+    return tuple(VARIANTS) if wanted else (native_variant(),)
+
+
+def native_variant() -> str:
+    """The variant for the processor of this machine, which is asked by the unit that knows it.
+
+    Raises:
+        CompilerError: there is no C compiler, or it fails.
+    """
+    if len(VARIANTS) == 1:
+        return "baseline"
     (processor,) = targets(())
     signature()
     path = _compiled(processor, *_translated(processor))
@@ -67,7 +76,7 @@ def chosen_variants() -> tuple[str, ...]:
     assert spec is not None
     module = importlib.util.module_from_spec(spec)
     loader.exec_module(module)
-    return tuple(VARIANTS)[-1:] if module.supports_x86_64_v3() else ("baseline",)
+    return "x86_64_v3" if module.supports_x86_64_v3() else "baseline"
 
 
 def _translated(target: Target) -> tuple[Path, str]:

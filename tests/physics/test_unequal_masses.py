@@ -208,9 +208,6 @@ def test_a_heavy_circle_that_falls_with_its_column_does_not_bounce() -> None:
     assert np.abs(circles.velocity).max() < 0.2 * G * H
 
 
-RESTLESS = pytest.mark.slow, pytest.mark.xfail(reason="not mended yet: 400 to 700 J are left, or 1 % of overlap")
-
-
 # ---- with links ------------------------------------------------------------------------------------------------------------
 
 

@@ -178,7 +178,7 @@ def solve(
                 count += note_hits(shared, k, bits_of(fast), first + count)
                 after = choose(fast, before, after)
         else:
-            if own.turned:  # a velocity of the middle of the substep, along the chord of the way around each other
+            if own.turned:  # along the normals of before the drift, to first order
                 slide: lanes = (m.vx - m.ux) * ny - (m.vy - m.uy) * nx
                 reach: lanes = load(w.reach, k * w.sized) * spread(1 / w.h)
                 speed = speed - smaller(slide * slide, reach * reach) / reach
@@ -196,11 +196,20 @@ def solve(
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def sweep(w: cython.pointer(Step), s: cython.Py_ssize_t, soft: cython.bint, pushes: cython.bint) -> cython.Py_ssize_t:
+    """As `solve`, compiled for rough circles and for smooth ones."""
+    return solve(w, s, True, soft, pushes) if w.rough else solve(w, s, False, soft, pushes)
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def solve_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.int) -> cython.bint:
     """Soft contacts of group s; then pairs that meet fast bounce. Whether any did."""
-    hits: cython.Py_ssize_t = solve(w, s, True, True, True) if w.rough else solve(w, s, False, True, True)
+    hits: cython.Py_ssize_t = sweep(w, s, True, True)
     bounced: cython.bint = hits > 0 and bounce_pairs(w, s, hits)
     w.bounced[s] = stage if bounced else 0
     w.searched[s] = stage
@@ -247,10 +256,7 @@ def bounce_again(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.in
 @cython.exceptval(check=False)
 def relax_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
     """Contacts of group s without their springs."""
-    if w.rough:
-        solve(w, s, True, False, False)
-    else:
-        solve(w, s, False, False, False)
+    sweep(w, s, False, False)
 
 
 @cython.cfunc
@@ -258,7 +264,4 @@ def relax_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void
 @cython.exceptval(check=False)
 def hold_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
     """Contacts of group s keep pairs from coming nearer."""
-    if w.rough:
-        solve(w, s, True, True, False)
-    else:
-        solve(w, s, False, True, False)
+    sweep(w, s, True, False)

@@ -21,8 +21,8 @@ def fill_links(k: cython.pointer(Links), a, passes: cython.int, period_x: cython
         a |= {name: np.zeros(particles) for name in ("own", "weight", "rim")}
         a["begun"] = np.zeros((particles, 3))
         a |= {name: np.zeros((len(a["node"]), 2)) for name in ("gradient", "slope")}
-        a |= {name: np.zeros(rows) for name in ("soft", "target", "turned", "turning", "keeps", "round")}
-        a |= {name: np.zeros((rows, 2)) for name in ("way", "ended", "given", "along", "wanted", "answer", "had")}
+        a |= {name: np.zeros(rows) for name in ("soft", "target", "turned", "turning", "keeps", "chord_speed")}
+        a |= {name: np.zeros((rows, 2)) for name in ("way", "end_way", "given", "along", "wanted", "answer", "had")}
         a |= {"inverse": np.zeros((rows, 3)), "acts": np.zeros(rows, np.int32)}
         a["rubs"] = np.ones(particles, np.int32)
         a["held"] = np.full(particles, -1, np.int32)
@@ -45,14 +45,14 @@ def fill_links(k: cython.pointer(Links), a, passes: cython.int, period_x: cython
     k.upper, k.strength, k.intact = doubles(a["upper"]), doubles(a["strength"]), small_integers(a["intact"])
     k.impulse, k.load, k.pull, k.value = doubles(a["impulse"]), doubles(a["load"]), doubles(a["pull"]), doubles(a["value"])
     k.next, k.soft, k.target, k.turned = doubles(a["next"]), doubles(a["soft"]), doubles(a["target"]), doubles(a["turned"])
-    k.round = doubles(a["round"])
+    k.chord_speed = doubles(a["chord_speed"])
     k.begun, k.had = doubles(a["begun"]), doubles(a["had"])
     k.rubs, k.rim = small_integers(a["rubs"]), doubles(a["rim"])
     k.held = small_integers(a["held"])
     k.driven = doubles(a["driven"])
     k.loaned, k.keeps = doubles(a["loaned"]), doubles(a["keeps"])
     k.turning = doubles(a["turning"])
-    k.acts, k.way, k.ended, k.given = small_integers(a["acts"]), doubles(a["way"]), doubles(a["ended"]), doubles(a["given"])
+    k.acts, k.way, k.end_way, k.given = small_integers(a["acts"]), doubles(a["way"]), doubles(a["end_way"]), doubles(a["given"])
     k.along, k.wanted, k.answer, k.inverse = (
         doubles(a["along"]),
         doubles(a["wanted"]),

@@ -69,8 +69,8 @@ Links = cython.struct(
     acts=cython.pointer(int32_t),
     # ---- distances
     way=cython.pointer(cython.double),  # (rows, 2) from the first end to the second at the start of the substep, m
-    ended=cython.pointer(cython.double),  # (rows, 2) unit vector along the way after the drift
-    round=cython.pointer(cython.double),  # m/s along it of a way that has only turned in the drift, by its velocity of then
+    end_way=cython.pointer(cython.double),  # (rows, 2) unit vector along the way after the drift
+    chord_speed=cython.pointer(cython.double),  # m/s along it of a way that has only turned in the drift, by its velocity of then
     given=cython.pointer(cython.double),  # (rows, 2) N s to the second end in this substep
     along=cython.pointer(cython.double),  # (rows, 2) the direction that an impulse has
     wanted=cython.pointer(cython.double),  # (rows, 2) m along it; N s that turn what has been given into it

@@ -233,13 +233,13 @@ def finish_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
         my: cython.double = p.y + k.way[2 * r + 1]
         square: cython.double = mx * mx + my * my
         s: cython.double = (p.y - k.way[2 * r + 1]) * mx - (p.x - k.way[2 * r]) * my
-        k.ended[2 * r], k.ended[2 * r + 1] = x, y
-        k.round[r] = s * (y * mx - x * my) / (square * k.h) if square > 0 else 0
+        k.end_way[2 * r], k.end_way[2 * r + 1] = x, y
+        k.chord_speed[r] = s * (y * mx - x * my) / (square * k.h) if square > 0 else 0
         along: cython.double = x * mx + y * my
         if not (along > 0 and along * along > STRAIGHT * square):
             length = sqrt(square)
-            k.ended[2 * r], k.ended[2 * r + 1] = mx / length if length > 0 else 0, my / length if length > 0 else 0
-            k.round[r] = 0
+            k.end_way[2 * r], k.end_way[2 * r + 1] = mx / length if length > 0 else 0, my / length if length > 0 else 0
+            k.chord_speed[r] = 0
     else:
         for e in range(k.first[r], k.first[r + 1]):
             k.slope[2 * e] = (k.slope[2 * e] + k.gradient[2 * e]) / 2

@@ -104,12 +104,12 @@ def aim_at_rest(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
     i: cython.Py_ssize_t = k.node[e]
     j: cython.Py_ssize_t = k.node[e + 1]
     k.acts[r] = k.intact[r] != 0 and k.stiffness[r] == INFINITY and (k.upper[r] > 0 or k.impulse[r] < 0)
-    x: cython.double = k.ended[2 * r]
-    y: cython.double = k.ended[2 * r + 1]
+    x: cython.double = k.end_way[2 * r]
+    y: cython.double = k.end_way[2 * r + 1]
     k.along[2 * r], k.along[2 * r + 1] = x, y
     let_go_of_wedged(k, i, j, x, y)
     k.turned[r] = 0
-    k.wanted[2 * r] = k.h * (k.round[r] - (k.u[2 * j] - k.u[2 * i]) * x - (k.u[2 * j + 1] - k.u[2 * i + 1]) * y)
+    k.wanted[2 * r] = k.h * (k.chord_speed[r] - (k.u[2 * j] - k.u[2 * i]) * x - (k.u[2 * j + 1] - k.u[2 * i + 1]) * y)
     k.wanted[2 * r + 1] = 0
 
 

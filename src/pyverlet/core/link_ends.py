@@ -36,7 +36,7 @@ def turn_impulses(k: cython.pointer(Links), share: cython.double, half: cython.d
             length: cython.double = sqrt(d.x * d.x + d.y * d.y)
             x: cython.double = d.x / length if length > 0 else 0
             y: cython.double = d.y / length if length > 0 else 0
-            k.ended[2 * r], k.ended[2 * r + 1], k.round[r] = x, y, 0
+            k.end_way[2 * r], k.end_way[2 * r + 1], k.chord_speed[r] = x, y, 0
             if k.intact[r]:
                 give(k, r, given * x - share * k.given[2 * r], given * y - share * k.given[2 * r + 1])
         elif k.intact[r]:

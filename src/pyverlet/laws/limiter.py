@@ -49,7 +49,7 @@ _ROUNDED = 1e-5
 """Of what momenta come to without their signs: less is rounding, in float32 by eight substeps of a thousand circles or so. Beside
 it what contacts make of rounded places: velocities, over h."""
 
-DEEP = 0.1
+_DEEP = 0.1
 """Of the contact distance: circles that overlap by more are where nobody can be."""
 
 _NEARLY = 1.01
@@ -132,7 +132,7 @@ class EnergyLimiter:
         """(n,) bool: circles that overlapped another one, by more than contacts let them, when the frame began."""
         root, begin = np.arange(len(slots)), self._start.position[slots.particle]
         bodies = (begin, np.zeros_like(begin), slots.radius, *slots.seam.period, slots.inverse_mass)
-        slots.motion.join_near_pairs(*bodies, listed, 1.0 - DEEP, root)
+        slots.motion.join_near_pairs(*bodies, listed, 1.0 - _DEEP, root)
         slots.motion.compress_paths(root)
         return np.asarray(np.bincount(root, minlength=len(root))[root] > 1)
 
