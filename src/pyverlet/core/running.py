@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
-from cython.cimports.libc.math import sqrt
 from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK
@@ -23,25 +22,15 @@ from pyverlet.core.surface_lists import list_surfaces
 @cython.nogil
 @cython.exceptval(check=False)
 def strays(w: cython.pointer(Step)) -> cython.bint:
-    """Whether a particle may leave where the list of pairs is good in the first substep.
-
-    Where some are so fast that they may be thrown beyond their sight of surfaces, they look for these in each frame: a world
-    that is restored does so, too.
-    """
+    """Whether a particle may leave where the list of pairs is good in the first substep."""
     i: cython.Py_ssize_t
     found: cython.bint = False
-    most: real = 0
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
     for i in range(w.count):
-        ux: real = w.h * v[width * i]
-        uy: real = w.h * v[width * i + 1]
-        most = max(most, ux * ux + uy * uy)
-        dx: real = w.position[2 * i] + ux - w.checked[2 * i]
-        dy: real = w.position[2 * i + 1] + uy - w.checked[2 * i + 1]
+        dx: real = w.position[2 * i] + w.h * v[width * i] - w.checked[2 * i]
+        dy: real = w.position[2 * i + 1] + w.h * v[width * i + 1] - w.checked[2 * i + 1]
         found |= not (dx * dx + dy * dy <= w.allowed)
-    if w.substep == 0 and 2 * sqrt(most) + w.near > w.lists.half_skin:
-        w.surfaces_good = False
     return found
 
 
