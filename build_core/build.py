@@ -76,7 +76,7 @@ def native_variant() -> str:
     assert spec is not None
     module = importlib.util.module_from_spec(spec)
     loader.exec_module(module)
-    return "x86_64_v3" if module.supports_x86_64_v3() else "baseline"
+    return {4: "x86_64_v4", 3: "x86_64_v3"}.get(module.level(), "baseline")
 
 
 def _translated(target: Target) -> tuple[Path, str]:
@@ -104,7 +104,7 @@ def _translated(target: Target) -> tuple[Path, str]:
 
 def _compiled(target: Target, source: Path, state: str) -> Path:
     """The extension of a target in the work folder."""
-    made = target.path(WORK / "made")
+    made, state = target.path(WORK / "made"), f"{state} {VARIANTS[target.variant]}"
     stamp = WORK / target.name / f"compiled-{target.variant}{sysconfig.get_config_var('EXT_SUFFIX')}"
     if not (made.exists() and stamp.exists() and stamp.read_text() == state):
         compile_extension(source, made, target.variant, [CORE], ["REAL64"] if target.real64 else [])

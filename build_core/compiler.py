@@ -28,7 +28,7 @@ FLAGS = [
 QUIET = ["-w", "-DCYTHON_INLINE=inline __attribute__((always_inline))"]
 
 X86 = platform.machine().lower() in ("x86_64", "amd64")
-VARIANTS = {"baseline": "x86-64", "x86_64_v3": "x86-64-v3"} if X86 else {"baseline": ""}
+VARIANTS = {"baseline": "x86-64", "x86_64_v3": "x86-64-v3", "x86_64_v4": "x86-64-v4"} if X86 else {"baseline": ""}
 """Sub-folder of the core -> processor it is compiled for."""
 
 

@@ -22,8 +22,8 @@ import numpy as np
 from pyverlet.ground import loading
 from pyverlet.ground.errors import CoreError
 
-VARIANTS: Final = ("x86_64_v3", "baseline")
-"""Sub-folders with compiled units, the fastest first."""
+VARIANTS: Final = {"x86_64_v4": 4, "x86_64_v3": 3, "baseline": 0}
+"""Sub-folder with compiled units, the fastest first -> level of x86-64 that it needs."""
 
 _FOLDER: Final = Path(__file__).resolve().parent
 
@@ -81,8 +81,8 @@ def variants() -> tuple[str, ...]:
     Raises:
         CoreError: the compiled core is damaged, missing, or made for another Python or processor.
     """
-    runs = VARIANTS if _processor().supports_x86_64_v3() else VARIANTS[1:]
-    return tuple(name for name in runs if _extension(name, "engine_f32"))
+    has = _processor().level()
+    return tuple(name for name, needs in VARIANTS.items() if needs <= has and _extension(name, "engine_f32"))
 
 
 @functools.cache

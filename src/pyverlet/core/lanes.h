@@ -29,9 +29,24 @@ LANES_INLINE lanes spread(real a) { return (lanes){a, a, a, a, a, a, a, a}; }
 LANES_INLINE lanes load(const real *array, int64_t k) { return *(const lanes_in_memory *)(array + k); }
 LANES_INLINE void store(real *array, int64_t k, lanes a) { *(lanes_in_memory *)(array + k) = a; }
 
-/* A mask has all bits of a lane set where a comparison holds. */
-LANES_INLINE mask above(lanes a, lanes b) { return a > b; }
-LANES_INLINE mask equal(lanes a, lanes b) { return a == b; }
+/* A mask has all bits of a lane set where a comparison holds. Register by register: gcc compares wider vectors number by number. */
+#if defined(__AVX512F__)
+enum { REGISTER = 64 };
+#elif defined(__AVX__)
+enum { REGISTER = 32 };
+#else
+enum { REGISTER = 16 };
+#endif
+enum { PART = sizeof(lanes) < REGISTER ? sizeof(lanes) : REGISTER, PARTS = sizeof(lanes) / PART };
+typedef real lanes_part __attribute__((vector_size(PART), may_alias));
+typedef lane_int mask_part __attribute__((vector_size(PART), may_alias));
+#define BY_PARTS(a, operator, b)                                                                                          \
+    mask m;                                                                                                               \
+    for (int k = 0; k < PARTS; k++)                                                                                       \
+        ((mask_part *)&m)[k] = (mask_part)(((lanes_part *)&a)[k] operator((lanes_part *)&b)[k]);                          \
+    return m;
+LANES_INLINE mask above(lanes a, lanes b) { BY_PARTS(a, >, b) }
+LANES_INLINE mask equal(lanes a, lanes b) { BY_PARTS(a, ==, b) }
 LANES_INLINE mask both(mask a, mask b) { return a & b; }
 LANES_INLINE mask either(mask a, mask b) { return a | b; }
 LANES_INLINE mask outside(mask a) { return ~a; }
@@ -74,18 +89,18 @@ LANES_INLINE int any_lane(mask m) {
 }
 /* The number of the lowest bit that is set, of a number that is not 0. */
 LANES_INLINE int lowest_bit(uint32_t bits) { return __builtin_ctz(bits); }
-LANES_INLINE int any_above(lanes a, lanes b) { return any_lane(a > b); }
+LANES_INLINE int any_above(lanes a, lanes b) { return any_lane(above(a, b)); }
 /* Of equal numbers, and where one is not a number, the second: (a > b ? a : b) and (a < b ? a : b), as C and SSE have it. */
-LANES_INLINE lanes larger(lanes a, lanes b) { return choose(a > b, a, b); }
-LANES_INLINE lanes smaller(lanes a, lanes b) { return choose(a < b, a, b); }
+LANES_INLINE lanes larger(lanes a, lanes b) { return choose(above(a, b), a, b); }
+LANES_INLINE lanes smaller(lanes a, lanes b) { return choose(above(b, a), a, b); }
 LANES_INLINE real largest_lane(lanes a) {
     real most = a[0];
     for (int l = 1; l < LANES; l++)
         most = a[l] > most ? a[l] : most;
     return most;
 }
-LANES_INLINE lanes where_zero(lanes test, lanes a, lanes b) { return choose(test == spread(0), a, b); }
-LANES_INLINE lanes magnitude(lanes a) { return choose(a < spread(0), -a, a); }
+LANES_INLINE lanes where_zero(lanes test, lanes a, lanes b) { return choose(equal(test, spread(0)), a, b); }
+LANES_INLINE lanes magnitude(lanes a) { return choose(above(spread(0), a), -a, a); }
 LANES_INLINE lanes square_root(lanes a) {
     lanes r;
     for (int l = 0; l < LANES; l++)
@@ -107,111 +122,119 @@ LANES_INLINE void scatter(real *array, const uint32_t *index, int64_t k, lanes a
     for (int l = 0; l < LANES; l++)
         array[index[k + l]] = a[l];
 }
+/* Points are moved four at a time: gcc splits shuffles of more than a register into single numbers. */
+typedef real four_reals __attribute__((vector_size(4 * sizeof(real)), aligned(sizeof(real)), may_alias));
+#define MIX(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
+LANES_INLINE four_reals half_of(lanes a, int h) {
+    if (PARTS == 1)
+        return h ? MIX(a, a, 4, 5, 6, 7) : MIX(a, a, 0, 1, 2, 3);
+    return ((four_reals *)&a)[h];
+}
+LANES_INLINE lanes joined(four_reals a, four_reals b) {
+    if (PARTS == 1)
+        return MIX(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
+    lanes r;
+    ((four_reals *)&r)[0] = a;
+    ((four_reals *)&r)[1] = b;
+    return r;
+}
+#if defined(__AVX__) && !defined(REAL64)
 /* Four numbers of a particle are one load; eight of those become four lanes by two rounds of shuffles. */
-typedef real four_reals __attribute__((vector_size(4 * sizeof(real)), aligned(sizeof(real))));
-#define LANES_SHUFFLE(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
-#define LANES_LOW(a, b) LANES_SHUFFLE(a, b, 0, 8, 1, 9, 4, 12, 5, 13)
-#define LANES_HIGH(a, b) LANES_SHUFFLE(a, b, 2, 10, 3, 11, 6, 14, 7, 15)
-#define LANES_EVEN(a, b) LANES_SHUFFLE(a, b, 0, 1, 8, 9, 4, 5, 12, 13)
-#define LANES_ODD(a, b) LANES_SHUFFLE(a, b, 2, 3, 10, 11, 6, 7, 14, 15)
+#define LOW(a, b) MIX(a, b, 0, 8, 1, 9, 4, 12, 5, 13)
+#define HIGH(a, b) MIX(a, b, 2, 10, 3, 11, 6, 14, 7, 15)
+#define EVEN(a, b) MIX(a, b, 0, 1, 8, 9, 4, 5, 12, 13)
+#define ODD(a, b) MIX(a, b, 2, 3, 10, 11, 6, 7, 14, 15)
 LANES_INLINE lanes4 take4(const real *array, const uint32_t *index, int64_t k) {
     const uint32_t *i = index + k;
 #define FOUR(l) (*(const four_reals *)(array + 4 * (size_t)i[l]))
-#define EIGHT(l) LANES_SHUFFLE(FOUR(l), FOUR(l + 4), 0, 1, 2, 3, 4, 5, 6, 7)
+#define EIGHT(l) MIX(FOUR(l), FOUR(l + 4), 0, 1, 2, 3, 4, 5, 6, 7)
     lanes p = EIGHT(0), q = EIGHT(1), r = EIGHT(2), s = EIGHT(3);
 #undef EIGHT
 #undef FOUR
-    lanes a = LANES_LOW(p, q), b = LANES_HIGH(p, q), c = LANES_LOW(r, s), d = LANES_HIGH(r, s);
-    return (lanes4){LANES_EVEN(a, c), LANES_ODD(a, c), LANES_EVEN(b, d), LANES_ODD(b, d)};
+    lanes a = LOW(p, q), b = HIGH(p, q), c = LOW(r, s), d = HIGH(r, s);
+    return (lanes4){EVEN(a, c), ODD(a, c), EVEN(b, d), ODD(b, d)};
 }
 LANES_INLINE void put4(real *array, const uint32_t *index, int64_t k, lanes x, lanes y, lanes z, lanes w) {
     const uint32_t *i = index + k;
-    lanes a = LANES_LOW(x, y), b = LANES_HIGH(x, y), c = LANES_LOW(z, w), d = LANES_HIGH(z, w);
-    lanes p = LANES_EVEN(a, c), q = LANES_ODD(a, c), r = LANES_EVEN(b, d), s = LANES_ODD(b, d);
+    lanes a = LOW(x, y), b = HIGH(x, y), c = LOW(z, w), d = HIGH(z, w);
+    lanes p = EVEN(a, c), q = ODD(a, c), r = EVEN(b, d), s = ODD(b, d);
 #define FOUR(l) (*(four_reals *)(array + 4 * (size_t)i[l]))
-    FOUR(0) = LANES_SHUFFLE(p, p, 0, 1, 2, 3);
-    FOUR(1) = LANES_SHUFFLE(q, q, 0, 1, 2, 3);
-    FOUR(2) = LANES_SHUFFLE(r, r, 0, 1, 2, 3);
-    FOUR(3) = LANES_SHUFFLE(s, s, 0, 1, 2, 3);
-    FOUR(4) = LANES_SHUFFLE(p, p, 4, 5, 6, 7);
-    FOUR(5) = LANES_SHUFFLE(q, q, 4, 5, 6, 7);
-    FOUR(6) = LANES_SHUFFLE(r, r, 4, 5, 6, 7);
-    FOUR(7) = LANES_SHUFFLE(s, s, 4, 5, 6, 7);
+    FOUR(0) = MIX(p, p, 0, 1, 2, 3);
+    FOUR(1) = MIX(q, q, 0, 1, 2, 3);
+    FOUR(2) = MIX(r, r, 0, 1, 2, 3);
+    FOUR(3) = MIX(s, s, 0, 1, 2, 3);
+    FOUR(4) = MIX(p, p, 4, 5, 6, 7);
+    FOUR(5) = MIX(q, q, 4, 5, 6, 7);
+    FOUR(6) = MIX(r, r, 4, 5, 6, 7);
+    FOUR(7) = MIX(s, s, 4, 5, 6, 7);
 #undef FOUR
 }
+#else
+/* Four rows of four numbers become columns, by what a processor mixes in one step: two rounds. */
 #ifdef REAL64
-LANES_INLINE lanes2 take(const real *array, const uint32_t *index, int64_t k) {
-    lanes2 r;
-    for (int l = 0; l < LANES; l++) {
-        r.x[l] = array[2 * (size_t)index[k + l]];
-        r.y[l] = array[2 * (size_t)index[k + l] + 1];
-    }
-    return r;
-}
-LANES_INLINE void put(real *array, const uint32_t *index, int64_t k, lanes x, lanes y) {
-    for (int l = 0; l < LANES; l++) {
-        array[2 * (size_t)index[k + l]] = x[l];
-        array[2 * (size_t)index[k + l] + 1] = y[l];
-    }
-}
+#define EVEN(a, b) MIX(a, b, 0, 4, 2, 6)
+#define ODD(a, b) MIX(a, b, 1, 5, 3, 7)
 #else
-/* Two floats at once, as one double that is only copied. */
-typedef double two_floats __attribute__((aligned(4), may_alias));
-#if defined(__AVX2__) || defined(__clang__)
-typedef double four_doubles __attribute__((vector_size(32)));
-LANES_INLINE lanes2 take(const real *array, const uint32_t *index, int64_t k) {
-    const two_floats *a = (const two_floats *)array;
-    const uint32_t *i = index + k;
-    lanes p = (lanes)(four_doubles){a[i[0]], a[i[1]], a[i[2]], a[i[3]]},
-          q = (lanes)(four_doubles){a[i[4]], a[i[5]], a[i[6]], a[i[7]]};
-    return (lanes2){__builtin_shufflevector(p, q, 0, 2, 4, 6, 8, 10, 12, 14),
-                    __builtin_shufflevector(p, q, 1, 3, 5, 7, 9, 11, 13, 15)};
+#define EVEN(a, b) MIX(a, b, 0, 4, 1, 5)
+#define ODD(a, b) MIX(a, b, 2, 6, 3, 7)
+#endif
+LANES_INLINE void transpose(four_reals *r) {
+    four_reals a = EVEN(r[0], r[1]), b = ODD(r[0], r[1]), c = EVEN(r[2], r[3]), d = ODD(r[2], r[3]);
+    r[0] = MIX(a, c, 0, 1, 4, 5);
+    r[sizeof(real) == 8 ? 2 : 1] = MIX(a, c, 2, 3, 6, 7);
+    r[sizeof(real) == 8 ? 1 : 2] = MIX(b, d, 0, 1, 4, 5);
+    r[3] = MIX(b, d, 2, 3, 6, 7);
 }
-LANES_INLINE void put(real *array, const uint32_t *index, int64_t k, lanes x, lanes y) {
-    two_floats *a = (two_floats *)array;
-    const uint32_t *i = index + k;
-    four_doubles p = (four_doubles)__builtin_shufflevector(x, y, 0, 8, 1, 9, 2, 10, 3, 11),
-                 q = (four_doubles)__builtin_shufflevector(x, y, 4, 12, 5, 13, 6, 14, 7, 15);
-    a[i[0]] = p[0];
-    a[i[1]] = p[1];
-    a[i[2]] = p[2];
-    a[i[3]] = p[3];
-    a[i[4]] = q[0];
-    a[i[5]] = q[1];
-    a[i[6]] = q[2];
-    a[i[7]] = q[3];
-}
-#else
-/* By halves of four lanes: gcc splits wider shuffles into single floats where registers have 16 bytes, 3 times as slow. */
-typedef double two_doubles __attribute__((vector_size(16)));
-typedef float half_lanes __attribute__((vector_size(16)));
-typedef union {
-    lanes all;
-    half_lanes half[2];
-} lane_halves;
-LANES_INLINE lanes2 take(const real *array, const uint32_t *index, int64_t k) {
-    const two_floats *a = (const two_floats *)array;
-    lane_halves x, y;
+LANES_INLINE lanes4 take4(const real *array, const uint32_t *index, int64_t k) {
+    four_reals half[2][4];
     for (int h = 0; h < 2; h++) {
-        const uint32_t *i = index + k + 4 * h;
-        half_lanes p = (half_lanes)(two_doubles){a[i[0]], a[i[1]]}, q = (half_lanes)(two_doubles){a[i[2]], a[i[3]]};
-        x.half[h] = __builtin_shufflevector(p, q, 0, 2, 4, 6);
-        y.half[h] = __builtin_shufflevector(p, q, 1, 3, 5, 7);
+        for (int l = 0; l < 4; l++)
+            half[h][l] = *(const four_reals *)(array + 4 * (size_t)index[k + 4 * h + l]);
+        transpose(half[h]);
     }
-    return (lanes2){x.all, y.all};
+    return (lanes4){joined(half[0][0], half[1][0]), joined(half[0][1], half[1][1]), joined(half[0][2], half[1][2]),
+                    joined(half[0][3], half[1][3])};
 }
-LANES_INLINE void put(real *array, const uint32_t *index, int64_t k, lanes x, lanes y) {
-    two_floats *a = (two_floats *)array;
-    lane_halves u = {x}, v = {y};
+LANES_INLINE void put4(real *array, const uint32_t *index, int64_t k, lanes x, lanes y, lanes z, lanes w) {
     for (int h = 0; h < 2; h++) {
-        const uint32_t *i = index + k + 4 * h;
-        two_doubles p = (two_doubles)__builtin_shufflevector(u.half[h], v.half[h], 0, 4, 1, 5),
-                    q = (two_doubles)__builtin_shufflevector(u.half[h], v.half[h], 2, 6, 3, 7);
-        a[i[0]] = p[0];
-        a[i[1]] = p[1];
-        a[i[2]] = q[0];
-        a[i[3]] = q[1];
+        four_reals half[4] = {half_of(x, h), half_of(y, h), half_of(z, h), half_of(w, h)};
+        transpose(half);
+        for (int l = 0; l < 4; l++)
+            *(four_reals *)(array + 4 * (size_t)index[k + 4 * h + l]) = half[l];
     }
 }
 #endif
+/* Two numbers of a particle are one load, too: of a vector, or of a double that is only copied. */
+#ifdef REAL64
+typedef double point __attribute__((vector_size(16), aligned(8), may_alias));
+#define TWO(a, b) MIX(a, b, 0, 1, 2, 3)
+#else
+typedef double point __attribute__((aligned(4), may_alias));
+typedef double two_points __attribute__((vector_size(16)));
+#define TWO(a, b) (four_reals)(two_points){a, b}
 #endif
+LANES_INLINE lanes2 take(const real *array, const uint32_t *index, int64_t k) {
+    const point *at = (const point *)array;
+    four_reals x[2], y[2];
+    for (int h = 0; h < 2; h++) {
+        const uint32_t *i = index + k + 4 * h;
+        four_reals a = TWO(at[i[0]], at[i[1]]), b = TWO(at[i[2]], at[i[3]]);
+        x[h] = MIX(a, b, 0, 2, 4, 6);
+        y[h] = MIX(a, b, 1, 3, 5, 7);
+    }
+    return (lanes2){joined(x[0], x[1]), joined(y[0], y[1])};
+}
+LANES_INLINE void put(real *array, const uint32_t *index, int64_t k, lanes x, lanes y) {
+    point *at = (point *)array;
+    for (int h = 0; h < 2; h++) {
+        const uint32_t *i = index + k + 4 * h;
+        four_reals a = half_of(x, h), b = half_of(y, h);
+        four_reals c = MIX(a, b, 0, 4, 1, 5), d = MIX(a, b, 2, 6, 3, 7);
+#ifdef REAL64
+        at[i[0]] = MIX(c, c, 0, 1), at[i[1]] = MIX(c, c, 2, 3), at[i[2]] = MIX(d, d, 0, 1), at[i[3]] = MIX(d, d, 2, 3);
+#else
+        two_points p = (two_points)c, q = (two_points)d;
+        at[i[0]] = p[0], at[i[1]] = p[1], at[i[2]] = q[0], at[i[3]] = q[1];
+#endif
+    }
+}

@@ -1,4 +1,4 @@
 # See processor.h.
 cdef extern from "processor.h":
-    bint has_x86_64_v3()
+    int x86_64_level()
     const char *compiler_name()

@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-from cython.cimports.processor import compiler_name, has_x86_64_v3
+from cython.cimports.processor import compiler_name, x86_64_level
 
 
-def supports_x86_64_v3():
-    """Whether code compiled for x86-64-v3 (AVX2 and its companions) runs on this processor and system."""
-    return has_x86_64_v3()
+def level():
+    """The highest level of x86-64 of this processor and system that some variant is for: 1, 3 or 4; 0 for other processors."""
+    return x86_64_level()
 
 
 def compiled_by():

@@ -289,7 +289,7 @@ def load(unit: str, dtype: Any = np.float32) -> ModuleType:
         "team": _team(),
         "libc.math": _math(),
         "libc.stdint": _INTEGERS,
-        "processor": {"has_x86_64_v3": lambda: False, "compiler_name": lambda: b"none"},
+        "processor": {"x86_64_level": lambda: 0, "compiler_name": lambda: b"none"},
     }
     module = ModuleType(f"{unit}_reference")
     names = vars(module)
