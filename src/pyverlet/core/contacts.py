@@ -28,7 +28,7 @@ from pyverlet.core.impacts import resolve_impacts
 from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, clamped, motion_of, slip_of
 from pyverlet.core.step import TOUCHED, Step
 from pyverlet.core.surfaces import bounce_surfaces
-from pyverlet.core.warm_start import measure_pairs
+from pyverlet.core.warm_start import Normals, measure_pairs, turned_normals
 
 NO_WAY = cython.declare(real, 1e-12 if cython.sizeof(real) == 8 else 1e-5)
 """Of the contact distance: less is rounding of places."""
@@ -131,7 +131,12 @@ def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, hits: cython.Py_
 @cython.nogil
 @cython.exceptval(check=False)
 def solve(
-    shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint, soft: cython.bint, pushes: cython.bint
+    shared: cython.pointer(Step),
+    s: cython.Py_ssize_t,
+    rough: cython.bint,
+    soft: cython.bint,
+    pushes: cython.bint,
+    turns: cython.bint,
 ) -> cython.Py_ssize_t:
     """One sweep over the contacts of group s; returns how many pairs meet so fast that they bounce, noted in `hit`.
 
@@ -139,12 +144,14 @@ def solve(
     it takes back the speed of pushing out.
     pushes: without, soft contacts only keep pairs from coming nearer than they are. That is for what links have made of
     velocities: they would give on what springs put out.
+    turns: normals of pairs that turn fast become those of after the drift.
     """
     own: Step = shared[0]  # which no store to an array can change: its fields stay in registers
     w: cython.pointer(Step) = cython.address(own)
     zero: lanes = spread(0)
     third: lanes = spread(cython.cast(real, 1.0) / 3)
     near: lanes = spread(-w.near)
+    turning: lanes = spread(w.turning * w.turning)
     first: cython.Py_ssize_t = w.begin[s]
     end: cython.Py_ssize_t = first + w.swept[s]
     count: cython.Py_ssize_t = 0
@@ -178,10 +185,16 @@ def solve(
                 count += note_hits(shared, k, bits_of(fast), first + count)
                 after = choose(fast, before, after)
         else:
-            if own.turned:  # along the normals of before the drift, to first order
-                slide: lanes = (m.vx - m.ux) * ny - (m.vy - m.uy) * nx
+            along_x: lanes = m.vx - m.ux
+            along_y: lanes = m.vy - m.uy
+            if own.turned and any_above(along_x * along_x + along_y * along_y, turning):
+                if turns:
+                    n: Normals = turned_normals(w, k, before, nx, ny)
+                    nx, ny = n.x, n.y
+                # Along the normals of before the drift, to first order.
+                slide: lanes = along_x * ny - along_y * nx
                 reach: lanes = load(w.reach, k * w.sized) * spread(1 / w.h)
-                speed = speed - smaller(slide * slide, reach * reach) / reach
+                speed = along_x * nx + along_y * ny - smaller(slide * slide, reach * reach) / reach
             after = choose(loaded, larger(before - speed, zero), zero)
             after = choose(fast_ones(w, k, speed, depth, nx, ny), before, after)  # it bounces in the next substep
         store(w.impulse, k, after)
@@ -199,9 +212,11 @@ def solve(
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def sweep(w: cython.pointer(Step), s: cython.Py_ssize_t, soft: cython.bint, pushes: cython.bint) -> cython.Py_ssize_t:
+def sweep(
+    w: cython.pointer(Step), s: cython.Py_ssize_t, soft: cython.bint, pushes: cython.bint, turns: cython.bint
+) -> cython.Py_ssize_t:
     """As `solve`, compiled for rough circles and for smooth ones."""
-    return solve(w, s, True, soft, pushes) if w.rough else solve(w, s, False, soft, pushes)
+    return solve(w, s, True, soft, pushes, turns) if w.rough else solve(w, s, False, soft, pushes, turns)
 
 
 @cython.cfunc
@@ -209,7 +224,7 @@ def sweep(w: cython.pointer(Step), s: cython.Py_ssize_t, soft: cython.bint, push
 @cython.exceptval(check=False)
 def solve_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.int) -> cython.bint:
     """Soft contacts of group s; then pairs that meet fast bounce. Whether any did."""
-    hits: cython.Py_ssize_t = sweep(w, s, True, True)
+    hits: cython.Py_ssize_t = sweep(w, s, True, True, False)
     bounced: cython.bint = hits > 0 and bounce_pairs(w, s, hits)
     w.bounced[s] = stage if bounced else 0
     w.searched[s] = stage
@@ -255,8 +270,11 @@ def bounce_again(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.in
 @cython.nogil
 @cython.exceptval(check=False)
 def relax_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
-    """Contacts of group s without their springs."""
-    sweep(w, s, False, False)
+    """Contacts of group s without their springs; in the first such sweep of a substep along the normals of after the drift."""
+    if w.sweep == 0:
+        sweep(w, s, False, False, True)
+    else:
+        sweep(w, s, False, False, False)
 
 
 @cython.cfunc
@@ -264,4 +282,4 @@ def relax_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void
 @cython.exceptval(check=False)
 def hold_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
     """Contacts of group s keep pairs from coming nearer."""
-    sweep(w, s, True, False)
+    sweep(w, s, True, False, False)

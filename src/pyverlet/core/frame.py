@@ -33,7 +33,7 @@ from pyverlet.core.step import OPEN, Step
 from pyverlet.core.surface_contacts import hold_surfaces, relax_surfaces, warm_surfaces
 from pyverlet.core.surface_sides import keep_inside, keep_sides
 from pyverlet.core.surfaces import bounce_surfaces
-from pyverlet.core.warm_start import turn_normals, warm_start
+from pyverlet.core.warm_start import warm_start
 from pyverlet.core.work import book_drift, book_end, book_grips, book_rubbing, book_start
 
 ROUNDS = cython.declare(cython.int, 2)
@@ -42,8 +42,8 @@ ROUGH_ROUNDS = cython.declare(cython.int, 4)
 round do not push out what overlaps, as links would give that on."""
 
 TURNING = cython.declare(real, 3e-4)
-"""Seconds: who moves farther in a substep than in this time at the speed at which overlaps are pushed out, turns its contacts.
-That is a four hundredth of a mean radius."""
+"""Seconds: pairs that move against each other by more in a substep than in this time at the speed at which overlaps are pushed
+out, turn their normals. That is a four hundredth of a mean radius."""
 
 MOST_ROUNDS = cython.declare(cython.int, 100)  # over the groups in which pairs have bounced
 
@@ -169,15 +169,6 @@ def bounce_on(w: cython.pointer(Step)) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def turn_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """The normals of a group after the drift."""
-    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    turn_normals(w, 2 * item + w.parity)
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def relax_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """The contacts of a group without their springs."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -268,11 +259,12 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
             solve_links(w, turn > 0, turn + 1 == rounds)
     w.turned = False
     team_stage(w.team, drift_stage, w, blocks)
-    if w.relaxes > 0 and fastest * w.h > TURNING * w.push:
+    w.turning = TURNING * w.push / w.h
+    if w.relaxes > 0 and 2 * fastest > w.turning:
         w.turned = True
         team_stage(w.team, moves_stage, w, blocks)
-        each_group(w, turn_stage)
     for sweep in range(w.relaxes):
+        w.sweep = sweep
         if sweep > 0 and surfaces:
             team_stage(w.team, relax_surfaces_stage, w, blocks)
         each_group(w, relax_stage)

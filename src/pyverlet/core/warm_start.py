@@ -27,6 +27,8 @@ from cython.cimports.lanes import (
 from pyverlet.core.pairs_in_lanes import apply_impulses, clamped, motion_of
 from pyverlet.core.step import FADING, TOUCHED, Step
 
+Normals = cython.struct(x=lanes, y=lanes)
+
 
 @cython.cfunc
 @cython.inline
@@ -112,39 +114,34 @@ def warm_start(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
 
 
 @cython.cfunc
+@cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def turn_normals(shared: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
-    """Normals of the pairs of group s that carry load, after the drift: impulses along those of before it would turn the pair.
+def turned_normals(w: cython.pointer(Step), k: cython.Py_ssize_t, impulse: lanes, old_x: lanes, old_y: lanes) -> Normals:
+    """Normals after the drift of the pairs from k on; old: those of before it, along which impulses would turn these pairs.
 
     So does the half of what they gave that velocities at the end of a frame have: it is told as if given along these.
     """
-    own: Step = shared[0]
-    w: cython.pointer(Step) = cython.address(own)
-    zero: lanes = spread(0)
-    first: cython.Py_ssize_t = w.begin[s]
-    k: cython.Py_ssize_t
-    for k in range(first, first + w.swept[s], 8):
-        impulse: lanes = load(w.impulse, k)
-        if not any_above(impulse, zero):
-            continue
-        p: lanes2 = take(w.moved, w.i, k)
-        q: lanes2 = take(w.moved, w.j, k)
-        dx: lanes = load(w.gap_x, k) + (q.x - p.x)
-        dy: lanes = load(w.gap_y, k) + (q.y - p.y)
-        distance: lanes = square_root(dx * dx + dy * dy)
-        reach: lanes = load(w.reach, k * w.sized)
-        dx = where_zero(distance, reach, dx)
-        per_metre: lanes = spread(1) / where_zero(distance, reach, distance)
-        nx: lanes = dx * per_metre
-        ny: lanes = dy * per_metre
-        x: lanes = impulse * (nx - load(w.normal_x, k))
-        y: lanes = impulse * (ny - load(w.normal_y, k))
-        store(w.normal_x, k, nx)
-        store(w.normal_y, k, ny)
+    p: lanes2 = take(w.moved, w.i, k)
+    q: lanes2 = take(w.moved, w.j, k)
+    dx: lanes = load(w.gap_x, k) + (q.x - p.x)
+    dy: lanes = load(w.gap_y, k) + (q.y - p.y)
+    distance: lanes = square_root(dx * dx + dy * dy)
+    reach: lanes = load(w.reach, k * w.sized)
+    dx = where_zero(distance, reach, dx)
+    per_metre: lanes = spread(1) / where_zero(distance, reach, distance)
+    n: Normals
+    n.x = dx * per_metre
+    n.y = dy * per_metre
+    store(w.normal_x, k, n.x)
+    store(w.normal_y, k, n.y)
+    if w.substep + 1 == w.substeps:
+        x: lanes = impulse * (n.x - old_x)
+        y: lanes = impulse * (n.y - old_y)
         part: lanes = load(w.share, k * w.varied)
         other: lanes = spread(1) - part
         u: lanes2 = take(w.free, w.i, k)
         v: lanes2 = take(w.free, w.j, k)
         put(w.free, w.i, k, u.x + x * part, u.y + y * part)
         put(w.free, w.j, k, v.x - x * other, v.y - y * other)
+    return n
