@@ -16,7 +16,7 @@ ROOMS: list[Any] = [pv.Box((0, 0), (12, 40)), pv.Circle(center=(6, 6), radius=9)
 METHODS: list[Any] = [pv.Fast(), pv.BruteForce()]
 
 
-def world_of(method: Any, room: Any, dtype: Any = np.float64, **law: float) -> pv.World:
+def world_of(method: Any, room: Any, dtype: Any = np.float64, **law: Any) -> pv.World:
     """40 circles of several sizes, apart from each other."""
     world = pv.World(boundary=room, dtype=dtype, collisions=pv.Collisions(method=method, **law))
     rng = np.random.default_rng(3)

@@ -25,7 +25,7 @@ from cython.cimports.lanes import (
 from cython.cimports.libc.stdint import int32_t
 
 from pyverlet.core.impacts import resolve_impacts
-from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, clamped, motion_of, slip_of
+from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, clamped, held_roll, motion_of, slip_of
 from pyverlet.core.step import TOUCHED, Step
 from pyverlet.core.surfaces import bounce_surfaces
 from pyverlet.core.warm_start import Normals, measure_pairs, turned_normals
@@ -199,12 +199,18 @@ def solve(
             after = choose(fast_ones(w, k, speed, depth, nx, ny), before, after)  # it bounces in the next substep
         store(w.impulse, k, after)
         tangent: lanes = zero
+        roll: lanes = zero
         if rough:
             old: lanes = load(w.tangent_impulse, k)
             new: lanes = clamped(old - third * slip_of(w, k, m, nx, ny), load(w.friction, k * w.mixed) * after)
             store(w.tangent_impulse, k, new)
             tangent = new - old
-        apply_impulses(w, k, rough, m, nx, ny, after - before, tangent)
+            if own.rolls:
+                had: lanes = load(w.roll_impulse, k)
+                holds: lanes = held_roll(w, k, m, after, tangent)
+                store(w.roll_impulse, k, holds)
+                roll = holds - had
+        apply_impulses(w, k, rough, m, nx, ny, after - before, tangent, roll)
     return count
 
 

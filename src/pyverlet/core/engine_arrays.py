@@ -83,15 +83,28 @@ def make_lane_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype
     """Of so many lanes."""
     w.lists.lanes_room = lanes
     a |= {name: np.zeros(lanes, np.uint32) for name in ("i", "j")}
-    a |= {name: np.zeros((2, lanes), dtype) for name in ("gap", "normal", "struck")}
+    a |= {name: np.zeros((2, lanes), dtype) for name in ("gap", "normal")}
     a |= {name: np.zeros(lanes, dtype) for name in ("depth", "load", "impulse", "tangent_impulse")}
     a |= {"hit": np.zeros(lanes, np.int64), "hit_time": np.zeros(lanes)}
     w.hit, w.hit_time, w.i, w.j = integers(a["hit"]), doubles(a["hit_time"]), indices(a["i"]), indices(a["j"])
     w.gap_x, w.gap_y = map_row(a["gap"], 0), map_row(a["gap"], 1)
     w.normal_x, w.normal_y = map_row(a["normal"], 0), map_row(a["normal"], 1)
-    w.struck_x, w.struck_y = map_row(a["struck"], 0), map_row(a["struck"], 1)
     w.depth, w.load = reals(a["depth"]), reals(a["load"])
     w.impulse, w.tangent_impulse = reals(a["impulse"]), reals(a["tangent_impulse"])
+    make_rare_arrays(w, a, dtype)
+
+
+@cython.cfunc
+def make_rare_arrays(w: cython.pointer(Step), a, dtype):
+    """Of lanes, what few worlds ask for: those that note what contacts give, and those that resist rolling."""
+    lanes = w.lists.lanes_room
+    for name, shape, wanted in (("struck", (2, lanes), w.noting), ("roll_impulse", (lanes,), w.rolls)):
+        if wanted and (name not in a or a[name].shape != shape):
+            a[name] = np.zeros(shape, dtype)
+    if w.noting:
+        w.struck_x, w.struck_y = map_row(a["struck"], 0), map_row(a["struck"], 1)
+    if w.rolls:
+        w.roll_impulse = reals(a["roll_impulse"])
 
 
 @cython.cfunc
@@ -100,7 +113,7 @@ def make_kept_arrays(ls: cython.pointer(Lists), a, lanes: cython.Py_ssize_t, dty
     old = a.get("kept")
     have = 0 if old is None else len(old)
     if have < lanes:
-        shapes = (("kept_next", lanes, np.int32), ("kept_other", lanes, np.uint32), ("kept", (lanes, 3), dtype))
+        shapes = (("kept_next", lanes, np.int32), ("kept_other", lanes, np.uint32), ("kept", (lanes, 4), dtype))
         for name, shape, kind in shapes:
             larger = np.zeros(shape, kind)
             if have:
@@ -137,7 +150,7 @@ def make_chains(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t):
 def make_material_arrays(w: cython.pointer(Step), a, dtype):
     """For what pairs are made of: one a lane, or eight."""
     lanes = max(w.lists.lanes_room, 8)
-    shapes = {"reach": (lanes if w.sized else 8,), "share": (lanes if w.varied else 8,), "made_of": (6, lanes if w.mixed else 8)}
+    shapes = {"reach": (lanes if w.sized else 8,), "share": (lanes if w.varied else 8,), "made_of": (7, lanes if w.mixed else 8)}
     for name, shape in shapes.items():
         if name not in a or a[name].shape != shape:
             a[name] = np.zeros(shape, dtype)
@@ -146,3 +159,4 @@ def make_material_arrays(w: cython.pointer(Step), a, dtype):
     made_of = a["made_of"]
     w.restitution, w.friction, w.radius_i = map_row(made_of, 0), map_row(made_of, 1), map_row(made_of, 2)
     w.radius_j, w.turn_i, w.turn_j = map_row(made_of, 3), map_row(made_of, 4), map_row(made_of, 5)
+    w.rolling = map_row(made_of, 6)

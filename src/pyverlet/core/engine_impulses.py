@@ -36,7 +36,7 @@ def read_impulses(w: cython.pointer(Step), who: cython.pointer(int32_t), particl
             if remembers(w, s, k):
                 begin[min(who[w.i[k]], who[w.j[k]]) + 1] += 1
     np.cumsum(first, out=first)
-    pairs, values = np.empty((first[-1], 2), np.int32), np.empty((first[-1], 3), dtype)
+    pairs, values = np.empty((first[-1], 2), np.int32), np.empty((first[-1], 4), dtype)
     pair: cython.pointer(int32_t) = small_integers(pairs)
     value: cython.pointer(real) = reals(values)
     for s in range(groups):
@@ -51,9 +51,10 @@ def read_impulses(w: cython.pointer(Step), who: cython.pointer(int32_t), particl
                 load: real = w.load[k] if w.load[k] > 0 else -w.load[k]
                 if touched and load == 0 and not w.impulse[k] > 0:
                     load = TOUCHED
-                value[3 * n] = w.impulse[k]
-                value[3 * n + 1] = w.tangent_impulse[k] if w.rough else 0
-                value[3 * n + 2] = load if touched else -load
+                value[4 * n] = w.impulse[k]
+                value[4 * n + 1] = w.tangent_impulse[k] if w.rough else 0
+                value[4 * n + 2] = load if touched else -load
+                value[4 * n + 3] = w.roll_impulse[k] if w.rolls else 0
     return pairs, values
 
 
@@ -64,8 +65,10 @@ def fill_kept(w: cython.pointer(Step), pairs, values):
     pair: cython.pointer(int32_t) = small_integers(pairs)
     value: cython.pointer(real) = reals(values)
     k: int64_t
+    n: cython.int
     clear_chains(w, ls)
     for k in range(len(pairs)):
         low: int32_t = min(pair[2 * k], pair[2 * k + 1])
-        ls.kept[3 * k], ls.kept[3 * k + 1], ls.kept[3 * k + 2] = value[3 * k], value[3 * k + 1], value[3 * k + 2]
+        for n in range(4):
+            ls.kept[4 * k + n] = value[4 * k + n]
         hang(ls, cython.cast(uint32_t, low), cython.cast(uint32_t, max(pair[2 * k], pair[2 * k + 1])), k)

@@ -18,12 +18,13 @@ from pyverlet.core.engine_arrays import (
     make_level_arrays,
     make_material_arrays,
     make_particle_arrays,
+    make_rare_arrays,
 )
 from pyverlet.core.engine_hearing import hear, make_hearing_arrays
 from pyverlet.core.engine_impulses import fill_kept, read_impulses
 from pyverlet.core.engine_links import fill_links
 from pyverlet.core.engine_surfaces import give_surfaces, make_surface_arrays, place_obstacles, set_obstacles, take_surfaces
-from pyverlet.core.engine_work import energy_of_last, friction_of_last
+from pyverlet.core.engine_work import energy_of_last, friction_of_last, rolling_of_last
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_ends import show_links
 from pyverlet.core.pair_lists import Lists
@@ -95,6 +96,7 @@ class Engine:
         w.given, w.given_spin = reals(a["given"]), reals(a["given_spin"])
         w.surfaces_good = False
         w.own_restitution, w.own_friction = reals(a["own_restitution"]), reals(a["own_friction"])
+        w.own_rolling, w.own_material = reals(a["own_rolling"]), indices(a["own_material"])
         self.c.position, self.c.radius = w.position, w.radius
         self.ls.particle, self.ls.filtered = small_integers(a["particle"]), len(a["category"]) > 0
         self.ls.category, self.ls.mask = indices(a["category"]), indices(a["mask"])
@@ -106,6 +108,8 @@ class Engine:
         bulk: largest radius of circles that stand in cells, m; smallest, largest and mean_radius, m. restitution, friction: of
         circles without values of their own. picky: whether some pairs are no pairs: of pinned or filtered ones, or linked ones.
         brute: whether all others are listed; bulk is then 0.
+
+        combine: see `combined`. together: (k, k, 3) of materials, k may be 0.
         """
         w: cython.pointer(Step) = cython.address(self.w)
         ls: cython.pointer(Lists) = cython.address(self.ls)
@@ -114,8 +118,11 @@ class Engine:
             w.groups, w.pins, ls.listed, ls.good = 0, False, False, False
         w.surfaces_good = False
         self.c.bulk, self.c.smallest, ls.largest, ls.mean_radius = n["bulk"], n["smallest"], n["largest"], n["mean_radius"]
-        ls.restitution, ls.friction, ls.picky = n["restitution"], n["friction"], n["picky"] or ls.linked
+        ls.restitution, ls.friction, ls.rolling = n["restitution"], n["friction"], n["rolling"]
+        ls.picky = n["picky"] or ls.linked
         ls.refill, ls.brute = True, n["brute"]
+        self.arrays["together"] = n["together"]
+        w.combine, w.materials, w.together = n["combine"], len(n["together"]), doubles(n["together"])
         make_material_arrays(w, self.arrays, self.dtype)
 
     def set_linked(self, begin, to):
@@ -138,12 +145,20 @@ class Engine:
         if self.w.linked and half > 0:
             show_links(cython.address(self.w), half, kick)
 
-    def set_room(self, room, x0, y0, x1, y1, restitution, friction, speed):
+    def set_room(self, room, x0, y0, x1, y1, restitution, friction, rolling, speed, material=0):
         """Walls: none (0); a cage (1) by centre and radius; a box (2) by two corners; m. speed: of a cage's surface, m/s."""
         w: cython.pointer(Step) = cython.address(self.w)
         if (w.room, w.x0, w.y0, w.x1, w.y1) != (room, x0, y0, x1, y1):
             w.room, w.x0, w.y0, w.x1, w.y1, w.surfaces_good = room, x0, y0, x1, y1, False
-        w.wall_restitution, w.wall_friction, w.wall_speed = restitution, friction, speed
+        w.wall_restitution, w.wall_friction, w.wall_rolling, w.wall_speed = restitution, friction, rolling, speed
+        w.wall_material = material
+
+    def set_rolls(self, wanted: cython.bint):
+        """Whether any contact resists rolling."""
+        if self.w.rolls != wanted:
+            self.w.rolls = wanted
+            self.arrays.pop("roll_impulse", None)
+            make_rare_arrays(cython.address(self.w), self.arrays, self.dtype)
 
     def set_seam(self, low_x: cython.double, low_y: cython.double, period_x: cython.double, period_y: cython.double):
         """The corner of a periodic room, and its periods, m; 0: none. Another room needs another list."""
@@ -168,7 +183,7 @@ class Engine:
         return place_obstacles(cython.address(self.w), which, dt, fresh)
 
     def take_surfaces(self):
-        """(slot, surface, values) of what contacts with surfaces remember: (k,), (k,) and (k, 2) m/s."""
+        """(slot, surface, values) of what contacts with surfaces remember: (k,), (k,) (k, 3): two in m/s, the last in m^2/s."""
         return take_surfaces(cython.address(self.w), self.arrays)
 
     def give_surfaces(self, slot, surface, values):
@@ -181,19 +196,20 @@ class Engine:
         if wall_given is not None:
             self.arrays["wall_given"], self.arrays["obstacle_given"] = wall_given, obstacle_given
             self.w.wall_given, self.w.obstacle_given = reals(wall_given), reals(obstacle_given)
+            make_rare_arrays(cython.address(self.w), self.arrays, self.dtype)
 
     def book(self, wanted: cython.bint):
-        """Note from now on what contacts change of the energy: "gained" (blocks,) and "work" (count, 4) J; or no more."""
+        """Note from now on what contacts change of the energy: "gained" (blocks,) and "work" (count, 5) J; or no more."""
         w: cython.pointer(Step) = cython.address(self.w)
         w.booking = wanted
         if wanted:
-            self.arrays |= {"gained": np.zeros((w.count + BLOCK - 1) // BLOCK + 1), "work": np.zeros((w.count + 1, 4))}
+            self.arrays |= {"gained": np.zeros((w.count + BLOCK - 1) // BLOCK + 1), "work": np.zeros((w.count + 1, 5))}
             w.gained, w.work = doubles(self.arrays["gained"]), doubles(self.arrays["work"])
 
     def energy_of_last(self, share: cython.double):
-        """(all, that along tangents) J by `share` of what contacts gave in the last substep, as velocities have it now."""
+        """J by `share` of what contacts gave in the last substep: all, that along tangents, that against rolling."""
         w: cython.pointer(Step) = cython.address(self.w)
-        return energy_of_last(w, share), friction_of_last(w, share)
+        return energy_of_last(w, share), friction_of_last(w, share), rolling_of_last(w, share)
 
     def listen(self, wanted: cython.bint):
         """Note from now on who touches, or no more; what was heard is forgotten."""

@@ -11,7 +11,7 @@ from cython.cimports.libc.stdint import int32_t
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.obstacles import LATE, PLACE, keeps_place, list_segment, put_segment
 from pyverlet.core.step import Step
-from pyverlet.core.surface_rows import CONTACT, DRAG, PUSH
+from pyverlet.core.surface_rows import CONTACT, PUSH, ROLL
 
 
 @cython.cfunc
@@ -63,12 +63,12 @@ def take_surfaces(w: cython.pointer(Step), a):
     # The list before, as long as it has not been looked through.
     side = (1 - w.side if w.surfaces_kept else w.side) if w.count > 0 else 0
     if w.count <= 0:
-        return np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros((0, 2))
+        return np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros((0, 3))
     begin, end = a[f"contact_begin{side}"], a[f"contact_end{side}"]
     count = end - begin
     slot = np.repeat(np.arange(w.count, dtype=np.int32), count)
     place = np.arange(len(slot)) - np.repeat(np.cumsum(count) - count, count) + begin[slot]
-    values = a[f"contact{side}"][place, PUSH : DRAG + 1]
+    values = a[f"contact{side}"][place, PUSH : ROLL + 1]
     loaded = (values[:, 0] > 0) & (a[f"surface{side}"][place] >= 0)  # those of pinned circles are pairs
     return slot[loaded], a[f"surface{side}"][place[loaded]], values[loaded]
 
@@ -81,7 +81,7 @@ def give_surfaces(w: cython.pointer(Step), a, slot, surface, values):
         make_surface_arrays(w, a, len(slot))
     before = "0" if w.side else "1"
     a["surface" + before][: len(slot)] = surface
-    a["contact" + before][: len(slot), PUSH : DRAG + 1] = values
+    a["contact" + before][: len(slot), PUSH : ROLL + 1] = values
     for name, side in (("contact_begin", "left"), ("contact_end", "right")):
         a[name + before][:] = np.searchsorted(slot, np.arange(w.count), side)
     w.surfaces_good, w.surfaces_kept = False, True

@@ -6,7 +6,7 @@ from __future__ import annotations
 import cython
 
 from pyverlet.core.step import Step
-from pyverlet.core.surface_rows import CONTACT, DRAG, NORMAL, PUSH, SPEED
+from pyverlet.core.surface_rows import CONTACT, DRAG, NORMAL, PUSH, ROLL, SPEED, SPIN
 
 
 @cython.cfunc
@@ -63,4 +63,35 @@ def friction_of_last(w: cython.pointer(Step), share: cython.double) -> cython.do
                     rim_speed = w.radius[i] * (w.spin[i] - half * w.given_spin[i])
                     slip: cython.double = x * row[first + NORMAL + 1] - y * row[first + NORMAL] - rim_speed
                     total += row[first + DRAG] * slip / w.inverse_mass[i]
+    return share * total
+
+
+@cython.cfunc
+def rolling_of_last(w: cython.pointer(Step), share: cython.double) -> cython.double:
+    """The part of that by what resists rolling, J."""
+    total: cython.double = 0
+    half: cython.double = 0.5 * share
+    i: cython.Py_ssize_t
+    j: cython.Py_ssize_t
+    k: cython.Py_ssize_t
+    s: cython.Py_ssize_t
+    inverse: cython.double
+    spin: cython.double
+    if not w.rolls:
+        return 0.0
+    for s in range(w.groups):
+        for k in range(w.begin[s], w.begin[s] + w.swept[s]):
+            i, j = w.i[k], w.j[k]
+            if w.roll_impulse[k] != 0 and not (k > w.begin[s] and w.i[k - 1] == i and w.j[k - 1] == j):
+                spin = w.spin[j] - half * w.given_spin[j]
+                spin -= w.spin[i] - half * w.given_spin[i]
+                inverse = w.inverse_mass[i]
+                inverse += w.inverse_mass[j]
+                total += w.roll_impulse[k] * spin / inverse
+    if w.surfaces_good:
+        for i in range(w.count):
+            for k in range(w.contact_begin[i], w.contact_end[i]):
+                if w.contact[CONTACT * k + PUSH] > 0 and w.inverse_mass[i] > 0:
+                    spin = w.spin[i] - half * w.given_spin[i] - w.contact[CONTACT * k + SPIN]
+                    total += w.contact[CONTACT * k + ROLL] * spin / w.inverse_mass[i]
     return share * total

@@ -9,7 +9,7 @@ from cython.cimports.libc.stdint import int32_t, int64_t
 
 from pyverlet.core.step import Step
 
-SEGMENT = cython.declare(cython.int, 32)
+SEGMENT = cython.declare(cython.int, 40)
 """Numbers of a segment, in metres. The first 18 are as in `laws.obstacles`, the others are made here."""
 BODY_OF = cython.declare(cython.int, 0)
 FIRST_FACE = cython.declare(cython.int, 1)  # of the polygon, FACES many; none if it is no part of one
@@ -28,6 +28,8 @@ PLACE = cython.declare(cython.int, 18)  # start and direction (4) at the beginni
 LATE = cython.declare(cython.int, 22)  # and at its end
 SPARE = cython.declare(cython.int, 26)  # how far it may move until it is to be listed again
 LISTED = cython.declare(cython.int, 27)  # start and end (4) when it was
+ROLLS = cython.declare(cython.int, 31)  # coefficient of rolling resistance of its surface
+MATERIAL = cython.declare(cython.int, 32)  # which of `Step.materials`
 
 SPARE_FRAMES = cython.declare(cython.double, 4.0)
 """Frames for which a segment that moves is listed ahead."""

@@ -233,19 +233,21 @@ def hang(ls: cython.pointer(Lists), low: uint32_t, high: uint32_t, k: int64_t) -
 def keep_impulses(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
     """Hang what the contacts of group s remember on the chains of their lower particles.
 
-    Impulses along the normal and the tangent, and the load that the substep began with; negative where they did not touch.
+    Impulses along the normal and the tangent, the load that the substep began with, negative where they did not touch, and the
+    angular impulse against rolling.
     """
     k: int64_t
     for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
         touched: cython.bint = w.impulse[k] > 0 or w.depth[k] > 0
         if (touched or w.load[k] != 0) and not repeats(w, s, k):
             low: uint32_t = min(w.i[k], w.j[k])
-            ls.kept[3 * k] = w.impulse[k]
-            ls.kept[3 * k + 1] = w.tangent_impulse[k] if w.rough else 0
+            ls.kept[4 * k] = w.impulse[k]
+            ls.kept[4 * k + 1] = w.tangent_impulse[k] if w.rough else 0
+            ls.kept[4 * k + 3] = w.roll_impulse[k] if w.rolls else 0
             load: real = w.load[k] if w.load[k] > 0 else -w.load[k]
             if touched and load == 0 and not w.impulse[k] > 0:
                 load = TOUCHED
-            ls.kept[3 * k + 2] = load if touched else -load
+            ls.kept[4 * k + 2] = load if touched else -load
             hang(ls, low, max(w.i[k], w.j[k]), k)
 
 
@@ -259,12 +261,17 @@ def give_impulses(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.
         low: uint32_t = min(w.i[k], w.j[k])
         high: uint32_t = max(w.i[k], w.j[k])
         w.impulse[k] = w.tangent_impulse[k] = w.load[k] = 0
+        if w.rolls:
+            w.roll_impulse[k] = 0
         w.depth[k] = -1
         n: int32_t = ls.head[chain_of(ls, low, high)]
         while n >= 0:
             if ls.kept_other[n] == high:
-                w.impulse[k], w.tangent_impulse[k], w.load[k] = ls.kept[3 * n], ls.kept[3 * n + 1], ls.kept[3 * n + 2]
-                w.depth[k] = 1 if ls.kept[3 * n] > 0 or ls.kept[3 * n + 2] > 0 else -1
+                w.impulse[k], w.tangent_impulse[k] = ls.kept[4 * n], ls.kept[4 * n + 1]
+                w.load[k] = ls.kept[4 * n + 2]
+                if w.rolls:
+                    w.roll_impulse[k] = ls.kept[4 * n + 3]
+                w.depth[k] = 1 if w.impulse[k] > 0 or w.load[k] > 0 else -1
                 n = -1
             else:
                 n = ls.kept_next[n]

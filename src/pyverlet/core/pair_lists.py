@@ -83,6 +83,7 @@ Lists = cython.struct(
     # ---- what circles without values of their own are made of
     restitution=cython.double,
     friction=cython.double,
+    rolling=cython.double,
 )
 
 

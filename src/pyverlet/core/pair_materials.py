@@ -16,21 +16,65 @@ from pyverlet.core.step import Step
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def compose(w: cython.pointer(Step), ls: cython.pointer(Lists), k: int64_t, i: int64_t, j: int64_t) -> cython.void:
-    """Restitution, friction and radii of particles i and j, in lane k.
+def combined(how: cython.int, a: cython.double, b: cython.double) -> cython.double:
+    """One value of two: 0 their geometric mean, 1 their mean, 2 the smaller, 3 the larger, 4 their product."""
+    if how == 4:
+        return a * b
+    if a == b:  # to the last bit
+        return a
+    if how == 0:
+        return sqrt(a * b)
+    if how == 1:
+        return 0.5 * (a + b)
+    return min(a, b) if how == 2 else max(a, b)
 
-    Of two discs the larger restitution counts, and the geometric mean of the frictions; those of all stand for negative ones.
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def bounce_of(how: cython.int, a: cython.double, b: cython.double) -> cython.double:
+    """The same of restitutions, of which the larger one counts where others have their geometric mean, as in Box2D."""
+    return max(a, b) if how == 0 else combined(how, a, b)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def together(
+    w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t, which: cython.int, own: cython.double
+) -> cython.double:
+    """What materials a and b have together, if the table says so: 0 restitution, 1 friction, 2 rolling resistance; else `own`."""
+    value: cython.double = w.together[3 * (a * w.materials + b) + which]
+    return value if value >= 0 else own
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def compose(w: cython.pointer(Step), ls: cython.pointer(Lists), k: int64_t, i: int64_t, j: int64_t) -> cython.void:
+    """Restitution, friction, rolling resistance and radii of particles i and j, in lane k.
+
+    Values of all stand for negative ones; two materials may have some together.
     """
-    e: real = cython.cast(real, ls.restitution)
-    mu: real = cython.cast(real, ls.friction)
-    of_i: real = w.own_restitution[i] if w.own_restitution[i] >= 0 else e
-    of_j: real = w.own_restitution[j] if w.own_restitution[j] >= 0 else e
-    w.restitution[k] = max(of_i, of_j)
-    w.friction[k] = mu
-    if w.own_friction[i] >= 0 or w.own_friction[j] >= 0:
-        of_i = w.own_friction[i] if w.own_friction[i] >= 0 else mu
-        of_j = w.own_friction[j] if w.own_friction[j] >= 0 else mu
-        w.friction[k] = cython.cast(real, sqrt(of_i * of_j))
+    e: cython.double = ls.restitution
+    mu: cython.double = ls.friction
+    c: cython.double = ls.rolling
+    own: cython.double = w.own_restitution[i]
+    other: cython.double = w.own_restitution[j]
+    e = bounce_of(w.combine, own if own >= 0 else e, other if other >= 0 else e)
+    own, other = w.own_friction[i], w.own_friction[j]
+    mu = combined(w.combine, own if own >= 0 else mu, other if other >= 0 else mu)
+    own, other = w.own_rolling[i], w.own_rolling[j]
+    c = combined(w.combine, own if own >= 0 else c, other if other >= 0 else c)
+    if w.materials > 0:
+        a: cython.Py_ssize_t = w.own_material[i]
+        b: cython.Py_ssize_t = w.own_material[j]
+        e, mu, c = together(w, a, b, 0, e), together(w, a, b, 1, mu), together(w, a, b, 2, c)
+    w.restitution[k], w.friction[k] = cython.cast(real, e), cython.cast(real, mu)
+    w.rolling[k] = cython.cast(real, c) * w.radius[i] * w.radius[j] / (w.radius[i] + w.radius[j])
     w.radius_i[k], w.radius_j[k] = w.radius[i], w.radius[j]
     w.turn_i[k], w.turn_j[k] = 2 / w.radius[i], 2 / w.radius[j]
 

@@ -38,6 +38,44 @@ def motion_of(w: cython.pointer(Step), k: cython.Py_ssize_t, rough: cython.bint)
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
+def ease_i(w: cython.pointer(Step), at: cython.Py_ssize_t, part: lanes) -> lanes:
+    """What an angular impulse over the reduced mass turns i by: w_i / (w_i + w_j) times 2 / r^2."""
+    turn: lanes = load(w.turn_i, at)
+    return part * turn * turn * spread(0.5)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def ease_j(w: cython.pointer(Step), at: cython.Py_ssize_t, other: lanes) -> lanes:
+    """The same of j."""
+    turn: lanes = load(w.turn_j, at)
+    return other * turn * turn * spread(0.5)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def held_roll(w: cython.pointer(Step), k: cython.Py_ssize_t, m: Motion, normal: lanes, tangent: lanes) -> lanes:
+    """The angular impulse of the pairs from k on that lets them not roll on each other, as far as their resistance goes.
+
+    It is at most c r_i r_j / (r_i + r_j) times the normal impulse (Ai, Chen, Rotter and Ooi 2011, model A, as a Coulomb cone).
+    tangent: what friction is just about to give.
+    """
+    at: cython.Py_ssize_t = k * w.mixed
+    part: lanes = load(w.share, k * w.varied)
+    other: lanes = spread(1) - part
+    spins: lanes = m.vs - m.us + tangent * (other * load(w.turn_j, at) - part * load(w.turn_i, at))
+    wanted: lanes = load(w.roll_impulse, k) - spins / (ease_i(w, at, part) + ease_j(w, at, other))
+    return clamped(wanted, load(w.rolling, at) * normal)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
 def apply_impulses(
     w: cython.pointer(Step),
     k: cython.Py_ssize_t,
@@ -47,8 +85,12 @@ def apply_impulses(
     ny: lanes,
     normal: lanes,
     tangent: lanes,
+    roll: lanes,
 ) -> cython.void:
-    """Push the pairs from k on apart by `normal` along n, and by `tangent` across it, which turns them; m: as they move."""
+    """Push the pairs from k on apart by `normal` along n, and by `tangent` across it, which turns them; m: as they move.
+
+    roll: angular impulse on j, the opposite of that on i; unless `rolls` it is none.
+    """
     part: lanes = load(w.share, k * w.varied)
     other: lanes = spread(1) - part
     x: lanes = normal * nx
@@ -59,6 +101,9 @@ def apply_impulses(
         y = y - tangent * nx
         turned_i: lanes = m.us + tangent * part * load(w.turn_i, at)
         turned_j: lanes = m.vs + tangent * other * load(w.turn_j, at)
+        if w.rolls:
+            turned_i = turned_i - roll * ease_i(w, at, part)
+            turned_j = turned_j + roll * ease_j(w, at, other)
         put4(w.motion, w.i, k, m.ux - x * part, m.uy - y * part, turned_i, spread(0))
         put4(w.motion, w.j, k, m.vx + x * other, m.vy + y * other, turned_j, spread(0))
     else:

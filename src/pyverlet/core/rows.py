@@ -97,7 +97,11 @@ def marks_differ(one, other) -> cython.bint:
     return found
 
 
-def any_differs(a, b, c, d, e, f, a_now, b_now, c_now, d_now, e_now, f_now) -> bool:
-    """Whether any of four columns of numbers and two of marks differs from what it is now."""
-    numbers: cython.bint = reals_differ(a, a_now) or reals_differ(b, b_now) or reals_differ(c, c_now) or reals_differ(d, d_now)
-    return numbers or marks_differ(e, e_now) or marks_differ(f, f_now)
+def any_differs(numbers, now, marks, marks_now) -> bool:
+    """Whether any of these columns of numbers, or of marks, differs from what it is now."""
+    found: cython.bint = False
+    for one, other in zip(numbers, now, strict=True):
+        found = found or reals_differ(one, other)
+    for one, other in zip(marks, marks_now, strict=True):
+        found = found or marks_differ(one, other)
+    return found

@@ -8,7 +8,22 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import fabs, sqrt
 
 from pyverlet.core.step import Step
-from pyverlet.core.surface_rows import BEND, CONTACT, DRAG, GAP, NORMAL, PUSH, RUB, SIDES, SPEED, pinned_lane
+from pyverlet.core.surface_rows import (
+    BEND,
+    CONTACT,
+    DRAG,
+    GAP,
+    NORMAL,
+    PUSH,
+    ROLL,
+    ROLL_MOST,
+    RUB,
+    SIDES,
+    SPEED,
+    SPIN,
+    pinned_lane,
+    pinned_sign,
+)
 from pyverlet.core.surface_shapes import measure_surface
 from pyverlet.core.surfaces import MOST_FASTER, length, push_off, speed_limit
 
@@ -46,6 +61,10 @@ def keep_with_pair(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.void
     if w.rough:
         w.tangent_impulse[lane] = cython.cast(real, -w.contact[CONTACT * k + DRAG])
         w.contact[CONTACT * k + DRAG] = -w.tangent_impulse[lane]
+    if w.rolls:
+        sign: cython.double = pinned_sign(w, lane)
+        w.roll_impulse[lane] = cython.cast(real, sign * w.contact[CONTACT * k + ROLL])
+        w.contact[CONTACT * k + ROLL] = sign * w.roll_impulse[lane]
 
 
 @cython.cfunc
@@ -112,6 +131,23 @@ def passes_by(
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def hold_roll(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.Py_ssize_t, after: cython.double, rubbed: cython.double
+) -> cython.void:
+    """The disc is not to roll on the surface, as far as its resistance to that goes; friction is about to give `rubbed`."""
+    row: cython.pointer(cython.double) = w.contact
+    r: cython.double = w.radius[i]
+    most: cython.double = row[first + ROLL_MOST] * after
+    had: cython.double = row[first + ROLL]
+    spin: cython.double = w.motion[4 * i + 2] - row[first + SPIN] - 2 * rubbed / r
+    row[first + ROLL] = min(max(had - 0.5 * r * r * spin, -most), most)
+    w.motion[4 * i + 2] += cython.cast(real, 2 * (row[first + ROLL] - had) / (r * r))
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def hold(
@@ -155,6 +191,8 @@ def hold(
         old: cython.double = row[first + DRAG]
         row[first + DRAG] = min(max(old - slip / 3, -most), most)
         rubbed = row[first + DRAG] - old
+        if w.rolls:
+            hold_roll(w, i, first, after, rubbed)
     if w.surface[k] < 0:
         keep_with_pair(w, k)
     push_off(w, i, k, after - before, rubbed, nx, ny)
@@ -305,5 +343,10 @@ def warm_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
                 w.contact[first + DRAG] *= w.scale
                 if w.surface[k] < 0:
                     keep_with_pair(w, k)
+            if w.rolls:
+                r: cython.double = w.radius[i]
+                if w.substep == w.first:
+                    w.contact[first + ROLL] *= w.scale
+                w.motion[4 * i + 2] += cython.cast(real, 2 * w.contact[first + ROLL] / (r * r))
             jt: cython.double = w.contact[first + DRAG] if w.rough else 0.0
             push_off(w, i, k, w.contact[first + PUSH], jt, w.contact[first + NORMAL], w.contact[first + NORMAL + 1])

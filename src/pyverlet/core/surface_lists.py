@@ -15,7 +15,18 @@ from cython.cimports.team import team_stage
 from pyverlet.core.cells import BLOCK, wrapped
 from pyverlet.core.obstacles import head_of, near_segment
 from pyverlet.core.step import BOX, CAGE, Step
-from pyverlet.core.surface_rows import CONTACT, DRAG, HEARD, HEARD_BOUNCES, HEARD_SPEED, PUSH, SIDES, pinned_lane
+from pyverlet.core.surface_rows import (
+    CONTACT,
+    DRAG,
+    HEARD,
+    HEARD_BOUNCES,
+    HEARD_SPEED,
+    PUSH,
+    ROLL,
+    SIDES,
+    pinned_lane,
+    pinned_sign,
+)
 
 FASTER = cython.declare(cython.double, 2.2)
 """Of what a particle moves in a substep: it sees surfaces that far away."""
@@ -159,16 +170,19 @@ def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
         end: cython.Py_ssize_t = see(w, i, begin, True) if w.contact_end[i] > 0 else begin
         w.contact_end[i] = cython.cast(int32_t, end)
         for k in range(begin, end):
-            w.contact[CONTACT * k + PUSH] = w.contact[CONTACT * k + DRAG] = 0
+            w.contact[CONTACT * k + PUSH] = w.contact[CONTACT * k + DRAG] = w.contact[CONTACT * k + ROLL] = 0
             w.contact[CONTACT * k + HEARD_SPEED] = w.contact[CONTACT * k + HEARD_BOUNCES] = w.contact[CONTACT * k + HEARD] = 0
             if w.surface[k] < 0:
                 w.contact[CONTACT * k + PUSH] = w.impulse[pinned_lane(w, k)]
                 w.contact[CONTACT * k + DRAG] = -w.tangent_impulse[pinned_lane(w, k)] if w.rough else 0
+                if w.rolls:
+                    w.contact[CONTACT * k + ROLL] = pinned_sign(w, pinned_lane(w, k)) * w.roll_impulse[pinned_lane(w, k)]
                 continue
             for o in range(w.old_begin[i], w.old_end[i]):
                 if w.old_surface[o] == w.surface[k]:
                     w.contact[CONTACT * k + PUSH] = w.old_contact[CONTACT * o + PUSH]
                     w.contact[CONTACT * k + DRAG] = w.old_contact[CONTACT * o + DRAG]
+                    w.contact[CONTACT * k + ROLL] = w.old_contact[CONTACT * o + ROLL]
 
 
 @cython.cfunc

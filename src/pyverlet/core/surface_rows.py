@@ -11,6 +11,7 @@ import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
 
+from pyverlet.core.pair_materials import bounce_of, combined, together
 from pyverlet.core.step import CAGE, Step
 
 SIDES = cython.declare(cython.int, 4)
@@ -19,7 +20,7 @@ SIDES = cython.declare(cython.int, 4)
 From there on they are segments. Negative ones are pinned circles: -1 - k is that of lane k of the list of pairs.
 """
 
-CONTACT = cython.declare(cython.int, 15)
+CONTACT = cython.declare(cython.int, 18)
 NORMAL = cython.declare(cython.int, 0)  # (2)
 GAP = cython.declare(cython.int, 2)  # m
 BEND = cython.declare(cython.int, 3)  # 1/m; positive: the surface bends towards the particle, as a cage does
@@ -28,10 +29,13 @@ BOUNCE = cython.declare(cython.int, 6)
 RUB = cython.declare(cython.int, 7)
 PUSH = cython.declare(cython.int, 8)  # impulses along the normal and the tangent over the mass, m/s
 DRAG = cython.declare(cython.int, 9)
-HEARD_SPEED = cython.declare(cython.int, 10)  # as in `Step`, of this frame, while `listening`
-HEARD_BOUNCES = cython.declare(cython.int, 11)
-HEARD = cython.declare(cython.int, 12)
-BEFORE_CHAIN = cython.declare(cython.int, 13)  # (2) PUSH and DRAG before a chain was solved
+ROLL = cython.declare(cython.int, 10)  # angular impulse against rolling over the mass, m^2/s
+HEARD_SPEED = cython.declare(cython.int, 11)  # as in `Step`, of this frame, while `listening`
+HEARD_BOUNCES = cython.declare(cython.int, 12)
+HEARD = cython.declare(cython.int, 13)
+BEFORE_CHAIN = cython.declare(cython.int, 14)  # (2) PUSH and DRAG before a chain was solved
+ROLL_MOST = cython.declare(cython.int, 16)  # most of that over PUSH: coefficient times radius, m
+SPIN = cython.declare(cython.int, 17)  # of the surface, rad/s
 
 ROUNDED = cython.declare(cython.double, 1e-6)
 """Of the reach: a face goes on so far beyond its ends, for what touches it at a joint to meet it in spite of rounding."""
@@ -44,12 +48,20 @@ FARAWAY = cython.declare(cython.double, 1e300)
 @cython.nogil
 @cython.exceptval(check=False)
 def mix(
-    w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.Py_ssize_t, e: cython.double, mu: cython.double
-) -> cython.void:
-    """Restitution and friction of a surface and of what touches it: the larger one, and the geometric mean, as in Box2D."""
-    own: cython.double = w.own_friction[i]
-    w.contact[first + BOUNCE] = max(e, cython.cast(cython.double, w.own_restitution[i]))
-    w.contact[first + RUB] = sqrt(mu * own) if own >= 0 else mu
+    w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.Py_ssize_t, e: cython.double, mu: cython.double,
+    c: cython.double, material: cython.Py_ssize_t,
+) -> cython.void:  # fmt: skip
+    """Restitution, friction and rolling resistance of a surface and of what touches it: as `compose` of pairs has it."""
+    own: cython.double = w.own_restitution[i]
+    e = bounce_of(w.combine, e, own) if own >= 0 else e
+    own = w.own_friction[i]
+    mu = combined(w.combine, mu, own) if own >= 0 else mu
+    own = w.own_rolling[i]
+    c = combined(w.combine, c, own) if own >= 0 else c
+    if w.materials > 0:
+        a: cython.Py_ssize_t = w.own_material[i]
+        e, mu, c = together(w, a, material, 0, e), together(w, a, material, 1, mu), together(w, a, material, 2, c)
+    w.contact[first + BOUNCE], w.contact[first + RUB], w.contact[first + ROLL_MOST] = e, mu, c * w.radius[i]
 
 
 @cython.cfunc
@@ -63,7 +75,7 @@ def measure_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
     x: cython.double = w.position[2 * i]
     y: cython.double = w.position[2 * i + 1]
     r: cython.double = w.radius[i]
-    row[first + SPEED] = row[first + SPEED + 1] = row[first + BEND] = 0.0
+    row[first + SPEED] = row[first + SPEED + 1] = row[first + BEND] = row[first + SPIN] = 0.0
     if w.room == CAGE:
         x -= w.x0
         y -= w.y0
@@ -73,6 +85,7 @@ def measure_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
         row[first + NORMAL], row[first + NORMAL + 1] = nx, ny
         row[first + GAP] = w.x1 - r - d
         row[first + BEND] = 1 / (w.x1 - r) if w.x1 > r else 0.0
+        row[first + SPIN] = w.wall_speed / w.x1
         row[first + SPEED], row[first + SPEED + 1] = -w.wall_speed * ny, w.wall_speed * nx
     else:
         row[first + NORMAL] = -1.0 if side == 0 else 1.0 if side == 1 else 0.0
@@ -85,7 +98,7 @@ def measure_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
             row[first + GAP] = y - r - w.y0
         else:
             row[first + GAP] = w.y1 - r - y
-    mix(w, i, first, w.wall_restitution, w.wall_friction)
+    mix(w, i, first, w.wall_restitution, w.wall_friction, w.wall_rolling, w.wall_material)
 
 
 @cython.cfunc
@@ -95,6 +108,15 @@ def measure_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
 def pinned_lane(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.Py_ssize_t:
     """The lane of the pair whose pinned circle is the surface of contact k."""
     return -1 - cython.cast(cython.Py_ssize_t, w.surface[k])
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def pinned_sign(w: cython.pointer(Step), lane: cython.Py_ssize_t) -> cython.double:
+    """1 if the free circle of this pair is its second, which angular impulses of the pair are those of, else -1."""
+    return 1.0 if w.inverse_mass[w.i[lane]] == 0 else -1.0
 
 
 @cython.cfunc
@@ -128,5 +150,6 @@ def measure_pinned(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_s
     turn: cython.double = w.motion[4 * j + 2] * cython.cast(cython.double, w.radius[j]) if w.rough else 0.0
     row[first + SPEED], row[first + SPEED + 1] = v[width * j] + turn * ny, v[width * j + 1] - turn * nx
     row[first + BOUNCE], row[first + RUB] = w.restitution[lane * w.mixed], w.friction[lane * w.mixed]
+    row[first + ROLL_MOST], row[first + SPIN] = w.rolling[lane * w.mixed], w.motion[4 * j + 2] if w.rough else 0.0
     w.normal_x[lane], w.normal_y[lane] = cython.cast(real, sign * nx), cython.cast(real, sign * ny)
     w.depth[lane] = cython.cast(real, reach - distance)

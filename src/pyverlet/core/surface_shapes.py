@@ -137,7 +137,7 @@ def depth_inside(w: cython.pointer(Step), at: cython.Py_ssize_t, x: cython.doubl
     first: cython.Py_ssize_t = cython.cast(int64_t, w.segment[at + FIRST_FACE])
     count: cython.Py_ssize_t = cython.cast(int64_t, w.segment[at + FACES])
     least: cython.double = FARAWAY
-    for k in range(SEGMENT * first, SEGMENT * (first + count), 32):
+    for k in range(SEGMENT * first, SEGMENT * (first + count), 40):
         ox: cython.double = x - w.segment[k + PLACE]
         oy: cython.double = y - w.segment[k + PLACE + 1]
         least = min(least, w.segment[k + PLACE + 2] * oy - w.segment[k + PLACE + 3] * ox)
@@ -188,7 +188,16 @@ def set_surface(
     y: cython.double = p.s * nx + p.c * ny
     row[first + NORMAL], row[first + NORMAL + 1] = x, y
     set_surface_speed(w, first, at, p.wx + w.radius[i] * x, p.wy + w.radius[i] * y, x, y, since)
-    mix(w, i, first, w.segment[at + RESTITUTION], w.segment[at + FRICTION])
+    mix(
+        w,
+        i,
+        first,
+        w.segment[at + RESTITUTION],
+        w.segment[at + FRICTION],
+        w.segment[at + ROLLS],
+        cython.cast(int64_t, w.segment[at + MATERIAL]),
+    )
+    row[first + SPIN] = w.body[6 * cython.cast(int64_t, w.segment[at + BODY_OF]) + 5]
 
 
 @cython.cfunc

@@ -84,11 +84,15 @@ def measure(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bi
         store(w.depth, k, reach - distance)
         if warm and loaded:
             tangent: lanes = zero
+            roll: lanes = zero
             if rough:
                 tangent = clamped(load(w.tangent_impulse, k) * scale, load(w.friction, k * w.mixed) * impulse)
                 store(w.tangent_impulse, k, tangent)
+                if w.rolls:
+                    roll = clamped(load(w.roll_impulse, k) * scale, load(w.rolling, k * w.mixed) * impulse)
+                    store(w.roll_impulse, k, roll)
             store(w.impulse, k, impulse)
-            apply_impulses(w, k, rough, motion_of(w, k, rough), nx, ny, impulse, tangent)
+            apply_impulses(w, k, rough, motion_of(w, k, rough), nx, ny, impulse, tangent, roll)
 
 
 @cython.cfunc

@@ -14,13 +14,14 @@ from cython.cimports.lanes import real
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.step import Step
-from pyverlet.core.surface_rows import CONTACT, DRAG, NORMAL, SIDES, SPEED
+from pyverlet.core.surface_rows import CONTACT, DRAG, NORMAL, ROLL, SIDES, SPEED, SPIN
 
-WORK = cython.declare(cython.int, 4)  # numbers a particle, J
+WORK = cython.declare(cython.int, 5)  # numbers a particle, J
 BY_IMPACTS = cython.declare(cython.int, 0)  # along normals, by impacts
 BY_FRICTION = cython.declare(cython.int, 1)
 BY_WALLS = cython.declare(cython.int, 2)  # by surfaces of the room that move along themselves
 BY_PLACES = cython.declare(cython.int, 3)  # against `acceleration`, by moving particles
+BY_ROLLING = cython.declare(cython.int, 4)  # by what resists rolling
 
 
 @cython.cfunc
@@ -147,6 +148,11 @@ def book_grips(what: cython.p_void, block: cython.int) -> cython.void:
                 turn = 0.5 * (turn + w.motion[4 * i + 2]) * w.radius[i]
                 w.work[WORK * i + BY_FRICTION] += jt * (ux * ny - uy * nx - turn) / w.inverse_mass[i]
                 book_belt(w, i, k, jt, nx, ny)
+            if w.rolls and row[first + ROLL] != 0 and w.inverse_mass[i] > 0:
+                turn = 0.5 * (w.free_spin[i] + cython.cast(cython.double, w.motion[4 * i + 2]))
+                w.work[WORK * i + BY_ROLLING] += row[first + ROLL] * (turn - row[first + SPIN]) / w.inverse_mass[i]
+                if 0 <= w.surface[k] < SIDES:
+                    w.work[WORK * i + BY_WALLS] += row[first + ROLL] * row[first + SPIN] / w.inverse_mass[i]
 
 
 @cython.cfunc
@@ -157,7 +163,7 @@ def book_rubbing(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
     k: cython.Py_ssize_t
     first: cython.Py_ssize_t = w.begin[s]
     for k in range(first, first + w.swept[s]):
-        if w.tangent_impulse[k] != 0:
+        if w.tangent_impulse[k] != 0 or (w.rolls and w.roll_impulse[k] != 0):
             i: cython.Py_ssize_t = w.i[k]
             j: cython.Py_ssize_t = w.j[k]
             if k > first and w.i[k - 1] == w.i[k] and w.j[k - 1] == w.j[k]:
@@ -166,6 +172,7 @@ def book_rubbing(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
             uy: cython.double = w.free[2 * j + 1]
             a: cython.double = w.free_spin[i]
             b: cython.double = w.free_spin[j]
+            spins: cython.double = b + w.motion[4 * j + 2] - a - w.motion[4 * i + 2]
             ux = ux - w.free[2 * i] + w.motion[4 * j] - w.motion[4 * i]
             uy = uy - w.free[2 * i + 1] + w.motion[4 * j + 1] - w.motion[4 * i + 1]
             a = (a + w.motion[4 * i + 2]) * w.radius[i]
@@ -174,3 +181,5 @@ def book_rubbing(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
             inverse += w.inverse_mass[j]
             slip: cython.double = 0.5 * (ux * w.normal_y[k] - uy * w.normal_x[k] + a + b)
             w.work[WORK * i + BY_FRICTION] += w.tangent_impulse[k] * slip / inverse
+            if w.rolls:
+                w.work[WORK * i + BY_ROLLING] += w.roll_impulse[k] * 0.5 * spins / inverse

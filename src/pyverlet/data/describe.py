@@ -85,15 +85,22 @@ def _kind(
 # ---- what there is -----------------------------------------------------------------------------------------------------
 
 _kind(rooms.Open)
-_kind(rooms.Circle, "center", "radius", "restitution", "friction", "angular_velocity")
-_kind(rooms.Box, "lower", "upper", "restitution", "friction")
-_kind(rooms.Periodic, "lower", "upper", "axes", "restitution", "friction")
+_kind(rooms.Circle, "center", "radius", "restitution", "friction", "rolling_resistance", "material", "angular_velocity")
+_kind(rooms.Box, "lower", "upper", "restitution", "friction", "rolling_resistance", "material")
+_kind(rooms.Periodic, "lower", "upper", "axes", "restitution", "friction", "rolling_resistance", "material")
 _kind(naive.ClampAndFlip, "room")
 _kind(naive.ProjectOnly, "room")
 
 _kind(Fast, "skin")
 _kind(BruteForce)
-_kind(Collisions, "restitution", "friction", "method")
+
+
+def _collisions(laws: Any) -> dict[str, Any]:
+    own = {name: getattr(laws, name) for name in ("restitution", "friction", "rolling_resistance", "combine", "method")}
+    return own | {"materials": {", ".join(names): dict(values) for names, values in laws.materials.items()}}
+
+
+_kind(Collisions, arguments=_collisions)
 
 for _integrator in integrators.BY_NAME.values():
     _kind(_integrator, *inspect.signature(_integrator).parameters)
@@ -122,7 +129,7 @@ def _let_go(grip: forces.Grip, state: dict[str, Any]) -> None:
 
 _kind(forces.Grip, arguments=_grip, state=lambda grip: {} if grip.particle >= 0 else {"holds": False}, recall=_let_go)
 
-SURFACE = ("restitution", "friction", "surface_speed", "velocity", "angular_velocity", "pivot")
+SURFACE = ("restitution", "friction", "rolling_resistance", "material", "surface_speed", "velocity", "angular_velocity", "pivot")
 """Arguments that all obstacles take."""
 
 

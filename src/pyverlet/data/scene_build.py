@@ -30,14 +30,15 @@ from pyverlet.world.world import World
 
 Table = dict[str, Any]
 
-COLUMNS = ("position", "velocity", "spin", "radius", "mass", "restitution", "friction", "category", "mask")
-"""Arrays of a group that is kept as such."""
+LATER = ("rolling_resistance", "material")
+COLUMNS = ("position", "velocity", "spin", "radius", "mass", "restitution", "friction", *LATER, "category", "mask")
+"""Arrays of a group that is kept as such; files of older versions lack the later ones."""
 
 HALF = 0.5
 """m: a circle of this radius has 1 kg unless its group says otherwise."""
 
 _LINKS: dict[str, Any] = {cls.__name__: cls for cls in (Stick, Rope, Spring, Pin, Angle, Area)}
-_COMMON = ("velocity", "spin", "restitution", "friction", "category", "mask")
+_COMMON = ("velocity", "spin", "restitution", "friction", *LATER, "category", "mask")
 
 
 class Recipe:
@@ -290,10 +291,11 @@ class Recipe:
             raise InputError(f"file '{beside}' has the hash {hash_of(content)}; allowed is {table['hash']}, the file of then")
         try:
             with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-                columns = {key: arrays[f"{table['name']}.{key}"] for key in COLUMNS}
+                places = {key: f"{table['name']}.{key}" for key in COLUMNS}
+                columns = {key: arrays[place] for key, place in places.items() if place in arrays or key not in LATER}
         except (ValueError, KeyError, OSError) as error:
             raise InputError(f"file '{beside}' lacks the arrays of {table['name']!r} ({error})") from None
-        own = {key: columns.pop(key) for key in ("restitution", "friction")}
+        own = {key: columns.pop(key) for key in ("restitution", "friction", "rolling_resistance") if key in columns}
         group = world.add(**columns)
         for key, column in own.items():  # negative: as the world says
             setattr(group, key, column)

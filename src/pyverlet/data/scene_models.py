@@ -54,6 +54,7 @@ def _one_of(models: list[Any]) -> Any:
 
 # Arguments by their annotation; those of links and outlines, which take any array, by their name.
 _ANNOTATED: dict[str, Any] = {
+    "str": str,
     "float": float,
     "float | None": float | None,
     "int": int,
@@ -135,6 +136,10 @@ class Collisions(Part):
     type: Literal["Collisions"] = "Collisions"
     restitution: Annotated[float, Field(ge=0, le=1)] = 0.0
     friction: Annotated[float, Field(ge=0)] = 0.0
+    rolling_resistance: Annotated[float, Field(ge=0)] = 0.0
+    combine: Literal["geometric", "mean", "min", "max", "multiply"] = "geometric"
+    materials: dict[str, dict[str, Annotated[float, Field(ge=0)]]] = Field(default_factory=dict)
+    """What two materials have together: "rubber, ice" -> restitution, friction, rolling_resistance."""
     method: Method = Field(default_factory=lambda: MODELS["Fast"](type="Fast"))
 
 
@@ -151,6 +156,8 @@ class Group(Part):
     """kg, of each; unless said, 1 kg for a radius of 0.5 m, and others by their area."""
     restitution: Annotated[float, Field(ge=0, le=1)] | None = None
     friction: Annotated[float, Field(ge=0)] | None = None
+    rolling_resistance: Annotated[float, Field(ge=0)] | None = None
+    material: str = ""
     category: Bits = 1
     mask: Bits = EVERYONE
     pinned: bool = False

@@ -142,6 +142,13 @@ def bits(name: str, value: ArrayLike, count: int) -> NDArray[np.uint32]:
     return column(name, array, np.dtype(np.uint32), count)
 
 
+def text(name: str, value: Any) -> str:
+    """A text."""
+    if not isinstance(value, str):
+        raise InputError(f"{name} is {value!r}; allowed is a text")
+    return value
+
+
 def indices(name: str, value: ArrayLike, count: int) -> NDArray[np.int64]:
     """Sorted indices without repetition from an index, several, or a mask of `count` bools."""
     allowed = f"are whole numbers from 0 to {count - 1}, or {count} bools"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -36,28 +37,89 @@ class BruteForce:
     """All pairs, in O(n^2): the reference for `Fast`."""
 
 
+COMBINE = ("geometric", "mean", "min", "max", "multiply")
+"""Ways to make one value of two, as the core numbers them."""
+
+TOGETHER = ("restitution", "friction", "rolling_resistance")
+"""What two materials may have together."""
+
+
+def _materials(table: Any) -> dict[tuple[str, str], dict[str, float]]:
+    """Checked, with names in alphabetical order. In files, where keys are text, a key is both names with a comma between."""
+    if not isinstance(table, Mapping):
+        raise InputError(f"materials is {table!r}; allowed is a table such as {{('rubber', 'ice'): {{'friction': 0.1}}}}")
+    checked: dict[tuple[str, str], dict[str, float]] = {}
+    for key, values in table.items():
+        names: Any = tuple(name.strip() for name in key.split(",")) if isinstance(key, str) else key
+        if not (isinstance(names, tuple) and len(names) == 2 and all(isinstance(name, str) and name for name in names)):
+            raise InputError(f"materials has the key {key!r}; allowed are two names, such as ('rubber', 'ice')")
+        if not isinstance(values, Mapping) or not values.keys() <= set(TOGETHER):
+            raise InputError(f"materials of {names} is {values!r}; allowed is a table of {', '.join(TOGETHER)}")
+        if "restitution" in values:
+            checks.fraction(f"restitution of {names}", values["restitution"])
+        first, second = sorted(names)
+        checked[first, second] = {name: checks.number(f"{name} of {names}", value, least=0.0) for name, value in values.items()}
+    return checked
+
+
 @dataclass(frozen=True, kw_only=True)
 class Collisions:
     """How particles collide with each other.
 
-    Both numbers are for circles added without values of their own. Of two that differ the larger restitution counts, and the
-    geometric mean of the frictions, as in Box2D; of a circle with values of its own and a wall likewise.
+    These numbers are for circles added without values of their own. Of two that differ the larger restitution counts, and the
+    geometric mean of the frictions, as in Box2D, and of the rolling resistances; so do those of a wall and of a circle that has
+    values of its own.
 
     Args:
         restitution: e, 0 to 1. An impact leaves with e times the normal speed it came with; contact at rest never bounces.
         friction: mu of Coulomb, 0 or more. 0 leaves spin alone.
+        rolling_resistance: c, 0 or more: contacts resist rolling by a torque of at most c r N, N being the normal force and r the
+            radius, between two circles r_i r_j / (r_i + r_j). A disc that rolls on a level floor at v0 stops after
+            v0^2 (1 + 1/2) / (2 c g), and rests on a slope of less than c. Bounces are free of it.
+        combine: how the values of two that touch become one: "geometric", "mean", "min", "max" or "multiply" (as in pymunk). With
+            "geometric" the larger restitution counts. Of a surface and a circle without values of its own, the surface's do.
+        materials: what two materials have together, whatever each has of its own: {("rubber", "ice"): {"friction": 0.1}}, with
+            any of restitution, friction and rolling_resistance; also of two of the same. Circles, obstacles and rooms are of
+            the material that their `material` names.
         method: how pairs are found, Fast() or the O(n^2) reference BruteForce(). Both find the same contacts.
     """
 
     restitution: float = 0.0
     friction: float = 0.0
+    rolling_resistance: float = 0.0
+    combine: str = "geometric"
+    materials: Mapping[Any, Mapping[str, float]] = field(default_factory=dict, hash=False)
     method: Fast | BruteForce = field(default_factory=Fast)
 
     def __post_init__(self) -> None:
         checks.fraction("restitution", self.restitution)
         checks.number("friction", self.friction, least=0.0)
+        checks.number("rolling_resistance", self.rolling_resistance, least=0.0)
+        if self.combine not in COMBINE:
+            raise InputError(f"combine is {self.combine!r}; allowed are {', '.join(map(repr, COMBINE))}")
+        object.__setattr__(self, "materials", _materials(self.materials))
         if not isinstance(self.method, Fast | BruteForce):
             raise InputError(f"method is {self.method!r}; allowed are pyverlet.Fast() and pyverlet.BruteForce()")
+
+    @property
+    def names(self) -> list[str]:
+        """Of all materials in the table."""
+        return sorted({name for names in self.materials for name in names})
+
+    def most(self, name: str) -> float:
+        """The largest value of this name that two of circles without values of their own may have."""
+        own: float = getattr(self, name)
+        return max([own, *(values.get(name, 0.0) for values in self.materials.values())])
+
+    def table(self, names: Sequence[str]) -> Array:
+        """(k, k, 3) what two of these materials have together, in the order of `TOGETHER`; -1 where the table says nothing."""
+        place, values = {name: k for k, name in enumerate(names)}, np.full((len(names), len(names), len(TOGETHER)), -1.0)
+        table: Any = self.materials
+        for (first, second), together in table.items():
+            if first in place and second in place:
+                i, j = place[first], place[second]
+                values[i, j] = values[j, i] = [together.get(name, -1.0) for name in TOGETHER]
+        return values
 
 
 class Overlap(NamedTuple):

@@ -23,6 +23,7 @@ class Ledger:
     Attributes:
         restitution: taken by impacts: (1 - e^2) of the energy along the normal. Contacts at rest are impacts with e = 0.
         friction: taken by Coulomb friction.
+        rolling: taken by rolling resistance.
         drag: work of forces whose `account` is "drag".
         forces: work of all other forces without a potential, such as a user's own and the mouse.
         links: taken by links: damping, and what stiff ones do not give back.
@@ -37,6 +38,7 @@ class Ledger:
 
     restitution: float = 0.0
     friction: float = 0.0
+    rolling: float = 0.0
     drag: float = 0.0
     forces: float = 0.0
     links: float = 0.0
@@ -70,12 +72,15 @@ class Bookkeeper:
     def __init__(self) -> None:
         self.ledger = Ledger()
         self._energy = 0.0  # at the end of the last frame
-        self._resting = 0.0  # J of friction that velocities shown then held of the last substep
+        self._resting = self._rolled = (
+            0.0  # J of friction, and against rolling, that velocities shown then held of the last substep
+        )
 
     def copy(self) -> Bookkeeper:
         """Another one with the same accounts."""
         other = Bookkeeper()
-        other.ledger, other._energy, other._resting = replace(self.ledger), self._energy, self._resting
+        other.ledger, other._energy = replace(self.ledger), self._energy
+        other._resting, other._rolled = self._resting, self._rolled
         return other
 
 
@@ -94,11 +99,11 @@ class Page:
         self._gravity, self._t = forces.gravity, t
         self._holding = [force for force in forces.forces if has_potential(force)]
         self._working = [force for force in forces.forces if not has_potential(force)]
-        self._open, self._resting = replace(books.ledger), books._resting
+        self._open, self._resting, self._rolled = replace(books.ledger), books._resting, books._rolled
         self._now = _Instant(0.0, {})
         self._begun = self._risen = 0.0  # J when the frame began; of those at its end, of who is beyond the seam
         self._engine: Any = None
-        self._sums = (0.0, 0.0, 0.0, 0.0)  # J by impacts, by friction, by walls, and by all contacts in this frame
+        self._sums = (0.0,) * 5  # J by impacts, by friction, against rolling, by walls, and by all contacts in this frame
 
     def __call__(self, stage: str) -> None:
         self._done(stage)
@@ -118,7 +123,8 @@ class Page:
         """Substeps begin; of what contacts gave in the last one, velocities hold `share`."""
         engine.book(True)
         # Along tangents as the last frame has found it: lists of contacts may be made anew since.
-        self._engine, self._sums = engine, (0.0, -self._resting if share else 0.0, 0.0, -engine.energy_of_last(share)[0])
+        held = (self._resting, self._rolled) if share else (0.0, 0.0)
+        self._engine, self._sums = engine, (0.0, -held[0], -held[1], 0.0, -engine.energy_of_last(share)[0])
 
     def moved(self, lag: float, gave: Any, kick: float) -> None:
         """A substep is over, and velocities are those of `lag` s ago; contacts gave `gave` (n, 2) m/s in it."""
@@ -141,30 +147,32 @@ class Page:
         """Let walls that the core does not know confine particles."""
         before = self._look(about[1], works=False).energy
         confine(self._state, *about)
-        self._add(0.0, 0.0, 0.0, self._look(about[1], works=False).energy - before)
+        self._add(0.0, 0.0, 0.0, 0.0, self._look(about[1], works=False).energy - before)
 
     def end(self, share: float) -> None:
         """Substeps are over, and velocities those of now, with `share` of what contacts gave in the last one."""
-        whole, self._resting = self._engine.energy_of_last(share)
+        whole, self._resting, self._rolled = self._engine.energy_of_last(share)
         self._engine.book(False)
-        impacts, friction, walls, places = self._engine.arrays["work"].sum(axis=0).tolist()
-        self._add(impacts, friction + self._resting, walls, float(self._engine.arrays["gained"].sum()) + places + whole)
+        impacts, friction, walls, places, rolling = self._engine.arrays["work"].sum(axis=0).tolist()
+        contacts = float(self._engine.arrays["gained"].sum()) + places + whole
+        self._add(impacts, friction + self._resting, rolling + self._rolled, walls, contacts)
 
     def _add(self, *more: float) -> None:
         self._sums = tuple(a + b for a, b in zip(self._sums, more, strict=True))  # type: ignore[assignment]
 
     def close(self, limiter: float) -> None:
         """The frame has gone well; limiter: J that the energy limiter has given, negative."""
-        impacts, friction, walls, contacts = self._sums
-        rest, page = contacts - impacts - friction - walls, self._open
+        impacts, friction, rolling, walls, contacts = self._sums
+        rest, page = contacts - impacts - friction - rolling - walls, self._open
         page.restitution += impacts + min(rest, 0.0)
         page.friction += friction
+        page.rolling += rolling
         page.projection += max(rest, 0.0)
         page.walls += walls
         page.limiter += limiter
         page.residual -= contacts + limiter
         page.seam -= self._risen
-        self._books.ledger, self._books._resting = page, self._resting
+        self._books.ledger, self._books._resting, self._books._rolled = page, self._resting, self._rolled
         self._books._energy = self._now.energy - self._risen
 
     def _beyond_seam(self) -> float:

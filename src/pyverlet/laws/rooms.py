@@ -100,11 +100,19 @@ class Open(Boundary):
 
 
 class _Walls(Boundary):
-    """Restitution and friction of walls."""
+    """Restitution, friction and rolling resistance of walls."""
 
-    def __init__(self, restitution: float, friction: float) -> None:
+    def __init__(self, restitution: float, friction: float, rolling_resistance: float, material: str) -> None:
         self.restitution = checks.fraction("restitution", restitution)
         self.friction = checks.number("friction", friction, least=0.0)
+        self.rolling_resistance = checks.number("rolling_resistance", rolling_resistance, least=0.0)
+        self.material = checks.text("material", material)
+
+    def _surface(self) -> str:
+        """For `repr`."""
+        rolling = f", rolling_resistance={self.rolling_resistance:g}" if self.rolling_resistance else ""
+        made = f", material={self.material!r}" if self.material else ""
+        return f"restitution={self.restitution:g}, friction={self.friction:g}{rolling}{made}"
 
     def _law(self, h: float, lag: float, rest_speed: float, belt: float = 0.0) -> tuple[float, ...]:
         """What `core.own_walls` asks of them; belt: m/s of their surface."""
@@ -125,6 +133,8 @@ class Circle(_Walls):
         radius: of the cage, m.
         restitution: e of the wall, 0 to 1.
         friction: mu of the wall, 0 or more.
+        rolling_resistance: c of the wall, 0 or more; see `Collisions`.
+        material: a name of `Collisions(materials=...)`, or none.
         angular_velocity: rad/s it turns with about its centre, counter-clockwise: a drum, whose wall takes along what rubs on it.
     """
 
@@ -135,9 +145,11 @@ class Circle(_Walls):
         radius: float,
         restitution: float = 0.0,
         friction: float = 0.0,
+        rolling_resistance: float = 0.0,
+        material: str = "",
         angular_velocity: float = 0.0,
     ) -> None:
-        super().__init__(restitution, friction)
+        super().__init__(restitution, friction, rolling_resistance, material)
         self.center = checks.vector("center", center)
         self.radius = checks.number("radius", radius, above=0.0)
         self.angular_velocity = checks.number("angular_velocity", angular_velocity)
@@ -178,7 +190,7 @@ class Circle(_Walls):
 
     def __repr__(self) -> str:
         turns = f", angular_velocity={self.angular_velocity:g}" if self.angular_velocity else ""
-        walls = f"restitution={self.restitution:g}, friction={self.friction:g}{turns}"
+        walls = f"{self._surface()}{turns}"
         return f"Circle(center={self.center}, radius={self.radius:g}, {walls})"
 
 
@@ -190,12 +202,21 @@ class Box(_Walls):
         upper: (x1, y1), the upper right corner, m.
         restitution: e of the walls, 0 to 1.
         friction: mu of the walls, 0 or more.
+        rolling_resistance: c of the walls, 0 or more; see `Collisions`.
+        material: a name of `Collisions(materials=...)`, or none.
     """
 
     def __init__(
-        self, lower: Sequence[float], upper: Sequence[float], *, restitution: float = 0.0, friction: float = 0.0
+        self,
+        lower: Sequence[float],
+        upper: Sequence[float],
+        *,
+        restitution: float = 0.0,
+        friction: float = 0.0,
+        rolling_resistance: float = 0.0,
+        material: str = "",
     ) -> None:
-        super().__init__(restitution, friction)
+        super().__init__(restitution, friction, rolling_resistance, material)
         self.lower = checks.vector("lower", lower)
         self.upper = checks.vector("upper", upper)
         if not (self.lower[0] < self.upper[0] and self.lower[1] < self.upper[1]):
@@ -230,7 +251,7 @@ class Box(_Walls):
         _fits(radius, half, f"half the shorter side of the box, {half:g} m")
 
     def __repr__(self) -> str:
-        return f"Box({self.lower}, {self.upper}, restitution={self.restitution:g}, friction={self.friction:g})"
+        return f"Box({self.lower}, {self.upper}, {self._surface()})"
 
 
 class Periodic(_Walls):
@@ -245,6 +266,8 @@ class Periodic(_Walls):
         axes: in which directions the room is periodic: "xy", or "x" or "y" alone, with walls in the other direction.
         restitution: e of the walls, where there are any, 0 to 1.
         friction: mu of the walls, where there are any, 0 or more.
+        rolling_resistance: c of the walls, where there are any, 0 or more; see `Collisions`.
+        material: a name of `Collisions(materials=...)`, or none.
 
     Raises:
         InputError: an argument is outside what is allowed; from `World.add`, a circle is larger than half a period.
@@ -258,8 +281,10 @@ class Periodic(_Walls):
         axes: str = "xy",
         restitution: float = 0.0,
         friction: float = 0.0,
+        rolling_resistance: float = 0.0,
+        material: str = "",
     ) -> None:
-        super().__init__(restitution, friction)
+        super().__init__(restitution, friction, rolling_resistance, material)
         self.lower, self.upper = checks.vector("lower", lower), checks.vector("upper", upper)
         if axes not in ("xy", "x", "y"):
             raise InputError(f"axes is {axes!r}; allowed are 'xy', 'x' and 'y'")
@@ -320,7 +345,7 @@ class Periodic(_Walls):
             _fits(radius, half, f"half the distance of the walls, {half:g} m")
 
     def __repr__(self) -> str:
-        walls = "" if self.axes == "xy" else f", axes={self.axes!r}, restitution={self.restitution:g}, friction={self.friction:g}"
+        walls = "" if self.axes == "xy" else f", axes={self.axes!r}, {self._surface()}"
         return f"Periodic({self.lower}, {self.upper}{walls})"
 
 

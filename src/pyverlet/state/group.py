@@ -155,8 +155,18 @@ class Group:
     mass = Column("(n,) kg; infinity pins a particle.")
     restitution = Column("(n,) e of these circles; negative: as the world's `Collisions` and bounds say.")
     friction = Column("(n,) mu of these circles; negative: as the world's `Collisions` and bounds say.")
+    rolling_resistance = Column("(n,) c of these circles; negative: as the world's `Collisions` and bounds say.")
     category = Column("(n,) uint32, the bits of what these circles are.")
     mask = Column("(n,) uint32, the bits of the categories they collide with.")
+
+    @property
+    def material(self) -> NDArray[np.str_]:
+        """(n,) names of materials, "" for none. A copy; one for all or (n,) may be set."""
+        return np.asarray(np.array(self._state.materials)[self._state.material[self._where]])
+
+    @material.setter
+    def material(self, names: Any) -> None:
+        self._state.material[self._where] = self._state.material_numbers(names, len(self))
 
     def pin(self, index: Any = slice(None)) -> None:
         """Make particles immovable where they are: mass infinite, no velocity. Give them a mass again to let go.
@@ -274,6 +284,7 @@ class Particle:
     mass = Column("kg; infinity pins it.")
     restitution = Column("e of its own; negative: as the world's `Collisions` and bounds say.")
     friction = Column("mu of its own; negative: as the world's `Collisions` and bounds say.")
+    rolling_resistance = Column("c of its own; negative: as the world's `Collisions` and bounds say.")
     category = Column("The bits of what it is.")
     mask = Column("The bits of the categories it collides with.")
 

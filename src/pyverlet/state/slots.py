@@ -32,9 +32,10 @@ class Slots:
         motion: the unit of the core that moves particles, for this dtype.
         real: rounds a number to the dtype; it remembers some, for NumPy takes longer to round one than a kernel to be called.
         particle: (n,) the user's index of the particle in each slot.
-        position, velocity, acceleration, spin, radius, mass, restitution, friction: as in State.
+        position, velocity, acceleration, spin, radius, mass, restitution, friction, rolling_resistance: as in State.
         category, mask: as in State, or empty while every circle collides with every other.
-        most_restitution, most_friction: the largest of their columns; negative if no circle has values of its own.
+        material: as in State, or empty while no circle has one. materials: as in State.
+        most_restitution, most_friction, most_rolling: the largest of their columns; negative if no circle has values of its own.
         revision: how often what users set was taken up anew, or others slept.
         inverse_mass: (n,) 1/kg; 0 for a pinned particle: whether one `pins`. total_mass: of others, kg.
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
@@ -76,8 +77,8 @@ class Slots:
         self._given: dict[str, Any] = {name: np.zeros(0, np.uint32 if name in MARKS else self.dtype) for name in _GIVEN}
         self._changed = True
         self.wall_hits = np.full(count, -1, self.dtype)
-        self.category = self.mask = np.empty(0, np.uint32)
-        self.most_restitution = self.most_friction = -1.0
+        self.category = self.mask = self.material = np.empty(0, np.uint32)
+        self.most_restitution = self.most_friction = self.most_rolling = -1.0
         self._scratch: list[Array] = []
         self._slot_of: Array | None = None
 
@@ -89,6 +90,7 @@ class Slots:
     mass: Array
     restitution: Array
     friction: Array
+    rolling_resistance: Array
     inverse_mass: Array
     seam = seam.NONE  # in a periodic room positions run on beyond it within a frame
     island: Array
@@ -124,8 +126,9 @@ class Slots:
         if not self._given_back.recall(given):  # what the user has not changed is not copied again
             self.motion.take_motion(self.position, self.velocity, self.acceleration, self.spin, *given, self.particle)
         # What seldom changes is compared in the user's order, where neighbours in memory need no index.
-        now = (state.radius, state.mass, state.restitution, state.friction, state.category, state.mask)
-        if self._changed or self.motion.any_differs(*(*self._given.values(), *now)):
+        given, now = tuple(self._given.values()), [getattr(state, name) for name in _GIVEN]
+        numbers, marks = slice(len(SET)), slice(len(SET), None)
+        if self._changed or self.motion.any_differs(given[numbers], now[numbers], given[marks], now[marks]):
             return self._take_given(state)
         return False
 
@@ -142,10 +145,12 @@ class Slots:
         # Summed in the user's order: that of slots, and with it the last bit, is another when a saved world is taken up.
         self.total_mass = float(state.mass.sum(dtype=float, where=(free := np.isfinite(state.mass))))
         self.pins = not free.all()
-        self.most_restitution, self.most_friction = (float(a.max(initial=-1.0)) for a in (self.restitution, self.friction))
+        own = self.restitution, self.friction, self.rolling_resistance
+        self.most_restitution, self.most_friction, self.most_rolling = (float(column.max(initial=-1.0)) for column in own)
         filters = (state.category != 1).any() or (state.mask != EVERYONE).any()
         order = self.particle if filters else self.particle[:0]
         self.category, self.mask = state.category[order], state.mask[order]
+        self.material, self.materials = state.material[self.particle if state.material.any() else order[:0]], state.materials
         self._changed = False
         return bool(changed)
 

@@ -19,13 +19,15 @@ from pyverlet.state import seam
 Array = NDArray[Any]
 
 ROWS = ("position", "velocity", "acceleration")
-SET = ("radius", "mass", "restitution", "friction")
+SET = ("radius", "mass", "restitution", "friction", "rolling_resistance")
 COLUMNS = ("spin", *SET)
-MARKS = ("category", "mask")
+MARKS = ("category", "mask", "material")
 
 EVERYONE = 0xFFFFFFFF  # a mask of 32 bits that takes every category
 
-_DEFAULTS: dict[str, Any] = {"angle": 0, "restitution": -1, "friction": -1, "category": 1, "mask": EVERYONE}
+_DEFAULTS: dict[str, Any] = {
+    "angle": 0, "restitution": -1, "friction": -1, "rolling_resistance": -1, "category": 1, "mask": EVERYONE, "material": 0,
+}  # fmt: skip
 
 
 class State:
@@ -37,8 +39,10 @@ class State:
         acceleration: (n, 2) m/s^2, of the last substep; the memory of the Verlet methods, scaled at rest. NaN: none yet.
         spin: (n,) angular velocity, rad/s, counter-clockwise. angle: (n,) rad it has turned; float64, for it grows and grows.
         radius, mass: (n,) m, and (n,) kg: infinity pins the particle.
-        restitution, friction: (n,) of circles that have values of their own; negative: as `Collisions` and the bounds say.
+        restitution, friction, rolling_resistance: (n,) of circles that have values of their own; negative: as `Collisions` and
+            the bounds say.
         category, mask: (n,) 32 bits each; two circles collide if each has a bit of its category in the other's mask.
+        material: (n,) of each, its place among `materials`, the names of all that there have been; "" is none.
         number: (n,) of each particle, in ascending order; no two particles of a world ever have the same.
         begun: the number of the first particle of each `append`, ascending. numbers: how many particles there have ever been.
         version: how often particles were added or removed.
@@ -55,8 +59,10 @@ class State:
     mass: Array
     restitution: Array
     friction: Array
+    rolling_resistance: Array
     category: Array
     mask: Array
+    material: Array
     number: Array
     angle: NDArray[np.float64]
 
@@ -66,6 +72,7 @@ class State:
         self._store |= {name: np.empty(0, dtype) for name in COLUMNS}
         for names, kind in ((MARKS, np.uint32), (("number",), np.int64), (("angle",), np.float64)):
             self._store |= {name: np.empty(0, kind) for name in names}
+        self.materials = [""]
         self.numbers = 0
         self.begun: list[int] = []
         self.version = 0
@@ -82,6 +89,7 @@ class State:
 
     def __getstate__(self) -> dict[str, Any]:
         kept = {"dtype": self.dtype, "_key": self.key, "seam": self.seam, "begun": self.begun, "version": self.version}
+        kept["materials"] = self.materials
         with self.turn:
             return kept | {"numbers": self.numbers, "_store": {name: array.copy() for name, array in self.arrays()}}
 
@@ -94,6 +102,15 @@ class State:
         """Names and arrays, always in the same order."""
         for name in self._store:
             yield name, getattr(self, name)
+
+    def material_numbers(self, names: Any, count: int) -> Array:
+        """(count,) numbers of materials, by one name or (count,) of them; new ones get the next."""
+        each = np.broadcast_to(np.asarray(names, dtype=np.str_), count)
+        known, which = np.unique(each, return_inverse=True)
+        for name in known.tolist():
+            if name not in self.materials:
+                self.materials.append(name)
+        return np.array([self.materials.index(name) for name in known.tolist()], np.uint32)[which]
 
     def append(self, values: dict[str, Array]) -> slice:
         """Add particles; `values` holds an array for each name, but for those that have a default. Returns where they stand."""

@@ -15,11 +15,11 @@ Array = NDArray[Any]
 class Memory(NamedTuple):
     """What outlives a frame, by the user's index: contacts with particles and surfaces, what they gave each, and the step.
 
-    pairs (k, 2) and values (k, 3): see `Engine.take_impulses`. surfaces (k, 2): particles and which surface, as the core numbers
-    them; pushes (k, 2): their impulses along the normals and the tangents, m/s. given: (n, 3) velocity and spin that contacts
-    gave in the last substep, over `kick` seconds. h: length of the last substep, s. hertz: frequency of the springs; finer: for
-    how long, s, a higher one would have been possible. asleep: what contacts of sleepers remember. listed, checked: (n, 2) of the
-    list of pairs, and skin: its numbers, as of `Engine.save_list`. Empty without one.
+    pairs (k, 2) and values (k, 4): see `Engine.take_impulses`. surfaces (k, 2): particles and which surface, as the core numbers
+    them; pushes (k, 3): their impulses along the normals and the tangents, m/s, and against rolling, m^2/s. given: (n, 3)
+    velocity and spin that contacts gave in the last substep, over `kick` seconds. h: length of the last substep, s. hertz:
+    frequency of the springs; finer: for how long, s, a higher one would have been possible. asleep: what contacts of sleepers
+    remember. listed, checked: (n, 2) of the list of pairs, and skin: its numbers, as of `Engine.save_list`. Empty without one.
     """
 
     pairs: Array
@@ -40,7 +40,20 @@ class Memory(NamedTuple):
     def empty(cls, dtype: np.dtype[Any]) -> Memory:
         """No contact remembers anything."""
         rows, none, nobody = np.empty((0, 2), dtype), np.empty((0, 3), dtype), np.empty((0, 2), np.int32)
-        return cls(nobody, none, nobody, np.empty((0, 2)), none, 0.0, 0.0, 0.0, 0.0, Remembered.nothing(dtype), rows, rows)
+        return cls(
+            nobody,
+            np.empty((0, 4), dtype),
+            nobody,
+            np.empty((0, 3)),
+            none,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            Remembered.nothing(dtype),
+            rows,
+            rows,
+        )
 
     def renumbered(self, now: Array) -> Memory:
         """Of the particles that are now at `now` (n,), or no more (-1). There is no list of pairs."""

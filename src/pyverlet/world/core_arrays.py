@@ -12,7 +12,7 @@ from pyverlet.ground.constants import SKIN
 from pyverlet.laws.obstacles import Course
 from pyverlet.state.slots import Slots
 from pyverlet.world.contact_memory import Memory, columns_of
-from pyverlet.world.materials import materials_of, skin_of, walls_of
+from pyverlet.world.materials import materials_of, names_of, numbers_of, resist, skin_of, walls_of
 from pyverlet.world.obstacle_rows import ObstacleRows
 from pyverlet.world.sleepers import Remembered
 
@@ -36,7 +36,7 @@ class CoreArrays:
         free: whether any particle is not pinned.
         largest, mean_radius: m. unequal: whether masses differ, pinned ones aside.
         asleep: what contacts of sleepers remember, in rates.
-        obstacle_friction: the largest of obstacles.
+        rough, rolls: whether any contact has friction or resists rolling, and whether any does the latter.
     """
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
@@ -86,6 +86,7 @@ class CoreArrays:
         self.kick, self.h, self.hertz, self.finer = memory.kick, memory.h, memory.hertz, memory.finer
         self._made = -1  # of `Slots.revision`, what the engine holds; -1: nothing
         self._collisions: Any = None
+        self._names: list[str] = []  # of materials
         self._skin: float | None = -1.0
 
     def note(self) -> Any:
@@ -131,6 +132,8 @@ class CoreArrays:
         if engine.threads < parts:
             engine.set_threads(parts)
         self.parts = parts
+        if collisions is not self._collisions:
+            self._names = names_of(collisions)
         self._wake(state)
         if self._particle is not state.particle or self._kept is not None:
             self._follow(state)
@@ -141,11 +144,14 @@ class CoreArrays:
             self._skin = skin
             if self._kept_list is None:
                 engine.set_skin(SKIN if self._skin is None else self._skin, self._skin is None)
-        engine.set_room(*walls_of(world.boundary))
+        engine.set_room(*walls_of(world.boundary, self._names))
         if world.boundary is not self._room:
             engine.set_seam(*state.seam)
             self._room = world.boundary
         self._follow_obstacles(world, dt)
+        self.rolls = resist(world, "rolling_resistance", state.most_rolling, self._obstacles.rolling)
+        self.rough = self.rolls or resist(world, "friction", state.most_friction, self._obstacles.friction)
+        engine.set_rolls(self.rolls)
         if self._kept_list is not None:
             engine.set_skin(self._kept_list[2][0], self._skin is None)
             engine.restore_list(*self._kept_list)
@@ -230,14 +236,13 @@ class CoreArrays:
 
     def _follow_obstacles(self, world: Any, dt: float) -> None:
         """Have the engine see the obstacles of now."""
-        now = self._obstacles.begin(world._course, self.engine, self.largest, dt)
+        now = self._obstacles.begin(world._course, self.engine, self.largest, dt, self._names)
         if now is not None and not self._named_anew:
             surfaces, pushes = self._at_surfaces()
             surfaces[:, 1] = now[surfaces[:, 1]]
             held = surfaces[:, 1] >= 0
             self._give_surfaces(surfaces[held], pushes[held])
         self._named_anew = False
-        self.obstacle_friction = self._obstacles.friction
 
     def _hold(self, state: Slots) -> None:
         """Have the engine take the arrays of now."""
@@ -245,7 +250,8 @@ class CoreArrays:
         self.engine.set_particles(
             position=state.position, velocity=state.velocity, acceleration=state.acceleration,
             inverse_mass=state.inverse_mass, radius=state.radius, own_restitution=state.restitution,
-            own_friction=state.friction, spin=state.spin, motion=np.zeros((count, 4), real), free=np.zeros((count, 2), real),
+            own_friction=state.friction, own_rolling=state.rolling_resistance, own_material=numbers_of(state, self._names),
+            spin=state.spin, motion=np.zeros((count, 4), real), free=np.zeros((count, 2), real),
             free_spin=np.zeros(count, real), given=self.gave, given_spin=self.gave_spin,
             particle=state.particle, category=state.category, mask=state.mask,
         )  # fmt: skip

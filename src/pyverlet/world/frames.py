@@ -138,8 +138,7 @@ class Frames:
             self._keep_way(state, before, h)
         if getattr(world.integrator, "naive_start", False):
             self._start_naively(world, (1.0 - half) * h)
-        frictions = collisions.friction if collisions else 0.0, getattr(world.boundary, "friction", 0.0)
-        rough = max(*frictions, state.most_friction, self.held.obstacle_friction) > 0.0
+        rough = self.held.rough
         done("gather")
         page = done if isinstance(done, Page) else None
         if page:  # of a world that was loaded the core does not know yet whether it is rough

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.laws.collisions import BruteForce, Collisions
+from pyverlet.ground.errors import InputError
+from pyverlet.laws.collisions import COMBINE, BruteForce, Collisions
 from pyverlet.laws.rooms import Box, Circle, Open, Periodic
 from pyverlet.state.slots import Slots
 
@@ -26,17 +27,51 @@ ALL = 1e12
 """Mean diameters: farther than positions of either precision mean anything."""
 
 
+def names_of(collisions: Collisions | None) -> list[str]:
+    """Materials as the core numbers them, "" for none first; empty if no two have anything together."""
+    return ["", *collisions.names] if collisions and collisions.materials else []
+
+
+def numbers_of(state: Slots, names: list[str]) -> Array:
+    """(n,) of each circle its material among `names`, 0 for none.
+
+    Raises:
+        InputError: there is another one.
+    """
+    if not len(state.material):
+        return np.zeros(len(state), np.uint32)
+    which = np.unique(state.material)
+    place = np.zeros(len(state.materials), np.uint32)
+    place[which] = [number_of(state.materials[k], names, "circles") for k in which]
+    return place[state.material]
+
+
+def number_of(material: str, names: list[str], whose: str) -> int:
+    """The same of a surface.
+
+    Raises:
+        InputError: its material is not there.
+    """
+    if material and material not in names:
+        known = ", ".join(map(repr, names[1:])) or "none, since `collisions` has no materials"
+        raise InputError(f"material of {whose} is {material!r}; allowed: {known}")
+    return names.index(material) if names else 0
+
+
 def materials_of(state: Slots, radius: Array, collisions: Collisions | None) -> dict[str, Any]:
     """The arguments of `Engine.set_materials`; radius: (n,) m, in the user's order, on which the last bit of a mean depends."""
     ordered = np.sort(radius)[::-1] if len(radius) else np.ones(1)
     # Very few that are much larger than all others stand in no cell.
     usual = float(ordered[min(len(ordered) // ALONE, len(ordered) - 1)])
+    own, names = (state.radius, state.restitution, state.friction, state.rolling_resistance), names_of(collisions)
     brute = collisions is not None and isinstance(collisions.method, BruteForce)
     return {
         "collides": collisions is not None,
         "sized": _differs(state.radius),
         "varied": _differs(state.inverse_mass),
-        "mixed": any(map(_differs, (state.radius, state.restitution, state.friction))),
+        "combine": COMBINE.index(collisions.combine) if collisions else 0,
+        "together": collisions.table(names) if collisions and names else np.zeros((0, 0, 3)),
+        "mixed": bool(len(state.material)) or any(map(_differs, own)),
         "brute": brute,
         "bulk": 0.0 if brute else float(ordered[ordered <= MUCH_LARGER * usual][0]),
         "smallest": float(ordered[-1]),
@@ -44,8 +79,15 @@ def materials_of(state: Slots, radius: Array, collisions: Collisions | None) -> 
         "mean_radius": float(radius.mean(dtype=np.float64)) if len(radius) else 1.0,
         "restitution": collisions.restitution if collisions else 0.0,
         "friction": collisions.friction if collisions else 0.0,
+        "rolling": collisions.rolling_resistance if collisions else 0.0,
         "picky": bool(len(state.category)) or not bool((state.inverse_mass > 0).all()),
     }
+
+
+def resist(world: Any, name: str, *most: float) -> bool:
+    """Whether any contact has friction, or whatever is called `name`; most: of circles and of obstacles."""
+    laws = world.collisions.most(name) if world.collisions else 0.0
+    return max(laws, getattr(world.boundary, name, 0.0), *most) > 0.0
 
 
 def skin_of(collisions: Collisions | None) -> float | None:
@@ -65,14 +107,15 @@ def knows(room: Any) -> bool:
     return type(room).confine in (each.confine for each in ROOMS)
 
 
-def walls_of(room: Any) -> tuple[float, ...]:
-    """The arguments of `Engine.set_room`."""
+def walls_of(room: Any, names: list[str]) -> tuple[float, ...]:
+    """The arguments of `Engine.set_room`; names: of materials."""
     if not knows(room):
-        return OPEN, *(0.0,) * 7
+        return OPEN, *(0.0,) * 8
+    material = number_of(getattr(room, "material", ""), names, "the room")
     if isinstance(room, Circle):
         speed = room.angular_velocity * room.radius
-        return CAGE, *room.center, room.radius, 0.0, room.restitution, room.friction, speed
+        return CAGE, *room.center, room.radius, 0.0, room.restitution, room.friction, room.rolling_resistance, speed, material
     if not isinstance(room, Box | Periodic) or (isinstance(room, Periodic) and room.axes == "xy"):
-        return OPEN, *(0.0,) * 7
+        return OPEN, *(0.0,) * 8
     corners = room._box if isinstance(room, Periodic) else (*room.lower, *room.upper)
-    return BOX, *corners, room.restitution, room.friction, 0.0
+    return BOX, *corners, room.restitution, room.friction, room.rolling_resistance, 0.0, material

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pyverlet.ground.constants import OBSTACLE_LINKS
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.obstacles import Course
+from pyverlet.world.materials import number_of
 
 Array = NDArray[Any]
 
@@ -20,7 +21,7 @@ _GIVEN = (
     "body", "first", "faces", "around", "lx", "ly", "lc", "ls", "length", "rounding", "inner", "before_x", "before_y", "after_x",
     "after_y", "restitution", "friction", "belt",
 )  # fmt: skip
-_WIDTH, _LENGTH, _ROUNDING, _INNER, _FRICTION = 32, 8, 9, 10, 16
+_WIDTH, _LENGTH, _ROUNDING, _INNER, _FRICTION, _ROLLING, _MATERIAL = 40, 8, 9, 10, 16, 31, 32
 
 SPARE_FRAMES = 4.0
 """Frames for which a segment that moves is listed ahead; as in `core.obstacles`."""
@@ -36,23 +37,24 @@ class ObstacleRows:
     """Segments and bodies of the obstacles of one world, in the core's form.
 
     Attributes:
-        friction: the largest of all.
+        friction, rolling: the largest of all.
     """
 
     def __init__(self) -> None:
-        self.friction = 0.0
+        self.friction = self.rolling = 0.0
         self._segments, self._bodies, self._moving = np.zeros((0, _WIDTH)), np.zeros((0, 6)), np.zeros(0, np.int32)
         self._owners = np.zeros((0, 2), np.int64)  # of each segment the id of its obstacle, and which of its segments it is
         self._seen: Any = None
         self._seen_version = -1
 
-    def begin(self, course: Course, engine: Any, radius: float, dt: float) -> Array | None:
-        """Give the engine the obstacles of now, as a frame of dt seconds begins; radius: of the largest particle, m.
+    def begin(self, course: Course, engine: Any, radius: float, dt: float, names: list[str]) -> Array | None:
+        """Give the engine the obstacles of now, as a frame of dt seconds begins; radius: of the largest particle, m;
+        names: of materials.
 
         Returns of each surface of before its number now, or -1; None: they are the same.
         """
         course.begin()
-        seen = course.version, course.seam, engine
+        seen = course.version, course.seam, engine, names
         if seen == self._seen:
             if len(self._moving):
                 self._bodies[:] = course.bodies
@@ -65,13 +67,13 @@ class ObstacleRows:
         if not same or not before or not np.array_equal(owners[:before], self._owners):
             renamed = _renamed(self._owners, owners)
             self._owners, self._segments = owners, np.zeros((len(owners), _WIDTH))
-            self._fill(course)
+            self._fill(course, names)
             self._build(engine, course.count, radius, dt)
             return renamed
         # Others may have been changed, and some have come: only these are listed anew.
         segments, bodies, more = self._segments[:, : len(_GIVEN)].copy(), self._bodies, len(owners) - before
         self._owners, self._segments = owners, np.concatenate((self._segments, np.zeros((more, _WIDTH))))
-        self._fill(course)
+        self._fill(course, names)
         other = np.ones(len(owners), bool)
         other[:before] = (segments != self._segments[:before, : len(_GIVEN)]).any(axis=1)
         other[:before] |= (bodies != self._bodies[: len(bodies)]).any(axis=1)[segments[:, 0].astype(np.int64)]
@@ -86,13 +88,19 @@ class ObstacleRows:
         course.begin()
         return None if course.version == self._seen_version else _renamed(self._owners, course.owners())
 
-    def _fill(self, course: Course) -> None:
+    def _fill(self, course: Course, names: list[str]) -> None:
         self._bodies = course.bodies.copy()
         for column, name in enumerate(_GIVEN):
             self._segments[:, column] = course.segments[name]
+        self._segments[:, _ROLLING] = course.segments["rolling"]
+        made, place = course.segments["material"], np.zeros(len(course.names))
+        for k in np.unique(made):
+            body = int(course.segments["body"][np.argmax(made == k)]) % course.count
+            place[k] = number_of(list(course.names)[k], names, f"obstacles[{body}]")
+        self._segments[:, _MATERIAL] = place[made]
         moves = (self._bodies[:, 3:] != 0.0).any(axis=1)
         self._moving = np.flatnonzero(moves[self._segments[:, 0].astype(np.int64)]).astype(np.int32)
-        self.friction = float(self._segments[:, _FRICTION].max(initial=0.0))
+        self.friction, self.rolling = (float(self._segments[:, k].max(initial=0.0)) for k in (_FRICTION, _ROLLING))
 
     def _build(self, engine: Any, count: int, radius: float, dt: float) -> None:
         """Make the grid of `count` obstacles, with cells as wide as the largest particle, or wider: not too many."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from typing import Any
 
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.guess import did_you_mean
 from pyverlet.ground.turns import Shared, in_turn, of_one_frame
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceList, Numbered
@@ -38,6 +39,7 @@ class Particles(Shared):
     _where = slice(None)
     boundary: Boundary
     obstacles: Obstacles
+    collisions: Any
     _course: Course
 
     def held(self) -> AbstractContextManager[None]:
@@ -66,6 +68,8 @@ class Particles(Shared):
         angle: ArrayLike = 0.0,
         restitution: ArrayLike | None = None,
         friction: ArrayLike | None = None,
+        rolling_resistance: ArrayLike | None = None,
+        material: str | Sequence[str] = "",
         category: ArrayLike = 1,
         mask: ArrayLike = EVERYONE,
         allow_overlap: bool = False,
@@ -82,6 +86,8 @@ class Particles(Shared):
             angle: (n,) or one for all, rad they have turned so far, counter-clockwise.
             restitution: (n,) or one for all, e from 0 to 1; None: as `Collisions` and the bounds say. The larger of two counts.
             friction: (n,) or one for all, mu, 0 or more; None: as for restitution. The geometric mean of two counts, as in Box2D.
+            rolling_resistance: (n,) or one for all, c, 0 or more; None: as for friction. See `Collisions`.
+            material: (n,) names or one for all, of `Collisions(materials=...)`; "" is none.
             category: (n,) or one for all, 32 bits: what these circles are.
             mask: (n,) or one for all, 32 bits: two circles collide if each has a bit of its category in the other's mask.
             allow_overlap: leave circles where they are said to be, inside an obstacle and outside the room too: the first frame
@@ -106,15 +112,19 @@ class Particles(Shared):
             "angle": checks.column("angle", angle, np.dtype(np.float64), count),
             "radius": size,
             "mass": _mass(mass, density, size),
-            "restitution": checks.column("restitution", -1.0 if restitution is None else restitution, dtype, count),
-            "friction": checks.column("friction", -1.0 if friction is None else friction, dtype, count),
             "category": checks.bits("category", category, count),
             "mask": checks.bits("mask", mask, count),
+            "material": self._material_numbers(material, count),
         }
-        if restitution is not None:
-            checks.within("restitution", values["restitution"], 0.0, 1.0)
-        if friction is not None:
-            checks.within("friction", values["friction"], 0.0, np.inf)
+        own = (
+            ("restitution", restitution, 1.0),
+            ("friction", friction, np.inf),
+            ("rolling_resistance", rolling_resistance, np.inf),
+        )
+        for name, value, most in own:
+            values[name] = checks.column(name, -1.0 if value is None else value, dtype, count)
+            if value is not None:
+                checks.within(name, values[name], 0.0, most)
         for name in ("spin", "angle"):
             checks.rows(name, np.column_stack((values[name], values[name])), np.dtype(np.float64), count)
         checks.positive("radius", values["radius"])
@@ -125,6 +135,17 @@ class Particles(Shared):
             self._refuse_misplaced(where, free)
             values["position"] = np.where(free[:, None], self.boundary.put_in(where, values["radius"]), where)
         return Group(self._state, self._state.append(values), self.remove)
+
+    def _material_numbers(self, names: Any, count: int) -> Array:
+        """(count,) numbers of materials that are in the table of `collisions`."""
+        known = {"", *(self.collisions.names if self.collisions else ())}
+        given = np.asarray(names)
+        if given.dtype.kind != "U" or given.shape not in ((), (count,)):
+            raise InputError(f"material is {names!r}; allowed is a name, or {count} of them")
+        if unknown := set(np.unique(given).tolist()) - known:
+            allowed = ", ".join(map(repr, sorted(known - {""}))) or "none, since `collisions` has no materials"
+            raise InputError(f"material is {min(unknown)!r}{did_you_mean(min(unknown), known)}; allowed: {allowed}")
+        return self._state.material_numbers(given, count)
 
     @of_one_frame
     def is_free(self, position: ArrayLike) -> NDArray[np.bool_]:
@@ -186,7 +207,17 @@ class Particles(Shared):
     restitution = Column("(n,) e of circles that have their own, negative where `Collisions` and the bounds decide; a view.")
     friction = Column("(n,) mu of circles that have their own, negative where `Collisions` and the bounds decide; a view.")
     category = Column("(n,) uint32, the bits of what each circle is; a view.")
+    rolling_resistance = Column("(n,) c of circles that have their own, else negative as for friction; a view.")
     mask = Column("(n,) uint32, the bits of the categories it collides with; a view.")
+
+    @property
+    def material(self) -> NDArray[np.str_]:
+        """(n,) names of materials, "" for none; set them as in `add`. A copy."""
+        return np.array(self._state.materials)[self._state.material]
+
+    @material.setter
+    def material(self, names: str | Sequence[str]) -> None:
+        self._state.material[:] = self._material_numbers(names, len(self._state))
 
     @property
     @of_one_frame

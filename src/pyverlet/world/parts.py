@@ -43,8 +43,10 @@ PARTICLES = {
     "mass": Field(None, "particles", above=0, infinite=True),
     "restitution": Field(None, "particles", most=1),
     "friction": Field(None, "particles"),
+    "rolling_resistance": Field(None, "particles"),
     "category": Field(np.uint32, "particles"),
     "mask": Field(np.uint32, "particles"),
+    "material": Field(np.uint32, "particles"),
     "number": Field(np.int64, "particles", least=0, most=2**31, order="ascending"),
     "begun": Field(np.int64, "groups", least=0, most=2**31, order="rising"),
 }
@@ -74,9 +76,9 @@ NEWS = {
 
 IMPULSES = {
     "pairs": Field(np.int32, "impulses", 2, least=0, below="particles"),
-    "values": Field(None, "impulses", 3),
+    "values": Field(None, "impulses", 4),
     "surfaces": Field(np.int32, "surfaces", 2, least=0),
-    "pushes": Field(np.float64, "surfaces", 2),
+    "pushes": Field(np.float64, "surfaces", 3),
     "given": Field(None, "remembered", 3),
     "listed": Field(None, "neighbours", 2),
     "checked": Field(None, "neighbours", 2),
@@ -115,6 +117,7 @@ def take_apart(world: World) -> Parts:
     saved = world.save()
     facts: dict[str, Any] = {
         "time": float(saved.time), "frames": saved.frames, "numbers": world._state.numbers,
+        "materials": world._state.materials,
     }  # fmt: skip
     arrays = {f"particles.{name}": array for name, array in saved.arrays.items()}
     arrays["particles.begun"] = np.array(world._state.begun, np.int64)
@@ -128,7 +131,8 @@ def take_apart(world: World) -> Parts:
             arrays |= {f"asleep.{name}": getattr(memory.asleep, name) for name in ASLEEP}
     if saved.books:
         facts["books"] = {
-            "energy": saved.books._energy, "resting": saved.books._resting, "ledger": saved.books.ledger.as_dict(),
+            "energy": saved.books._energy, "resting": saved.books._resting, "rolled": saved.books._rolled,
+            "ledger": saved.books.ledger.as_dict(),
         }  # fmt: skip
     if saved.events:
         facts["hit_speed"] = saved.events.hit_speed
@@ -153,8 +157,19 @@ def check(parts: Parts, real: np.dtype[Any]) -> None:
         InputError: one of them; the sentence names it.
     """
     sizes = {"one": 1}
+    _bring_up_to_date(parts.arrays, real)
     for name, array in parts.arrays.items():
         FIELDS[name].check(name, array, real, sizes)
+
+
+def _bring_up_to_date(arrays: dict[str, Array], real: np.dtype[Any]) -> None:
+    """Files of before there was rolling resistance lack columns: nothing has rolled against it, and nobody has a material."""
+    for name, width in (("impulses.values", 4), ("asleep.values", 4), ("impulses.pushes", 3), ("asleep.pushes", 3)):
+        if name in arrays and arrays[name].ndim == 2 and arrays[name].shape[1] == width - 1:
+            arrays[name] = np.column_stack((arrays[name], np.zeros(len(arrays[name]), arrays[name].dtype)))
+    if "particles.friction" in arrays and "particles.rolling_resistance" not in arrays:
+        arrays["particles.rolling_resistance"] = np.full(len(arrays["particles.friction"]), -1, real)
+        arrays["particles.material"] = np.zeros(len(arrays["particles.friction"]), np.uint32)
 
 
 def fill(world: World, parts: Parts) -> None:
@@ -173,7 +188,14 @@ def fill(world: World, parts: Parts) -> None:
     most = int(arrays["number"][-1]) + 1 if len(world) else 0
     world._state.numbers = checks.whole("numbers", parts.facts.get("numbers"), least=most, most=2**31)
     world._state.begun = begun.tolist()
+    world._state.materials = _names(parts.facts.get("materials", [""]), int(arrays["material"].max(initial=0)))
     world.boundary.check(world.radius)
+
+
+def _names(names: Any, most: int) -> list[str]:
+    if not (isinstance(names, list) and names[:1] == [""] and len(names) > most and all(isinstance(name, str) for name in names)):
+        raise InputError(f"materials is {names!r}; allowed is a list of names, the first '', for each number up to {most}")
+    return names
 
 
 def put_together(world: World, parts: Parts) -> Saved:
@@ -253,6 +275,7 @@ def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
 def _books(facts: Facts) -> Bookkeeper:
     books = Bookkeeper()
     books._energy, books._resting = (checks.number(name, facts[name]) for name in ("energy", "resting"))
+    books._rolled = checks.number("rolled", facts.get("rolled", 0.0))
     accounts = Ledger().as_dict()
     books.ledger = Ledger(**{name: checks.number(name, facts["ledger"].get(name, 0.0)) for name in accounts})
     return books

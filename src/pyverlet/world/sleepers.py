@@ -14,9 +14,9 @@ Array = NDArray[Any]
 
 ASLEEP = {
     "pairs": Field(np.int32, "asleep", 2, least=0, below="particles"),
-    "values": Field(None, "asleep", 3),
+    "values": Field(None, "asleep", 4),
     "surfaces": Field(np.int32, "asleep_surfaces", 2, least=0),
-    "pushes": Field(np.float64, "asleep_surfaces", 2),
+    "pushes": Field(np.float64, "asleep_surfaces", 3),
     "particle": Field(np.int32, "asleep_particles", least=0, below="particles"),
     "given": Field(None, "asleep_particles", 3),
     "hertz": Field(np.float64, "asleep_particles", above=0),
@@ -27,8 +27,9 @@ ASLEEP = {
 class Remembered(NamedTuple):
     """What contacts remember, by the user's index of particles.
 
-    pairs (k, 2) and values (k, 3): see `Engine.take_impulses`. surfaces (m, 2): particles and which surface, as the core numbers
-    them; pushes (m, 2): impulses along the normal and the tangent. particle (n,), given (n, 3): of these the velocity and spin
+    pairs (k, 2) and values (k, 4): see `Engine.take_impulses`. surfaces (m, 2): particles and which surface, as the core numbers
+    them; pushes (m, 3): impulses along the normal, the tangent and against rolling. particle (n,), given (n, 3): of these the
+    velocity and spin
     that contacts gave in the last substep. All are m/s and rad/s; of sleepers they are rates, m/s^2 and rad/s^2, for the next
     substep may have another length. hertz: (n,) of the springs that they lie on.
     """
@@ -45,7 +46,7 @@ class Remembered(NamedTuple):
     def nothing(cls, dtype: np.dtype[Any]) -> Remembered:
         """No contact remembers anything."""
         whose, rows = np.empty((0, 2), np.int32), np.empty((0, 3), dtype)
-        return cls(whose, rows, whose, np.empty((0, 2)), whose[:, 0], rows, np.empty(0))
+        return cls(whose, np.empty((0, 4), dtype), whose, np.empty((0, 3)), whose[:, 0], rows, np.empty(0))
 
     @classmethod
     def taken_up(cls, arrays: dict[str, Array], count: int, dtype: np.dtype[Any]) -> Remembered:

@@ -126,8 +126,9 @@ class World(Measures, Queries, Doors):
         changed = self._slots.gather(self._state) or woken
         if not self._slots.most_restitution <= 1.0:
             checks.at_most("restitution", self._state.restitution, 1.0)
-        if not self._slots.most_friction < np.inf:
-            checks.at_most("friction", self._state.friction, float(np.finfo(self.dtype).max))
+        for name in ("friction", "rolling_resistance"):
+            if not max(self._slots.most_friction, self._slots.most_rolling) < np.inf:
+                checks.at_most(name, getattr(self._state, name), float(np.finfo(self.dtype).max))
         if changed:
             try:
                 checks.positive("radius", self._state.radius)

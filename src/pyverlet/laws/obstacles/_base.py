@@ -100,6 +100,8 @@ class Obstacle(ABC):
         points: (n, 2) corners, m.
         restitution: e of its surface, 0 to 1.
         friction: mu of its surface, 0 or more.
+        rolling_resistance: c of its surface, 0 or more; see `Collisions`.
+        material: a name of `Collisions(materials=...)`, or none.
         surface_speed: of a conveyor belt, m/s. Segments and chains carry along their points, on both sides; discs, capsules and
             polygons counter-clockwise around themselves.
         velocity: (x, y) it moves with, m/s, whatever is in its way.
@@ -112,6 +114,8 @@ class Obstacle(ABC):
 
     restitution = _Checked(checks.fraction)
     friction = _Checked(lambda name, value: checks.number(name, value, least=0.0))
+    rolling_resistance = _Checked(lambda name, value: checks.number(name, value, least=0.0))
+    material = _Checked(checks.text)
     surface_speed = _Checked(checks.number)
     velocity = _Checked(checks.vector)
     angular_velocity = _Checked(checks.number)
@@ -126,6 +130,8 @@ class Obstacle(ABC):
         *,
         restitution: float = 0.0,
         friction: float = 0.0,
+        rolling_resistance: float = 0.0,
+        material: str = "",
         surface_speed: float = 0.0,
         velocity: Sequence[float] = (0.0, 0.0),
         angular_velocity: float = 0.0,
@@ -133,6 +139,8 @@ class Obstacle(ABC):
     ) -> None:
         self.restitution = restitution
         self.friction = friction
+        self.rolling_resistance = rolling_resistance
+        self.material = material
         self.surface_speed = surface_speed
         self.velocity = velocity
         self.angular_velocity = angular_velocity

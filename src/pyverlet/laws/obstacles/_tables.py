@@ -27,10 +27,13 @@ SEGMENT = np.dtype(
         ("length", np.float64), ("rounding", np.float64), ("inner", np.float64),  # inner: who is inside is as near as this, m
         ("before_x", np.float64), ("before_y", np.float64),  # from its start to the neighbour's start, in its own frame; or 0
         ("after_x", np.float64), ("after_y", np.float64),  # from its end to the neighbour's end
-        ("restitution", np.float64), ("friction", np.float64), ("belt", np.float64),
+        ("restitution", np.float64), ("friction", np.float64), ("belt", np.float64), ("rolling", np.float64),
+        ("material", np.int64),  # which of `Tables.names`
     ]
 )  # fmt: skip
 """A rounded segment of an obstacle. Metres."""
+
+_SURFACE = ("restitution", "friction", "belt", "rolling", "material")
 
 
 class _Rows:
@@ -65,11 +68,13 @@ class Tables:
 
     Attributes:
         seam: of the room. In a periodic one there are images of all obstacles beside it: circles run on beyond it within a frame.
+        names: of materials that there have been, and their numbers in the table.
         version: another number whenever an obstacle has come, gone or been changed by others than its own motion.
     """
 
     def __init__(self, obstacles: Obstacles, seam: Seam = NONE) -> None:
         self._obstacles, self.seam, self.version = obstacles, seam, 0
+        self.names = {"": 0}
         self._seen: list[Obstacle] = []
         self._listed = self._revision = -1
         self._imaged = seam
@@ -95,6 +100,11 @@ class Tables:
     def seen(self) -> list[Obstacle]:
         """The obstacles of the last frame."""
         return self._seen
+
+    def _surface(self, obstacle: Obstacle) -> tuple[float, ...]:
+        """What its surface is like: see `_SURFACE`."""
+        material = self.names.setdefault(obstacle.material, len(self.names))
+        return obstacle.restitution, obstacle.friction, obstacle.surface_speed, obstacle.rolling_resistance, material
 
     def begin(self) -> None:
         """At the beginning of a frame: look what has changed."""
@@ -186,8 +196,8 @@ class Tables:
         rows = np.concatenate(parts).view(SEGMENT)
         first = self._first[-1] + np.cumsum([0, *count])
         rows["body"], rows["first"] = np.repeat(before + np.arange(len(fresh)), count), np.repeat(first[:-1], count)
-        surfaces = [(obstacle.restitution, obstacle.friction, obstacle.surface_speed) for obstacle in fresh]
-        for name, column in zip(("restitution", "friction", "belt"), zip(*surfaces, strict=True), strict=bool(surfaces)):
+        surfaces = [self._surface(obstacle) for obstacle in fresh]
+        for name, column in zip(_SURFACE, zip(*surfaces, strict=True), strict=bool(surfaces)):
             rows[name] = np.repeat(column, count)
         self._own_segments.extend(rows)
         self._own_bodies.extend(np.array([_body(obstacle) for obstacle in fresh], BODY))
@@ -210,9 +220,8 @@ class Tables:
         for image, (x, y) in enumerate(self.seam.images() if self.seam else _HERE):
             self._bodies[image * count + k] = (body[0] + x, body[1] + y, *body[2:])
             part = self._segments[image * sides + self._first[k] : image * sides + self._first[k + 1]]
-            part["restitution"] = obstacle.restitution
-            part["friction"] = obstacle.friction
-            part["belt"] = obstacle.surface_speed
+            for name, value in zip(_SURFACE, self._surface(obstacle), strict=True):
+                part[name] = value
         self._own_bodies.rows[k] = body
         self._sort_in(k)
         self.version += 1

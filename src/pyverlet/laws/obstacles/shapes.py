@@ -24,7 +24,7 @@ class Chain(Obstacle):
         points: (n, 2), m, at least two.
         closed: join the last to the first.
         radius: half its thickness, m.
-        surface: restitution, friction, surface_speed, velocity, angular_velocity, pivot; see `Obstacle`.
+        surface: restitution, friction and all that `Obstacle` takes beside points.
     """
 
     def __init__(self, points: ArrayLike, *, closed: bool = False, radius: float = 0.0, **surface: Any) -> None:
@@ -51,7 +51,7 @@ class Segment(Chain):
     Args:
         start: (x, y), m.
         end: (x, y), m.
-        surface: restitution, friction, surface_speed, velocity, angular_velocity, pivot; see `Obstacle`.
+        surface: restitution, friction and all that `Obstacle` takes beside points.
     """
 
     def __init__(self, start: Sequence[float], end: Sequence[float], **surface: Any) -> None:
@@ -65,7 +65,7 @@ class Capsule(Chain):
         start: (x, y) of the centre of one end, m.
         end: (x, y) of the other's, m.
         radius: half its thickness, m, greater than 0.
-        surface: restitution, friction, surface_speed, velocity, angular_velocity, pivot; see `Obstacle`.
+        surface: restitution, friction and all that `Obstacle` takes beside points.
     """
 
     def __init__(self, start: Sequence[float], end: Sequence[float], *, radius: float, **surface: Any) -> None:
@@ -82,7 +82,7 @@ class Disc(Obstacle):
     Args:
         center: (x, y), m.
         radius: m, greater than 0.
-        surface: restitution, friction, surface_speed, velocity, angular_velocity, pivot; see `Obstacle`.
+        surface: restitution, friction and all that `Obstacle` takes beside points.
     """
 
     def __init__(self, center: Sequence[float], radius: float, **surface: Any) -> None:
@@ -103,7 +103,7 @@ class Polygon(Obstacle):
     Args:
         points: (n, 2) corners in order, m, at least three.
         radius: of its rounded rim, m, beyond the corners.
-        surface: restitution, friction, surface_speed, velocity, angular_velocity, pivot; see `Obstacle`.
+        surface: restitution, friction and all that `Obstacle` takes beside points.
     """
 
     def __init__(self, points: ArrayLike, *, radius: float = 0.0, **surface: Any) -> None:
