@@ -130,8 +130,12 @@ class Overlap(NamedTuple):
     contacts: int
 
 
-def find_contacts(state: State) -> NDArray[np.int64]:
-    """(k, 2) user's indices i < j of all overlapping pairs, sorted; not of two that are pinned, or that masks keep apart."""
+def find_contacts(state: State, radius: Array | None = None) -> NDArray[np.int64]:
+    """(k, 2) user's indices i < j of all overlapping pairs, sorted; not of two that are pinned, or that masks keep apart.
+
+    radius: (n,) m, in place of those of the state.
+    """
+    radius = state.radius if radius is None else radius
     core, count = unit("engine", state.dtype), len(state)
     position = state.seam.wrapped(state.position)
     shift = state.seam.images() if state.seam else np.zeros((1, 2))
@@ -140,7 +144,7 @@ def find_contacts(state: State) -> NDArray[np.int64]:
     level, pairs, found = np.empty(count, np.int64), np.empty((0, 2), np.int64), 4 * count
     while found > len(pairs):
         pairs = np.empty((found, 2), np.int64)
-        found = core.touching(np.ascontiguousarray(position), state.radius, *about, level, heads, following, pairs)
+        found = core.touching(np.ascontiguousarray(position), radius, *about, level, heads, following, pairs)
     pairs = pairs[:found]
     return np.asarray(pairs[np.lexsort(pairs.T[::-1])])
 

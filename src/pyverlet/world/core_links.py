@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from pyverlet.laws.links._set import partners
+from pyverlet.world.contact_rules import ContactRule
 from pyverlet.world.link_rows import LinkRows
 
 
@@ -23,8 +24,16 @@ class CoreLinks:
         self._rows.forget()
 
     def keep_apart(self, world: Any, engine: Any) -> None:
-        """Give the engine the pairs that links keep from touching, if they are others than before."""
-        if (world.links or self._apart is not None) and (apart := world.links.known_apart()) is not self._apart:
+        """Give the engine the pairs that links and rules keep from touching, if they are others than before."""
+        rules = [apart for actor in world.actors if isinstance(actor, ContactRule) and len(apart := actor.apart(world))]
+        if not (world.links or rules or self._apart is not None):
+            return
+        apart = world.links.known_apart()
+        if rules:
+            apart = np.concatenate((apart, *rules))
+            if self._apart is not None and np.array_equal(apart, self._apart):
+                apart = self._apart
+        if apart is not self._apart:
             self._apart = apart
             begin, to = partners(apart, len(world))
             engine.set_linked(begin, to.astype(np.int32))

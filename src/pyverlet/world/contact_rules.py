@@ -1,0 +1,149 @@
+"""A user's own rule for circles that are about to touch: ignore the contact, break, merge or split them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.ground import pickling
+from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import count
+from pyverlet.laws.collisions import find_contacts
+from pyverlet.world.actors import Actor
+
+if TYPE_CHECKING:
+    from pyverlet.world.world import World
+
+Array = NDArray[Any]
+
+
+class NewContacts(NamedTuple):
+    """Circles that do not touch yet and may in the frame that comes."""
+
+    a: NDArray[np.int64]
+    """(k,) index of one circle."""
+    b: NDArray[np.int64]
+    """(k,) index of the other, a < b."""
+    meets: NDArray[np.bool_]
+    """(k,) whether they will touch on straight paths. Others will if they are turned aside within the frame."""
+    speed: NDArray[np.float64]
+    """(k,) at which they come nearer where they touch, or now if they do not, m/s."""
+    point: NDArray[np.float64]
+    """(k, 2) where that is, on the rim of a, m."""
+    normal: NDArray[np.float64]
+    """(k, 2) of length 1, out of a."""
+
+    def __repr__(self) -> str:
+        return f"NewContacts of {count(len(self.a), 'pair')}"
+
+
+Rule = Callable[["World", NewContacts], Any]
+
+
+class ContactRule(Actor):
+    """What `contact_rule` makes of a function; append it to `world.actors`. It can still be called like one."""
+
+    def __init__(self, function: Rule) -> None:
+        if not callable(function):
+            raise InputError(f"function is {function!r}; allowed is a function of the world and its new contacts")
+        self._function = function
+        # By `world.number`: pairs that have met, and those that do not collide.
+        self._met = self._ignored = np.empty((0, 2), np.int64)
+
+    def __call__(self, world: World, new: NewContacts) -> Any:
+        return self._function(world, new)
+
+    def __repr__(self) -> str:
+        return f"contact_rule({getattr(self._function, '__qualname__', self._function)})"
+
+    def __reduce__(self) -> Any:
+        pickling.check(repr(self), self._function)
+        return _again, (self._function, self.save())
+
+    def __copy__(self) -> ContactRule:
+        return _again(self._function, self.save())
+
+    def __deepcopy__(self, memo: Any) -> ContactRule:
+        return _again(self._function, self.save())
+
+    def act(self, world: World, dt: float) -> None:
+        pairs, meets, *where = _near(world, dt)
+        near = world.number[pairs]
+        met = _among(near, self._met)
+        kept, fresh = near[met & _among(near, self._ignored)], ~met
+        self._met = near[met | meets]
+        if fresh.any():
+            told = NewContacts(pairs[fresh, 0], pairs[fresh, 1], meets[fresh], *(column[fresh] for column in where))
+            answer = self._function(world, told)
+            if answer is not None:
+                kept = np.concatenate((kept, near[fresh][self._checked(answer, len(told.a))]))
+        self._ignored = kept
+
+    def _checked(self, answer: Any, pairs: int) -> Array:
+        ignored = np.asarray(answer)
+        if ignored.dtype != bool or ignored.shape not in ((), (pairs,)):
+            raise InputError(f"{self} returned {answer!r}; allowed are None, and {pairs} bools: which of the contacts to ignore")
+        return np.broadcast_to(ignored, pairs)
+
+    def apart(self, world: World) -> Array:
+        """(k, 2) indices of the pairs that do not collide."""
+        place = np.searchsorted(world.number, self._ignored).clip(max=max(len(world) - 1, 0))
+        there = (world.number[place] == self._ignored).all(axis=1) if len(world) else np.zeros(len(place), bool)
+        return np.asarray(place[there])
+
+    def save(self) -> Any:
+        return self._met, self._ignored
+
+    def restore(self, saved: Any) -> None:
+        self._met, self._ignored = saved
+
+
+def contact_rule(function: Rule) -> ContactRule:
+    """Make a rule for contacts of a function; also as a decorator. `world.actors.append(rule)` puts it to work.
+
+    The function is called before each frame in which circles may come to touch, as `rule(world, new)`, with `NewContacts`. It
+    may change the world: remove circles, add others, join two by a link. It returns which of the contacts to ignore, (k,) bools
+    or one for all, or None: these pass through each other, in this frame, or until they are apart again if they meet. Each frame
+    costs a search for circles that are near each other; where other ones are ignored than before, it costs a new list of pairs.
+    """
+    return ContactRule(function)
+
+
+def _among(pairs: Array, others: Array) -> Array:
+    """(k,) whether each pair is one of the others."""
+    keys = (array.astype(np.int64) @ np.array([1 << 31, 1]) for array in (pairs, others))
+    return np.isin(*keys)
+
+
+def _again(function: Rule, saved: Any) -> ContactRule:
+    """The rule of a function with what it remembers."""
+    rule = ContactRule(function)
+    rule.restore(saved)
+    return rule
+
+
+def _near(world: World, dt: float) -> tuple[Array, Array, Array, Array, Array]:
+    """(k, 2) indices of circles that touch or may within dt; whether they do on straight paths; speed, point, normal of there."""
+    state = world._state
+    common = np.median(state.velocity, axis=0) if len(state) else 0.0  # moves nobody nearer to another
+    pairs = find_contacts(state, (state.radius + dt * np.hypot(*(state.velocity - common).T)).astype(state.dtype))
+    i, j = pairs.T
+    way = state.seam.nearest(state.position[j].astype(float) - state.position[i])
+    against = state.velocity[j].astype(float) - state.velocity[i]
+    # |way + against t| = r_i + r_j, for the first time.
+    square, along = (against**2).sum(axis=1), (way * against).sum(axis=1)
+    apart = (way**2).sum(axis=1) - (state.radius[i].astype(float) + state.radius[j]) ** 2
+    root = along**2 - square * apart
+    with np.errstate(invalid="ignore", divide="ignore"):
+        first = apart / (np.sqrt(np.maximum(root, 0)) - along)
+    touch = (apart > 0) & (root >= 0) & (along < 0)
+    meets = (apart <= 0) | (touch & (first <= dt))
+    time = np.where(touch & meets, first, 0.0)[:, None]
+    line = way + against * time
+    far = np.hypot(*line.T)[:, None]
+    normal = np.divide(line, far, out=np.tile((1.0, 0.0), (len(line), 1)), where=far > 0)
+    point = state.position[i] + state.velocity[i] * time + normal * state.radius[i, None]
+    return pairs, meets, -(against * normal).sum(axis=1), point, normal
