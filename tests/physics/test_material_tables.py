@@ -87,6 +87,26 @@ def test_the_table_counts_for_surfaces(what: str) -> None:
     assert highest == pytest.approx(0.81 * height, rel=1e-3)  # looked at 240 times a second: g / 8 / 240^2 of a metre
 
 
+@pytest.mark.parametrize("what", ["wall", "segment", "pair"])
+@pytest.mark.parametrize("rule", ["geometric", "multiply", "table"])
+def test_events_tell_what_turned_them(rule: str, what: str) -> None:
+    """The impulse of a hit is what it changes: m (1 + e) v at a surface, half of that for two alike."""
+    table = {("a", "b"): {"restitution": 0.3}} if rule == "table" else {}
+    laws = pv.Collisions(combine="geometric" if rule == "table" else rule, materials=table)
+    own: dict[str, Any] = {"restitution": A} | ({"material": "a"} if table else {})
+    other: dict[str, Any] = {"restitution": B} | ({"material": "b"} if table else {})
+    room = pv.Box((-5, -5), (5, 5), **(other if what == "wall" else {}))
+    world = pv.World(boundary=room, gravity=(0, 0), collisions=laws, dtype=np.float64, events=True)
+    ball = world.add(position=(0, 0), velocity=(2, 0), radius=0.5, mass=3.0, **own)
+    if what == "segment":
+        world.obstacles.append(pv.Segment((2, -5), (2, 5), **other))
+    elif what == "pair":
+        world.add(position=(2, 0), velocity=(-2, 0), radius=0.5, mass=3.0, **other)
+    while not len(world.events.begin):
+        world.step(1 / 60)
+    assert world.events.begin["impulse"][0] == pytest.approx(3.0 * (2.0 - ball.velocity[0, 0]), rel=1e-9)
+
+
 def test_materials_change_in_flight_and_wake(tmp_path: Path) -> None:
     laws = pv.Collisions(friction=0.5, materials={("skate", "ice"): {"friction": 0.0}})
     slope = pv.Box((-50, 0), (50, 9), friction=0.5, material="ice")

@@ -113,12 +113,11 @@ class Collisions:
 
     def table(self, names: Sequence[str]) -> Array:
         """(k, k, 3) what two of these materials have together, in the order of `TOGETHER`; -1 where the table says nothing."""
-        place, values = {name: k for k, name in enumerate(names)}, np.full((len(names), len(names), len(TOGETHER)), -1.0)
-        table: Any = self.materials
-        for (first, second), together in table.items():
-            if first in place and second in place:
-                i, j = place[first], place[second]
-                values[i, j] = values[j, i] = [together.get(name, -1.0) for name in TOGETHER]
+        values, table = np.full((len(names), len(names), len(TOGETHER)), -1.0), dict[Any, Any](self.materials)
+        for i, first in enumerate(names):
+            for j, second in enumerate(names):
+                together = table.get((min(first, second), max(first, second)), {})
+                values[i, j] = [together.get(name, -1.0) for name in TOGETHER]
         return values
 
 
@@ -128,6 +127,14 @@ class Overlap(NamedTuple):
     mean: float
     max: float
     contacts: int
+
+
+def combined(rule: str, a: Array, b: Array) -> Array:
+    """One value of two by a rule of `COMBINE`, as in `core.pair_materials`."""
+    ways: dict[str, Array] = {
+        "geometric": np.sqrt(a * b), "mean": 0.5 * (a + b), "min": np.minimum(a, b), "max": np.maximum(a, b), "multiply": a * b,
+    }  # fmt: skip
+    return ways[rule]
 
 
 def find_contacts(state: State, radius: Array | None = None) -> NDArray[np.int64]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pyverlet.core import unit
 from pyverlet.ground import checks
 from pyverlet.ground.constants import FIRST_OBSTACLE
+from pyverlet.laws.collisions import Collisions, combined
 from pyverlet.laws.obstacles import Course, Obstacle
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
@@ -131,7 +132,8 @@ class Events:
         # Those who sleep are not listed, but go on. To sort keys alone takes a third of what it takes to know their order.
         now = np.sort(np.concatenate((told.keys, self._slept, self._sleeping(slots, state))))
         now = now[np.diff(now, prepend=-1) > 0]
-        gone, new = _absent(self._touching, now), _absent(now, self._touching)
+        same = np.array_equal(now, self._touching)
+        gone, new = (now[:0], now[:0]) if same else (_absent(self._touching, now), _absent(now, self._touching))
         # Bounces: each is a beginning, and but for the last an end; another one, if they touched before, ends what went on.
         again, bounces = _counted(told)
         begun = np.unique(np.concatenate((new, again)))
@@ -174,8 +176,8 @@ class Place(NamedTuple):
 
     room: Boundary
     course: Course
-    restitution: float
-    """Of circles that have none of their own, between each other."""
+    laws: Collisions | None
+    """Of circles among each other."""
 
     def hits(self, met: Array, speed: Array, state: State) -> Array:
         """HIT from CONTACT and m/s, of circles that are where they are now."""
@@ -196,16 +198,35 @@ class Place(NamedTuple):
             far = np.hypot(*way.T)
             normal = way / np.maximum(far, 1e-300)[:, None]
             e, other = of(state.restitution, a), of(state.restitution, b)
-            both = np.maximum(np.where(e >= 0, e, self.restitution), np.where(other >= 0, other, self.restitution))
+            usual = self.laws.restitution if self.laws else 0.0
+            both = self._bounce(np.where(e >= 0, e, usual), np.where(other >= 0, other, usual))
+            both = self._together(both, state, a, state.material[b], state.materials)
             weight = 1 / of(state.mass, a) + 1 / of(state.mass, b)
             self._write(found, pair, x + (r + 0.5 * (far - r - s))[:, None] * normal, normal, both, weight)
         if len(single):
             a = met["a"][single]
             x, e = of(state.position, a), of(state.restitution, a)
             gap, into, surface = self._surface(x, met["wall"][single], met["obstacle"][single])
-            both = np.maximum(surface, np.where(e >= 0, e, 0.0))
+            both = np.where(e >= 0, self._bounce(surface, np.maximum(e, 0.0)), surface)
+            made = [*dict.fromkeys(each.material for each in self.course.seen()), getattr(self.room, "material", ""), ""]
+            number = np.array([made.index(each.material) for each in self.course.seen()] or [0])
+            which = np.where(met["obstacle"][single] >= 0, number[met["obstacle"][single]], len(made) - 2)
+            both = self._together(both, state, a, which, made)
             self._write(found, single, x - gap[:, None] * into, -into, both, 1 / of(state.mass, a))
         return found
+
+    def _bounce(self, e: Array, other: Array) -> Array:
+        """The restitution of two."""
+        rule = self.laws.combine if self.laws else "geometric"
+        return np.maximum(e, other) if rule == "geometric" else combined(rule, e, other)
+
+    def _together(self, e: Array, state: State, a: Array, which: Array, names: list[str]) -> Array:
+        """The restitution of circles a and materials names[which], if the table has one, else e."""
+        if not (self.laws and self.laws.materials):
+            return e
+        table = self.laws.table([*state.materials, *names])[:, :, 0]
+        special: Array = table[state.material[a], len(state.materials) + which]
+        return np.where(special >= 0, special, e)
 
     def _write(self, found: Array, rows: Array, point: Array, normal: Array, e: Array, weight: Array) -> None:
         found["point"][rows], found["normal"][rows] = self.room.seam.wrapped(point), normal
@@ -295,8 +316,12 @@ def _among(keys: Array, others: Array) -> Array:
 def _largest(keys: Array, told: Told) -> Array:
     """The largest of the speeds that were told of each of the keys, which are sorted; -1 if there is none."""
     out = np.full(len(keys), -1.0)
-    which = _among(told.keys, keys)
-    np.maximum.at(out, np.searchsorted(keys, told.keys[which]), told.speeds[which])
+    if len(keys):
+        asked = np.zeros(int(max(told.keys.max(initial=0), keys[-1]) >> 32) + 1, bool)
+        asked[keys >> 32] = True
+        which = np.flatnonzero(asked[told.keys >> 32])  # of many that touch few begin to
+        which = which[_among(told.keys[which], keys)]
+        np.maximum.at(out, np.searchsorted(keys, told.keys[which]), told.speeds[which])
     return out
 
 

@@ -19,8 +19,7 @@ def told_of(engine: Any, state: Slots, course: Course) -> list[Told]:
     for (i, j, speed, bounces), (slot, surface, fast, thrown) in engine.tell():
         a, b = particle[i], particle[j]
         # A lane may stand twice in a batch, the second time for nothing.
-        key, first = np.unique(key_of_pair(np.minimum(a, b), np.maximum(a, b)), return_index=True)
-        told.append(Told(key, speed[first], bounces[first].astype(np.int64)))
+        told.append(Told(key_of_pair(np.minimum(a, b), np.maximum(a, b)), speed, bounces.astype(np.int64)))
         at_obstacle = surface >= SIDES
         number = surface.copy()
         number[at_obstacle] = bodies[surface[at_obstacle] - SIDES]

@@ -150,7 +150,7 @@ class Measures(Particles):
 
     def _place(self) -> Place:
         """What circles may meet, for the events of a frame."""
-        return Place(self.boundary, self._course, self.collisions.restitution if self.collisions else 0.0)
+        return Place(self.boundary, self._course, self.collisions)
 
     def _noting(self) -> Touches:
         if self._touches is None:
