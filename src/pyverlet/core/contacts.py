@@ -149,7 +149,6 @@ def solve(
     own: Step = shared[0]  # which no store to an array can change: its fields stay in registers
     w: cython.pointer(Step) = cython.address(own)
     zero: lanes = spread(0)
-    third: lanes = spread(cython.cast(real, 1.0) / 3)
     near: lanes = spread(-w.near)
     turning: lanes = spread(w.turning * w.turning)
     first: cython.Py_ssize_t = w.begin[s]
@@ -202,7 +201,9 @@ def solve(
         roll: lanes = zero
         if rough:
             old: lanes = load(w.tangent_impulse, k)
-            new: lanes = clamped(old - third * slip_of(w, k, m, nx, ny), load(w.friction, k * w.mixed) * after)
+            new: lanes = clamped(
+                old - load(w.grip, k * w.mixed) * slip_of(w, k, m, nx, ny), load(w.friction, k * w.mixed) * after
+            )
             store(w.tangent_impulse, k, new)
             tangent = new - old
             if own.rolls:

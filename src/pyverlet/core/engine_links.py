@@ -18,7 +18,7 @@ def fill_links(k: cython.pointer(Links), a, passes: cython.int, period_x: cython
     k.period_x, k.period_y = period_x, period_y
     if "x" not in a:
         a |= {name: np.zeros((particles, 2)) for name in ("x", "u", "warm", "loaned", "driven", "react")}
-        a |= {name: np.zeros(particles) for name in ("own", "weight", "rim")}
+        a |= {name: np.zeros(particles) for name in ("own", "weight", "rim", "ease")}
         a["begun"] = np.zeros((particles, 3))
         a |= {name: np.zeros((len(a["node"]), 2)) for name in ("gradient", "slope")}
         a |= {name: np.zeros(rows) for name in ("soft", "target", "turned", "turning", "keeps", "chord_speed")}
@@ -47,7 +47,7 @@ def fill_links(k: cython.pointer(Links), a, passes: cython.int, period_x: cython
     k.next, k.soft, k.target, k.turned = doubles(a["next"]), doubles(a["soft"]), doubles(a["target"]), doubles(a["turned"])
     k.chord_speed = doubles(a["chord_speed"])
     k.begun, k.had = doubles(a["begun"]), doubles(a["had"])
-    k.rubs, k.rim = small_integers(a["rubs"]), doubles(a["rim"])
+    k.rubs, k.rim, k.ease = small_integers(a["rubs"]), doubles(a["rim"]), doubles(a["ease"])
     k.held = small_integers(a["held"])
     k.driven = doubles(a["driven"])
     k.loaned, k.keeps = doubles(a["loaned"]), doubles(a["keeps"])

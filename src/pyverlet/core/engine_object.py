@@ -97,6 +97,7 @@ class Engine:
         w.surfaces_good = False
         w.own_restitution, w.own_friction = reals(a["own_restitution"]), reals(a["own_friction"])
         w.own_rolling, w.own_material = reals(a["own_rolling"]), indices(a["own_material"])
+        w.ease = reals(a["ease"])
         self.c.position, self.c.radius = w.position, w.radius
         self.ls.particle, self.ls.filtered = small_integers(a["particle"]), len(a["category"]) > 0
         self.ls.category, self.ls.mask = indices(a["category"]), indices(a["mask"])

@@ -135,7 +135,7 @@ def rub(
     w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(Meeting), nx: cython.double, ny: cython.double,
     pushed: cython.double, t: cython.double,
 ) -> cython.void:  # fmt: skip
-    """Friction of an impact that has pushed by `pushed` along n: the point of contact has the inverse mass 3 W along t."""
+    """Friction of an impact that has pushed by `pushed` along n."""
     at: cython.Py_ssize_t = k * w.mixed
     mu: cython.double = w.friction[at]
     if not w.rough or mu == 0:
@@ -145,7 +145,7 @@ def rub(
     uy: cython.double = w.motion[4 * m.j + 1] - w.motion[4 * m.i + 1] + m.ay * back
     slip: cython.double = ux * ny - uy * nx + w.motion[4 * m.i + 2] * w.radius_i[at] + w.motion[4 * m.j + 2] * w.radius_j[at]
     most: cython.double = mu * pushed
-    jt: cython.double = min(max(-slip / 3, -most), most)
+    jt: cython.double = min(max(-slip * w.grip[at], -most), most)
     strike_pair(w, k, m, jt * ny, -jt * nx, jt, t)
 
 

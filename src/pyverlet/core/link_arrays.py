@@ -27,6 +27,7 @@ Links = cython.struct(
     rough=cython.bint,
     rubs=cython.pointer(int32_t),  # (count,) whether what holds it rubs it
     rim=cython.pointer(cython.double),  # (count,) spin times radius, m/s
+    ease=cython.pointer(cython.double),  # (count,) as in `Step`
     begun=cython.pointer(cython.double),  # (count, 3) `u` and `rim` before its chain was solved
     had=cython.pointer(cython.double),  # (rows, 2) `given` then
     held=cython.pointer(int32_t),  # (count,) contact with the surface that holds it, -1: none

@@ -16,8 +16,6 @@ from pyverlet.core.surfaces import note_surface
 WEDGED = cython.declare(cython.double, 1e-3)
 """Of its mobility: where surfaces leave less of it to a row, it is solved as if there were none, and they follow."""
 
-ROLLING = cython.declare(cython.double, 2.0 / 3.0)
-
 Mobility = cython.struct(xx=cython.double, xy=cython.double, yy=cython.double)
 
 
@@ -28,7 +26,7 @@ Mobility = cython.struct(xx=cython.double, xy=cython.double, yy=cython.double)
 def share_along(k: cython.pointer(Links), i: cython.Py_ssize_t, c: cython.Py_ssize_t) -> cython.double:
     """Of what linked particle i gets along the surface: a disc that grips it begins to turn, and keeps two thirds."""
     grips: cython.bint = fabs(k.contact[CONTACT * c + DRAG]) < k.contact[CONTACT * c + RUB] * k.contact[CONTACT * c + PUSH]
-    return ROLLING if k.rough and k.rubs[i] and grips else 1.0
+    return k.ease[i] / (1 + k.ease[i]) if k.rough and k.rubs[i] and grips else 1.0
 
 
 @cython.cfunc
@@ -78,11 +76,11 @@ def press(
     k.u[2 * i + 1] -= into * ny
     if k.rough and k.rubs[i]:
         most: cython.double = k.contact[at + RUB] * k.contact[at + PUSH]
-        rubbed: cython.double = min(max(k.contact[at + DRAG] - slip / 3, -most), most) - k.contact[at + DRAG]
+        rubbed: cython.double = min(max(k.contact[at + DRAG] - slip / (1 + k.ease[i]), -most), most) - k.contact[at + DRAG]
         k.contact[at + DRAG] += rubbed
         k.u[2 * i] += rubbed * ny
         k.u[2 * i + 1] -= rubbed * nx
-        k.rim[i] -= 2 * rubbed
+        k.rim[i] -= k.ease[i] * rubbed
 
 
 @cython.cfunc

@@ -8,7 +8,7 @@ Along the tangent (n_y, -n_x) the point of contact of two discs has three times 
 from __future__ import annotations
 
 import cython
-from cython.cimports.lanes import lanes, lanes2, lanes4, larger, load, put, put4, smaller, spread, take, take4
+from cython.cimports.lanes import lanes, lanes2, lanes4, larger, load, put, put4, smaller, spread, take, take4, where_zero
 
 from pyverlet.core.step import Step
 
@@ -39,7 +39,7 @@ def motion_of(w: cython.pointer(Step), k: cython.Py_ssize_t, rough: cython.bint)
 @cython.nogil
 @cython.exceptval(check=False)
 def ease_i(w: cython.pointer(Step), at: cython.Py_ssize_t, part: lanes) -> lanes:
-    """What an angular impulse over the reduced mass turns i by: w_i / (w_i + w_j) times 2 / r^2."""
+    """What an angular impulse over the reduced mass turns i by: w_i / (w_i + w_j) times 2 / r^2; 0 if its rotation is fixed."""
     turn: lanes = load(w.turn_i, at)
     return part * turn * turn * spread(0.5)
 
@@ -68,7 +68,8 @@ def held_roll(w: cython.pointer(Step), k: cython.Py_ssize_t, m: Motion, normal: 
     part: lanes = load(w.share, k * w.varied)
     other: lanes = spread(1) - part
     spins: lanes = m.vs - m.us + tangent * (other * load(w.turn_j, at) - part * load(w.turn_i, at))
-    wanted: lanes = load(w.roll_impulse, k) - spins / (ease_i(w, at, part) + ease_j(w, at, other))
+    ease: lanes = ease_i(w, at, part) + ease_j(w, at, other)
+    wanted: lanes = load(w.roll_impulse, k) - where_zero(ease, spread(0), spins / where_zero(ease, spread(1), ease))
     return clamped(wanted, load(w.rolling, at) * normal)
 
 

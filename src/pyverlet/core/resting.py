@@ -81,7 +81,8 @@ def find_edited(given, held, particle, island, edited) -> int:
     """Set edited[k] = 1 for sleepers that the user has written to; returns how many there are.
 
     given: what the user has, in the user's order: position, velocity, spin, radius, mass, restitution, friction,
-    rolling resistance, category, mask, material.
+    rolling resistance, category, mask, material,
+    fixed rotation.
     held: what the slots hold of it, without velocity and spin, which are 0; categories and masks are empty where all are default.
     """
     x: cython.pointer[cython.const[real]] = const_reals(given[0])
@@ -95,6 +96,7 @@ def find_edited(given, held, particle, island, edited) -> int:
     category: cython.pointer[cython.const[uint32_t]] = const_indices(given[8])
     mask: cython.pointer[cython.const[uint32_t]] = const_indices(given[9])
     material: cython.pointer[cython.const[uint32_t]] = const_indices(given[10])
+    fixed: cython.pointer[cython.const[uint32_t]] = const_indices(given[11])
     was_x: cython.pointer[cython.const[real]] = const_reals(held[0])
     was_radius: cython.pointer[cython.const[real]] = const_reals(held[1])
     was_mass: cython.pointer[cython.const[real]] = const_reals(held[2])
@@ -104,12 +106,14 @@ def find_edited(given, held, particle, island, edited) -> int:
     was_category: cython.pointer[cython.const[uint32_t]] = const_indices(held[6])
     was_mask: cython.pointer[cython.const[uint32_t]] = const_indices(held[7])
     was_material: cython.pointer[cython.const[uint32_t]] = const_indices(held[8])
+    was_fixed: cython.pointer[cython.const[uint32_t]] = const_indices(held[9])
     order: cython.pointer[cython.const[int32_t]] = const_small_integers(particle)
     asleep: cython.pointer[cython.const[int64_t]] = const_integers(island)
     to: cython.pointer(uint8_t) = octets(edited)
     sorted_out: cython.bint = len(held[6]) > 0
     masked: cython.bint = len(held[7]) > 0
     made: cython.bint = len(held[8]) > 0
+    holds: cython.bint = len(held[9]) > 0
     none: uint32_t = 0
     one: uint32_t = 1
     every: uint32_t = 0xFFFFFFFF
@@ -135,6 +139,7 @@ def find_edited(given, held, particle, island, edited) -> int:
                 or category[i] != (was_category[k] if sorted_out else one)
                 or mask[i] != (was_mask[k] if masked else every)
                 or material[i] != (was_material[k] if made else none)
+                or fixed[i] != (was_fixed[k] if holds else none)
             ):
                 to[k] = 1
                 found += 1

@@ -140,11 +140,14 @@ def hold_roll(
     """The disc is not to roll on the surface, as far as its resistance to that goes; friction is about to give `rubbed`."""
     row: cython.pointer(cython.double) = w.contact
     r: cython.double = w.radius[i]
+    ease: cython.double = w.ease[i]
+    if ease == 0:
+        return
     most: cython.double = row[first + ROLL_MOST] * after
     had: cython.double = row[first + ROLL]
-    spin: cython.double = w.motion[4 * i + 2] - row[first + SPIN] - 2 * rubbed / r
-    row[first + ROLL] = min(max(had - 0.5 * r * r * spin, -most), most)
-    w.motion[4 * i + 2] += cython.cast(real, 2 * (row[first + ROLL] - had) / (r * r))
+    spin: cython.double = w.motion[4 * i + 2] - row[first + SPIN] - ease * rubbed / r
+    row[first + ROLL] = min(max(had - r * r * spin / ease, -most), most)
+    w.motion[4 * i + 2] += cython.cast(real, ease * (row[first + ROLL] - had) / (r * r))
 
 
 @cython.cfunc
@@ -189,7 +192,7 @@ def hold(
         slip: cython.double = ux * ny - uy * nx - v[4 * i + 2] * w.radius[i]
         most: cython.double = row[first + RUB] * after
         old: cython.double = row[first + DRAG]
-        row[first + DRAG] = min(max(old - slip / 3, -most), most)
+        row[first + DRAG] = min(max(old - slip / (1 + w.ease[i]), -most), most)
         rubbed = row[first + DRAG] - old
         if w.rolls:
             hold_roll(w, i, first, after, rubbed)
@@ -347,6 +350,6 @@ def warm_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
                 r: cython.double = w.radius[i]
                 if w.substep == w.first:
                     w.contact[first + ROLL] *= w.scale
-                w.motion[4 * i + 2] += cython.cast(real, 2 * w.contact[first + ROLL] / (r * r))
+                w.motion[4 * i + 2] += cython.cast(real, w.ease[i] * w.contact[first + ROLL] / (r * r))
             jt: cython.double = w.contact[first + DRAG] if w.rough else 0.0
             push_off(w, i, k, w.contact[first + PUSH], jt, w.contact[first + NORMAL], w.contact[first + NORMAL + 1])

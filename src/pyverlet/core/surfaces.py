@@ -93,7 +93,7 @@ def push_off(
     v[width * i + 1] -= cython.cast(real, jt * nx + jn * ny)
     note_surface(w, i, k, w.weigh * (jt * ny - jn * nx), -w.weigh * (jt * nx + jn * ny), False)
     if w.rough:
-        v[4 * i + 2] -= cython.cast(real, jt * 2 / w.radius[i])
+        v[4 * i + 2] -= cython.cast(real, jt * w.ease[i] / w.radius[i])
 
 
 @cython.cfunc
@@ -122,8 +122,8 @@ def bounce_at(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
     if w.rough and mu > 0:
         slip: cython.double = ux * ny - uy * nx - w.motion[4 * i + 2] * w.radius[i]
         most: cython.double = mu * given
-        jt: cython.double = min(max(-slip / 3, -most), most)
-        strike(w, i, jt * ny, -jt * nx, -jt * 2 / w.radius[i], hit.time)
+        jt: cython.double = min(max(-slip / (1 + w.ease[i]), -most), most)
+        strike(w, i, jt * ny, -jt * nx, -jt * w.ease[i] / w.radius[i], hit.time)
         note_surface(w, i, k, jt * ny, -jt * nx, True)
         if w.booking:
             book_belt(w, i, k, jt, nx, ny)

@@ -30,7 +30,7 @@ from pyverlet.world.world import World
 
 Table = dict[str, Any]
 
-LATER = ("rolling_resistance", "material")
+LATER = ("rolling_resistance", "material", "fixed_rotation")
 COLUMNS = ("position", "velocity", "spin", "radius", "mass", "restitution", "friction", *LATER, "category", "mask")
 """Arrays of a group that is kept as such; files of older versions lack the later ones."""
 

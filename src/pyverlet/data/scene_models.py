@@ -158,6 +158,7 @@ class Group(Part):
     friction: Annotated[float, Field(ge=0)] | None = None
     rolling_resistance: Annotated[float, Field(ge=0)] | None = None
     material: str = ""
+    fixed_rotation: bool = False
     category: Bits = 1
     mask: Bits = EVERYONE
     pinned: bool = False

@@ -158,6 +158,7 @@ class Group:
     rolling_resistance = Column("(n,) c of these circles; negative: as the world's `Collisions` and bounds say.")
     category = Column("(n,) uint32, the bits of what these circles are.")
     mask = Column("(n,) uint32, the bits of the categories they collide with.")
+    fixed_rotation = Column("(n,) uint32, 1 of circles that nothing turns, else 0.")
 
     @property
     def material(self) -> NDArray[np.str_]:
@@ -287,6 +288,7 @@ class Particle:
     rolling_resistance = Column("c of its own; negative: as the world's `Collisions` and bounds say.")
     category = Column("The bits of what it is.")
     mask = Column("The bits of the categories it collides with.")
+    fixed_rotation = Column("1 if nothing turns it, else 0.")
 
 
 def _places(state: State, numbers: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

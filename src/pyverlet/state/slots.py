@@ -34,7 +34,7 @@ class Slots:
         particle: (n,) the user's index of the particle in each slot.
         position, velocity, acceleration, spin, radius, mass, restitution, friction, rolling_resistance: as in State.
         category, mask: as in State, or empty while every circle collides with every other.
-        material: as in State, or empty while no circle has one. materials: as in State.
+        material, fixed_rotation: as in State, or empty while they are 0 of all. materials: as in State.
         most_restitution, most_friction, most_rolling: the largest of their columns; negative if no circle has values of its own.
         revision: how often what users set was taken up anew, or others slept.
         inverse_mass: (n,) 1/kg; 0 for a pinned particle: whether one `pins`. total_mass: of others, kg.
@@ -77,7 +77,7 @@ class Slots:
         self._given: dict[str, Any] = {name: np.zeros(0, np.uint32 if name in MARKS else self.dtype) for name in _GIVEN}
         self._changed = True
         self.wall_hits = np.full(count, -1, self.dtype)
-        self.category = self.mask = self.material = np.empty(0, np.uint32)
+        self.category = self.mask = self.material = self.fixed_rotation = np.empty(0, np.uint32)
         self.most_restitution = self.most_friction = self.most_rolling = -1.0
         self._scratch: list[Array] = []
         self._slot_of: Array | None = None
@@ -150,7 +150,10 @@ class Slots:
         filters = (state.category != 1).any() or (state.mask != EVERYONE).any()
         order = self.particle if filters else self.particle[:0]
         self.category, self.mask = state.category[order], state.mask[order]
-        self.material, self.materials = state.material[self.particle if state.material.any() else order[:0]], state.materials
+        self.materials = state.materials
+        for name in ("material", "fixed_rotation"):
+            marks = getattr(state, name)
+            setattr(self, name, marks[self.particle] if marks.any() else marks[:0].copy())
         self._changed = False
         return bool(changed)
 

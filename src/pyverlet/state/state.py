@@ -21,12 +21,13 @@ Array = NDArray[Any]
 ROWS = ("position", "velocity", "acceleration")
 SET = ("radius", "mass", "restitution", "friction", "rolling_resistance")
 COLUMNS = ("spin", *SET)
-MARKS = ("category", "mask", "material")
+MARKS = ("category", "mask", "material", "fixed_rotation")
 
 EVERYONE = 0xFFFFFFFF  # a mask of 32 bits that takes every category
 
 _DEFAULTS: dict[str, Any] = {
     "angle": 0, "restitution": -1, "friction": -1, "rolling_resistance": -1, "category": 1, "mask": EVERYONE, "material": 0,
+    "fixed_rotation": 0,
 }  # fmt: skip
 
 
@@ -43,6 +44,7 @@ class State:
             the bounds say.
         category, mask: (n,) 32 bits each; two circles collide if each has a bit of its category in the other's mask.
         material: (n,) of each, its place among `materials`, the names of all that there have been; "" is none.
+        fixed_rotation: (n,) 1 of those that nothing turns, else 0.
         number: (n,) of each particle, in ascending order; no two particles of a world ever have the same.
         begun: the number of the first particle of each `append`, ascending. numbers: how many particles there have ever been.
         version: how often particles were added or removed.
@@ -63,6 +65,7 @@ class State:
     category: Array
     mask: Array
     material: Array
+    fixed_rotation: Array
     number: Array
     angle: NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from pyverlet.ground.constants import SKIN
 from pyverlet.laws.obstacles import Course
 from pyverlet.state.slots import Slots
 from pyverlet.world.contact_memory import Memory, columns_of
-from pyverlet.world.materials import materials_of, names_of, numbers_of, resist, skin_of, walls_of
+from pyverlet.world.materials import ease_of, materials_of, names_of, numbers_of, resist, skin_of, walls_of
 from pyverlet.world.obstacle_rows import ObstacleRows
 from pyverlet.world.sleepers import Remembered
 
@@ -251,7 +251,7 @@ class CoreArrays:
             position=state.position, velocity=state.velocity, acceleration=state.acceleration,
             inverse_mass=state.inverse_mass, radius=state.radius, own_restitution=state.restitution,
             own_friction=state.friction, own_rolling=state.rolling_resistance, own_material=numbers_of(state, self._names),
-            spin=state.spin, motion=np.zeros((count, 4), real), free=np.zeros((count, 2), real),
+            ease=ease_of(state), spin=state.spin, motion=np.zeros((count, 4), real), free=np.zeros((count, 2), real),
             free_spin=np.zeros(count, real), given=self.gave, given_spin=self.gave_spin,
             particle=state.particle, category=state.category, mask=state.mask,
         )  # fmt: skip

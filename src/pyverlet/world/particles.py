@@ -69,6 +69,7 @@ class Particles(Shared):
         restitution: ArrayLike | None = None,
         friction: ArrayLike | None = None,
         rolling_resistance: ArrayLike | None = None,
+        fixed_rotation: ArrayLike = False,
         material: str | Sequence[str] = "",
         category: ArrayLike = 1,
         mask: ArrayLike = EVERYONE,
@@ -87,6 +88,7 @@ class Particles(Shared):
             restitution: (n,) or one for all, e from 0 to 1; None: as `Collisions` and the bounds say. The larger of two counts.
             friction: (n,) or one for all, mu, 0 or more; None: as for restitution. The geometric mean of two counts, as in Box2D.
             rolling_resistance: (n,) or one for all, c, 0 or more; None: as for friction. See `Collisions`.
+            fixed_rotation: (n,) or one for all: whether nothing turns it, as if its moment of inertia were infinite.
             material: (n,) names or one for all, of `Collisions(materials=...)`; "" is none.
             category: (n,) or one for all, 32 bits: what these circles are.
             mask: (n,) or one for all, 32 bits: two circles collide if each has a bit of its category in the other's mask.
@@ -114,6 +116,7 @@ class Particles(Shared):
             "mass": _mass(mass, density, size),
             "category": checks.bits("category", category, count),
             "mask": checks.bits("mask", mask, count),
+            "fixed_rotation": checks.bits("fixed_rotation", np.asarray(fixed_rotation) + 0, count),
             "material": self._material_numbers(material, count),
         }
         own = (
@@ -209,6 +212,7 @@ class Particles(Shared):
     category = Column("(n,) uint32, the bits of what each circle is; a view.")
     rolling_resistance = Column("(n,) c of circles that have their own, else negative as for friction; a view.")
     mask = Column("(n,) uint32, the bits of the categories it collides with; a view.")
+    fixed_rotation = Column("(n,) uint32, 1 of circles that nothing turns, else 0; a view.")
 
     @property
     def material(self) -> NDArray[np.str_]:

@@ -47,6 +47,7 @@ PARTICLES = {
     "category": Field(np.uint32, "particles"),
     "mask": Field(np.uint32, "particles"),
     "material": Field(np.uint32, "particles"),
+    "fixed_rotation": Field(np.uint32, "particles"),
     "number": Field(np.int64, "particles", least=0, most=2**31, order="ascending"),
     "begun": Field(np.int64, "groups", least=0, most=2**31, order="rising"),
 }
@@ -169,7 +170,8 @@ def _bring_up_to_date(arrays: dict[str, Array], real: np.dtype[Any]) -> None:
             arrays[name] = np.column_stack((arrays[name], np.zeros(len(arrays[name]), arrays[name].dtype)))
     if "particles.friction" in arrays and "particles.rolling_resistance" not in arrays:
         arrays["particles.rolling_resistance"] = np.full(len(arrays["particles.friction"]), -1, real)
-        arrays["particles.material"] = np.zeros(len(arrays["particles.friction"]), np.uint32)
+        for name in ("material", "fixed_rotation"):
+            arrays[f"particles.{name}"] = np.zeros(len(arrays["particles.friction"]), np.uint32)
 
 
 def fill(world: World, parts: Parts) -> None:

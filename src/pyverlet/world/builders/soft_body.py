@@ -40,7 +40,7 @@ def soft_body(
     """A body inside `outline`, such as `pv.builders.disc((0, 3), 1.0)`, `pv.builders.box((0, 0), (2, 1))` or corners of your own.
 
     Hollow, it is a skin of springs that keeps its area: a balloon, which forgets its corners in time. Filled, it is a lattice of
-    springs throughout, which keeps its shape.
+    springs throughout, which keeps its shape. Its particles do not turn by themselves.
 
     Args:
         world: gets the particles and the links.
@@ -73,6 +73,7 @@ def soft_body(
     points = np.concatenate((skin, _lattice(shrunk, skin, apart))) if filled else skin
     nearest = float(np.sqrt(_squares(points)[np.triu_indices(len(points), 1)].min()))
     group = add(world, points, min(apart, nearest), None, mass)
+    group.fixed_rotation[:] = 1  # they are bits of a skin, no wheels for it to roll on
     n = np.arange(len(skin))
     pairs = np.column_stack((n, np.roll(n, -1))) if not filled else _neighbours(points, apart)
     links: list[Link] = []
