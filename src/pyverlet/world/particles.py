@@ -126,12 +126,6 @@ class Particles(Shared):
             values["position"] = np.where(free[:, None], self.boundary.put_in(where, values["radius"]), where)
         return Group(self._state, self._state.append(values), self.remove)
 
-    @of_one_frame
-    def is_free(self, position: ArrayLike) -> NDArray[np.bool_]:
-        """(n,) whether these places, (n, 2) or (2,), m, are inside the room and in no obstacle. Circles do not count."""
-        where = checks.rows("position", position, np.dtype(np.float64))
-        return np.asarray(~self.boundary.outside(where) & (self._course.covering(where) < 0))
-
     def _refuse_misplaced(self, position: Array, free: Array) -> None:
         """No particle that is free may start inside an obstacle or outside the room."""
         outside, inside = self.boundary.outside(position), self._course.covering(position)
