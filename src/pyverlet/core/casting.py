@@ -44,7 +44,7 @@ Cast = cython.struct(
     discs=cython.bint, x0=cython.double, y0=cython.double, cell=cython.double, columns=int64_t, rows=int64_t,
     begin=cython.pointer[cython.const[int32_t]], member=cython.pointer[cython.const[int32_t]],
     position=cython.pointer[cython.const[real]], radius=cython.pointer[cython.const[real]], disc_kinds=Kinds,
-    grid=Grid, bodies=int64_t, low_x=cython.double, low_y=cython.double, high_x=cython.double, high_y=cython.double,
+    obstacles=cython.bint, grid=Grid, bodies=int64_t, low_x=cython.double, low_y=cython.double, high_x=cython.double, high_y=cython.double,
     body_kinds=Kinds, wall=cython.pointer[cython.const[cython.double]], wall_kinds=Kinds,
     kind=cython.pointer(int64_t), index=cython.pointer(int64_t),
     distance=cython.p_double, normal=cython.p_double, point=cython.p_double,
@@ -196,7 +196,7 @@ def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
         stop(j, q, cython.address(r), to_wall(j.wall, k, cython.address(r)), WALL, k, cython.address(j.wall_kinds), 0, 0)
     if j.discs:
         pass_discs(j, q, cython.address(r))
-    if j.grid.segments > 0:
+    if j.obstacles:
         pass_segments(j, q, cython.address(r))
     n: Normal
     n.x = n.y = 0.0
@@ -258,7 +258,7 @@ def cast(rays, discs, obstacles, walls, threads: cython.int, kind, index, distan
     j: cython.pointer(Cast) = cython.address(job)
     j.count, j.origin, j.heading = len(rays[0]), const_doubles(rays[0]), const_doubles(rays[1])
     j.length, j.size, j.own = const_doubles(rays[2]), const_doubles(rays[3]), kinds_of(rays[4:])
-    j.discs, j.grid.segments = discs is not None, 0
+    j.discs, j.obstacles = discs is not None, obstacles is not None
     if discs is not None:
         j.x0, j.y0, j.cell, j.columns, j.rows = discs[:5]
         j.begin, j.member = const_small_integers(discs[5]), const_small_integers(discs[6])
