@@ -10,6 +10,7 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.world import casts
+from pyverlet.world.images import Images
 
 LOW, HIGH = np.array((-12.0, -9.0)), np.array((12.0, 9.0))
 ROOMS: dict[str, Callable[[], pv.Boundary]] = {
@@ -303,11 +304,21 @@ def test_rays_far_from_sparse_obstacles_cost_no_more_than_looking_at_each() -> N
     assert found.distance[:2].tolist() == [1e7 - 0.5, np.inf]
 
 
+@pytest.mark.parametrize("away", [1e9, 1e13, 1e18, 1e100])
+def test_rays_from_far_away_come_to_an_end(away: float) -> None:
+    """Where a cell is less than a bit of the distance, no step would lead into the next one."""
+    world = pv.World(dtype=np.float64)
+    world.add(position=np.column_stack((np.arange(20.0), np.zeros(20))), radius=0.1)
+    world.obstacles.extend(pv.Disc((k, 0), 0.1) for k in range(300))
+    found = world.ray((-away, 0), [(1, 0), (1, 1e-300), (-1, 0), (0, 1)] * 5)
+    assert found.distance[:4] == pytest.approx([away, away, np.inf, np.inf], rel=1e-9)
+
+
 def test_a_crowd_of_large_discs_is_listed_in_larger_cells() -> None:
     world = pv.World(dtype=np.float64)
     rng = np.random.default_rng(0)
     world.add(position=rng.uniform(0, 1, (200, 2)), radius=50.0, allow_overlap=True)
-    *_, columns, rows, _, member = casts._listed(casts.Images.of(world._state, 50.0), 0.0, few=False)
+    *_, columns, rows, _, member = casts._listed(Images.of(world._state, 50.0), 0.0, few=False)
     assert len(member) <= casts.LISTED * 4 * 200
     assert columns * rows < 200
     found = world.ray((-100, 0.5), np.tile((1.0, 0.0), (20, 1)))

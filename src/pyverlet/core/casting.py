@@ -32,6 +32,9 @@ OBSTACLE = cython.declare(cython.int, 1)
 WALL = cython.declare(cython.int, 2)
 NOTHING = cython.declare(cython.int, 3)
 
+FARTHEST_WALKED = cython.declare(cython.double, 1099511627776.0)
+"""Cells, 2^40, that a ray may begin or end away from the origin to be walked along: rounding then is far less than a cell."""
+
 RAYS = cython.declare(cython.Py_ssize_t, 256)
 """Rays that a thread takes at a time."""
 
@@ -44,7 +47,8 @@ Cast = cython.struct(
     discs=cython.bint, x0=cython.double, y0=cython.double, cell=cython.double, columns=int64_t, rows=int64_t,
     begin=cython.pointer[cython.const[int32_t]], member=cython.pointer[cython.const[int32_t]],
     position=cython.pointer[cython.const[real]], radius=cython.pointer[cython.const[real]], disc_kinds=Kinds,
-    obstacles=cython.bint, grid=Grid, bodies=int64_t, low_x=cython.double, low_y=cython.double, high_x=cython.double, high_y=cython.double,
+    obstacles=cython.bint, grid=Grid, bodies=int64_t,
+    low_x=cython.double, low_y=cython.double, high_x=cython.double, high_y=cython.double,  # a rectangle about them
     body_kinds=Kinds, wall=cython.pointer[cython.const[cython.double]], wall_kinds=Kinds,
     kind=cython.pointer(int64_t), index=cython.pointer(int64_t),
     distance=cython.p_double, normal=cython.p_double, point=cython.p_double,
@@ -169,7 +173,9 @@ def pass_segments(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.point
     if not w.begin <= w.end:
         return
     k: cython.Py_ssize_t
-    if (w.end - w.begin) * (fabs(r.dx) + fabs(r.dy)) > (j.grid.segments - 1) * j.grid.cell:  # few segments, or far between
+    far: cython.bint = not fabs(r.x) + fabs(r.y) + w.end < FARTHEST_WALKED * j.grid.cell
+    if far or (w.end - w.begin) * (fabs(r.dx) + fabs(r.dy)) > (j.grid.segments - 1) * j.grid.cell:
+        # More cells than segments, or so far away that rounding does not tell cells apart.
         for k in range(j.grid.segments):
             pass_segment(j, q, r, k)
         return
