@@ -118,9 +118,10 @@ def walls_of(world: pv.World, start: Any, heading: Any, size: Any) -> Any:
         o, r = start - room.center, room.radius - size
         b, left = (o * heading).sum(axis=1), r**2 - (o**2).sum(axis=1)
         return np.where(left > 0, -b + np.sqrt(np.maximum(b**2 + left, 0)), 0.0)[:, None]
-    if room.facing(start) is None:
+    facing = room.facing(start)
+    if facing is None:
         return np.full((len(start), 1), np.inf)
-    gap, normal = room.facing(start)
+    gap, normal = facing
     closing = -(normal * heading[:, None]).sum(axis=2)
     gap = gap - np.broadcast_to(size, len(start))[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -290,6 +291,15 @@ def test_rays_follow_what_moves_and_grows() -> None:
     world.radius[0] = 2.0
     assert world.ray((0, 0), way).distance[:2] == pytest.approx([4, 6])
     assert world.circle_cast((0, 0), way, 0.5).distance[:2] == pytest.approx([3.5, 5.5])
+    saved = world.save()
+    world.position[0] = (20, 0)
+    assert world.ray((0, 0), way).distance[:2] == pytest.approx([18, 6])
+    world.add(position=np.zeros((50, 2)) + (0, 30), allow_overlap=True)  # arrays are others
+    world.restore(saved)
+    assert world.ray((0, 0), way).distance[:2] == pytest.approx([4, 6])
+    for radius in np.linspace(0.1, 0.9, 20):  # more than are remembered
+        assert world.circle_cast((0, 0), way, radius).distance[0] == pytest.approx(4 - radius)
+    assert len(world.ray(np.zeros((0, 2)), (1, 0)).position) == 0
     world.obstacles.clear()
     world.remove([0, 1])
     assert np.isinf(world.ray((0, 0), way).distance).all()
@@ -318,7 +328,7 @@ def test_a_crowd_of_large_discs_is_listed_in_larger_cells() -> None:
     world = pv.World(dtype=np.float64)
     rng = np.random.default_rng(0)
     world.add(position=rng.uniform(0, 1, (200, 2)), radius=50.0, allow_overlap=True)
-    *_, columns, rows, _, member = casts._listed(Images.of(world._state, 50.0), 0.0, few=False)
+    *_, columns, rows, _, member = casts._cells_of(Images.of(world._state, 50.0), 0.0, few=False)
     assert len(member) <= casts.LISTED * 4 * 200
     assert columns * rows < 200
     found = world.ray((-100, 0.5), np.tile((1.0, 0.0), (20, 1)))

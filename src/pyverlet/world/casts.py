@@ -33,6 +33,9 @@ LISTED = 16
 ROUNDED_OFF = 1e-6
 """Part of a cell that discs are listed too far: rays find their cells by other sums."""
 
+MOST_LISTS = 8
+"""Radii of circles for which lists of discs are kept while nothing moves."""
+
 _NOTHING = 3
 """After particles, obstacles and walls: no kind of thing, as the core numbers them."""
 
@@ -223,17 +226,21 @@ class Casts(Queries):
     def _discs(self, reach: float, questions: int) -> tuple[Indices | None, tuple[Any, ...]]:
         """Whose images discs are, and those in cells within `reach` m of them, as `core.casting` takes them."""
         s, few = self._state, questions <= FEW
-        if not few and not (self._listed and all(map(np.array_equal, self._listed, (s.position, s.radius)))):
+        if not few and not (self._listed and all(map(np.array_equal, self._listed[:2], (s.position, s.radius)))):
             self._listed = s.position.copy(), s.radius.copy(), {}
         lists = {} if few or self._listed is None else self._listed[2]
         if (reach, s.seam) not in lists:
+            if len(lists) == MOST_LISTS:
+                lists.clear()
             seen = Images.of(s, float(s.radius.max()) + reach)
-            lists[reach, s.seam] = seen.owner, (*_listed(seen, reach, few=few), np.ascontiguousarray(seen.position), seen.radius)
-        owner, discs = lists[reach, s.seam]
-        return owner, (*discs, *((s.category, s.mask) if owner is None else (s.category[owner], s.mask[owner])))
+            lists[reach, s.seam] = _cells_of(seen, reach, few=few), seen
+        cells, (position, radius, owner) = lists[reach, s.seam]
+        if owner is None:
+            return None, (*cells, s.position, s.radius, s.category, s.mask)
+        return owner, (*cells, position, radius, s.category[owner], s.mask[owner])
 
 
-def _listed(seen: Images, reach: float, *, few: bool) -> tuple[Any, ...]:
+def _cells_of(seen: Images, reach: float, *, few: bool) -> tuple[Any, ...]:
     """Cells over all discs, and which are in each: in one, if there are few questions."""
     tools, radius = unit("tools", seen.position.dtype), seen.radius.astype(float)
     x0, y0, x1, y1 = tools.extent(seen.position)
@@ -246,10 +253,9 @@ def _listed(seen: Images, reach: float, *, few: bool) -> tuple[Any, ...]:
     while ((2.0 * (radius + reach) / cell + 1.0) ** 2).mean() > LISTED:
         cell *= 2.0
     columns, rows = int(width / cell) + 1, int(height / cell) + 1
-    begin, member, found = np.empty(columns * rows + 2, np.int32), np.empty(4 * len(radius), np.int32), 0
-    while (found := tools.list_discs(
-        seen.position, seen.radius, reach + ROUNDED_OFF * cell, x0, y0, cell, columns, rows, begin, member)
-    ) > len(member):  # fmt: skip
+    begin, member = np.empty(columns * rows + 2, np.int32), np.empty(4 * len(radius), np.int32)
+    about = seen.position, seen.radius, reach + ROUNDED_OFF * cell, x0, y0, cell, columns, rows, begin
+    while (found := tools.list_discs(*about, member)) > len(member):
         member = np.empty(found, np.int32)
     return x0, y0, cell, columns, rows, begin, member
 
