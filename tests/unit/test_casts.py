@@ -294,7 +294,7 @@ def test_rays_follow_what_moves_and_grows() -> None:
     saved = world.save()
     world.position[0] = (20, 0)
     assert world.ray((0, 0), way).distance[:2] == pytest.approx([18, 6])
-    world.add(position=np.zeros((50, 2)) + (0, 30), allow_overlap=True)  # arrays are others
+    world.add(position=np.tile((0.0, 30.0), (50, 1)), allow_overlap=True)  # arrays are others
     world.restore(saved)
     assert world.ray((0, 0), way).distance[:2] == pytest.approx([4, 6])
     for radius in np.linspace(0.1, 0.9, 20):  # more than are remembered
