@@ -137,6 +137,8 @@ def test_first_hits_are_those_of_brute_force(room: str, dtype: Any, spread: floa
     world, rng = world_of(room, dtype, spread, seed=len(room) + int(spread))
     count = 300
     start, angle = rng.uniform(LOW, HIGH, (count, 2)), rng.uniform(0, 2 * np.pi, count)
+    if room == "open":  # from outside of all grids
+        start = np.where(rng.random((count, 1)) < 0.5, 1.4 * start, start)
     start[:30] = world.position[:30] + 0.3 * world.radius[:30, None] * rng.normal(0, 1, (30, 2))
     heading = np.column_stack((np.cos(angle), np.sin(angle)))
     size = rng.uniform(0.0, 1.2, count) if moving else np.zeros(count)
@@ -312,6 +314,22 @@ def test_rays_far_from_sparse_obstacles_cost_no_more_than_looking_at_each() -> N
         world.obstacles.append(pv.Disc((1e8 * k, 1e7), 0.5))
     found = world.ray((-1e7, 1e7), [(1, 0), (0, 1)] * 500)
     assert found.distance[:2].tolist() == [1e7 - 0.5, np.inf]
+
+
+def test_rays_from_outside_of_the_grid_enter_its_first_cell() -> None:
+    """Rounding puts some of them beside it; whatever cells there are, each ray aims at a disc, and nothing is before that."""
+    rng = np.random.default_rng(7)
+    for _ in range(30):
+        world = pv.World(dtype=np.float64)
+        place = rng.uniform(0, 10, (60, 2))
+        world.add(position=place, radius=rng.uniform(0.01, 0.3, 60), allow_overlap=True)
+        start = 5 + 10 * rng.uniform(1, 2) * (angle := rng.normal(0, 1, (200, 2))) / np.hypot(*angle.T)[:, None]
+        aim = place[rng.integers(0, 60, 200)] - start
+        far = np.hypot(*aim.T)
+        along = ((place - start[:, None]) * (aim / far[:, None])[:, None]).sum(axis=2)
+        root = world.radius**2 - (((place - start[:, None]) ** 2).sum(axis=2) - along**2)
+        best = np.where(root >= 0, along - np.sqrt(np.maximum(root, 0)), np.inf).min(axis=1)
+        assert world.ray(start, aim).distance == pytest.approx(best, abs=NEAR)
 
 
 @pytest.mark.parametrize("away", [1e9, 1e13, 1e18, 1e100])

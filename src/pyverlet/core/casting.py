@@ -79,11 +79,15 @@ def clip(w: cython.pointer(Walk), p: cython.double, d: cython.double, low: cytho
 @cython.nogil
 @cython.exceptval(check=False)
 def enter(
-    w: cython.pointer(Walk), r: cython.pointer(Ray), x0: cython.double, y0: cython.double, cell: cython.double
-) -> cython.void:
-    """Stand in the cell in which the part begins."""
+    w: cython.pointer(Walk), r: cython.pointer(Ray), x0: cython.double, y0: cython.double, cell: cython.double,
+    columns: int64_t, rows: int64_t,
+) -> cython.void:  # fmt: skip
+    """Stand in the cell in which the part begins, of columns times rows: rounding may put it beside the first. 0: of any."""
     w.column = cython.cast(int64_t, floor((r.x + w.begin * r.dx - x0) / cell))
     w.row = cython.cast(int64_t, floor((r.y + w.begin * r.dy - y0) / cell))
+    if columns > 0:
+        w.column = min(max(w.column, 0), columns - 1)
+        w.row = min(max(w.row, 0), rows - 1)
     w.step_x = 1 if r.dx > 0.0 else -1
     w.step_y = 1 if r.dy > 0.0 else -1
     w.per_x = cell / fabs(r.dx) if r.dx != 0.0 else INFINITY
@@ -136,9 +140,7 @@ def pass_discs(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(
     clip(cython.address(w), r.y, r.dy, j.y0, j.y0 + j.rows * j.cell)
     if not w.begin <= w.end:
         return
-    enter(cython.address(w), r, j.x0, j.y0, j.cell)
-    w.column = min(max(w.column, 0), j.columns - 1)  # rounding may put it beside the first cell
-    w.row = min(max(w.row, 0), j.rows - 1)
+    enter(cython.address(w), r, j.x0, j.y0, j.cell, j.columns, j.rows)
     n: cython.Py_ssize_t
     while w.column >= 0 and w.column < j.columns and w.row >= 0 and w.row < j.rows:
         at: int64_t = w.row * j.columns + w.column
@@ -179,7 +181,7 @@ def pass_segments(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.point
         for k in range(j.grid.segments):
             pass_segment(j, q, r, k)
         return
-    enter(cython.address(w), r, 0.0, 0.0, j.grid.cell)
+    enter(cython.address(w), r, 0.0, 0.0, j.grid.cell, 0, 0)
     while True:
         link: int32_t = j.grid.head[head_at(w.column, w.row, j.grid.heads)]
         while link >= 0:
