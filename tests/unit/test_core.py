@@ -81,9 +81,8 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     tools.draw_discs(pixels, ground, position, radius, colour, -3.0, 2.0, 10.0)
     tools.draw_lines(pixels, position.reshape(30, 2, 2), colour[:30], -3.0, 2.0, 10.0, 0.8)
     cells = (-20.0, -20.0, 40.0, 1, 1, np.array([0, 60]), np.arange(60))
-    index, distance, nearest, square = np.empty(5, np.int64), np.empty(5), np.full((5, 3), -1), np.full((5, 3), np.inf)
+    nearest, square = np.full((5, 3), -1), np.full((5, 3), np.inf)
     points, heading = np.ascontiguousarray(position[:5], float), np.tile([0.6, 0.8], (5, 1))
-    tools.first_on_rays(points + 2.0, heading, np.full(5, 9.0), 1.0, cells, position, radius, index, distance)
     tools.nearest_to(points, cells, position, nearest, square)
     segments = np.tile([0.0, 0.0, 0.6, 0.8, 2.0, 0.5, 0.0, 0.0, 0.0, 0.0], (6, 1))
     segments[:, :2], segments[:, 7] = np.arange(12).reshape(6, 2) % 5, np.arange(6)
@@ -92,9 +91,35 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     used = tools.list_segments(segments, 1.0, 1.0, heads, links)
     tools.covered_by(segments, 1.0, heads, links, where, by)
     found = tools.nearest_bodies(segments, 6, 1.0, 1.0, heads, links, where, np.full(60, 0.3), *row, gap, normal)
+    touched = tools.bodies_at(segments, 6, 1.0, heads, links, where, np.full(60, 0.3), *row)
+    begin, member, size = np.empty(42 * 42 + 2, np.int32), np.empty(9999, np.int32), np.array([0.0, 0.1, 0.3, 0.0, 0.2])
+    listed = tools.list_discs(position, radius, 0.3, -21.0, -21.0, 1.0, 42, 42, begin, member)
+    cells_of_discs, both = (-21.0, -21.0, 1.0, 42, 42, begin, member), (bits, bits)
+    rays, rooms = (points + 2.0, heading, np.full(5, 9.0), size, bits, bits), np.array([-9.0, -8.0, 9.0, np.inf, 0.0, 0.0, 8.0])
+    hits = [np.empty(5, np.int64), np.empty(5, np.int64), np.empty(5), np.empty((5, 2)), np.empty((5, 2))]
+    casts = [array.copy() for array in (tools.cast(rays, None, None, (rooms, *both), 1, *hits), *hits) if array is not None]
+    tools.cast(
+        rays, (*cells_of_discs, position, radius, *both), (segments, 1.0, heads, links, 6, *both), (rooms, *both), 1, *hits
+    )
     absent = np.empty(60, bool)
     tools.mark_absent(np.arange(0, 180, 3), np.arange(0, 180, 2), absent)
-    arrays = (absent, near, pixels, index, distance, nearest, square, heads, links[:used], by, row, gap, normal)
+    arrays = (
+        absent,
+        near,
+        pixels,
+        *casts,
+        *hits,
+        begin,
+        member[:listed],
+        nearest,
+        square,
+        heads,
+        links[:used],
+        by,
+        row,
+        gap,
+        normal,
+    )
     return [
         *engine.energies(position, velocity, spin, radius, mass, 0.5, -9.81),
         *engine.momenta(position, velocity, spin, radius, mass),
@@ -102,6 +127,7 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
         engine.pinned_move(mass, velocity, spin),
         near_ones,
         found,
+        touched,
         tools.checksum(np.arange(9000, dtype=np.uint64) << np.uint64(40)),
         *(array.tobytes() for array in arrays),
     ]

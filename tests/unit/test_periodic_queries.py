@@ -70,7 +70,7 @@ def test_rays_go_on_through_the_seam(axes: str) -> None:
     far = np.where((root >= 0) & (along >= 0), along - np.sqrt(np.maximum(root, 0)), np.inf)
     far = np.where(square <= radius**2, 0.0, far)
     far = np.where(far <= length, far, np.inf)
-    found = world.ray(start, heading, length)
+    found = world.ray(start, heading, length, walls=False)
     assert found.distance == pytest.approx(far.min(axis=1), abs=1e-9)
     hit = np.isfinite(found.distance) & (found.distance > 0)  # from inside of two discs both are as near
     assert hit.sum() > 15

@@ -156,20 +156,28 @@ def gap_to(g: cython.pointer(Grid), k: cython.Py_ssize_t, x: cython.double, y: c
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def is_covered(g: cython.pointer(Grid), k: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.bint:
-    """Whether (x, y) is in segment k, or in the polygon of which it is a face; faces run counter-clockwise."""
-    at: cython.Py_ssize_t = PLACED * k
-    if g.segment[at + ROUNDING] > 0.0 and gap_to(g, k, x, y).gap < 0.0:
-        return True
-    faces: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, g.segment[at + FACES])
-    first: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, g.segment[at + FIRST])
+def is_within(
+    s: cython.pointer[cython.const[cython.double]], k: cython.Py_ssize_t, x: cython.double, y: cython.double
+) -> cython.bint:
+    """Whether (x, y) is inside the polygon of which segment k is a face; faces run counter-clockwise."""
+    faces: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, s[PLACED * k + FACES])
+    first: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, s[PLACED * k + FIRST])
     n: cython.Py_ssize_t
     for n in range(first, first + faces):
-        at = PLACED * n
-        across: cython.double = g.segment[at + COSINE] * (y - g.segment[at + Y]) - g.segment[at + SINE] * (x - g.segment[at + X])
-        if across <= 0.0:
+        at: cython.Py_ssize_t = PLACED * n
+        if s[at + COSINE] * (y - s[at + Y]) - s[at + SINE] * (x - s[at + X]) <= 0.0:
             return False
     return faces > 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def is_covered(g: cython.pointer(Grid), k: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.bint:
+    """Whether (x, y) is in segment k, or in the polygon of which it is a face."""
+    if g.segment[PLACED * k + ROUNDING] > 0.0 and gap_to(g, k, x, y).gap < 0.0:
+        return True
+    return is_within(g.segment, k, x, y)
 
 
 def covered_by(segments, cell: cython.double, heads, links, position, by):
@@ -258,3 +266,34 @@ def least_gap(g: cython.pointer(Grid), x: cython.double, y: cython.double, each:
         least = min(least, gap_to(g, g.link[2 * link], x, y).gap)
         link = g.link[2 * link + 1]
     return least
+
+
+def bodies_at(segments, bodies: int64_t, cell: cython.double, heads, links, position, radius, row, body) -> int:
+    """The segments, or polygons they are of, that circles (n, 2), of `radius` (n,) m up to the reach of the grid, touch.
+
+    Fills row, of the circles, and body (without images), in no order and more than once where segments of one body are touched;
+    returns how many that makes, also beyond their room.
+    """
+    grid: Grid = grid_of(segments, cell, heads, links)
+    g: cython.pointer(Grid) = cython.address(grid)
+    x: cython.pointer[cython.const[cython.double]] = const_doubles(position)
+    size: cython.pointer[cython.const[cython.double]] = const_doubles(radius)
+    to_row: cython.pointer(int64_t) = integers(row)
+    to_body: cython.pointer(int64_t) = integers(body)
+    room: cython.Py_ssize_t = len(row)
+    count: cython.Py_ssize_t = len(position)
+    found: cython.Py_ssize_t = 0
+    i: cython.Py_ssize_t
+    with cython.nogil:
+        for i in range(count):
+            each: cython.bint = not fabs(x[2 * i]) + fabs(x[2 * i + 1]) < FARTHEST * g.cell
+            link: int64_t = 0 if each else first_link(g, x[2 * i], x[2 * i + 1])
+            while link >= 0 and link < (g.segments if each else link + 1):
+                k: cython.Py_ssize_t = link if each else g.link[2 * link]
+                link = link + 1 if each else g.link[2 * link + 1]
+                if gap_to(g, k, x[2 * i], x[2 * i + 1]).gap <= size[i] or is_within(g.segment, k, x[2 * i], x[2 * i + 1]):
+                    if found < room:
+                        to_row[found] = i
+                        to_body[found] = cython.cast(int64_t, g.segment[PLACED * k + BODY]) % bodies
+                    found += 1
+    return found

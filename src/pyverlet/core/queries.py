@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Questions about particles in cells: which covers a point, is in a region, is hit by a ray, is nearest.
+"""Questions about particles in cells: which covers a point, is in a region, is nearest.
 
 Of the cells: `x0`, `y0` their lower left corner, `cell` their size, m; `columns`, `rows`; `start` (columns rows + 1,) where each
 begins in `member`, whose indices are those of the particles. A particle is in the cell of its centre; the cells cover all
@@ -12,7 +12,7 @@ from __future__ import annotations
 import cython
 from cython.cimports.arrays import const_doubles, const_integers, const_reals, doubles, integers
 from cython.cimports.lanes import real
-from cython.cimports.libc.math import INFINITY, sqrt
+from cython.cimports.libc.math import INFINITY
 from cython.cimports.libc.stdint import int64_t
 
 from pyverlet.core.query_cells import cell_at
@@ -122,99 +122,6 @@ def in_regions(lower, upper, center, size, cells, position, query, particle):
                             which[found] = i
                         found += 1
     return found
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def distance_along(
-    x: cython.double,
-    y: cython.double,
-    dx: cython.double,
-    dy: cython.double,
-    px: cython.double,
-    py: cython.double,
-    r: cython.double,
-) -> cython.double:
-    """Distance along a ray from (x, y) in the unit direction (dx, dy) to a disc; 0 from inside, infinity for a miss."""
-    ox: cython.double = px - x
-    oy: cython.double = py - y
-    along: cython.double = ox * dx + oy * dy
-    across: cython.double = ox * dy - oy * dx
-    if ox * ox + oy * oy <= r * r:
-        return 0.0
-    if along < 0.0 or across * across > r * r:
-        return INFINITY
-    return along - sqrt(r * r - across * across)
-
-
-Part = cython.struct(begin=cython.double, end=cython.double)
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def within_reach(part: Part, p: cython.double, d: cython.double, size: cython.double, reach: cython.double) -> Part:
-    """The part of a ray that is within reach of the cells along one axis: p from their edge, at d for each metre, size wide."""
-    if d != 0.0:
-        a: cython.double = (-reach - p) / d
-        b: cython.double = (size + reach - p) / d
-        part.begin = max(part.begin, min(a, b))
-        part.end = min(part.end, max(a, b))
-    elif not (-reach <= p and p <= size + reach):
-        part.end = -1.0
-    return part
-
-
-def first_on_rays(origin, direction, length, reach: cython.double, cells, position, radius, index, distance):
-    """The first particle on each ray, and how far away; -1 and infinity for none. `direction` (q, 2): of length 1.
-
-    The ray is walked in steps of a cell. At each the cells within `reach`, the largest radius, of the piece are searched, until
-    no later one can be nearer.
-    """
-    grid: Cells = cells_of(cells)
-    c: cython.pointer(Cells) = cython.address(grid)
-    start: cython.pointer[cython.const[cython.double]] = const_doubles(origin)
-    heading: cython.pointer[cython.const[cython.double]] = const_doubles(direction)
-    far: cython.pointer[cython.const[cython.double]] = const_doubles(length)
-    p: cython.pointer[cython.const[real]] = const_reals(position)
-    r: cython.pointer[cython.const[real]] = const_reals(radius)
-    which: cython.pointer[int64_t] = integers(index)
-    way: cython.p_double = doubles(distance)
-    count: int64_t = len(origin)
-    q: int64_t
-    k: int64_t
-    row: int64_t
-    with cython.nogil:
-        for q in range(count):
-            x: cython.double = start[2 * q]
-            y: cython.double = start[2 * q + 1]
-            dx: cython.double = heading[2 * q]
-            dy: cython.double = heading[2 * q + 1]
-            which[q] = -1
-            way[q] = INFINITY
-            part: Part
-            part.begin = 0.0
-            part.end = far[q]
-            part = within_reach(part, x - c.x0, dx, c.cell * c.columns, reach)
-            part = within_reach(part, y - c.y0, dy, c.cell * c.rows, reach)
-            s: cython.double = part.begin
-            while s <= part.end and s <= way[q]:
-                ax: cython.double = x + s * dx
-                ay: cython.double = y + s * dy
-                bx: cython.double = x + (s + c.cell) * dx
-                by: cython.double = y + (s + c.cell) * dy
-                left: int64_t = column_of(c, min(ax, bx) - reach)
-                right: int64_t = column_of(c, max(ax, bx) + reach)
-                for row in range(row_of(c, min(ay, by) - reach), row_of(c, max(ay, by) + reach) + 1):
-                    for k in range(c.start[row * c.columns + left], c.start[row * c.columns + right + 1]):
-                        i: int64_t = c.member[k]
-                        d: cython.double = distance_along(x, y, dx, dy, p[2 * i], p[2 * i + 1], r[i])
-                        if d <= far[q] and (d < way[q] or (d == way[q] and i < which[q])):
-                            which[q] = i
-                            way[q] = d
-                s += c.cell
 
 
 @cython.cfunc

@@ -4,17 +4,21 @@
 from __future__ import annotations
 
 from pyverlet.core.area_drawing import draw_convex, fill, stroke, tint
+from pyverlet.core.casting import cast
 from pyverlet.core.checksum import checksum
 from pyverlet.core.disc_drawing import draw_discs
+from pyverlet.core.disc_lists import list_discs
 from pyverlet.core.line_drawing import draw_lines
-from pyverlet.core.obstacle_queries import covered_by, list_segments, nearest_bodies
+from pyverlet.core.obstacle_queries import bodies_at, covered_by, list_segments, nearest_bodies
 from pyverlet.core.page_arrays import copy_moving, put_rows, quantize
-from pyverlet.core.queries import at_points, first_on_rays, in_regions, nearest_to
+from pyverlet.core.queries import at_points, in_regions, nearest_to
 from pyverlet.core.query_cells import extent, sort_into_cells
 from pyverlet.core.sorted_keys import mark_absent
 
 __all__ = [
     "at_points",
+    "bodies_at",
+    "cast",
     "checksum",
     "copy_moving",
     "covered_by",
@@ -23,8 +27,8 @@ __all__ = [
     "draw_lines",
     "extent",
     "fill",
-    "first_on_rays",
     "in_regions",
+    "list_discs",
     "list_segments",
     "mark_absent",
     "nearest_bodies",

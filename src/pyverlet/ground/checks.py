@@ -174,7 +174,6 @@ def _array(name: str, value: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
 
 
 def _finite(name: str, array: NDArray[Any]) -> None:
-    good = np.isfinite(array).all(axis=1)
-    if not good.all():
-        first = int(np.flatnonzero(~good)[0])
+    if not np.isfinite(array).all():
+        first = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
         raise InputError(f"{name}[{first}] is {tuple(map(float, array[first]))}; allowed are finite numbers (x, y)")

@@ -150,12 +150,6 @@ class Particles(Shared):
             raise InputError(f"material is {min(unknown)!r}{did_you_mean(min(unknown), known)}; allowed: {allowed}")
         return self._state.material_numbers(given, count)
 
-    @of_one_frame
-    def is_free(self, position: ArrayLike) -> NDArray[np.bool_]:
-        """(n,) whether these places, (n, 2) or (2,), m, are inside the room and in no obstacle. Circles do not count."""
-        where = checks.rows("position", position, np.dtype(np.float64))
-        return np.asarray(~self.boundary.outside(where) & (self._course.covering(where) < 0))
-
     def _refuse_misplaced(self, position: Array, free: Array) -> None:
         """No particle that is free may start inside an obstacle or outside the room."""
         outside, inside = self.boundary.outside(position), self._course.covering(position)

@@ -1,8 +1,7 @@
-"""Questions about where particles are, many at once: who covers a point, is in a box or a circle, is on a ray, is nearest."""
+"""Questions about where particles are, many at once: who covers a point, is in a box or a circle, is nearest."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +14,7 @@ from pyverlet.ground.shown import count
 from pyverlet.ground.turns import Shared, of_one_frame
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import State
-from pyverlet.world.images import PERIODS, Images, left_in_room
+from pyverlet.world.images import Images
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -23,20 +22,6 @@ Indices = NDArray[np.int64]
 
 FEW = 8
 """Questions up to which looking at every particle costs less than sorting them into cells."""
-
-
-class RayHits(NamedTuple):
-    """What rays hit first."""
-
-    particle: Indices
-    """(q,) its index; -1 for none."""
-    distance: Floats
-    """(q,) from the origin to its rim, m; 0 from inside, infinity for none."""
-    normal: Floats
-    """(q, 2) of length 1, out of the particle where it is hit; 0 for none."""
-
-    def __repr__(self) -> str:
-        return f"RayHits of {count(len(self.particle), 'ray')}, {np.count_nonzero(self.particle >= 0)} of which hit"
 
 
 class Nearest(NamedTuple):
@@ -84,7 +69,7 @@ class Queries(Shared):
             (k,) indices; for many boxes (k, 2), rows of box and particle.
         """
         low, high = (checks.rows(name, value, np.dtype(float)) for name, value in (("lower", lower), ("upper", upper)))
-        low, high = _alike("lower", low, "upper", high)
+        low, high = alike("lower", low, "upper", high)
         if (wrong := np.flatnonzero((low > high).any(axis=1))).size:
             k = int(wrong[0])
             raise InputError(
@@ -103,52 +88,9 @@ class Queries(Shared):
         Returns:
             (k,) indices; for many circles (k, 2), rows of circle and particle.
         """
-        middle = checks.rows("center", center, np.dtype(float))
-        size = np.asarray(radius, float)
-        if size.ndim == 1 and len(middle) == 1:
-            middle = np.broadcast_to(middle, (len(size), 2))
-        size = checks.column("radius", size, np.dtype(float), len(middle))
-        if (wrong := np.flatnonzero(~(np.isfinite(size) & (size >= 0)))).size:
-            raise InputError(f"radius[{wrong[0]}] is {size[wrong[0]]:g}; allowed is a finite number of at least 0")
+        middle, size = circles("center", center, radius)
         box = size[:, None]
         return self._in(middle - box, middle + box, middle, size, many=np.ndim(center) > 1 or np.ndim(radius) > 0)
-
-    @of_one_frame
-    def ray(self, origin: ArrayLike, direction: ArrayLike, length: ArrayLike = np.inf) -> RayHits:
-        """What rays hit first.
-
-        Args:
-            origin: (q, 2) or (2,), m.
-            direction: (q, 2) or (2,) where they go; its length does not matter.
-            length: m, how far they reach, or (q,). In a periodic room they go on through the seam, for 100 rooms at most.
-        """
-        start, heading = checks.rows("origin", origin, np.dtype(float)), checks.rows("direction", direction, np.dtype(float))
-        start, heading = _alike("origin", start, "direction", heading)
-        norm = np.hypot(*heading.T)
-        if (wrong := np.flatnonzero(norm == 0)).size:
-            raise InputError(f"direction[{wrong[0]}] is (0.0, 0.0); allowed is a direction other than 0")
-        heading = heading / norm[:, None]
-        far = np.array(checks.column("length", length, np.dtype(float), len(start)))
-        if (wrong := np.flatnonzero(~(far >= 0))).size:
-            raise InputError(f"length[{wrong[0]}] is {far[wrong[0]]:g}; allowed is a number of at least 0")
-        index, distance, normal = np.full(len(start), -1, np.int64), np.full(len(start), np.inf), np.zeros((len(start), 2))
-        if len(self._state):
-            s = self._state
-            reach = float(s.radius.max())
-            seen = Images.of(s, reach)
-            cells = self._cells(seen.position, len(start))
-            for rays, at, gone, left in _pieces(start, heading, far, s.seam):
-                piece, way = np.full(len(rays), -1, np.int64), np.full(len(rays), np.inf)
-                tools = unit("tools", seen.position.dtype)
-                tools.first_on_rays(at, heading[rays], left, reach, cells, seen.position, seen.radius, piece, way)
-                hit = piece >= 0
-                index[rays[hit]], distance[rays[hit]] = seen.named(piece[hit]), gone[hit] + way[hit]
-                rim = at[hit] + way[hit, None] * heading[rays[hit]] - seen.position[piece[hit]]
-                out = np.hypot(*rim.T)[:, None]
-                # From the very centre of a particle every way out is as good: against the ray.
-                normal[rays[hit]] = np.divide(rim, out, out=-heading[rays[hit]], where=out > 0)
-                far[rays[hit]] = -1.0  # no further
-        return RayHits(index, distance, normal)
 
     @of_one_frame
     def nearest(self, points: ArrayLike, k: int = 1) -> Nearest:
@@ -224,25 +166,6 @@ def _nearer(index: Indices, square: Floats, other: Indices, far: Floats) -> tupl
     return np.take_along_axis(both, order, 1), np.take_along_axis(distance, order, 1)
 
 
-def _pieces(start: Floats, heading: Floats, far: Floats, seam: Seam) -> Iterator[tuple[Indices, Floats, Floats, Floats]]:
-    """Rays in pieces that stay in the room, as far as `far` lets them: which, from where, how far they have come and go on."""
-    if not seam:
-        yield np.arange(len(start)), start, np.zeros(len(start)), far.copy()
-        return
-    at, gone = seam.wrapped(start), np.zeros(len(start))
-    for k in range(PERIODS):
-        rays = np.flatnonzero(far > gone if k else far >= 0)
-        if not len(rays):
-            return
-        ahead = np.minimum(left_in_room(at[rays], heading[rays], seam), far[rays] - gone[rays])
-        yield rays, at[rays], gone[rays], ahead
-        if not np.isfinite(ahead).all():
-            far[rays[np.isinf(ahead)]] = -1.0
-            ahead = np.where(np.isinf(ahead), 0.0, ahead)
-        at[rays] = seam.entered(at[rays] + ahead[:, None] * heading[rays], heading[rays])
-        gone[rays] += ahead
-
-
 def _sorted(position: NDArray[Any], questions: int) -> tuple[Any, ...]:
     """Cells over all centres with about one particle in each, as the kernels take them; one for all where that is cheaper."""
     member = np.arange(len(position))
@@ -262,12 +185,24 @@ def _sorted(position: NDArray[Any], questions: int) -> tuple[Any, ...]:
     return x0, y0, cell, columns, rows, start, member[order]
 
 
-def _alike(first: str, a: Floats, second: str, b: Floats) -> tuple[Floats, Floats]:
+def alike(first: str, a: Floats, second: str, b: Floats) -> tuple[Floats, Floats]:
     """One row is spread over as many as the other has."""
     if len(a) != len(b) and 1 not in (len(a), len(b)):
         raise InputError(f"{second} has {len(b)} rows; allowed are 1 or {len(a)}, as many as {first}")
     count = max(len(a), len(b)) if min(len(a), len(b)) else 0
-    return np.broadcast_to(a, (count, 2)).copy(), np.broadcast_to(b, (count, 2)).copy()
+    first_rows, second_rows = (rows if len(rows) == count else np.repeat(rows, count, axis=0) for rows in (a, b))
+    return np.ascontiguousarray(first_rows), np.ascontiguousarray(second_rows)
+
+
+def circles(name: str, center: ArrayLike, radius: ArrayLike) -> tuple[Floats, Floats]:
+    """Checked centres (q, 2) and radii (q,), m; one of either is spread over as many as the other has."""
+    middle, size = checks.rows(name, center, np.dtype(float)), np.asarray(radius, float)
+    if size.ndim == 1 and len(middle) == 1:
+        middle = np.broadcast_to(middle, (len(size), 2))
+    size = checks.column("radius", size, np.dtype(float), len(middle))
+    if (wrong := np.flatnonzero(~(np.isfinite(size) & (size >= 0)))).size:
+        raise InputError(f"radius[{wrong[0]}] is {size[wrong[0]]:g}; allowed is a finite number of at least 0")
+    return np.ascontiguousarray(middle), np.ascontiguousarray(size)
 
 
 def _pair(row: Floats) -> tuple[float, float]:

@@ -27,12 +27,12 @@ from pyverlet.laws.touches import Touches
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 from pyverlet.world.actors import Actor, act_after, act_once
+from pyverlet.world.casts import Casts
 from pyverlet.world.convenience import Doors
 from pyverlet.world.frames import Frames
 from pyverlet.world.measures import Measures
 from pyverlet.world.moments import Moment
 from pyverlet.world.profile import Profile
-from pyverlet.world.queries import Queries
 from pyverlet.world.saved import Saved
 from pyverlet.world.team import Team
 
@@ -41,7 +41,7 @@ Array = NDArray[Any]
 _DEFAULT_COLLISIONS = Collisions()  # for scenes whose argument is left alone, while None means no collisions
 
 
-class World(Measures, Queries, Doors):
+class World(Measures, Casts, Doors):
     """Particles in a room, and the laws they follow. SI units, y up.
 
     Args:
@@ -97,6 +97,7 @@ class World(Measures, Queries, Doors):
         self.time, self.frames, self.profile, self.actors = 0.0, 0, Profile(), list[Actor]()
         self._frames = Frames(self._state.dtype)
         self._team, self._precision = Team(), Precision()
+        self._kept = self._listed = None
         # Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins.
         self.onlooker: Callable[[Moment], None] | None = None
 

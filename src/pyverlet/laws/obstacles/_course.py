@@ -82,6 +82,23 @@ class Course(Tables):
         order = np.lexsort((body[:found], row[:found])) if len(row) else np.zeros(0, np.int64)
         return Facing(row[order], body[order], gap[order], normal[order] if len(row) else np.zeros((0, 2)))
 
+    def standing(self, within: float) -> tuple[Any, ...] | None:
+        """Segments, their grid, which reaches `within` m about them, and how many obstacles they are of; None without any."""
+        self.begin()
+        if not self._seen:
+            return None
+        self._place(0.0, within)
+        return self._standing, self._cell, self._heads, self._links, len(self._seen)
+
+    def at(self, position: Array, radius: Array) -> NDArray[np.int64]:
+        """(k, 2) rows of circle and obstacle that touch, ascending; position (n, 2) and radius (n,), m, of the circles."""
+        grid, where = self.standing(1.01 * float(radius.max(initial=0.0))), self.seam.wrapped(position)
+        row, body, found = np.empty(0, np.int64), np.empty(0, np.int64), len(position) if grid else 0
+        while found > len(row) and grid:
+            row, body = np.empty(2 * found, np.int64), np.empty(2 * found, np.int64)
+            found = _tools().bodies_at(grid[0], grid[4], *grid[1:4], where, radius, row, body)
+        return np.unique(np.column_stack((row[:found], body[:found])), axis=0)
+
     def _place(self, ahead: float, within: float) -> None:
         """Have the grid be about where obstacles are in `ahead` seconds."""
         placed = self.version, self.seam, self._frames, ahead if len(self._moving) else 0.0

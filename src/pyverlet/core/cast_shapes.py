@@ -1,0 +1,163 @@
+# mypy: ignore-errors
+"""How far a circle, or as one of radius 0 a ray, gets until it touches a disc, a rounded segment or a wall, and the normal there.
+
+A circle of radius R touches a thing when its centre is on the thing grown by R: all distances are those of a ray to grown things.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.libc.math import INFINITY, fabs, sqrt
+from cython.cimports.libc.stdint import int64_t
+
+from pyverlet.core.obstacle_queries import COSINE, FACES, FIRST, LENGTH, PLACED, ROUNDING, SINE, X, Y, is_within
+
+CAGE = cython.declare(cython.int, 4)
+"""Number of the side after those of a box, as the walls are tried; a cage has this one alone."""
+
+ROUNDED_OFF = cython.declare(cython.double, 1e-12)
+"""Part of a length by which rounding may be wrong: a ray that aims at a joint of two segments hits one of them."""
+
+Ray = cython.struct(
+    x=cython.double, y=cython.double, dx=cython.double, dy=cython.double,  # origin and unit direction of the centre
+    size=cython.double,  # radius R of the circle
+    best=cython.double,  # how far it gets at most, as far as is known
+    kind=cython.int, index=int64_t, segment=cython.Py_ssize_t,  # what stops it there
+)  # fmt: skip
+Normal = cython.struct(x=cython.double, y=cython.double)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def to_disc(r: cython.pointer(Ray), px: cython.double, py: cython.double, radius: cython.double) -> cython.double:
+    """Distance along a ray to a disc that is grown already, m; 0 from inside, infinity for a miss."""
+    ox: cython.double = px - r.x
+    oy: cython.double = py - r.y
+    along: cython.double = ox * r.dx + oy * r.dy
+    across: cython.double = ox * r.dy - oy * r.dx
+    if ox * ox + oy * oy <= radius * radius:
+        return 0.0
+    if along < 0.0 or across * across > radius * radius:
+        return INFINITY
+    return along - sqrt(radius * radius - across * across)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def to_segment(s: cython.pointer[cython.const[cython.double]], k: cython.Py_ssize_t, r: cython.pointer(Ray)) -> cython.double:
+    """Distance along a ray to segment k, m; 0 from inside of it or of its polygon, infinity for a miss."""
+    at: cython.Py_ssize_t = PLACED * k
+    c: cython.double = s[at + COSINE]
+    d: cython.double = s[at + SINE]
+    length: cython.double = s[at + LENGTH]
+    grown: cython.double = s[at + ROUNDING] + r.size
+    ox: cython.double = r.x - s[at + X]
+    oy: cython.double = r.y - s[at + Y]
+    u: cython.double = c * ox + d * oy  # along the segment, from its start
+    v: cython.double = c * oy - d * ox  # to its left
+    nearest: cython.double = min(max(u, 0.0), length)
+    if (u - nearest) * (u - nearest) + v * v <= grown * grown or (v > 0.0 and is_within(s, k, r.x, r.y)):
+        return 0.0
+    end: cython.double = 0.0 if u < 0.0 else length
+    if fabs(v) > grown:
+        closing: cython.double = (d * r.dx - c * r.dy) * (1.0 if v > 0.0 else -1.0)
+        if closing <= 0.0:
+            return INFINITY
+        way: cython.double = (fabs(v) - grown) / closing
+        there: cython.double = u + way * (c * r.dx + d * r.dy)
+        spare: cython.double = ROUNDED_OFF * (length + fabs(u) + way)
+        if -spare <= there and there <= length + spare:
+            return way
+        end = 0.0 if there < 0.0 else length
+    return to_disc(r, s[at + X] + end * c, s[at + Y] + end * d, grown)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def normal_to(x: cython.double, y: cython.double, r: cython.pointer(Ray)) -> Normal:
+    """The unit normal along (x, y); where that is 0, as in the centre of a disc, every way out is as good: against the ray."""
+    n: Normal
+    far: cython.double = sqrt(x * x + y * y)
+    n.x = x / far if far > 0.0 else -r.dx
+    n.y = y / far if far > 0.0 else -r.dy
+    return n
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def normal_of_segment(s: cython.pointer[cython.const[cython.double]], k: cython.Py_ssize_t, r: cython.pointer(Ray)) -> Normal:
+    """Out of segment k where the ray touches it, after `r.best` m; out of the nearest face from inside of its polygon."""
+    x: cython.double = r.x + r.best * r.dx
+    y: cython.double = r.y + r.best * r.dy
+    n: cython.Py_ssize_t
+    nearest: cython.Py_ssize_t = k
+    inside: cython.bint = r.best == 0.0 and is_within(s, k, x, y)
+    at: cython.Py_ssize_t = PLACED * k
+    if inside:
+        least: cython.double = INFINITY
+        first: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, s[at + FIRST])
+        for n in range(first, first + cython.cast(cython.Py_ssize_t, s[at + FACES])):
+            at = PLACED * n
+            depth: cython.double = s[at + COSINE] * (y - s[at + Y]) - s[at + SINE] * (x - s[at + X])
+            if depth < least:
+                least, nearest = depth, n
+        at = PLACED * nearest
+    c: cython.double = s[at + COSINE]
+    d: cython.double = s[at + SINE]
+    u: cython.double = c * (x - s[at + X]) + d * (y - s[at + Y])
+    # Of a thin line only the origin says on which side the ray comes; from on it, it is the side it leaves behind.
+    v: cython.double = c * (r.y - s[at + Y]) - d * (r.x - s[at + X])
+    spare: cython.double = ROUNDED_OFF * (s[at + LENGTH] + fabs(u) + r.best)
+    if inside or (s[at + LENGTH] > 0.0 and -spare <= u and u <= s[at + LENGTH] + spare and v != 0.0):
+        side: cython.double = -1.0 if inside or v < 0.0 else 1.0
+        return normal_to(-side * d, side * c, r)
+    end: cython.double = min(max(u, 0.0), s[at + LENGTH])
+    return normal_to(x - s[at + X] - end * c, y - s[at + Y] - end * d, r)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def to_wall(w: cython.pointer[cython.const[cython.double]], k: cython.int, r: cython.pointer(Ray)) -> cython.double:
+    """Distance along a ray to a side of the room, m; 0 from beyond it. w: (7,) corners of a box; centre and radius of a cage.
+
+    Sides of a box are the left, the right, the floor and the ceiling. What is not there is infinitely far away.
+    """
+    along: cython.double = r.dx if k < 2 else r.dy
+    at: cython.double = r.x if k < 2 else r.y
+    if k < CAGE:
+        low: cython.bint = k % 2 == 0
+        edge: cython.double = w[k // 2 if low else 2 + k // 2]
+        gap: cython.double = (at - edge if low else edge - at) - r.size
+        closing: cython.double = -along if low else along
+        if gap <= 0.0:
+            return 0.0
+        return gap / closing if closing > 0.0 and gap < INFINITY else INFINITY
+    ox: cython.double = r.x - w[4]
+    oy: cython.double = r.y - w[5]
+    room: cython.double = w[6] - r.size
+    left: cython.double = room * room - ox * ox - oy * oy
+    if not room < INFINITY:
+        return INFINITY
+    if room <= 0.0 or left <= 0.0:
+        return 0.0
+    away: cython.double = ox * r.dx + oy * r.dy
+    root: cython.double = sqrt(away * away + left)
+    return left / (away + root) if away > 0.0 else root - away  # without a difference of two that are almost equal
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def normal_of_wall(w: cython.pointer[cython.const[cython.double]], k: cython.int, r: cython.pointer(Ray)) -> Normal:
+    """Into the room, from a side that `to_wall` numbers."""
+    if k == CAGE:
+        return normal_to(w[4] - r.x - r.best * r.dx, w[5] - r.y - r.best * r.dy, r)
+    side: cython.double = 1.0 if k % 2 == 0 else -1.0
+    return normal_to(side if k < 2 else 0.0, 0.0 if k < 2 else side, r)

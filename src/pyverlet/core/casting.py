@@ -1,0 +1,300 @@
+# mypy: ignore-errors
+"""What rays and moving circles touch first: they walk from cell to cell of the discs, then of the obstacles, until stopped.
+
+Discs stand in a grid that covers them all (`disc_lists`), segments of obstacles in one of hashed cells (`obstacle_queries`): each
+in all cells into which it, grown by the radius of the circle, reaches. The cells that the centre passes hold what it touches.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.arrays import const_doubles, const_indices, const_reals, const_small_integers, doubles, integers
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import INFINITY, NAN, fabs, floor
+from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
+from cython.cimports.team import team_free, team_new, team_run, team_stage, thread_team
+
+from pyverlet.core.cast_shapes import (
+    CAGE,
+    Normal,
+    Ray,
+    normal_of_segment,
+    normal_of_wall,
+    normal_to,
+    to_disc,
+    to_segment,
+    to_wall,
+)
+from pyverlet.core.obstacle_queries import BODY, COSINE, LENGTH, PLACED, ROUNDING, SINE, Grid, X, Y, grid_of, head_at
+
+PARTICLE = cython.declare(cython.int, 0)
+OBSTACLE = cython.declare(cython.int, 1)
+WALL = cython.declare(cython.int, 2)
+NOTHING = cython.declare(cython.int, 3)
+
+FARTHEST_WALKED = cython.declare(cython.double, 1099511627776.0)
+"""Cells, 2^40, that a ray may begin or end away from the origin to be walked along: rounding then is far less than a cell."""
+
+RAYS = cython.declare(cython.Py_ssize_t, 256)
+"""Rays that a thread takes at a time."""
+
+Kinds = cython.struct(category=cython.pointer[cython.const[uint32_t]], mask=cython.pointer[cython.const[uint32_t]])
+Cast = cython.struct(
+    team=cython.pointer(thread_team),
+    count=cython.Py_ssize_t,
+    origin=cython.pointer[cython.const[cython.double]], heading=cython.pointer[cython.const[cython.double]],
+    length=cython.pointer[cython.const[cython.double]], size=cython.pointer[cython.const[cython.double]], own=Kinds,
+    discs=cython.bint, x0=cython.double, y0=cython.double, cell=cython.double, columns=int64_t, rows=int64_t,
+    begin=cython.pointer[cython.const[int32_t]], member=cython.pointer[cython.const[int32_t]],
+    position=cython.pointer[cython.const[real]], radius=cython.pointer[cython.const[real]], disc_kinds=Kinds,
+    obstacles=cython.bint, grid=Grid, bodies=int64_t,
+    low_x=cython.double, low_y=cython.double, high_x=cython.double, high_y=cython.double,  # a rectangle about them
+    body_kinds=Kinds, wall=cython.pointer[cython.const[cython.double]], wall_kinds=Kinds,
+    kind=cython.pointer(int64_t), index=cython.pointer(int64_t),
+    distance=cython.p_double, normal=cython.p_double, point=cython.p_double,
+)  # fmt: skip
+Walk = cython.struct(
+    begin=cython.double, end=cython.double,  # the part of the ray in a rectangle, m from its origin
+    column=int64_t, row=int64_t, step_x=int64_t, step_y=int64_t,
+    next_x=cython.double, next_y=cython.double,  # m from the origin to the next column and row
+    per_x=cython.double, per_y=cython.double,  # m between two columns and two rows
+)  # fmt: skip
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def clip(w: cython.pointer(Walk), p: cython.double, d: cython.double, low: cython.double, high: cython.double) -> cython.void:
+    """Keep the part of a ray between low and high along one axis: it begins at p and goes d for each metre."""
+    if d != 0.0:
+        w.begin = max(w.begin, min((low - p) / d, (high - p) / d))
+        w.end = min(w.end, max((low - p) / d, (high - p) / d))
+    elif not (low <= p and p <= high):
+        w.end = -1.0
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def enter(
+    w: cython.pointer(Walk), r: cython.pointer(Ray), x0: cython.double, y0: cython.double, cell: cython.double,
+    columns: int64_t, rows: int64_t,
+) -> cython.void:  # fmt: skip
+    """Stand in the cell in which the part begins, of columns times rows: rounding may put it beside the first. 0: of any."""
+    w.column = cython.cast(int64_t, floor((r.x + w.begin * r.dx - x0) / cell))
+    w.row = cython.cast(int64_t, floor((r.y + w.begin * r.dy - y0) / cell))
+    if columns > 0:
+        w.column = min(max(w.column, 0), columns - 1)
+        w.row = min(max(w.row, 0), rows - 1)
+    w.step_x = 1 if r.dx > 0.0 else -1
+    w.step_y = 1 if r.dy > 0.0 else -1
+    w.per_x = cell / fabs(r.dx) if r.dx != 0.0 else INFINITY
+    w.per_y = cell / fabs(r.dy) if r.dy != 0.0 else INFINITY
+    w.next_x = (x0 + (w.column + (1 if r.dx > 0.0 else 0)) * cell - r.x) / r.dx if r.dx != 0.0 else INFINITY
+    w.next_y = (y0 + (w.row + (1 if r.dy > 0.0 else 0)) * cell - r.y) / r.dy if r.dy != 0.0 else INFINITY
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def go_on(w: cython.pointer(Walk), best: cython.double) -> cython.bint:
+    """Step into the next cell; whether the ray, which is stopped after `best` m, gets there."""
+    if min(w.next_x, w.next_y) > min(w.end, best):
+        return False
+    if w.next_x < w.next_y:
+        w.column += w.step_x
+        w.next_x += w.per_x
+    else:
+        w.row += w.step_y
+        w.next_y += w.per_y
+    return True
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def stop(
+    j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(Ray), far: cython.double, kind: cython.int, index: int64_t,
+    things: cython.pointer(Kinds), at: int64_t, segment: cython.Py_ssize_t,
+) -> cython.void:  # fmt: skip
+    """A thing is `far` m away; it stops the ray if the two see each other and it is nearer, or as near and first in order."""
+    nearer: cython.bint = far < r.best or (
+        far == r.best and far < INFINITY and (kind < r.kind or (kind == r.kind and index < r.index))
+    )
+    if nearer and (j.own.category[q] & things.mask[at]) != 0 and (j.own.mask[q] & things.category[at]) != 0:
+        r.best, r.kind, r.index, r.segment = far, kind, index, segment
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def pass_discs(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(Ray)) -> cython.void:
+    """Stop the ray at the first disc on it."""
+    w: Walk
+    w.begin, w.end = 0.0, r.best
+    clip(cython.address(w), r.x, r.dx, j.x0, j.x0 + j.columns * j.cell)
+    clip(cython.address(w), r.y, r.dy, j.y0, j.y0 + j.rows * j.cell)
+    if not w.begin <= w.end:
+        return
+    enter(cython.address(w), r, j.x0, j.y0, j.cell, j.columns, j.rows)
+    n: cython.Py_ssize_t
+    while w.column >= 0 and w.column < j.columns and w.row >= 0 and w.row < j.rows:
+        at: int64_t = w.row * j.columns + w.column
+        for n in range(j.begin[at], j.begin[at + 1]):
+            i: cython.Py_ssize_t = j.member[n]
+            far: cython.double = to_disc(r, j.position[2 * i], j.position[2 * i + 1], j.radius[i] + r.size)
+            if far <= r.best:
+                stop(j, q, r, far, PARTICLE, i, cython.address(j.disc_kinds), i, 0)
+        if not go_on(cython.address(w), r.best):
+            break
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def pass_segment(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(Ray), k: cython.Py_ssize_t) -> cython.void:
+    """Stop the ray at segment k, or one's polygon, if it is on it."""
+    body: int64_t = cython.cast(int64_t, j.grid.segment[PLACED * k + BODY]) % j.bodies
+    stop(j, q, r, to_segment(j.grid.segment, k, r), OBSTACLE, body, cython.address(j.body_kinds), body, k)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def pass_segments(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(Ray)) -> cython.void:
+    """Stop the ray at the first obstacle on it."""
+    w: Walk
+    w.begin, w.end = 0.0, r.best
+    clip(cython.address(w), r.x, r.dx, j.low_x - r.size, j.high_x + r.size)
+    clip(cython.address(w), r.y, r.dy, j.low_y - r.size, j.high_y + r.size)
+    if not w.begin <= w.end:
+        return
+    k: cython.Py_ssize_t
+    far: cython.bint = not fabs(r.x) + fabs(r.y) + w.end < FARTHEST_WALKED * j.grid.cell
+    if far or (w.end - w.begin) * (fabs(r.dx) + fabs(r.dy)) > (j.grid.segments - 1) * j.grid.cell:
+        # More cells than segments, or so far away that rounding does not tell cells apart.
+        for k in range(j.grid.segments):
+            pass_segment(j, q, r, k)
+        return
+    enter(cython.address(w), r, 0.0, 0.0, j.grid.cell, 0, 0)
+    while True:
+        link: int32_t = j.grid.head[head_at(w.column, w.row, j.grid.heads)]
+        while link >= 0:
+            pass_segment(j, q, r, j.grid.link[2 * link])
+            link = j.grid.link[2 * link + 1]
+        if not go_on(cython.address(w), r.best):
+            break
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
+    """Write what ray q touches."""
+    r: Ray
+    r.x, r.y, r.dx, r.dy = j.origin[2 * q], j.origin[2 * q + 1], j.heading[2 * q], j.heading[2 * q + 1]
+    r.size, r.best, r.kind, r.index, r.segment = j.size[q], j.length[q], NOTHING, -1, 0
+    k: cython.int
+    for k in range(CAGE + 1):
+        stop(j, q, cython.address(r), to_wall(j.wall, k, cython.address(r)), WALL, k, cython.address(j.wall_kinds), 0, 0)
+    if j.discs:
+        pass_discs(j, q, cython.address(r))
+    if j.obstacles:
+        pass_segments(j, q, cython.address(r))
+    n: Normal
+    n.x = n.y = 0.0
+    x: cython.double = r.x + r.best * r.dx
+    y: cython.double = r.y + r.best * r.dy
+    if r.kind == PARTICLE:
+        n = normal_to(x - j.position[2 * r.index], y - j.position[2 * r.index + 1], cython.address(r))
+    elif r.kind == OBSTACLE:
+        n = normal_of_segment(j.grid.segment, r.segment, cython.address(r))
+    elif r.kind == WALL:
+        n = normal_of_wall(j.wall, cython.cast(cython.int, r.index), cython.address(r))
+    hit: cython.bint = r.kind != NOTHING
+    j.kind[q], j.index[q] = r.kind, r.index % CAGE if r.kind == WALL else r.index
+    j.distance[q] = r.best if hit else INFINITY
+    j.normal[2 * q], j.normal[2 * q + 1] = n.x, n.y
+    j.point[2 * q] = x - r.size * n.x if hit else NAN
+    j.point[2 * q + 1] = y - r.size * n.y if hit else NAN
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def cast_stage(what: cython.p_void, item: cython.int) -> cython.void:
+    """Some rays."""
+    j: cython.pointer(Cast) = cython.cast(cython.pointer(Cast), what)
+    q: cython.Py_ssize_t
+    for q in range(item * RAYS, min((item + 1) * RAYS, j.count)):
+        cast_one(j, q)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def cast_all(what: cython.p_void, part: cython.int) -> cython.void:
+    """All rays, shared out to the team."""
+    j: cython.pointer(Cast) = cython.cast(cython.pointer(Cast), what)
+    team_stage(j.team, cast_stage, j, cython.cast(cython.int, (j.count + RAYS - 1) // RAYS))
+
+
+@cython.cfunc
+def kinds_of(pair) -> Kinds:
+    """As a struct, from arrays of categories and masks."""
+    k: Kinds
+    k.category, k.mask = const_indices(pair[0]), const_indices(pair[1])
+    return k
+
+
+def cast(rays, discs, obstacles, walls, threads: cython.int, kind, index, distance, normal, point):
+    """What each of q circles, or rays of radius 0, touches first, and where.
+
+    rays: origin (q, 2), unit direction (q, 2), length (q,), radius (q,), category and mask (q,) uint32. discs: None or (x0, y0,
+    cell, columns, rows, begin, member, position, radius, categories, masks), as `list_discs` has made them for radii as large as
+    these; obstacles: None or (segments, cell, heads, links, bodies, categories, masks), as `list_segments` has; walls: corners of
+    a box and centre and radius of a cage (7,), infinite where there is none, categories and masks (1,).
+    threads: that share this out. Written: kind (q,) PARTICLE, OBSTACLE, WALL or NOTHING; index (q,) of the thing; distance (q,) m
+    of the centre, normal (q, 2), and where it touches (q, 2).
+    """
+    job: Cast
+    j: cython.pointer(Cast) = cython.address(job)
+    j.count, j.origin, j.heading = len(rays[0]), const_doubles(rays[0]), const_doubles(rays[1])
+    j.length, j.size, j.own = const_doubles(rays[2]), const_doubles(rays[3]), kinds_of(rays[4:])
+    j.discs, j.obstacles = discs is not None, obstacles is not None
+    if discs is not None:
+        j.x0, j.y0, j.cell, j.columns, j.rows = discs[:5]
+        j.begin, j.member = const_small_integers(discs[5]), const_small_integers(discs[6])
+        j.position, j.radius, j.disc_kinds = const_reals(discs[7]), const_reals(discs[8]), kinds_of(discs[9:])
+    k: cython.Py_ssize_t
+    if obstacles is not None:
+        j.grid, j.bodies, j.body_kinds = (
+            grid_of(obstacles[0], obstacles[1], obstacles[2], obstacles[3]),
+            obstacles[4],
+            kinds_of(obstacles[5:]),
+        )
+        j.low_x = j.low_y = INFINITY
+        j.high_x = j.high_y = -INFINITY
+        s: cython.pointer[cython.const[cython.double]] = j.grid.segment
+        for k in range(j.grid.segments):
+            a: cython.double = s[PLACED * k + X]
+            b: cython.double = s[PLACED * k + Y]
+            c: cython.double = a + s[PLACED * k + LENGTH] * s[PLACED * k + COSINE]
+            d: cython.double = b + s[PLACED * k + LENGTH] * s[PLACED * k + SINE]
+            far: cython.double = s[PLACED * k + ROUNDING]
+            j.low_x, j.high_x = min(j.low_x, min(a, c) - far), max(j.high_x, max(a, c) + far)
+            j.low_y, j.high_y = min(j.low_y, min(b, d) - far), max(j.high_y, max(b, d) + far)
+    j.wall, j.wall_kinds = const_doubles(walls[0]), kinds_of(walls[1:])
+    j.kind, j.index = integers(kind), integers(index)
+    j.distance, j.normal, j.point = doubles(distance), doubles(normal), doubles(point)
+    j.team = team_new(threads)
+    if j.team == cython.NULL:
+        raise MemoryError
+    with cython.nogil:
+        team_run(j.team, cast_all, j, threads)
+        team_free(j.team)

@@ -1,0 +1,304 @@
+"""What rays and moving circles hit first, what circles overlap, and where there is room: among particles, obstacles and walls."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyverlet.core import unit
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import count
+from pyverlet.ground.threads import max_threads
+from pyverlet.ground.turns import of_one_frame
+from pyverlet.laws.naive import Naive
+from pyverlet.laws.obstacles import Course, Obstacles
+from pyverlet.laws.rooms import Boundary, Box, Circle, Periodic
+from pyverlet.state.seam import Seam
+from pyverlet.state.state import EVERYONE
+from pyverlet.world.images import PERIODS, Images, left_in_room
+from pyverlet.world.queries import FEW, Floats, Indices, Queries, alike, circles
+
+Kinds = tuple[NDArray[np.uint32], NDArray[np.uint32]]
+
+RAYS_A_THREAD = 1024
+"""Rays for which another thread gains: to start one takes as long as some hundred."""
+
+LISTED = 16
+"""Cells that a disc is listed in at most, on average."""
+
+ROUNDED_OFF = 1e-6
+"""Part of a cell that discs are listed too far: rays find their cells by other sums."""
+
+MOST_LISTS = 8
+"""Radii of circles for which lists of discs are kept while nothing moves."""
+
+_NOTHING = 3
+"""After particles, obstacles and walls: no kind of thing, as the core numbers them."""
+
+NO_WALLS = np.array((-np.inf, -np.inf, np.inf, np.inf, 0.0, 0.0, np.inf))
+
+
+class RayHits(NamedTuple):
+    """What rays or moving circles hit first: a particle, an obstacle or a wall."""
+
+    particle: Indices
+    """(q,) its index; -1 for none."""
+    distance: Floats
+    """(q,) from the origin to its rim, for circles the distance that the centre moves, m; 0 from inside, infinity for none."""
+    normal: Floats
+    """(q, 2) of length 1, out of what is hit, or from a wall into the room; 0 for none."""
+    obstacle: Indices
+    """(q,) its index in `world.obstacles`; -1 for none."""
+    wall: Indices
+    """(q,) the number of the room's side, as in events; -1 for none."""
+    position: Floats
+    """(q, 2) where it is hit, m, for circles the point of their rim that touches; NaN for none. In a periodic room inside it."""
+
+    def __repr__(self) -> str:
+        return f"RayHits of {count(len(self.particle), 'ray')}, {np.isfinite(self.distance).sum()} of which hit"
+
+
+class Overlaps(NamedTuple):
+    """What circles overlap or touch, ascending: (k,) indices, for many circles (k, 2) rows of circle and index."""
+
+    particle: Indices
+    obstacle: Indices
+    """In `world.obstacles`."""
+    wall: Indices
+    """Of the room, numbered as in events."""
+
+    def __repr__(self) -> str:
+        found = zip(("particle", "obstacle", "wall"), self, strict=True)
+        return f"Overlaps with {', '.join(count(len(rows), name) for name, rows in found)}"
+
+
+class Casts(Queries):
+    """Rays and circles among all that is in a world.
+
+    They have 32 bits of `category` and `mask`, as particles have: a ray and a thing see each other if each has a bit of its
+    category in the other's mask. Walls are those of `Circle`, `Box` and `Periodic`; beyond them all is solid.
+    """
+
+    boundary: Boundary
+    obstacles: Obstacles
+    _course: Course
+    _threads: int | None
+    _listed: tuple[Any, Any, dict[tuple[float, Seam], Any]] | None = None
+    """Of the last rays: where particles were and how large, and the cells for some radii of circles."""
+
+    def ray(self, origin: ArrayLike, direction: ArrayLike, length: ArrayLike = np.inf, **among: Any) -> RayHits:
+        """What rays hit first; keywords as for `circle_cast`.
+
+        Args:
+            origin: (q, 2) or (2,), m.
+            direction: (q, 2) or (2,) where they go; its length does not matter.
+            length: m, how far they reach, or (q,). In a periodic room they go on through the seam, for 100 rooms at most.
+        """
+        return self.circle_cast(origin, direction, 0.0, length, **among)
+
+    @of_one_frame
+    def circle_cast(
+        self,
+        origin: ArrayLike,
+        direction: ArrayLike,
+        radius: ArrayLike,
+        length: ArrayLike = np.inf,
+        *,
+        category: ArrayLike = EVERYONE,
+        mask: ArrayLike = EVERYONE,
+        particles: bool = True,
+        obstacles: bool = True,
+        walls: bool = True,
+    ) -> RayHits:
+        """What moving circles touch first. Of things as near, particles come before obstacles and walls, then lower indices.
+
+        Args:
+            origin: (q, 2) or (2,), m, of their centres.
+            direction: (q, 2) or (2,) where they go; its length does not matter.
+            radius: m, at least 0, or (q,).
+            length: m, how far they go, or (q,). In a periodic room they go on through the seam, for 100 rooms at most.
+            category: 32 bits, what they are, or (q,).
+            mask: 32 bits, the categories that they see, or (q,).
+            particles: whether they hit particles.
+            obstacles: whether they hit obstacles.
+            walls: whether they hit walls of the room.
+
+        Raises:
+            InputError: an argument is outside what is allowed.
+        """
+        start, heading = checks.rows("origin", origin, np.dtype(float)), checks.rows("direction", direction, np.dtype(float))
+        start, heading = alike("origin", start, "direction", heading)
+        norm = np.hypot(*heading.T)
+        if (wrong := np.flatnonzero(norm == 0)).size:
+            raise InputError(f"direction[{wrong[0]}] is (0.0, 0.0); allowed is a direction other than 0")
+        heading = heading / norm[:, None]
+        far = np.array(checks.column("length", length, np.dtype(float), len(start)))
+        if (wrong := np.flatnonzero(~(far >= 0))).size:
+            raise InputError(f"length[{wrong[0]}] is {far[wrong[0]]:g}; allowed is a number of at least 0")
+        start, size = circles("origin", start, radius)
+        rays = (start, heading, far, size, *_bits(category, mask, len(start)))
+        return self._cast(rays, particles=particles, obstacles=obstacles, walls=walls)
+
+    @of_one_frame
+    def overlap_area(
+        self, center: ArrayLike, radius: ArrayLike, *, category: ArrayLike = EVERYONE, mask: ArrayLike = EVERYONE
+    ) -> Overlaps:
+        """The particles, obstacles and walls that circles overlap or touch.
+
+        Args:
+            center: (2,) m, or (q, 2) of many circles.
+            radius: m, at least 0, or (q,).
+            category: 32 bits, what they are, or (q,).
+            mask: 32 bits, the categories that they see, or (q,).
+        """
+        middle, size = circles("center", center, radius)
+        own, s, many = _bits(category, mask, len(middle)), self._state, np.ndim(center) > 1 or np.ndim(radius) > 0
+        rows = np.zeros((0, 2), np.int64)
+        if len(s):
+            wide = (size + float(s.radius.max()))[:, None]
+            rows = self._in(middle - wide, middle + wide, middle, wide[:, 0], many=True)
+            q, i = rows.T
+            way = s.seam.nearest(s.position[i] - middle[q])
+            touch = (way * way).sum(axis=1) <= (size[q] + s.radius[i]) ** 2
+            rows = rows[touch & _see(own, (s.category, s.mask), q, i)]
+        q, k = self._course.at(middle, size).T
+        seen = _see(own, _kinds_of(self.obstacles), q, k)
+        room = self.boundary.room if isinstance(self.boundary, Naive) else self.boundary
+        facing = room.facing(s.seam.wrapped(middle))
+        near = np.zeros((len(middle), 0), bool) if facing is None else facing[0] <= size[:, None]
+        side = np.argwhere(near & _see(own, _kinds_of([self.boundary]), np.arange(len(middle)), 0)[:, None])
+        found = (rows, np.column_stack((q[seen], k[seen])), side)
+        return Overlaps(*(rows if many else np.ascontiguousarray(rows[:, 1]) for rows in found))
+
+    @of_one_frame
+    def is_free(
+        self, position: ArrayLike, radius: ArrayLike | None = None, *, category: ArrayLike = EVERYONE, mask: ArrayLike = EVERYONE
+    ) -> NDArray[np.bool_]:
+        """(q,) bool, whether circles at these places would touch nothing, in the room.
+
+        Args:
+            position: (q, 2) or (2,), m.
+            radius: m, at least 0, or (q,). None: whether the places are inside the room and in no obstacle, as `add` asks of
+                centres; particles do not count then.
+            category: 32 bits, what the circles are, or (q,).
+            mask: 32 bits, the categories that they see, or (q,).
+        """
+        if radius is None:
+            where = checks.rows("position", position, np.dtype(np.float64))
+            return np.asarray(~self.boundary.outside(where) & (self._course.covering(where) < 0))
+        middle, size = circles("position", position, radius)
+        ahead, none = np.tile((1.0, 0.0), (len(middle), 1)), np.zeros(len(middle))
+        hits = self._cast((middle, ahead, none, size, *_bits(category, mask, len(middle))))
+        return np.asarray(np.isinf(hits.distance) & ~self.boundary.outside(middle))
+
+    def _cast(self, rays: tuple[Any, ...], *, particles: bool = True, obstacles: bool = True, walls: bool = True) -> RayHits:
+        """Rays: origin, unit direction, length, radius, category, mask, of as many each."""
+        s, (start, heading, far, size, *own) = self._state, rays
+        largest = float(size.max(initial=0.0))
+        owner, discs = self._discs(largest, len(start)) if particles and len(s) else (None, None)
+        course = self._course.standing(1.01 * largest) if obstacles else None
+        bodies = course and (*course, *_kinds_of(self.obstacles))
+        room = (_walls(self.boundary) if walls else NO_WALLS, *_kinds_of([self.boundary]))
+        threads = min(self._threads or max_threads(), 1 + len(start) // RAYS_A_THREAD)
+        kind, index = np.full(len(start), _NOTHING), np.full(len(start), -1)
+        distance, normal, point = np.full(len(start), np.inf), np.zeros((len(start), 2)), np.full((len(start), 2), np.nan)
+        found = kind, index, distance, normal, point
+        cast = unit("tools", s.dtype).cast
+        if not s.seam:
+            cast(rays, discs, bodies, room, threads, *found)
+        for which, at, gone, left in _pieces(start, heading, far, s.seam) if s.seam else ():
+            part = tuple(column[which] for column in found)
+            asked = at, heading[which], left, size[which], *(bits[which] for bits in own)
+            cast(asked, discs, bodies, room, threads, *part)
+            hit = np.flatnonzero(part[0] != _NOTHING)
+            for to, column in zip(found, part, strict=True):
+                to[which[hit]] = column[hit]
+            distance[which[hit]] += gone[hit]
+            far[which[hit]] = -1.0  # no further
+        particle, obstacle, wall = (np.where(kind == number, index, -1) for number in range(_NOTHING))
+        particle = particle if owner is None else np.where(particle >= 0, owner[particle], -1)
+        return RayHits(particle, distance, normal, obstacle, wall, s.seam.wrapped(point))
+
+    def _discs(self, reach: float, questions: int) -> tuple[Indices | None, tuple[Any, ...]]:
+        """Whose images discs are, and those in cells within `reach` m of them, as `core.casting` takes them."""
+        s, few = self._state, questions <= FEW
+        if not few and not (self._listed and all(map(np.array_equal, self._listed[:2], (s.position, s.radius)))):
+            self._listed = s.position.copy(), s.radius.copy(), {}
+        lists = {} if few or self._listed is None else self._listed[2]
+        if (reach, s.seam) not in lists:
+            if len(lists) == MOST_LISTS:
+                lists.clear()
+            seen = Images.of(s, float(s.radius.max()) + reach)
+            lists[reach, s.seam] = _cells_of(seen, reach, few=few), seen
+        cells, (position, radius, owner) = lists[reach, s.seam]
+        if owner is None:
+            return None, (*cells, s.position, s.radius, s.category, s.mask)
+        return owner, (*cells, position, radius, s.category[owner], s.mask[owner])
+
+
+def _cells_of(seen: Images, reach: float, *, few: bool) -> tuple[Any, ...]:
+    """Cells over all discs, and which are in each: in one, if there are few questions."""
+    tools, radius = unit("tools", seen.position.dtype), seen.radius.astype(float)
+    x0, y0, x1, y1 = tools.extent(seen.position)
+    margin = float(radius.max()) + reach
+    x0, y0, width, height = x0 - margin, y0 - margin, x1 - x0 + 2 * margin, y1 - y0 + 2 * margin
+    if few:
+        one = np.arange(len(radius), dtype=np.int32)
+        return x0, y0, max(width, height), 1, 1, np.array([0, len(one), 0], np.int32), one
+    cell = max(np.sqrt(width * height / len(radius)), max(width, height) / len(radius), radius.mean() + reach)
+    while ((2.0 * (radius + reach) / cell + 1.0) ** 2).mean() > LISTED:
+        cell *= 2.0
+    columns, rows = int(width / cell) + 1, int(height / cell) + 1
+    begin, member = np.empty(columns * rows + 2, np.int32), np.empty(4 * len(radius), np.int32)
+    about = seen.position, seen.radius, reach + ROUNDED_OFF * cell, x0, y0, cell, columns, rows, begin
+    while (found := tools.list_discs(*about, member)) > len(member):
+        member = np.empty(found, np.int32)
+    return x0, y0, cell, columns, rows, begin, member
+
+
+def _pieces(start: Floats, heading: Floats, far: Floats, seam: Seam) -> Iterator[tuple[Indices, Floats, Floats, Floats]]:
+    """Rays in pieces that stay in a room, as far as `far` lets them: which, from where, how far they have come and go on."""
+    at, gone = seam.wrapped(start), np.zeros(len(start))
+    for k in range(PERIODS):
+        rays = np.flatnonzero(far > gone if k else far >= 0)
+        if not len(rays):
+            return
+        ahead = np.minimum(left_in_room(at[rays], heading[rays], seam), far[rays] - gone[rays])
+        yield rays, at[rays], gone[rays], ahead
+        if not np.isfinite(ahead).all():
+            far[rays[np.isinf(ahead)]] = -1.0
+            ahead = np.where(np.isinf(ahead), 0.0, ahead)
+        at[rays] = seam.entered(at[rays] + ahead[:, None] * heading[rays], heading[rays])
+        gone[rays] += ahead
+
+
+def _walls(room: Boundary) -> Floats:
+    """Corners of a box, and centre and radius of a cage, m, as `core.casting` takes them; infinite where there is none."""
+    room = room.room if isinstance(room, Naive) else room
+    walls = NO_WALLS.copy()
+    if isinstance(room, Circle):
+        walls[4:] = *room.center, room.radius
+    elif isinstance(room, Box):
+        walls[:4] = *room.lower, *room.upper
+    elif isinstance(room, Periodic):
+        walls[:4] = room._box
+    return walls
+
+
+def _bits(category: ArrayLike, mask: ArrayLike, count: int) -> Kinds:
+    return np.array(checks.bits("category", category, count)), np.array(checks.bits("mask", mask, count))
+
+
+def _kinds_of(things: Sequence[Any]) -> Kinds:
+    """Categories and masks of obstacles or rooms."""
+    category, mask = ([getattr(thing, name, bits) for thing in things] for name, bits in (("category", 1), ("mask", EVERYONE)))
+    return np.array(category, np.uint32), np.array(mask, np.uint32)
+
+
+def _see(own: Kinds, others: Kinds, q: Indices, k: Any) -> NDArray[np.bool_]:
+    """Whether questions q and things k see each other."""
+    return np.asarray(((own[0][q] & others[1][k]) != 0) & ((others[0][k] & own[1][q]) != 0))
