@@ -46,6 +46,18 @@ class Column:
             getattr(group._state, self._name)[group._where] = value
 
 
+class Measured(Column):
+    """A property that follows from others: a copy, not to be written."""
+
+    def __get__(self, group: Any, owner: type) -> Array:
+        found = np.array(super().__get__(group, owner))
+        found.flags.writeable = False
+        return found
+
+    def __set__(self, group: Any, value: Any) -> None:
+        raise InputError(f"{self._name} is only to be read; allowed is to write position")
+
+
 class Group:
     """A handle on particles that were added together; valid whatever order the engine keeps inside.
 
@@ -148,6 +160,7 @@ class Group:
         return np.arange(where.start, where.stop)
 
     position = Column("(n, 2) centres, m.")
+    unwrapped = Measured("(n, 2) centres as if a periodic room did not repeat, m, float64; a copy.")
     velocity = Column("(n, 2) m/s.")
     spin = Column("(n,) angular velocity, rad/s, counter-clockwise.")
     angle = Column("(n,) rad they have turned, counter-clockwise; float64.")
@@ -267,6 +280,7 @@ class Particle:
         self.mass, self.velocity, self.spin = np.inf, 0.0, 0.0
 
     position = Column("(2,) its centre, m; a view.")
+    unwrapped = Measured("(2,) its centre as if a periodic room did not repeat, m, float64; a copy.")
     velocity = Column("(2,) m/s; a view.")
     spin = Column("Angular velocity, rad/s, counter-clockwise.")
     angle = Column("rad it has turned, counter-clockwise.")

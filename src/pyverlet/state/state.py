@@ -25,7 +25,7 @@ MARKS = ("category", "mask")
 
 EVERYONE = 0xFFFFFFFF  # a mask of 32 bits that takes every category
 
-_DEFAULTS: dict[str, Any] = {"angle": 0, "restitution": -1, "friction": -1, "category": 1, "mask": EVERYONE}
+_DEFAULTS: dict[str, Any] = {"angle": 0, "restitution": -1, "friction": -1, "category": 1, "mask": EVERYONE, "crossed": 0}
 
 
 class State:
@@ -39,6 +39,7 @@ class State:
         radius, mass: (n,) m, and (n,) kg: infinity pins the particle.
         restitution, friction: (n,) of circles that have values of their own; negative: as `Collisions` and the bounds say.
         category, mask: (n,) 32 bits each; two circles collide if each has a bit of its category in the other's mask.
+        crossed: (n, 2) m, float64: whole periods of a periodic room by which each particle has left it.
         number: (n,) of each particle, in ascending order; no two particles of a world ever have the same.
         begun: the number of the first particle of each `append`, ascending. numbers: how many particles there have ever been.
         version: how often particles were added or removed.
@@ -59,6 +60,7 @@ class State:
     mask: Array
     number: Array
     angle: NDArray[np.float64]
+    crossed: NDArray[np.float64]
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self.dtype, self.turn = dtype, Turn()
@@ -66,6 +68,7 @@ class State:
         self._store |= {name: np.empty(0, dtype) for name in COLUMNS}
         for names, kind in ((MARKS, np.uint32), (("number",), np.int64), (("angle",), np.float64)):
             self._store |= {name: np.empty(0, kind) for name in names}
+        self._store["crossed"] = np.empty((0, 2))
         self.numbers = 0
         self.begun: list[int] = []
         self.version = 0
@@ -79,6 +82,11 @@ class State:
         """The same for this and its copies, and for no other."""
         self._key = self._key or uuid.uuid4().hex
         return self._key
+
+    @property
+    def unwrapped(self) -> NDArray[np.float64]:
+        """(n, 2) m, positions as if a periodic room did not repeat. A copy."""
+        return self.position.astype(np.float64) + self.crossed
 
     def __getstate__(self) -> dict[str, Any]:
         kept = {"dtype": self.dtype, "_key": self.key, "seam": self.seam, "begun": self.begun, "version": self.version}

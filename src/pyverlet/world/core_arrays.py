@@ -153,7 +153,8 @@ class CoreArrays:
         if len(state) >= SORTED_FROM:
             self._sort(state)
         if state.seam:
-            engine.follow_seam()
+            state.crossed = np.zeros(state.position.shape)
+            engine.follow_seam(state.crossed)
 
     def set_aside(self, state: Slots) -> None:
         """Some have fallen asleep: keep what their contacts remember."""

@@ -18,7 +18,7 @@ from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.rooms import Boundary
 from pyverlet.laws.touches import Touches
-from pyverlet.state.group import Column, Group, Particle
+from pyverlet.state.group import Column, Group, Measured, Particle
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import EVERYONE, State
 
@@ -124,6 +124,7 @@ class Particles(Shared):
             free = np.isfinite(values["mass"])
             self._refuse_misplaced(where, free)
             values["position"] = np.where(free[:, None], self.boundary.put_in(where, values["radius"]), where)
+            values["crossed"] = self._state.seam.periods(where.astype(np.float64) - values["position"])
         return Group(self._state, self._state.append(values), self.remove)
 
     @of_one_frame
@@ -178,6 +179,7 @@ class Particles(Shared):
         return len(self._state)
 
     position = Column("(n, 2) centres of all particles in the order they were added, m; a view.")
+    unwrapped = Measured("(n, 2) centres as if a periodic room did not repeat, m, float64: whole periods count on; a copy.")
     velocity = Column("(n, 2) m/s; a view.")
     spin = Column("(n,) angular velocity, rad/s, counter-clockwise; a view.")
     angle = Column("(n,) rad they have turned, counter-clockwise, float64 whatever the dtype: it grows and grows; a view.")

@@ -45,10 +45,11 @@ PARTICLES = {
     "friction": Field(None, "particles"),
     "category": Field(np.uint32, "particles"),
     "mask": Field(np.uint32, "particles"),
+    "crossed": Field(np.float64, "particles", 2),
     "number": Field(np.int64, "particles", least=0, most=2**31, order="ascending"),
     "begun": Field(np.int64, "groups", least=0, most=2**31, order="rising"),
 }
-"""The user's arrays, and where each group begins."""
+"""The user's arrays, and where each group begins. Files of older versions lack `crossed`."""
 
 SLOTS = {
     "particle": Field(np.int32, "slots", least=0, below="slots", order="permutation"),
@@ -163,6 +164,7 @@ def fill(world: World, parts: Parts) -> None:
     Raises:
         InputError: the arrays are not what they must be.
     """
+    parts.arrays.setdefault("particles.crossed", np.zeros((len(parts.arrays.get("particles.number", ())), 2)))
     check(parts, world.dtype)
     try:
         arrays = {name: parts.arrays[f"particles.{name}"] for name, _ in world._state.arrays()}
