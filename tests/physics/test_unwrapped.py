@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -102,7 +103,7 @@ def restored(world: pv.World, path: Path) -> pv.World:
     return world
 
 
-WAYS = {
+WAYS: dict[str, Callable[[pv.World, Path], pv.World]] = {
     "file": saved,
     "restore": restored,
     "copy": lambda w, _: copy.deepcopy(w),
@@ -146,9 +147,9 @@ def test_elsewhere_it_is_the_position_and_is_only_read() -> None:
     ball = world.add(position=[(2, 3), (4, 3)])
     world.run(seconds=1)
     assert world.unwrapped.tolist() == world.position.astype(float).tolist()
-    for write in (lambda: setattr(world, "unwrapped", 0), lambda: setattr(ball, "unwrapped", 0)):
+    for thing in (world, ball, ball[0]):
         with pytest.raises(pv.InputError, match="unwrapped is only to be read; allowed is to write position"):
-            write()
+            thing.unwrapped = 0
     with pytest.raises(ValueError, match="read-only"):
         ball.unwrapped[0] = 1
 

@@ -201,8 +201,8 @@ class Picked(Group):
         """Where those are among the world's now that are left."""
         if self._version != self._state.version:
             with self._state.turn:
-                where, there = _places(self._state, self._numbers)
-                self._index, self._version = where[there], self._state.version
+                where = self._state.index_of(self._numbers)
+                self._index, self._version = where[where >= 0], self._state.version
         return self._index
 
     def __len__(self) -> int:
@@ -251,16 +251,17 @@ class Particle:
     @property
     def is_there(self) -> bool:
         """Whether it was not removed."""
-        return bool(_places(self._state, np.array([self.number]))[1][0])
+        with self._state.turn:
+            return bool(self._state.index_of(np.array(self.number)) >= 0)
 
     @property
     def index(self) -> int:
         """Its index among all of the world's particles now; InputError if it was removed."""
         with self._state.turn:
-            (where,), (there,) = _places(self._state, np.array([self.number]))
-        if not there:
+            where = int(self._state.index_of(np.array(self.number)))
+        if where < 0:
             raise InputError(f"particle {self.number} was removed; allowed is one that is there")
-        return int(where)
+        return where
 
     @property
     def _where(self) -> int:
@@ -290,11 +291,3 @@ class Particle:
     friction = Column("mu of its own; negative: as the world's `Collisions` and bounds say.")
     category = Column("The bits of what it is.")
     mask = Column("The bits of the categories it collides with.")
-
-
-def _places(state: State, numbers: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Where the particles of these numbers are, and which of them are there."""
-    where = np.searchsorted(state.number, numbers)
-    there = where < len(state.number)
-    there[there] = state.number[where[there]] == numbers[there]
-    return where, there

@@ -143,6 +143,14 @@ class State:
             getattr(self, name)[:] = arrays[name]
         self.version += 1
 
+    def index_of(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Where the particles with these numbers, of any shape, are; -1 where there is none."""
+        known, count = self.number, len(self)
+        if not count or known[-1] == count - 1:  # numbers are indices, for only the last that came have gone
+            return np.where((numbers >= 0) & (numbers < count), numbers, -1)
+        where = np.searchsorted(known, numbers).clip(max=count - 1)
+        return np.where(known[where] == numbers, where, -1)
+
     def find(self, first: int, stop: int) -> slice:
         """Where the particles with numbers from `first` up to, not including, `stop` are."""
         return slice(*map(int, np.searchsorted(self.number, (first, stop))))

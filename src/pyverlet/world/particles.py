@@ -202,6 +202,31 @@ class Particles(Shared):
         """(n,) which call of `add` brought each particle, ascending from 0; it keeps that while others come and go."""
         return np.searchsorted(self._state.begun, self.number, side="right") - 1
 
+    @of_one_frame
+    def index_of(self, numbers: ArrayLike) -> NDArray[np.int64]:
+        """Indices of the particles with these numbers, as `number` and the records of events and contacts have them.
+
+        Args:
+            numbers: of any shape, which is that of the answer.
+
+        Returns:
+            Where each particle is among all of the world's now; -1 where it was removed, or there never was one.
+
+        Raises:
+            InputError: they are no whole numbers.
+        """
+        return self._state.index_of(checks.numbers("numbers", numbers))
+
+    @of_one_frame
+    def group_of(self, numbers: ArrayLike) -> NDArray[np.int64]:
+        """Indices in `groups` of which group brought the particles with these numbers, also those removed; see `index_of`.
+
+        -1 where there never was such a particle.
+        """
+        asked = checks.numbers("numbers", numbers)
+        known = (asked >= 0) & (asked < self._state.numbers)
+        return np.where(known, np.searchsorted(self._state.begun, asked, side="right") - 1, -1)
+
     @property
     @of_one_frame
     def groups(self) -> list[Group]:

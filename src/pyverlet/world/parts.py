@@ -63,15 +63,18 @@ NEWS = {
     "touching": Field(np.int64, "touching", least=0, order="ascending"),
     "begin": Field(np.int64, "begin", 4, least=-1),
     "begin_how": Field(np.float64, "begin", 6),
+    "begin_number": Field(np.int64, "begin", 2, least=-1),
     "end": Field(np.int64, "end", 2, least=-1),
     "end_at": Field(np.int64, "end", 2, least=-1),
+    "end_number": Field(np.int64, "end", 2, least=-1),
     "broken": Field(np.int64, "broken", 4, least=-1),
+    "broken_number": Field(np.int64, "broken", 2, least=-1),
     "broken_force": Field(np.float64, "broken", infinite=True),
     "islands": Field(np.int64, "islands", least=0, order="ascending"),
     "members": Field(np.int64, "islands", least=1),
 }
 """What happened in the last frame, and who sleeps. Of `begin` a, b, wall and obstacle; speed, point (2), normal (2), impulse. Of
-`end` a and b; wall and obstacle, which files of older versions lack."""
+`end` a and b; wall and obstacle. Files of older versions lack these, and numbers of particles."""
 
 IMPULSES = {
     "pairs": Field(np.int32, "impulses", 2, least=0, below="particles"),
@@ -143,7 +146,7 @@ def take_apart(world: World) -> Parts:
     broken = saved.links[2]
     if len(broken):
         arrays["news.broken"] = np.column_stack([broken[name] for name in ("link", "row", "i", "j")])
-        arrays["news.broken_force"] = broken["force"].copy()
+        arrays["news.broken_force"], arrays["news.broken_number"] = broken["force"].copy(), broken["number"].copy()
     return Parts(facts, arrays)
 
 
@@ -265,6 +268,13 @@ def _events_apart(events: Events, arrays: dict[str, Array]) -> None:
     arrays["news.end"], arrays["news.end_at"] = np.hsplit(np.column_stack([events.end[name] for name in _WHO]), 2)
     arrays["news.begin"] = np.column_stack([events.begin[name] for name in _WHO])
     arrays["news.begin_how"] = np.column_stack([events.begin[name] for name in _HOW])
+    arrays["news.begin_number"], arrays["news.end_number"] = events.begin["number"].copy(), events.end["number"].copy()
+
+
+def _numbers(name: str, first: Array, second: Array, arrays: dict[str, Array]) -> Array:
+    """(k, 2) of particles in records of this name; in files that lack them those at these indices, -1 for none."""
+    number = np.append(arrays["particles.number"], -1)
+    return arrays.get(f"news.{name}_number", np.column_stack((number[first], number[second])))
 
 
 def _events(facts: Facts, arrays: dict[str, Array]) -> Events:
@@ -280,6 +290,8 @@ def _events(facts: Facts, arrays: dict[str, Array]) -> Events:
         events.begin[name] = column
     events.begin["speed"], events.begin["point"], events.begin["normal"] = how[:, 0], how[:, 1:3], how[:, 3:5]
     events.begin["impulse"] = how[:, 5]
+    for name, records in (("begin", events.begin), ("end", events.end)):
+        records["number"] = _numbers(name, records["a"], records["b"], arrays)
     events.hit = events.begin[events.begin["speed"] >= events.hit_speed]
     return events
 
@@ -290,6 +302,7 @@ def _broken(arrays: dict[str, Array]) -> Array:
     for name, column in zip(("link", "row", "i", "j"), rows.T, strict=True):
         broken[name] = column
     broken["force"] = arrays.get("news.broken_force", 0.0)
+    broken["number"] = _numbers("broken", broken["i"], broken["j"], arrays)
     return broken
 
 
