@@ -35,7 +35,7 @@ def test_numbers_lead_to_indices_and_groups(acts: list[Any]) -> None:
     numbers = [number for number, _ in there]
     assert world.number.tolist() == numbers
     every = np.arange(-2, added + 3)
-    assert world.index_of(every).tolist() == [numbers.index(n) if n in numbers else -1 for n in every]
+    assert world.index_of(every).tolist() == [numbers.index(n) if n in numbers else -1 for n in every.tolist()]
     assert world.group_of(every).tolist() == [brought[n] if 0 <= n < added else -1 for n in every]
     assert world.group_of(world.number).tolist() == world.group_number.tolist() == [group for _, group in there]
     assert all(world.groups[group].index[0] <= k for k, (_, group) in enumerate(there))

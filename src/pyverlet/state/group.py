@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import IndexInputError, InputError
+from pyverlet.state.data import Data
 from pyverlet.state.state import State
 
 Array = NDArray[Any]
@@ -171,6 +172,11 @@ class Group:
     category = Column("(n,) uint32, the bits of what these circles are.")
     mask = Column("(n,) uint32, the bits of the categories they collide with.")
 
+    @property
+    def data(self) -> Data:
+        """Their part of `world.data`, arrays of your own by name."""
+        return Data(self)
+
     def pin(self, index: Any = slice(None)) -> None:
         """Make particles immovable where they are: mass infinite, no velocity. Give them a mass again to let go.
 
@@ -271,6 +277,11 @@ class Particle:
     def world(self) -> Any:
         """The world it is in."""
         return self._remove.__self__  # type: ignore[attr-defined]
+
+    @property
+    def data(self) -> Data:
+        """Its part of `world.data`, arrays of your own by name."""
+        return Data(self)
 
     def remove(self) -> None:
         """Remove it from its world."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pyverlet.ground import memory
 from pyverlet.ground.turns import Turn
 from pyverlet.state import seam
+from pyverlet.state.data import Columns
 
 Array = NDArray[Any]
 
@@ -43,6 +44,7 @@ class State:
         number: (n,) of each particle, in ascending order; no two particles of a world ever have the same.
         begun: the number of the first particle of each `append`, ascending. numbers: how many particles there have ever been.
         version: how often particles were added or removed.
+        data: arrays of the user's own, in which new particles have the row in front; see `state.data`.
         turn: whose turn it is to step, change or read them, where several threads do.
     """
 
@@ -71,6 +73,7 @@ class State:
         self._store["crossed"] = np.empty((0, 2))
         self.numbers = 0
         self.begun: list[int] = []
+        self.data: Columns = {}
         self.version = 0
         self._show(0)
 
@@ -91,7 +94,8 @@ class State:
     def __getstate__(self) -> dict[str, Any]:
         kept = {"dtype": self.dtype, "_key": self.key, "seam": self.seam, "begun": self.begun, "version": self.version}
         with self.turn:
-            return kept | {"numbers": self.numbers, "_store": {name: array.copy() for name, array in self.arrays()}}
+            kept |= {"numbers": self.numbers, "data": {name: column.copy() for name, column in self.data.items()}}
+            return kept | {"_store": {name: array.copy() for name, array in self.arrays()}}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
@@ -103,8 +107,11 @@ class State:
         for name in self._store:
             yield name, getattr(self, name)
 
-    def append(self, values: dict[str, Array]) -> slice:
-        """Add particles; `values` holds an array for each name, but for those that have a default. Returns where they stand."""
+    def append(self, values: dict[str, Array], data: Columns | None = None) -> slice:
+        """Add particles; `values` holds an array for each name, but for those that have a default. Returns where they stand.
+
+        data: rows for them in arrays of the user's own.
+        """
         start = len(self)
         stop = start + len(values["radius"])
         capacity = len(self._store["radius"])
@@ -117,6 +124,8 @@ class State:
         self._show(stop)
         for name, value in (_DEFAULTS | values).items():
             getattr(self, name)[start:stop] = value
+        for name, column in self.data.items():
+            self.data[name] = np.concatenate((column, (data or {}).get(name, np.repeat(column[:1], stop - start, axis=0))))
         self.begun.append(self.numbers)
         self.number[start:] = np.arange(self.numbers, self.numbers + stop - start)
         self.numbers += stop - start
@@ -129,12 +138,14 @@ class State:
         first, left = int(np.argmin(kept)) if not kept.all() else len(kept), int(np.count_nonzero(kept))
         for array in self._store.values():
             array[first:left] = array[first : len(kept)][kept[first:]]
+        self.data = {name: column[np.append(True, kept)] for name, column in self.data.items()}
         self._show(left)
         self.version += 1
         return now
 
-    def restore(self, arrays: dict[str, Array], *, own: bool = False) -> None:
+    def restore(self, arrays: dict[str, Array], data: Columns, *, own: bool = False) -> None:
         """Take up what `arrays` gave once, however many particles that were; `own`: in these arrays themselves, from now on."""
+        self.data = {name: column.copy() for name, column in data.items()}
         count = len(arrays["number"])
         if own or count > len(self._store["number"]):
             self._store = {name: arrays[name] if own else np.empty_like(arrays[name]) for name in self._store}

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,17 +13,23 @@ from numpy.typing import ArrayLike, NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.turns import Shared, in_turn, of_one_frame
+from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceList, Numbered
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.rooms import Boundary
 from pyverlet.laws.touches import Touches
+from pyverlet.state.data import Data, known, rows
 from pyverlet.state.group import Column, Group, Measured, Particle
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import EVERYONE, State
+from pyverlet.world.overlaps import free_in_order, on_others
 
 Array = NDArray[Any]
+OnOverlap = Literal["push", "skip", "error"]
+
+_ALLOWED = "allowed are free places, and all with on_overlap='push'"
 
 
 class Particles(Shared):
@@ -39,6 +46,7 @@ class Particles(Shared):
     boundary: Boundary
     obstacles: Obstacles
     _course: Course
+    collisions: Collisions | None
 
     def held(self) -> AbstractContextManager[None]:
         """Meanwhile no other thread steps or changes this world: `with world.held():` what is read belongs to one frame."""
@@ -68,7 +76,9 @@ class Particles(Shared):
         friction: ArrayLike | None = None,
         category: ArrayLike = 1,
         mask: ArrayLike = EVERYONE,
-        allow_overlap: bool = False,
+        on_overlap: OnOverlap | None = None,
+        data: Mapping[str, ArrayLike] | None = None,
+        allow_overlap: bool | None = None,
     ) -> Group:
         """Add particles.
 
@@ -84,15 +94,20 @@ class Particles(Shared):
             friction: (n,) or one for all, mu, 0 or more; None: as for restitution. The geometric mean of two counts, as in Box2D.
             category: (n,) or one for all, 32 bits: what these circles are.
             mask: (n,) or one for all, 32 bits: two circles collide if each has a bit of its category in the other's mask.
-            allow_overlap: leave circles where they are said to be, inside an obstacle and outside the room too: the first frame
-                gets them out, or in. Circles on top of each other need no leave: they part slowly.
+            on_overlap: what becomes of circles on top of others, of those that are there and those before them here, and of free
+                ones whose centre is inside an obstacle or outside the room. "push": all are added where they are said to be;
+                contacts part those on top of each other slowly, and the first frame gets the rest out, or in. "skip": only
+                those are added that are on top of nothing, in order. "error": refused. None: refused inside obstacles and
+                outside the room, pushed on top of each other. Circles that would not collide are not on top of each other.
+            data: by name, (n,) or (n, k) or one for all, for arrays of `world.data`; others get the value of new particles.
+            allow_overlap: True is on_overlap="push", False is None; deprecated.
 
         Returns:
-            A handle whose arrays are views on these particles, in the order given.
+            A handle whose arrays are views on the particles added, in the order given.
 
         Raises:
-            InputError: shapes disagree, a value is not finite, a circle does not fit into the boundary, or a centre is inside an
-                obstacle or outside the room, where only pinned ones may be; nothing is added.
+            InputError: shapes disagree, a value is not finite, a circle does not fit into the boundary, or `on_overlap` refuses
+                a place; nothing is added.
         """
         dtype = self._state.dtype
         where = checks.rows("position", position, dtype)
@@ -120,12 +135,29 @@ class Particles(Shared):
         checks.positive("radius", values["radius"])
         checks.positive("mass", values["mass"], infinite_is="pinned")
         self.boundary.check(values["radius"])
-        if not allow_overlap:
-            free = np.isfinite(values["mass"])
+        columns, on_overlap = self._state.data, _on_overlap(on_overlap, allow_overlap)
+        own = {name: rows(name, value, count, known(columns, name)) for name, value in (data or {}).items()}
+        if on_overlap != "push" and not (kept := self._put_down(values, on_overlap)).all():
+            values, own = ({name: column[kept] for name, column in columns.items()} for columns in (values, own))
+        return Group(self._state, self._state.append(values, own), self.remove)
+
+    def _put_down(self, values: dict[str, Array], on_overlap: str | None) -> NDArray[np.bool_]:
+        """(n,) which of these particles are to be added; all are put inside the room."""
+        where, free = values["position"], np.isfinite(values["mass"])
+        kept = ~free | self.is_free(where)
+        if on_overlap != "skip":
             self._refuse_misplaced(where, free)
-            values["position"] = np.where(free[:, None], self.boundary.put_in(where, values["radius"]), where)
-            values["crossed"] = self._state.seam.periods(where.astype(np.float64) - values["position"])
-        return Group(self._state, self._state.append(values), self.remove)
+        values["position"] = np.where(free[:, None], self.boundary.put_in(where, values["radius"]), where)
+        values["crossed"] = self._state.seam.periods(where.astype(np.float64) - values["position"])
+        if on_overlap is None or self.collisions is None:
+            return kept
+        pairs = on_others(self._state, values)
+        if on_overlap == "error" and len(pairs):
+            (k, i), there = pairs[0].tolist(), len(self)
+            x, y = where[k]
+            other = f"particle {i}" if i < there else f"position[{i - there}]"
+            raise InputError(f"position[{k}] is ({x:g}, {y:g}) m, on top of {other}; {_ALLOWED}")
+        return free_in_order(pairs, len(self), kept)
 
     @of_one_frame
     def is_free(self, position: ArrayLike) -> NDArray[np.bool_]:
@@ -141,9 +173,7 @@ class Particles(Shared):
             k = int(wrong[0])
             what = f"outside the room, {self.boundary}" if outside[k] else f"inside the {self.obstacles[inside[k]]}"
             x, y = position[k]
-            raise InputError(
-                f"position[{k}] is ({x:g}, {y:g}) m, {what}; allowed are free places, and all with allow_overlap=True"
-            )
+            raise InputError(f"position[{k}] is ({x:g}, {y:g}) m, {what}; {_ALLOWED}")
 
     @in_turn
     def remove(self, which: Group | Particle | ArrayLike) -> None:
@@ -189,6 +219,11 @@ class Particles(Shared):
     friction = Column("(n,) mu of circles that have their own, negative where `Collisions` and the bounds decide; a view.")
     category = Column("(n,) uint32, the bits of what each circle is; a view.")
     mask = Column("(n,) uint32, the bits of the categories it collides with; a view.")
+
+    @property
+    def data(self) -> Data:
+        """Arrays of your own by name, which follow the particles: `world.data["age"] = 0.0`."""
+        return Data(self, whole=True)
 
     @property
     @of_one_frame
@@ -241,6 +276,15 @@ class Particles(Shared):
     def version(self) -> int:
         """How often particles were added or removed."""
         return self._state.version
+
+
+def _on_overlap(on_overlap: OnOverlap | None, allow_overlap: bool | None) -> OnOverlap | None:
+    if allow_overlap is not None:
+        warnings.warn("allow_overlap is deprecated; on_overlap='push' is allow_overlap=True", DeprecationWarning, stacklevel=4)
+        on_overlap = on_overlap or ("push" if allow_overlap else None)
+    if on_overlap not in (None, *get_args(OnOverlap)):
+        raise InputError(f"on_overlap is {on_overlap!r}; allowed are 'push', 'skip', 'error' and None")
+    return on_overlap
 
 
 def _mass(mass: ArrayLike | None, density: ArrayLike | None, radius: Array) -> Array:

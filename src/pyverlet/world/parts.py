@@ -19,6 +19,7 @@ from pyverlet.laws.events import CONTACT, HIT, Events
 from pyverlet.laws.ledger import Bookkeeper, Ledger
 from pyverlet.laws.links._set import BROKEN
 from pyverlet.laws.sleep import Sleep, laws
+from pyverlet.state.data import Columns
 from pyverlet.world.contact_memory import Memory
 from pyverlet.world.saved import Saved
 from pyverlet.world.sleepers import ASLEEP, Remembered
@@ -99,6 +100,9 @@ FIELDS = {
     for name, field in fields.items()
 }
 
+OWN = "data."
+"""Before the number of an array of the user's own, whose name is in `facts["data"]`; see `state.data.Columns`."""
+
 RETIRED = frozenset({
     "particles.grown", "slots.fed",
     *(f"contacts.{name}" for name in ("built", "checked", "low", "high", "slip", "lent_particle", "lent", "busy", "held")),
@@ -143,6 +147,8 @@ def take_apart(world: World) -> Parts:
         members = dict(sorted(saved.sleep._members.items()))
         arrays["news.islands"] = np.array(list(members), np.int64)
         arrays["news.members"] = np.array(list(members.values()), np.int64)
+    facts["data"] = list(saved.data)
+    arrays |= {f"{OWN}{k}": column for k, column in enumerate(saved.data.values())}
     broken = saved.links[2]
     if len(broken):
         arrays["news.broken"] = np.column_stack([broken[name] for name in ("link", "row", "i", "j")])
@@ -158,7 +164,8 @@ def check(parts: Parts, real: np.dtype[Any]) -> None:
     """
     sizes = {"one": 1}
     for name, array in parts.arrays.items():
-        FIELDS[name].check(name, array, real, sizes)
+        if not name.startswith(OWN):
+            FIELDS[name].check(name, array, real, sizes)
 
 
 def fill(world: World, parts: Parts) -> None:
@@ -174,11 +181,22 @@ def fill(world: World, parts: Parts) -> None:
         begun = parts.arrays["particles.begun"]
     except KeyError as error:
         raise InputError(f"the array {error} is missing; allowed are files that have all") from None
-    world._state.restore(arrays, own=True)
+    world._state.restore(arrays, _data(parts), own=True)
     most = int(arrays["number"][-1]) + 1 if len(world) else 0
     world._state.numbers = checks.whole("numbers", parts.facts.get("numbers"), least=most, most=2**31)
     world._state.begun = begun.tolist()
     world.boundary.check(world.radius)
+
+
+def _data(parts: Parts) -> Columns:
+    data = {name: parts.arrays[f"{OWN}{k}"] for k, name in enumerate(parts.facts.get("data", ()))}
+    count = len(parts.arrays["particles.number"])
+    for name, column in data.items():
+        if len(column) != count + 1:
+            raise InputError(
+                f"data[{name!r}] has {len(column)} rows; allowed are {count + 1}, one for each particle and for new ones"
+            )
+    return data
 
 
 def put_together(world: World, parts: Parts) -> Saved:
@@ -202,6 +220,7 @@ def put_together(world: World, parts: Parts) -> Saved:
         obstacles=world.obstacles.save(),
         actors=[(actor, actor.save()) for actor in world.actors],
         links=(links, pools, _broken(parts.arrays)),
+        data=_data(parts),
     )
 
 

@@ -66,7 +66,7 @@ class Queries(Shared):
         found = np.full(len(where), -1, np.int64)
         if len(self._state):
             reach = float(self._state.radius.max())
-            seen = Images.of(self._state, reach)
+            seen = Images.of(self._state.position, self._state.radius, self._state.seam, reach)
             inside, cells = self._state.seam.wrapped(where), self._cells(seen.position, len(where))
             unit("tools", seen.position.dtype).at_points(inside, reach, cells, seen.position, seen.radius, found)
             found = seen.named(found)
@@ -135,7 +135,7 @@ class Queries(Shared):
         if len(self._state):
             s = self._state
             reach = float(s.radius.max())
-            seen = Images.of(s, reach)
+            seen = Images.of(s.position, s.radius, s.seam, reach)
             cells = self._cells(seen.position, len(start))
             for rays, at, gone, left in _pieces(start, heading, far, s.seam):
                 piece, way = np.full(len(rays), -1, np.int64), np.full(len(rays), np.inf)

@@ -258,6 +258,7 @@ class World(Measures, Queries, Doors):
             obstacles=self.obstacles.save(),
             actors=[(actor, actor.save()) for actor in self.actors],
             links=self.links.save(),
+            data={name: column.copy() for name, column in self._state.data.items()},
         )
 
     @in_turn
@@ -269,7 +270,7 @@ class World(Measures, Queries, Doors):
         """
         saved = saved.of(self)
         numbers = self._state.number.copy()
-        self._state.restore(saved.arrays)
+        self._state.restore(saved.arrays, saved.data)
         if not np.array_equal(numbers, self._state.number):
             self._renumber(self._state.index_of(numbers))
         self.links.restore(saved.links)
