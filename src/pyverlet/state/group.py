@@ -172,6 +172,21 @@ class Group:
     category = Column("(n,) uint32, the bits of what these circles are.")
     mask = Column("(n,) uint32, the bits of the categories they collide with.")
 
+    def move_to(self, position: ArrayLike) -> None:
+        """Put them elsewhere at once, without a motion: nothing is met on the way, and nothing is pushed.
+
+        Velocities, spins and angles stay. Contacts forget them, links to others and pins pull from there, sleepers wake,
+        `unwrapped` becomes the position given, and a ledger has what energy they gain under `outside`.
+
+        Args:
+            position: (2,), m, for the mean of their centres, so that their shape stays; or (n, 2), for each.
+
+        Raises:
+            InputError: shapes disagree, or a centre would be inside an obstacle or outside the room, where only pinned ones may
+                be; nothing is moved.
+        """
+        self.world._move(self, position)
+
     @property
     def data(self) -> Data:
         """Their part of `world.data`, arrays of your own by name."""
@@ -277,6 +292,10 @@ class Particle:
     def world(self) -> Any:
         """The world it is in."""
         return self._remove.__self__  # type: ignore[attr-defined]
+
+    def move_to(self, position: ArrayLike) -> None:
+        """Put it elsewhere at once, (2,) m, without a motion; see `Group.move_to`."""
+        self.world._move(self, position)
 
     @property
     def data(self) -> Data:

@@ -72,7 +72,7 @@ def free_in_order(pairs: NDArray[np.int64], there: int, allowed: NDArray[np.bool
 
     pairs: what `on_others` found beside so many that were there.
     """
-    free = allowed.copy()
+    free: NDArray[np.bool_] = allowed.copy()
     for k, i in pairs.tolist():
         free[k] &= i >= there and not free[i - there]
     return free

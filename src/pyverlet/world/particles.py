@@ -24,6 +24,7 @@ from pyverlet.state.data import Data, known, rows
 from pyverlet.state.group import Column, Group, Measured, Particle
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import EVERYONE, State
+from pyverlet.world.moving import move
 from pyverlet.world.overlaps import free_in_order, on_others
 
 Array = NDArray[Any]
@@ -144,7 +145,7 @@ class Particles(Shared):
     def _put_down(self, values: dict[str, Array], on_overlap: str | None) -> NDArray[np.bool_]:
         """(n,) which of these particles are to be added; all are put inside the room."""
         where, free = values["position"], np.isfinite(values["mass"])
-        kept = ~free | self.is_free(where)
+        kept: NDArray[np.bool_] = ~free | self.is_free(where)
         if on_overlap != "skip":
             self._refuse_misplaced(where, free)
         values["position"] = np.where(free[:, None], self.boundary.put_in(where, values["radius"]), where)
@@ -198,6 +199,10 @@ class Particles(Shared):
         now = self._state.remove(kept)
         self._slots.forget(now)
         self._renumber(now)
+
+    @in_turn
+    def _move(self, which: Group | Particle, position: ArrayLike) -> None:
+        move(self, which, position)  # type: ignore[arg-type]  # it is mixed into World
 
     def _renumber(self, now: Array) -> None:
         """Tell those who hold a particle by its index where it is now, or that it is no more (-1)."""
