@@ -205,7 +205,10 @@ BAD: dict[str, tuple[Any, str]] = {
     "numbers": ("there", r"position is not an array of numbers"),
     "finite": ((np.nan, 0), r"position\[0\] is \(nan, 0.0\); allowed are finite numbers"),
     "outside": ((20, 0), r"position\[0\] is \(19, 0\) m, outside the room, Box"),
-    "inside": ([(0, 3), (5, 5.2)], r"position\[1\] is \(5, 5.2\) m, inside the Disc at \(5, 5\) m; allowed are free places"),
+    "inside": (
+        [(0, 3), (5, 5.2)],
+        r"position\[1\] is \(5, 5.2\) m, inside the Disc at \(5, 5\) m; allowed are free places, and any for pinned ones$",
+    ),
 }
 
 

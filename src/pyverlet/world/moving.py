@@ -29,7 +29,7 @@ def move(world: World, which: Group | Particle, position: ArrayLike) -> None:
     elif len(goal) != len(index):
         raise InputError(f"position has shape {goal.shape}; allowed is (2,), for their centre, or ({len(index)}, 2)")
     where = goal.astype(state.dtype)
-    world._refuse_misplaced(where, np.isfinite(state.mass[index]))
+    world._refuse_misplaced(where, np.isfinite(state.mass[index]), allowed="free places, and any for pinned ones")
     inside = state.seam.wrapped(where)
     state.crossed[index] = state.seam.periods(where.astype(np.float64) - inside)
     index, inside = index[moved := (inside != state.position[index]).any(axis=1)], inside[moved]

@@ -30,7 +30,7 @@ from pyverlet.world.overlaps import free_in_order, on_others
 Array = NDArray[Any]
 OnOverlap = Literal["push", "skip", "error"]
 
-_ALLOWED = "allowed are free places, and all with on_overlap='push'"
+_ALLOWED = "free places, and all with on_overlap='push'"
 
 
 class Particles(Shared):
@@ -147,7 +147,7 @@ class Particles(Shared):
         where, free = values["position"], np.isfinite(values["mass"])
         kept: NDArray[np.bool_] = ~free | self.is_free(where)
         if on_overlap != "skip":
-            self._refuse_misplaced(where, free)
+            self._refuse_misplaced(where, free, allowed=_ALLOWED)
         values["position"] = np.where(free[:, None], self.boundary.put_in(where, values["radius"]), where)
         values["crossed"] = self._state.seam.periods(where.astype(np.float64) - values["position"])
         if on_overlap is None or self.collisions is None:
@@ -157,7 +157,7 @@ class Particles(Shared):
             (k, i), there = pairs[0].tolist(), len(self)
             x, y = where[k]
             other = f"particle {i}" if i < there else f"position[{i - there}]"
-            raise InputError(f"position[{k}] is ({x:g}, {y:g}) m, on top of {other}; {_ALLOWED}")
+            raise InputError(f"position[{k}] is ({x:g}, {y:g}) m, on top of {other}; allowed are {_ALLOWED}")
         return free_in_order(pairs, len(self), kept)
 
     @of_one_frame
@@ -166,7 +166,7 @@ class Particles(Shared):
         where = checks.rows("position", position, np.dtype(np.float64))
         return np.asarray(~self.boundary.outside(where) & (self._course.covering(where) < 0))
 
-    def _refuse_misplaced(self, position: Array, free: Array) -> None:
+    def _refuse_misplaced(self, position: Array, free: Array, *, allowed: str) -> None:
         """No particle that is free may start inside an obstacle or outside the room."""
         outside, inside = self.boundary.outside(position), self._course.covering(position)
         wrong = np.flatnonzero(free & (outside | (inside >= 0)))
@@ -174,7 +174,7 @@ class Particles(Shared):
             k = int(wrong[0])
             what = f"outside the room, {self.boundary}" if outside[k] else f"inside the {self.obstacles[inside[k]]}"
             x, y = position[k]
-            raise InputError(f"position[{k}] is ({x:g}, {y:g}) m, {what}; {_ALLOWED}")
+            raise InputError(f"position[{k}] is ({x:g}, {y:g}) m, {what}; allowed are {allowed}")
 
     @in_turn
     def remove(self, which: Group | Particle | ArrayLike) -> None:
