@@ -49,5 +49,7 @@ def wrap_seam(w: cython.pointer(Step), crossed: cython.pointer(cython.double)):
         low: cython.double = c.low_y if axis else c.low_x
         for i in range(w.count if period > 0 else 0):
             x: real = w.position[2 * i + axis]
-            w.position[2 * i + axis] = wrapped(x, low, period)
-            crossed[2 * i + axis] += period * rint((cython.cast(cython.double, x) - w.position[2 * i + axis]) / period)
+            inside: real = wrapped(x, low, period)
+            if inside != x:  # NaN, too
+                w.position[2 * i + axis] = inside
+                crossed[2 * i + axis] += period * rint((cython.cast(cython.double, x) - inside) / period)

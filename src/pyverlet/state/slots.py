@@ -186,7 +186,8 @@ class Slots:
         self.motion.put_motion(*moved, self.acceleration, self.spin, *given, state.angle, 0.5 * dt, self.particle)
         self._given_back.remember(given)
         if self.crossed is not None:
-            state.crossed[self.particle] += self.crossed
+            row, axis = np.divmod(at := np.flatnonzero(self.crossed), 2)
+            state.crossed[self.particle[row], axis] += self.crossed.reshape(-1)[at]
             self.crossed = None
 
     def where(self) -> Array:
