@@ -200,6 +200,18 @@ def test_pinned_and_picked_ones_and_single_particles() -> None:
     world.add(position=np.zeros((0, 2))).move_to((1, 1))
 
 
+def test_places_in_any_memory_order_and_never_in_the_middle_of_a_frame() -> None:
+    world = pv.World(boundary=pv.Periodic((0, 0), (12, 9)), dtype=np.float64)
+    balls = world.add(position=[(1, 2), (3, 4), (5, 6)])
+    balls.move_to(np.asfortranarray([(2.0, 3.0), (14.0, 5.0), (6.0, -2.0)]))
+    assert world.position.tolist() == [[2, 3], [2, 5], [6, 7]]
+    assert world.unwrapped.tolist() == [[2, 3], [14, 5], [6, -2]]
+
+    world.onlooker = lambda _: balls.move_to((1, 1))
+    with pytest.raises(pv.InputError, match="move_to is called in the middle of a frame of this world"):
+        world.step(FRAME)
+
+
 BAD: dict[str, tuple[Any, str]] = {
     "shape": ([(1, 1), (2, 2), (3, 3)], r"position has shape \(3, 2\); allowed is \(2,\), for their centre, or \(2, 2\)"),
     "numbers": ("there", r"position is not an array of numbers"),

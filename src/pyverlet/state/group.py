@@ -185,7 +185,7 @@ class Group:
             InputError: shapes disagree, or a centre would be inside an obstacle or outside the room, where only pinned ones may
                 be; nothing is moved.
         """
-        self.world._move(self, position)
+        self.world._move_to(self, position)
 
     @property
     def data(self) -> Data:
@@ -295,7 +295,7 @@ class Particle:
 
     def move_to(self, position: ArrayLike) -> None:
         """Put it elsewhere at once, (2,) m, without a motion; see `Group.move_to`."""
-        self.world._move(self, position)
+        self.world._move_to(self, position)
 
     @property
     def data(self) -> Data:

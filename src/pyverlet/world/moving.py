@@ -28,7 +28,7 @@ def move(world: World, which: Group | Particle, position: ArrayLike) -> None:
         goal = goal + shape - shape.mean(axis=0)
     elif len(goal) != len(index):
         raise InputError(f"position has shape {goal.shape}; allowed is (2,), for their centre, or ({len(index)}, 2)")
-    where = goal.astype(state.dtype)
+    where = np.ascontiguousarray(goal, state.dtype)
     world._refuse_misplaced(where, np.isfinite(state.mass[index]), allowed="free places, and any for pinned ones")
     inside = state.seam.wrapped(where)
     state.crossed[index] = state.seam.periods(where.astype(np.float64) - inside)

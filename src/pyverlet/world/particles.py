@@ -201,7 +201,7 @@ class Particles(Shared):
         self._renumber(now)
 
     @in_turn
-    def _move(self, which: Group | Particle, position: ArrayLike) -> None:
+    def _move_to(self, which: Group | Particle, position: ArrayLike) -> None:
         move(self, which, position)  # type: ignore[arg-type]  # it is mixed into World
 
     def _renumber(self, now: Array) -> None:

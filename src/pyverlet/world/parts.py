@@ -257,6 +257,8 @@ def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
             f"impulses.skin has {len(skin)} numbers and impulses.listed {len(listed)} rows; allowed are 6 and one "
             "for each row of impulses.given, or none"
         )
+    for number in skin[4:]:  # counts
+        checks.whole("skin", int(number), least=0, most=_MOST)
     return Memory(
         pairs.copy(),
         values.copy(),
