@@ -53,20 +53,17 @@ class Data(MutableMapping[str, Any]):
         if not isinstance(name, str) or not name:
             raise InputError(f"name is {name!r}; allowed is a text")
         with self._owner._state.turn.held():
-            columns, where = self._columns, self._owner._where
-            if not self._whole:
-                column = known(columns, name)
-                at = np.arange(1, len(column))[where]
-                values = rows(name, value, np.size(at), column)
-                columns[name] = column = column.astype(np.result_type(column, values), copy=False)
-                column[at] = values.reshape(np.shape(column[at]))
-                return
-            before = columns.get(name)
-            values = rows(name, value, len(self._owner), before)
-            new = np.zeros_like(values, shape=(1, *values.shape[1:])) if before is None else before[:1]
-            if np.ndim(value) < values.ndim:  # one for all
-                new = rows(name, value, 1, before)
-            columns[name] = np.concatenate((new, values))
+            columns = self._columns
+            if self._whole and name not in columns:
+                values = rows(name, value, len(self._owner), None)
+                columns[name] = np.concatenate((np.zeros_like(values, shape=(1, *values.shape[1:])), values))
+            column = known(columns, name)
+            at = np.arange(1, len(column))[self._owner._where]
+            values = rows(name, value, np.size(at), column)
+            columns[name] = column = column.astype(values.dtype, copy=False)
+            column[at] = values.reshape(np.shape(column[at]))
+            if self._whole and np.ndim(value) < values.ndim:
+                column[:1] = rows(name, value, 1, column)  # one for all, also for those that come
 
     def __delitem__(self, name: str) -> None:
         if not self._whole:
