@@ -36,6 +36,7 @@ def subjects() -> list[tuple[dict[str, Any], dict[str, Any], bytes]]:
     busy.obstacles.append(pv.Polygon([(3, 1), (4, 1), (3.5, 2)], angular_velocity=1.0))
     busy.actors.append(pv.Emitter(pv.Box((1, 8), (11, 11)), rate=30, radius=0.1))
     busy.forces.append(pv.Drag(linear=0.1))
+    busy.data["age"], busy.data["name"], busy.data["place"] = 0.5, "abc", np.ones((len(busy), 2), np.float32)
     asleep = pv.World(boundary=pv.Box((0, 0), (6, 6)), sleep=True, substeps=2)
     asleep.add(position=[(1, 0.5), (2, 0.5), (3, 0.5), (4.5, 4)], radius=0.5)
     heavy = pv.World(boundary=pv.Circle(radius=5), collisions=pv.Collisions(restitution=0.3), substeps=2)

@@ -31,7 +31,7 @@ def crossing() -> pv.World:
     world = pv.World(boundary=pv.Periodic((0, 0), (12, 12), axes="x"), contacts=True, dtype=np.float64, events=True)
     world.add(position=pv.fill(pv.Box((1, 5), (11, 11)), radius=0.4, count=60).position, radius=0.4)
     world.obstacles += [pv.Capsule((3, 1), (9, 1), radius=0.3, angular_velocity=1.0), pv.Disc((6, 3), 0.5, velocity=(0.5, 0))]
-    pair = world.add(position=[(0.5, 2.0), (11.5, 2.0)], radius=0.1, allow_overlap=True)
+    pair = world.add(position=[(0.5, 2.0), (11.5, 2.0)], radius=0.1, on_overlap="push")
     world.links.append(pv.Rope(pair, 0, 1, length=1.0, breaking_force=3.0))
     world.forces.append(pv.ConstantForce((0, 2), group=pair))
     return world

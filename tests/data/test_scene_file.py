@@ -17,6 +17,7 @@ import pyverlet as pv
 from pyverlet.cli import main
 from pyverlet.data import toml
 from pyverlet.data.scene_file import schema, validated
+from pyverlet.data.scene_freeze import freeze
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "scenes").glob("*.*"))
 
@@ -279,3 +280,13 @@ def test_a_file_wherever_a_name_goes(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert main(["scene", "freeze", path, path]) == 2
     assert main(["scene", "schema"]) == 0
     assert json.loads(capsys.readouterr().out)["title"] == "pyverlet scene"
+
+
+def test_arrays_of_the_users_own_are_refused(tmp_path: Path) -> None:
+    world = pv.World()
+    world.add(position=(0, 0))
+    world.data["age"] = 1.0
+    with pytest.raises(
+        pv.InputError, match=r"world.data has 'age'; allowed in scene files are no arrays, which pyverlet.save keeps"
+    ):
+        freeze(world, tmp_path / "scene.toml")

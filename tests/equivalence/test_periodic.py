@@ -21,7 +21,7 @@ def _crowd(seed: int) -> pv.World:
     radius[1:] *= 0.1 if seed % 5 == 0 else 1.0
     room = pv.Periodic(tuple(lower), tuple(lower + period), axes=("xy", "x", "y")[seed % 7 % 3])
     world = pv.World(boundary=room, dtype=(np.float32, np.float64)[seed % 2])
-    world.add(position=rng.uniform(lower, lower + period, (count, 2)), radius=radius, allow_overlap=True)
+    world.add(position=rng.uniform(lower, lower + period, (count, 2)), radius=radius, on_overlap="push")
     return world
 
 

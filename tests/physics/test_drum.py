@@ -56,7 +56,7 @@ def test_a_bounce_on_a_running_wall_rubs_as_coulomb_says() -> None:
 def test_without_friction_it_is_a_cage() -> None:
     def bits(speed: float) -> str:
         world = pv.World(boundary=pv.Circle(radius=3, angular_velocity=speed))
-        world.add(position=np.random.default_rng(1).uniform(-1, 1, (20, 2)), radius=0.1, allow_overlap=True)
+        world.add(position=np.random.default_rng(1).uniform(-1, 1, (20, 2)), radius=0.1, on_overlap="push")
         world.run(seconds=0.5)
         return world.state_hash()
 

@@ -56,7 +56,7 @@ def test_crowds_without_room_bring_no_energy(radius: float) -> None:
     # Seven discs have room in a circle of 10 m up to a third of that. Lowered into others they were thrown back, 4e-2 m g H a
     # frame.
     world = pv.World(boundary=pv.Circle(radius=10, restitution=0.3), gravity=(0, -G), substeps=32)
-    world.add(position=np.random.default_rng(1).uniform(-4, 4, (7, 2)), radius=radius, allow_overlap=True)
+    world.add(position=np.random.default_rng(1).uniform(-4, 4, (7, 2)), radius=radius, on_overlap="push")
     before, most = world.energy().total, 1e-4 * 7 * G * 20  # what physics.md promises
     for _ in range(900):
         world.step(1 / 60)
@@ -100,7 +100,7 @@ def test_who_has_been_put_where_nobody_can_be_is_out_after_a_frame(place: str, w
     world.add(position=[(6, 0)], radius=0.5)
     world.step(1 / 60)
     if way == "added":
-        world.add(position=[where], radius=0.5, allow_overlap=True)
+        world.add(position=[where], radius=0.5, on_overlap="push")
     else:
         world.add(position=[where], radius=0.5, mass=np.inf)
         world.step(1 / 60)

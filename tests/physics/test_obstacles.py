@@ -166,7 +166,7 @@ def test_a_single_wall_stops_whoever_comes(x: float, slope: float, speed: float,
 def test_who_is_inside_a_polygon_is_let_out_by_the_nearest_face() -> None:
     block = pv.Polygon([(-10, 0), (10, 0), (10, 8), (-10, 8)])
     world = world_with(block, gravity=(0, 0))
-    balls = world.add(position=[(0, 5), (9, 4), (-2, 1)], radius=R, allow_overlap=True)
+    balls = world.add(position=[(0, 5), (9, 4), (-2, 1)], radius=R, on_overlap="push")
     world.step(DT)
     assert balls.position == pytest.approx(np.array([(0, 8 + R), (10 + R, 4), (-2, -R)]), abs=1e-9)
     assert np.hypot(*balls.velocity.T).max() < 1e-9

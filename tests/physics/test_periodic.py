@@ -66,7 +66,7 @@ def test_everything_moved_alike(laws: dict[str, Any]) -> None:
     worlds = []
     for move in np.array([(0.0, 0.0), (3.7, -2.2), (-50.3, 41.9)]):
         laid = _world()
-        laid.add(position=crowd + move, radius=radius, allow_overlap=True)
+        laid.add(position=crowd + move, radius=radius, on_overlap="push")
         world = _world(collisions=pv.Collisions(**laws))
         world.add(position=place + move, velocity=velocity, radius=radius, mass=radius**2)
         worlds.append((world, laid, move))

@@ -163,7 +163,7 @@ def test_obstacles_that_move_push_nobody_through_the_wall(room: pv.Boundary, e: 
         pv.Disc((0, 9), 1.5, velocity=(0, -5)),
     ]
     x, y = np.meshgrid(np.arange(-3, 3.1, 0.7), np.arange(-3, 3.1, 0.7))
-    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.25, allow_overlap=True)
+    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.25, on_overlap="push")
     for _ in range(200):
         world.step(DT)
         assert beyond(world) < 1e-4
@@ -186,7 +186,7 @@ def test_a_squeezed_disc_stays_in_the_room_and_calm() -> None:
 def test_who_is_added_inside_an_obstacle_beside_the_wall_stays_in_the_room() -> None:
     world = pv.World(boundary=pv.Box((-5, -5), (5, 5)), threads=1)
     world.obstacles += [pv.Polygon([(3.5, -4), (5.5, -4), (5.5, 4), (3.5, 4)]), pv.Disc((-5, 0), 1.0)]
-    world.add(position=[(4.8, 0), (-4.9, 0.1), (4.2, 3)], radius=0.4, allow_overlap=True)
+    world.add(position=[(4.8, 0), (-4.9, 0.1), (4.2, 3)], radius=0.4, on_overlap="push")
     for _ in range(120):
         world.step(DT)
         assert beyond(world) < 1e-6
@@ -198,7 +198,7 @@ REFUSED = {
     "capsule": (pv.Capsule((-1, 0), (1, 0), radius=0.2), (0.9, 0.1), r"inside the Capsule at \(0, 0\) m"),
     "polygon": (pv.Polygon([(-1, -1), (1, -1), (0, 1)]), (0, 0.5), r"inside the Polygon"),
     "turned": (pv.Capsule((-2, 0), (2, 0), radius=0.2, angular_velocity=np.pi / 2 / DT), (0, 1.9), r"inside the Capsule"),
-    "room": (pv.Segment((0, 0), (1, 0)), (-6, 0), r"outside the room, Box\(\(-5.0, -5.0\).*allow_overlap=True"),
+    "room": (pv.Segment((0, 0), (1, 0)), (-6, 0), r"outside the room, Box\(\(-5.0, -5.0\).*on_overlap='push'"),
 }
 
 
@@ -212,7 +212,7 @@ def test_circles_inside_obstacles_or_outside_the_room_are_refused_or_asked_for(c
     with pytest.raises(pv.InputError, match=says):
         world.add(position=[(4, 4), where], radius=0.1)
     assert len(world) == 0
-    world.add(position=[(4, 4), where], radius=0.1, allow_overlap=True)
+    world.add(position=[(4, 4), where], radius=0.1, on_overlap="push")
     world.run(seconds=0.1, dt=DT)
     assert not world.escaped()
     assert np.isfinite(world.position).all()

@@ -27,7 +27,7 @@ def test_circles_between_a_wall_and_a_pinned_circle_that_moves_into_it(
     out = np.column_stack((np.cos(angle), np.sin(angle)))
     pistons = world.add(position=5 * out, radius=1.0, velocity=speed * out, mass=np.inf)
     # The small ones do not meet each other: what one is given it keeps.
-    world.add(position=rng.uniform(-6.5, 6.5, (400, 2)), radius=0.05, allow_overlap=True, category=2, mask=1)
+    world.add(position=rng.uniform(-6.5, 6.5, (400, 2)), radius=0.05, on_overlap="push", category=2, mask=1)
     small = np.arange(len(pistons), len(world))
     for _ in range(90):
         world.step(1 / 60)

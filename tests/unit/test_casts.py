@@ -34,8 +34,8 @@ def world_of(room: str, dtype: Any, spread: float, seed: int) -> tuple[pv.World,
     world = pv.World(boundary=ROOMS[room](), dtype=dtype, gravity=(0, 0))
     where = rng.uniform(0.6 * LOW, 0.6 * HIGH, (60, 2))
     radius = 1.0 / spread ** rng.uniform(0, 1, 60)
-    bits = {"category": rng.integers(1, 8, 60), "mask": rng.integers(0, 8, 60)}
-    world.add(position=where, radius=radius, mass=np.inf, allow_overlap=True, **bits)
+    bits: dict[str, Any] = {"category": rng.integers(1, 8, 60), "mask": rng.integers(0, 8, 60)}
+    world.add(position=where, radius=radius, mass=np.inf, on_overlap="push", **bits)
     for k in range(15):
         at, turn = rng.uniform(0.8 * LOW, 0.8 * HIGH), rng.uniform(0, 6)
         corners = at + rng.uniform(0.3, 1.5) * np.column_stack((np.cos(turn + np.arange(5)), np.sin(turn + np.arange(5))))
@@ -305,7 +305,7 @@ def test_rays_follow_what_moves_and_grows() -> None:
     saved = world.save()
     world.position[0] = (20, 0)
     assert world.ray((0, 0), way).distance[:2] == pytest.approx([18, 6])
-    world.add(position=np.tile((0.0, 30.0), (50, 1)), allow_overlap=True)  # arrays are others
+    world.add(position=np.tile((0.0, 30.0), (50, 1)), on_overlap="push")  # arrays are others
     world.restore(saved)
     assert world.ray((0, 0), way).distance[:2] == pytest.approx([4, 6])
     for radius in np.linspace(0.1, 0.9, 20):  # more than are remembered
@@ -331,7 +331,7 @@ def test_rays_from_outside_of_the_grid_enter_its_first_cell() -> None:
     for _ in range(30):
         world = pv.World(dtype=np.float64)
         place = rng.uniform(0, 10, (60, 2))
-        world.add(position=place, radius=rng.uniform(0.01, 0.3, 60), allow_overlap=True)
+        world.add(position=place, radius=rng.uniform(0.01, 0.3, 60), on_overlap="push")
         start = 5 + 10 * rng.uniform(1, 2) * (angle := rng.normal(0, 1, (200, 2))) / np.hypot(*angle.T)[:, None]
         aim = place[rng.integers(0, 60, 200)] - start
         far = np.hypot(*aim.T)
@@ -354,8 +354,10 @@ def test_rays_from_far_away_come_to_an_end(away: float) -> None:
 def test_a_crowd_of_large_discs_is_listed_in_larger_cells() -> None:
     world = pv.World(dtype=np.float64)
     rng = np.random.default_rng(0)
-    world.add(position=rng.uniform(0, 1, (200, 2)), radius=50.0, allow_overlap=True)
-    *_, columns, rows, _, member = casts._cells_of(Images.of(world._state, 50.0), 0.0, few=False)
+    world.add(position=rng.uniform(0, 1, (200, 2)), radius=50.0, on_overlap="push")
+    *_, columns, rows, _, member = casts._cells_of(
+        Images.of(world.position, world.radius, world._state.seam, 50.0), 0.0, few=False
+    )
     assert len(member) <= casts.LISTED * 4 * 200
     assert columns * rows < 200
     found = world.ray((-100, 0.5), np.tile((1.0, 0.0), (20, 1)))

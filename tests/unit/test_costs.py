@@ -228,7 +228,7 @@ def test_overlaps_are_those_that_all_pairs_have(room: pv.Boundary, scale: float,
     rng = np.random.default_rng(2)
     world = pv.World(boundary=room, dtype=np.float64)
     radius = rng.uniform(0.3 / spread, 0.3, 300) * scale
-    group = world.add(position=rng.uniform((-3, -3), (5, 4), (300, 2)) * scale, radius=radius, allow_overlap=True)
+    group = world.add(position=rng.uniform((-3, -3), (5, 4), (300, 2)) * scale, radius=radius, on_overlap="push")
     group.mass[:20] = np.inf
     group.category[30:60], group.mask[60:90] = 2, 1
     world.links.append(pv.Stick(group, 0, 100, length=scale, collide=False))

@@ -330,7 +330,7 @@ def test_each_wall_and_each_obstacle_begins_and_ends(dtype: str, restitution: fl
     del world.obstacles[1]
     begun, ended = news(world, 3)
     assert begun.tolist() == []
-    assert ended.tolist() == [(2, -1, -1, -1)]
+    assert ended[["a", "b", "wall", "obstacle"]].tolist() == [(2, -1, -1, -1)]
     world.gravity = (0, 0)
     world.position[1], world.velocity[1] = (9.5, 9.45), (4, 4)
     begun, ended = news(world, 1)

@@ -80,7 +80,7 @@ def test_contacts_are_one_line_and_an_array() -> None:
     world = pv.World(boundary=pv.Box((0, 0), (5, 5)), contacts=True)
     world.add(position=[(1, 0.5), (3, 0.5)])
     world.run(seconds=0.2)
-    assert repr(world.contacts) == "2 records of (a, b, wall, obstacle, point, normal, impulse, rub)"
+    assert repr(world.contacts) == "2 records of (a, b, wall, obstacle, point, normal, impulse, rub, number)"
     assert world.contacts["a"].tolist() == [0, 1]
     assert repr(world.contacts["a"]) == "array([0, 1])"
 

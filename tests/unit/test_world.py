@@ -95,7 +95,7 @@ def test_collisions_none_lets_them_pass() -> None:
 
 def test_escaped_counts_centres_outside() -> None:
     world = pv.World(boundary=pv.Box((0, 0), (10, 10)))
-    world.add(position=[(5, 5), (-1, 5), (5, 11)], allow_overlap=True)
+    world.add(position=[(5, 5), (-1, 5), (5, 11)], on_overlap="push")
     assert world.escaped() == 2
     world.step(1 / 60)
     assert world.escaped() == 0

@@ -28,7 +28,7 @@ RED, PLACES = (255, 0, 0), [(0.1, 4.0), (9.9, 7.9), (5.0, 4.0), (6.0, 0.3)]
 def _world(axes: str = "xy") -> pv.World:
     """One at the left end, one in the upper right corner, one in the middle, one at the foot; the first two are linked."""
     world = pv.World(gravity=(0, 0), boundary=pv.Periodic((0, 0), (10, 8), axes=axes), collisions=None)
-    four = world.add(position=PLACES, radius=0.5, spin=1.0, allow_overlap=True)
+    four = world.add(position=PLACES, radius=0.5, spin=1.0, on_overlap="push")
     world.links.append(pv.Rope(four, 0, 1, length=4.0))
     return world
 

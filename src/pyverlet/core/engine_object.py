@@ -346,13 +346,13 @@ class Engine:
         a["order"][:] = np.arange(len(order), dtype=np.uint32)
         self.c.falls = 0
 
-    def follow_seam(self):
-        """In a periodic room: places become the images nearest to where the list was last looked at."""
-        follow_seam(cython.address(self.w))
+    def follow_seam(self, crossed):
+        """In a periodic room: places become the images nearest to where the list was last looked at; see `core.seams`."""
+        follow_seam(cython.address(self.w), doubles(crossed))
 
-    def wrap_seam(self):
+    def wrap_seam(self, crossed):
         """Put all places inside a periodic room."""
-        wrap_seam(cython.address(self.w))
+        wrap_seam(cython.address(self.w), doubles(crossed))
 
     # ---- what outlives it ----------------------------------------------------------------------------------------------------
 

@@ -20,8 +20,12 @@ def freeze(world: World, path: Path) -> Table:
     """What a document says about a world at its start, whose arrays go into a file beside `path`.
 
     Raises:
-        InputError: there are objects of a user's own class in it, which no file can hold.
+        InputError: there are objects of a user's own class in it, or arrays of the user's own, which no such file can hold.
     """
+    if world.data:
+        raise InputError(
+            f"world.data has {next(iter(world.data))!r}; allowed in scene files are no arrays, which pyverlet.save keeps"
+        )
     arrays: dict[str, Any] = {}
     groups, number = [], world.group_number
     beside = path.with_suffix(".npz")

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.core.sources import sources_hash
-from pyverlet.data import archive, describe_links, memory
+from pyverlet.data import archive, describe_links, memory, own_arrays
 from pyverlet.data.describe import Builder, describe
 from pyverlet.data.durable import replacing
 from pyverlet.ground import checks
@@ -82,6 +82,9 @@ def to_table(world: World, scene: Mapping[str, Any] | None = None) -> tuple[Head
         arrays[name] = array
         return {memory.ARRAY: name}
 
+    own = [name for name in arrays if name.startswith(apart.OWN)]
+    kinds = [own_arrays.kind_of(name, arrays[key]) for key, name in zip(own, moving.facts["data"], strict=True)]
+    arrays |= {key: own_arrays.to_bytes(arrays[key]) for key in own}
     header: Header = {
         "format": FORMAT,
         "made_by": _made_by(),
@@ -90,6 +93,7 @@ def to_table(world: World, scene: Mapping[str, Any] | None = None) -> tuple[Head
         "scene": memory.pack(dict(scene)) if scene is not None else None,
         "world": memory.map_arrays(_settings(world), put_aside),
         "facts": memory.pack(moving.facts),
+        "own": memory.pack(kinds),
     }
     return header, arrays
 
@@ -172,7 +176,9 @@ def from_table(header: Header, arrays: dict[str, Array], *, exact: bool = False,
     settings = _with_arrays(header["world"], arrays)
     known = {name: array for name, array in _moving(arrays).items() if name not in apart.RETIRED}
     moving = Parts(memory.unpack(header["facts"]), known)
-    if unknown := set(moving.arrays) - set(apart.FIELDS):
+    for k, kind in enumerate(memory.unpack(header.get("own", []))):
+        known[f"{apart.OWN}{k}"] = own_arrays.from_bytes(known[f"{apart.OWN}{k}"], *kind)
+    if unknown := {name for name in known if not name.startswith(apart.OWN)} - set(apart.FIELDS):
         raise InputError(f"there is an array {min(unknown)!r}; allowed are those pyverlet knows")
     with ThreadPoolExecutor(1) as beside:
         hashed = beside.submit(_hash, header, arrays)

@@ -166,6 +166,17 @@ def indices(name: str, value: ArrayLike, count: int) -> NDArray[np.int64]:
     return np.unique(array).astype(np.int64)
 
 
+def numbers(name: str, value: ArrayLike) -> NDArray[np.int64]:
+    """Whole numbers in an array of any shape."""
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        raise InputError(f"{name} is {value!r}; allowed are whole numbers") from None
+    if array.size and array.dtype.kind not in "iu":
+        raise InputError(f"{name} is {value!r}; allowed are whole numbers")
+    return array.astype(np.int64)
+
+
 def _array(name: str, value: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
     try:
         return np.asarray(value, dtype=dtype)

@@ -15,6 +15,12 @@ class IndexInputError(InputError, IndexError):
     """There is no such particle in a group."""
 
 
+class KeyInputError(InputError, KeyError):
+    """There is no such array in `world.data`."""
+
+    __str__ = PyverletError.__str__
+
+
 class Interrupted(PyverletError):  # noqa: N818  (like KeyboardInterrupt, it is no error)
     """A person ended long work early (Ctrl-C); the message says what is kept of it."""
 

@@ -114,7 +114,8 @@ def in_turn(method: Callable[Concatenate[S, P], R]) -> Callable[Concatenate[S, P
         turn: Turn = self._state.turn
         if turn.in_frame and turn.mine:
             raise InputError(
-                f"{method.__name__} is called in the middle of a frame of this world; allowed is between two frames, as actors do"
+                f"{method.__name__.strip('_')} is called in the middle of a frame of this world; "
+                "allowed is between two frames, as actors do"
             )
         with whole, turn if turn.page is None else turn.held():
             return method(self, *arguments, **options)

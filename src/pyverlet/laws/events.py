@@ -22,8 +22,9 @@ Array = NDArray[Any]
 WALL = -1
 """In the place of b: a wall of the bounds, or an obstacle."""
 
-CONTACT = np.dtype([("a", np.int64), ("b", np.int64), ("wall", np.int64), ("obstacle", np.int64)])
-"""Indices a < b of two particles; or a and WALL, and which wall of the room or which obstacle it is, else -1."""
+CONTACT = np.dtype([("a", np.int64), ("b", np.int64), ("wall", np.int64), ("obstacle", np.int64), ("number", np.int64, (2,))])
+"""Indices a < b of two particles; or a and WALL, and which wall of the room or which obstacle it is, else -1; and the numbers
+(`world.number`) of both particles, -1 in the place of b, which stay what they are when particles are removed."""
 
 _LOWER, _SURFACE, _LOST = 0xFFFFFFFF, 0x80000000, 0x7FFFFFFF
 """Bits of a key that are b + 1, of two particles' a < b, or `_SURFACE` and the number of one; the others are a. Numbers from
@@ -32,7 +33,7 @@ _LOWER, _SURFACE, _LOST = 0xFFFFFFFF, 0x80000000, 0x7FFFFFFF
 HIT = np.dtype(
     [
         ("a", np.int64), ("b", np.int64), ("speed", np.float64), ("wall", np.int64), ("obstacle", np.int64),
-        ("point", np.float64, (2,)), ("normal", np.float64, (2,)), ("impulse", np.float64),
+        ("point", np.float64, (2,)), ("normal", np.float64, (2,)), ("impulse", np.float64), ("number", np.int64, (2,)),
     ]
 )  # fmt: skip
 """The same, and the largest normal speed they met with, m/s; where they touch, m, and the unit normal out of a, both as of the
@@ -65,7 +66,8 @@ class Events:
     and begin again.
 
     Indices stay valid until the next frame: when particles are removed, these arrays are renumbered in place, and a removed
-    particle is -1 in them. Copies are not renumbered.
+    particle is -1 in them. Copies are not renumbered. The field `number` stays as it is, in copies too: `World.index_of` tells
+    where those particles are now.
 
     Attributes:
         begin: HIT, contacts that touch now and did not in the frame before, and bounces.
@@ -330,17 +332,8 @@ def _contacts(keys: Array, state: State) -> Array:
     found, lower = np.empty(len(keys), CONTACT), keys & _LOWER
     at_wall = (lower & _SURFACE) != 0
     number = np.where(at_wall, lower & _LOST, _LOST)
-    found["a"], found["b"] = _index(keys >> 32, state), np.where(at_wall, WALL, _index(lower - 1, state))
+    found["number"] = np.column_stack((keys >> 32, np.where(at_wall, WALL, lower - 1)))
+    found["a"], found["b"] = state.index_of(found["number"]).T
     found["wall"] = np.where(number < FIRST_OBSTACLE, number, -1)
     found["obstacle"] = np.where((number >= FIRST_OBSTACLE) & (number < _LOST), number - FIRST_OBSTACLE, -1)
     return found
-
-
-def _index(number: Array, state: State) -> Array:
-    """Indices of the particles with these numbers; -1 where there is none."""
-    if not len(state):
-        return np.full(len(number), -1)
-    if _as_indices(state):
-        return np.where(number < len(state), number, -1)
-    where = np.searchsorted(state.number, number).clip(max=len(state) - 1)
-    return np.where(state.number[where] == number, where, -1)

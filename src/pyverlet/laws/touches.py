@@ -25,11 +25,12 @@ NOBODY = -1
 TOUCH = np.dtype(
     [
         ("a", np.int64), ("b", np.int64), ("wall", np.int64), ("obstacle", np.int64), ("point", np.float64, (2,)),
-        ("normal", np.float64, (2,)), ("impulse", np.float64), ("rub", np.float64),
+        ("normal", np.float64, (2,)), ("impulse", np.float64), ("rub", np.float64), ("number", np.int64, (2,)),
     ]
 )  # fmt: skip
 """A contact: circle a and circle b, or b = -1 and the number of a wall or of an obstacle (the others are -1); where they touch,
-m; the unit normal out of a; what pushes them apart along it and what rubs a along (-n_y, n_x), summed over the frame, N s."""
+m; the unit normal out of a; what pushes them apart along it and what rubs a along (-n_y, n_x), summed over the frame, N s; the
+numbers (`world.number`) of both circles, -1 in the place of b."""
 
 _NEAR = 0.02
 """Of its radius: walls that are farther than the nearest by more were not touched."""
@@ -153,9 +154,8 @@ class _End:
         """With the indices of now; `state` is as it was, but for removed particles and new ones at its end."""
         if np.array_equal(self._numbers, state.number[: len(self._numbers)]):
             return found.copy()
-        where = np.searchsorted(state.number, self._numbers)
-        lives = where < len(state)
-        lives[lives] = state.number[where[lives]] == self._numbers[lives]
+        where = state.index_of(self._numbers)
+        lives = where >= 0
         kept: Array = found[lives[found["a"]] & ((found["b"] < 0) | lives[found["b"]])].copy()
         kept["a"] = where[kept["a"]]
         kept["b"] = np.where(kept["b"] < 0, WALL, where[kept["b"]])
@@ -165,6 +165,8 @@ class _End:
         """TOUCH, by the indices of then."""
         rows = [self._between_circles(), self.at(1), self.at(2)]
         both = np.concatenate(rows)
+        number = np.append(self._numbers, NOBODY)  # of index -1, too
+        both["number"] = np.column_stack((number[both["a"]], number[both["b"]]))
         return both[np.lexsort((both["obstacle"], both["wall"], both["b"], both["a"]))]
 
     def pushes(self) -> Pushes:

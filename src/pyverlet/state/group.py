@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import IndexInputError, InputError
+from pyverlet.state.data import Data
 from pyverlet.state.state import State
 
 Array = NDArray[Any]
@@ -44,6 +45,18 @@ class Column:
     def __set__(self, group: Any, value: Any) -> None:
         with group._state.turn.held():
             getattr(group._state, self._name)[group._where] = value
+
+
+class Measured(Column):
+    """A property that follows from others: a copy, not to be written."""
+
+    def __get__(self, group: Any, owner: type) -> Array:
+        found = np.array(super().__get__(group, owner))
+        found.flags.writeable = False
+        return found
+
+    def __set__(self, group: Any, value: Any) -> None:
+        raise InputError(f"{self._name} is only to be read; allowed is to write position")
 
 
 class Group:
@@ -148,6 +161,7 @@ class Group:
         return np.arange(where.start, where.stop)
 
     position = Column("(n, 2) centres, m.")
+    unwrapped = Measured("(n, 2) centres as if a periodic room did not repeat, m, float64; a copy.")
     velocity = Column("(n, 2) m/s.")
     spin = Column("(n,) angular velocity, rad/s, counter-clockwise.")
     angle = Column("(n,) rad they have turned, counter-clockwise; float64.")
@@ -168,6 +182,26 @@ class Group:
     @material.setter
     def material(self, names: Any) -> None:
         self._state.material[self._where] = self._state.material_numbers(names, len(self))
+
+    def move_to(self, position: ArrayLike) -> None:
+        """Put them elsewhere at once, without a motion: nothing is met on the way, and nothing is pushed.
+
+        Velocities, spins and angles stay. Contacts forget them, links to others and pins pull from there, sleepers wake,
+        `unwrapped` becomes the position given, and a ledger has what energy they gain under `outside`.
+
+        Args:
+            position: (2,), m, for the mean of their centres, so that their shape stays; or (n, 2), for each.
+
+        Raises:
+            InputError: shapes disagree, or a centre would be inside an obstacle or outside the room, where only pinned ones may
+                be; nothing is moved.
+        """
+        self.world._move_to(self, position)
+
+    @property
+    def data(self) -> Data:
+        """Their part of `world.data`, arrays of your own by name."""
+        return Data(self)
 
     def pin(self, index: Any = slice(None)) -> None:
         """Make particles immovable where they are: mass infinite, no velocity. Give them a mass again to let go.
@@ -199,8 +233,8 @@ class Picked(Group):
         """Where those are among the world's now that are left."""
         if self._version != self._state.version:
             with self._state.turn:
-                where, there = _places(self._state, self._numbers)
-                self._index, self._version = where[there], self._state.version
+                where = self._state.index_of(self._numbers)
+                self._index, self._version = where[where >= 0], self._state.version
         return self._index
 
     def __len__(self) -> int:
@@ -249,16 +283,17 @@ class Particle:
     @property
     def is_there(self) -> bool:
         """Whether it was not removed."""
-        return bool(_places(self._state, np.array([self.number]))[1][0])
+        with self._state.turn:
+            return bool(self._state.index_of(np.array(self.number)) >= 0)
 
     @property
     def index(self) -> int:
         """Its index among all of the world's particles now; InputError if it was removed."""
         with self._state.turn:
-            (where,), (there,) = _places(self._state, np.array([self.number]))
-        if not there:
+            where = int(self._state.index_of(np.array(self.number)))
+        if where < 0:
             raise InputError(f"particle {self.number} was removed; allowed is one that is there")
-        return int(where)
+        return where
 
     @property
     def _where(self) -> int:
@@ -269,6 +304,15 @@ class Particle:
         """The world it is in."""
         return self._remove.__self__  # type: ignore[attr-defined]
 
+    def move_to(self, position: ArrayLike) -> None:
+        """Put it elsewhere at once, (2,) m, without a motion; see `Group.move_to`."""
+        self.world._move_to(self, position)
+
+    @property
+    def data(self) -> Data:
+        """Its part of `world.data`, arrays of your own by name."""
+        return Data(self)
+
     def remove(self) -> None:
         """Remove it from its world."""
         self._remove(np.array([self.index]))
@@ -278,6 +322,7 @@ class Particle:
         self.mass, self.velocity, self.spin = np.inf, 0.0, 0.0
 
     position = Column("(2,) its centre, m; a view.")
+    unwrapped = Measured("(2,) its centre as if a periodic room did not repeat, m, float64; a copy.")
     velocity = Column("(2,) m/s; a view.")
     spin = Column("Angular velocity, rad/s, counter-clockwise.")
     angle = Column("rad it has turned, counter-clockwise.")
@@ -289,11 +334,3 @@ class Particle:
     category = Column("The bits of what it is.")
     mask = Column("The bits of the categories it collides with.")
     fixed_rotation = Column("1 if nothing turns it, else 0.")
-
-
-def _places(state: State, numbers: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Where the particles of these numbers are, and which of them are there."""
-    where = np.searchsorted(state.number, numbers)
-    there = where < len(state.number)
-    there[there] = state.number[where[there]] == numbers[there]
-    return where, there

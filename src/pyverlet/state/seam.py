@@ -40,10 +40,12 @@ class Seam(NamedTuple):
 
     def nearest(self, way: Array) -> Array:
         """(..., 2) of these differences of places, m, the images that are nearest to 0; themselves where there is no period."""
-        if not self:
-            return way
+        return np.asarray(way - self.periods(way)) if self else way
+
+    def periods(self, way: Array) -> Array:
+        """(..., 2) m, the whole periods in these differences of places; 0 where there is no period."""
         period = np.asarray(self.period, way.dtype)
-        return np.asarray(way - period * np.rint(np.divide(way, period, out=np.zeros_like(way), where=period > 0)))
+        return np.asarray(period * np.rint(np.divide(way, period, out=np.zeros_like(way), where=period > 0)))
 
     def wrapped(self, position: Array) -> Array:
         """(n, 2) the images of these places inside the room, m; the same array without a seam."""

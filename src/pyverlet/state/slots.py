@@ -43,6 +43,7 @@ class Slots:
         island, calm: (n,) number of a sleeper's island, -1 if awake, and s it has been calm; empty unless particles may sleep.
         wall_hits: (n,) largest speed with which the circle met a wall of a user's own room in this frame, m/s; negative: none.
         taken: J that the energy limiter has taken in this frame.
+        crossed: (n, 2) m, whole periods by which particles were put back inside a periodic room in this frame; None elsewhere.
 
     Args:
         sleeps: whether particles may sleep.
@@ -76,7 +77,7 @@ class Slots:
             self.__dict__.pop(scratch, None)
         self._given: dict[str, Any] = {name: np.zeros(0, np.uint32 if name in MARKS else self.dtype) for name in _GIVEN}
         self._changed = True
-        self.wall_hits = np.full(count, -1, self.dtype)
+        self.wall_hits, self.crossed = np.full(count, -1, self.dtype), None
         self.category = self.mask = self.material = self.fixed_rotation = np.empty(0, np.uint32)
         self.most_restitution = self.most_friction = self.most_rolling = -1.0
         self._scratch: list[Array] = []
@@ -95,6 +96,7 @@ class Slots:
     seam = seam.NONE  # in a periodic room positions run on beyond it within a frame
     island: Array
     calm: Array
+    crossed: Array | None
 
     @cached_property
     def force(self) -> Array:
@@ -170,9 +172,9 @@ class Slots:
         self._kept = {name: column[slots] for name, column in kept if len(column)}
 
     def clear_notes(self) -> None:
-        """Forget what walls and the energy limiter have noted in the last frame."""
+        """Forget what walls, the seam and the energy limiter have noted in the last frame."""
         self.wall_hits.fill(-1)
-        self.taken = 0.0
+        self.taken, self.crossed = 0.0, None
 
     def forget(self, now: Array) -> None:
         """The user's particles are now at `now` (n,), or no more (-1): let those go, keep the order of the others."""
@@ -191,6 +193,10 @@ class Slots:
         given, moved = (state.position, state.velocity, state.acceleration, state.spin), (self.position, self.velocity)
         self.motion.put_motion(*moved, self.acceleration, self.spin, *given, state.angle, 0.5 * dt, self.particle)
         self._given_back.remember(given)
+        if self.crossed is not None:
+            row, axis = np.divmod(at := np.flatnonzero(self.crossed), 2)
+            state.crossed[self.particle[row], axis] += self.crossed.reshape(-1)[at]
+            self.crossed = None
 
     def where(self) -> Array:
         """(n, 2) the positions of now in the user's order, m."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pyverlet.ground import memory
 from pyverlet.ground.turns import Turn
 from pyverlet.state import seam
+from pyverlet.state.data import Columns
 
 Array = NDArray[Any]
 
@@ -27,7 +28,7 @@ EVERYONE = 0xFFFFFFFF  # a mask of 32 bits that takes every category
 
 _DEFAULTS: dict[str, Any] = {
     "angle": 0, "restitution": -1, "friction": -1, "rolling_resistance": -1, "category": 1, "mask": EVERYONE, "material": 0,
-    "fixed_rotation": 0,
+    "fixed_rotation": 0, "crossed": 0,
 }  # fmt: skip
 
 
@@ -45,9 +46,11 @@ class State:
         category, mask: (n,) 32 bits each; two circles collide if each has a bit of its category in the other's mask.
         material: (n,) of each, its place among `materials`, the names of all that there have been; "" is none.
         fixed_rotation: (n,) 1 of those that nothing turns, else 0.
+        crossed: (n, 2) m, float64: whole periods of a periodic room by which each particle has left it.
         number: (n,) of each particle, in ascending order; no two particles of a world ever have the same.
         begun: the number of the first particle of each `append`, ascending. numbers: how many particles there have ever been.
         version: how often particles were added or removed.
+        data: arrays of the user's own, in which new particles have the row in front; see `state.data`.
         turn: whose turn it is to step, change or read them, where several threads do.
     """
 
@@ -68,6 +71,7 @@ class State:
     fixed_rotation: Array
     number: Array
     angle: NDArray[np.float64]
+    crossed: NDArray[np.float64]
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self.dtype, self.turn = dtype, Turn()
@@ -76,8 +80,10 @@ class State:
         for names, kind in ((MARKS, np.uint32), (("number",), np.int64), (("angle",), np.float64)):
             self._store |= {name: np.empty(0, kind) for name in names}
         self.materials = [""]
+        self._store["crossed"] = np.empty((0, 2))
         self.numbers = 0
         self.begun: list[int] = []
+        self.data: Columns = {}
         self.version = 0
         self._show(0)
 
@@ -90,11 +96,17 @@ class State:
         self._key = self._key or uuid.uuid4().hex
         return self._key
 
+    @property
+    def unwrapped(self) -> NDArray[np.float64]:
+        """(n, 2) m, positions as if a periodic room did not repeat. A copy."""
+        return self.position.astype(np.float64) + self.crossed
+
     def __getstate__(self) -> dict[str, Any]:
         kept = {"dtype": self.dtype, "_key": self.key, "seam": self.seam, "begun": self.begun, "version": self.version}
         kept["materials"] = self.materials
         with self.turn:
-            return kept | {"numbers": self.numbers, "_store": {name: array.copy() for name, array in self.arrays()}}
+            kept |= {"numbers": self.numbers, "data": {name: column.copy() for name, column in self.data.items()}}
+            return kept | {"_store": {name: array.copy() for name, array in self.arrays()}}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
@@ -115,8 +127,11 @@ class State:
                 self.materials.append(name)
         return np.array([self.materials.index(name) for name in known.tolist()], np.uint32)[which]
 
-    def append(self, values: dict[str, Array]) -> slice:
-        """Add particles; `values` holds an array for each name, but for those that have a default. Returns where they stand."""
+    def append(self, values: dict[str, Array], data: Columns | None = None) -> slice:
+        """Add particles; `values` holds an array for each name, but for those that have a default. Returns where they stand.
+
+        data: rows for them in arrays of the user's own.
+        """
         start = len(self)
         stop = start + len(values["radius"])
         capacity = len(self._store["radius"])
@@ -129,6 +144,8 @@ class State:
         self._show(stop)
         for name, value in (_DEFAULTS | values).items():
             getattr(self, name)[start:stop] = value
+        for name, column in self.data.items():
+            self.data[name] = np.concatenate((column, (data or {}).get(name, np.repeat(column[:1], stop - start, axis=0))))
         self.begun.append(self.numbers)
         self.number[start:] = np.arange(self.numbers, self.numbers + stop - start)
         self.numbers += stop - start
@@ -141,12 +158,14 @@ class State:
         first, left = int(np.argmin(kept)) if not kept.all() else len(kept), int(np.count_nonzero(kept))
         for array in self._store.values():
             array[first:left] = array[first : len(kept)][kept[first:]]
+        self.data = {name: column[np.append(True, kept)] for name, column in self.data.items()}
         self._show(left)
         self.version += 1
         return now
 
-    def restore(self, arrays: dict[str, Array], *, own: bool = False) -> None:
+    def restore(self, arrays: dict[str, Array], data: Columns, *, own: bool = False) -> None:
         """Take up what `arrays` gave once, however many particles that were; `own`: in these arrays themselves, from now on."""
+        self.data = {name: column.copy() for name, column in data.items()}
         count = len(arrays["number"])
         if own or count > len(self._store["number"]):
             self._store = {name: arrays[name] if own else np.empty_like(arrays[name]) for name in self._store}
@@ -154,6 +173,14 @@ class State:
         for name in self._store:
             getattr(self, name)[:] = arrays[name]
         self.version += 1
+
+    def index_of(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Where the particles with these numbers, of any shape, are; -1 where there is none."""
+        known, count = self.number, len(self)
+        if not count or known[-1] == count - 1:  # numbers are indices, for only the last that came have gone
+            return np.where((numbers >= 0) & (numbers < count), numbers, -1)
+        where = np.searchsorted(known, numbers).clip(max=count - 1)
+        return np.where(known[where] == numbers, where, -1)
 
     def find(self, first: int, stop: int) -> slice:
         """Where the particles with numbers from `first` up to, not including, `stop` are."""

@@ -198,6 +198,12 @@ class Sink(Actor):
         crossed &= ~self._takes(end)  # these are removed before the next frame
         self._remove(world, known[crossed])
 
+    def forget(self, numbers: NDArray[np.int64]) -> None:
+        """The particles with these numbers have been put elsewhere since the frame began: that was no way of theirs."""
+        known, start = self._start
+        others = ~np.isin(known, numbers)
+        self._start = known[others], start[others]
+
     def _remove(self, world: World, gone: NDArray[np.intp]) -> None:
         if len(gone):
             world.remove(gone)

@@ -232,7 +232,7 @@ class Casts(Queries):
         if (reach, s.seam) not in lists:
             if len(lists) == MOST_LISTS:
                 lists.clear()
-            seen = Images.of(s, float(s.radius.max()) + reach)
+            seen = Images.of(s.position, s.radius, s.seam, float(s.radius.max()) + reach)
             lists[reach, s.seam] = _cells_of(seen, reach, few=few), seen
         cells, (position, radius, owner) = lists[reach, s.seam]
         if owner is None:

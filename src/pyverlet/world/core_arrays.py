@@ -125,6 +125,17 @@ class CoreArrays:
         """The particles are now at `now` (n,), or no more (-1)."""
         self.restore(self.save().renumbered(now), named_anew=False)
 
+    def leave(self, moved: Array, lone: Array) -> None:
+        """Contacts forget the particles `moved` (k,); those of them that no link joins, `lone`, have been given nothing either.
+
+        What links have given belongs to the velocities of a body that is moved as a whole.
+        """
+        memory = self.save()
+        now, given = np.arange(max(len(memory.given), int(moved.max(initial=-1)) + 1)), memory.given
+        now[moved] = -1
+        given[lone[lone < len(given)]] = 0
+        self.restore(memory.renumbered(now)._replace(given=given), named_anew=False)
+
     def load(self, world: Any, dt: float) -> None:
         """Have the engine see the particles of a frame of dt seconds, and what they are made of."""
         state, engine, collisions = world._slots, self.engine, world.collisions
@@ -159,7 +170,8 @@ class CoreArrays:
         if len(state) >= SORTED_FROM:
             self._sort(state)
         if state.seam:
-            engine.follow_seam()
+            state.crossed = np.zeros(state.position.shape)
+            engine.follow_seam(state.crossed)
 
     def set_aside(self, state: Slots) -> None:
         """Some have fallen asleep: keep what their contacts remember."""

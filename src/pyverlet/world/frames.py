@@ -209,7 +209,7 @@ class Frames:
             self.held.set_aside(state)
         done("finish")
         if state.seam:
-            engine.wrap_seam()
+            engine.wrap_seam(state.crossed)
         return True
 
     def _wake_met(self, world: Any, step: int, h: float, *, alone: bool, rough: bool) -> None:

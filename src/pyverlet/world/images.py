@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.state.seam import Seam
-from pyverlet.state.state import State
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -25,22 +24,21 @@ class Images(NamedTuple):
     owner: Indices | None
 
     @classmethod
-    def of(cls, state: State, reach: float) -> Images:
+    def of(cls, position: NDArray[Any], radius: NDArray[Any], seam: Seam, reach: float) -> Images:
         """All particles and, of a periodic room, those images that are within `reach`, m, of it."""
-        seam = state.seam
         if not seam:
-            return cls(state.position, state.radius, None)
-        inside = seam.wrapped(state.position)
+            return cls(position, radius, None)
+        inside = seam.wrapped(position)
         low, high = np.array((seam.low_x, seam.low_y)), np.array((seam.low_x + seam.period_x, seam.low_y + seam.period_y))
         periodic = np.array(seam.period) > 0
-        places, owners = [inside], [np.arange(len(state))]
+        places, owners = [inside], [np.arange(len(radius))]
         for shift in seam.images()[1:]:
             moved = inside + shift
             near = np.flatnonzero((((moved >= low - reach) & (moved <= high + reach)) | ~periodic).all(axis=1))
             places.append(moved[near].astype(inside.dtype))
             owners.append(near)
         owner = np.concatenate(owners)
-        return cls(np.concatenate(places), state.radius[owner], owner)
+        return cls(np.concatenate(places), radius[owner], owner)
 
     def named(self, found: Indices) -> Indices:
         """Particles in place of images; -1 stays."""

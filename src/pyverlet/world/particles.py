@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,17 +14,24 @@ from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
 from pyverlet.ground.turns import Shared, in_turn, of_one_frame
+from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceList, Numbered
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.rooms import Boundary
 from pyverlet.laws.touches import Touches
-from pyverlet.state.group import Column, Group, Particle
+from pyverlet.state.data import Data, known, rows
+from pyverlet.state.group import Column, Group, Measured, Particle
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import EVERYONE, State
+from pyverlet.world.moving import move
+from pyverlet.world.overlaps import free_in_order, on_others
 
 Array = NDArray[Any]
+OnOverlap = Literal["push", "skip", "error"]
+
+_ALLOWED = "free places, and all with on_overlap='push'"
 
 
 class Particles(Shared):
@@ -39,8 +47,8 @@ class Particles(Shared):
     _where = slice(None)
     boundary: Boundary
     obstacles: Obstacles
-    collisions: Any
     _course: Course
+    collisions: Collisions | None
 
     def held(self) -> AbstractContextManager[None]:
         """Meanwhile no other thread steps or changes this world: `with world.held():` what is read belongs to one frame."""
@@ -73,7 +81,9 @@ class Particles(Shared):
         material: str | Sequence[str] = "",
         category: ArrayLike = 1,
         mask: ArrayLike = EVERYONE,
-        allow_overlap: bool = False,
+        on_overlap: OnOverlap | None = None,
+        data: Mapping[str, ArrayLike] | None = None,
+        allow_overlap: bool | None = None,
     ) -> Group:
         """Add particles.
 
@@ -92,15 +102,20 @@ class Particles(Shared):
             material: (n,) names or one for all, of `Collisions(materials=...)`; "" is none.
             category: (n,) or one for all, 32 bits: what these circles are.
             mask: (n,) or one for all, 32 bits: two circles collide if each has a bit of its category in the other's mask.
-            allow_overlap: leave circles where they are said to be, inside an obstacle and outside the room too: the first frame
-                gets them out, or in. Circles on top of each other need no leave: they part slowly.
+            on_overlap: what becomes of circles on top of others, of those that are there and those before them here, and of free
+                ones whose centre is inside an obstacle or outside the room. "push": all are added where they are said to be;
+                contacts part those on top of each other slowly, and the first frame gets the rest out, or in. "skip": only
+                those are added that are on top of nothing, in order. "error": refused. None: refused inside obstacles and
+                outside the room, pushed on top of each other. Circles that would not collide are not on top of each other.
+            data: by name, (n,) or (n, k) or one for all, for arrays of `world.data`; others get the value of new particles.
+            allow_overlap: True is on_overlap="push", False is None; deprecated.
 
         Returns:
-            A handle whose arrays are views on these particles, in the order given.
+            A handle whose arrays are views on the particles added, in the order given.
 
         Raises:
-            InputError: shapes disagree, a value is not finite, a circle does not fit into the boundary, or a centre is inside an
-                obstacle or outside the room, where only pinned ones may be; nothing is added.
+            InputError: shapes disagree, a value is not finite, a circle does not fit into the boundary, or `on_overlap` refuses
+                a place; nothing is added.
         """
         dtype = self._state.dtype
         where = checks.rows("position", position, dtype)
@@ -119,12 +134,11 @@ class Particles(Shared):
             "fixed_rotation": checks.bits("fixed_rotation", np.asarray(fixed_rotation) + 0, count),
             "material": self._material_numbers(material, count),
         }
-        own = (
+        for name, value, most in (
             ("restitution", restitution, 1.0),
             ("friction", friction, np.inf),
             ("rolling_resistance", rolling_resistance, np.inf),
-        )
-        for name, value, most in own:
+        ):
             values[name] = checks.column(name, -1.0 if value is None else value, dtype, count)
             if value is not None:
                 checks.within(name, values[name], 0.0, most)
@@ -133,11 +147,29 @@ class Particles(Shared):
         checks.positive("radius", values["radius"])
         checks.positive("mass", values["mass"], infinite_is="pinned")
         self.boundary.check(values["radius"])
-        if not allow_overlap:
-            free = np.isfinite(values["mass"])
-            self._refuse_misplaced(where, free)
-            values["position"] = np.where(free[:, None], self.boundary.put_in(where, values["radius"]), where)
-        return Group(self._state, self._state.append(values), self.remove)
+        columns, on_overlap = self._state.data, _on_overlap(on_overlap, allow_overlap)
+        own = {name: rows(name, value, count, known(columns, name)) for name, value in (data or {}).items()}
+        if on_overlap != "push" and not (kept := self._put_down(values, on_overlap)).all():
+            values, own = ({name: column[kept] for name, column in columns.items()} for columns in (values, own))
+        return Group(self._state, self._state.append(values, own), self.remove)
+
+    def _put_down(self, values: dict[str, Array], on_overlap: str | None) -> NDArray[np.bool_]:
+        """(n,) which of these particles are to be added; all are put inside the room."""
+        where, free = values["position"], np.isfinite(values["mass"])
+        kept: NDArray[np.bool_] = ~free | ~(self.boundary.outside(where) | (self._course.covering(where) >= 0))
+        if on_overlap != "skip":
+            self._refuse_misplaced(where, free, allowed=_ALLOWED)
+        values["position"] = np.where(free[:, None], self.boundary.put_in(where, values["radius"]), where)
+        values["crossed"] = self._state.seam.periods(where.astype(np.float64) - values["position"])
+        if on_overlap is None or self.collisions is None:
+            return kept
+        pairs = on_others(self._state, values)
+        if on_overlap == "error" and len(pairs):
+            (k, i), there = pairs[0].tolist(), len(self)
+            x, y = where[k]
+            other = f"particle {i}" if i < there else f"position[{i - there}]"
+            raise InputError(f"position[{k}] is ({x:g}, {y:g}) m, on top of {other}; allowed are {_ALLOWED}")
+        return free_in_order(pairs, len(self), kept)
 
     def _material_numbers(self, names: Any, count: int) -> Array:
         """(count,) numbers of materials that are in the table of `collisions`."""
@@ -150,7 +182,7 @@ class Particles(Shared):
             raise InputError(f"material is {min(unknown)!r}{did_you_mean(min(unknown), known)}; allowed: {allowed}")
         return self._state.material_numbers(given, count)
 
-    def _refuse_misplaced(self, position: Array, free: Array) -> None:
+    def _refuse_misplaced(self, position: Array, free: Array, *, allowed: str) -> None:
         """No particle that is free may start inside an obstacle or outside the room."""
         outside, inside = self.boundary.outside(position), self._course.covering(position)
         wrong = np.flatnonzero(free & (outside | (inside >= 0)))
@@ -158,9 +190,7 @@ class Particles(Shared):
             k = int(wrong[0])
             what = f"outside the room, {self.boundary}" if outside[k] else f"inside the {self.obstacles[inside[k]]}"
             x, y = position[k]
-            raise InputError(
-                f"position[{k}] is ({x:g}, {y:g}) m, {what}; allowed are free places, and all with allow_overlap=True"
-            )
+            raise InputError(f"position[{k}] is ({x:g}, {y:g}) m, {what}; allowed are {allowed}")
 
     @in_turn
     def remove(self, which: Group | Particle | ArrayLike) -> None:
@@ -186,6 +216,10 @@ class Particles(Shared):
         self._slots.forget(now)
         self._renumber(now)
 
+    @in_turn
+    def _move_to(self, which: Group | Particle, position: ArrayLike) -> None:
+        move(self, which, position)  # type: ignore[arg-type]  # it is mixed into World
+
     def _renumber(self, now: Array) -> None:
         """Tell those who hold a particle by its index where it is now, or that it is no more (-1)."""
         for holder in (self.links, self._frames, self._events, self._touches, *self.forces):
@@ -196,6 +230,7 @@ class Particles(Shared):
         return len(self._state)
 
     position = Column("(n, 2) centres of all particles in the order they were added, m; a view.")
+    unwrapped = Measured("(n, 2) centres as if a periodic room did not repeat, m, float64: whole periods count on; a copy.")
     velocity = Column("(n, 2) m/s; a view.")
     spin = Column("(n,) angular velocity, rad/s, counter-clockwise; a view.")
     angle = Column("(n,) rad they have turned, counter-clockwise, float64 whatever the dtype: it grows and grows; a view.")
@@ -218,6 +253,11 @@ class Particles(Shared):
         self._state.material[:] = self._material_numbers(names, len(self._state))
 
     @property
+    def data(self) -> Data:
+        """Arrays of your own by name, which follow the particles: `world.data["age"] = 0.0`."""
+        return Data(self, whole=True)
+
+    @property
     @of_one_frame
     def number(self) -> Array:
         """(n,) a number for each particle, ascending, that it keeps while others come and go; a view, not to be written."""
@@ -228,6 +268,31 @@ class Particles(Shared):
     def group_number(self) -> NDArray[np.int64]:
         """(n,) which call of `add` brought each particle, ascending from 0; it keeps that while others come and go."""
         return np.searchsorted(self._state.begun, self.number, side="right") - 1
+
+    @of_one_frame
+    def index_of(self, numbers: ArrayLike) -> NDArray[np.int64]:
+        """Indices of the particles with these numbers, as `number` and the records of events and contacts have them.
+
+        Args:
+            numbers: of any shape, which is that of the answer.
+
+        Returns:
+            Where each particle is among all of the world's now; -1 where it was removed, or there never was one.
+
+        Raises:
+            InputError: they are no whole numbers.
+        """
+        return self._state.index_of(checks.numbers("numbers", numbers))
+
+    @of_one_frame
+    def group_of(self, numbers: ArrayLike) -> NDArray[np.int64]:
+        """Indices in `groups` of which group brought the particles with these numbers, also those removed; see `index_of`.
+
+        -1 where there never was such a particle.
+        """
+        asked = checks.numbers("numbers", numbers)
+        known = (asked >= 0) & (asked < self._state.numbers)
+        return np.where(known, np.searchsorted(self._state.begun, asked, side="right") - 1, -1)
 
     @property
     @of_one_frame
@@ -243,6 +308,15 @@ class Particles(Shared):
     def version(self) -> int:
         """How often particles were added or removed."""
         return self._state.version
+
+
+def _on_overlap(on_overlap: OnOverlap | None, allow_overlap: bool | None) -> OnOverlap | None:
+    if allow_overlap is not None:
+        warnings.warn("allow_overlap is deprecated; on_overlap='push' is allow_overlap=True", DeprecationWarning, stacklevel=4)
+        on_overlap = on_overlap or ("push" if allow_overlap else None)
+    if on_overlap not in (None, *get_args(OnOverlap)):
+        raise InputError(f"on_overlap is {on_overlap!r}; allowed are 'push', 'skip', 'error' and None")
+    return on_overlap
 
 
 def _mass(mass: ArrayLike | None, density: ArrayLike | None, radius: Array) -> Array:

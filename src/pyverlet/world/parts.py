@@ -19,6 +19,7 @@ from pyverlet.laws.events import CONTACT, HIT, Events
 from pyverlet.laws.ledger import Bookkeeper, Ledger
 from pyverlet.laws.links._set import BROKEN
 from pyverlet.laws.sleep import Sleep, laws
+from pyverlet.state.data import Columns
 from pyverlet.world.contact_memory import Memory
 from pyverlet.world.saved import Saved
 from pyverlet.world.sleepers import ASLEEP, Remembered
@@ -48,10 +49,11 @@ PARTICLES = {
     "mask": Field(np.uint32, "particles"),
     "material": Field(np.uint32, "particles"),
     "fixed_rotation": Field(np.uint32, "particles"),
+    "crossed": Field(np.float64, "particles", 2),
     "number": Field(np.int64, "particles", least=0, most=2**31, order="ascending"),
     "begun": Field(np.int64, "groups", least=0, most=2**31, order="rising"),
 }
-"""The user's arrays, and where each group begins."""
+"""The user's arrays, and where each group begins. Files of older versions lack `crossed`."""
 
 SLOTS = {
     "particle": Field(np.int32, "slots", least=0, below="slots", order="permutation"),
@@ -65,15 +67,18 @@ NEWS = {
     "touching": Field(np.int64, "touching", least=0, order="ascending"),
     "begin": Field(np.int64, "begin", 4, least=-1),
     "begin_how": Field(np.float64, "begin", 6),
+    "begin_number": Field(np.int64, "begin", 2, least=-1),
     "end": Field(np.int64, "end", 2, least=-1),
     "end_at": Field(np.int64, "end", 2, least=-1),
+    "end_number": Field(np.int64, "end", 2, least=-1),
     "broken": Field(np.int64, "broken", 4, least=-1),
+    "broken_number": Field(np.int64, "broken", 2, least=-1),
     "broken_force": Field(np.float64, "broken", infinite=True),
     "islands": Field(np.int64, "islands", least=0, order="ascending"),
     "members": Field(np.int64, "islands", least=1),
 }
 """What happened in the last frame, and who sleeps. Of `begin` a, b, wall and obstacle; speed, point (2), normal (2), impulse. Of
-`end` a and b; wall and obstacle, which files of older versions lack."""
+`end` a and b; wall and obstacle. Files of older versions lack these, and numbers of particles."""
 
 IMPULSES = {
     "pairs": Field(np.int32, "impulses", 2, least=0, below="particles"),
@@ -97,6 +102,9 @@ FIELDS = {
     )
     for name, field in fields.items()
 }
+
+OWN = "data."
+"""Before the number of an array of the user's own, whose name is in `facts["data"]`; see `state.data.Columns`."""
 
 RETIRED = frozenset({
     "particles.grown", "slots.fed",
@@ -144,10 +152,12 @@ def take_apart(world: World) -> Parts:
         members = dict(sorted(saved.sleep._members.items()))
         arrays["news.islands"] = np.array(list(members), np.int64)
         arrays["news.members"] = np.array(list(members.values()), np.int64)
+    facts["data"] = list(saved.data)
+    arrays |= {f"{OWN}{k}": column for k, column in enumerate(saved.data.values())}
     broken = saved.links[2]
     if len(broken):
         arrays["news.broken"] = np.column_stack([broken[name] for name in ("link", "row", "i", "j")])
-        arrays["news.broken_force"] = broken["force"].copy()
+        arrays["news.broken_force"], arrays["news.broken_number"] = broken["force"].copy(), broken["number"].copy()
     return Parts(facts, arrays)
 
 
@@ -160,7 +170,8 @@ def check(parts: Parts, real: np.dtype[Any]) -> None:
     sizes = {"one": 1}
     _bring_up_to_date(parts.arrays, real)
     for name, array in parts.arrays.items():
-        FIELDS[name].check(name, array, real, sizes)
+        if not name.startswith(OWN):
+            FIELDS[name].check(name, array, real, sizes)
 
 
 def _bring_up_to_date(arrays: dict[str, Array], real: np.dtype[Any]) -> None:
@@ -180,13 +191,14 @@ def fill(world: World, parts: Parts) -> None:
     Raises:
         InputError: the arrays are not what they must be.
     """
+    parts.arrays.setdefault("particles.crossed", np.zeros((len(parts.arrays.get("particles.number", ())), 2)))
     check(parts, world.dtype)
     try:
         arrays = {name: parts.arrays[f"particles.{name}"] for name, _ in world._state.arrays()}
         begun = parts.arrays["particles.begun"]
     except KeyError as error:
         raise InputError(f"the array {error} is missing; allowed are files that have all") from None
-    world._state.restore(arrays, own=True)
+    world._state.restore(arrays, _data(parts), own=True)
     most = int(arrays["number"][-1]) + 1 if len(world) else 0
     world._state.numbers = checks.whole("numbers", parts.facts.get("numbers"), least=most, most=2**31)
     world._state.begun = begun.tolist()
@@ -198,6 +210,17 @@ def _names(names: Any, most: int) -> list[str]:
     if not (isinstance(names, list) and names[:1] == [""] and len(names) > most and all(isinstance(name, str) for name in names)):
         raise InputError(f"materials is {names!r}; allowed is a list of names, the first '', for each number up to {most}")
     return names
+
+
+def _data(parts: Parts) -> Columns:
+    data = {name: parts.arrays[f"{OWN}{k}"] for k, name in enumerate(parts.facts.get("data", ()))}
+    count = len(parts.arrays["particles.number"])
+    for name, column in data.items():
+        if len(column) != count + 1:
+            raise InputError(
+                f"data[{name!r}] has {len(column)} rows; allowed are {count + 1}, one for each particle and for new ones"
+            )
+    return data
 
 
 def put_together(world: World, parts: Parts) -> Saved:
@@ -221,6 +244,7 @@ def put_together(world: World, parts: Parts) -> Saved:
         obstacles=world.obstacles.save(),
         actors=[(actor, actor.save()) for actor in world.actors],
         links=(links, pools, _broken(parts.arrays)),
+        data=_data(parts),
     )
 
 
@@ -257,6 +281,8 @@ def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
             f"impulses.skin has {len(skin)} numbers and impulses.listed {len(listed)} rows; allowed are 6 and one "
             "for each row of impulses.given, or none"
         )
+    for number in skin[4:]:  # counts
+        checks.whole("skin", int(number), least=0, most=_MOST)
     return Memory(
         pairs.copy(),
         values.copy(),
@@ -288,6 +314,13 @@ def _events_apart(events: Events, arrays: dict[str, Array]) -> None:
     arrays["news.end"], arrays["news.end_at"] = np.hsplit(np.column_stack([events.end[name] for name in _WHO]), 2)
     arrays["news.begin"] = np.column_stack([events.begin[name] for name in _WHO])
     arrays["news.begin_how"] = np.column_stack([events.begin[name] for name in _HOW])
+    arrays["news.begin_number"], arrays["news.end_number"] = events.begin["number"].copy(), events.end["number"].copy()
+
+
+def _numbers(name: str, first: Array, second: Array, arrays: dict[str, Array]) -> Array:
+    """(k, 2) of particles in records of this name; in files that lack them those at these indices, -1 for none."""
+    number = np.append(arrays["particles.number"], -1)
+    return arrays.get(f"news.{name}_number", np.column_stack((number[first], number[second])))
 
 
 def _events(facts: Facts, arrays: dict[str, Array]) -> Events:
@@ -303,6 +336,8 @@ def _events(facts: Facts, arrays: dict[str, Array]) -> Events:
         events.begin[name] = column
     events.begin["speed"], events.begin["point"], events.begin["normal"] = how[:, 0], how[:, 1:3], how[:, 3:5]
     events.begin["impulse"] = how[:, 5]
+    for name, records in (("begin", events.begin), ("end", events.end)):
+        records["number"] = _numbers(name, records["a"], records["b"], arrays)
     events.hit = events.begin[events.begin["speed"] >= events.hit_speed]
     return events
 
@@ -313,6 +348,7 @@ def _broken(arrays: dict[str, Array]) -> Array:
     for name, column in zip(("link", "row", "i", "j"), rows.T, strict=True):
         broken[name] = column
     broken["force"] = arrays.get("news.broken_force", 0.0)
+    broken["number"] = _numbers("broken", broken["i"], broken["j"], arrays)
     return broken
 
 

@@ -51,7 +51,7 @@ class Queries(Shared):
         found = np.full(len(where), -1, np.int64)
         if len(self._state):
             reach = float(self._state.radius.max())
-            seen = Images.of(self._state, reach)
+            seen = Images.of(self._state.position, self._state.radius, self._state.seam, reach)
             inside, cells = self._state.seam.wrapped(where), self._cells(seen.position, len(where))
             unit("tools", seen.position.dtype).at_points(inside, reach, cells, seen.position, seen.radius, found)
             found = seen.named(found)

@@ -12,6 +12,7 @@ from pyverlet.ground.errors import InputError
 from pyverlet.laws.events import Events
 from pyverlet.laws.ledger import Bookkeeper
 from pyverlet.laws.sleep import Sleep
+from pyverlet.state.data import Columns
 from pyverlet.state.state import State
 from pyverlet.world.actors import Actor
 
@@ -37,6 +38,7 @@ class Saved:
     obstacles: Any
     actors: list[tuple[Actor, Any]]
     links: Any
+    data: Columns
 
     def __repr__(self) -> str:
         return f"Saved(particles={len(self.arrays['mass'])}, time={self.time:g}, frames={self.frames})"

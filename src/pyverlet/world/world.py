@@ -260,6 +260,7 @@ class World(Measures, Casts, Doors):
             obstacles=self.obstacles.save(),
             actors=[(actor, actor.save()) for actor in self.actors],
             links=self.links.save(),
+            data={name: column.copy() for name, column in self._state.data.items()},
         )
 
     @in_turn
@@ -271,10 +272,9 @@ class World(Measures, Casts, Doors):
         """
         saved = saved.of(self)
         numbers = self._state.number.copy()
-        self._state.restore(saved.arrays)
+        self._state.restore(saved.arrays, saved.data)
         if not np.array_equal(numbers, self._state.number):
-            where = np.searchsorted(self._state.number, numbers).clip(max=max(len(self) - 1, 0))
-            self._renumber(np.where(self._state.number[where] == numbers, where, -1) if len(self) else np.full(len(numbers), -1))
+            self._renumber(self._state.index_of(numbers))
         self.links.restore(saved.links)
         self.obstacles.restore(saved.obstacles)
         self.actors[:] = [actor for actor, _ in saved.actors]

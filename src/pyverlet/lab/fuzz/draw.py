@@ -94,7 +94,7 @@ def _circles(c: _Chance, count: int) -> str:
         arguments.append("restitution=rng.random(n), friction=rng.random(n)")
     if c.happens(0.1):
         arguments.append("category=1 << rng.integers(0, 3, n), mask=rng.integers(1, 8, n)")
-    return f"circles = world.add({', '.join(arguments)}, allow_overlap=True)"
+    return f"circles = world.add({', '.join(arguments)}, on_overlap='push')"
 
 
 def _link(c: _Chance) -> str:
@@ -155,7 +155,7 @@ def _actor(c: _Chance) -> str:
 
 def _deed(c: _Chance) -> str:
     kinds = [
-        f"world.add(position={c.point(4)}, radius={c.number(0.1, 0.8)}, allow_overlap=True)",
+        f"world.add(position={c.point(4)}, radius={c.number(0.1, 0.8)}, on_overlap='push')",
         "world.remove(np.arange(0, len(world), 3))", "world.remove(np.arange(len(world)) % 2 == 0)",
         f"world.velocity += {c.point(3)}", "world.velocity *= -1", "world.position[:1] = (0.1, 0.2)",
         "world.spin[:] = 3", "world.mass[:2] = np.inf", "world.mass[:] = 1", "world.radius *= 0.8",

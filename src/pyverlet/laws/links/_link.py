@@ -85,11 +85,14 @@ class Link(metaclass=_InTurn):
                 self._pool.rows[name][self._where] = column
         self._moving = {}
 
+    def _arrays(self) -> dict[str, Array]:
+        """What it says of each row, by the names of attributes; these arrays are replaced, never written to."""
+        columns = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        return {name: column for name, column in columns.items() if len(column) == len(self)}
+
     def _keep(self, mask: NDArray[np.bool_]) -> None:
         """Keep these rows."""
-        for name, column in vars(self).items():
-            if isinstance(column, np.ndarray) and len(column) == len(mask):
-                setattr(self, name, column[mask])
+        vars(self).update({name: column[mask] for name, column in self._arrays().items()})
 
     @abstractmethod
     def _new_pool(self) -> Pool:
@@ -112,10 +115,8 @@ class Link(metaclass=_InTurn):
         """
         if self._version == self._state.version:  # nobody has come or gone since
             return
-        known = self._state.number
-        where = np.searchsorted(known, self._number)
-        gone = where >= len(known)
-        gone |= known[np.where(gone, 0, where)] != self._number if len(known) else True
+        where = self._state.index_of(self._number)
+        gone = where < 0
         if gone.any():
             row = int(np.flatnonzero(gone.any(axis=1))[0])
             raise InputError(f"{self!r} joins, in its row {row}, a particle that was removed; allowed are those of the world")
@@ -136,6 +137,11 @@ class Link(metaclass=_InTurn):
         if self._pool is not None:
             self._pool.rows[column][self._where] = value
             self._pool.edits += 1
+
+    @property
+    def numbers(self) -> NDArray[np.int64]:
+        """(k, p) `world.number` of what each joins, which stays what it is when other particles are removed; a copy."""
+        return self._number.copy()
 
     @property
     def force(self) -> Floats:

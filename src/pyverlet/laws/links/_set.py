@@ -20,8 +20,11 @@ from pyverlet.state.state import State
 
 AnyLink = TypeVar("AnyLink", bound=Link)
 
-BROKEN = np.dtype([("link", np.int64), ("row", np.int64), ("i", np.int64), ("j", np.int64), ("force", np.float64)])
-"""Number of the link in `world.links`, row of it, its first and last particle, and what it pulled with when it broke, N."""
+BROKEN = np.dtype(
+    [("link", np.int64), ("row", np.int64), ("i", np.int64), ("j", np.int64), ("force", np.float64), ("number", np.int64, (2,))]
+)
+"""Number of the link in `world.links`, row of it, indices of its first and last particle, what it pulled with when it broke, N,
+and the numbers of these particles, which stay what they are when others are removed."""
 
 
 class Links(Shared):
@@ -165,8 +168,9 @@ class Links(Shared):
         """The BROKEN entries of these rows of a pool."""
         note, number = np.empty(len(snapped), BROKEN), {owner: k for k, owner in enumerate(self._links)}
         for k, (row, owner) in enumerate(zip(snapped, pool.rows["owner"][snapped].tolist(), strict=True)):
-            ends = self._links[owner].particles[within := int(row) - self._links[owner]._where.start]
-            note[k] = (number[owner], within, ends[0], ends[-1], pull[k])
+            link = self._links[owner]
+            ends = link.particles[within := int(row) - link._where.start]
+            note[k] = (number[owner], within, ends[0], ends[-1], pull[k], link._number[within][[0, -1]])
         return note
 
     # ---- to look at ----------------------------------------------------------------------------------------------------
@@ -251,7 +255,7 @@ class Links(Shared):
     def save(self) -> Any:
         """A copy of all there is about links."""
         pools = [(family, pool.rows.copy(), pool.entries.copy()) for family, pool in zip(self._pools, self._kept, strict=True)]
-        links = [(owner, link, link.particles) for owner, link in self._links.items()]
+        links = [(owner, link, link._arrays()) for owner, link in self._links.items()]
         return links, pools, self.broken.copy()
 
     def restore(self, saved: Any) -> None:
@@ -269,8 +273,8 @@ class Links(Shared):
             pool = self._pools[family]
             pool.rows, pool.entries = rows.copy(), entries.copy()
         self._links, self._listed = {owner: link for owner, link, _ in links}, None
-        for owner, link, particles in links:
-            link.particles, link._id, link._pool = particles, owner, self._pools[link._family]
+        for owner, link, arrays in links:
+            vars(link).update(arrays, _id=owner, _pool=self._pools[link._family])
         self._apart_stale = True
 
 

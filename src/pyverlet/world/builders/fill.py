@@ -14,7 +14,8 @@ from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import count
 from pyverlet.laws.obstacles import Obstacle
 from pyverlet.world.builders.ink import Ink
-from pyverlet.world.builders.region import Floats, Region, overlapping
+from pyverlet.world.builders.region import Floats, Region
+from pyverlet.world.overlaps import overlapping
 from pyverlet.world.world import World
 
 GAP = 1e-3

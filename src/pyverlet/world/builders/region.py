@@ -8,19 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.core import unit
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links.area import signed_area
 from pyverlet.laws.obstacles import Obstacle, Polygon
 from pyverlet.laws.rooms import Boundary
 from pyverlet.world.builders.outline import inside, simple_polygon
+from pyverlet.world.overlaps import ROUNDING, overlapping
 from pyverlet.world.world import World
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-
-ROUNDING = 1e-9
-"""Of what is touched: a circle that just fits is not refused for the last digit."""
 
 SAMPLES = 400
 """Points along each side of the grid by which the free part of an area is counted: to about a thousandth of it."""
@@ -64,28 +61,6 @@ class Region:
         points = np.stack(np.meshgrid(across, up), axis=-1).reshape(-1, 2)
         share = float(self.free(points, np.zeros(len(points))).mean())
         return share * (x1 - x0) * (y1 - y0)
-
-
-def overlapping(points: Floats, radius: Floats, position: Floats, size: Floats) -> NDArray[np.int64]:
-    """(m, 2) rows (k, i): the circle about points[k] (k, 2) overlaps that about position[i] (n, 2); radii (k,) and (n,), m."""
-    if not len(points) or not len(position):
-        return np.zeros((0, 2), np.int64)
-    reach = radius + float(size.max())
-    (x0, y0), (x1, y1) = position.min(axis=0), position.max(axis=0)
-    cell = max(2.0 * float(size.max()), (x1 - x0) / 2_000, (y1 - y0) / 2_000) or 1.0
-    columns, rows = int((x1 - x0) / cell) + 1, int((y1 - y0) / cell) + 1
-    number, start = np.empty(len(position), np.int32), np.empty(columns * rows + 2, np.int64)
-    order, tools = np.empty(len(position), np.int64), unit("tools", np.float64)
-    tools.sort_into_cells(position, x0, y0, 1 / cell, columns, rows, number, start, order)
-    cells, room, found = (x0, y0, cell, columns, rows, start, order), 8 * len(points), np.inf
-    far = reach[:, None]
-    while found > room:
-        room = room if found == np.inf else int(found)
-        query, particle = np.empty(room, np.int64), np.empty(room, np.int64)
-        found = tools.in_regions(points - far, points + far, points, reach, cells, position, query, particle)
-    pairs = np.column_stack((query[: int(found)], particle[: int(found)]))
-    between = np.hypot(*(points[pairs[:, 0]] - position[pairs[:, 1]]).T)
-    return np.asarray(pairs[between < (radius[pairs[:, 0]] + size[pairs[:, 1]]) * (1 - ROUNDING)])
 
 
 def _walls(where: Any) -> tuple[Callable[[Floats], Floats], tuple[float, float, float, float]]:

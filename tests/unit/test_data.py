@@ -1,0 +1,262 @@
+"""Arrays of the user's own: they follow the particles wherever these go."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import pyverlet as pv
+
+KINDS: dict[str, Any] = {
+    "bool": np.array([True, False, True]),
+    "int8": np.array([1, -2, 3], np.int8),
+    "uint64": np.array([2**63, 1, 2], np.uint64),
+    "float16": np.array([0.5, -1, 2], np.float16),
+    "float32": np.array([[0.5, 1, 2], [3, 4, 5], [6, 7, 8]], np.float32),
+    "big-endian": np.array([1.5, 2.5, 3.5], ">f8"),
+    "complex": np.array([1 + 2j, 3, 4j]),
+    "text": np.array(["red", "grün", ""]),
+    "bytes": np.array([b"a", b"bcd", b""]),
+    "date": np.array(["2024-02-29", "1970-01-01", "NaT"], "M8[D]"),
+    "record": np.array([(1, (2.0, 3.0)), (4, (5.0, 6.0)), (7, (8.0, 9.0))], [("team", np.int32), ("aim", np.float64, (2,))]),
+    "no columns": np.zeros((3, 0)),
+}
+
+
+def three(**options: Any) -> pv.World:
+    world = pv.World(gravity=(0, 0), **options)
+    world.add(position=[(0, 0), (2, 0), (4, 0)])
+    return world
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.one_of(st.integers(0, 6), st.lists(st.integers(0, 30), min_size=1, max_size=9)), min_size=1, max_size=12))
+def test_any_order_of_adding_and_removing(acts: list[Any]) -> None:
+    # The model: names, which are the ages of those added with one, and -1 of the others.
+    world, names = pv.World(), list[float]()
+    world.data["age"] = -1.0
+    world.data["pair"] = np.zeros((0, 2), np.int32)
+    for name, act in enumerate(acts):
+        if isinstance(act, int):
+            own = name % 2 == 0
+            group = world.add(position=np.zeros((act, 2)), data={"age": name, "pair": [name, -name]} if own else None)
+            names += [name if own else -1.0] * act
+            assert len(group.data["age"]) == act
+        else:
+            gone = {k for k in act if k < len(names)}
+            world.remove(np.array(sorted(gone), int))
+            names = [each for k, each in enumerate(names) if k not in gone]
+    assert world.data["age"].tolist() == names
+    assert world.data["pair"].tolist() == [[n, -n] if n >= 0 else [0, 0] for n in names]
+    assert world.data["age"].dtype == np.float64
+    assert world.data["pair"].dtype == np.int32
+
+
+def test_it_is_a_mapping_of_views() -> None:
+    world = three()
+    world.data["age"] = 0.0
+    age = world.data["age"]
+    age += 0.5
+    world.data["age"] += 1.0
+    world.data["age"][1] = 7
+    assert age.tolist() == [1.5, 7.0, 1.5]  # a view still
+    world.data["age"][:] = world.data["age"]
+    world.step(1 / 60)
+    assert world.data["age"].tolist() == [1.5, 7.0, 1.5]  # frames leave it alone
+    assert dict(world.data).keys() == {"age"}
+    assert "age" in world.data
+    assert "mass" not in world.data
+    assert world.data.get("mass") is None
+    assert repr(world.data) == "Data of 1 array: 'age' float64 (3,)"
+    world.data.update(team=1, place=np.ones((3, 2)))
+    assert list(world.data) == ["age", "team", "place"]
+    del world.data["team"]
+    assert len(world.data) == 2
+    world.data.clear()
+    assert repr(world.data) == "Data of 0 arrays"
+
+
+def test_groups_and_particles_see_their_rows() -> None:
+    world = three()
+    late = world.add(position=[(0, 4), (2, 4)])
+    world.data["heat"] = np.arange(10.0).reshape(5, 2)
+    assert late.data["heat"].tolist() == [[6, 7], [8, 9]]
+    assert np.shares_memory(late.data["heat"], world.data["heat"])
+    late.data["heat"][0] = 1, 2
+    late[1].data["heat"] = 3.0
+    late[1].data["heat"][1] = 4.0
+    first = world.groups[0]
+    first[[2, 0]].data["heat"] = [[20, 21], [0.5, 1.5]]
+    assert world.data["heat"].tolist() == [[0.5, 1.5], [2, 3], [20, 21], [1, 2], [3, 4]]
+    assert first[[2, 0]].data["heat"].tolist() == [[20, 21], [0.5, 1.5]]
+    with pytest.raises(ValueError, match="read-only"):
+        first[[2, 0]].data["heat"][0] = 1
+    world.data["level"] = np.arange(5)
+    assert late[0].data["level"] == 3
+    late.data["level"] = 0.5  # takes up a dtype that holds it, for all
+    assert world.data["level"].tolist() == [0, 1, 2, 0.5, 0.5]
+    first.remove()
+    assert late.data["level"].tolist() == [0.5, 0.5]
+    with pytest.raises(pv.InputError, match="group is one of 3 particles that were all removed"):
+        first.data["level"]
+    for write in (late.data.clear, lambda: late.data.pop("level")):
+        with pytest.raises(pv.InputError, match=r"data\['(level|heat)'\] is of all particles; allowed is del world.data\["):
+            write()
+
+
+def test_dtypes_hold_what_is_set_and_new_particles_get_what_all_had() -> None:
+    world = three()
+    world.data["small"] = np.float32(2)
+    world.data["small"] = 0.1  # a plain number changes no dtype
+    world.data["byte"] = np.array([1, 2, 3], np.int8)
+    world.data["byte"] = [3, 4, 5]
+    assert world.data["byte"].dtype == np.int8
+    world.data["byte"] = 300  # does not fit
+    assert world.data["byte"].tolist() == [300] * 3
+    world.data["count"] = 5
+    world.data["name"] = "ab"
+    world.data["tag"] = np.array(["x", "yy", "zzz"])
+    world.data["row"] = [(1, 2), (3, 4), (5, 6)]
+    world.data["row"] = (7, 8)
+    world.add(position=(8, 8), data={"name": "longer", "count": 1.5})
+    world.add(position=(9, 9))
+    assert world.data["small"].dtype == np.float32
+    assert world.data["small"].tolist() == [np.float32(0.1)] * 5
+    assert world.data["count"].tolist() == [5, 5, 5, 1.5, 5]
+    assert world.data["name"].tolist() == ["ab"] * 3 + ["longer", "ab"]
+    assert world.data["tag"].tolist() == ["x", "yy", "zzz", "", ""]
+    assert world.data["row"].tolist() == [[7, 8]] * 5
+    world.data["count"] = np.arange(5)
+    world.add(position=(7, 7))
+    assert world.data["count"].tolist() == [0, 1, 2, 3, 4, 5]  # what was set for all last
+
+
+def saved(world: pv.World, path: Path) -> pv.World:
+    pv.save(world, path)
+    return pv.load(path, exact=True)
+
+
+def restored(world: pv.World, _: Path) -> pv.World:
+    kept = world.save()
+    for name in world.data:
+        world.data[name][:] = world.data[name][0]
+    world.data["other"] = 1
+    world.remove(1)
+    world.restore(kept)
+    return world
+
+
+WAYS: dict[str, Callable[[pv.World, Path], pv.World]] = {
+    "file": saved,
+    "restore": restored,
+    "pickle": lambda world, _: pickle.loads(pickle.dumps(world)),
+    "copy": lambda world, _: copy.deepcopy(world),
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_every_dtype_is_kept(way: str, tmp_path: Path) -> None:
+    world = three()
+    for name, values in KINDS.items():
+        world.data[name] = values
+    world.data["new"] = 4.5
+    again = WAYS[way](world, tmp_path / "world.pvsnap")
+    assert list(again.data) == [*KINDS, "new"]
+    for name, values in KINDS.items():
+        assert again.data[name].dtype == values.dtype.newbyteorder("=")
+        assert again.data[name].tobytes() == values.astype(values.dtype.newbyteorder("=")).tobytes()
+    if again is not world:
+        assert not np.shares_memory(again.data["new"], world.data["new"])
+    again.add(position=(9, 9))
+    again.remove(0)
+    again.run(seconds=0.1)
+    assert again.data["new"].tolist() == [4.5] * 3
+    assert again.data["int8"].tolist() == [-2, 3, 0]
+
+
+def test_objects_are_kept_but_in_files(tmp_path: Path) -> None:
+    world = three()
+    world.data["thing"] = np.array([{"a": 1}, None, "text"], object)
+    for again in (copy.deepcopy(world), pickle.loads(pickle.dumps(world))):
+        assert again.data["thing"].tolist() == [{"a": 1}, None, "text"]
+        assert again.data["thing"][0] is not world.data["thing"][0]
+    says = r"data\['thing'\] holds Python objects; allowed in files are numbers, texts and dates of NumPy's dtypes"
+    with pytest.raises(pv.InputError, match=says):
+        pv.save(world, tmp_path / "world.pvsnap")
+    assert not (tmp_path / "world.pvsnap").exists()
+
+
+def aged(settings: pv.scenes.Settings) -> pv.World:
+    world = three()
+    world.data["age"] = float(settings.seed % 100)
+    world.data["name"] = ["a", "b", "c"]
+    return world
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_many_worlds_have_theirs(processes: int) -> None:
+    with pv.Worlds(pv.scenes.Scene("aged", "", aged), 2, processes=processes) as many:
+        many.run(seconds=0.1)
+        for world in many:
+            assert world.data["name"].tolist() == ["a", "b", "c"]
+        ages = [world.data["age"].tolist() for world in many]
+        assert ages[0] != ages[1]
+        many.restore(many.save(), [0])
+        assert [world.data["age"].tolist() for world in many] == ages
+
+
+def test_emitters_and_sinks() -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (20, 20)))
+    world.data["born"] = -1.0
+    world.actors += [pv.Emitter(pv.Box((1, 15), (19, 19)), rate=60, radius=0.2), pv.Sink(pv.Box((0, 0), (20, 10)))]
+    for _ in range(120):
+        world.data["born"][world.data["born"] < 0] = world.time
+        world.step(1 / 60)
+    assert len(world) < world.actors[0].emitted  # type: ignore[attr-defined]
+    born = world.data["born"]
+    assert len(born) == len(world)
+    assert (np.diff(np.where(born < 0, world.time, born)) >= 0).all()  # in the order in which they came
+
+
+ONE = "allowed is one value for all, or "
+BAD: dict[str, tuple[Callable[[pv.World], Any], str]] = {
+    "length": (lambda w: w.data.update(age=[1, 2]), rf"data\['age'\] has shape \(2,\); {ONE}\(3,\) or \(n, k\)"),
+    "deep": (lambda w: w.data.update(age=np.zeros((3, 2, 2))), r"data\['age'\] has shape \(3, 2, 2\); allowed is one value"),
+    "row": (lambda w: w.data.update(row=np.zeros((3, 4))), rf"data\['row'\] has shape \(3, 4\); {ONE}\(3, 2\)"),
+    "short row": (lambda w: w.data.update(row=[1, 2, 3]), rf"data\['row'\] has shape \(3,\); {ONE}\(3, 2\)"),
+    "ragged": (lambda w: w.data.update(age=[[1], [1, 2], 3]), r"data\['age'\] is no array; allowed is one value for all"),
+    "text": (lambda w: w.data.update(row="red"), r"data\['row'\] is <U3; allowed is what goes together with float64"),
+    "date": (lambda w: w.data.update(row=np.datetime64("2024-01-01")), r"data\['row'\] is datetime64\[D\]; allowed is what goes"),
+    "name": (lambda w: w.data.__setitem__(3, 1), r"name is 3; allowed is a text"),
+    "no name": (lambda w: w.data.__setitem__("", 1), r"name is ''; allowed is a text"),
+    "unknown": (
+        lambda w: w.data["rwo"],
+        r"data has no 'rwo' \(did you mean 'row'\?\); there are 'row', and world.data\['rwo'\] = ",
+    ),
+    "index": (lambda w: w.data[:2], r"data has no slice\(None, 2, None\); there are 'row'"),  # type: ignore[index]
+    "deleted": (lambda w: w.data.pop("age"), r"data has no 'age'"),
+    "group": (lambda w: w.groups[0].data.update(age=1), r"data has no 'age'; there are 'row'"),
+    "group rows": (lambda w: w.groups[0][1:].data.update(row=np.zeros((3, 2))), rf"has shape \(3, 2\); {ONE}\(2, 2\)"),
+    "add unknown": (lambda w: w.add(position=(0, 9), data={"age": 1}), r"data has no 'age'"),
+    "add shape": (lambda w: w.add(position=(0, 9), data={"row": [1, 2, 3]}), rf"has shape \(3,\); {ONE}\(1, 2\)"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_gets_one_sentence_and_changes_nothing(case: str) -> None:
+    act, says = BAD[case]
+    world = three()
+    world.data["row"] = np.arange(6.0).reshape(3, 2)
+    with pytest.raises(pv.InputError, match=says):
+        act(world)
+    assert (len(world), list(world.data)) == (3, ["row"])
+    assert world.data["row"].tolist() == [[0, 1], [2, 3], [4, 5]]
+    assert world.data["row"].dtype == np.float64
