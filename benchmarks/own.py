@@ -325,7 +325,7 @@ def rays(limit_ms: float = 5.0) -> Iterator[Row]:
     """What 100 robots see that look around in a degree's steps, in a frame in which particles have moved."""
     rng, angle = np.random.default_rng(1), np.radians(np.arange(360.0))
     world = pv.World(boundary=pv.Box((0, 0), (40, 40)))
-    world.add(position=rng.uniform(0, 40, (10_000, 2)), radius=0.1, allow_overlap=True)
+    world.add(position=rng.uniform(0, 40, (10_000, 2)), radius=0.1, on_overlap="push")
     eye, look = np.repeat(rng.uniform(0, 40, (100, 2)), 360, axis=0), np.column_stack((np.cos(angle), np.sin(angle)))
     ways = np.tile(look, (100, 1))
 
