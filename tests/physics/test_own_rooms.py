@@ -30,7 +30,7 @@ class MyCage(pv.Circle):
         super().confine(state, h, lag, rest_speed)
 
 
-def room(kind: str, **law: float) -> Any:
+def room(kind: str, **law: Any) -> Any:
     return MyBox((-20, 0), (20, 40), **law) if kind == "box" else MyCage(center=(0, 20), radius=20, **law)
 
 

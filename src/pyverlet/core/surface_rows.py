@@ -19,7 +19,7 @@ SIDES = cython.declare(cython.int, 4)
 From there on they are segments. Negative ones are pinned circles: -1 - k is that of lane k of the list of pairs.
 """
 
-CONTACT = cython.declare(cython.int, 15)
+CONTACT = cython.declare(cython.int, 16)
 NORMAL = cython.declare(cython.int, 0)  # (2)
 GAP = cython.declare(cython.int, 2)  # m
 BEND = cython.declare(cython.int, 3)  # 1/m; positive: the surface bends towards the particle, as a cage does
@@ -32,6 +32,7 @@ HEARD_SPEED = cython.declare(cython.int, 10)  # as in `Step`, of this frame, whi
 HEARD_BOUNCES = cython.declare(cython.int, 11)
 HEARD = cython.declare(cython.int, 12)
 BEFORE_CHAIN = cython.declare(cython.int, 13)  # (2) PUSH and DRAG before a chain was solved
+HELD = cython.declare(cython.int, 15)  # 1: by a one-way line, in this substep; see `core.one_way`
 
 ROUNDED = cython.declare(cython.double, 1e-6)
 """Of the reach: a face goes on so far beyond its ends, for what touches it at a joint to meet it in spite of rounding."""

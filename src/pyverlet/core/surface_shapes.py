@@ -25,6 +25,7 @@ from pyverlet.core.obstacles import (
     ROUNDING,
     SEGMENT,
 )
+from pyverlet.core.one_way import is_passable
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import (
     BEND,
@@ -137,7 +138,7 @@ def depth_inside(w: cython.pointer(Step), at: cython.Py_ssize_t, x: cython.doubl
     first: cython.Py_ssize_t = cython.cast(int64_t, w.segment[at + FIRST_FACE])
     count: cython.Py_ssize_t = cython.cast(int64_t, w.segment[at + FACES])
     least: cython.double = FARAWAY
-    for k in range(SEGMENT * first, SEGMENT * (first + count), 32):
+    for k in range(SEGMENT * first, SEGMENT * (first + count), 36):
         ox: cython.double = x - w.segment[k + PLACE]
         oy: cython.double = y - w.segment[k + PLACE + 1]
         least = min(least, w.segment[k + PLACE + 2] * oy - w.segment[k + PLACE + 3] * ox)
@@ -157,7 +158,9 @@ def measure_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_
     nx: cython.double = 0.0
     ny: cython.double = -1.0 if p.above else 1.0
     row[first + BEND] = 0.0
-    if w.segment[at + FACES] > 0 and p.above:  # behind the face
+    if is_passable(w, k, at):
+        row[first + GAP] = FARAWAY
+    elif w.segment[at + FACES] > 0 and p.above:  # behind the face
         inside: cython.double = depth_inside(w, at, p.wx, p.wy)
         ny = 1.0
         row[first + GAP] = -(p.reach + p.y) if inside == p.y and inside > 0 else FARAWAY

@@ -11,6 +11,7 @@ from cython.cimports.libc.stdint import int64_t
 from pyverlet.core.cells import wrapped
 from pyverlet.core.impacts import NEVER
 from pyverlet.core.obstacles import AFTER, BEFORE, BODY_OF, FACES, PLACE, SEGMENT
+from pyverlet.core.one_way import is_passable
 from pyverlet.core.step import CAGE, Step
 from pyverlet.core.surface_rows import CONTACT, GAP, NORMAL, ROUNDED, SIDES, SPEED, pinned_lane
 from pyverlet.core.surface_shapes import Path, Spot, path_of, set_surface_speed, spot_of
@@ -153,7 +154,7 @@ def meet_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
         hit.time = 0.0
         return hit
     p: Spot = spot_of(w, i, at, PLACE)
-    if w.segment[at + FACES] > 0 and p.above:
+    if is_passable(w, k, at) or (w.segment[at + FACES] > 0 and p.above):
         return hit
     f: Path = path_of(w, i, at, cython.address(p))
     nx: cython.double = 0.0

@@ -85,9 +85,9 @@ def _kind(
 # ---- what there is -----------------------------------------------------------------------------------------------------
 
 _kind(rooms.Open)
-_kind(rooms.Circle, "center", "radius", "restitution", "friction", "angular_velocity")
-_kind(rooms.Box, "lower", "upper", "restitution", "friction")
-_kind(rooms.Periodic, "lower", "upper", "axes", "restitution", "friction")
+_kind(rooms.Circle, "center", "radius", "restitution", "friction", "angular_velocity", "category", "mask")
+_kind(rooms.Box, "lower", "upper", "restitution", "friction", "category", "mask")
+_kind(rooms.Periodic, "lower", "upper", "axes", "restitution", "friction", "category", "mask")
 _kind(naive.ClampAndFlip, "room")
 _kind(naive.ProjectOnly, "room")
 
@@ -122,7 +122,7 @@ def _let_go(grip: forces.Grip, state: dict[str, Any]) -> None:
 
 _kind(forces.Grip, arguments=_grip, state=lambda grip: {} if grip.particle >= 0 else {"holds": False}, recall=_let_go)
 
-SURFACE = ("restitution", "friction", "surface_speed", "velocity", "angular_velocity", "pivot")
+SURFACE = ("restitution", "friction", "surface_speed", "velocity", "angular_velocity", "pivot", "category", "mask", "sensor")
 """Arguments that all obstacles take."""
 
 
@@ -139,6 +139,7 @@ def _shape(obstacle: Any) -> dict[str, Any]:
     else:
         shape = {"points": local, "closed": obstacle.closed, "radius": obstacle.radius}
     surface = {name: getattr(obstacle, name) for name in SURFACE}
+    shape |= {"one_way": obstacle.one_way} if isinstance(obstacle, obstacles.Chain) else {}
     return shape | surface | {"pivot": (0.0, 0.0)}
 
 

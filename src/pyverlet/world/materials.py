@@ -68,11 +68,11 @@ def knows(room: Any) -> bool:
 def walls_of(room: Any) -> tuple[float, ...]:
     """The arguments of `Engine.set_room`."""
     if not knows(room):
-        return OPEN, *(0.0,) * 7
+        return OPEN, *(0.0,) * 7, 0, 0
     if isinstance(room, Circle):
         speed = room.angular_velocity * room.radius
-        return CAGE, *room.center, room.radius, 0.0, room.restitution, room.friction, speed
+        return CAGE, *room.center, room.radius, 0.0, room.restitution, room.friction, speed, room.category, room.mask
     if not isinstance(room, Box | Periodic) or (isinstance(room, Periodic) and room.axes == "xy"):
-        return OPEN, *(0.0,) * 7
+        return OPEN, *(0.0,) * 7, 0, 0
     corners = room._box if isinstance(room, Periodic) else (*room.lower, *room.upper)
-    return BOX, *corners, room.restitution, room.friction, 0.0
+    return BOX, *corners, room.restitution, room.friction, 0.0, room.category, room.mask

@@ -18,9 +18,9 @@ SIDES = 4
 
 _GIVEN = (
     "body", "first", "faces", "around", "lx", "ly", "lc", "ls", "length", "rounding", "inner", "before_x", "before_y", "after_x",
-    "after_y", "restitution", "friction", "belt",
+    "after_y", "restitution", "friction", "belt", "category", "mask", "way_x", "way_y", "sensor",
 )  # fmt: skip
-_WIDTH, _LENGTH, _ROUNDING, _INNER, _FRICTION = 32, 8, 9, 10, 16
+_WIDTH, _LENGTH, _ROUNDING, _INNER, _FRICTION, _SENSOR = 36, 8, 9, 10, 16, 22
 
 SPARE_FRAMES = 4.0
 """Frames for which a segment that moves is listed ahead; as in `core.obstacles`."""
@@ -92,7 +92,12 @@ class ObstacleRows:
             self._segments[:, column] = course.segments[name]
         moves = (self._bodies[:, 3:] != 0.0).any(axis=1)
         self._moving = np.flatnonzero(moves[self._segments[:, 0].astype(np.int64)]).astype(np.int32)
-        self.friction = float(self._segments[:, _FRICTION].max(initial=0.0))
+        solid = self._segments[:, _SENSOR] == 0
+        self.friction = float(self._segments[solid, _FRICTION].max(initial=0.0))
+        if not solid.all():
+            rank = np.zeros(course.count)
+            rank[course.sensors] = np.arange(1, len(course.sensors) + 1)
+            self._segments[:, _SENSOR] = rank[self._segments[:, 0].astype(np.int64) % course.count]
 
     def _build(self, engine: Any, count: int, radius: float, dt: float) -> None:
         """Make the grid of `count` obstacles, with cells as wide as the largest particle, or wider: not too many."""

@@ -122,20 +122,27 @@ class Particles(Shared):
         self.boundary.check(values["radius"])
         if not allow_overlap:
             free = np.isfinite(values["mass"])
-            self._refuse_misplaced(where, free)
-            values["position"] = np.where(free[:, None], self.boundary.put_in(where, values["radius"]), where)
+            held = free & self.boundary.holds(values["category"], values["mask"])
+            inside = self._course.covering(where, values["category"], values["mask"])
+            self._refuse_misplaced(where, held, np.where(free, inside, -1))
+            values["position"] = np.where(held[:, None], self.boundary.put_in(where, values["radius"]), where)
         return Group(self._state, self._state.append(values), self.remove)
 
     @of_one_frame
-    def is_free(self, position: ArrayLike) -> NDArray[np.bool_]:
-        """(n,) whether these places, (n, 2) or (2,), m, are inside the room and in no obstacle. Circles do not count."""
-        where = checks.rows("position", position, np.dtype(np.float64))
-        return np.asarray(~self.boundary.outside(where) & (self._course.covering(where) < 0))
+    def is_free(self, position: ArrayLike, *, category: ArrayLike = 1, mask: ArrayLike = EVERYONE) -> NDArray[np.bool_]:
+        """(n,) whether these places, (n, 2) or (2,), m, are inside the room and in no obstacle. Circles do not count.
 
-    def _refuse_misplaced(self, position: Array, free: Array) -> None:
-        """No particle that is free may start inside an obstacle or outside the room."""
-        outside, inside = self.boundary.outside(position), self._course.covering(position)
-        wrong = np.flatnonzero(free & (outside | (inside >= 0)))
+        category, mask: (n,) or one for all; walls and obstacles that such particles do not collide with do not count either.
+        """
+        where = checks.rows("position", position, np.dtype(np.float64))
+        marks = checks.bits("category", category, len(where)), checks.bits("mask", mask, len(where))
+        outside = self.boundary.outside(where) & self.boundary.holds(*marks)
+        return np.asarray(~outside & (self._course.covering(where, *marks) < 0))
+
+    def _refuse_misplaced(self, position: Array, held: Array, inside: Array) -> None:
+        """No particle may start outside the room that holds it, nor inside an obstacle, or -1."""
+        outside = held & self.boundary.outside(position)
+        wrong = np.flatnonzero(outside | (inside >= 0))
         if len(wrong):
             k = int(wrong[0])
             what = f"outside the room, {self.boundary}" if outside[k] else f"inside the {self.obstacles[inside[k]]}"

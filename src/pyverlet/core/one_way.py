@@ -1,0 +1,118 @@
+# mypy: ignore-errors
+"""One-way lines: particles pass in one direction, u, and are held on the side that u points to.
+
+A line holds a particle that does not overlap it and whose centre is, seen from the nearest point of the line, on the side that u
+points to. It goes on to hold it while they overlap, until the centre is no longer on that side; what overlaps a line without
+having been held passes, and all other parts of a chain let it pass meanwhile. This is decided once a substep, and remembered.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import fabs, sqrt
+from cython.cimports.libc.stdint import int64_t
+
+from pyverlet.core.cells import wrapped
+from pyverlet.core.obstacles import BODY_OF, LENGTH, PLACE, ROUNDING, SEGMENT, WAY
+from pyverlet.core.step import Step
+from pyverlet.core.surface_rows import CONTACT, DRAG, HELD, PUSH, SIDES
+
+OVERLAPS = cython.declare(cython.double, 1e-3)
+"""Of the reach: by less a particle does not overlap a line that it lies on."""
+
+ROUNDED_AWAY = cython.declare(cython.double, 8)
+"""Of its coordinates: nor by less than these."""
+
+SIDEWAYS = cython.declare(cython.double, 1e-6)
+"""Cosine of the angle to u: parts of a line along u hold nothing."""
+
+Side = cython.struct(held=cython.bint, overlaps=cython.bint)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def is_one_way(w: cython.pointer(Step), at: cython.Py_ssize_t) -> cython.bint:
+    """Whether the segment whose row begins at `at` is."""
+    return w.segment[at + WAY] != 0 or w.segment[at + WAY + 1] != 0
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def is_passable(w: cython.pointer(Step), k: cython.Py_ssize_t, at: cython.Py_ssize_t) -> cython.bint:
+    """Whether the segment of contact k, whose row begins at `at`, does not hold the particle in this substep."""
+    return is_one_way(w, at) and w.contact[CONTACT * k + HELD] == 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def side_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t) -> Side:
+    """Whether particle i is on the side where a one-way segment holds, and whether it overlaps it."""
+    found: Side
+    ox: cython.double = wrapped(w.position[2 * i], w.cells.low_x, w.cells.period_x) - w.segment[at + PLACE]
+    oy: cython.double = wrapped(w.position[2 * i + 1], w.cells.low_y, w.cells.period_y) - w.segment[at + PLACE + 1]
+    x: cython.double = w.segment[at + PLACE + 2] * ox + w.segment[at + PLACE + 3] * oy
+    y: cython.double = w.segment[at + PLACE + 2] * oy - w.segment[at + PLACE + 3] * ox
+    x -= min(max(x, 0.0), w.segment[at + LENGTH])
+    reach: cython.double = w.segment[at + ROUNDING] + w.radius[i]
+    rounding: cython.double = 2.3e-16 if cython.sizeof(real) == 8 else 1.2e-7
+    rounding *= ROUNDED_AWAY * (fabs(w.position[2 * i]) + fabs(w.position[2 * i + 1]))
+    distance: cython.double = sqrt(x * x + y * y)
+    found.held = x * w.segment[at + WAY] + y * w.segment[at + WAY + 1] > SIDEWAYS * distance
+    found.overlaps = distance < reach - OVERLAPS * reach - rounding
+    return found
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def find_sides(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
+    """Which of the one-way lines that particle i may touch hold it in the substep that begins."""
+    k: cython.Py_ssize_t = w.contact_begin[i]
+    n: cython.Py_ssize_t
+    end: cython.Py_ssize_t
+    at: cython.Py_ssize_t
+    side: Side
+    while k < w.contact_end[i]:
+        at = SEGMENT * (cython.cast(int64_t, w.surface[k]) - SIDES)
+        if w.surface[k] < SIDES or not is_one_way(w, at):
+            k += 1
+            continue
+        whose: cython.double = w.segment[at + BODY_OF]
+        overlaps: cython.bint = False
+        stays: cython.bint = False
+        end = k
+        while end < w.contact_end[i] and w.surface[end] >= SIDES:  # segments of an obstacle are listed one after the other
+            at = SEGMENT * (cython.cast(int64_t, w.surface[end]) - SIDES)
+            if w.segment[at + BODY_OF] != whose:
+                break
+            side = side_of(w, i, at)
+            overlaps |= side.overlaps
+            stays |= side.overlaps and side.held and w.contact[CONTACT * end + HELD] != 0
+            end += 1
+        for n in range(k, end):
+            side = side_of(w, i, SEGMENT * (cython.cast(int64_t, w.surface[n]) - SIDES))
+            w.contact[CONTACT * n + HELD] = 1.0 if side.held and (stays or not overlaps) else 0.0
+            if w.contact[CONTACT * n + HELD] == 0:
+                w.contact[CONTACT * n + PUSH] = w.contact[CONTACT * n + DRAG] = 0
+        k = end
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def stops(w: cython.pointer(Step), i: cython.Py_ssize_t, segment: cython.Py_ssize_t, across: cython.double) -> cython.bint:
+    """Whether a one-way segment stops the centre of particle i, which begins so far to the left of it, m."""
+    at: cython.Py_ssize_t = SEGMENT * segment
+    k: cython.Py_ssize_t
+    if across * w.segment[at + WAY + 1] <= 0:
+        return False
+    for k in range(w.contact_begin[i], w.contact_end[i]):
+        if w.surface[k] == SIDES + segment:
+            return w.contact[CONTACT * k + HELD] != 0
+    return True  # it was far off
