@@ -13,7 +13,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import fabs, sqrt
 from cython.cimports.libc.stdint import int64_t
 
-from pyverlet.core.cells import wrapped
+from pyverlet.core.cells import Cells, image_of
 from pyverlet.core.obstacles import BODY_OF, LENGTH, PLACE, ROUNDING, SEGMENT, WAY
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import CONTACT, DRAG, HELD, PUSH, SIDES
@@ -54,8 +54,11 @@ def is_passable(w: cython.pointer(Step), k: cython.Py_ssize_t, at: cython.Py_ssi
 def side_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t) -> Side:
     """Whether particle i is on the side where a one-way segment holds, and whether it overlaps it."""
     found: Side
-    ox: cython.double = wrapped(w.position[2 * i], w.cells.low_x, w.cells.period_x) - w.segment[at + PLACE]
-    oy: cython.double = wrapped(w.position[2 * i + 1], w.cells.low_y, w.cells.period_y) - w.segment[at + PLACE + 1]
+    c: cython.pointer(Cells) = w.cells
+    ox: cython.double = image_of(w.position[2 * i], w.checked[2 * i], c.low_x, c.period_x)
+    oy: cython.double = image_of(w.position[2 * i + 1], w.checked[2 * i + 1], c.low_y, c.period_y)
+    ox -= w.segment[at + PLACE]
+    oy -= w.segment[at + PLACE + 1]
     x: cython.double = w.segment[at + PLACE + 2] * ox + w.segment[at + PLACE + 3] * oy
     y: cython.double = w.segment[at + PLACE + 2] * oy - w.segment[at + PLACE + 3] * ox
     x -= min(max(x, 0.0), w.segment[at + LENGTH])

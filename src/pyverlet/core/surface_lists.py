@@ -12,7 +12,7 @@ from cython.cimports.libc.math import floor, sqrt
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 from cython.cimports.team import team_stage
 
-from pyverlet.core.cells import BLOCK, wrapped
+from pyverlet.core.cells import BLOCK, image_of
 from pyverlet.core.obstacles import SEGMENT, SENSOR, accepts, accepts_segment, head_of, near_segment
 from pyverlet.core.one_way import is_one_way
 from pyverlet.core.step import BOX, CAGE, Step
@@ -107,8 +107,8 @@ def see(w: cython.pointer(Step), i: cython.Py_ssize_t, begin: cython.Py_ssize_t,
                 end = put_surface(w, begin, end, side) if fill else end + 1
     if w.solids == 0:
         return end
-    x: cython.double = wrapped(w.position[2 * i], w.cells.low_x, w.cells.period_x)
-    y: cython.double = wrapped(w.position[2 * i + 1], w.cells.low_y, w.cells.period_y)
+    x: cython.double = image_of(w.position[2 * i], w.checked[2 * i], w.cells.low_x, w.cells.period_x)
+    y: cython.double = image_of(w.position[2 * i + 1], w.checked[2 * i + 1], w.cells.low_y, w.cells.period_y)
     far += w.radius[i]
     row: int64_t
     column: int64_t

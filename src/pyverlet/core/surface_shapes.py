@@ -8,7 +8,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
 from cython.cimports.libc.stdint import int64_t
 
-from pyverlet.core.cells import wrapped
+from pyverlet.core.cells import image_of
 from pyverlet.core.obstacles import (
     AFTER,
     AROUND,
@@ -102,8 +102,8 @@ def path_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t
 def spot_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t, to: cython.int) -> Spot:
     """Particle i as the segment whose row begins at `at` sees it, as it stands at `to`: PLACE or LATE."""
     p: Spot
-    p.wx = wrapped(w.position[2 * i], w.cells.low_x, w.cells.period_x)
-    p.wy = wrapped(w.position[2 * i + 1], w.cells.low_y, w.cells.period_y)
+    p.wx = image_of(w.position[2 * i], w.checked[2 * i], w.cells.low_x, w.cells.period_x)
+    p.wy = image_of(w.position[2 * i + 1], w.checked[2 * i + 1], w.cells.low_y, w.cells.period_y)
     p.c = w.segment[at + to + 2]
     p.s = w.segment[at + to + 3]
     ox: cython.double = p.wx - w.segment[at + to]

@@ -155,14 +155,13 @@ def flag(name: str, value: Any) -> bool:
 
 
 def direction(name: str, value: Sequence[SupportsFloat] | NDArray[Any] | None) -> tuple[float, float] | None:
-    """A unit vector from (x, y) of any length but 0, or None."""
+    """Two finite floats (x, y) that are not both 0, or None."""
     if value is None:
         return None
-    x, y = vector(name, value)
-    length = math.hypot(x, y)
-    if length == 0.0:
-        raise InputError(f"{name} is {(x, y)}; allowed is a direction other than 0, or None")
-    return x / length, y / length
+    result = vector(name, value)
+    if result == (0.0, 0.0):
+        raise InputError(f"{name} is {result}; allowed is a direction other than 0, or None")
+    return result
 
 
 def indices(name: str, value: ArrayLike, count: int) -> NDArray[np.int64]:

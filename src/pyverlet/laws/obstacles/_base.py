@@ -131,7 +131,7 @@ class Obstacle(ABC):
     mask = Checked(checks.bit_set)
     sensor = Checked(checks.flag)
     one_way: tuple[float, float] | None = None
-    """Unit vector in which it is passable, relative to it at an angle of 0; None: in no direction."""
+    """Direction in which it is passable, relative to it at an angle of 0; None: in none."""
     table: Any = None
     """Its segments as the engine has them, made when it first meets a world."""
 
@@ -221,7 +221,7 @@ def _dashes(outline: Outline) -> list[Outline]:
 def _arrow(points: Points, way: tuple[float, float], angle: float) -> Outline:
     """In the middle of a line through points, the way it lets particles through."""
     c, s = np.cos(angle), np.sin(angle)
-    along = np.array([c * way[0] - s * way[1], s * way[0] + c * way[1]])
+    along = np.array([c * way[0] - s * way[1], s * way[0] + c * way[1]]) / np.hypot(*way)
     across = np.array([-along[1], along[0]])
     size = _ARROW * float(np.ptp(points, axis=0).max())
     k = (len(points) - 1) // 2

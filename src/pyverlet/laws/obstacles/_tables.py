@@ -289,7 +289,7 @@ def _solids(obstacles: list[Obstacle]) -> list[Obstacle]:
 
 def _set_way(rows: Array, obstacle: Obstacle) -> None:
     """The way through each of its segments, as that sees it."""
-    x, y = obstacle.one_way or (0.0, 0.0)
+    x, y = np.array(obstacle.one_way or (0.0, 0.0)) / (np.hypot(*obstacle.one_way) if obstacle.one_way else 1.0)
     rows["way_x"], rows["way_y"] = rows["lc"] * x + rows["ls"] * y, rows["lc"] * y - rows["ls"] * x
 
 
