@@ -163,6 +163,16 @@ def test_the_direction_turns_with_the_obstacle() -> None:
     assert balls.position[1, 1] == pytest.approx(-3, abs=1e-6)
 
 
+def test_it_is_drawn_with_an_arrow_that_turns_with_it() -> None:
+    line = pv.Segment((-3, 0), (3, 0), one_way=(0, 2))
+    for angle, way in ((0.0, (0, 1)), (np.pi / 2, (-1, 0))):
+        line.angle = angle
+        body, arrow = line.drawn()
+        assert np.array_equal(body.points, line.points)
+        head = arrow.points[1] - 0.5 * (arrow.points[0] + arrow.points[2])
+        assert head / np.hypot(*head) == pytest.approx(way)
+
+
 def test_any_direction_of_gravity_and_a_periodic_room() -> None:
     # The platform lies across the seam of a room, and gravity points to the right.
     room = pv.Periodic((0, 0), (10, 10), axes="y")
