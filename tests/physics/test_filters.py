@@ -88,7 +88,7 @@ def test_two_collide_if_each_has_a_bit_in_the_others_mask(dtype: Any) -> None:
     # All pairs of some filters, by the formula; those that are held lie on the floor, and events and contacts tell of them alone.
     bits = np.array([(1, EVERY), (2, 1), (1, 2), (6, 5), (0x80000000, 0x80000001), (0, EVERY), (EVERY, 0), (4, 4)], np.uint32)
     for category, mask in bits:
-        filters = {"category": int(category), "mask": int(mask)}
+        filters: dict[str, Any] = {"category": int(category), "mask": int(mask)}
         for kind in ("obstacle", "room"):
             obstacles = [pv.Segment((-5, 0), (15, 0), **filters)] if kind == "obstacle" else []
             room = pv.Box((-5, 0), (15, 9), **filters) if kind == "room" else None
@@ -162,7 +162,7 @@ def test_a_filter_that_changes_wakes_those_that_rely_on_it(change: str) -> None:
 
 @pytest.mark.parametrize("make", ["rope", "chain", "cloth", "net", "soft_body", "bridge"])
 def test_linked_bodies_have_filters(make: str) -> None:
-    def built(world: pv.World, **marks: int) -> Any:
+    def built(world: pv.World, **marks: Any) -> Any:
         if make in ("cloth", "net"):
             return getattr(pv, make)(world, (-1, 3), width=2, height=1, columns=5, rows=4, **marks)
         if make == "soft_body":

@@ -79,7 +79,13 @@ def busy(*sensors: pv.Obstacle, **options: Any) -> pv.World:
 
 def many() -> list[pv.Obstacle]:
     """Forty sensors, some of which move, rub and turn."""
-    moving = {"velocity": (0.5, 0.1), "angular_velocity": 0.7, "friction": 1.0, "surface_speed": 3.0, "restitution": 1.0}
+    moving: dict[str, Any] = {
+        "velocity": (0.5, 0.1),
+        "angular_velocity": 0.7,
+        "friction": 1.0,
+        "surface_speed": 3.0,
+        "restitution": 1.0,
+    }
     lines = [pv.Segment((-5, 0.2 * k), (5, 0.2 * k), sensor=True, **(moving if k % 3 == 0 else {})) for k in range(38)]
     return [*lines, pv.Disc((0, 0), 2, sensor=True), pv.Polygon([(-3, 0), (3, 0), (0, 4)], sensor=True, velocity=(0, 0.4))]
 
@@ -249,4 +255,4 @@ def test_nobody_is_refused_a_place_in_a_sensor_and_it_looks_different() -> None:
     assert len(disc.drawn()) > 5
     assert not any(filled for _, filled in disc.drawn())
     with pytest.raises(pv.InputError, match="sensor is 1; allowed are True and False"):
-        disc.sensor = 1  # type: ignore[assignment]
+        disc.sensor = 1
