@@ -9,7 +9,7 @@ from cython.cimports.arrays import doubles, indices, integers, small_integers
 from cython.cimports.libc.stdint import int32_t
 
 from pyverlet.core.cells import BLOCK
-from pyverlet.core.obstacles import LATE, PLACE, SENSOR, WAY, keeps_place, list_segment, put_segment
+from pyverlet.core.obstacles import LATE, PLACE, SEGMENT, SENSOR, WAY, keeps_place, list_segment, put_segment
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import CONTACT, DRAG, HELD, PUSH
 
@@ -59,7 +59,7 @@ def point_to_surfaces(w: cython.pointer(Step), a):
 
 @cython.cfunc
 def take_surfaces(w: cython.pointer(Step), a):
-    """(slot, surface, values) of contacts that carry load, or with one-way lines that hold."""
+    """(slot, surface, values) of contacts that carry load, and of those with one-way lines; the load is -1 where these pass."""
     # The list before, as long as it has not been looked through.
     side = (1 - w.side if w.surfaces_kept else w.side) if w.count > 0 else 0
     if w.count <= 0:
@@ -69,7 +69,9 @@ def take_surfaces(w: cython.pointer(Step), a):
     slot = np.repeat(np.arange(w.count, dtype=np.int32), count)
     place = np.arange(len(slot)) - np.repeat(np.cumsum(count) - count, count) + begin[slot]
     values = a[f"contact{side}"][place, PUSH : DRAG + 1]
-    loaded = (values[:, 0] > 0) | (a[f"contact{side}"][place, HELD] > 0)
+    held = a[f"contact{side}"][place, HELD]
+    values[held < 0, 0] = -1
+    loaded = (values[:, 0] > 0) | (held != 0)
     loaded &= a[f"surface{side}"][place] >= 0  # those of pinned circles are pairs
     return slot[loaded], a[f"surface{side}"][place[loaded]], values[loaded]
 
@@ -83,7 +85,8 @@ def give_surfaces(w: cython.pointer(Step), a, slot, surface, values):
     before = "0" if w.side else "1"
     a["surface" + before][: len(slot)] = surface
     a["contact" + before][: len(slot), PUSH : DRAG + 1] = values
-    a["contact" + before][: len(slot), HELD] = 1
+    a["contact" + before][: len(slot), HELD] = np.where(values[:, 0] < 0, -1, 1)
+    a["contact" + before][: len(slot), PUSH] = np.maximum(values[:, 0], 0)
     for name, side in (("contact_begin", "left"), ("contact_end", "right")):
         a[name + before][:] = np.searchsorted(slot, np.arange(w.count), side)
     w.surfaces_good, w.surfaces_kept = False, True
@@ -112,6 +115,8 @@ def place_obstacles(w: cython.pointer(Step), which, dt: cython.double, fresh: cy
         k: cython.Py_ssize_t = segment[n]
         put_segment(w, k, 0.0, PLACE)
         put_segment(w, k, 0.0, LATE)
+        if w.segment[SEGMENT * k + SENSOR] != 0:
+            continue  # nothing looks for it there
         if fresh or not keeps_place(w, k, dt):
             w.surfaces_good = False
             if not list_segment(w, k, dt):

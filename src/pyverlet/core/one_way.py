@@ -14,7 +14,7 @@ from cython.cimports.libc.math import fabs, sqrt
 from cython.cimports.libc.stdint import int64_t
 
 from pyverlet.core.cells import Cells, image_of
-from pyverlet.core.obstacles import BODY_OF, LENGTH, PLACE, ROUNDING, SEGMENT, WAY
+from pyverlet.core.obstacles import AFTER, BEFORE, BODY_OF, LENGTH, PLACE, ROUNDING, SEGMENT, WAY
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import CONTACT, DRAG, HELD, PUSH, SIDES
 
@@ -27,7 +27,15 @@ ROUNDED_AWAY = cython.declare(cython.double, 8)
 SIDEWAYS = cython.declare(cython.double, 1e-6)
 """Cosine of the angle to u: parts of a line along u hold nothing."""
 
-Side = cython.struct(held=cython.bint, overlaps=cython.bint)
+MOST_PARTS = cython.declare(cython.int, 64)
+"""Of a chain, one after the other, that are asked for the side of what is beyond a joint."""
+
+SHALLOW = cython.declare(cython.double, 0.1)
+"""Of the reach: what is found to overlap a line by less, and was not near it before, has been thrown there, and is held."""
+
+Side = cython.struct(held=cython.bint, overlaps=cython.bint, shallow=cython.bint)
+Nearby = cython.struct(beyond=cython.int, distance=cython.double, held=cython.bint)
+"""Of a particle: -1 before the start of a segment, 1 beyond its end; how far from it, m; whether on the side where it holds."""
 
 
 @cython.cfunc
@@ -45,15 +53,15 @@ def is_one_way(w: cython.pointer(Step), at: cython.Py_ssize_t) -> cython.bint:
 @cython.exceptval(check=False)
 def is_passable(w: cython.pointer(Step), k: cython.Py_ssize_t, at: cython.Py_ssize_t) -> cython.bint:
     """Whether the segment of contact k, whose row begins at `at`, does not hold the particle in this substep."""
-    return is_one_way(w, at) and w.contact[CONTACT * k + HELD] == 0
+    return is_one_way(w, at) and w.contact[CONTACT * k + HELD] <= 0
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def side_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t) -> Side:
-    """Whether particle i is on the side where a one-way segment holds, and whether it overlaps it."""
-    found: Side
+def spot_at(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t) -> Nearby:
+    """Where particle i is, as a one-way segment sees it."""
+    p: Nearby
     c: cython.pointer(Cells) = w.cells
     ox: cython.double = image_of(w.position[2 * i], w.checked[2 * i], c.low_x, c.period_x)
     oy: cython.double = image_of(w.position[2 * i + 1], w.checked[2 * i + 1], c.low_y, c.period_y)
@@ -61,13 +69,42 @@ def side_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t
     oy -= w.segment[at + PLACE + 1]
     x: cython.double = w.segment[at + PLACE + 2] * ox + w.segment[at + PLACE + 3] * oy
     y: cython.double = w.segment[at + PLACE + 2] * oy - w.segment[at + PLACE + 3] * ox
+    p.beyond = -1 if x < 0 else 1 if x > w.segment[at + LENGTH] else 0
     x -= min(max(x, 0.0), w.segment[at + LENGTH])
+    p.distance = sqrt(x * x + y * y)
+    p.held = x * w.segment[at + WAY] + y * w.segment[at + WAY + 1] > SIDEWAYS * p.distance
+    return p
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def side_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t) -> Side:
+    """Whether particle i is on the side where a one-way segment holds, and whether it overlaps it.
+
+    Beyond a joint that is decided by the part of the chain that it is at: seen from a summit, what comes up a slope is below.
+    """
+    found: Side
+    p: Nearby = spot_at(w, i, at)
     reach: cython.double = w.segment[at + ROUNDING] + w.radius[i]
     rounding: cython.double = 2.3e-16 if cython.sizeof(real) == 8 else 1.2e-7
     rounding *= ROUNDED_AWAY * (fabs(w.position[2 * i]) + fabs(w.position[2 * i + 1]))
-    distance: cython.double = sqrt(x * x + y * y)
-    found.held = x * w.segment[at + WAY] + y * w.segment[at + WAY + 1] > SIDEWAYS * distance
-    found.overlaps = distance < reach - OVERLAPS * reach - rounding
+    found.overlaps = p.distance < reach - OVERLAPS * reach - rounding
+    found.shallow = p.distance > (1 - SHALLOW) * reach
+    way: cython.int = p.beyond
+    _: cython.int
+    for _ in range(MOST_PARTS):
+        joint: cython.Py_ssize_t = at + (BEFORE if way < 0 else AFTER)
+        if way == 0 or p.beyond != way or (w.segment[joint] == 0 and w.segment[joint + 1] == 0):
+            break
+        following: cython.Py_ssize_t = at + way * SEGMENT
+        if following < 0 or following >= SEGMENT * w.segments or w.segment[following + BODY_OF] != w.segment[at + BODY_OF]:
+            break  # around a closed chain
+        q: Nearby = spot_at(w, i, following)
+        if q.beyond == -way:
+            break  # the joint is nearest
+        at, p = following, q
+    found.held = p.held
     return found
 
 
@@ -89,19 +126,25 @@ def find_sides(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
         whose: cython.double = w.segment[at + BODY_OF]
         overlaps: cython.bint = False
         stays: cython.bint = False
+        passes: cython.bint = False
+        thrown: cython.bint = False
         end = k
         while end < w.contact_end[i] and w.surface[end] >= SIDES:  # segments of an obstacle are listed one after the other
             at = SEGMENT * (cython.cast(int64_t, w.surface[end]) - SIDES)
             if w.segment[at + BODY_OF] != whose:
                 break
             side = side_of(w, i, at)
+            held: cython.double = w.contact[CONTACT * end + HELD]
             overlaps |= side.overlaps
-            stays |= side.overlaps and side.held and w.contact[CONTACT * end + HELD] != 0
+            passes |= side.overlaps and held < 0
+            stays |= side.held and held > 0
+            thrown |= side.held and held == 0 and side.overlaps and side.shallow
             end += 1
+        stays |= thrown and not passes
         for n in range(k, end):
             side = side_of(w, i, SEGMENT * (cython.cast(int64_t, w.surface[n]) - SIDES))
-            w.contact[CONTACT * n + HELD] = 1.0 if side.held and (stays or not overlaps) else 0.0
-            if w.contact[CONTACT * n + HELD] == 0:
+            w.contact[CONTACT * n + HELD] = 1.0 if side.held and (stays or not overlaps) else -1.0
+            if w.contact[CONTACT * n + HELD] < 0:
                 w.contact[CONTACT * n + PUSH] = w.contact[CONTACT * n + DRAG] = 0
         k = end
 
@@ -117,5 +160,5 @@ def stops(w: cython.pointer(Step), i: cython.Py_ssize_t, segment: cython.Py_ssiz
         return False
     for k in range(w.contact_begin[i], w.contact_end[i]):
         if w.surface[k] == SIDES + segment:
-            return w.contact[CONTACT * k + HELD] != 0
+            return w.contact[CONTACT * k + HELD] > 0
     return True  # it was far off

@@ -32,7 +32,7 @@ HEARD_SPEED = cython.declare(cython.int, 10)  # as in `Step`, of this frame, whi
 HEARD_BOUNCES = cython.declare(cython.int, 11)
 HEARD = cython.declare(cython.int, 12)
 BEFORE_CHAIN = cython.declare(cython.int, 13)  # (2) PUSH and DRAG before a chain was solved
-HELD = cython.declare(cython.int, 15)  # 1: by a one-way line, in this substep; see `core.one_way`
+HELD = cython.declare(cython.int, 15)  # by a one-way line: 1; -1: it passes; 0: not known
 
 ROUNDED = cython.declare(cython.double, 1e-6)
 """Of the reach: a face goes on so far beyond its ends, for what touches it at a joint to meet it in spite of rounding."""

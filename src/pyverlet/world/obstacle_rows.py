@@ -101,7 +101,8 @@ class ObstacleRows:
 
     def _build(self, engine: Any, count: int, radius: float, dt: float) -> None:
         """Make the grid of `count` obstacles, with cells as wide as the largest particle, or wider: not too many."""
-        s, (around, farthest) = self._segments, self._reach(count, dt)
+        solid = self._segments[:, _SENSOR] == 0  # sensors are not in it, so that it is the same without them
+        s, (around, farthest) = self._segments[solid], (each[solid] for each in self._reach(count, dt))
         cell, links = max(2.0 * radius, 4.0 * float(farthest.max(initial=0.0)) / 2.0**50, float(np.finfo(float).tiny)), 0.0
         if radius == 0.0 and len(s):
             cell = max(float(np.median(around + s[:, _LENGTH])), cell)
@@ -116,7 +117,7 @@ class ObstacleRows:
         self._heads = np.full(1 << max(int(links).bit_length(), 6), -1, np.int32)
         while True:
             self._give(engine, keep=False)
-            if engine.place_obstacles(np.arange(len(s), dtype=np.int32), dt, True):
+            if engine.place_obstacles(np.arange(len(self._segments), dtype=np.int32), dt, True):
                 return
             self._links = np.zeros((2 * len(self._links), 2), np.int32)
 
