@@ -245,6 +245,31 @@ def test_sleepers_stay_on_it_and_wake_on_it() -> None:
     assert (world.position[:, 1] < 0).all()
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_on_jagged_ground_all_have_the_bits_of_solid_ground(seed: int) -> None:
+    # Sharp summits and clefts, masses of 1:1000, fast discs, links: what comes from above cannot tell, nor whether sensors watch.
+    chance = np.random.default_rng(seed)
+    corners = np.column_stack((np.linspace(-6, 6, 15 + 3 * seed), chance.normal(0, 0.3, 15 + 3 * seed)))
+    law, dtype, hashes = pv.Collisions(friction=0.3, restitution=0.3), (np.float32, np.float64)[seed % 2], []
+    for way, watched in ((None, False), (UP, False), (UP, True)):
+        ground = pv.Chain(corners, one_way=way, friction=0.3)
+        watch = [pv.Segment((-6, k), (6, k), sensor=True, velocity=(0, 0.3 * k)) for k in range(3 * watched)]
+        room = pv.Box((-6, -30), (6, 40))
+        world = world_with(*watch, ground, dtype=dtype, collisions=law, boundary=room, substeps=4, events=True)
+        again = np.random.default_rng(seed + 100)
+        x, y = np.meshgrid(np.linspace(-5.3, 5.3, 9), 2.0 + 0.75 * np.arange(6))
+        world.add(
+            position=np.column_stack((x.ravel(), y.ravel())), radius=0.05 * 6 ** again.random(54),
+            mass=1000 ** again.random(54), velocity=again.normal(0, 3, (54, 2)),
+        )  # fmt: skip
+        if seed % 3 == 0:
+            pv.soft_body(world, pv.builders.box((-1, 10), (1, 11)), spacing=0.4)
+        world.run(seconds=3.0, dt=DT)
+        hashes.append(world.state_hash())
+        assert world.position[:, 1].min() > -1
+    assert hashes[0] == hashes[1] == hashes[2]
+
+
 def test_a_disc_may_be_added_inside_a_thick_one() -> None:
     world = world_with(pv.Capsule((-3, 0), (3, 0), radius=0.5, one_way=UP))
     assert world.is_free((0, 0)).all()

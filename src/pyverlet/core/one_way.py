@@ -31,9 +31,9 @@ MOST_PARTS = cython.declare(cython.int, 64)
 """Of a chain, one after the other, that are asked for the side of what is beyond a joint."""
 
 SHALLOW = cython.declare(cython.double, 0.1)
-"""Of the reach: what is found to overlap a line by less, and was not near it before, has been thrown there, and is held."""
+"""Of the reach: what is new to a line, and overlaps it by less or came from beyond it, was thrown there: it is held."""
 
-Side = cython.struct(held=cython.bint, overlaps=cython.bint, shallow=cython.bint)
+Side = cython.struct(held=cython.bint, overlaps=cython.bint, came=cython.bint)
 Nearby = cython.struct(beyond=cython.int, distance=cython.double, held=cython.bint)
 """Of a particle: -1 before the start of a segment, 1 beyond its end; how far from it, m; whether on the side where it holds."""
 
@@ -59,12 +59,18 @@ def is_passable(w: cython.pointer(Step), k: cython.Py_ssize_t, at: cython.Py_ssi
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def spot_at(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t) -> Nearby:
-    """Where particle i is, as a one-way segment sees it."""
+def spot_at(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t, ago: cython.double) -> Nearby:
+    """Where particle i is, or was so many seconds ago if nothing has struck it since, as a one-way segment sees it."""
     p: Nearby
     c: cython.pointer(Cells) = w.cells
     ox: cython.double = image_of(w.position[2 * i], w.checked[2 * i], c.low_x, c.period_x)
     oy: cython.double = image_of(w.position[2 * i + 1], w.checked[2 * i + 1], c.low_y, c.period_y)
+    if ago > 0:
+        b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[at + BODY_OF])
+        width: cython.Py_ssize_t = 4 if w.rough else 2
+        v: cython.pointer(real) = w.motion if w.rough else w.velocity
+        ox -= (v[width * i] - w.body[b + 3]) * ago
+        oy -= (v[width * i + 1] - w.body[b + 4]) * ago
     ox -= w.segment[at + PLACE]
     oy -= w.segment[at + PLACE + 1]
     x: cython.double = w.segment[at + PLACE + 2] * ox + w.segment[at + PLACE + 3] * oy
@@ -85,12 +91,13 @@ def side_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t
     Beyond a joint that is decided by the part of the chain that it is at: seen from a summit, what comes up a slope is below.
     """
     found: Side
-    p: Nearby = spot_at(w, i, at)
+    p: Nearby = spot_at(w, i, at, 0)
     reach: cython.double = w.segment[at + ROUNDING] + w.radius[i]
     rounding: cython.double = 2.3e-16 if cython.sizeof(real) == 8 else 1.2e-7
     rounding *= ROUNDED_AWAY * (fabs(w.position[2 * i]) + fabs(w.position[2 * i + 1]))
     found.overlaps = p.distance < reach - OVERLAPS * reach - rounding
-    found.shallow = p.distance > (1 - SHALLOW) * reach
+    q: Nearby = spot_at(w, i, at, w.h)
+    found.came = p.distance > (1 - SHALLOW) * reach or (q.held and q.distance > (1 - OVERLAPS) * reach)
     way: cython.int = p.beyond
     _: cython.int
     for _ in range(MOST_PARTS):
@@ -100,7 +107,7 @@ def side_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t
         following: cython.Py_ssize_t = at + way * SEGMENT
         if following < 0 or following >= SEGMENT * w.segments or w.segment[following + BODY_OF] != w.segment[at + BODY_OF]:
             break  # around a closed chain
-        q: Nearby = spot_at(w, i, following)
+        q = spot_at(w, i, following, 0)
         if q.beyond == -way:
             break  # the joint is nearest
         at, p = following, q
@@ -138,7 +145,7 @@ def find_sides(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
             overlaps |= side.overlaps
             passes |= side.overlaps and held < 0
             stays |= side.held and held > 0
-            thrown |= side.held and held == 0 and side.overlaps and side.shallow
+            thrown |= side.held and held == 0 and side.overlaps and side.came
             end += 1
         stays |= thrown and not passes
         for n in range(k, end):
