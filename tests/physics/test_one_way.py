@@ -84,6 +84,14 @@ def test_what_begins_on_a_line_passes(depth: float) -> None:
     assert world.state_hash() == free.state_hash()
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_what_is_put_on_it_a_little_too_deep_lies_on_it(dtype: Any) -> None:
+    world = world_with(PLATFORMS["joint"][0](one_way=UP), dtype=dtype)
+    discs = world.add(position=[(-1.0, 0.92 * R), (0.0, R), (1.0, 0.999 * R)], radius=R)
+    world.run(seconds=1.0, dt=DT)
+    assert discs.position[:, 1] == pytest.approx(R, abs=1e-6)
+
+
 def heap(floor: pv.Obstacle, dtype: Any, **options: Any) -> pv.World:
     """Discs of radii of 1:10 that fall on a floor between two walls of its own."""
     walls = [pv.Segment((x, -0.5), (x, 9), friction=0.3) for x in (-2.5, 2.5)]

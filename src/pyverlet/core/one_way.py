@@ -3,7 +3,8 @@
 
 A line holds a particle that does not overlap it and whose centre is, seen from the nearest point of the line, on the side that u
 points to. It goes on to hold it while they overlap, until the centre is no longer on that side; what overlaps a line without
-having been held passes, and all other parts of a chain let it pass meanwhile. This is decided once a substep, and remembered.
+having been held passes, and all other parts of a chain let it pass meanwhile. What is new to a line and all but beyond it, or was
+so a substep ago, is held. This is decided once a substep, and remembered.
 """
 
 from __future__ import annotations
