@@ -27,6 +27,9 @@ THINGS: list[Any] = [
     pv.Segment((0.1, 0.2), (1.3, 0.7), friction=0.3), pv.Capsule((0, 0), (1, 1 / 3), radius=0.1, surface_speed=2),
     pv.Disc((1 / 3, 2), 0.5, velocity=(1, 0)), pv.Polygon([(0, 0), (0, 1), (1 / 7, 0)], radius=0.1, angular_velocity=1.0),
     pv.Chain([(0, 0), (1, 0.3), (2, 0)], closed=True, pivot=(0.1, 0)),
+    pv.Box((0, 0), (1, 1), category=6, mask=2**32 - 2), pv.Circle(radius=2, mask=4), pv.Periodic((0, 0), (4, 4), mask=0),
+    pv.Disc((0, 0), 1, sensor=True, category=5), pv.Segment((0, 0), (1, 2), one_way=(0.3, 0.1)),
+    pv.Chain([(0, 0), (1, 0.3), (2, 0)], one_way=(0, 1), mask=9), pv.Capsule((0, 0), (1, 1), radius=0.1, one_way=(0, -2)),
 ]  # fmt: skip
 
 
@@ -42,6 +45,9 @@ def test_there_and_back(thing: Any) -> None:
     assert memory.plain(describe(again)) == described
     if isinstance(thing, pv.Obstacle):
         assert again.points.tobytes() == thing.points.tobytes()
+        assert again.one_way == thing.one_way
+    for name in ("category", "mask", "sensor"):
+        assert getattr(again, name, None) == getattr(thing, name, None)
 
 
 def test_an_obstacle_that_has_turned_keeps_every_bit() -> None:

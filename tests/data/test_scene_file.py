@@ -130,6 +130,30 @@ def test_a_file_builds_what_it_says(tmp_path: Path) -> None:
     assert not world.velocity[30:].any()
 
 
+def test_filters_sensors_and_one_way_lines(tmp_path: Path) -> None:
+    document = changed(
+        room={"type": "Box", "lower": [0, 0], "upper": [10, 10], "category": 4, "mask": 3},
+        builders=[{"type": "chain", "name": "links", "start": [1, 3], "end": [4, 3], "category": 2, "mask": 6}],
+        obstacles=[
+            {"type": "Segment", "start": [1, 2], "end": [9, 2], "one_way": [0, 1], "category": 4},
+            {"type": "Disc", "center": [5, 5], "radius": 2, "sensor": True, "mask": 2},
+            {"type": "Chain", "points": [[0, 1], [5, 0.5], [10, 1]], "mask": 6},
+        ],
+    )
+    scene = pv.scenes.read(written(tmp_path, document))
+    world = scene.world()
+    floor, disc, chain = world.obstacles
+    assert (floor.one_way, floor.category, disc.sensor, disc.mask, chain.one_way) == ((0.0, 1.0), 4, True, 2, None)
+    assert isinstance(world.boundary, pv.Box)
+    assert (world.boundary.category, world.boundary.mask) == (4, 3)
+    assert (world.category[-1], world.mask[-1]) == (2, 6)
+    scene.freeze(tmp_path / "b.toml")
+    again = pv.scenes.read(tmp_path / "b.toml").world()
+    for each in (world, again):
+        each.run(seconds=1.0)
+    assert again.state_hash() == world.state_hash()
+
+
 def test_settings_change_what_the_file_says(tmp_path: Path) -> None:
     scene = pv.scenes.read(written(tmp_path, SILO))
     assert scene.settings().particles == 30
@@ -166,6 +190,8 @@ def test_settings_change_what_the_file_says(tmp_path: Path) -> None:
         (changed(links=[{"type": "Stick", "ends": [["grains", 99], ["pegs", 0]]}]), "links[0]: "),
         (changed(forces=[{"type": "ConstantForce", "newtons": [1, 0], "group": "x"}]), "forces[0]: group is 'x'"),
         (changed(obstacles=[{"type": "Disc", "center": [5, 5], "radius": -1}]), "obstacles[0]: radius is -1"),
+        (changed(obstacles=[{"type": "Disc", "center": [5, 5], "radius": 1, "one_way": 1}]), "obstacles[0] has no key 'one_way'"),
+        (changed(obstacles=[{"type": "Segment", "start": [0, 0], "end": [1, 0], "mask": -1}]), "obstacles[0]: mask is -1"),
         (changed(scene="cage"), "names a scene and has"),
         (changed(settings={"particles": 3}), "has settings and names no scene"),
         ({"format": 1, "scene": "cge"}, "unknown scene 'cge' (did you mean 'cage'?)"),

@@ -166,7 +166,23 @@ def crowded() -> pv.World:
     return world
 
 
-FEATURES = (rubbing, told, sleeping, uneven, pouring, linked, crowded)
+def filtered() -> pv.World:
+    """Discs that some walls and platforms hold, others let through; sensors watch."""
+    law = pv.Collisions(friction=0.3)
+    room = pv.Box((0, 0), (12, 60), category=5)
+    world = pv.World(boundary=room, collisions=law, events=True, contacts=True)
+    world.add(position=pv.fill(pv.Box((1, 2), (11, 9)), radius=0.3, count=100).position, radius=0.3, category=3)
+    world.velocity[::3, 1] = 9.0
+    world.mask[::5] = 0xFFFFFFFE
+    world.obstacles += [
+        pv.Chain([(0, 8), (6, 7), (12, 8)], one_way=(0, 1)), pv.Segment((0, 4), (12, 4), one_way=(0, 1), velocity=(0, 0.2)),
+        pv.Disc((6, 5), 2, sensor=True, velocity=(0.3, 0)), pv.Segment((0, 6), (12, 6), sensor=True, mask=2),
+        pv.Disc((3, 3), 0.7, mask=4), pv.Disc((9, 3), 0.7, category=4),
+    ]  # fmt: skip
+    return world
+
+
+FEATURES = (rubbing, told, sleeping, uneven, pouring, linked, crowded, filtered)
 
 
 @pytest.mark.parametrize(("frames", "threads"), [(71, 2), *(pytest.param(141, n, marks=pytest.mark.slow) for n in (1, 2))])

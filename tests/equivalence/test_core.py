@@ -51,6 +51,33 @@ def test_uncompiled_it_has_the_same_bits(dtype: Any, more: dict[str, float], mon
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("room", [pv.Box((-2, -2), (2, 2), mask=5), pv.Periodic((-2, -2), (2, 2), axes="x", mask=5)])
+def test_uncompiled_filters_sensors_and_one_way_lines_have_the_same_bits(
+    dtype: Any, room: pv.Box, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def run() -> tuple[str, list[bytes]]:
+        made = pv.World(boundary=room, dtype=dtype, substeps=2, events=True)
+        made.obstacles += [
+            pv.Chain([(-2, -0.5), (0, -0.8), (1.9, -0.3)], one_way=(0, 1)),
+            pv.Segment((-2, 0.5), (2, 0.5), sensor=True),
+            pv.Polygon([(-1, -1), (1, -1), (0, 1)], sensor=True, angular_velocity=2.0),
+            pv.Disc((1, 0), 0.3, mask=2),
+        ]
+        y = np.linspace(-1.5, 1.5, 6)
+        speed = np.column_stack((0 * y, np.where(y < 0, 9, -40)))
+        made.add(position=np.column_stack((y, y)), velocity=speed, radius=0.15, category=[1, 2, 3, 4, 5, 6])
+        said = []
+        for _ in range(6):
+            made.step(1 / 60)
+            said += [made.events.begin[["a", "obstacle"]].tobytes(), made.events.end.tobytes()]
+        return made.state_hash(), said
+
+    compiled = run()
+    monkeypatch.setattr(core, "unit", functools.cache(reference.load))
+    assert run() == compiled
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_uncompiled_sleepers_wake_with_the_same_bits(dtype: Any, friction: float, monkeypatch: pytest.MonkeyPatch) -> None:
     def row() -> tuple[pv.World, list[int]]:

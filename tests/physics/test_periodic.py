@@ -439,3 +439,14 @@ def test_obstacles_across_the_seam(speed: float) -> None:
         assert other[0] == pytest.approx(velocity, abs=1e-9)
         assert _apart(other[1], place) < 1e-9
         assert _apart(other[2], pivot) < 1e-9
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_what_slides_along_an_obstacle_across_the_seam_stays_on_it(dtype: Any) -> None:
+    # In the substep in which its centre crosses the seam it still touches the image that it was on, not that of the other side.
+    world = pv.World(gravity=(9.81, 0), boundary=pv.Periodic((0, 0), (10, 10), axes="y"), dtype=dtype, collisions=None)
+    world.obstacles.append(pv.Segment((6, 8), (6, 12)))
+    discs = world.add(position=[(5.8, 0.52), (5.8, 9.48)], velocity=[(0, -1.5), (0, 1.5)], radius=0.2)
+    world.run(seconds=1.0, dt=1 / 60)
+    assert discs.position[:, 0] == pytest.approx(5.8, abs=1e-6)
+    assert discs.position[:, 1] == pytest.approx([9.02, 0.98], abs=480 * 1e-6)  # so many roundings of 10 m

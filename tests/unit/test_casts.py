@@ -148,7 +148,7 @@ def test_first_hits_are_those_of_brute_force(room: str, dtype: Any, spread: floa
     if filtered:
         world.boundary.category, world.boundary.mask = 2, 5  # type: ignore[attr-defined]
         for k, each in enumerate(world.obstacles):
-            each.category, each.mask = 1 + k % 7, 1 + (k * 3) % 7  # type: ignore[attr-defined]
+            each.category, each.mask = 1 + k % 7, 1 + (k * 3) % 7
     found = world.circle_cast(start, heading, size, length, category=category, mask=mask)
     if not moving:
         again = world.ray(start, heading, length, category=category, mask=mask)

@@ -121,6 +121,17 @@ def wrapped(value: real, low: cython.double, period: cython.double) -> real:
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def image_of(value: real, seen: real, low: cython.double, period: cython.double) -> real:
+    """The image of a coordinate that belongs to that of `seen` inside the room: itself where the period is 0."""
+    if period > 0:
+        value = cython.cast(real, value - period * floor((seen - low) / period))
+    return value
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def find_cells(c: cython.pointer(Cells), block: cython.Py_ssize_t) -> cython.void:

@@ -23,7 +23,15 @@ from pyverlet.core.engine_arrays import (
 from pyverlet.core.engine_hearing import hear, make_hearing_arrays
 from pyverlet.core.engine_impulses import fill_kept, read_impulses
 from pyverlet.core.engine_links import fill_links
-from pyverlet.core.engine_surfaces import give_surfaces, make_surface_arrays, place_obstacles, set_obstacles, take_surfaces
+from pyverlet.core.engine_surfaces import (
+    give_surfaces,
+    make_sensing_arrays,
+    make_surface_arrays,
+    place_obstacles,
+    set_obstacles,
+    take_surfaces,
+    touched_of,
+)
 from pyverlet.core.engine_work import energy_of_last, friction_of_last, rolling_of_last
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_ends import show_links
@@ -146,11 +154,12 @@ class Engine:
         if self.w.linked and half > 0:
             show_links(cython.address(self.w), half, kick)
 
-    def set_room(self, room, x0, y0, x1, y1, restitution, friction, rolling, speed, material=0):
+    def set_room(self, room, x0, y0, x1, y1, restitution, friction, rolling, speed, material=0, category=0, mask=0):
         """Walls: none (0); a cage (1) by centre and radius; a box (2) by two corners; m. speed: of a cage's surface, m/s."""
         w: cython.pointer(Step) = cython.address(self.w)
-        if (w.room, w.x0, w.y0, w.x1, w.y1) != (room, x0, y0, x1, y1):
+        if (w.room, w.x0, w.y0, w.x1, w.y1, w.wall_category, w.wall_mask) != (room, x0, y0, x1, y1, category, mask):
             w.room, w.x0, w.y0, w.x1, w.y1, w.surfaces_good = room, x0, y0, x1, y1, False
+            w.wall_category, w.wall_mask = category, mask
         w.wall_restitution, w.wall_friction, w.wall_rolling, w.wall_speed = restitution, friction, rolling, speed
         w.wall_material = material
 
@@ -219,6 +228,11 @@ class Engine:
         w.listening, w.collected, w.waiting = wanted, True, False
         if wanted:
             hear(w, self.arrays)
+            make_sensing_arrays(w, self.arrays)
+
+    def touched_sensors(self):
+        """(slots, sensors) that have touched since, and that do at the end of the last call."""
+        return touched_of(self.arrays["sensed"]), touched_of(self.arrays["inside"])
 
     def tell(self):
         """What was heard since: of pairs (i, j, speed, bounces), of surfaces (slot, surface, speed, bounces); a list of such."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import cython
 import numpy as np
-from cython.cimports.arrays import doubles, integers, small_integers
+from cython.cimports.arrays import doubles, indices, integers, small_integers
 from cython.cimports.libc.stdint import int32_t
 
 from pyverlet.core.cells import BLOCK
-from pyverlet.core.obstacles import LATE, PLACE, keeps_place, list_segment, put_segment
+from pyverlet.core.obstacles import LATE, PLACE, SEGMENT, SENSOR, WAY, keeps_place, list_segment, put_segment
 from pyverlet.core.step import Step
-from pyverlet.core.surface_rows import CONTACT, PUSH, ROLL
+from pyverlet.core.surface_rows import CONTACT, HELD, PUSH, ROLL
 
 
 @cython.cfunc
@@ -59,7 +59,7 @@ def point_to_surfaces(w: cython.pointer(Step), a):
 
 @cython.cfunc
 def take_surfaces(w: cython.pointer(Step), a):
-    """(slot, surface, values) of contacts that carry load."""
+    """(slot, surface, values) of contacts that carry load, and of those with one-way lines; the load is -1 where these pass."""
     # The list before, as long as it has not been looked through.
     side = (1 - w.side if w.surfaces_kept else w.side) if w.count > 0 else 0
     if w.count <= 0:
@@ -69,7 +69,10 @@ def take_surfaces(w: cython.pointer(Step), a):
     slot = np.repeat(np.arange(w.count, dtype=np.int32), count)
     place = np.arange(len(slot)) - np.repeat(np.cumsum(count) - count, count) + begin[slot]
     values = a[f"contact{side}"][place, PUSH : ROLL + 1]
-    loaded = (values[:, 0] > 0) & (a[f"surface{side}"][place] >= 0)  # those of pinned circles are pairs
+    held = a[f"contact{side}"][place, HELD]
+    values[held < 0, 0] = -1
+    loaded = (values[:, 0] > 0) | (held != 0)
+    loaded &= a[f"surface{side}"][place] >= 0  # those of pinned circles are pairs
     return slot[loaded], a[f"surface{side}"][place[loaded]], values[loaded]
 
 
@@ -82,6 +85,8 @@ def give_surfaces(w: cython.pointer(Step), a, slot, surface, values):
     before = "0" if w.side else "1"
     a["surface" + before][: len(slot)] = surface
     a["contact" + before][: len(slot), PUSH : ROLL + 1] = values
+    a["contact" + before][: len(slot), HELD] = np.where(values[:, 0] < 0, -1, 1)
+    a["contact" + before][: len(slot), PUSH] = np.maximum(values[:, 0], 0)
     for name, side in (("contact_begin", "left"), ("contact_end", "right")):
         a[name + before][:] = np.searchsorted(slot, np.arange(w.count), side)
     w.surfaces_good, w.surfaces_kept = False, True
@@ -93,6 +98,8 @@ def set_obstacles(w: cython.pointer(Step), a, cell: cython.double, keep: cython.
     w.segments, w.moving_count = len(a["segments"]), len(a["moving"])
     w.segment, w.body, w.moving = doubles(a["segments"]), doubles(a["bodies"]), small_integers(a["moving"])
     w.cell, w.cell_heads, w.head, w.link = cell, len(a["heads"]), small_integers(a["heads"]), small_integers(a["links"])
+    w.solids, w.sensors = int((a["segments"][:, SENSOR] == 0).sum()), int(a["segments"][:, SENSOR].max(initial=0))
+    w.one_way = bool(a["segments"][:, WAY : WAY + 2].any())
     w.surfaces_good = False
     if not keep:
         a["heads"].fill(-1)
@@ -108,8 +115,28 @@ def place_obstacles(w: cython.pointer(Step), which, dt: cython.double, fresh: cy
         k: cython.Py_ssize_t = segment[n]
         put_segment(w, k, 0.0, PLACE)
         put_segment(w, k, 0.0, LATE)
+        if w.segment[SEGMENT * k + SENSOR] != 0:
+            continue  # nothing looks for it there
         if fresh or not keeps_place(w, k, dt):
             w.surfaces_good = False
             if not list_segment(w, k, dt):
                 return False
     return True
+
+
+@cython.cfunc
+def make_sensing_arrays(w: cython.pointer(Step), a):
+    """No sensor is touched yet."""
+    shape = max(w.count, 0), (w.sensors + 31) // 32
+    if "sensed" not in a or a["sensed"].shape != shape:
+        a["sensed"], a["inside"] = np.zeros(shape, np.uint32), np.zeros(shape, np.uint32)
+        w.sensed, w.inside = indices(a["sensed"]), indices(a["inside"])
+    a["sensed"].fill(0)
+
+
+@cython.cfunc
+def touched_of(words):
+    """(slots, sensors) whose bits are set in (count, words), by slot."""
+    slot, word = np.nonzero(words)
+    row, bit = np.nonzero((words[slot, word][:, None] >> np.arange(32, dtype=np.uint32)) & 1)
+    return slot[row], 32 * word[row] + bit

@@ -29,6 +29,7 @@ from pyverlet.core.links import begin_links, end_links, relax_links, remember_li
 from pyverlet.core.obstacles import place_moving
 from pyverlet.core.particle_stages import drift, kick_stage, moves_stage, remember_stage
 from pyverlet.core.relisting import each_group
+from pyverlet.core.sensors import sense
 from pyverlet.core.step import OPEN, Step
 from pyverlet.core.surface_contacts import hold_surfaces, relax_surfaces, warm_surfaces
 from pyverlet.core.surface_sides import keep_inside, keep_sides
@@ -79,7 +80,7 @@ def hold_on_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Surfaces once more hold particles of a block: pairs may have thrown them there."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     hold_surfaces_stage(what, block)
-    if w.segments > 0:
+    if w.solids > 0:
         keep_sides(w, block)
 
 
@@ -105,6 +106,8 @@ def drift_stage(what: cython.p_void, block: cython.int) -> cython.void:
         hold_on_stage(what, block)
     elif w.room != OPEN:
         keep_inside(w, block)
+    if w.listening and w.sensors > 0:
+        sense(w, block)
     drift(w, a, min(a + BLOCK, w.count), block)
     if w.booking:
         book_drift(w, block)
@@ -231,7 +234,7 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     fastest: real = cython.cast(real, sqrt(most))
     w.far = 2 * w.h * fastest + w.near
     w.least_bounce = max(w.rest_speed, fastest * cython.cast(real, 1e-14 if cython.sizeof(real) == 8 else 2e-6))
-    surfaces: cython.bint = w.room != OPEN or w.segments > 0 or w.pins
+    surfaces: cython.bint = w.room != OPEN or w.solids > 0 or w.pins
     if w.linked:
         begin_links(w, surfaces)
     place_moving(w)

@@ -1,18 +1,19 @@
 # mypy: ignore-errors
 """Questions about obstacles where they stand: which covers a point, and which are the nearest.
 
-A segment is ten numbers: start and direction, length, rounding, inner (who is inside its polygon is as near as this), its body,
-and the first and how many faces of its polygon. Segments stand in a grid of hashed cells, each in all cells within reach of it.
+A segment is thirteen numbers: start and direction, length, rounding, inner (who is inside its polygon is as near as this), its
+body, the first and how many faces of its polygon, its category and mask, and 1 if particles pass through it. Segments stand in a
+grid of hashed cells, each in all cells within reach of it.
 """
 
 from __future__ import annotations
 
 import cython
-from cython.cimports.arrays import const_doubles, const_small_integers, doubles, integers, small_integers
+from cython.cimports.arrays import const_doubles, const_indices, const_small_integers, doubles, integers, small_integers
 from cython.cimports.libc.math import INFINITY, fabs, floor, hypot
-from cython.cimports.libc.stdint import int32_t, int64_t
+from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 
-PLACED = cython.declare(cython.int, 10)
+PLACED = cython.declare(cython.int, 13)
 X = cython.declare(cython.int, 0)
 Y = cython.declare(cython.int, 1)
 COSINE = cython.declare(cython.int, 2)
@@ -23,6 +24,9 @@ INNER = cython.declare(cython.int, 6)
 BODY = cython.declare(cython.int, 7)
 FIRST = cython.declare(cython.int, 8)
 FACES = cython.declare(cython.int, 9)
+CATEGORY = cython.declare(cython.int, 10)
+MASK = cython.declare(cython.int, 11)
+PASSABLE = cython.declare(cython.int, 12)
 
 FARTHEST = cython.declare(cython.double, 1125899906842624.0)
 """Cells from the origin, 2^50, to where a point can still be looked up."""
@@ -34,6 +38,9 @@ Grid = cython.struct(
     head=cython.pointer[cython.const[int32_t]],
     heads=int64_t,
     link=cython.pointer[cython.const[int32_t]],
+    category=cython.pointer[cython.const[uint32_t]],  # of the points
+    mask=cython.pointer[cython.const[uint32_t]],
+    filtered=cython.bint,  # whether they have any
 )
 Gap = cython.struct(gap=cython.double, x=cython.double, y=cython.double)
 
@@ -115,11 +122,14 @@ def list_segments(segments, reach: cython.double, cell: cython.double, heads, li
 
 
 @cython.cfunc
-def grid_of(segments, cell: cython.double, heads, links) -> Grid:
-    """As a struct."""
+def grid_of(segments, cell: cython.double, heads, links, category=None, mask=None) -> Grid:
+    """As a struct; category and mask: (n,) of the points, or empty or None: then all count that there is."""
     g: Grid
     g.segment, g.segments, g.cell = const_doubles(segments), len(segments), cell
     g.head, g.heads, g.link = const_small_integers(heads), len(heads), const_small_integers(links)
+    g.filtered = category is not None and len(category) > 0
+    if g.filtered:
+        g.category, g.mask = const_indices(category), const_indices(mask)
     return g
 
 
@@ -154,6 +164,22 @@ def gap_to(g: cython.pointer(Grid), k: cython.Py_ssize_t, x: cython.double, y: c
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def gap_of(g: cython.pointer(Grid), i: cython.Py_ssize_t, k: cython.Py_ssize_t, x: cython.double, y: cython.double) -> Gap:
+    """The same of point i at (x, y); infinite where it does not collide with segment k."""
+    found: Gap
+    found.gap, found.x, found.y = INFINITY, 0.0, 0.0
+    if g.filtered:
+        category: uint32_t = cython.cast(uint32_t, g.segment[PLACED * k + CATEGORY])
+        mask: uint32_t = cython.cast(uint32_t, g.segment[PLACED * k + MASK])
+        if (g.category[i] & mask) == 0 or (category & g.mask[i]) == 0:
+            return found
+    return gap_to(g, k, x, y)
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def is_within(
@@ -180,9 +206,9 @@ def is_covered(g: cython.pointer(Grid), k: cython.Py_ssize_t, x: cython.double, 
     return is_within(g.segment, k, x, y)
 
 
-def covered_by(segments, cell: cython.double, heads, links, position, by):
+def covered_by(segments, cell: cython.double, heads, links, position, category, mask, by):
     """by[i]: the body that has point i of (n, 2) in it, of several the first; -1 for none. Lines have no inside."""
-    grid: Grid = grid_of(segments, cell, heads, links)
+    grid: Grid = grid_of(segments, cell, heads, links, category, mask)
     g: cython.pointer(Grid) = cython.address(grid)
     x: cython.pointer[cython.const[cython.double]] = const_doubles(position)
     to: cython.pointer(int64_t) = integers(by)
@@ -197,20 +223,22 @@ def covered_by(segments, cell: cython.double, heads, links, position, by):
             while link >= 0:
                 k: cython.Py_ssize_t = g.link[2 * link]
                 body: int64_t = cython.cast(int64_t, g.segment[PLACED * k + BODY])
-                if (to[i] < 0 or body < to[i]) and is_covered(g, k, x[2 * i], x[2 * i + 1]):
+                counts: cython.bint = (to[i] < 0 or body < to[i]) and g.segment[PLACED * k + PASSABLE] == 0
+                if counts and gap_of(g, i, k, x[2 * i], x[2 * i + 1]).gap < INFINITY and is_covered(g, k, x[2 * i], x[2 * i + 1]):
                     to[i] = body
                 link = g.link[2 * link + 1]
 
 
 def nearest_bodies(
-    segments, bodies: int64_t, reach: cython.double, cell: cython.double, heads, links, position, beyond, row, body, gap, normal
-) -> int:
+    segments, bodies: int64_t, reach: cython.double, cell: cython.double, heads, links, position, beyond, category, mask, row,
+    body, gap, normal,
+) -> int:  # fmt: skip
     """The bodies nearest to each of the points (n, 2), and those at most `beyond` (n,) m farther away.
 
     bodies: how many, without images. reach: m, up to which a cell knows all segments near it; who is farther from all is compared
     with each. Fills row, body, gap and normal, and returns how many there are, also beyond their room.
     """
-    grid: Grid = grid_of(segments, cell, heads, links)
+    grid: Grid = grid_of(segments, cell, heads, links, category, mask)
     g: cython.pointer(Grid) = cython.address(grid)
     place: cython.pointer[cython.const[cython.double]] = const_doubles(position)
     extra: cython.pointer[cython.const[cython.double]] = const_doubles(beyond)
@@ -227,17 +255,17 @@ def nearest_bodies(
             x: cython.double = place[2 * i]
             y: cython.double = place[2 * i + 1]
             each: cython.bint = not fabs(x) + fabs(y) < FARTHEST * g.cell
-            least: cython.double = least_gap(g, x, y, each)
+            least: cython.double = least_gap(g, i, x, y, each)
             if not each and least + extra[i] > reach:
                 each = True
-                least = least_gap(g, x, y, each)
+                least = least_gap(g, i, x, y, each)
             begun: cython.Py_ssize_t = found
             link: int64_t = 0 if each else first_link(g, x, y)
             while link >= 0 and link < (g.segments if each else link + 1):
                 k: cython.Py_ssize_t = link if each else g.link[2 * link]
                 link = link + 1 if each else g.link[2 * link + 1]
-                there: Gap = gap_to(g, k, x, y)
-                if not there.gap <= least + extra[i]:
+                there: Gap = gap_of(g, i, k, x, y)
+                if not there.gap <= least + extra[i] or there.gap == INFINITY:
                     continue
                 which: int64_t = cython.cast(int64_t, g.segment[PLACED * k + BODY]) % bodies
                 at: cython.Py_ssize_t = begun
@@ -253,17 +281,19 @@ def nearest_bodies(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def least_gap(g: cython.pointer(Grid), x: cython.double, y: cython.double, each: cython.bint) -> cython.double:
-    """Distance of (x, y) from the nearest segment of its cell, or of all."""
+def least_gap(
+    g: cython.pointer(Grid), i: cython.Py_ssize_t, x: cython.double, y: cython.double, each: cython.bint
+) -> cython.double:
+    """Distance of point i at (x, y) from the nearest segment of its cell, or of all."""
     least: cython.double = INFINITY
     k: cython.Py_ssize_t
     if each:
         for k in range(g.segments):
-            least = min(least, gap_to(g, k, x, y).gap)
+            least = min(least, gap_of(g, i, k, x, y).gap)
         return least
     link: int32_t = first_link(g, x, y)
     while link >= 0:
-        least = min(least, gap_to(g, g.link[2 * link], x, y).gap)
+        least = min(least, gap_of(g, i, g.link[2 * link], x, y).gap)
         link = g.link[2 * link + 1]
     return least
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.libc.math import cos, fabs, floor, sin, sqrt
-from cython.cimports.libc.stdint import int32_t, int64_t
+from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 
 from pyverlet.core.step import Step
 
 SEGMENT = cython.declare(cython.int, 40)
-"""Numbers of a segment, in metres. The first 18 are as in `laws.obstacles`, the others are made here."""
+"""Numbers of a segment, in metres. The first 23 are as in `laws.obstacles`, the others are made here."""
 BODY_OF = cython.declare(cython.int, 0)
 FIRST_FACE = cython.declare(cython.int, 1)  # of the polygon, FACES many; none if it is no part of one
 FACES = cython.declare(cython.int, 2)
@@ -24,12 +24,16 @@ AFTER = cython.declare(cython.int, 13)
 RESTITUTION = cython.declare(cython.int, 15)
 FRICTION = cython.declare(cython.int, 16)
 BELT = cython.declare(cython.int, 17)
-PLACE = cython.declare(cython.int, 18)  # start and direction (4) at the beginning of the substep
-LATE = cython.declare(cython.int, 22)  # and at its end
-SPARE = cython.declare(cython.int, 26)  # how far it may move until it is to be listed again
-LISTED = cython.declare(cython.int, 27)  # start and end (4) when it was
-ROLLS = cython.declare(cython.int, 31)  # coefficient of rolling resistance of its surface
-MATERIAL = cython.declare(cython.int, 32)  # which of `Step.materials`
+CATEGORY = cython.declare(cython.int, 18)  # 32 bits each
+MASK = cython.declare(cython.int, 19)
+WAY = cython.declare(cython.int, 20)  # (2) unit vector in which it is passable, in its own frame; 0: in no direction
+SENSOR = cython.declare(cython.int, 22)  # 1 + number among the sensors; 0: it is none
+PLACE = cython.declare(cython.int, 23)  # start and direction (4) at the beginning of the substep
+LATE = cython.declare(cython.int, 27)  # and at its end
+SPARE = cython.declare(cython.int, 31)  # how far it may move until it is to be listed again
+LISTED = cython.declare(cython.int, 32)  # start and end (4) when it was
+ROLLS = cython.declare(cython.int, 36)  # coefficient of rolling resistance of its surface
+MATERIAL = cython.declare(cython.int, 37)  # which of `Step.materials`
 
 SPARE_FRAMES = cython.declare(cython.double, 4.0)
 """Frames for which a segment that moves is listed ahead."""
@@ -162,3 +166,25 @@ def near_segment(
     if w.segment[at + FACES] > 0:
         far += w.segment[at + INNER]
     return past * past + across * across <= far * far
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def accepts(w: cython.pointer(Step), i: cython.Py_ssize_t, category: uint32_t, mask: uint32_t) -> cython.bint:
+    """Whether particle i and something else each have a bit of their category in the other's mask."""
+    if w.lists.filtered:
+        return (w.lists.category[i] & mask) != 0 and (w.lists.mask[i] & category) != 0
+    return (mask & 1) != 0 and category != 0
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def accepts_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t) -> cython.bint:
+    """The same of segment k, as an obstacle or as a sensor."""
+    at: cython.Py_ssize_t = SEGMENT * k
+    category: uint32_t = cython.cast(uint32_t, w.segment[at + CATEGORY])
+    return accepts(w, i, category, cython.cast(uint32_t, w.segment[at + MASK]))

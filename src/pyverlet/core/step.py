@@ -119,6 +119,13 @@ Step = cython.struct(
     wall_material=cython.Py_ssize_t,
     # ---- obstacles, and the list of surfaces that particles may touch: walls and segments; see `core.surface_lists`
     surfaces_good=cython.bint,  # whether the list is about the particles, the room and the obstacles of now
+    wall_category=uint32_t,  # of the room
+    wall_mask=uint32_t,
+    one_way=cython.bint,  # whether an obstacle is
+    solids=cython.Py_ssize_t,  # segments of obstacles that are no sensors
+    sensors=cython.Py_ssize_t,  # how many there are, while `listening`; see `core.sensors`
+    sensed=cython.pointer(uint32_t),  # (count, words) a bit for each sensor that a particle has touched in this frame
+    inside=cython.pointer(uint32_t),  # and that it touches at the end of it
     surfaces_kept=cython.bint,  # whether what it remembers has been put where the next one looks for it
     side=cython.int,  # which of two lists is that of now; the other is the one before
     since=cython.pointer(cython.double),  # (count,) s into the substep, of the last impact, or 0

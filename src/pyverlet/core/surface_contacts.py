@@ -7,6 +7,7 @@ import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import fabs, sqrt
 
+from pyverlet.core.one_way import find_sides
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import (
     BEND,
@@ -335,6 +336,8 @@ def relax_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void
 def warm_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """What surfaces gave particle i in the last substep, along the normals of now."""
     k: cython.Py_ssize_t
+    if w.one_way:
+        find_sides(w, i)
     for k in range(w.contact_begin[i], w.contact_end[i]):
         first: cython.Py_ssize_t = CONTACT * k
         if w.surface[k] < 0 and w.noting:

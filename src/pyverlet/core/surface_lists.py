@@ -12,8 +12,9 @@ from cython.cimports.libc.math import floor, sqrt
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 from cython.cimports.team import team_stage
 
-from pyverlet.core.cells import BLOCK, wrapped
-from pyverlet.core.obstacles import head_of, near_segment
+from pyverlet.core.cells import BLOCK, image_of
+from pyverlet.core.obstacles import SEGMENT, SENSOR, accepts, accepts_segment, head_of, near_segment
+from pyverlet.core.one_way import is_one_way
 from pyverlet.core.step import BOX, CAGE, Step
 from pyverlet.core.surface_rows import (
     CONTACT,
@@ -21,6 +22,7 @@ from pyverlet.core.surface_rows import (
     HEARD,
     HEARD_BOUNCES,
     HEARD_SPEED,
+    HELD,
     PUSH,
     ROLL,
     SIDES,
@@ -89,6 +91,17 @@ def put_surface(w: cython.pointer(Step), begin: cython.Py_ssize_t, end: cython.P
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def sees(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, x: cython.double, y: cython.double, far: cython.double
+) -> cython.bint:
+    """Whether particle i at (x, y) collides with segment k if it comes there, and is that near."""
+    return near_segment(w, k, x, y, far) and w.segment[SEGMENT * k + SENSOR] == 0 and accepts_segment(w, i, k)
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def see(w: cython.pointer(Step), i: cython.Py_ssize_t, begin: cython.Py_ssize_t, fill: cython.bint) -> cython.Py_ssize_t:
@@ -100,14 +113,14 @@ def see(w: cython.pointer(Step), i: cython.Py_ssize_t, begin: cython.Py_ssize_t,
     while pair >= 0:
         end = put_surface(w, begin, end, -1 - pair) if fill else end + 1
         pair = w.lists.kept_next[pair]
-    if w.room == BOX or w.room == CAGE:
+    if (w.room == BOX or w.room == CAGE) and accepts(w, i, w.wall_category, w.wall_mask):
         for side in range(4):
             if near_side(w, i, side, far):
                 end = put_surface(w, begin, end, side) if fill else end + 1
-    if w.segments == 0:
+    if w.solids == 0:
         return end
-    x: cython.double = wrapped(w.position[2 * i], w.cells.low_x, w.cells.period_x)
-    y: cython.double = wrapped(w.position[2 * i + 1], w.cells.low_y, w.cells.period_y)
+    x: cython.double = image_of(w.position[2 * i], w.checked[2 * i], w.cells.low_x, w.cells.period_x)
+    y: cython.double = image_of(w.position[2 * i + 1], w.checked[2 * i + 1], w.cells.low_y, w.cells.period_y)
     far += w.radius[i]
     row: int64_t
     column: int64_t
@@ -118,7 +131,7 @@ def see(w: cython.pointer(Step), i: cython.Py_ssize_t, begin: cython.Py_ssize_t,
     k: cython.Py_ssize_t
     if (last - first + 1) * cython.cast(cython.double, high - low + 1) > w.segments:  # so far that all are looked at in less time
         for k in range(w.segments):
-            if near_segment(w, k, x, y, far):
+            if sees(w, i, k, x, y, far):
                 end = put_surface(w, begin, end, cython.cast(int32_t, SIDES + k)) if fill else end + 1
         return end
     for row in range(low, high + 1):
@@ -127,7 +140,7 @@ def see(w: cython.pointer(Step), i: cython.Py_ssize_t, begin: cython.Py_ssize_t,
             while link >= 0:
                 k = w.link[2 * link]
                 link = w.link[2 * link + 1]
-                if near_segment(w, k, x, y, far):
+                if sees(w, i, k, x, y, far):
                     end = put_surface(w, begin, end, cython.cast(int32_t, SIDES + k)) if fill else end + 1
     return end
 
@@ -171,6 +184,7 @@ def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
         w.contact_end[i] = cython.cast(int32_t, end)
         for k in range(begin, end):
             w.contact[CONTACT * k + PUSH] = w.contact[CONTACT * k + DRAG] = w.contact[CONTACT * k + ROLL] = 0
+            w.contact[CONTACT * k + HELD] = 0
             w.contact[CONTACT * k + HEARD_SPEED] = w.contact[CONTACT * k + HEARD_BOUNCES] = w.contact[CONTACT * k + HEARD] = 0
             if w.surface[k] < 0:
                 w.contact[CONTACT * k + PUSH] = w.impulse[pinned_lane(w, k)]
@@ -183,6 +197,8 @@ def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
                     w.contact[CONTACT * k + PUSH] = w.old_contact[CONTACT * o + PUSH]
                     w.contact[CONTACT * k + DRAG] = w.old_contact[CONTACT * o + DRAG]
                     w.contact[CONTACT * k + ROLL] = w.old_contact[CONTACT * o + ROLL]
+                    if w.surface[k] >= SIDES and is_one_way(w, SEGMENT * (cython.cast(int64_t, w.surface[k]) - SIDES)):
+                        w.contact[CONTACT * k + HELD] = w.old_contact[CONTACT * o + HELD]
 
 
 @cython.cfunc

@@ -20,7 +20,7 @@ SIDES = cython.declare(cython.int, 4)
 From there on they are segments. Negative ones are pinned circles: -1 - k is that of lane k of the list of pairs.
 """
 
-CONTACT = cython.declare(cython.int, 18)
+CONTACT = cython.declare(cython.int, 19)
 NORMAL = cython.declare(cython.int, 0)  # (2)
 GAP = cython.declare(cython.int, 2)  # m
 BEND = cython.declare(cython.int, 3)  # 1/m; positive: the surface bends towards the particle, as a cage does
@@ -36,6 +36,7 @@ HEARD = cython.declare(cython.int, 13)
 BEFORE_CHAIN = cython.declare(cython.int, 14)  # (2) PUSH and DRAG before a chain was solved
 ROLL_MOST = cython.declare(cython.int, 16)  # most of that over PUSH: coefficient times radius, m
 SPIN = cython.declare(cython.int, 17)  # of the surface, rad/s
+HELD = cython.declare(cython.int, 18)  # by a one-way line: 1; -1: it passes; 0: not known
 
 ROUNDED = cython.declare(cython.double, 1e-6)
 """Of the reach: a face goes on so far beyond its ends, for what touches it at a joint to meet it in spite of rounding."""

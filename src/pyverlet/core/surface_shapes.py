@@ -8,7 +8,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
 from cython.cimports.libc.stdint import int64_t
 
-from pyverlet.core.cells import wrapped
+from pyverlet.core.cells import image_of
 from pyverlet.core.obstacles import (
     AFTER,
     AROUND,
@@ -25,6 +25,7 @@ from pyverlet.core.obstacles import (
     ROUNDING,
     SEGMENT,
 )
+from pyverlet.core.one_way import is_passable
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import (
     BEND,
@@ -101,8 +102,8 @@ def path_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t
 def spot_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t, to: cython.int) -> Spot:
     """Particle i as the segment whose row begins at `at` sees it, as it stands at `to`: PLACE or LATE."""
     p: Spot
-    p.wx = wrapped(w.position[2 * i], w.cells.low_x, w.cells.period_x)
-    p.wy = wrapped(w.position[2 * i + 1], w.cells.low_y, w.cells.period_y)
+    p.wx = image_of(w.position[2 * i], w.checked[2 * i], w.cells.low_x, w.cells.period_x)
+    p.wy = image_of(w.position[2 * i + 1], w.checked[2 * i + 1], w.cells.low_y, w.cells.period_y)
     p.c = w.segment[at + to + 2]
     p.s = w.segment[at + to + 3]
     ox: cython.double = p.wx - w.segment[at + to]
@@ -157,7 +158,9 @@ def measure_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_
     nx: cython.double = 0.0
     ny: cython.double = -1.0 if p.above else 1.0
     row[first + BEND] = 0.0
-    if w.segment[at + FACES] > 0 and p.above:  # behind the face
+    if is_passable(w, k, at):
+        row[first + GAP] = FARAWAY
+    elif w.segment[at + FACES] > 0 and p.above:  # behind the face
         inside: cython.double = depth_inside(w, at, p.wx, p.wy)
         ny = 1.0
         row[first + GAP] = -(p.reach + p.y) if inside == p.y and inside > 0 else FARAWAY

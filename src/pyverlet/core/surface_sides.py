@@ -14,7 +14,8 @@ from cython.cimports.libc.stdint import int32_t, int64_t
 
 from pyverlet.core.cells import BLOCK, wrapped
 from pyverlet.core.impacts import NEVER, strike
-from pyverlet.core.obstacles import BODY_OF, FACES, LENGTH, PLACE, ROUNDING, SEGMENT, head_of
+from pyverlet.core.obstacles import BODY_OF, FACES, LENGTH, PLACE, ROUNDING, SEGMENT, SENSOR, accepts, accepts_segment, head_of
+from pyverlet.core.one_way import is_one_way, stops
 from pyverlet.core.step import CAGE, Step
 from pyverlet.core.work import book_place
 
@@ -25,10 +26,10 @@ Way = cython.struct(x=cython.double, y=cython.double, dx=cython.double, dy=cytho
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def crossing(w: cython.pointer(Step), k: cython.Py_ssize_t, way: cython.pointer(Way)) -> cython.double:
-    """Which part of a way leads to line k, if it crosses that, else NEVER."""
+def crossing(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, way: cython.pointer(Way)) -> cython.double:
+    """Which part of a way of particle i leads to line k, if it crosses that and collides with it, else NEVER."""
     at: cython.Py_ssize_t = SEGMENT * k
-    if w.segment[at + FACES] > 0 or w.segment[at + LENGTH] == 0:
+    if w.segment[at + FACES] > 0 or w.segment[at + LENGTH] == 0 or w.segment[at + SENSOR] != 0 or not accepts_segment(w, i, k):
         return NEVER
     b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[at + BODY_OF])
     h: cython.double = w.h
@@ -44,14 +45,16 @@ def crossing(w: cython.pointer(Step), k: cython.Py_ssize_t, way: cython.pointer(
         return NEVER
     part: cython.double = -across / gone
     crossed: cython.double = c * x + s * y + part * (c * dx + s * dy)
-    return NEVER if crossed < 0 or crossed > w.segment[at + LENGTH] else part
+    if crossed < 0 or crossed > w.segment[at + LENGTH] or (is_one_way(w, at) and not stops(w, i, k, across)):
+        return NEVER
+    return part
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def first_crossing(w: cython.pointer(Step), way: cython.pointer(Way)) -> cython.Py_ssize_t:
-    """The line that a way crosses first, -1: none."""
+def first_crossing(w: cython.pointer(Step), i: cython.Py_ssize_t, way: cython.pointer(Way)) -> cython.Py_ssize_t:
+    """The line that a way of particle i crosses first, -1: none."""
     found: cython.Py_ssize_t = -1
     first: cython.double = NEVER
     k: cython.Py_ssize_t
@@ -64,7 +67,7 @@ def first_crossing(w: cython.pointer(Step), way: cython.pointer(Way)) -> cython.
     high: int64_t = cython.cast(int64_t, floor(max(way.y, way.y + way.dy) / w.cell))
     if (right - left + 1) * cython.cast(cython.double, high - low + 1) > w.segments:
         for k in range(w.segments):
-            part = crossing(w, k, way)
+            part = crossing(w, i, k, way)
             if part < first:
                 first, found = part, k
         return found
@@ -74,7 +77,7 @@ def first_crossing(w: cython.pointer(Step), way: cython.pointer(Way)) -> cython.
             while link >= 0:
                 k = w.link[2 * link]
                 link = w.link[2 * link + 1]
-                part = crossing(w, k, way)
+                part = crossing(w, i, k, way)
                 if part < first or (part == first and part != NEVER and k < found):
                     first, found = part, k
     return found
@@ -115,7 +118,7 @@ def keep_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
         return  # it saw all that it may come to
     way.x = wrapped(cython.cast(real, from_x), w.cells.low_x, w.cells.period_x)
     way.y = wrapped(cython.cast(real, from_y), w.cells.low_y, w.cells.period_y)
-    k: cython.Py_ssize_t = first_crossing(w, cython.address(way))
+    k: cython.Py_ssize_t = first_crossing(w, i, cython.address(way))
     if k < 0:
         return
     line: cython.Py_ssize_t = SEGMENT * k
@@ -124,7 +127,7 @@ def keep_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     s: cython.double = w.segment[line + PLACE + 3]
     gone: cython.double = c * (way.dy - w.body[b + 4] * h) - s * (way.dx - w.body[b + 3] * h)
     # It stops where it touches the line, or does not move against it if it did already; and goes on along it.
-    part: cython.double = crossing(w, k, cython.address(way)) - (w.segment[line + ROUNDING] + w.radius[i]) / fabs(gone)
+    part: cython.double = crossing(w, i, k, cython.address(way)) - (w.segment[line + ROUNDING] + w.radius[i]) / fabs(gone)
     part = max(part, 0.0)
     rate: cython.double = c * (v[width * i + 1] - w.body[b + 4]) - s * (v[width * i] - w.body[b + 3])
     if rate * gone > 0:
@@ -172,7 +175,7 @@ def keep_inside(w: cython.pointer(Step), block: cython.int) -> cython.void:
             part: cython.double = min((w.x1 - r) / d, 1.0) if d > 0 else 1.0
             to_x, to_y = w.x0 + part * (x - w.x0), w.y0 + part * (y - w.y0)
         beyond: cython.double = sqrt((x - to_x) * (x - to_x) + (y - to_y) * (y - to_y))
-        if beyond < 0.5 * r or w.inverse_mass[i] == 0:
+        if beyond < 0.5 * r or w.inverse_mass[i] == 0 or not accepts(w, i, w.wall_category, w.wall_mask):
             continue
         nx: cython.double = (x - to_x) / beyond
         ny: cython.double = (y - to_y) / beyond

@@ -8,9 +8,10 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import cos, sin, sqrt
 from cython.cimports.libc.stdint import int64_t
 
-from pyverlet.core.cells import wrapped
+from pyverlet.core.cells import image_of
 from pyverlet.core.impacts import NEVER
 from pyverlet.core.obstacles import AFTER, BEFORE, BODY_OF, FACES, PLACE, SEGMENT
+from pyverlet.core.one_way import is_passable
 from pyverlet.core.step import CAGE, Step
 from pyverlet.core.surface_rows import CONTACT, GAP, NORMAL, ROUNDED, SIDES, SPEED, pinned_lane
 from pyverlet.core.surface_shapes import Path, Spot, path_of, set_surface_speed, spot_of
@@ -153,7 +154,7 @@ def meet_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
         hit.time = 0.0
         return hit
     p: Spot = spot_of(w, i, at, PLACE)
-    if w.segment[at + FACES] > 0 and p.above:
+    if is_passable(w, k, at) or (w.segment[at + FACES] > 0 and p.above):
         return hit
     f: Path = path_of(w, i, at, cython.address(p))
     nx: cython.double = 0.0
@@ -212,8 +213,8 @@ def set_speed(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
     if w.surface[k] >= SIDES:
         at: cython.Py_ssize_t = SEGMENT * (cython.cast(int64_t, w.surface[k]) - SIDES)
         half: cython.double = 0.5 * hit.time * (w.h - hit.time)
-        x: cython.double = wrapped(w.position[2 * i], w.cells.low_x, w.cells.period_x)
-        y: cython.double = wrapped(w.position[2 * i + 1], w.cells.low_y, w.cells.period_y)
+        x: cython.double = image_of(w.position[2 * i], w.checked[2 * i], w.cells.low_x, w.cells.period_x)
+        y: cython.double = image_of(w.position[2 * i + 1], w.checked[2 * i + 1], w.cells.low_y, w.cells.period_y)
         x += v[width * i] * hit.time - w.acceleration[2 * i] * half
         y += v[width * i + 1] * hit.time - w.acceleration[2 * i + 1] * half
         set_surface_speed(w, first, at, x + w.radius[i] * hit.nx, y + w.radius[i] * hit.ny, hit.nx, hit.ny, hit.time)

@@ -85,9 +85,11 @@ def _kind(
 # ---- what there is -----------------------------------------------------------------------------------------------------
 
 _kind(rooms.Open)
-_kind(rooms.Circle, "center", "radius", "restitution", "friction", "rolling_resistance", "material", "angular_velocity")
-_kind(rooms.Box, "lower", "upper", "restitution", "friction", "rolling_resistance", "material")
-_kind(rooms.Periodic, "lower", "upper", "axes", "restitution", "friction", "rolling_resistance", "material")
+WALLS = ("restitution", "friction", "rolling_resistance", "material", "category", "mask")
+
+_kind(rooms.Circle, "center", "radius", "angular_velocity", *WALLS)
+_kind(rooms.Box, "lower", "upper", *WALLS)
+_kind(rooms.Periodic, "lower", "upper", "axes", *WALLS)
 _kind(naive.ClampAndFlip, "room")
 _kind(naive.ProjectOnly, "room")
 
@@ -129,7 +131,10 @@ def _let_go(grip: forces.Grip, state: dict[str, Any]) -> None:
 
 _kind(forces.Grip, arguments=_grip, state=lambda grip: {} if grip.particle >= 0 else {"holds": False}, recall=_let_go)
 
-SURFACE = ("restitution", "friction", "rolling_resistance", "material", "surface_speed", "velocity", "angular_velocity", "pivot")
+SURFACE = (
+    "restitution", "friction", "rolling_resistance", "material", "surface_speed", "velocity", "angular_velocity", "pivot",
+    "category", "mask", "sensor",
+)  # fmt: skip
 """Arguments that all obstacles take."""
 
 
@@ -146,6 +151,7 @@ def _shape(obstacle: Any) -> dict[str, Any]:
     else:
         shape = {"points": local, "closed": obstacle.closed, "radius": obstacle.radius}
     surface = {name: getattr(obstacle, name) for name in SURFACE}
+    shape |= {"one_way": obstacle.one_way} if isinstance(obstacle, obstacles.Chain) else {}
     return shape | surface | {"pivot": (0.0, 0.0)}
 
 

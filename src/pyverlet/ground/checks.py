@@ -149,6 +149,28 @@ def text(name: str, value: Any) -> str:
     return value
 
 
+def bit_set(name: str, value: Any) -> int:
+    """32 bits, from a whole number of 0 to 2^32 - 1."""
+    return whole(name, value, least=0, most=2**32 - 1)
+
+
+def flag(name: str, value: Any) -> bool:
+    """True or False."""
+    if not isinstance(value, bool | np.bool_):
+        raise InputError(f"{name} is {value!r}; allowed are True and False")
+    return bool(value)
+
+
+def direction(name: str, value: Sequence[SupportsFloat] | NDArray[Any] | None) -> tuple[float, float] | None:
+    """Two finite floats (x, y) that are not both 0, or None."""
+    if value is None:
+        return None
+    result = vector(name, value)
+    if result == (0.0, 0.0):
+        raise InputError(f"{name} is {result}; allowed is a direction other than 0, or None")
+    return result
+
+
 def indices(name: str, value: ArrayLike, count: int) -> NDArray[np.int64]:
     """Sorted indices without repetition from an index, several, or a mask of `count` bools."""
     allowed = f"are whole numbers from 0 to {count - 1}, or {count} bools"

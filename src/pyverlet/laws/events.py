@@ -65,6 +65,8 @@ class Events:
     bounce, after an end, even if it touched in the frame before. In a pile that comes to rest, contacts without weight may end
     and begin again.
 
+    A sensor that a particle crosses within a frame begins and ends in it. What it tells has speed and impulse 0, and is no hit.
+
     Indices stay valid until the next frame: when particles are removed, these arrays are renumbered in place, and a removed
     particle is -1 in them. Copies are not renumbered. The field `number` stays as it is, in copies too: `World.index_of` tells
     where those particles are now.
@@ -83,6 +85,8 @@ class Events:
         self._obstacles: list[Obstacle] | None = None  # that the keys number; None: those of now
         self._told: list[Told] = []
         self._slept = np.zeros(0, np.int64)  # contacts of those who slept when the frame began, and have woken in it
+        self._sensed: list[Array] | None = None  # keys of contacts with sensors: in this frame, and at its end; None: as before
+        self._sensed_at = -1  # `Course.version` when sensors were asked last
 
     def __repr__(self) -> str:
         return f"Events of the last frame: {len(self.begin)} begin, {len(self.end)} end, {len(self.hit)} hit"
@@ -124,11 +128,21 @@ class Events:
 
     def forget(self) -> None:
         """A frame begins, or begins again."""
-        self._told, self._slept = [], self._slept[:0]
+        self._told, self._slept, self._sensed = [], self._slept[:0], None
+
+    def senses(self, course: Course) -> bool:
+        """Whether sensors may touch others than in the frame before although no particle moves."""
+        return bool(course.sensors) and (course.sensors_move or course.version != self._sensed_at)
+
+    def sense(self, course: Course, touched: Array, inside: Array) -> None:
+        """Keys, sorted, of contacts with sensors in this frame, and of those at its end, by the user's indices."""
+        self._sensed, self._sensed_at = [touched, inside], course.version
 
     def close(self, slots: Slots, state: State, place: Place) -> None:
         """The frame has gone well: what was told is what happened; `place`: what circles met."""
         lost = self._number_obstacles(place.course.seen())
+        at_sensor = _of(self._touching, place.course.sensors)
+        watched, self._touching = self._touching[at_sensor], self._touching[~at_sensor]
         told = Told.of([*self._told, place.walls(slots)])
         told = told._replace(keys=_numbered(told.keys, state))
         # Those who sleep are not listed, but go on. To sort keys alone takes a third of what it takes to know their order.
@@ -142,13 +156,17 @@ class Events:
         times = np.ones(len(begun), np.int64)
         times[np.searchsorted(begun, again)] = bounces
         ended = np.concatenate((lost, gone, np.repeat(again, bounces - 1 + _among(again, self._touching))))
-        speeds = _largest(begun, told)
-        self._touching = now
+        touched, inside = (watched, watched) if self._sensed is None else (_numbered(keys, state) for keys in self._sensed)
+        entered = _absent(touched, watched)
+        ended = np.concatenate((ended, _absent(np.union1d(watched, touched), inside)))
+        speeds = np.concatenate((_largest(begun, told), np.zeros(len(entered))))
+        begun, times = np.concatenate((begun, entered)), np.concatenate((times, np.ones(len(entered), np.int64)))
+        self._touching = np.sort(np.concatenate((now, inside)))
         self.end = _contacts(np.sort(ended ^ _SURFACE) ^ _SURFACE, state)  # walls and obstacles before particles
         order = np.argsort(begun ^ _SURFACE)
         begun, speeds = (np.repeat(column[order], times[order]) for column in (begun, speeds))
         self.begin = place.hits(_contacts(begun, state), speeds, state)
-        self.hit = self.begin[speeds >= self._hit_speed]
+        self.hit = self.begin[(speeds >= self._hit_speed) & ~np.isin(self.begin["obstacle"], place.course.sensors)]
         self.forget()
 
     def _number_obstacles(self, obstacles: list[Obstacle]) -> Array:
@@ -269,6 +287,12 @@ def key_of_pair(a: Array, b: Array) -> Array:
 def key_of_surface(a: Array, number: Array, obstacle: Array) -> Array:
     """Of contacts with walls of the room, or (`obstacle`) with obstacles, of these numbers."""
     return np.asarray((a << 32) + _SURFACE + np.where(obstacle, FIRST_OBSTACLE + number, number))
+
+
+def _of(keys: Array, obstacles: list[int]) -> Array:
+    """(n,) bool, which keys are of contacts with these obstacles."""
+    lower = keys & _LOWER
+    return np.asarray(((lower & _SURFACE) != 0) & np.isin((lower & _LOST) - FIRST_OBSTACLE, obstacles))
 
 
 def _counted(told: Told) -> tuple[Array, Array]:

@@ -115,7 +115,9 @@ class EnergyLimiter:
     def _excuse_misplaced(self, slots: Slots, listed: Callable[[], Listed]) -> bool:
         """Particles that were where nobody can be begin where they are now. False: there were none."""
         start = self._start
-        misplaced = self._room.outside(start.position) | (self._course.covering(start.position) >= 0)
+        marks = start.category, start.mask
+        misplaced = self._room.outside(start.position) & self._room.holds(*marks)
+        misplaced |= self._course.covering(start.position, *marks) >= 0
         moved = (misplaced & np.isfinite(start.mass))[slots.particle]
         if any(hasattr(force, "among") for force in self._kept):
             moved |= self._overlapped(slots, listed())
@@ -151,7 +153,9 @@ class EnergyLimiter:
         share = self._links.gains(start.position, slots.where()) if self._links else np.zeros(0)
         about = self._clusters(slots, listed, moved), pull, slots.particle, share
         more = slots.motion.take_energy(then, now, about, limits, lift, moved, lower)
-        slots.position[:] = self._within_room(slots.position.astype(float), lower, slots.radius)
+        within = self._within_room(slots.position.astype(float), lower, slots.radius)
+        held = self._room.holds(start.category, start.mask)[slots.particle]
+        slots.position[:] = np.where(held[:, None], within, lower)
         return np.asarray(more)
 
     def _put_back(self, slots: Slots, raised: Array, allowed: float) -> float:

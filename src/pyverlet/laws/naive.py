@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from numpy.typing import NDArray
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground.errors import InputError
-from pyverlet.laws.rooms import Boundary, Box, Circle, Extent
+from pyverlet.laws.rooms import Boundary, Box, Circle, Extent, held_by
 from pyverlet.state.slots import Slots
 
 Array = NDArray[Any]
@@ -42,7 +43,7 @@ class Naive(Boundary):
         room = self.room
         clamp: Any = state.motion.clamp_to_box if isinstance(room, Box) else state.motion.clamp_to_circle
         shape = (*room.lower, *room.upper) if isinstance(room, Box) else (*room.center, room.radius)
-        moving = state.position, state.velocity, state.radius, state.inverse_mass
+        moving = state.position, state.velocity, state.radius, held_by(room, state)
         clamp(*shape, *moving, h, room.restitution, self._flip)
 
     def extent(self) -> Extent:
@@ -50,6 +51,9 @@ class Naive(Boundary):
 
     def outside(self, position: Array) -> Array:
         return self.room.outside(position)
+
+    def holds(self, category: ArrayLike, mask: ArrayLike) -> NDArray[np.bool_]:
+        return self.room.holds(category, mask)
 
     def check(self, radius: Array) -> None:
         self.room.check(radius)

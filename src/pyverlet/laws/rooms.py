@@ -11,13 +11,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.constants import STANDS_OUT
 from pyverlet.ground.errors import InputError
 from pyverlet.state.seam import NONE, Seam
 from pyverlet.state.slots import Slots
+from pyverlet.state.state import EVERYONE
 
 Array = NDArray[Any]
 Extent = tuple[float, float, float, float]
@@ -58,6 +59,10 @@ class Boundary(ABC):
     def facing(self, position: Array) -> tuple[Array, Array] | None:
         """(k, w) distance of centres (k, 2) from each of its walls, m, and (k, w, 2) the unit normal of each into the room."""
         return None
+
+    def holds(self, category: ArrayLike, mask: ArrayLike) -> NDArray[np.bool_]:
+        """(n,) or one bool, whether its walls hold particles of this category and mask, (n,) or one each."""
+        return np.ones(np.shape(category), bool)
 
     def perimeter(self) -> float | None:
         """Length of its walls, m; None if that is not known."""
@@ -100,13 +105,26 @@ class Open(Boundary):
 
 
 class _Walls(Boundary):
-    """Restitution, friction and rolling resistance of walls."""
+    """What walls are made of, and which particles they hold."""
 
-    def __init__(self, restitution: float, friction: float, rolling_resistance: float, material: str) -> None:
+    def __init__(
+        self, restitution: float, friction: float, rolling_resistance: float, material: str, category: int, mask: int
+    ) -> None:
         self.restitution = checks.fraction("restitution", restitution)
         self.friction = checks.number("friction", friction, least=0.0)
         self.rolling_resistance = checks.number("rolling_resistance", rolling_resistance, least=0.0)
         self.material = checks.text("material", material)
+        self.category, self.mask = checks.bit_set("category", category), checks.bit_set("mask", mask)
+
+    def holds(self, category: ArrayLike, mask: ArrayLike) -> NDArray[np.bool_]:
+        met = np.asarray(category, np.int64) & self.mask, np.asarray(mask, np.int64) & self.category
+        return np.asarray((met[0] != 0) & (met[1] != 0))
+
+    def _bodies(self, state: Slots) -> tuple[tuple[Array, ...], Array, Array]:
+        """What `core.own_walls` asks of circles; those that the walls do not hold count as pinned."""
+        moving = state.position, state.velocity, state.acceleration, state.spin
+        about = state.radius, state.restitution, state.friction
+        return (*moving, *about), held_by(self, state), state.wall_hits
 
     def _surface(self) -> str:
         """For `repr`."""
@@ -114,15 +132,19 @@ class _Walls(Boundary):
         made = f", material={self.material!r}" if self.material else ""
         return f"restitution={self.restitution:g}, friction={self.friction:g}{rolling}{made}"
 
+    def _shown_filter(self) -> str:
+        """For `repr`."""
+        return "" if self.category == self.mask == EVERYONE else f", category={self.category}, mask={self.mask}"
+
     def _law(self, h: float, lag: float, rest_speed: float, belt: float = 0.0) -> tuple[float, ...]:
         """What `core.own_walls` asks of them; belt: m/s of their surface."""
         return h, lag, self.restitution, self.friction, belt, rest_speed
 
 
-def _bodies(state: Slots) -> tuple[tuple[Array, ...], Array, Array]:
-    """What `core.own_walls` asks of circles."""
-    moving = state.position, state.velocity, state.acceleration, state.spin
-    return (*moving, state.radius, state.restitution, state.friction), state.inverse_mass, state.wall_hits
+def held_by(room: Boundary, state: Slots) -> Array:
+    """(n,) inverse masses, 1/kg, 0 of those that the walls of a room do not hold."""
+    marks = (state.category, state.mask) if len(state.category) else (1, EVERYONE)
+    return np.where(room.holds(*marks), state.inverse_mass, state.real(0))
 
 
 class Circle(_Walls):
@@ -136,6 +158,8 @@ class Circle(_Walls):
         rolling_resistance: c of the wall, 0 or more; see `Collisions`.
         material: a name of `Collisions(materials=...)`, or none.
         angular_velocity: rad/s it turns with about its centre, counter-clockwise: a drum, whose wall takes along what rubs on it.
+        category: 32 bits, what its wall is.
+        mask: 32 bits; it holds particles that have a bit of their category in it, and one of `category` in their mask.
     """
 
     def __init__(
@@ -148,8 +172,10 @@ class Circle(_Walls):
         rolling_resistance: float = 0.0,
         material: str = "",
         angular_velocity: float = 0.0,
+        category: int = EVERYONE,
+        mask: int = EVERYONE,
     ) -> None:
-        super().__init__(restitution, friction, rolling_resistance, material)
+        super().__init__(restitution, friction, rolling_resistance, material, category, mask)
         self.center = checks.vector("center", center)
         self.radius = checks.number("radius", radius, above=0.0)
         self.angular_velocity = checks.number("angular_velocity", angular_velocity)
@@ -160,7 +186,7 @@ class Circle(_Walls):
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         law = self._law(h, lag, rest_speed, self.angular_velocity * self.radius)
-        state.motion.confine_to_circle(*self.center, self.radius, *_bodies(state), law)
+        state.motion.confine_to_circle(*self.center, self.radius, *self._bodies(state), law)
 
     def facing(self, position: Array) -> tuple[Array, Array]:
         way = self.center - position.astype(np.float64)
@@ -190,7 +216,7 @@ class Circle(_Walls):
 
     def __repr__(self) -> str:
         turns = f", angular_velocity={self.angular_velocity:g}" if self.angular_velocity else ""
-        walls = f"{self._surface()}{turns}"
+        walls = f"{self._surface()}{turns}{self._shown_filter()}"
         return f"Circle(center={self.center}, radius={self.radius:g}, {walls})"
 
 
@@ -204,6 +230,8 @@ class Box(_Walls):
         friction: mu of the walls, 0 or more.
         rolling_resistance: c of the walls, 0 or more; see `Collisions`.
         material: a name of `Collisions(materials=...)`, or none.
+        category: 32 bits, what the walls are.
+        mask: 32 bits; they hold particles that have a bit of their category in it, and one of `category` in their mask.
     """
 
     def __init__(
@@ -215,15 +243,17 @@ class Box(_Walls):
         friction: float = 0.0,
         rolling_resistance: float = 0.0,
         material: str = "",
+        category: int = EVERYONE,
+        mask: int = EVERYONE,
     ) -> None:
-        super().__init__(restitution, friction, rolling_resistance, material)
+        super().__init__(restitution, friction, rolling_resistance, material, category, mask)
         self.lower = checks.vector("lower", lower)
         self.upper = checks.vector("upper", upper)
         if not (self.lower[0] < self.upper[0] and self.lower[1] < self.upper[1]):
             raise InputError(f"upper is {self.upper}; allowed is a corner above and to the right of lower, {self.lower}")
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
-        state.motion.confine_to_box(*self.lower, *self.upper, *_bodies(state), self._law(h, lag, rest_speed))
+        state.motion.confine_to_box(*self.lower, *self.upper, *self._bodies(state), self._law(h, lag, rest_speed))
 
     def facing(self, position: Array) -> tuple[Array, Array]:
         """Its walls are, in this order, the left, the right, the floor and the ceiling."""
@@ -251,7 +281,7 @@ class Box(_Walls):
         _fits(radius, half, f"half the shorter side of the box, {half:g} m")
 
     def __repr__(self) -> str:
-        return f"Box({self.lower}, {self.upper}, {self._surface()})"
+        return f"Box({self.lower}, {self.upper}, {self._surface()}{self._shown_filter()})"
 
 
 class Periodic(_Walls):
@@ -268,6 +298,8 @@ class Periodic(_Walls):
         friction: mu of the walls, where there are any, 0 or more.
         rolling_resistance: c of the walls, where there are any, 0 or more; see `Collisions`.
         material: a name of `Collisions(materials=...)`, or none.
+        category: 32 bits, what the walls are.
+        mask: 32 bits; they hold particles that have a bit of their category in it, and one of `category` in their mask.
 
     Raises:
         InputError: an argument is outside what is allowed; from `World.add`, a circle is larger than half a period.
@@ -283,8 +315,10 @@ class Periodic(_Walls):
         friction: float = 0.0,
         rolling_resistance: float = 0.0,
         material: str = "",
+        category: int = EVERYONE,
+        mask: int = EVERYONE,
     ) -> None:
-        super().__init__(restitution, friction, rolling_resistance, material)
+        super().__init__(restitution, friction, rolling_resistance, material, category, mask)
         self.lower, self.upper = checks.vector("lower", lower), checks.vector("upper", upper)
         if axes not in ("xy", "x", "y"):
             raise InputError(f"axes is {axes!r}; allowed are 'xy', 'x' and 'y'")
@@ -304,7 +338,7 @@ class Periodic(_Walls):
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
         if self.axes != "xy":
-            state.motion.confine_to_box(*self._box, *_bodies(state), self._law(h, lag, rest_speed))
+            state.motion.confine_to_box(*self._box, *self._bodies(state), self._law(h, lag, rest_speed))
 
     def facing(self, position: Array) -> tuple[Array, Array] | None:
         """Numbered as the walls of a `Box`: left, right, floor, ceiling."""
@@ -345,7 +379,7 @@ class Periodic(_Walls):
             _fits(radius, half, f"half the distance of the walls, {half:g} m")
 
     def __repr__(self) -> str:
-        walls = "" if self.axes == "xy" else f", axes={self.axes!r}, {self._surface()}"
+        walls = "" if self.axes == "xy" else f", axes={self.axes!r}, {self._surface()}{self._shown_filter()}"
         return f"Periodic({self.lower}, {self.upper}{walls})"
 
 

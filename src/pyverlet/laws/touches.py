@@ -75,7 +75,7 @@ class Touches:
         self, state: Slots, users: State, room: Boundary, course: Course, dt: float, virial: float
     ) -> None:  # fmt: skip
         """The frame of dt seconds is over. virial: of contacts between circles, N s m."""
-        self._end = _End(state, users.number.copy(), self._given, self._heard, room, course, dt)
+        self._end = _End(state, users, self._given, self._heard, room, course, dt)
         self._found, self._shown, self._is_shown = None, [], False
         self._virial = virial
 
@@ -129,12 +129,12 @@ class _End:
     """What is known when a frame is over."""
 
     def __init__(
-        self, state: Slots, numbers: Array, given: Floats, heard: list[tuple[Array, Array, Floats]], room: Boundary,
+        self, state: Slots, users: State, given: Floats, heard: list[tuple[Array, Array, Floats]], room: Boundary,
         course: Course, dt: float,
     ) -> None:  # fmt: skip
         count = len(state)
         self.given, self._heard, self._room, self.dt = given, heard, room, dt
-        self._numbers = numbers
+        self._numbers = users.number.copy()
         self._position, self._radius = np.empty((count, 2)), np.empty(count)
         self._free = np.empty(count, bool)
         order = state.particle
@@ -144,7 +144,8 @@ class _End:
         who = np.flatnonzero(given[2].any(axis=1))
         r = self._radius[who]
         within = (1 + 2 * _NEAR) * float(r.max(initial=0.0))
-        self._beside = course.facing(self._position[who], _NEAR * r, within=within, ahead=dt)
+        marks = users.category[who], users.mask[who]
+        self._beside = course.facing(self._position[who], _NEAR * r, within=within, ahead=dt, marks=marks)
 
     def number_of(self, obstacle: Any) -> int:
         """Among the obstacles of then; -2 if it was none."""

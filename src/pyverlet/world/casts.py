@@ -189,7 +189,9 @@ class Casts(Queries):
         """
         if radius is None:
             where = checks.rows("position", position, np.dtype(np.float64))
-            return np.asarray(~self.boundary.outside(where) & (self._course.covering(where) < 0))
+            marks = _bits(category, mask, len(where))
+            outside = self.boundary.outside(where) & self.boundary.holds(*marks)
+            return np.asarray(~outside & (self._course.covering(where, *marks) < 0))
         middle, size = circles("position", position, radius)
         ahead, none = np.tile((1.0, 0.0), (len(middle), 1)), np.zeros(len(middle))
         hits = self._cast((middle, ahead, none, size, *_bits(category, mask, len(middle))))
@@ -294,8 +296,11 @@ def _bits(category: ArrayLike, mask: ArrayLike, count: int) -> Kinds:
 
 
 def _kinds_of(things: Sequence[Any]) -> Kinds:
-    """Categories and masks of obstacles or rooms."""
-    category, mask = ([getattr(thing, name, bits) for thing in things] for name, bits in (("category", 1), ("mask", EVERYONE)))
+    """Categories and masks of obstacles or rooms: none of sensors, and all of rooms of the user's own."""
+    every = [0 if getattr(thing, "sensor", False) else EVERYONE for thing in things]
+    category, mask = (
+        [getattr(thing, name, bits) & bits for thing, bits in zip(things, every, strict=True)] for name in ("category", "mask")
+    )
     return np.array(category, np.uint32), np.array(mask, np.uint32)
 
 

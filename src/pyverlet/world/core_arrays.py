@@ -254,6 +254,7 @@ class CoreArrays:
             surfaces[:, 1] = now[surfaces[:, 1]]
             held = surfaces[:, 1] >= 0
             self._give_surfaces(surfaces[held], pushes[held])
+            self.asleep = self.asleep.at_surfaces(now)  # sensors that go wake nobody
         self._named_anew = False
 
     def _hold(self, state: Slots) -> None:

@@ -24,7 +24,7 @@ from pyverlet.world.contact_notes import ContactNotes
 from pyverlet.world.core_arrays import CoreArrays
 from pyverlet.world.core_links import CoreLinks
 from pyverlet.world.free_steps import FreeSteps, kicks
-from pyverlet.world.heard import told_of
+from pyverlet.world.heard import sensed_by, told_of
 from pyverlet.world.materials import knows
 from pyverlet.world.own_walls import OwnWalls
 
@@ -103,7 +103,8 @@ class Frames:
             self.held.forget_list()
         before = self.held.note()
         with np.errstate(over="ignore", invalid="ignore"):  # what becomes infinite is told of as such
-            if world._sleep and world._sleep.all_asleep(world._slots):
+            senses = world._events and world._events.senses(world._course)
+            if world._sleep and world._sleep.all_asleep(world._slots) and not senses:
                 done("gather")  # nothing moves; what contacts gave when all fell asleep they go on to give
                 done("finish")
             elif not self.run(world, dt, done):
@@ -127,7 +128,7 @@ class Frames:
         alone = by_core and not (forces.forces or own_walls)
         keeps_way = isinstance(world.integrator, PositionVerlet) and before not in (0.0, h)
         # Where the method raises the energy by itself, nothing can be said of contacts.
-        limited = (bool(collisions and len(world) > 1) or bool(world.obstacles)) and not keeps_way
+        limited = (bool(collisions and len(world) > 1) or world._course.solid) and not keeps_way
         limiter = limiter_for(world, dt) if limited and (forces.forces or world.links) else None
         gravity = world.gravity
         state.h = h
@@ -204,6 +205,7 @@ class Frames:
             notes.close(world, dt)
         if listens:
             world._events.hear(told_of(engine, state, world._course))
+            world._events.sense(world._course, *sensed_by(engine, state, world._course))
             engine.listen(False)
         if world._sleep and world._sleep.end(state, self.listed(), dt, float(np.hypot(*gravity))):
             self.held.set_aside(state)

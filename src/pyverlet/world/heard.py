@@ -25,3 +25,12 @@ def told_of(engine: Any, state: Slots, course: Course) -> list[Told]:
         number[at_obstacle] = bodies[surface[at_obstacle] - SIDES]
         told.append(Told(key_of_surface(particle[slot], number, at_obstacle), fast, thrown))
     return told
+
+
+def sensed_by(engine: Any, state: Slots, course: Course) -> list[Any]:
+    """Keys, sorted, of contacts with sensors in this frame, and of those at its end, by the user's indices."""
+    if not course.sensors:
+        return [np.zeros(0, np.int64)] * 2
+    numbers, particle = np.array(course.sensors), state.particle.astype(np.int64)
+    found = engine.touched_sensors()
+    return [np.sort(key_of_surface(particle[slot], numbers[sensor], np.ones(len(slot), bool))) for slot, sensor in found]

@@ -196,8 +196,9 @@ class Measures(Particles):
 
     @of_one_frame
     def escaped(self) -> int:
-        """Particles whose centre is outside the boundary."""
-        return int(np.count_nonzero(self.boundary.outside(self.position)))
+        """Particles whose centre is outside the boundary, but for those that its walls do not hold."""
+        held = self.boundary.holds(self.category, self.mask)
+        return int(np.count_nonzero(self.boundary.outside(self.position) & held))
 
     @of_one_frame
     def state_hash(self) -> str:

@@ -29,7 +29,9 @@ def move(world: World, which: Group | Particle, position: ArrayLike) -> None:
     elif len(goal) != len(index):
         raise InputError(f"position has shape {goal.shape}; allowed is (2,), for their centre, or ({len(index)}, 2)")
     where = np.ascontiguousarray(goal, state.dtype)
-    world._refuse_misplaced(where, np.isfinite(state.mass[index]), allowed="free places, and any for pinned ones")
+    free, marks = np.isfinite(state.mass[index]), (state.category[index], state.mask[index])
+    held, within = free & world.boundary.holds(*marks), np.where(free, world._course.covering(where, *marks), -1)
+    world._refuse_misplaced(where, held, within, allowed="free places, and any for pinned ones")
     inside = state.seam.wrapped(where)
     state.crossed[index] = state.seam.periods(where.astype(np.float64) - inside)
     index, inside = index[moved := (inside != state.position[index]).any(axis=1)], inside[moved]

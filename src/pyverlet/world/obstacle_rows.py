@@ -19,9 +19,9 @@ SIDES = 4
 
 _GIVEN = (
     "body", "first", "faces", "around", "lx", "ly", "lc", "ls", "length", "rounding", "inner", "before_x", "before_y", "after_x",
-    "after_y", "restitution", "friction", "belt",
+    "after_y", "restitution", "friction", "belt", "category", "mask", "way_x", "way_y", "sensor",
 )  # fmt: skip
-_WIDTH, _LENGTH, _ROUNDING, _INNER, _FRICTION, _ROLLING, _MATERIAL = 40, 8, 9, 10, 16, 31, 32
+_WIDTH, _LENGTH, _ROUNDING, _INNER, _FRICTION, _SENSOR, _ROLLING, _MATERIAL = 40, 8, 9, 10, 16, 22, 36, 37
 
 SPARE_FRAMES = 4.0
 """Frames for which a segment that moves is listed ahead; as in `core.obstacles`."""
@@ -100,11 +100,17 @@ class ObstacleRows:
         self._segments[:, _MATERIAL] = place[made]
         moves = (self._bodies[:, 3:] != 0.0).any(axis=1)
         self._moving = np.flatnonzero(moves[self._segments[:, 0].astype(np.int64)]).astype(np.int32)
-        self.friction, self.rolling = (float(self._segments[:, k].max(initial=0.0)) for k in (_FRICTION, _ROLLING))
+        solid = self._segments[:, _SENSOR] == 0
+        self.friction, self.rolling = (float(self._segments[solid, k].max(initial=0.0)) for k in (_FRICTION, _ROLLING))
+        if not solid.all():
+            rank = np.zeros(course.count)
+            rank[course.sensors] = np.arange(1, len(course.sensors) + 1)
+            self._segments[:, _SENSOR] = rank[self._segments[:, 0].astype(np.int64) % course.count]
 
     def _build(self, engine: Any, count: int, radius: float, dt: float) -> None:
         """Make the grid of `count` obstacles, with cells as wide as the largest particle, or wider: not too many."""
-        s, (around, farthest) = self._segments, self._reach(count, dt)
+        solid = self._segments[:, _SENSOR] == 0  # sensors are not in it, so that it is the same without them
+        s, (around, farthest) = self._segments[solid], (each[solid] for each in self._reach(count, dt))
         cell, links = max(2.0 * radius, 4.0 * float(farthest.max(initial=0.0)) / 2.0**50, float(np.finfo(float).tiny)), 0.0
         if radius == 0.0 and len(s):
             cell = max(float(np.median(around + s[:, _LENGTH])), cell)
@@ -119,7 +125,7 @@ class ObstacleRows:
         self._heads = np.full(1 << max(int(links).bit_length(), 6), -1, np.int32)
         while True:
             self._give(engine, keep=False)
-            if engine.place_obstacles(np.arange(len(s), dtype=np.int32), dt, True):
+            if engine.place_obstacles(np.arange(len(self._segments), dtype=np.int32), dt, True):
                 return
             self._links = np.zeros((2 * len(self._links), 2), np.int32)
 

@@ -156,10 +156,12 @@ class Particles(Shared):
     def _put_down(self, values: dict[str, Array], on_overlap: str | None) -> NDArray[np.bool_]:
         """(n,) which of these particles are to be added; all are put inside the room."""
         where, free = values["position"], np.isfinite(values["mass"])
-        kept: NDArray[np.bool_] = ~free | ~(self.boundary.outside(where) | (self._course.covering(where) >= 0))
+        marks = values["category"], values["mask"]
+        held, inside = free & self.boundary.holds(*marks), np.where(free, self._course.covering(where, *marks), -1)
+        kept: NDArray[np.bool_] = ~(held & self.boundary.outside(where)) & (inside < 0)
         if on_overlap != "skip":
-            self._refuse_misplaced(where, free, allowed=_ALLOWED)
-        values["position"] = np.where(free[:, None], self.boundary.put_in(where, values["radius"]), where)
+            self._refuse_misplaced(where, held, inside, allowed=_ALLOWED)
+        values["position"] = np.where(held[:, None], self.boundary.put_in(where, values["radius"]), where)
         values["crossed"] = self._state.seam.periods(where.astype(np.float64) - values["position"])
         if on_overlap is None or self.collisions is None:
             return kept
@@ -182,10 +184,10 @@ class Particles(Shared):
             raise InputError(f"material is {min(unknown)!r}{did_you_mean(min(unknown), known)}; allowed: {allowed}")
         return self._state.material_numbers(given, count)
 
-    def _refuse_misplaced(self, position: Array, free: Array, *, allowed: str) -> None:
-        """No particle that is free may start inside an obstacle or outside the room."""
-        outside, inside = self.boundary.outside(position), self._course.covering(position)
-        wrong = np.flatnonzero(free & (outside | (inside >= 0)))
+    def _refuse_misplaced(self, position: Array, held: Array, inside: Array, *, allowed: str) -> None:
+        """No particle may start outside the room that holds it, nor inside an obstacle, or -1."""
+        outside = held & self.boundary.outside(position)
+        wrong = np.flatnonzero(outside | (inside >= 0))
         if len(wrong):
             k = int(wrong[0])
             what = f"outside the room, {self.boundary}" if outside[k] else f"inside the {self.obstacles[inside[k]]}"

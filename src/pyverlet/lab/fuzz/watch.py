@@ -270,7 +270,7 @@ def _in_obstacles(world: World) -> bool:
     """Whether anybody is, if only with its rim."""
     course = world._course
     course.covering(world.position)  # obstacles are placed for that
-    near = course.facing(world.position)
+    near = course.facing(world.position, marks=(world.category, world.mask))
     return bool((near.gap < world.radius[near.row]).any())
 
 
@@ -280,7 +280,8 @@ def _finite(world: World) -> bool:
 
 
 def _stay(world: World, frame: int) -> None:
-    gone = np.flatnonzero(world.boundary.outside(world.position) & np.isfinite(world.mass))
+    held = world.boundary.holds(world.category, world.mask) & np.isfinite(world.mass)
+    gone = np.flatnonzero(world.boundary.outside(world.position) & held)
     if len(gone):
         raise Broken(
             "room", frame, f"particle {gone[0]} of {len(world)} is at {world.position[gone[0]]}, {len(gone)} are outside"

@@ -16,6 +16,13 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import listed
+from pyverlet.state.state import EVERYONE
+
+_DASHES = 12
+"""In which a sensor is drawn."""
+
+_ARROW = 0.03
+"""Half the width of the arrow at a one-way line, of that line's length."""
 
 Value = TypeVar("Value")
 Points = NDArray[np.float64]
@@ -73,7 +80,7 @@ class Parts(NamedTuple):
     """The surface, if it moves, runs counter-clockwise around the shape instead of along the line."""
 
 
-class _Checked(Generic[Value]):
+class Checked(Generic[Value]):
     """An attribute that is checked when it is set, and that tells the world that the obstacle has changed."""
 
     def __init__(self, check: Callable[[str, Any], Value]) -> None:
@@ -107,20 +114,28 @@ class Obstacle(ABC):
         velocity: (x, y) it moves with, m/s, whatever is in its way.
         angular_velocity: rad/s it turns with about its pivot, counter-clockwise.
         pivot: (x, y), m; None is the middle of its points.
+        category: 32 bits, what it is; all of them unless said.
+        mask: 32 bits; it and a particle collide if each has a bit of its category in the other's mask.
+        sensor: hold nothing, and tell `events` which of these particles begin and end to touch it.
 
     Every one of them may be set while the world runs; `pivot` and `angle` say where it is now, and setting them puts it there
     without hitting anybody.
     """
 
-    restitution = _Checked(checks.fraction)
-    friction = _Checked(lambda name, value: checks.number(name, value, least=0.0))
-    rolling_resistance = _Checked(lambda name, value: checks.number(name, value, least=0.0))
-    material = _Checked(checks.text)
-    surface_speed = _Checked(checks.number)
-    velocity = _Checked(checks.vector)
-    angular_velocity = _Checked(checks.number)
-    pivot = _Checked(checks.vector)
-    angle = _Checked(checks.number)
+    restitution = Checked(checks.fraction)
+    friction = Checked(lambda name, value: checks.number(name, value, least=0.0))
+    rolling_resistance = Checked(lambda name, value: checks.number(name, value, least=0.0))
+    material = Checked(checks.text)
+    surface_speed = Checked(checks.number)
+    velocity = Checked(checks.vector)
+    angular_velocity = Checked(checks.number)
+    pivot = Checked(checks.vector)
+    angle = Checked(checks.number)
+    category = Checked(checks.bit_set)
+    mask = Checked(checks.bit_set)
+    sensor = Checked(checks.flag)
+    one_way: tuple[float, float] | None = None
+    """Direction in which it is passable, relative to it at an angle of 0; None: in none."""
     table: Any = None
     """Its segments as the engine has them, made when it first meets a world."""
 
@@ -136,6 +151,9 @@ class Obstacle(ABC):
         velocity: Sequence[float] = (0.0, 0.0),
         angular_velocity: float = 0.0,
         pivot: Sequence[float] | None = None,
+        category: int = EVERYONE,
+        mask: int = EVERYONE,
+        sensor: bool = False,
     ) -> None:
         self.restitution = restitution
         self.friction = friction
@@ -146,6 +164,7 @@ class Obstacle(ABC):
         self.angular_velocity = angular_velocity
         self.pivot = points.mean(axis=0) if pivot is None else pivot
         self.angle = 0.0
+        self.category, self.mask, self.sensor = category, mask, sensor
         self._local: Points = points - np.asarray(self.pivot)
         self._drawn_at: Any = None
         self._drawn: list[Outline] = []
@@ -182,15 +201,40 @@ class Obstacle(ABC):
         self.__dict__.update(pivot=pivot, angle=angle)
 
     def drawn(self) -> list[Outline]:
-        """As `outlines`; the same list as long as it has not moved."""
-        where = (self.pivot, self.angle)
+        """As `outlines`, a sensor in dashes, a one-way line with an arrow; the same list as long as it has not moved."""
+        where = (self.pivot, self.angle, self.sensor, self.one_way)
         if where != self._drawn_at:
-            self._drawn_at, self._drawn = where, self.outlines()
+            lines = self.outlines()
+            if self.sensor:
+                lines = [dash for outline in lines for dash in _dashes(outline)]
+            elif self.one_way is not None:
+                lines = [*lines, _arrow(self.points, self.one_way, self.angle)]
+            self._drawn_at, self._drawn = where, lines
         return self._drawn
 
     def __repr__(self) -> str:
         x, y = self.pivot
         return f"{type(self).__name__} at ({x:g}, {y:g}) m"
+
+
+def _dashes(outline: Outline) -> list[Outline]:
+    """Every other part of an outline."""
+    points = np.concatenate((outline.points, outline.points[:1])) if outline.filled else outline.points
+    gone = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
+    ends = np.linspace(0.0, gone[-1], 2 * _DASHES).reshape(-1, 2)
+    x, y = (np.interp(ends, gone, column) for column in points.T)
+    return [Outline(dash, filled=False) for dash in np.stack((x, y), axis=-1)]
+
+
+def _arrow(points: Points, way: tuple[float, float], angle: float) -> Outline:
+    """In the middle of a line through points, the way it lets particles through."""
+    c, s = np.cos(angle), np.sin(angle)
+    along = np.array([c * way[0] - s * way[1], s * way[0] + c * way[1]]) / np.hypot(*way)
+    across = np.array([-along[1], along[0]])
+    size = _ARROW * float(np.ptp(points, axis=0).max())
+    k = (len(points) - 1) // 2
+    middle = 0.5 * (points[k] + points[k + 1])
+    return Outline(middle + size * np.array([-across, 2 * along, across]), filled=False)
 
 
 AnyObstacle = TypeVar("AnyObstacle", bound=Obstacle)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.core import unit
 from pyverlet.ground.constants import OBSTACLE_LINKS
@@ -13,8 +13,12 @@ from pyverlet.ground.errors import InputError
 from pyverlet.laws.obstacles._base import Obstacles
 from pyverlet.laws.obstacles._tables import Tables
 from pyverlet.state.seam import NONE, Seam
+from pyverlet.state.state import EVERYONE
 
 Array = NDArray[Any]
+
+_STANDING = 13
+"""Numbers of a segment in `core.obstacle_queries`."""
 
 _TOO_FAR = 2.0**48
 """Cells from the origin to where a segment may stand: beyond, numbers do not tell neighbouring cells apart."""
@@ -45,21 +49,28 @@ class Course(Tables):
         self._placed: Any = None  # what the grid is about
         self._within = 0.0  # m from a segment up to which its cells reach
         self._cell = 1.0
-        self._standing = np.zeros((0, 10))
+        self._standing = np.zeros((0, _STANDING))
         self._heads, self._links = np.full(1, -1, np.int32), np.zeros((0, 2), np.int32)
 
-    def covering(self, position: Array) -> NDArray[np.int64]:
-        """(n,) which obstacle has each of these (n, 2) points inside it, m, -1 for none."""
+    def covering(self, position: Array, category: ArrayLike = 1, mask: ArrayLike = EVERYONE) -> NDArray[np.int64]:
+        """(n,) which obstacle has each of these (n, 2) points inside it, m, -1 for none.
+
+        Only those that particles of this category and mask, (n,) or one for all, collide with and cannot pass.
+        """
         by = np.full(len(position), -1)
         self.begin()
         if self._seen:
             self._place(0.0, 0.0)
             where = self.seam.wrapped(np.ascontiguousarray(position, np.float64))
-            _tools().covered_by(self._standing, self._cell, self._heads, self._links, where, by)
+            filters = _bits(category, len(where)), _bits(mask, len(where))
+            _tools().covered_by(self._standing, self._cell, self._heads, self._links, where, *filters, by)
             by[by >= 0] %= len(self._seen)
         return by
 
-    def facing(self, position: Array, beyond: Array | float = 0.0, *, within: float = 0.0, ahead: float = 0.0) -> Facing:
+    def facing(
+        self, position: Array, beyond: Array | float = 0.0, *, within: float = 0.0, ahead: float = 0.0,
+        marks: tuple[ArrayLike, ArrayLike] | None = None,
+    ) -> Facing:  # fmt: skip
         """Of each of these points (n, 2) the nearest obstacle, and those up to `beyond` m, (n,), farther away.
 
         Who is inside a polygon is as far from it as from its rim.
@@ -69,16 +80,19 @@ class Course(Tables):
             beyond: m.
             within: m; who is farther from all is compared with each, which takes longer.
             ahead: s since obstacles were where the world has them, as at the end of a frame that is not accepted yet.
+            marks: category and mask, (n,) or one for all: only what particles with these collide with. None: all, sensors too.
         """
         row, body, gap, normal = (np.empty(0, kind) for kind in (np.int64, np.int64, float, float))
         found, where = len(position), np.ascontiguousarray(position, np.float64)
         extra = np.broadcast_to(np.asarray(beyond, float), len(position)).copy()
+        filters = [_bits(each, found if marks else 0) for each in marks or (0, 0)]
         while found > len(row) and self._seen:
             self._place(ahead, within)
             row, body, gap = np.empty(2 * found, np.int64), np.empty(2 * found, np.int64), np.empty(2 * found)
             normal = np.empty((2 * found, 2))
             grid = self._within, self._cell, self._heads, self._links
-            found = _tools().nearest_bodies(self._standing, len(self._seen), *grid, where, extra, row, body, gap, normal)
+            answer = row, body, gap, normal
+            found = _tools().nearest_bodies(self._standing, len(self._seen), *grid, where, extra, *filters, *answer)
         order = np.lexsort((body[:found], row[:found])) if len(row) else np.zeros(0, np.int64)
         return Facing(row[order], body[order], gap[order], normal[order] if len(row) else np.zeros((0, 2)))
 
@@ -109,7 +123,7 @@ class Course(Tables):
 
     def _stand(self, ahead: float) -> Array:
         """Segments as `core.obstacle_queries` has them, `ahead` seconds from now."""
-        s, standing = self._segments, np.empty((len(self._segments), 10))
+        s, standing = self._segments, np.empty((len(self._segments), _STANDING))
         x, y, angle, vx, vy, spin = self.bodies[s["body"]].T
         with np.errstate(over="ignore", invalid="ignore"):
             c, d = np.cos(angle + ahead * spin), np.sin(angle + ahead * spin)
@@ -118,7 +132,9 @@ class Course(Tables):
                 c * s["lc"] - d * s["ls"], d * s["lc"] + c * s["ls"],
             )  # fmt: skip
         names = ("length", "rounding", "inner", "body", "first", "faces")
-        for k, column in enumerate((*columns, *(s[name] for name in names))):
+        solid = s["sensor"] == 0
+        filters = solid * s["category"], solid * s["mask"], (s["way_x"] != 0) | (s["way_y"] != 0)
+        for k, column in enumerate((*columns, *(s[name] for name in names), *filters)):
             standing[:, k] = column
         return standing
 
@@ -165,6 +181,11 @@ class Course(Tables):
         angles = bodies["angle"][self._moving].tolist()
         for k, (x, y), angle in zip(self._moving.tolist(), place.tolist(), angles, strict=True):
             self._seen[k].carry((x, y), angle)
+
+
+def _bits(value: ArrayLike, count: int) -> NDArray[np.uint32]:
+    """(count,) as kernels take them."""
+    return np.ascontiguousarray(np.broadcast_to(np.asarray(value, np.uint32), (count,)))
 
 
 def _tools() -> Any:

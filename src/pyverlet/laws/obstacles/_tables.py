@@ -15,6 +15,12 @@ Array = NDArray[Any]
 
 _HERE = ((0.0, 0.0),)
 
+_SURFACE = (
+    ("restitution", "restitution"), ("friction", "friction"), ("belt", "surface_speed"),
+    ("rolling", "rolling_resistance"), ("category", "category"), ("mask", "mask"), ("sensor", "sensor"),
+)  # fmt: skip
+"""Columns of all segments of an obstacle, and the attributes that they are."""
+
 BODY = np.dtype([(name, np.float64) for name in ("x", "y", "angle", "vx", "vy", "spin")])
 """Where an obstacle's pivot is at the beginning of a frame, m and rad, and how it moves, m/s and rad/s."""
 
@@ -29,11 +35,12 @@ SEGMENT = np.dtype(
         ("after_x", np.float64), ("after_y", np.float64),  # from its end to the neighbour's end
         ("restitution", np.float64), ("friction", np.float64), ("belt", np.float64), ("rolling", np.float64),
         ("material", np.int64),  # which of `Tables.names`
+        ("category", np.int64), ("mask", np.int64),
+        ("way_x", np.float64), ("way_y", np.float64),  # in which it is passable, in its own frame; 0: in no direction
+        ("sensor", np.int64),  # 1: it is one
     ]
 )  # fmt: skip
 """A rounded segment of an obstacle. Metres."""
-
-_SURFACE = ("restitution", "friction", "belt", "rolling", "material")
 
 
 class _Rows:
@@ -70,10 +77,11 @@ class Tables:
         seam: of the room. In a periodic one there are images of all obstacles beside it: circles run on beyond it within a frame.
         names: of materials that there have been, and their numbers in the table.
         version: another number whenever an obstacle has come, gone or been changed by others than its own motion.
+        solid_version: the same of those that are no sensors.
     """
 
     def __init__(self, obstacles: Obstacles, seam: Seam = NONE) -> None:
-        self._obstacles, self.seam, self.version = obstacles, seam, 0
+        self._obstacles, self.seam, self.version, self.solid_version = obstacles, seam, 0, 0
         self.names = {"": 0}
         self._seen: list[Obstacle] = []
         self._listed = self._revision = -1
@@ -82,7 +90,7 @@ class Tables:
         self._bodies, self._segments = self._own_bodies.rows, self._own_segments.rows
         self._first = np.zeros(1, np.int64)  # of each its first segment, and one more
         self._number: dict[int, int] | None = {}  # of each by its id
-        self._moves, self._drives = set[int](), set[int]()
+        self._moves, self._drives, self._sensors = set[int](), set[int](), set[int]()
         self._moving = np.zeros(0, np.int64)
 
     def __reduce__(self) -> Any:
@@ -94,17 +102,31 @@ class Tables:
 
     @property
     def drives(self) -> bool:
-        """Whether any moves, or has a surface that does."""
+        """Whether any that is no sensor moves, or has a surface that does."""
         return bool(self._drives)
+
+    @property
+    def solid(self) -> bool:
+        """Whether any is no sensor."""
+        return len(self._seen) > len(self._sensors)
+
+    @property
+    def sensors(self) -> list[int]:
+        """Which are."""
+        return sorted(self._sensors)
+
+    @property
+    def sensors_move(self) -> bool:
+        """Whether any of them does."""
+        return not self._sensors.isdisjoint(self._moves)
 
     def seen(self) -> list[Obstacle]:
         """The obstacles of the last frame."""
         return self._seen
 
-    def _surface(self, obstacle: Obstacle) -> tuple[float, ...]:
-        """What its surface is like: see `_SURFACE`."""
-        material = self.names.setdefault(obstacle.material, len(self.names))
-        return obstacle.restitution, obstacle.friction, obstacle.surface_speed, obstacle.rolling_resistance, material
+    def _material(self, obstacle: Obstacle) -> int:
+        """The number of its material."""
+        return self.names.setdefault(obstacle.material, len(self.names))
 
     def begin(self) -> None:
         """At the beginning of a frame: look what has changed."""
@@ -171,6 +193,8 @@ class Tables:
             order[new], fresh = before + np.arange(len(new)), [now[k] for k in new]
         if order is None and not fresh and self._imaged == self.seam:
             return fresh
+        if _solids(now) != _solids(seen) if order is not None else _solids(fresh):
+            self.solid_version += 1
         self._seen, self.version = now, self.version + 1
         self._append(fresh, before)
         if order is not None:
@@ -196,9 +220,13 @@ class Tables:
         rows = np.concatenate(parts).view(SEGMENT)
         first = self._first[-1] + np.cumsum([0, *count])
         rows["body"], rows["first"] = np.repeat(before + np.arange(len(fresh)), count), np.repeat(first[:-1], count)
-        surfaces = [self._surface(obstacle) for obstacle in fresh]
-        for name, column in zip(_SURFACE, zip(*surfaces, strict=True), strict=bool(surfaces)):
-            rows[name] = np.repeat(column, count)
+        for name, attribute in _SURFACE:
+            rows[name] = np.repeat([getattr(obstacle, attribute) for obstacle in fresh], count)
+        rows["material"] = np.repeat([self._material(obstacle) for obstacle in fresh], count)
+        for k, obstacle in enumerate(fresh):
+            if obstacle.one_way is not None:
+                start = first[k] - first[0]
+                _set_way(rows[start : start + count[k]], obstacle)
         self._own_segments.extend(rows)
         self._own_bodies.extend(np.array([_body(obstacle) for obstacle in fresh], BODY))
         self._first = np.concatenate((self._first, first[1:]))
@@ -220,16 +248,22 @@ class Tables:
         for image, (x, y) in enumerate(self.seam.images() if self.seam else _HERE):
             self._bodies[image * count + k] = (body[0] + x, body[1] + y, *body[2:])
             part = self._segments[image * sides + self._first[k] : image * sides + self._first[k + 1]]
-            for name, value in zip(_SURFACE, self._surface(obstacle), strict=True):
-                part[name] = value
+            for name, attribute in _SURFACE:
+                part[name] = getattr(obstacle, attribute)
+            part["material"] = self._material(obstacle)
+            _set_way(part, obstacle)
         self._own_bodies.rows[k] = body
+        was = k in self._sensors
         self._sort_in(k)
         self.version += 1
+        self.solid_version += not (was and obstacle.sensor)
 
     def _sort_in(self, k: int) -> None:
         """Note what an obstacle does that only few do."""
         obstacle, moves = self._seen[k], self._seen[k].moves
-        (self._drives.add if moves or obstacle.surface_speed != 0.0 else self._drives.discard)(k)
+        (self._sensors.add if obstacle.sensor else self._sensors.discard)(k)
+        drives = (moves or obstacle.surface_speed != 0.0) and not obstacle.sensor
+        (self._drives.add if drives else self._drives.discard)(k)
         if moves != (k in self._moves):
             (self._moves.add if moves else self._moves.discard)(k)
             self._moving = np.array(sorted(self._moves), np.int64)
@@ -240,7 +274,8 @@ class Tables:
         s, b = self._own_segments.rows, self._own_bodies.rows
         self._moving = np.flatnonzero((b["vx"] != 0.0) | (b["vy"] != 0.0) | (b["spin"] != 0.0))
         self._moves = set(self._moving.tolist())
-        self._drives = self._moves | set(s["body"][s["belt"] != 0.0].tolist())
+        self._sensors = set(s["body"][s["sensor"] != 0].tolist())
+        self._drives = (self._moves | set(s["body"][s["belt"] != 0.0].tolist())) - self._sensors
 
     def _imagine(self) -> None:
         """The obstacles and, in a periodic room, their images beside it."""
@@ -254,6 +289,17 @@ class Tables:
         number = np.repeat(np.arange(len(shift)), sides)
         self._segments["body"] += count * number
         self._segments["first"] += sides * number
+
+
+def _solids(obstacles: list[Obstacle]) -> list[Obstacle]:
+    """Those that are no sensors."""
+    return [obstacle for obstacle in obstacles if not obstacle.sensor]
+
+
+def _set_way(rows: Array, obstacle: Obstacle) -> None:
+    """The way through each of its segments, as that sees it."""
+    x, y = np.array(obstacle.one_way or (0.0, 0.0)) / (np.hypot(*obstacle.one_way) if obstacle.one_way else 1.0)
+    rows["way_x"], rows["way_y"] = rows["lc"] * x + rows["ls"] * y, rows["lc"] * y - rows["ls"] * x
 
 
 def _body(obstacle: Obstacle) -> tuple[float, ...]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
-from pyverlet.laws.obstacles._base import Obstacle, Outline, Parts, Points
+from pyverlet.laws.obstacles._base import Checked, Obstacle, Outline, Parts, Points
 
 _CORNER = 24
 """Points of a half circle that is drawn: off by 0.2 % of its radius."""
@@ -24,12 +24,25 @@ class Chain(Obstacle):
         points: (n, 2), m, at least two.
         closed: join the last to the first.
         radius: half its thickness, m.
+        one_way: (x, y), a direction in which particles pass through it; it holds those that come from the other side. It turns
+            with the chain. Who overlaps it without having been held passes until it is entirely beyond. None: solid.
         surface: restitution, friction and all that `Obstacle` takes beside points.
     """
 
-    def __init__(self, points: ArrayLike, *, closed: bool = False, radius: float = 0.0, **surface: Any) -> None:
+    one_way = Checked(checks.direction)
+
+    def __init__(
+        self,
+        points: ArrayLike,
+        *,
+        closed: bool = False,
+        radius: float = 0.0,
+        one_way: Sequence[float] | None = None,
+        **surface: Any,
+    ) -> None:
         corners = _corners("points", points, least=2)
         self.closed = bool(closed)
+        self.one_way = one_way
         self.radius = checks.number("radius", radius, least=0.0)
         super().__init__(corners, **surface)
 
@@ -51,11 +64,14 @@ class Segment(Chain):
     Args:
         start: (x, y), m.
         end: (x, y), m.
+        one_way: (x, y), a direction in which particles pass through it; see `Chain`.
         surface: restitution, friction and all that `Obstacle` takes beside points.
     """
 
-    def __init__(self, start: Sequence[float], end: Sequence[float], **surface: Any) -> None:
-        super().__init__([checks.vector("start", start), checks.vector("end", end)], **surface)
+    def __init__(
+        self, start: Sequence[float], end: Sequence[float], *, one_way: Sequence[float] | None = None, **surface: Any
+    ) -> None:
+        super().__init__([checks.vector("start", start), checks.vector("end", end)], one_way=one_way, **surface)
 
 
 class Capsule(Chain):
@@ -65,12 +81,22 @@ class Capsule(Chain):
         start: (x, y) of the centre of one end, m.
         end: (x, y) of the other's, m.
         radius: half its thickness, m, greater than 0.
+        one_way: (x, y), a direction in which particles pass through it; see `Chain`.
         surface: restitution, friction and all that `Obstacle` takes beside points.
     """
 
-    def __init__(self, start: Sequence[float], end: Sequence[float], *, radius: float, **surface: Any) -> None:
+    def __init__(
+        self,
+        start: Sequence[float],
+        end: Sequence[float],
+        *,
+        radius: float,
+        one_way: Sequence[float] | None = None,
+        **surface: Any,
+    ) -> None:
         checks.number("radius", radius, above=0.0)
-        super().__init__([checks.vector("start", start), checks.vector("end", end)], radius=radius, **surface)
+        corners = [checks.vector("start", start), checks.vector("end", end)]
+        super().__init__(corners, radius=radius, one_way=one_way, **surface)
 
     def _parts(self) -> Parts:
         return super()._parts()._replace(around=True)

@@ -51,10 +51,13 @@ class Sheet(Built):
     grid: NDArray[np.int64]
 
 
-def add(world: World, position: NDArray[np.float64], spacing: float, radius: float | None, mass: float) -> Group:
+def add(
+    world: World, position: NDArray[np.float64], spacing: float, radius: float | None, mass: float, category: int, mask: int
+) -> Group:
     """Particles that weigh `mass` together; their radius unless given is RIM of the spacing."""
     each = checks.number("mass", mass, above=0.0) / len(position)
-    return world.add(position=position, radius=RIM * spacing if radius is None else radius, mass=each)
+    size = RIM * spacing if radius is None else radius
+    return world.add(position=position, radius=size, mass=each, category=category, mask=mask)
 
 
 def ends(start: Point, end: Point) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from pyverlet.ground import checks
 from pyverlet.laws.links import Stick
+from pyverlet.state.state import EVERYONE
 from pyverlet.world.builders._built import Built, Point, add, ends
 
 if TYPE_CHECKING:
@@ -24,6 +25,8 @@ def chain(
     radius: float | None = None,
     compliance: float = 0.0,
     breaking_force: float = np.inf,
+    category: int = 1,
+    mask: int = EVERYONE,
 ) -> Built:
     """Particles from `start` to `end`, joined by sticks; `chain.group.pin(0)` hangs it up.
 
@@ -36,10 +39,12 @@ def chain(
         radius: of each, m; by default they all but touch.
         compliance: of each stick, m/N.
         breaking_force: at which a stick breaks, N.
+        category: of all particles, 32 bits; see `World.add`.
+        mask: of all particles, 32 bits.
     """
     count = checks.whole("links", links)
     a, b, apart = ends(start, end)
-    group = add(world, a + np.linspace(0.0, 1.0, count + 1)[:, None] * (b - a), apart / count, radius, mass)
+    group = add(world, a + np.linspace(0.0, 1.0, count + 1)[:, None] * (b - a), apart / count, radius, mass, category, mask)
     k = np.arange(count)
     stick = Stick(group, k, k + 1, compliance=compliance, breaking_force=breaking_force, collide=False)
     return Built(group, (world.links.append(stick),))

@@ -40,6 +40,7 @@ class Region:
         for k, obstacle in enumerate(self._obstacles):
             if not isinstance(obstacle, Obstacle):
                 raise InputError(f"avoid[{k}] is {obstacle!r}; allowed are a world, and a list of obstacles")
+        self._obstacles = [obstacle for obstacle in self._obstacles if not obstacle.sensor]
         self._gap, self.extent = _walls(where)
 
     def free(self, points: Floats, radius: Floats) -> Flags:

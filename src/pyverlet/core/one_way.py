@@ -1,0 +1,172 @@
+# mypy: ignore-errors
+"""One-way lines: particles pass in one direction, u, and are held on the side that u points to.
+
+A line holds a particle that does not overlap it and whose centre is, seen from the nearest point of the line, on the side that u
+points to. It goes on to hold it while they overlap, until the centre is no longer on that side; what overlaps a line without
+having been held passes, and all other parts of a chain let it pass meanwhile. What is new to a line and all but beyond it, or was
+so a substep ago, is held. This is decided once a substep, and remembered.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import fabs, sqrt
+from cython.cimports.libc.stdint import int64_t
+
+from pyverlet.core.cells import Cells, image_of
+from pyverlet.core.obstacles import AFTER, BEFORE, BODY_OF, LENGTH, PLACE, ROUNDING, SEGMENT, WAY
+from pyverlet.core.step import Step
+from pyverlet.core.surface_rows import CONTACT, DRAG, HELD, PUSH, SIDES
+
+OVERLAPS = cython.declare(cython.double, 1e-3)
+"""Of the reach: by less a particle does not overlap a line that it lies on."""
+
+ROUNDED_AWAY = cython.declare(cython.double, 8)
+"""Of its coordinates: nor by less than these."""
+
+SIDEWAYS = cython.declare(cython.double, 1e-6)
+"""Cosine of the angle to u: parts of a line along u hold nothing."""
+
+MOST_PARTS = cython.declare(cython.int, 64)
+"""Of a chain, one after the other, that are asked for the side of what is beyond a joint."""
+
+SHALLOW = cython.declare(cython.double, 0.1)
+"""Of the reach: what is new to a line, and overlaps it by less or came from beyond it, was thrown there: it is held."""
+
+Side = cython.struct(held=cython.bint, overlaps=cython.bint, came=cython.bint)
+Nearby = cython.struct(beyond=cython.int, distance=cython.double, held=cython.bint)
+"""Of a particle: -1 before the start of a segment, 1 beyond its end; how far from it, m; whether on the side where it holds."""
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def is_one_way(w: cython.pointer(Step), at: cython.Py_ssize_t) -> cython.bint:
+    """Whether the segment whose row begins at `at` is."""
+    return w.segment[at + WAY] != 0 or w.segment[at + WAY + 1] != 0
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def is_passable(w: cython.pointer(Step), k: cython.Py_ssize_t, at: cython.Py_ssize_t) -> cython.bint:
+    """Whether the segment of contact k, whose row begins at `at`, does not hold the particle in this substep."""
+    return is_one_way(w, at) and w.contact[CONTACT * k + HELD] <= 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def spot_at(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t, ago: cython.double) -> Nearby:
+    """Where particle i is, or was so many seconds ago if nothing has struck it since, as a one-way segment sees it."""
+    p: Nearby
+    c: cython.pointer(Cells) = w.cells
+    ox: cython.double = image_of(w.position[2 * i], w.checked[2 * i], c.low_x, c.period_x)
+    oy: cython.double = image_of(w.position[2 * i + 1], w.checked[2 * i + 1], c.low_y, c.period_y)
+    if ago > 0:
+        b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[at + BODY_OF])
+        width: cython.Py_ssize_t = 4 if w.rough else 2
+        v: cython.pointer(real) = w.motion if w.rough else w.velocity
+        ox -= (v[width * i] - w.body[b + 3]) * ago
+        oy -= (v[width * i + 1] - w.body[b + 4]) * ago
+    ox -= w.segment[at + PLACE]
+    oy -= w.segment[at + PLACE + 1]
+    x: cython.double = w.segment[at + PLACE + 2] * ox + w.segment[at + PLACE + 3] * oy
+    y: cython.double = w.segment[at + PLACE + 2] * oy - w.segment[at + PLACE + 3] * ox
+    p.beyond = -1 if x < 0 else 1 if x > w.segment[at + LENGTH] else 0
+    x -= min(max(x, 0.0), w.segment[at + LENGTH])
+    p.distance = sqrt(x * x + y * y)
+    p.held = x * w.segment[at + WAY] + y * w.segment[at + WAY + 1] > SIDEWAYS * p.distance
+    return p
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def side_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t) -> Side:
+    """Whether particle i is on the side where a one-way segment holds, and whether it overlaps it.
+
+    Beyond a joint that is decided by the part of the chain that it is at: seen from a summit, what comes up a slope is below.
+    """
+    found: Side
+    p: Nearby = spot_at(w, i, at, 0)
+    reach: cython.double = w.segment[at + ROUNDING] + w.radius[i]
+    rounding: cython.double = 2.3e-16 if cython.sizeof(real) == 8 else 1.2e-7
+    rounding *= ROUNDED_AWAY * (fabs(w.position[2 * i]) + fabs(w.position[2 * i + 1]))
+    found.overlaps = p.distance < reach - OVERLAPS * reach - rounding
+    q: Nearby = spot_at(w, i, at, w.h)
+    found.came = p.distance > (1 - SHALLOW) * reach or (q.held and q.distance > (1 - OVERLAPS) * reach)
+    way: cython.int = p.beyond
+    _: cython.int
+    for _ in range(MOST_PARTS):
+        joint: cython.Py_ssize_t = at + (BEFORE if way < 0 else AFTER)
+        if way == 0 or p.beyond != way or (w.segment[joint] == 0 and w.segment[joint + 1] == 0):
+            break
+        following: cython.Py_ssize_t = at + way * SEGMENT
+        if following < 0 or following >= SEGMENT * w.segments or w.segment[following + BODY_OF] != w.segment[at + BODY_OF]:
+            break  # around a closed chain
+        q = spot_at(w, i, following, 0)
+        if q.beyond == -way:
+            break  # the joint is nearest
+        at, p = following, q
+    found.held = p.held
+    return found
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def find_sides(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
+    """Which of the one-way lines that particle i may touch hold it in the substep that begins."""
+    k: cython.Py_ssize_t = w.contact_begin[i]
+    n: cython.Py_ssize_t
+    end: cython.Py_ssize_t
+    at: cython.Py_ssize_t
+    side: Side
+    while k < w.contact_end[i]:
+        at = SEGMENT * (cython.cast(int64_t, w.surface[k]) - SIDES)
+        if w.surface[k] < SIDES or not is_one_way(w, at):
+            k += 1
+            continue
+        whose: cython.double = w.segment[at + BODY_OF]
+        overlaps: cython.bint = False
+        stays: cython.bint = False
+        passes: cython.bint = False
+        thrown: cython.bint = False
+        end = k
+        while end < w.contact_end[i] and w.surface[end] >= SIDES:  # segments of an obstacle are listed one after the other
+            at = SEGMENT * (cython.cast(int64_t, w.surface[end]) - SIDES)
+            if w.segment[at + BODY_OF] != whose:
+                break
+            side = side_of(w, i, at)
+            held: cython.double = w.contact[CONTACT * end + HELD]
+            overlaps |= side.overlaps
+            passes |= side.overlaps and held < 0
+            stays |= side.held and held > 0
+            thrown |= side.held and held == 0 and side.overlaps and side.came
+            end += 1
+        stays |= thrown and not passes
+        for n in range(k, end):
+            side = side_of(w, i, SEGMENT * (cython.cast(int64_t, w.surface[n]) - SIDES))
+            w.contact[CONTACT * n + HELD] = 1.0 if side.held and (stays or not overlaps) else -1.0
+            if w.contact[CONTACT * n + HELD] < 0:
+                w.contact[CONTACT * n + PUSH] = w.contact[CONTACT * n + DRAG] = 0
+        k = end
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def stops(w: cython.pointer(Step), i: cython.Py_ssize_t, segment: cython.Py_ssize_t, across: cython.double) -> cython.bint:
+    """Whether a one-way segment stops the centre of particle i, which begins so far to the left of it, m."""
+    at: cython.Py_ssize_t = SEGMENT * segment
+    k: cython.Py_ssize_t
+    if across * w.segment[at + WAY + 1] <= 0:
+        return False
+    for k in range(w.contact_begin[i], w.contact_end[i]):
+        if w.surface[k] == SIDES + segment:
+            return w.contact[CONTACT * k + HELD] > 0
+    return True  # it was far off

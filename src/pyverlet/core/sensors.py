@@ -1,0 +1,230 @@
+# mypy: ignore-errors
+"""Which sensors particles touch on their ways in a substep: straight to their last impact, and straight on from there.
+
+Sensors are segments, as those of obstacles are, which no list of contacts has.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+from cython.cimports.libc.stdint import int64_t, uint32_t
+
+from pyverlet.core.cells import BLOCK, wrapped
+from pyverlet.core.obstacles import FACES, FIRST_FACE, LATE, LENGTH, PLACE, ROUNDING, SEGMENT, SENSOR, accepts_segment
+from pyverlet.core.step import Step
+
+Leg = cython.struct(
+    x=cython.double,  # of the centre at its start, m
+    y=cython.double,
+    dx=cython.double,  # to its end
+    dy=cython.double,
+    begin=cython.double,  # parts of the substep
+    end=cython.double,
+    reach=cython.double,
+)
+Box = cython.struct(x0=cython.double, y0=cython.double, x1=cython.double, y1=cython.double)
+Point = cython.struct(x=cython.double, y=cython.double)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def leg_of(w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.bint) -> Leg:
+    """The way of particle i in this substep, before it drifts: from its last impact on, or (`first`) up to that."""
+    leg: Leg
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    h: cython.double = w.h
+    since: cython.double = min(w.since[i], h)
+    bend: cython.double = 0.5 * since * (h - since)
+    x: cython.double = w.position[2 * i] + v[width * i] * since - w.acceleration[2 * i] * bend
+    y: cython.double = w.position[2 * i + 1] + v[width * i + 1] * since - w.acceleration[2 * i + 1] * bend
+    if first:
+        leg.dx, leg.dy = x - w.begun[2 * i], y - w.begun[2 * i + 1]
+        x, y = w.begun[2 * i], w.begun[2 * i + 1]
+        leg.begin, leg.end = 0.0, since / h
+    else:
+        leg.dx, leg.dy = w.position[2 * i] + v[width * i] * h - x, w.position[2 * i + 1] + v[width * i + 1] * h - y
+        leg.begin, leg.end = since / h, 1.0
+    leg.x = wrapped(cython.cast(real, x), w.cells.low_x, w.cells.period_x)
+    leg.y = wrapped(cython.cast(real, y), w.cells.low_y, w.cells.period_y)
+    leg.reach = w.radius[i]
+    return leg
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def widen(box: cython.pointer(Box), x: cython.double, y: cython.double, by: cython.double) -> cython.void:
+    """The box takes in a disc."""
+    box.x0, box.y0 = min(box.x0, x - by), min(box.y0, y - by)
+    box.x1, box.y1 = max(box.x1, x + by), max(box.y1, y + by)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def nothing() -> Box:
+    """A box without anything in it."""
+    box: Box
+    box.x0 = box.y0 = 1e300
+    box.x1 = box.y1 = -1e300
+    return box
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def box_of(w: cython.pointer(Step), k: cython.Py_ssize_t, faces: cython.Py_ssize_t) -> Box:
+    """Around segment k, or the polygon of so many faces that begins with it, in this substep."""
+    box: Box = nothing()
+    n: cython.Py_ssize_t
+    to: cython.Py_ssize_t
+    for n in range(k, k + max(faces, 1)):
+        for to in range(SEGMENT * n + PLACE, SEGMENT * n + LATE + 1, 4):
+            far: cython.double = w.segment[SEGMENT * n + LENGTH]
+            widen(cython.address(box), w.segment[to], w.segment[to + 1], w.segment[SEGMENT * n + ROUNDING])
+            x: cython.double = w.segment[to] + far * w.segment[to + 2]
+            widen(cython.address(box), x, w.segment[to + 1] + far * w.segment[to + 3], w.segment[SEGMENT * n + ROUNDING])
+    return box
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def seen(w: cython.pointer(Step), k: cython.Py_ssize_t, x: cython.double, y: cython.double, part: cython.double) -> Point:
+    """A point as segment k sees it after so much of the substep: its start is the origin, its end (length, 0)."""
+    p: Point
+    at: cython.Py_ssize_t = SEGMENT * k
+    late: cython.Py_ssize_t
+    p.x = p.y = 0.0
+    for late in range(2):
+        to: cython.Py_ssize_t = at + (LATE if late == 1 else PLACE)
+        share: cython.double = part if late == 1 else 1.0 - part
+        ox: cython.double = x - w.segment[to]
+        oy: cython.double = y - w.segment[to + 1]
+        p.x += share * (w.segment[to + 2] * ox + w.segment[to + 3] * oy)
+        p.y += share * (w.segment[to + 2] * oy - w.segment[to + 3] * ox)
+    return p
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def square_from(
+    x: cython.double, y: cython.double, ax: cython.double, ay: cython.double, bx: cython.double, by: cython.double
+) -> cython.double:
+    """Square of the distance of (x, y) from the line from a to b, m^2."""
+    dx: cython.double = bx - ax
+    dy: cython.double = by - ay
+    square: cython.double = dx * dx + dy * dy
+    part: cython.double = 0.0
+    if square > 0:
+        part = min(max(((x - ax) * dx + (y - ay) * dy) / square, 0.0), 1.0)
+    x -= ax + part * dx
+    y -= ay + part * dy
+    return x * x + y * y
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def passes(w: cython.pointer(Step), k: cython.Py_ssize_t, leg: cython.pointer(Leg)) -> cython.bint:
+    """Whether a particle touches segment k anywhere on a leg of its way."""
+    a: Point = seen(w, k, leg.x, leg.y, leg.begin)
+    b: Point = seen(w, k, leg.x + leg.dx, leg.y + leg.dy, leg.end)
+    length: cython.double = w.segment[SEGMENT * k + LENGTH]
+    reach: cython.double = w.segment[SEGMENT * k + ROUNDING] + leg.reach
+    if a.y * b.y < 0:
+        x: cython.double = a.x + a.y / (a.y - b.y) * (b.x - a.x)
+        if 0 <= x <= length:
+            return True
+    nearest: cython.double = min(square_from(a.x, a.y, 0, 0, length, 0), square_from(b.x, b.y, 0, 0, length, 0))
+    nearest = min(nearest, square_from(0, 0, a.x, a.y, b.x, b.y))
+    return min(nearest, square_from(length, 0, a.x, a.y, b.x, b.y)) < reach * reach
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def touches(w: cython.pointer(Step), k: cython.Py_ssize_t, faces: cython.Py_ssize_t, leg: cython.pointer(Leg)) -> cython.bint:
+    """The same of segment k, or of the polygon of so many faces that begins with it: those inside touch it."""
+    n: cython.Py_ssize_t
+    inside: cython.bint = faces > 0
+    for n in range(k, k + max(faces, 1)):
+        if passes(w, n, leg):
+            return True
+        inside &= seen(w, n, leg.x + leg.dx, leg.y + leg.dy, leg.end).y > 0
+    return inside
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def meets_box(box: cython.pointer(Box), leg: cython.pointer(Leg)) -> cython.bint:
+    """Whether a leg may lead through a box."""
+    x: cython.bint = min(leg.x, leg.x + leg.dx) - leg.reach <= box.x1 and max(leg.x, leg.x + leg.dx) + leg.reach >= box.x0
+    return x and min(leg.y, leg.y + leg.dy) - leg.reach <= box.y1 and max(leg.y, leg.y + leg.dy) + leg.reach >= box.y0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def sense_one(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, faces: cython.Py_ssize_t, box: cython.pointer(Box)
+) -> cython.void:
+    """Note whether particle i touches the sensor of segment k, which is in the box."""
+    leg: Leg = leg_of(w, i, False)
+    number: int64_t = cython.cast(int64_t, w.segment[SEGMENT * k + SENSOR]) - 1
+    place: cython.Py_ssize_t = i * ((w.sensors + 31) // 32) + number // 32
+    bit: uint32_t = cython.cast(uint32_t, cython.cast(uint32_t, 1) << (number % 32))
+    if meets_box(box, cython.address(leg)) and touches(w, k, faces, cython.address(leg)):
+        w.sensed[place] |= bit
+        if w.substep + 1 == w.substeps:
+            leg.x, leg.y, leg.dx, leg.dy, leg.begin = leg.x + leg.dx, leg.y + leg.dy, 0.0, 0.0, leg.end
+            if touches(w, k, faces, cython.address(leg)):
+                w.inside[place] |= bit
+    if w.since[i] > 0 and (w.sensed[place] & bit) == 0:
+        leg = leg_of(w, i, True)
+        if meets_box(box, cython.address(leg)) and touches(w, k, faces, cython.address(leg)):
+            w.sensed[place] |= bit
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def sense(w: cython.pointer(Step), block: cython.int) -> cython.void:
+    """Note which sensors the particles of a block touch in this substep, and in the last one of a call, at its end."""
+    i: cython.Py_ssize_t
+    k: cython.Py_ssize_t
+    a: cython.Py_ssize_t = block * BLOCK
+    b: cython.Py_ssize_t = min(a + BLOCK, w.count)
+    words: cython.Py_ssize_t = (w.sensors + 31) // 32
+    here: Box = nothing()
+    leg: Leg
+    if w.substep + 1 == w.substeps:
+        for i in range(a * words, b * words):
+            w.inside[i] = 0
+    for i in range(a, b):
+        leg = leg_of(w, i, False)
+        widen(cython.address(here), leg.x, leg.y, leg.reach)
+        widen(cython.address(here), leg.x + leg.dx, leg.y + leg.dy, leg.reach)
+        if w.since[i] > 0:
+            leg = leg_of(w, i, True)
+            widen(cython.address(here), leg.x, leg.y, leg.reach)
+            widen(cython.address(here), leg.x + leg.dx, leg.y + leg.dy, leg.reach)
+    for k in range(w.segments):
+        faces: cython.Py_ssize_t = cython.cast(int64_t, w.segment[SEGMENT * k + FACES])
+        first: cython.Py_ssize_t = cython.cast(int64_t, w.segment[SEGMENT * k + FIRST_FACE])
+        if w.segment[SEGMENT * k + SENSOR] == 0 or (faces > 0 and first != k):
+            continue
+        box: Box = box_of(w, k, faces)
+        if box.x0 <= here.x1 and box.x1 >= here.x0 and box.y0 <= here.y1 and box.y1 >= here.y0:
+            for i in range(a, b):
+                if accepts_segment(w, i, k):
+                    sense_one(w, i, k, faces, cython.address(box))
