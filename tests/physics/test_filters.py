@@ -118,7 +118,7 @@ def test_contacts_are_told_apart_where_two_obstacles_are_at_the_same_place() -> 
 
 
 def test_changing_a_filter_while_it_runs() -> None:
-    world = world_with(OBSTACLES["segment"](), boundary=pv.Box((-9, -3), (9, 9)))
+    world = world_with(OBSTACLES["segment"](category=1), boundary=pv.Box((-9, -3), (9, 9), category=1))
     discs = world.add(position=[(-1, R), (1, R)], radius=R)
     world.run(seconds=0.5, dt=DT)
     assert discs.position[:, 1] == pytest.approx(R)
@@ -138,7 +138,7 @@ def test_changing_a_filter_while_it_runs() -> None:
 
 @pytest.mark.parametrize("change", ["obstacle", "room", "particle", "sensor"])
 def test_a_filter_that_changes_wakes_those_that_rely_on_it(change: str) -> None:
-    floor, room = OBSTACLES["polygon"](), pv.Box((-9, -9), (9, 9))
+    floor, room = OBSTACLES["polygon"](category=1), pv.Box((-9, -9), (9, 9))
     world = world_with(*([floor] if change != "room" else []), boundary=room, sleep=True)
     world.add(position=[(0, R if change != "room" else R - 9), (0, 3 * R if change != "room" else 3 * R - 9)], radius=R)
     world.run(seconds=4.0, dt=DT)
@@ -203,7 +203,7 @@ def test_places_that_are_refused_depend_on_filters() -> None:
 def test_what_is_thrown_far_passes_what_it_does_not_collide_with() -> None:
     # Struck at rest, it leaves so fast that it gets to lines that are in none of its contacts: see `core.surface_sides`.
     for mask, passes in ((2, True), (3, False)):
-        wall = pv.Segment((1, -9), (1, 9))
+        wall = pv.Segment((1, -9), (1, 9), category=1)
         world = world_with(wall, gravity=(0, 0), substeps=1, collisions=pv.Collisions(restitution=1))
         light = world.add(position=(0.5, 0), radius=R, mass=1e-3, category=3, mask=mask)
         world.add(position=(-1.0, 0), velocity=(40, 0), radius=R, mass=1e3, category=2, mask=2)
