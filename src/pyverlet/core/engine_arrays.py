@@ -160,3 +160,20 @@ def make_material_arrays(w: cython.pointer(Step), a, dtype):
     w.restitution, w.friction, w.radius_i = map_row(made_of, 0), map_row(made_of, 1), map_row(made_of, 2)
     w.radius_j, w.turn_i, w.turn_j = map_row(made_of, 3), map_row(made_of, 4), map_row(made_of, 5)
     w.rolling, w.grip = map_row(made_of, 6), map_row(made_of, 7)
+
+
+@cython.cfunc
+def set_materials(w: cython.pointer(Step), a, n, dtype):
+    """See `Engine.set_materials`."""
+    ls: cython.pointer(Lists) = w.lists
+    w.sized, w.varied, w.mixed, w.collides = n["sized"], n["varied"], n["mixed"], n["collides"]
+    if not w.collides:
+        w.groups, w.pins, ls.listed, ls.good = 0, False, False, False
+    w.surfaces_good = False
+    w.cells.bulk, w.cells.smallest, ls.largest, ls.mean_radius = n["bulk"], n["smallest"], n["largest"], n["mean_radius"]
+    ls.restitution, ls.friction, ls.rolling = n["restitution"], n["friction"], n["rolling"]
+    ls.picky = n["picky"] or ls.linked
+    ls.refill, ls.brute = True, n["brute"]
+    a["together"] = n["together"]
+    w.combine, w.materials, w.together = n["combine"], len(n["together"]), doubles(n["together"])
+    make_material_arrays(w, a, dtype)

@@ -19,6 +19,7 @@ from pyverlet.core.engine_arrays import (
     make_material_arrays,
     make_particle_arrays,
     make_rare_arrays,
+    set_materials,
 )
 from pyverlet.core.engine_hearing import hear, make_hearing_arrays
 from pyverlet.core.engine_impulses import fill_kept, read_impulses
@@ -116,23 +117,9 @@ class Engine:
 
         bulk: largest radius of circles that stand in cells, m; smallest, largest and mean_radius, m. restitution, friction: of
         circles without values of their own. picky: whether some pairs are no pairs: of pinned or filtered ones, or linked ones.
-        brute: whether all others are listed; bulk is then 0.
-
-        combine: see `combined`. together: (k, k, 3) of materials, k may be 0.
+        brute: whether all others are listed; bulk is then 0. combine: see `combined`. together: (k, k, 3) of k materials.
         """
-        w: cython.pointer(Step) = cython.address(self.w)
-        ls: cython.pointer(Lists) = cython.address(self.ls)
-        w.sized, w.varied, w.mixed, w.collides = n["sized"], n["varied"], n["mixed"], n["collides"]
-        if not w.collides:
-            w.groups, w.pins, ls.listed, ls.good = 0, False, False, False
-        w.surfaces_good = False
-        self.c.bulk, self.c.smallest, ls.largest, ls.mean_radius = n["bulk"], n["smallest"], n["largest"], n["mean_radius"]
-        ls.restitution, ls.friction, ls.rolling = n["restitution"], n["friction"], n["rolling"]
-        ls.picky = n["picky"] or ls.linked
-        ls.refill, ls.brute = True, n["brute"]
-        self.arrays["together"] = n["together"]
-        w.combine, w.materials, w.together = n["combine"], len(n["together"]), doubles(n["together"])
-        make_material_arrays(w, self.arrays, self.dtype)
+        set_materials(cython.address(self.w), self.arrays, n, self.dtype)
 
     def set_linked(self, begin, to):
         """Pairs that links keep from touching: of the user's particle p those from begin[p] to begin[p + 1], higher ones."""
