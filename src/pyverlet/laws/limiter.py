@@ -217,10 +217,13 @@ class EnergyLimiter:
         return lower
 
     def _since_thrown(self, slots: Slots) -> Array:
-        """(n, 2) m: how far each has come at most since it met somebody: a pair that bounces may be where it was before."""
+        """(n, 2) m: how far each may have come since it met somebody: a pair that bounces may be where it was before.
+
+        Twice what it comes at the speed of now: it may have met others since.
+        """
         kick = slots.velocity - self._start.velocity[slots.particle] - self._dt * np.asarray(self._gravity)
         met = np.abs(kick).max(axis=1) > _ROUNDED * np.abs(slots.velocity).max(axis=1)
-        return np.where(met[:, None], self._dt * slots.velocity, 0.0)
+        return np.where(met[:, None], 2.0 * self._dt * slots.velocity, 0.0)
 
     def _clusters(self, slots: Slots, listed: Listed, moved: Array) -> Array:
         """(n,) lowest slot of the cluster that each slot belongs to."""
