@@ -241,6 +241,8 @@ import os, signal, threading, time
 import numpy as np
 import pyverlet as pv
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs begin without it
+
 def built():
     world = pv.World(boundary=pv.Box((0, 0), (12, 12)), collisions=pv.Collisions(friction=0.3), events=True, ledger=True)
     world.add(position=np.random.default_rng(0).uniform(1, 11, (60, 2)), radius=0.3)
