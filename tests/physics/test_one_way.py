@@ -294,3 +294,24 @@ def test_a_disc_may_be_added_inside_a_thick_one() -> None:
 def test_a_direction_that_is_none_is_refused(way: Any, said: str) -> None:
     with pytest.raises(pv.InputError, match=said):
         pv.Segment((0, 0), (1, 0), one_way=way)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("passing", [(), (6,), (6, 7), (5, 8, 11)])
+def test_a_line_that_lets_a_rolling_disc_pass_for_a_moment_takes_no_more_of_its_roll(
+    passing: tuple[int, ...], dtype: Any
+) -> None:
+    # Rolling resistance takes dv = -(2/3) c J of a disc that rolls, J being the normal impulse over its mass. Lying
+    # on the line before and after, J = g t, whether or not the line let it fall for some frames and caught it again,
+    # as long as it is caught too slowly to bounce.
+    c, h = 0.3, 1 / 960
+    line = pv.Segment((-9, 0), (9, 0), one_way=UP, friction=1.0, rolling_resistance=c)
+    world = world_with(line, dtype=dtype, substeps=1)
+    disc = world.add(position=[(0, R)], velocity=[(1, 0)], spin=[-1 / R], radius=R)
+    frames = 20
+    for frame in range(frames):
+        line.one_way = (0.0, -1.0) if frame in passing else UP
+        world.step(h)
+    speed = 1 - 2 / 3 * c * G * frames * h
+    assert disc.velocity == pytest.approx(np.array([[speed, 0]]), abs=20 * frames * float(np.finfo(dtype).eps))
+    assert disc.spin == pytest.approx(-speed / R, abs=20 * frames * float(np.finfo(dtype).eps) / R)

@@ -136,7 +136,7 @@ def solve(
     rough: cython.bint,
     soft: cython.bint,
     pushes: cython.bint,
-    turns: cython.bint,
+    moves_normals: cython.bint,
 ) -> cython.Py_ssize_t:
     """One sweep over the contacts of group s; returns how many pairs meet so fast that they bounce, noted in `hit`.
 
@@ -144,7 +144,7 @@ def solve(
     it takes back the speed of pushing out.
     pushes: without, soft contacts only keep pairs from coming nearer than they are. That is for what links have made of
     velocities: they would give on what springs put out.
-    turns: normals of pairs that turn fast become those of after the drift.
+    moves_normals: normals of pairs that turn fast become those of after the drift.
     """
     own: Step = shared[0]  # which no store to an array can change: its fields stay in registers
     w: cython.pointer(Step) = cython.address(own)
@@ -187,7 +187,7 @@ def solve(
             along_x: lanes = m.vx - m.ux
             along_y: lanes = m.vy - m.uy
             if own.turned and any_above(along_x * along_x + along_y * along_y, turning):
-                if turns:
+                if moves_normals:
                     n: Normals = turned_normals(w, k, before, nx, ny)
                     nx, ny = n.x, n.y
                 # Along the normals of before the drift, to first order.
@@ -220,10 +220,10 @@ def solve(
 @cython.nogil
 @cython.exceptval(check=False)
 def sweep(
-    w: cython.pointer(Step), s: cython.Py_ssize_t, soft: cython.bint, pushes: cython.bint, turns: cython.bint
+    w: cython.pointer(Step), s: cython.Py_ssize_t, soft: cython.bint, pushes: cython.bint, moves_normals: cython.bint
 ) -> cython.Py_ssize_t:
     """As `solve`, compiled for rough circles and for smooth ones."""
-    return solve(w, s, True, soft, pushes, turns) if w.rough else solve(w, s, False, soft, pushes, turns)
+    return solve(w, s, True, soft, pushes, moves_normals) if w.rough else solve(w, s, False, soft, pushes, moves_normals)
 
 
 @cython.cfunc

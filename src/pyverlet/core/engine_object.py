@@ -33,7 +33,7 @@ from pyverlet.core.engine_surfaces import (
     take_surfaces,
     touched_of,
 )
-from pyverlet.core.engine_work import energy_of_last, friction_of_last, rolling_of_last
+from pyverlet.core.engine_work import energy_of_last, friction_of_last
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_ends import show_links
 from pyverlet.core.pair_lists import Lists
@@ -206,7 +206,7 @@ class Engine:
     def energy_of_last(self, share: cython.double):
         """J by `share` of what contacts gave in the last substep: all, that along tangents, that against rolling."""
         w: cython.pointer(Step) = cython.address(self.w)
-        return energy_of_last(w, share), friction_of_last(w, share), rolling_of_last(w, share)
+        return (energy_of_last(w, share), *friction_of_last(w, share))
 
     def listen(self, wanted: cython.bint):
         """Note from now on who touches, or no more; what was heard is forgotten."""

@@ -17,7 +17,7 @@ from cython.cimports.libc.stdint import int64_t
 from pyverlet.core.cells import Cells, image_of
 from pyverlet.core.obstacles import AFTER, BEFORE, BODY_OF, LENGTH, PLACE, ROUNDING, SEGMENT, WAY
 from pyverlet.core.step import Step
-from pyverlet.core.surface_rows import CONTACT, DRAG, HELD, PUSH, SIDES
+from pyverlet.core.surface_rows import CONTACT, DRAG, HELD, PUSH, ROLL, SIDES
 
 OVERLAPS = cython.declare(cython.double, 1e-3)
 """Of the reach: by less a particle does not overlap a line that it lies on."""
@@ -153,7 +153,7 @@ def find_sides(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
             side = side_of(w, i, SEGMENT * (cython.cast(int64_t, w.surface[n]) - SIDES))
             w.contact[CONTACT * n + HELD] = 1.0 if side.held and (stays or not overlaps) else -1.0
             if w.contact[CONTACT * n + HELD] < 0:
-                w.contact[CONTACT * n + PUSH] = w.contact[CONTACT * n + DRAG] = 0
+                w.contact[CONTACT * n + PUSH] = w.contact[CONTACT * n + DRAG] = w.contact[CONTACT * n + ROLL] = 0
         k = end
 
 

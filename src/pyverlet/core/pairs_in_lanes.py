@@ -38,20 +38,9 @@ def motion_of(w: cython.pointer(Step), k: cython.Py_ssize_t, rough: cython.bint)
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def ease_i(w: cython.pointer(Step), at: cython.Py_ssize_t, part: lanes) -> lanes:
-    """What an angular impulse over the reduced mass turns i by: w_i / (w_i + w_j) times 2 / r^2; 0 if its rotation is fixed."""
-    turn: lanes = load(w.turn_i, at)
+def roll_ease(turn: lanes, part: lanes) -> lanes:
+    """What an angular impulse over the reduced mass turns a disc by: part times 2 / r^2; turn is 2 / r, 0 of a fixed rotation."""
     return part * turn * turn * spread(0.5)
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def ease_j(w: cython.pointer(Step), at: cython.Py_ssize_t, other: lanes) -> lanes:
-    """The same of j."""
-    turn: lanes = load(w.turn_j, at)
-    return other * turn * turn * spread(0.5)
 
 
 @cython.cfunc
@@ -68,7 +57,7 @@ def held_roll(w: cython.pointer(Step), k: cython.Py_ssize_t, m: Motion, normal: 
     part: lanes = load(w.share, k * w.varied)
     other: lanes = spread(1) - part
     spins: lanes = m.vs - m.us + tangent * (other * load(w.turn_j, at) - part * load(w.turn_i, at))
-    ease: lanes = ease_i(w, at, part) + ease_j(w, at, other)
+    ease: lanes = roll_ease(load(w.turn_i, at), part) + roll_ease(load(w.turn_j, at), other)
     wanted: lanes = load(w.roll_impulse, k) - where_zero(ease, spread(0), spins / where_zero(ease, spread(1), ease))
     return clamped(wanted, load(w.rolling, at) * normal)
 
@@ -103,8 +92,8 @@ def apply_impulses(
         turned_i: lanes = m.us + tangent * part * load(w.turn_i, at)
         turned_j: lanes = m.vs + tangent * other * load(w.turn_j, at)
         if w.rolls:
-            turned_i = turned_i - roll * ease_i(w, at, part)
-            turned_j = turned_j + roll * ease_j(w, at, other)
+            turned_i = turned_i - roll * roll_ease(load(w.turn_i, at), part)
+            turned_j = turned_j + roll * roll_ease(load(w.turn_j, at), other)
         put4(w.motion, w.i, k, m.ux - x * part, m.uy - y * part, turned_i, spread(0))
         put4(w.motion, w.j, k, m.vx + x * other, m.vy + y * other, turned_j, spread(0))
     else:

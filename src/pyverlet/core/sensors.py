@@ -151,7 +151,9 @@ def passes(w: cython.pointer(Step), k: cython.Py_ssize_t, leg: cython.pointer(Le
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def touches(w: cython.pointer(Step), k: cython.Py_ssize_t, faces: cython.Py_ssize_t, leg: cython.pointer(Leg)) -> cython.bint:
+def meets_segment(
+    w: cython.pointer(Step), k: cython.Py_ssize_t, faces: cython.Py_ssize_t, leg: cython.pointer(Leg)
+) -> cython.bint:
     """The same of segment k, or of the polygon of so many faces that begins with it: those inside touch it."""
     n: cython.Py_ssize_t
     inside: cython.bint = faces > 0
@@ -183,15 +185,15 @@ def sense_one(
     number: int64_t = cython.cast(int64_t, w.segment[SEGMENT * k + SENSOR]) - 1
     place: cython.Py_ssize_t = i * ((w.sensors + 31) // 32) + number // 32
     bit: uint32_t = cython.cast(uint32_t, cython.cast(uint32_t, 1) << (number % 32))
-    if meets_box(box, cython.address(leg)) and touches(w, k, faces, cython.address(leg)):
+    if meets_box(box, cython.address(leg)) and meets_segment(w, k, faces, cython.address(leg)):
         w.sensed[place] |= bit
         if w.substep + 1 == w.substeps:
             leg.x, leg.y, leg.dx, leg.dy, leg.begin = leg.x + leg.dx, leg.y + leg.dy, 0.0, 0.0, leg.end
-            if touches(w, k, faces, cython.address(leg)):
+            if meets_segment(w, k, faces, cython.address(leg)):
                 w.inside[place] |= bit
     if w.since[i] > 0 and (w.sensed[place] & bit) == 0:
         leg = leg_of(w, i, True)
-        if meets_box(box, cython.address(leg)) and touches(w, k, faces, cython.address(leg)):
+        if meets_box(box, cython.address(leg)) and meets_segment(w, k, faces, cython.address(leg)):
             w.sensed[place] |= bit
 
 

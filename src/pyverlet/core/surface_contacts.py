@@ -135,6 +135,18 @@ def passes_by(
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
+def turn_by(w: cython.pointer(Step), i: cython.Py_ssize_t, roll: cython.double) -> cython.void:
+    """Give particle i an angular impulse over its mass, m^2/s."""
+    if w.rolls:
+        r: cython.double = w.radius[i]
+        ease: cython.double = w.ease[i]
+        w.motion[4 * i + 2] += cython.cast(real, ease * roll / (r * r))
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
 def hold_roll(
     w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.Py_ssize_t, after: cython.double, rubbed: cython.double
 ) -> cython.void:
@@ -148,7 +160,7 @@ def hold_roll(
     had: cython.double = row[first + ROLL]
     spin: cython.double = w.motion[4 * i + 2] - row[first + SPIN] - ease * rubbed / r
     row[first + ROLL] = min(max(had - r * r * spin / ease, -most), most)
-    w.motion[4 * i + 2] += cython.cast(real, ease * (row[first + ROLL] - had) / (r * r))
+    turn_by(w, i, row[first + ROLL] - had)
 
 
 @cython.cfunc
@@ -350,9 +362,8 @@ def warm_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
                 if w.surface[k] < 0:
                     keep_with_pair(w, k)
             if w.rolls:
-                r: cython.double = w.radius[i]
                 if w.substep == w.first:
                     w.contact[first + ROLL] *= w.scale
-                w.motion[4 * i + 2] += cython.cast(real, w.ease[i] * w.contact[first + ROLL] / (r * r))
+                turn_by(w, i, w.contact[first + ROLL])
             jt: cython.double = w.contact[first + DRAG] if w.rough else 0.0
             push_off(w, i, k, w.contact[first + PUSH], jt, w.contact[first + NORMAL], w.contact[first + NORMAL + 1])

@@ -87,6 +87,7 @@ class CoreArrays:
         self._made = -1  # of `Slots.revision`, what the engine holds; -1: nothing
         self._collisions: Any = None
         self._names: list[str] = []  # of materials
+        self._most_friction = self._most_rolling = 0.0  # of two circles without values of their own
         self._skin: float | None = -1.0
 
     def note(self) -> Any:
@@ -145,6 +146,8 @@ class CoreArrays:
         self.parts = parts
         if collisions is not self._collisions:
             self._names = names_of(collisions)
+            self._most_friction = collisions.most("friction") if collisions else 0.0
+            self._most_rolling = collisions.most("rolling_resistance") if collisions else 0.0
         self._wake(state)
         if self._particle is not state.particle or self._kept is not None:
             self._follow(state)
@@ -160,8 +163,10 @@ class CoreArrays:
             engine.set_seam(*state.seam)
             self._room = world.boundary
         self._follow_obstacles(world, dt)
-        self.rolls = resist(world, "rolling_resistance", state.most_rolling, self._obstacles.rolling)
-        self.rough = self.rolls or resist(world, "friction", state.most_friction, self._obstacles.friction)
+        self.rolls = resist(world.boundary, "rolling_resistance", self._most_rolling, state.most_rolling, self._obstacles.rolling)
+        self.rough = self.rolls or resist(
+            world.boundary, "friction", self._most_friction, state.most_friction, self._obstacles.friction
+        )
         engine.set_rolls(self.rolls)
         if self._kept_list is not None:
             engine.set_skin(self._kept_list[2][0], self._skin is None)

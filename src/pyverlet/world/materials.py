@@ -91,10 +91,9 @@ def materials_of(state: Slots, radius: Array, collisions: Collisions | None) -> 
     }
 
 
-def resist(world: Any, name: str, *most: float) -> bool:
-    """Whether any contact has friction, or whatever is called `name`; most: of circles and of obstacles."""
-    laws = world.collisions.most(name) if world.collisions else 0.0
-    return max(laws, getattr(world.boundary, name, 0.0), *most) > 0.0
+def resist(room: Any, name: str, *most: float) -> bool:
+    """Whether any contact has friction, or whatever is called `name`; most: of pairs, circles and obstacles."""
+    return max(getattr(room, name, 0.0), *most) > 0.0
 
 
 def skin_of(collisions: Collisions | None) -> float | None:
