@@ -42,7 +42,8 @@ class ObstacleRows:
 
     def __init__(self) -> None:
         self.friction = self.rolling = 0.0
-        self._segments, self._bodies, self._moving = np.zeros((0, _WIDTH)), np.zeros((0, 6)), np.zeros(0, np.int32)
+        self._room = self._segments = np.zeros((0, _WIDTH))  # the room has places for more of them
+        self._bodies, self._moving, self._count = np.zeros((0, 6)), np.zeros(0, np.int32), 0
         self._owners = np.zeros((0, 2), np.int64)  # of each segment the id of its obstacle, and which of its segments it is
         self._seen: Any = None
         self._seen_version = -1
@@ -62,24 +63,26 @@ class ObstacleRows:
                     self._build(engine, course.count, radius, dt)
             return None
         same = self._seen is not None and self._seen[1:] == seen[1:]
-        self._seen, self._seen_version, owners = seen, course.version, course.owners()
-        before = len(self._owners)
-        if not same or not before or not np.array_equal(owners[:before], self._owners):
+        changed = course.changed_since(self._seen_version) if same and len(self._owners) else None
+        self._seen, self._seen_version = seen, course.version
+        if changed is None:
+            owners = course.owners()
             renamed = _renamed(self._owners, owners)
             self._owners, self._segments = owners, np.zeros((len(owners), _WIDTH))
-            self._fill(course, names)
+            self._room = self._segments
+            self._fill(course, names, np.arange(len(owners)))
             self._build(engine, course.count, radius, dt)
             return renamed
-        # Others may have been changed, and some have come: only these are listed anew.
-        segments, bodies, more = self._segments[:, : len(_GIVEN)].copy(), self._bodies, len(owners) - before
-        self._owners, self._segments = owners, np.concatenate((self._segments, np.zeros((more, _WIDTH))))
-        self._fill(course, names)
-        other = np.ones(len(owners), bool)
-        other[:before] = (segments != self._segments[:before, : len(_GIVEN)]).any(axis=1)
-        other[:before] |= (bodies != self._bodies[: len(bodies)]).any(axis=1)[segments[:, 0].astype(np.int64)]
-        self._reach(course.count, dt)
+        rows = course.rows_of(changed)
+        if course.count > self._count:
+            self._owners = np.concatenate((self._owners, course.owners(self._count)))
+            if len(self._owners) > len(self._room):
+                self._room = np.concatenate((self._segments, np.zeros_like(self._segments), np.zeros((64, _WIDTH))))
+            self._segments = self._room[: len(self._owners)]
+        self._fill(course, names, rows)
+        self._reach(course.count, dt, rows)
         self._give(engine, keep=True)
-        if not engine.place_obstacles(np.flatnonzero(other).astype(np.int32), dt, True):
+        if not (engine.place_obstacles(rows.astype(np.int32), dt, True) and engine.place_obstacles(self._moving, dt, False)):
             self._build(engine, course.count, radius, dt)
         return None
 
@@ -88,16 +91,17 @@ class ObstacleRows:
         course.begin()
         return None if course.version == self._seen_version else _renamed(self._owners, course.owners())
 
-    def _fill(self, course: Course, names: list[str]) -> None:
-        self._bodies = course.bodies.copy()
+    def _fill(self, course: Course, names: list[str], rows: Array) -> None:
+        """All bodies, and these rows of the segments."""
+        self._bodies, self._count, fresh = course.bodies.copy(), course.count, course.segments[rows]
         for column, name in enumerate(_GIVEN):
-            self._segments[:, column] = course.segments[name]
-        self._segments[:, _ROLLING] = course.segments["rolling"]
-        made, place = course.segments["material"], np.zeros(len(course.names))
+            self._segments[rows, column] = fresh[name]
+        self._segments[rows, _ROLLING] = fresh["rolling"]
+        made, place = fresh["material"], np.zeros(len(course.names))
         for k in np.unique(made):
-            body = int(course.segments["body"][np.argmax(made == k)]) % course.count
+            body = int(fresh["body"][np.argmax(made == k)]) % course.count
             place[k] = number_of(list(course.names)[k], names, f"obstacles[{body}]")
-        self._segments[:, _MATERIAL] = place[made]
+        self._segments[rows, _MATERIAL] = place[made]
         moves = (self._bodies[:, 3:] != 0.0).any(axis=1)
         self._moving = np.flatnonzero(moves[self._segments[:, 0].astype(np.int64)]).astype(np.int32)
         solid = self._segments[:, _SENSOR] == 0
@@ -105,12 +109,12 @@ class ObstacleRows:
         if not solid.all():
             rank = np.zeros(course.count)
             rank[course.sensors] = np.arange(1, len(course.sensors) + 1)
-            self._segments[:, _SENSOR] = rank[self._segments[:, 0].astype(np.int64) % course.count]
+            self._segments[rows, _SENSOR] = rank[fresh["body"] % course.count]
 
     def _build(self, engine: Any, count: int, radius: float, dt: float) -> None:
         """Make the grid of `count` obstacles, with cells as wide as the largest particle, or wider: not too many."""
         solid = self._segments[:, _SENSOR] == 0  # sensors are not in it, so that it is the same without them
-        s, (around, farthest) = self._segments[solid], (each[solid] for each in self._reach(count, dt))
+        s, (around, farthest) = self._segments[solid], self._reach(count, dt, np.flatnonzero(solid))
         cell, links = max(2.0 * radius, 4.0 * float(farthest.max(initial=0.0)) / 2.0**50, float(np.finfo(float).tiny)), 0.0
         if radius == 0.0 and len(s):
             cell = max(float(np.median(around + s[:, _LENGTH])), cell)
@@ -129,13 +133,14 @@ class ObstacleRows:
                 return
             self._links = np.zeros((2 * len(self._links), 2), np.int32)
 
-    def _reach(self, count: int, dt: float) -> tuple[Array, Array]:
-        """How far from each segment it is listed, and how far from the origin that is, m. count: of obstacles.
+    def _reach(self, count: int, dt: float, rows: Array) -> tuple[Array, Array]:
+        """How far from each of these segments it is listed, and how far from the origin that is, m. count: of obstacles.
 
         Raises:
             InputError: one is farther away than numbers reach.
         """
-        s, body = self._segments, self._bodies[self._segments[:, 0].astype(np.int64)]
+        s = self._segments[rows]
+        body = self._bodies[s[:, 0].astype(np.int64)]
         speed = np.hypot(body[:, 3], body[:, 4]) + np.abs(body[:, 5]) * (np.hypot(s[:, 4], s[:, 5]) + s[:, _LENGTH])
         with np.errstate(over="ignore", invalid="ignore"):
             around = s[:, _ROUNDING] + s[:, _INNER] + SPARE_FRAMES * dt * speed
@@ -153,6 +158,11 @@ class ObstacleRows:
 
 def _renamed(before: Array, after: Array) -> Array:
     """Of each surface of before its number after, or -1."""
-    now = {owner: k for k, owner in enumerate(map(tuple, after.tolist()))}
-    found = [now.get(owner, -SIDES - 1) for owner in map(tuple, before.tolist())]
-    return np.concatenate((np.arange(SIDES), np.array(found, np.int64) + SIDES))
+    both = np.concatenate((after, before))
+    key = np.unique(both[:, 0], return_inverse=True)[1] * (both[:, 1].max(initial=0) + 1) + both[:, 1]
+    now, then = np.split(key, [len(after)])
+    order = np.argsort(now, kind="stable")
+    last = np.searchsorted(now, then, "right", sorter=order) - 1  # of an obstacle that is listed twice
+    found = np.where(last >= 0, order[last], 0) if len(after) else np.zeros(len(before), np.int64)
+    found[(last < 0) | (now[found] != then) if len(after) else slice(None)] = -SIDES - 1
+    return np.concatenate((np.arange(SIDES), found + SIDES))

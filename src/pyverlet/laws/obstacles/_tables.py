@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections import deque
 from collections.abc import Iterable
 from typing import Any
 
@@ -92,6 +94,8 @@ class Tables:
         self._number: dict[int, int] | None = {}  # of each by its id
         self._moves, self._drives, self._sensors = set[int](), set[int](), set[int]()
         self._moving = np.zeros(0, np.int64)
+        self._changes: deque[tuple[int, int]] = deque(maxlen=4096)  # versions, and which obstacle each has changed or added
+        self._renumbered = 0  # the last version in which others have other numbers
 
     def __reduce__(self) -> Any:
         """A copy finds out by itself."""
@@ -164,12 +168,29 @@ class Tables:
         """Of obstacles, without images."""
         return len(self._seen)
 
-    def owners(self) -> Array:
-        """(n, 2) of each segment the id of its obstacle, and which of its segments it is, images counted on."""
-        sides, count = len(self._own_segments.rows), np.diff(self._first)
+    def changed_since(self, version: int) -> list[int] | None:
+        """Which obstacles have come or been changed after that version; None: others have other numbers now, or none is known."""
+        oldest = self._changes[0][0] if len(self._changes) == self._changes.maxlen else 0
+        if version < max(self._renumbered, oldest):
+            return None
+        return sorted({k for _, k in itertools.takewhile(lambda change: change[0] > version, reversed(self._changes))})
+
+    def rows_of(self, which: list[int]) -> Array:
+        """Numbers of the segments of these obstacles, those of images behind the others."""
+        own = np.concatenate([np.arange(self._first[k], self._first[k + 1]) for k in which] or [self._first[:0]])
+        sides = len(self._own_segments.rows)
+        return (own + sides * np.arange(len(self._segments) // max(sides, 1))[:, None]).ravel()
+
+    def owners(self, start: int = 0) -> Array:
+        """(n, 2) of each segment the id of its obstacle, and which of its segments it is, images counted on.
+
+        start: without those of the obstacles before it, where there are no images.
+        """
+        first, seen = self._first[start:], self._seen[start:]
+        sides, count = len(self._own_segments.rows), np.diff(first)
         images = len(self._segments) // max(sides, 1)
-        who = np.repeat(np.fromiter(map(id, self._seen), np.int64, len(self._seen)), count)
-        number = np.arange(sides) - np.repeat(self._first[:-1], count)
+        who = np.repeat(np.fromiter(map(id, seen), np.int64, len(seen)), count)
+        number = np.arange(first[0], sides) - np.repeat(first[:-1], count)
         step = int(count.max(initial=0))
         return np.column_stack((np.tile(who, images), (number + step * np.arange(images)[:, None]).ravel()))
 
@@ -193,7 +214,7 @@ class Tables:
             order[new], fresh = before + np.arange(len(new)), [now[k] for k in new]
         if order is None and not fresh and self._imaged == self.seam:
             return fresh
-        if _solids(now) != _solids(seen) if order is not None else _solids(fresh):
+        if self._solids_differ(fresh, np.arange(before) if order is None else order[order < before]):
             self.solid_version += 1
         self._seen, self.version = now, self.version + 1
         self._append(fresh, before)
@@ -202,12 +223,24 @@ class Tables:
         self._imagine()
         if order is not None or self.seam:
             self._start_anew()
+            self._renumbered = self.version
         else:
             for k in range(before, len(now)):
                 self._sort_in(k)
+                self._changes.append((self.version, k))
                 if self._number is not None:
                     self._number[id(now[k])] = k
         return fresh
+
+    def _solids_differ(self, fresh: list[Obstacle], kept: Array) -> bool:
+        """Whether of those that are no sensors any is new, is not kept, or comes in another order. kept: numbers of before."""
+        gone = np.ones(len(self._seen), bool)
+        gone[kept] = False
+        return (
+            any(not obstacle.sensor for obstacle in fresh)
+            or not self._sensors.issuperset(np.flatnonzero(gone).tolist())
+            or bool((np.diff(kept) < 0).any())
+        )
 
     def _append(self, fresh: list[Obstacle], before: int) -> None:
         """Add these to the tables, in which there are so many."""
@@ -257,6 +290,9 @@ class Tables:
         self._sort_in(k)
         self.version += 1
         self.solid_version += not (was and obstacle.sensor)
+        self._changes.append((self.version, k))
+        if was != obstacle.sensor:
+            self._renumbered = self.version  # sensors have numbers of their own
 
     def _sort_in(self, k: int) -> None:
         """Note what an obstacle does that only few do."""
@@ -289,11 +325,6 @@ class Tables:
         number = np.repeat(np.arange(len(shift)), sides)
         self._segments["body"] += count * number
         self._segments["first"] += sides * number
-
-
-def _solids(obstacles: list[Obstacle]) -> list[Obstacle]:
-    """Those that are no sensors."""
-    return [obstacle for obstacle in obstacles if not obstacle.sensor]
 
 
 def _set_way(rows: Array, obstacle: Obstacle) -> None:
