@@ -33,7 +33,7 @@ from pyverlet.laws.integrators import (
     Yoshida4,
 )
 from pyverlet.laws.ledger import Ledger
-from pyverlet.laws.links import Angle, Area, Pin, Rope, Spring, Stick
+from pyverlet.laws.links import Angle, AngleLimit, Area, Motor, Pin, Rope, Spring, Stick
 from pyverlet.laws.naive import ClampAndFlip, ProjectOnly
 from pyverlet.laws.obstacles import Capsule, Chain, Disc, Obstacle, Polygon, Segment
 from pyverlet.laws.rooms import Boundary, Box, Circle, Open, Periodic
@@ -68,6 +68,7 @@ __all__ = [
     "RK4",
     "Actor",
     "Angle",
+    "AngleLimit",
     "Area",
     "Attractor",
     "Boundary",
@@ -95,6 +96,7 @@ __all__ = [
     "InputError",
     "Integrator",
     "Ledger",
+    "Motor",
     "NewContacts",
     "NonFiniteError",
     "Obstacle",

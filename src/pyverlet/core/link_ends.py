@@ -7,7 +7,7 @@ import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, sqrt
 
-from pyverlet.core.link_arrays import DISTANCE, Links
+from pyverlet.core.link_arrays import DISTANCE, MOTOR, Links
 from pyverlet.core.link_blocks import push_row, solve_block
 from pyverlet.core.link_chains import give
 from pyverlet.core.link_shapes import LinkWay, measure_row, mobility, way_between
@@ -60,7 +60,8 @@ def project(w: cython.pointer(Step)) -> cython.void:
             k.weight[i] = k.u[2 * i] = k.u[2 * i + 1] = 0
     for _ in range(1 if k.colours == 1 else SWEEPS):
         for b in range(k.chunk[k.colour[k.colours]]):
-            solve_block(w, b, False)
+            if k.kind[k.block[b]] != MOTOR:
+                solve_block(w, b, False)
     for r in range(k.rows):
         k.impulse[r] = k.target[r]
 

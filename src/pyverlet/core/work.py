@@ -16,12 +16,13 @@ from pyverlet.core.cells import BLOCK
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import CONTACT, DRAG, NORMAL, ROLL, SIDES, SPEED, SPIN
 
-WORK = cython.declare(cython.int, 5)  # numbers a particle, J
+WORK = cython.declare(cython.int, 6)  # numbers a particle, J
 BY_IMPACTS = cython.declare(cython.int, 0)  # along normals, by impacts
 BY_FRICTION = cython.declare(cython.int, 1)
 BY_WALLS = cython.declare(cython.int, 2)  # by surfaces of the room that move along themselves
 BY_PLACES = cython.declare(cython.int, 3)  # against `acceleration`, by moving particles
 BY_ROLLING = cython.declare(cython.int, 4)  # by what resists rolling
+BY_MOTORS = cython.declare(cython.int, 5)
 
 
 @cython.cfunc

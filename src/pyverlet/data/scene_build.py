@@ -19,7 +19,7 @@ from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
 from pyverlet.laws.integrators import Integrator, PositionVerlet
-from pyverlet.laws.links import Angle, Area, Pin, Rope, Spring, Stick
+from pyverlet.laws.links import Angle, AngleLimit, Area, Motor, Pin, Rope, Spring, Stick
 from pyverlet.laws.obstacles import Obstacle
 from pyverlet.laws.rooms import Boundary, Box, Circle, Open
 from pyverlet.scenes import Settings, _start
@@ -37,7 +37,7 @@ COLUMNS = ("position", "velocity", "spin", "radius", "mass", "restitution", "fri
 HALF = 0.5
 """m: a circle of this radius has 1 kg unless its group says otherwise."""
 
-_LINKS: dict[str, Any] = {cls.__name__: cls for cls in (Stick, Rope, Spring, Pin, Angle, Area)}
+_LINKS: dict[str, Any] = {cls.__name__: cls for cls in (Stick, Rope, Spring, Pin, Angle, AngleLimit, Motor, Area)}
 _COMMON = ("velocity", "spin", "restitution", "friction", *LATER, "category", "mask")
 
 

@@ -17,7 +17,7 @@ from pyverlet.laws import naive, rooms
 from pyverlet.laws.collisions import BruteForce, Fast
 from pyverlet.laws.forces import Force
 from pyverlet.laws.integrators import Integrator
-from pyverlet.laws.links import Angle, Area, Pin, Rope, Spring, Stick
+from pyverlet.laws.links import Angle, AngleLimit, Area, Motor, Pin, Rope, Spring, Stick
 from pyverlet.laws.obstacles import Obstacle
 from pyverlet.scenes import Settings
 from pyverlet.state.state import EVERYONE
@@ -218,7 +218,7 @@ Builders: Any = _one_of(
     [_named(name, _fields(build, skip=("world",)) | _built, inspect.getdoc(build)) for name, build in BUILDERS.items()]
 )
 
-LINKS: dict[str, Any] = {cls.__name__: cls for cls in (Stick, Rope, Spring, Pin, Angle, Area)}
+LINKS: dict[str, Any] = {cls.__name__: cls for cls in (Stick, Rope, Spring, Pin, Angle, AngleLimit, Motor, Area)}
 End = tuple[str, int | list[int]]
 """The name of a group and an index in it, or several."""
 

@@ -258,11 +258,11 @@ def _rounding(slots: Slots) -> float:
 def undriven(world: Any) -> bool:
     """Whether nothing but contacts and links could raise the energy of a world.
 
-    Forces have a potential or are drag, which wind is not, no obstacle, wall or pinned circle moves, gravity does not point along
+    Forces have a potential or are drag, which wind is not, no motor runs, no obstacle, wall or pinned circle moves, gravity does not point along
     a period, and the integrator does not raise it either: it is of order 2 or more.
     """
     room = world.boundary
-    if world.integrator.order < 2 or room.moves:
+    if world.integrator.order < 2 or room.moves or world.links.drive:
         return False
     if world._slots.pins and pinned_move(world._slots):
         return False

@@ -141,6 +141,7 @@ def take_apart(world: World) -> Parts:
     if saved.books:
         facts["books"] = {
             "energy": saved.books._energy, "resting": saved.books._resting, "rolled": saved.books._rolled,
+            "driven": saved.books._driven,
             "ledger": saved.books.ledger.as_dict(),
         }  # fmt: skip
     if saved.events:
@@ -303,7 +304,7 @@ def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
 def _books(facts: Facts) -> Bookkeeper:
     books = Bookkeeper()
     books._energy, books._resting = (checks.number(name, facts[name]) for name in ("energy", "resting"))
-    books._rolled = checks.number("rolled", facts.get("rolled", 0.0))
+    books._rolled, books._driven = (checks.number(name, facts.get(name, 0.0)) for name in ("rolled", "driven"))
     accounts = Ledger().as_dict()
     books.ledger = Ledger(**{name: checks.number(name, facts["ledger"].get(name, 0.0)) for name in accounts})
     return books
