@@ -256,6 +256,7 @@ def finish_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
             k.end_way[2 * r], k.end_way[2 * r + 1] = mx / length if length > 0 else 0, my / length if length > 0 else 0
             k.chord_speed[r] = 0
     else:
+        k.given[2 * r] = k.impulse[r]
         # What a motor gives after the drift is along the arm of then.
         for e in range(k.first[r], k.first[r] if k.kind[r] == MOTOR else k.first[r + 1]):
             k.slope[2 * e] = (k.slope[2 * e] + k.gradient[2 * e]) / 2

@@ -40,7 +40,11 @@ def turn_impulses(k: cython.pointer(Links), share: cython.double, half: cython.d
             if k.intact[r]:
                 give(k, r, given * x - share * k.given[2 * r], given * y - share * k.given[2 * r + 1])
         elif k.intact[r]:
-            push_row(k, r, -share * k.impulse[r], k.gradient)
+            if k.kind[r] == MOTOR:  # what it has given since the drift is along the directions of now
+                given = share * k.given[2 * r]
+                push_row(k, r, -given, k.gradient)
+            else:
+                push_row(k, r, -share * k.impulse[r], k.gradient)
             push_row(k, r, given, k.slope)
 
 

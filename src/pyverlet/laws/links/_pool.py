@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.laws.links._link import REMEMBERED, Array
+from pyverlet.laws.links._link import CHANGED, REMEMBERED, Array
 from pyverlet.laws.links._measured import MOTOR, measured, stretches
 from pyverlet.laws.links._table import Table
 from pyverlet.state.seam import Seam
@@ -82,7 +82,14 @@ class Pool(ABC):
 
     @property
     def drives(self) -> bool:
-        """Whether any row does work of its own."""
+        """Whether any row does work of its own in the frame that comes: a motor, or one that has been changed."""
+        rows = self.rows
+        changed = (rows["next"][:, 0] == CHANGED) & (rows["intact"] != 0)
+        return bool(changed.any()) or self.turns
+
+    @property
+    def turns(self) -> bool:
+        """Whether any row is a motor."""
         return "kind" in self.rows and bool((self.rows["kind"] == MOTOR).any())
 
     @property

@@ -200,8 +200,13 @@ class Links(Shared):
 
     @property
     def drive(self) -> bool:
-        """Whether there is a motor."""
+        """Whether any does work of its own in the frame that comes."""
         return bool(self._kept) and any(pool.drives for pool in self._kept)
+
+    @property
+    def turn(self) -> bool:
+        """Whether there is a motor."""
+        return bool(self._kept) and any(pool.turns for pool in self._kept)
 
     def stored(self, state: Slots) -> float:
         """The same in the middle of a frame, J, where the particles are now, without those that have broken in it."""
