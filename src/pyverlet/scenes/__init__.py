@@ -15,6 +15,7 @@ from pyverlet.scenes import (
     box,
     cage,
     cage_brute_force,
+    car,
     cloth,
     conveyor,
     drum,
@@ -27,6 +28,7 @@ from pyverlet.scenes import (
     image,
     newton_cradle,
     orbit,
+    ragdoll,
     rope_bridge,
     sketch,
     soft_bodies,
@@ -62,6 +64,8 @@ SCENES: dict[str, Scene] = {
         rope_bridge.SCENE,
         soft_bodies.SCENE,
         newton_cradle.SCENE,
+        car.SCENE,
+        ragdoll.SCENE,
         wrecking_ball.SCENE,
     )
 }
