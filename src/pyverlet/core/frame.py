@@ -25,8 +25,8 @@ from cython.cimports.team import team_stage
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.contacts import bounce_again, hold_contacts, relax_contacts, solve_contacts
 from pyverlet.core.hearing import hear_loads, hear_surface_loads
-from pyverlet.core.links import begin_links, end_links, relax_links, remember_links_stage, solve_links
 from pyverlet.core.link_motors import book_motors, note_spun
+from pyverlet.core.links import begin_links, end_links, relax_links, remember_links_stage, solve_links
 from pyverlet.core.obstacles import place_moving
 from pyverlet.core.particle_stages import drift, kick_stage, moves_stage, remember_stage
 from pyverlet.core.relisting import each_group

@@ -100,7 +100,12 @@ class Page:
         self._gravity, self._t = forces.gravity, t
         self._holding = [force for force in forces.forces if has_potential(force)]
         self._working = [force for force in forces.forces if not has_potential(force)]
-        self._open, self._resting, self._rolled, self._driven = replace(books.ledger), books._resting, books._rolled, books._driven
+        self._open, self._resting, self._rolled, self._driven = (
+            replace(books.ledger),
+            books._resting,
+            books._rolled,
+            books._driven,
+        )
         self._now = _Instant(0.0, {})
         self._begun = self._risen = 0.0  # J when the frame began; of those at its end, of who is beyond the seam
         self._engine: Any = None

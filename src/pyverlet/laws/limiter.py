@@ -258,8 +258,9 @@ def _rounding(slots: Slots) -> float:
 def undriven(world: Any) -> bool:
     """Whether nothing but contacts and links could raise the energy of a world.
 
-    Forces have a potential or are drag, which wind is not, no motor runs, no link is given another length, no obstacle, wall or pinned circle moves, gravity does not point along
-    a period, and the integrator does not raise it either: it is of order 2 or more.
+    Forces have a potential or are drag, which wind is not, no motor runs, no link is given another length, no obstacle, wall or
+    pinned circle moves, gravity does not point along a period, and the integrator does not raise it either: it is of order 2 or
+    more.
     """
     room = world.boundary
     if world.integrator.order < 2 or room.moves or world.links.drive:

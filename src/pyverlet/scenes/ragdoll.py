@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from pyverlet.laws.forces import Drag
@@ -52,21 +54,22 @@ def build(settings: Settings) -> World:
     """
     rng = np.random.default_rng(settings.seed)
     dolls, balls = divmod(settings.particles, len(BODY))
-    rows = -(-dolls // 4) + 1
-    world = settings.empty_world(
-        Box((-5.0, 0.0), (5.0, 7.0 + TALL * rows), restitution=settings.restitution, friction=settings.friction)
-    )
+    bays = max(1, -(-dolls // 8))  # side by side: a body presses the lower one's limbs through each other if too many lie on it
+    top = 6.0 + 2 * TALL
+    surface: dict[str, Any] = {"restitution": settings.restitution, "friction": settings.friction}
+    world = settings.empty_world(Box((-5.0, 0.0), (10.0 * bays - 5.0, top + 1.0), **surface))
     world.forces.append(Drag(linear=AIR))
     world.links.iterations = 2
-    for x, y, rise in BARS:
-        world.obstacles.append(Capsule((x - 0.7, y - rise), (x + 0.7, y + rise), radius=0.2, friction=settings.friction))
+    for middle, height, rise in BARS * bays:
+        x = middle + 10.0 * (len(world.obstacles) // len(BARS))
+        world.obstacles.append(Capsule((x - 0.7, height - rise), (x + 0.7, height + rise), radius=0.2, **surface))
     x, y, radius, mass = np.array(list(BODY.values())).T
+    at = np.column_stack((x, y))
     number = {name: k for k, name in enumerate(BODY)}
     for doll in range(dolls):
-        place = np.array([WIDE * (doll % 4 - 1.5), 6.0 + TALL * (doll // 4)])
-        at = np.column_stack((x, y))
-        turn, middle = rng.uniform(-2.0, 2.0), mass @ at / mass.sum()
-        swing = turn * (at - middle)[:, ::-1] * (-1.0, 1.0)
+        row, column = divmod(doll, 4 * bays)
+        place = np.array([10.0 * (column // 4) + WIDE * (column % 4 - 1.5), 6.0 + TALL * row])
+        swing = rng.uniform(-2.0, 2.0) * (at - mass @ at / mass.sum())[:, ::-1] * (-1.0, 1.0)
         body = world.add(position=at + place, velocity=swing, radius=radius, mass=mass, fixed_rotation=True)
         i, j = np.array([[number[name] for name in bone] for bone in BONES]).T
         world.links.append(Stick(body, i, j, collide=False))
@@ -75,8 +78,7 @@ def build(settings: Settings) -> World:
             now = np.arctan2(*(c - b)[::-1]) - np.arctan2(*(a - b)[::-1])
             world.links.append(AngleLimit(body, *(number[name] for name in names), least=now + least, most=now + most))
     if balls:
-        spot = np.arange(balls)
-        world.add(position=np.column_stack((0.5 * spot - 4.0, np.full(balls, 6.3 + TALL * (rows - 1)))), radius=0.2, mass=1.0)
+        world.add(position=np.column_stack((0.5 * np.arange(balls) - 4.0, np.full(balls, top + 0.5))), radius=0.2)
     return world
 
 

@@ -36,7 +36,7 @@ class CoreArrays:
         free: whether any particle is not pinned.
         largest, mean_radius: m. unequal: whether masses differ, pinned ones aside.
         asleep: what contacts of sleepers remember, in rates.
-        rough, rolls: whether any contact has friction or resists rolling or a motor turns a disc, and whether any does the latter.
+        rough, rolls: whether a contact has friction or resists rolling, or a motor runs, and whether a contact does the latter.
     """
 
     def __init__(self, dtype: np.dtype[Any]) -> None:

@@ -151,7 +151,7 @@ class Link(metaclass=_InTurn):
 
     @property
     def force(self) -> Floats:
-        """(k,) what each pulls with, N (N m for an angle or a motor, N/m for an area), averaged over 1/120 s; negative: it pushes."""
+        """(k,) what each pulls with, N (N m for angles and motors, N/m for areas), averaged over 1/120 s; negative: it pushes."""
         return np.zeros(len(self)) if self._pool is None else self._pool.rows["force"][self._where].copy()
 
     @property
