@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import functools
 import pickle
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,8 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
+from pyverlet import core
+from pyverlet.core import reference
 
 G, K = 9.81, 0.5  # m/s^2; I / (m r^2) of a disc
 DTYPES = pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -245,6 +248,18 @@ def test_any_number_of_threads_gives_the_same_bits(dtype: Any) -> None:
         world.run(seconds=0.3)
         hashes.add(world.state_hash())
     assert len(hashes) == 1
+
+
+@DTYPES
+def test_uncompiled_it_has_the_same_bits(dtype: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def run() -> tuple[str, dict[str, float]]:
+        world = driven(dtype=dtype, substeps=4)
+        world.run(seconds=0.3)
+        return world.state_hash(), world.ledger.as_dict()
+
+    compiled = run()
+    monkeypatch.setattr(core, "unit", functools.cache(reference.load))
+    assert run() == compiled
 
 
 def test_a_file_of_a_scene_may_have_motors(tmp_path: Path) -> None:

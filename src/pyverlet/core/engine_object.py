@@ -36,13 +36,11 @@ from pyverlet.core.engine_surfaces import (
 from pyverlet.core.engine_work import energy_of_last, friction_of_last
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_ends import show_links
-from pyverlet.core.link_motors import work_of_last_motors
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.running import refresh_lists, remake_list, run_substeps
 from pyverlet.core.seams import follow_seam, wrap_seam
 from pyverlet.core.step import Step
 from pyverlet.core.waking import find_met
-from pyverlet.core.work import WORK
 
 
 @cython.cclass
@@ -198,17 +196,17 @@ class Engine:
             make_rare_arrays(cython.address(self.w), self.arrays, self.dtype)
 
     def book(self, wanted: cython.bint):
-        """Note from now on what contacts change of the energy: "gained" (blocks,) and "work" (count, WORK) J; or no more."""
+        """Note from now on what contacts change of the energy: "gained" (blocks,) and "work" (count, 6) J; or no more."""
         w: cython.pointer(Step) = cython.address(self.w)
         w.booking = wanted
         if wanted:
-            self.arrays |= {"gained": np.zeros((w.count + BLOCK - 1) // BLOCK + 1), "work": np.zeros((w.count + 1, WORK))}
+            self.arrays |= {"gained": np.zeros((w.count + BLOCK - 1) // BLOCK + 1), "work": np.zeros((w.count + 1, 6))}
             w.gained, w.work = doubles(self.arrays["gained"]), doubles(self.arrays["work"])
 
     def energy_of_last(self, share: cython.double):
         """J by `share` of what contacts gave in the last substep: all, that along tangents, that against rolling, by motors."""
         w: cython.pointer(Step) = cython.address(self.w)
-        return (energy_of_last(w, share), *friction_of_last(w, share), work_of_last_motors(w, share))
+        return (energy_of_last(w, share), *friction_of_last(w, share))
 
     def listen(self, wanted: cython.bint):
         """Note from now on who touches, or no more; what was heard is forgotten."""
