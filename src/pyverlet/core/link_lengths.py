@@ -167,10 +167,12 @@ def step_in_net(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.P
     """
     k: cython.pointer(Links) = w.link_table
     r: cython.Py_ssize_t
-    held: cython.bint = k.held[k.node[k.first[first]]] >= 0
-    for r in range(first, end):
-        held |= k.held[k.node[k.first[r] + 1]] >= 0
-    if not (held and k.rough and k.surfaces):
+    held: cython.bint = False
+    if k.rough and k.surfaces:
+        held = k.held[k.node[k.first[first]]] >= 0
+        for r in range(first, end):
+            held |= k.held[k.node[k.first[r] + 1]] >= 0
+    if not held:
         step_chain(k, first, end, True, CHORDS)
         hold_chain(w, first, end)
         return
