@@ -8,6 +8,7 @@ import cython
 from pyverlet.core.link_motors import work_of_last_motors
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import CONTACT, DRAG, NORMAL, PUSH, ROLL, SPEED, SPIN
+from pyverlet.core.work import moment
 
 
 @cython.cfunc
@@ -23,7 +24,7 @@ def energy_of_last(w: cython.pointer(Step), share: cython.double) -> cython.doub
             turn: cython.double = w.given_spin[i] if w.rough else 0
             r: cython.double = w.radius[i]
             moved: cython.double = gx * (w.velocity[2 * i] - half * gx) + gy * (w.velocity[2 * i + 1] - half * gy)
-            total += share * (moved + 0.5 * r * r * turn * (w.spin[i] - half * turn)) / w.inverse_mass[i]
+            total += share * (moved + moment(w, i) * r * r * turn * (w.spin[i] - half * turn)) / w.inverse_mass[i]
     return total
 
 

@@ -30,7 +30,7 @@ from pyverlet.world.world import World
 
 Table = dict[str, Any]
 
-LATER = ("rolling_resistance", "material", "fixed_rotation")
+LATER = ("rolling_resistance", "inertia", "material", "fixed_rotation")
 COLUMNS = ("position", "velocity", "spin", "radius", "mass", "restitution", "friction", *LATER, "category", "mask")
 """Arrays of a group that is kept as such; files of older versions lack the later ones."""
 
@@ -295,7 +295,7 @@ class Recipe:
                 columns = {key: arrays[place] for key, place in places.items() if place in arrays or key not in LATER}
         except (ValueError, KeyError, OSError) as error:
             raise InputError(f"file '{beside}' lacks the arrays of {table['name']!r} ({error})") from None
-        own = {key: columns.pop(key) for key in ("restitution", "friction", "rolling_resistance") if key in columns}
+        own = {key: columns.pop(key) for key in ("restitution", "friction", "rolling_resistance", "inertia") if key in columns}
         group = world.add(**columns)
         for key, column in own.items():  # negative: as the world says
             setattr(group, key, column)

@@ -157,6 +157,7 @@ class Group(Part):
     restitution: Annotated[float, Field(ge=0, le=1)] | None = None
     friction: Annotated[float, Field(ge=0)] | None = None
     rolling_resistance: Annotated[float, Field(ge=0)] | None = None
+    inertia: Annotated[float, Field(gt=0)] | None = None
     material: str = ""
     fixed_rotation: bool = False
     category: Bits = 1

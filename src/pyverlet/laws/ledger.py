@@ -11,6 +11,7 @@ import numpy as np
 from pyverlet.laws.forces import ForceSum, has_potential, soften
 from pyverlet.laws.links import Links
 from pyverlet.state.slots import Slots
+from pyverlet.state.state import spin_radius
 
 
 @dataclass
@@ -197,7 +198,7 @@ class Page:
         """Now, with velocities that are `lag` seconds behind. works: whether the power of forces is asked for."""
         s = self._state
         energy: float = s.motion.total_energy(
-            s.position, s.velocity, s.acceleration, lag, s.spin, s.radius, s.mass, *self._gravity
+            s.position, s.velocity, s.acceleration, lag, s.spin, spin_radius(s), s.mass, *self._gravity
         )  # fmt: skip
         held = self._links.energy(s.where()) if self._links and self._links.give else 0.0
         if self._holding:

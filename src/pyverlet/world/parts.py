@@ -45,6 +45,7 @@ PARTICLES = {
     "restitution": Field(None, "particles", most=1),
     "friction": Field(None, "particles"),
     "rolling_resistance": Field(None, "particles"),
+    "inertia": Field(None, "particles", least=0),
     "category": Field(np.uint32, "particles"),
     "mask": Field(np.uint32, "particles"),
     "material": Field(np.uint32, "particles"),
@@ -176,7 +177,7 @@ def check(parts: Parts, real: np.dtype[Any]) -> None:
 
 
 def _bring_up_to_date(arrays: dict[str, Array], real: np.dtype[Any]) -> None:
-    """Files of before there was rolling resistance lack columns: nothing has rolled against it, and nobody has a material."""
+    """Older files lack columns: nothing has rolled against any resistance, nothing has a material, all are discs."""
     for name, width in (("impulses.values", 4), ("asleep.values", 4), ("impulses.pushes", 3), ("asleep.pushes", 3)):
         if name in arrays and arrays[name].ndim == 2 and arrays[name].shape[1] == width - 1:
             arrays[name] = np.column_stack((arrays[name], np.zeros(len(arrays[name]), arrays[name].dtype)))
@@ -184,6 +185,8 @@ def _bring_up_to_date(arrays: dict[str, Array], real: np.dtype[Any]) -> None:
         arrays["particles.rolling_resistance"] = np.full(len(arrays["particles.friction"]), -1, real)
         for name in ("material", "fixed_rotation"):
             arrays[f"particles.{name}"] = np.zeros(len(arrays["particles.friction"]), np.uint32)
+    if "particles.friction" in arrays and "particles.inertia" not in arrays:
+        arrays["particles.inertia"] = np.zeros(len(arrays["particles.friction"]), real)
 
 
 def fill(world: World, parts: Parts) -> None:
