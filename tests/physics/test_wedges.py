@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -45,7 +47,7 @@ def test_circles_between_a_wall_and_a_pinned_circle_that_moves_into_it(
 def test_what_lets_go_of_a_wedge_takes_back_its_friction_and_its_roll(friction: float, restitution: float) -> None:
     # Where friction would hold a circle in a wedge that closes, surfaces are solved once more without it. What they gave along the
     # tangent and against rolling is not given, and not remembered: |j_t| <= mu j and |L| <= c r j.
-    rough = {"restitution": restitution, "friction": friction, "rolling_resistance": 0.3}
+    rough: dict[str, Any] = {"restitution": restitution, "friction": friction, "rolling_resistance": 0.3}
     law = pv.Collisions(restitution=restitution, friction=friction, rolling_resistance=0.3)
     world = pv.World(boundary=pv.Box((-10, -10), (10, 10), **rough), gravity=(0, 0), collisions=law, dtype="float64")
     angle = np.linspace(0, 2 * np.pi, 12, endpoint=False)
