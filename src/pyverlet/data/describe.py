@@ -22,6 +22,8 @@ from pyverlet.ground.fields import Field
 from pyverlet.ground.guess import did_you_mean
 from pyverlet.laws import forces, integrators, naive, obstacles, rooms
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
+from pyverlet.scenes.boids import Flock
+from pyverlet.scenes.particle_life import Likings
 from pyverlet.state.group import Group, Picked
 from pyverlet.world.actors import Actor, Emitter, Sink
 from pyverlet.world.world import World
@@ -131,6 +133,8 @@ _kind(
     forces.Cohesion, "strength", "break_distance",
     state=lambda cohesion: {"bonds": cohesion.bonds.copy()} if len(cohesion.bonds) else {}, recall=_recall_bonds,
 )  # fmt: skip
+_kind(Likings, "likes", "kind", "pull", "range")
+_kind(Flock, "sight", "apart", "speed", "turns")
 _kind(forces.Push, "center", "radius", "acceleration")
 
 

@@ -198,6 +198,7 @@ class Page:
         held = self._links.energy(s.where()) if self._links and self._links.give else 0.0
         if self._holding:
             state = s.in_users_order()
+            state.seam.wrap(state.position)  # as they will be: rounded anew
             held += sum(force.potential(state) for force in self._holding)
         return _Instant(energy + held, self._power(lag) if works and self._working else {})
 
