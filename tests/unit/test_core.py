@@ -140,7 +140,7 @@ def results_of_motion(motion: Any, dtype: Any) -> list[bytes]:
     light = 1 / mass
     grid, spare = (-20.0, -20.0, 40.0, 40.0, 20, 20, 0.0, 40.0), (np.empty(60, np.int64), np.empty(402, np.int64))
     first, second = np.zeros((2, 2000), np.int32)
-    listed = motion.list_near(position, 2.0, grid, *spare, np.empty(60, np.int64), first, second)
+    listed = motion.list_near(position, 2.0, grid, *spare, np.empty(60, np.int64), np.empty((60, 2)), first, second)
     near, distance, way = np.zeros((2, listed), np.int32), np.empty(listed), np.empty((listed, 2))
     found = motion.measure_near(position, first[:listed], second[:listed], 1.5, 0.0, 40.0, near, distance, way)
     force = np.zeros_like(position)

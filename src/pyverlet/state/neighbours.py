@@ -50,7 +50,8 @@ def list_pairs(position: Array, reach: float, seam: Seam = NONE) -> tuple[NDArra
     cell = max(reach * (1 + 1e-9), np.sqrt(width * height / few), width / few, height / few)
     columns, rows = (max(int(size / cell), 1) for size in (width, height))
     grid = x0, y0, width or 1.0, height or 1.0, columns, rows, *seam.period
-    spare = np.empty(count, np.int64), np.empty(columns * rows + 2, np.int64), np.empty(count, np.int64)
+    numbers = np.empty(count, np.int64), np.empty(columns * rows + 2, np.int64), np.empty(count, np.int64)
+    spare = *numbers, np.empty((count, 2))
     room, found = 8 * count, 8 * count + 1
     while found > room:
         room = max(room, found)
@@ -63,7 +64,7 @@ def list_pairs(position: Array, reach: float, seam: Seam = NONE) -> tuple[NDArra
 
 def near(position: Array, reach: float, seam: Seam = NONE) -> Near:
     """All pairs nearer than `reach` m now, but for those at the same place."""
-    i, j = list_pairs(position, reach, seam)
+    i, j = list_pairs(position, reach * (1 + 1e-9), seam)  # rounded images; what is too far is dropped
     return _measured(position, i, j, reach, seam, *_room_for(len(i)))
 
 
