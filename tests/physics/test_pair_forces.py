@@ -225,7 +225,7 @@ def test_a_class_of_ones_own() -> None:
         def force(self, distance: Array, i: Array, j: Array) -> Any:
             return np.where(i == 0, -1.0, 0.5)
 
-    class Push(pv.PairLaw):
+    class Push(pv.PairForce):
         range = 2.0
 
         def force(self, distance: Array, i: Array, j: Array) -> Any:

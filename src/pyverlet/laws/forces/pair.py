@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, NoReturn
 
@@ -22,7 +23,7 @@ Indices = NDArray[np.int32]
 Law = Callable[[Array, Indices, Indices], Any]
 
 
-class PairForce(Shown):
+class PairForce(Shown, ABC):
     """A force between every two particles nearer than `range` m, along their line of centres.
 
     A class of one's own has `range` and `force`, and `PairLaw` as its base if it has an energy. Pinned particles act on others,
@@ -35,9 +36,9 @@ class PairForce(Shown):
     looks_at_particles = True  # whether i and j matter: if not, they may be those of the engine, which takes less time
     range: float
 
+    @abstractmethod
     def force(self, distance: Array, i: Indices, j: Indices) -> Array:
         """(k,) N of k pairs of the user's particles i and j, (k,) each, at `distance` (k,) m; positive drives them apart."""
-        raise NotImplementedError
 
     def among(self, state: Slots) -> Array:
         """Slots of those whose forces on each other add up to nothing."""
@@ -78,9 +79,9 @@ class PairForce(Shown):
 class PairLaw(PairForce):
     """One with an energy, which the world's energy includes."""
 
+    @abstractmethod
     def energy(self, distance: Array, i: Indices, j: Indices) -> Array:
         """(k,) J of these pairs; 0 at the range."""
-        raise NotImplementedError
 
     def potential(self, state: State) -> float:
         """Sum of the energy of all pairs, J."""
