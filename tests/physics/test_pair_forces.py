@@ -348,6 +348,16 @@ def test_a_bond_takes_its_energy_to_break(*, parts: bool) -> None:
     assert abs(world.ledger.residual) < 1e-4 * 2.5
 
 
+def test_bonds_pull_in_the_pressure_through_the_seam() -> None:
+    """P = (sum of force times distance) / 2 A at rest: -6 N at a gap of 0.2 m, 2.2 m between the centres."""
+    world = empty(boundary=pv.Periodic((0, 0), (10, 10)), contacts=True)
+    world.add(position=[(9.5, 5), (1.7, 5)], radius=1.0)
+    glue = world.forces.append(pv.Cohesion(strength=10.0, break_distance=0.5))
+    glue.bonds = np.array([(0, 1)])
+    assert world.pressure() == pytest.approx(-6 * 2.2 / 200, rel=1e-12)
+    assert world.energy().potential == pytest.approx(-10 * 0.3**2 / (2 * 0.5), rel=1e-12)
+
+
 def test_removed_particles_take_their_bonds_with_them() -> None:
     world = empty()
     world.add(position=[(0, 0), (2, 0), (4, 0), (6, 0)], radius=1.0)
