@@ -348,6 +348,23 @@ def test_a_bond_takes_its_energy_to_break(*, parts: bool) -> None:
     assert abs(world.ledger.residual) < 1e-4 * 2.5
 
 
+def test_a_frame_that_fails_makes_no_bonds() -> None:
+    world, glue = pair(0.2)
+    world.velocity[1] = -30.0, 0.0  # they meet in the second of eight substeps
+
+    @pv.force
+    def fails(x: Any, y: Any, vx: Any, vy: Any, mass: Any, t: Any) -> Any:
+        return (0.0 if t < 0.015 else np.nan) * x, 0.0
+
+    world.forces.append(fails)
+    with pytest.raises(pv.NonFiniteError):
+        world.step(0.02)
+    assert len(glue.bonds) == 0
+    world.forces.remove(fails)
+    world.step(0.02)
+    assert len(glue.bonds) == 1
+
+
 def test_bonds_pull_in_the_pressure_through_the_seam() -> None:
     """P = (sum of force times distance) / 2 A at rest: -6 N at a gap of 0.2 m, 2.2 m between the centres."""
     world = empty(boundary=pv.Periodic((0, 0), (10, 10)), contacts=True)
