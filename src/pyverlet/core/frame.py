@@ -33,7 +33,7 @@ from pyverlet.core.relisting import each_group
 from pyverlet.core.sensors import sense
 from pyverlet.core.step import OPEN, Step
 from pyverlet.core.surface_contacts import hold_surfaces, relax_surfaces, warm_surfaces
-from pyverlet.core.surface_sides import keep_inside, keep_sides
+from pyverlet.core.surface_sides import keep_in_sight, keep_inside, keep_sides
 from pyverlet.core.surfaces import bounce_surfaces
 from pyverlet.core.warm_start import warm_start
 from pyverlet.core.work import book_drift, book_end, book_grips, book_rubbing, book_start
@@ -104,6 +104,8 @@ def drift_stage(what: cython.p_void, block: cython.int) -> cython.void:
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     a: cython.Py_ssize_t = block * BLOCK
     if not w.linked:
+        if w.collides and not w.lists.brute:
+            keep_in_sight(w, block)
         hold_on_stage(what, block)
     elif w.room != OPEN:
         keep_inside(w, block)

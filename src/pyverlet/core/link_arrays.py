@@ -26,6 +26,7 @@ Links = cython.struct(
     surfaces=cython.bint,  # whether there are any
     contact=cython.pointer(cython.double),  # of `Step`
     rough=cython.bint,
+    drifted=cython.bint,  # whether particles have moved in this substep
     rubs=cython.pointer(int32_t),  # (count,) whether what holds it rubs it
     rim=cython.pointer(cython.double),  # (count,) spin times radius, m/s
     spun=cython.pointer(cython.double),  # (count,) rad/s that motors have given it in this substep

@@ -112,6 +112,8 @@ def take_back_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void
     """Row r begins to be solved with what it keeps."""
     k.impulse[r] *= k.keeps[r]
     if k.kind[r] == DISTANCE:
+        d: LinkWay = way_between(k, k.node[k.first[r]], k.node[k.first[r] + 1], 0)  # impacts may have moved its ends
+        k.way[2 * r], k.way[2 * r + 1] = d.x, d.y
         k.given[2 * r] *= k.keeps[r]
         k.given[2 * r + 1] *= k.keeps[r]
 

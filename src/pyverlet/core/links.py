@@ -86,6 +86,9 @@ def take_held_stage(what: cython.p_void, block: cython.int) -> cython.void:
     i: cython.Py_ssize_t
     take_stage(what, block)
     for i in range(a, min(a + BLOCK, k.count)):
+        at: cython.Py_ssize_t = k.slot[i]
+        if not k.drifted and w.since[at] > 0:  # an impact has moved the start of its path
+            k.x[2 * i], k.x[2 * i + 1] = w.position[2 * at], w.position[2 * at + 1]
         find_hold(w, i)
         if w.noting:
             note_holds(w, i, -1)
@@ -275,6 +278,7 @@ def begin_links(w: cython.pointer(Step), surfaces: cython.bint) -> cython.void:
     k.scale = cython.cast(cython.double, w.scale if opens else 1)
     k.least = cython.cast(cython.double, w.rest_speed)
     k.contact, k.surfaces, k.rough = w.contact, surfaces, w.rough
+    k.drifted = False
     k.deepest = PUT_OUT * k.h * w.push
     team_stage(w.team, open_stage, w, blocks_of(k))
     team_stage(w.team, begin_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
@@ -323,6 +327,7 @@ def relax_links(w: cython.pointer(Step), back: cython.bint) -> cython.void:
     k: cython.pointer(Links) = w.link_table
     p: cython.Py_ssize_t
     c: cython.int
+    k.drifted = True
     team_stage(w.team, take_held_stage, w, blocks_of(k))
     for p in range(k.pins):
         hold_rigid_pin(k, p)

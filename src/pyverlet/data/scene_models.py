@@ -83,6 +83,8 @@ _BY_NAME: dict[str, Any] = {
     "outline": list[Vector] | Disc,
     "point": Vector | list[Vector] | None,
     "axes": Literal["xy", "x", "y"],
+    "likes": list[list[float]],
+    "kind": list[int],
 }
 
 

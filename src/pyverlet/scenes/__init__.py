@@ -7,6 +7,7 @@ from pathlib import Path
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
 from pyverlet.scenes import (
+    boids,
     bounce_euler,
     bounce_order,
     bounce_random,
@@ -18,6 +19,7 @@ from pyverlet.scenes import (
     car,
     cloth,
     conveyor,
+    droplets,
     drum,
     energy,
     fall,
@@ -28,6 +30,7 @@ from pyverlet.scenes import (
     image,
     newton_cradle,
     orbit,
+    particle_life,
     ragdoll,
     rope_bridge,
     sketch,
@@ -67,6 +70,9 @@ SCENES: dict[str, Scene] = {
         car.SCENE,
         ragdoll.SCENE,
         wrecking_ball.SCENE,
+        particle_life.SCENE,
+        boids.SCENE,
+        droplets.SCENE,
     )
 }
 

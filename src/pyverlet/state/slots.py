@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pyverlet import core
 from pyverlet.ground import memory
 from pyverlet.state import seam
+from pyverlet.state.neighbours import Near, VerletLists
 from pyverlet.state.state import COLUMNS, EVERYONE, MARKS, ROWS, SET, State
 from pyverlet.state.unchanged import Unchanged
 
@@ -54,6 +55,7 @@ class Slots:
         self.motion: Any = core.unit("motion", dtype)
         self.real = lru_cache(64)(dtype.type)
         self._kept: dict[str, Array] = {}
+        self._lists = VerletLists()
         self.total_mass, self.pins, self.taken, self.revision, self.h = 0.0, False, 0.0, 0, 0.0
         self._resize(0)
 
@@ -103,6 +105,14 @@ class Slots:
     def force(self) -> Array:
         """(n, 2) N; made when it is first asked for."""
         return np.zeros_like(self.position)
+
+    def near(self, reach: float) -> Near:
+        """Pairs of slots nearer to each other than `reach` m, in arrays that the next call fills again.
+
+        Raises:
+            InputError: a periodic room is narrower than twice that.
+        """
+        return self._lists.within(self.position, self.particle, self.seam, reach)
 
     @cached_property
     def resistance(self) -> Array:

@@ -248,6 +248,7 @@ def put_together(world: World, parts: Parts) -> Saved:
         obstacles=world.obstacles.save(),
         actors=[(actor, actor.save()) for actor in world.actors],
         links=(links, pools, _broken(parts.arrays)),
+        forces=world._memories(),
         data=_data(parts),
     )
 
