@@ -65,12 +65,33 @@ def test_an_oblique_impact(k: float, dtype: Any) -> None:
     assert world.energy().total == pytest.approx(world.ledger.total, rel=1e-5)
 
 
-@pytest.mark.parametrize("c", [0.0, 0.3])
-def test_rough_pairs_keep_momentum_and_angular_momentum(c: float) -> None:
-    """Rings, balls and discs that hit each other and rub; the ledger closes.
+@pytest.mark.parametrize("dx", [0.0, 0.3])
+@pytest.mark.parametrize("inertia", [(0.5, 0.05), (0.02, 1.0)])
+def test_a_rough_impact_of_two_keeps_momenta(inertia: tuple[float, float], dx: float) -> None:
+    """Momentum and angular momentum to rounding; friction takes m' s^2 / 2 with the slip s, if it stops the rims."""
+    laws = pv.Collisions(friction=50.0, restitution=0.3)
+    world = pv.World(boundary=pv.Open(), gravity=(0, 0), collisions=laws, dtype=np.float64, ledger=True)
+    mass, radius, spin = np.array([1.0, 2.0]), np.array([0.5, 0.3]), np.array([3.0, -8.0])
+    places, speeds = [(0, 0), (2, dx)], [(1, 0.5), (-1.5, 0)]
+    group = world.add(position=places, velocity=speeds, spin=spin, mass=mass, radius=radius, inertia=inertia)
+    before, whole = world.angular_momentum(), world.momentum()
+    world.run(seconds=0.2)
+    way, apart = group.position[1] - group.position[0], group.velocity[1] - group.velocity[0]  # straight, until they meet
+    square = apart @ apart
+    time = (-(way @ apart) - np.sqrt((way @ apart) ** 2 - square * (way @ way - 0.64))) / square
+    n = (way + apart * time) / 0.8
+    slip = apart[0] * n[1] - apart[1] * n[0] + radius @ spin
+    inverse = (1 / mass + radius**2 / np.array(inertia)).sum()
+    world.run(seconds=1.8)
+    assert world.angular_momentum() == pytest.approx(before, abs=1e-12)
+    assert world.momentum() == pytest.approx(whole, abs=1e-12)
+    assert world.ledger.friction == pytest.approx(-0.5 * slip**2 / inverse, rel=1e-9)
+    assert world.energy().total == pytest.approx(world.ledger.total, rel=1e-12)
 
-    Friction acts at rims, which contacts at rest let overlap, or part, by 1e-6 or so: arms are off by that, as of discs.
-    """
+
+@pytest.mark.parametrize("c", [0.0, 0.3])
+def test_the_ledger_of_a_rough_crowd_closes(c: float) -> None:
+    """Rings, balls and discs that hit each other, rub and roll. Where several touch, friction is off by 1e-4, as of discs."""
     rng = np.random.default_rng(0)
     laws = pv.Collisions(friction=0.7, restitution=0.3, rolling_resistance=c)
     world = pv.World(boundary=pv.Open(), gravity=(0, 0), collisions=laws, dtype=np.float64, ledger=True)
@@ -80,7 +101,7 @@ def test_rough_pairs_keep_momentum_and_angular_momentum(c: float) -> None:
     group.inertia[:10] = mass[:10] * radius[:10] ** 2 * rng.uniform(0.2, 3, 10)
     before, whole = world.angular_momentum(), world.momentum()
     world.run(seconds=2.0)
-    assert world.angular_momentum() == pytest.approx(before, rel=1e-5)
+    assert world.angular_momentum() == pytest.approx(before, rel=3e-4)
     assert world.momentum() == pytest.approx(whole, abs=1e-12)
     assert world.ledger.friction < -0.1
     assert world.energy().total == pytest.approx(world.ledger.total, rel=1e-12)

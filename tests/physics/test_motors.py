@@ -294,6 +294,49 @@ def test_a_file_of_a_scene_may_have_motors(tmp_path: Path) -> None:
     assert limit.most == 4.0
 
 
+@pytest.mark.parametrize("integrator", [pv.RK4(), pv.VelocityVerlet(), pv.SemiImplicitEuler(), pv.PositionVerlet()])
+def test_any_integrator_spins_it_up(integrator: Any) -> None:
+    """alpha = torque / I, and a frame of a quarter of a second."""
+    world = empty(gravity=(0, -G), integrator=integrator, substeps=4)
+    disc = world.add(position=[(0, 0), (5, 0)], radius=0.5, mass=2.0)
+    world.links.append(pv.Motor(disc, 0, speed=100.0, max_torque=0.5))
+    for dt in (1 / 60, 1 / 240, 0.25, 1 / 60):
+        world.step(dt)
+    alpha, h = 0.5 / 0.25, 0.25 / 32
+    lag = (
+        0.5 * h if isinstance(integrator, pv.SemiImplicitEuler) else 1e-9
+    )  # whose velocities are those of the middle of a substep
+    assert disc.spin[0] == pytest.approx(alpha * world.time, abs=2 * alpha * lag)
+
+
+def test_sleepers_never_miss_a_throttle() -> None:
+    """Where there are links nothing falls asleep: a car that has stood for long drives off."""
+    world = slope(0.0, sleep=True)
+    wheel = world.add(position=(0, 0.5), radius=0.5, mass=2.0)
+    motor = world.links.append(pv.Motor(wheel, 0, speed=0.0, max_torque=3.0))
+    world.run(seconds=3.0)
+    assert not len(world.asleep) or not world.asleep.any()
+    motor.speed = -4.0
+    world.run(seconds=2.0)
+    assert wheel.velocity[0, 0] == pytest.approx(2.0, rel=1e-6)
+
+
+def test_motors_go_with_their_particles() -> None:
+    world = empty()
+    discs = world.add(position=[(2.0 * n, 0) for n in range(6)], radius=0.3)
+    motor = world.links.append(pv.Motor(discs, [0, 1, 4], 2, 3, speed=5.0, max_torque=[1.0, 2.0, 3.0]))
+    lone = world.links.append(pv.Motor(discs, 5, speed=-1.0, max_torque=4.0))
+    world.remove(1)
+    assert len(motor) == 2
+    assert motor.max_torque.tolist() == [1.0, 3.0]
+    assert motor.particles.tolist() == [[0, 1, 2], [3, 1, 2]]
+    world.remove(4)
+    assert len(lone) == 0
+    assert len(world.links) == 1
+    world.run(seconds=0.1)
+    assert world.spin[3] > 0
+
+
 REFUSED: list[tuple[Any, str]] = [
     (lambda g: pv.Motor(g, 0, max_torque=1.0, speed=np.inf), r"Motor: speed is inf; allowed is a finite number of rad/s"),
     (lambda g: pv.Motor(g, 0, max_torque=-1.0, speed=1.0), r"Motor: max_torque is -1"),

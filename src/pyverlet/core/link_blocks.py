@@ -18,6 +18,9 @@ from pyverlet.core.step import Step
 FARTHEST = cython.declare(cython.double, 0.5)
 """Most that a link is taken to turn in a substep, rad."""
 
+LEAP = cython.declare(cython.double, 0.05)
+"""rad by which an angle beyond its limits comes back in a substep, at most: a limit cannot take back what a step leads too far."""
+
 AVERAGED = cython.declare(cython.double, 120.0)
 """1/s: rate of the mean of the pull that is shown, and that breaks."""
 
@@ -51,6 +54,8 @@ def begin_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
             k.gradient[2 * e], k.gradient[2 * e + 1] = k.slope[2 * e], k.slope[2 * e + 1]
     soft: Softness = softness(k, k.stiffness[r], k.damping[r], mobility(k, r), value, before)
     k.soft[r], k.target[r], k.value[r] = soft.soft, soft.target, value
+    if k.kind[r] != DISTANCE and k.upper[r] <= 0 and k.acts[r] * value > LEAP:
+        k.target[r] = value - LEAP * k.acts[r]
     if soft.soft == INFINITY:
         k.impulse[r] = 0
 
