@@ -121,7 +121,7 @@ def test_a_limit_outside_its_range_is_reached_again(start: float) -> None:
     world, group, _ = pendulum(start, 1.5, gravity=(0, 0))
     world.step(1 / 60)
     assert angle_of(group) == pytest.approx(start, abs=0.05**2 / 2)  # steps along tangents, of 0.05 rad at most
-    assert np.abs(group.velocity).max() < 1e-9
+    assert np.abs(group.velocity).max() < 1e-9 * 0.05 * 480  # of the speed at which it came
 
 
 @DTYPES
