@@ -2,9 +2,10 @@
 """Particles sorted by cell: nested grids, each with cells half as large as those of the one before.
 
 A circle stands in the smallest cells that its diameter and the skin fit into. Very few that are much larger than all others
-(`bulk` and up), and a few that get farther in a substep than the skin, stand in no cell. Rows of cells follow each other along v,
-columns along u; u and v are x and y, or y and x in rooms that are much longer than high. Columns are a third as wide as rows are high, so that the neighbours of a circle, which
-stand together along a row, are cut out more closely. In a periodic room the last row, or column, is followed by the first.
+(`bulk` and up), and a few that get farther in a substep than the skin, stand in no cell. Rows of cells follow each other along
+v, columns along u; u and v are x and y, or y and x in rooms that are much longer than high. Columns are a third as wide as rows
+are high, so that the neighbours of a circle, which stand together along a row, are cut out more closely. In a periodic room the
+last row, or column, is followed by the first.
 """
 
 from __future__ import annotations
