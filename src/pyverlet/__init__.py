@@ -49,7 +49,7 @@ from pyverlet.laws.integrators import (
     Yoshida4,
 )
 from pyverlet.laws.ledger import Ledger
-from pyverlet.laws.links import Angle, Area, Pin, Rope, Spring, Stick
+from pyverlet.laws.links import Angle, AngleLimit, Area, Motor, Pin, Rope, Spring, Stick
 from pyverlet.laws.naive import ClampAndFlip, ProjectOnly
 from pyverlet.laws.obstacles import Capsule, Chain, Disc, Obstacle, Polygon, Segment
 from pyverlet.laws.rooms import Boundary, Box, Circle, Open, Periodic
@@ -84,6 +84,7 @@ __all__ = [
     "RK4",
     "Actor",
     "Angle",
+    "AngleLimit",
     "Area",
     "Attractor",
     "Boundary",
@@ -114,6 +115,7 @@ __all__ = [
     "Langevin",
     "Ledger",
     "LennardJones",
+    "Motor",
     "NewContacts",
     "NonFiniteError",
     "Obstacle",

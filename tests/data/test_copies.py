@@ -243,6 +243,7 @@ def things() -> dict[str, Any]:
             center=(0, 0), radius=1, acceleration=1), swirl, pv.Chain([(0, 0), (1, 1)]), pv.Segment((0, 0), (1, 0)),
         pv.Capsule((0, 0), (1, 0), radius=0.1), pv.Disc((0, 0), 1), pv.Polygon([(0, 0), (1, 0), (0, 1)]), pv.Stick(balls, 0, 1),
         pv.Rope(balls, 0, 1), pv.Spring(balls, 0, 1, stiffness=1), pv.Pin(balls, 0), pv.Angle(balls, 0, 1, 2), pv.Area(balls),
+        pv.AngleLimit(balls, 0, 1, 2, least=0, most=1), pv.Motor(balls, 0, speed=1, max_torque=1),
         pv.Emitter(pv.Box((0, 0), (1, 1)), rate=1), pv.Sink(pv.Box((0, 0), (1, 1))), pv.Clock(dt=0.1), pv.FrameBudget(),
         pv.slider("test of copies", 0, 1, 0.5), pv.Panels.of(world), world.events, world.profile, world.energy(),
         world.overlap(), world.obstacles, world.forces, world.links, world.ray((0, 5), (0, -1)), world.nearest((0, 0), 2),

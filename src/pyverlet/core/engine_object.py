@@ -196,15 +196,15 @@ class Engine:
             make_rare_arrays(cython.address(self.w), self.arrays, self.dtype)
 
     def book(self, wanted: cython.bint):
-        """Note from now on what contacts change of the energy: "gained" (blocks,) and "work" (count, 5) J; or no more."""
+        """Note from now on what contacts change of the energy: "gained" (blocks,) and "work" (count, 6) J; or no more."""
         w: cython.pointer(Step) = cython.address(self.w)
         w.booking = wanted
         if wanted:
-            self.arrays |= {"gained": np.zeros((w.count + BLOCK - 1) // BLOCK + 1), "work": np.zeros((w.count + 1, 5))}
+            self.arrays |= {"gained": np.zeros((w.count + BLOCK - 1) // BLOCK + 1), "work": np.zeros((w.count + 1, 6))}
             w.gained, w.work = doubles(self.arrays["gained"]), doubles(self.arrays["work"])
 
     def energy_of_last(self, share: cython.double):
-        """J by `share` of what contacts gave in the last substep: all, that along tangents, that against rolling."""
+        """J by `share` of what contacts gave in the last substep: all, that along tangents, that against rolling, by motors."""
         w: cython.pointer(Step) = cython.address(self.w)
         return (energy_of_last(w, share), *friction_of_last(w, share))
 

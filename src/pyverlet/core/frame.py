@@ -25,6 +25,7 @@ from cython.cimports.team import team_stage
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.contacts import bounce_again, hold_contacts, relax_contacts, solve_contacts
 from pyverlet.core.hearing import hear_loads, hear_surface_loads
+from pyverlet.core.link_motors import book_motors, note_spun
 from pyverlet.core.links import begin_links, end_links, relax_links, remember_links_stage, solve_links
 from pyverlet.core.obstacles import place_moving
 from pyverlet.core.particle_stages import drift, kick_stage, moves_stage, remember_stage
@@ -280,6 +281,10 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     if w.booking and w.rough:
         each_group(w, rubbing_stage)
         team_stage(w.team, book_grips, w, blocks)
+    if w.linked and w.link_table.motors:
+        if w.booking:
+            book_motors(w)
+        note_spun(w)
     if w.booking:
         team_stage(w.team, book_end, w, blocks)
     if w.listening:

@@ -20,6 +20,7 @@ from pyverlet.laws.ledger import Page
 from pyverlet.laws.limiter import fall, limiter_for
 from pyverlet.laws.rooms import Open
 from pyverlet.state.moves import advance, first_non_finite
+from pyverlet.state.state import spin_radius
 from pyverlet.world.contact_memory import Memory
 from pyverlet.world.contact_notes import ContactNotes
 from pyverlet.world.core_arrays import CoreArrays
@@ -252,8 +253,8 @@ class Frames:
         if limiter is None and not world.forces and not world.links:
             start, (gx, gy) = world._state, world.gravity
             gained = state.motion.energy_gained(
-                (start.position, start.velocity, start.spin, start.radius, start.mass),
-                (state.position, state.velocity, state.spin, state.radius, state.mass), gx, gy,
+                (start.position, start.velocity, start.spin, spin_radius(start), start.mass),
+                (state.position, state.velocity, state.spin, spin_radius(state), state.mass), gx, gy,
             )  # fmt: skip
             if gained > SURPLUS * fall(state.total_mass, world.gravity, world.boundary.extent()):
                 limiter = limiter_for(world, dt)

@@ -23,6 +23,7 @@ from pyverlet.laws.ledger import Bookkeeper, Ledger, Page
 from pyverlet.laws.obstacles import Course, Obstacle, Obstacles
 from pyverlet.laws.rooms import Boundary
 from pyverlet.laws.touches import Touches
+from pyverlet.state.state import spin_radius
 from pyverlet.world.particles import Particles
 
 Array = NDArray[Any]
@@ -186,7 +187,7 @@ class Measures(Particles):
     def _momenta(self) -> tuple[float, float, float]:
         s = self._state
         found: tuple[float, float, float] = unit("engine", s.position.dtype).momenta(
-            s.position, s.velocity, s.spin, s.radius, s.mass
+            s.position, s.velocity, s.spin, spin_radius(s), s.mass
         )
         return found
 
