@@ -15,7 +15,7 @@ from playwright.sync_api import Browser, Page, Playwright, expect
 
 import pyverlet as pv
 
-from .browser import FLAGS, NOTHING, Serve, chromium, comes_true, everywhere, number, pause, status, visit, where
+from .browser import FLAGS, NO_OUTLINES, Serve, chromium, comes_true, everywhere, number, pause, status, visit, where
 
 
 def reads(page: Page, name: str, value: Any) -> bool:
@@ -185,7 +185,7 @@ def test_groups_have_a_colour_each(page: Page, program: Serve) -> None:
     apart = np.hypot.reduce(np.array(hues)[1:] - np.array(hues)[:-1], axis=1)
     assert apart.min() > 60  # neighbours in the order of adding are told apart
     page.keyboard.press("4")
-    page.mouse.click(500, 120)  # a circle added by hand is a group of its own
+    page.mouse.click(500, 120)  # a circle added by pointer is a group of its own
     assert comes_true(page, lambda: len(page.evaluate("() => window.pyverlet.groups()")) == len(groups) + 1)
     assert page.evaluate("() => window.pyverlet.ink(0)") == inks[0]
 
@@ -208,7 +208,7 @@ def test_slow_motion(page: Page, program: Serve) -> None:
     assert reads(page, "speed", 1)
     pause(page)
     expect(page.locator("#link")).to_have_text("paused")
-    expect(page.get_by_test_id("pace")).to_have_text(NOTHING)
+    expect(page.get_by_test_id("pace")).to_have_text(NO_OUTLINES)
 
 
 @pytest.mark.slow

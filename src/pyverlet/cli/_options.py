@@ -82,7 +82,7 @@ Seconds = Annotated[float | None, typer.Option(parser=real, help="Simulated seco
 Frames = Annotated[
     int | None, typer.Option(parser=whole, help="Frames to run, in place of --seconds.", metavar="N", show_default=False)
 ]
-Look = Annotated[ThemeName, typer.Option("--theme", help="Behind the circles.")]
+ThemeOption = Annotated[ThemeName, typer.Option("--theme", help="Behind the circles.")]
 Size = Annotated[str | None, typer.Option(help="Width and height in pixels.", metavar="WxH", show_default="1280x720")]
 Picture = Annotated[
     Path | None,

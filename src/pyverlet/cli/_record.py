@@ -38,7 +38,7 @@ def record(
         options.ColourName | None,
         typer.Option(help="What the colours of the circles say.", show_default="origin, or the scene's"),
     ] = None,
-    theme: options.Look = "dark",
+    theme: options.ThemeOption = "dark",
     particles: options.Particles = None,
     substeps: options.Substeps = None,
     integrator: options.IntegratorName = None,

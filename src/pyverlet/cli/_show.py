@@ -34,12 +34,12 @@ def page(
     if scene.sketch is not None:
         scene.sketch.patience = Patience()  # a screen waits for what is called with each picture
     from pyverlet.viewers import serve
-    from pyverlet.viewers.exhibit import Exhibit, Repertoire
+    from pyverlet.viewers.presentation import Presentation, Repertoire
 
     SCENES.setdefault(scene.name, scene)  # one from a file may be picked on the page like the others
     repertoire = Repertoire(scene, dt=dt, integrators=integrators, overrides=overrides)
 
-    def build() -> Exhibit:
+    def build() -> Presentation:
         with Progress("where each circle ends") as progress:
             return repertoire.open(progress)
 
@@ -50,7 +50,7 @@ def page(
     from pyverlet.viewers.journal import Journal
 
     with Journal(journal, dt=dt) as kept:
-        serve(build, scene_name=scene.name, stage=kept.stage, **options)
+        serve(build, scene_name=scene.name, view_state=kept.view_state, **options)
     out.note(f"'{journal}' holds {kept.frame:,} frames: pyverlet replay '{journal}'")
 
 

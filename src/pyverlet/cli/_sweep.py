@@ -113,12 +113,12 @@ def show_world(
 ) -> None:
     """Show the world of a run on the live page, from its start."""
     from pyverlet.viewers import serve
-    from pyverlet.viewers.exhibit import Exhibit
+    from pyverlet.viewers.presentation import Presentation
 
     study = open_study(folder)
 
-    def build() -> Exhibit:
-        return replace(Exhibit.of(study.world(number), f"{study.scene.name}, run {number}"), answers=study.scene.sketch)
+    def build() -> Presentation:
+        return replace(Presentation.of(study.world(number), f"{study.scene.name}, run {number}"), callbacks=study.scene.sketch)
 
     if study.scene.sketch is not None:
         study.scene.sketch.patience = Patience()  # a screen waits for what is called with each picture

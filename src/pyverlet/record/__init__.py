@@ -26,7 +26,7 @@ from pyverlet.picture.pen import Draw
 from pyverlet.record import _films
 from pyverlet.scenes.report import frame_count
 from pyverlet.viewers.frames import Rect
-from pyverlet.viewers.painter import Painter, check_look
+from pyverlet.viewers.renderer import Renderer, check_look
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
@@ -212,7 +212,7 @@ def to_image(
         if not _is_still(Path(path)):
             raise InputError(f"path is '{path}'; allowed is a name that ends in {_films.PICTURE}")
         film = _films.film_for(Path(path))(Path(path), size, 1)
-    pixels = np.ascontiguousarray(Painter(world, size=size, colour=colour, theme=theme, part=part, draw=draw).paint()[..., :3])
+    pixels = np.ascontiguousarray(Renderer(world, size=size, colour=colour, theme=theme, part=part, draw=draw).paint()[..., :3])
     if film:
         film.add(pixels)
         if film.error:

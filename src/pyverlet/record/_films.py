@@ -25,7 +25,7 @@ from pyverlet.record import _reel
 from pyverlet.record._disk import Disk
 from pyverlet.viewers import bundle
 from pyverlet.viewers.frames import Frame, Rect
-from pyverlet.viewers.painter import Painter
+from pyverlet.viewers.renderer import Renderer
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
@@ -64,7 +64,7 @@ class Film(ABC):
         self, world: World, *, colour: Colouring | None, theme: Theme, part: Rect | None, draw: Draw | None = None
     ) -> Callable[[], Any]:
         """What gives a picture of the world, as it is whenever that is called, in the form that `add` takes."""
-        return Painter(world, size=self.size, colour=colour, theme=theme, part=part, draw=draw).paint
+        return Renderer(world, size=self.size, colour=colour, theme=theme, part=part, draw=draw).paint
 
     def __init__(self, path: Path, size: tuple[int, int], fps: int) -> None:
         self.path, self.size, self.fps = path, size, fps

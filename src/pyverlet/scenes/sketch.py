@@ -117,7 +117,7 @@ class Sketch(Shown):
         return hook not in self._off and callable(getattr(self.module, hook, None))
 
     @property
-    def answers(self) -> bool:
+    def has_callbacks(self) -> bool:
         """Whether what the user does reaches the sketch: then its worlds are more than what they started with."""
         return bool(self.sliders) or any(self.has(hook) for hook in ("update", "keys", "click"))
 

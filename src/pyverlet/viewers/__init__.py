@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 from pyverlet.ground.submodules import lazily
 
 if TYPE_CHECKING:
-    from pyverlet.viewers.exhibit import Exhibit, Repertoire
     from pyverlet.viewers.handle import Page
+    from pyverlet.viewers.presentation import Presentation, Repertoire
     from pyverlet.world.panels import Panels
     from pyverlet.world.world import World
 
@@ -81,11 +81,11 @@ def view(
     Raises:
         InputError: the port is taken or not a port, or another argument is outside what is allowed.
     """
-    from pyverlet.viewers.answers import Functions
-    from pyverlet.viewers.exhibit import Exhibit
+    from pyverlet.viewers.presentation import Presentation
+    from pyverlet.viewers.user_callbacks import CallbackFunctions
 
-    shown = Exhibit.of(world, title)
-    shown = replace(shown, answers=Functions(draw=draw, keys=keys, click=click))
+    shown = Presentation.of(world, title)
+    shown = replace(shown, callbacks=CallbackFunctions(draw=draw, keys=keys, click=click))
     if block:
         from pyverlet.viewers import launch
 
@@ -98,7 +98,7 @@ def view(
 
 
 def serve(
-    build: Callable[[], World | Panels | Exhibit],
+    build: Callable[[], World | Panels | Presentation],
     *,
     scene_name: str,
     repertoire: Repertoire | None = None,
@@ -113,7 +113,7 @@ def serve(
     The port is taken before the world is built, so that a taken one is told at once.
 
     Args:
-        build: makes the world, the panels or the exhibit.
+        build: makes the world, the panels or the presentation.
         scene_name: heading of the page.
         repertoire: scenes to pick from on the page; None: none.
         host: address to listen on; anything but this machine's own lets the whole network in.

@@ -18,7 +18,7 @@ from pyverlet.scenes._graph import Graph
 from pyverlet.state.seam import Seam
 from pyverlet.viewers.forces import NONE as NO_CONTACTS
 from pyverlet.viewers.forces import Contacts
-from pyverlet.viewers.sketch import NOTHING, Sketch
+from pyverlet.viewers.obstacle_outlines import NO_OUTLINES, ObstacleOutlines
 
 if TYPE_CHECKING:
     from pyverlet.world.moments import Moment
@@ -84,13 +84,13 @@ class Shape:
     """Several worlds side by side; empty for a single one."""
     differing: tuple[str, ...]
     """Settings in which the panels differ, and which therefore stay as they are."""
-    obstacles: Sketch
+    obstacles: ObstacleOutlines
     """Those that stand still."""
     scene: str
     """Name of the scene, or "" for worlds of the user's own."""
     scenes: tuple[tuple[str, str], ...]
     """Name and one line of each scene that can be picked; empty where none can."""
-    answers: tuple[str, ...]
+    callbacks: tuple[str, ...]
     """Of "keys" and "click", what the user's own program wants to know of."""
     countable: bool
     """Whether another number of circles can be asked for."""
@@ -173,7 +173,7 @@ class Frame:
     """(n, 2) positions in metres, read-only copy, in the order the particles were added or that of `whose`."""
     moving: NDArray[np.float32]
     """(n, 2) velocities in m/s, likewise by `whose_moving`; of an earlier moment unless somebody asks for them."""
-    obstacles: Sketch = NOTHING
+    obstacles: ObstacleOutlines = NO_OUTLINES
     """Those that move."""
     joined: NDArray[np.uint32] = field(default_factory=lambda: np.empty((0, 2), np.uint32))
     """(m, 2) which circles each link joins."""

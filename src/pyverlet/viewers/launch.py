@@ -20,12 +20,12 @@ import uvicorn
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
-from pyverlet.viewers.artist import Artist, draws_here
-from pyverlet.viewers.exhibit import Exhibit, Repertoire
-from pyverlet.viewers.looks import Look
+from pyverlet.viewers.jpeg_renderer import JpegRenderer, draws_here
+from pyverlet.viewers.presentation import Presentation, Repertoire
 from pyverlet.viewers.protocol import MAX_MESSAGE
 from pyverlet.viewers.session import Session
-from pyverlet.viewers.stage import Stage
+from pyverlet.viewers.view_options import ViewOptions
+from pyverlet.viewers.view_state import ViewState
 from pyverlet.viewers.web import LOOPBACK_NAMES, make_app
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ GOODBYE_S = 1
 
 
 def serve(
-    build: Callable[[], World | Panels | Exhibit],
+    build: Callable[[], World | Panels | Presentation],
     *,
     title: str,
     host: str,
@@ -47,7 +47,7 @@ def serve(
     open_browser: bool,
     dt: float,
     repertoire: Repertoire | None = None,
-    stage: Callable[[Exhibit], Stage] = Stage,
+    view_state: Callable[[Presentation], ViewState] = ViewState,
     beside: Callable[[Session], contextlib.AbstractContextManager[None]] | None = None,
 ) -> None:
     """Show the world that `build` makes until Ctrl-C. See `pyverlet.viewers.serve`.
@@ -56,10 +56,10 @@ def serve(
     """
     _refuse_running_loop()
     with contextlib.suppress(KeyboardInterrupt), take_port(host, port) as listener:
-        exhibit = Exhibit.of(build(), title)
-        session = Session(exhibit, dt=dt, repertoire=repertoire, stage=stage)
+        presentation = Presentation.of(build(), title)
+        session = Session(presentation, dt=dt, repertoire=repertoire, view_state=view_state)
         if draws_here(session.latest.shape):
-            Artist().jpeg(session.latest, Look())  # loads what it needs: no tab shall wait for that
+            JpegRenderer().jpeg(session.latest, ViewOptions())  # loads what it needs: no tab shall wait for that
         with on_air(session, listener, only_loopback=host in LOOPBACK_NAMES), _ended_by_signals(session):
             url = address(host, listener)
             announce(title, url, host, open_browser)

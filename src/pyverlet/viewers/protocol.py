@@ -17,7 +17,7 @@ import dataclasses
 import json
 import math
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,35 +27,10 @@ from numpy.typing import NDArray
 from pyverlet.ground.errors import InputError
 from pyverlet.laws import integrators
 from pyverlet.picture.pen import Drawing, Stroke
-from pyverlet.viewers.commands import (
-    MAX_PARTICLES,
-    MAX_SUBSTEPS,
-    Build,
-    Click,
-    Command,
-    Delete,
-    Drag,
-    Key,
-    Pause,
-    Pin,
-    Poke,
-    Redo,
-    Release,
-    Reset,
-    SetFriction,
-    SetGravity,
-    SetIntegrator,
-    SetRestitution,
-    SetSlider,
-    SetSpeed,
-    SetSubsteps,
-    Spawn,
-    Step,
-    Undo,
-)
+from pyverlet.viewers.commands import COMMANDS, MAX_PARTICLES, MAX_SUBSTEPS, Command, SetIntegrator, Step
 from pyverlet.viewers.frames import Frame, Rect, Shape, quantise
-from pyverlet.viewers.hands import POKE_RADIUS
-from pyverlet.viewers.looks import Look
+from pyverlet.viewers.pointers import POKE_RADIUS
+from pyverlet.viewers.view_options import ViewOptions
 
 MAX_MESSAGE = 4096
 """Bytes. The longest honest message is about a hundred."""
@@ -68,11 +43,11 @@ class Ack:
     seq: int
 
 
-Request = Command | Ack | Look
+Request = Command | Ack | ViewOptions
 
 
-def decode(text: str, hand: int) -> Request:
-    """Read one message of a page. `hand` is the tab's own number: no tab moves another's hand.
+def decode(text: str, pointer: int) -> Request:
+    """Read one message of a page. `pointer` is the tab's own number: no tab moves another's pointer.
 
     Raises:
         InputError: the message is too long, no JSON object, of no known type, or a field is missing or wrong.
@@ -86,10 +61,14 @@ def decode(text: str, hand: int) -> Request:
     if not isinstance(message, dict):
         raise InputError(f"message {_short(text)} is not an object; allowed is one JSON object")
     kind = message.get("type")
-    maker = _MAKERS.get(kind) if isinstance(kind, str) else None
-    if maker is None:
-        raise InputError(f"message type is {_short(kind)}; allowed are {', '.join(_MAKERS)}")
-    return maker(message, hand)
+    if kind == "ack":
+        return Ack(_field(message, "seq", "int"))
+    if kind == "look":
+        return _options(message)
+    command = COMMANDS.get(kind) if isinstance(kind, str) else None
+    if command is None:
+        raise InputError(f"message type is {_short(kind)}; allowed are {', '.join(('ack', 'look', *COMMANDS))}")
+    return _command(command, message, pointer)
 
 
 def encode_frame(frame: Frame, part: Rect | None = None, *, velocity: bool = False, force: bool = False) -> bytes:
@@ -177,7 +156,7 @@ def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = N
         "obstacles": shape.obstacles.lines,
         "scene": shape.scene,
         "scenes": shape.scenes,
-        "answers": shape.answers,
+        "callbacks": shape.callbacks,
         "countable": shape.countable,
         "integrators": list(integrators.BY_NAME),
         "count": len(shape.radius),
@@ -208,7 +187,7 @@ def _runs(group: NDArray[np.int64]) -> list[list[int]]:
 
 
 def encode_refusal(reason: str) -> bytes:
-    """Tells a page why its message was not obeyed."""
+    """Tells a page why its message was not applied."""
     return _join({"kind": "refused", "reason": reason}, b"")
 
 
@@ -234,81 +213,41 @@ def _short(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _real(message: Mapping[str, Any], name: str) -> float:
+_ALLOWED = {"float": "a number", "int": "a whole number", "bool": "true and false", "str": "a text"}
+
+
+def _field(message: Mapping[str, Any], name: str, kind: str) -> Any:
+    """A field of a message as a value of this type, named as in annotations."""
     value = message.get(name)
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(f"{name} is {_short(value)}; allowed is a number")
+    if kind.endswith(" | None") and value is None:
+        return None
+    kind = kind.removesuffix(" | None")
+    types = {"float": int | float, "int": int, "bool": bool, "str": str}[kind]
+    if not isinstance(value, types) or isinstance(value, bool) != (kind == "bool"):
+        raise InputError(f"{name} is {_short(value)}; allowed {'are' if kind == 'bool' else 'is'} {_ALLOWED[kind]}")
     try:
-        return float(value)
+        return float(value) if kind == "float" else value
     except OverflowError:
         raise InputError(f"{name} is {_short(value)}; allowed is a number that fits a float") from None
 
 
-def _whole(message: Mapping[str, Any], name: str) -> int:
-    value = message.get(name)
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise InputError(f"{name} is {_short(value)}; allowed is a whole number")
-    return value
+def _command(kind: type[Command], message: Mapping[str, Any], pointer: int) -> Command:
+    """A command of the fields that its class has."""
+    if kind is Step:  # one frame at a time
+        return Step()
+    values: dict[str, Any] = {}
+    for field in dataclasses.fields(kind):
+        name = "value" if kind is SetIntegrator else field.name
+        values[field.name] = pointer if name == "pointer" else _field(message, name, str(field.type))
+    command: Command = kind(**values)
+    return command
 
 
-def _flag(message: Mapping[str, Any], name: str) -> bool:
-    value = message.get(name)
-    if not isinstance(value, bool):
-        raise InputError(f"{name} is {_short(value)}; allowed are true and false")
-    return value
-
-
-def _text(message: Mapping[str, Any], name: str) -> str:
-    value = message.get(name)
-    if not isinstance(value, str):
-        raise InputError(f"{name} is {_short(value)}; allowed is a text")
-    return value
-
-
-def _look(message: Mapping[str, Any]) -> Look:
+def _options(message: Mapping[str, Any]) -> ViewOptions:
     part = message.get("part")
     if part is not None:
         if not isinstance(part, list) or len(part) != 4:
             raise InputError(f"part is {_short(part)}; allowed are four numbers [x0, y0, x1, y1], and null")
-        part = tuple(_real({"part": value}, "part") for value in part)
-    return Look(
-        part,
-        _whole(message, "width"),
-        _whole(message, "height"),
-        _text(message, "colour"),
-        _flag(message, "dark"),
-        _flag(message, "velocity"),
-        _flag({"force": False} | dict(message), "force"),
-    )
-
-
-def _build(message: Mapping[str, Any]) -> Build:
-    scene = None if message.get("scene") is None else _text(message, "scene")
-    return Build(scene, None if message.get("particles") is None else _whole(message, "particles"))
-
-
-_MAKERS: dict[str, Callable[[Mapping[str, Any], int], Request]] = {
-    "ack": lambda m, hand: Ack(_whole(m, "seq")),
-    "look": lambda m, hand: _look(m),
-    "pause": lambda m, hand: Pause(_flag(m, "on")),
-    "step": lambda m, hand: Step(),
-    "reset": lambda m, hand: Reset(),
-    "speed": lambda m, hand: SetSpeed(_real(m, "value")),
-    "build": lambda m, hand: _build(m),
-    "gravity": lambda m, hand: SetGravity(_real(m, "x"), _real(m, "y")),
-    "substeps": lambda m, hand: SetSubsteps(_whole(m, "value")),
-    "restitution": lambda m, hand: SetRestitution(_real(m, "value")),
-    "friction": lambda m, hand: SetFriction(_real(m, "value")),
-    "integrator": lambda m, hand: SetIntegrator(_text(m, "value")),
-    "drag": lambda m, hand: Drag(hand, _real(m, "x"), _real(m, "y"), _real(m, "reach")),
-    "poke": lambda m, hand: Poke(hand, _real(m, "x"), _real(m, "y")),
-    "pin": lambda m, hand: Pin(hand, _real(m, "x"), _real(m, "y"), _real(m, "reach")),
-    "spawn": lambda m, hand: Spawn(hand, _real(m, "x"), _real(m, "y")),
-    "delete": lambda m, hand: Delete(hand, _real(m, "x"), _real(m, "y"), _real(m, "reach")),
-    "release": lambda m, hand: Release(hand),
-    "undo": lambda m, hand: Undo(),
-    "redo": lambda m, hand: Redo(),
-    "slider": lambda m, hand: SetSlider(_text(m, "name"), _real(m, "value")),
-    "key": lambda m, hand: Key(_text(m, "key")),
-    "click": lambda m, hand: Click(hand, _real(m, "x"), _real(m, "y"), _text(m, "button")),
-}
+        part = tuple(_field({"part": value}, "part", "float") for value in part)
+    kinds = {"width": "int", "height": "int", "colour": "str", "dark": "bool", "velocity": "bool", "force": "bool"}
+    return ViewOptions(part, **{name: _field({"force": False} | dict(message), name, kind) for name, kind in kinds.items()})

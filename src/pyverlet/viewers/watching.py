@@ -14,7 +14,7 @@ from pyverlet.ground.errors import PyverletError
 from pyverlet.ground.patience import Patience, TooLong, interrupt
 from pyverlet.laws.integrators import Integrator
 from pyverlet.scenes.sketch import Sketch
-from pyverlet.viewers.exhibit import Exhibit, Repertoire
+from pyverlet.viewers.presentation import Presentation, Repertoire
 from pyverlet.viewers.session import Session
 from pyverlet.world.panels import Panel, Panels
 from pyverlet.world.world import World
@@ -58,14 +58,14 @@ class Workshop:
         self.fault: str | None = None
         """Why the last build has come to nothing."""
 
-    def build(self) -> Exhibit | None:
+    def build(self) -> Presentation | None:
         """The sketch as it is now; None if that cannot be: see `fault`."""
         try:
             sketch = Sketch.read(self.path, self._sketch)
             self._sketch = sketch
             with Patience().within(self._patience):
                 scene = sketch.scene()
-                exhibit = Repertoire(scene, dt=self._dt, integrators=self._integrators, overrides=self._overrides).open()
+                presentation = Repertoire(scene, dt=self._dt, integrators=self._integrators, overrides=self._overrides).open()
             sketch.patience = Patience()  # a screen waits for what is called with each picture
         except TooLong:
             self.fault = f"{self.path.name} is not built after {self._patience:g} s"
@@ -77,12 +77,12 @@ class Workshop:
             self.fault = f"{self.path.name} needs more memory than there is"
             return None
         self.fault = None
-        return exhibit
+        return presentation
 
-    def first(self) -> Exhibit:
+    def first(self) -> Presentation:
         """The sketch, or an empty world while it cannot be built."""
         built = self.build()
-        return built if built else Exhibit(self.path.stem, Panels([Panel("", World())]))
+        return built if built else Presentation(self.path.stem, Panels([Panel("", World())]))
 
     def stamps(self) -> dict[Path, Stamp]:
         """Of the sketch's files as they are now; without those that are not there, or still empty: they are being saved."""

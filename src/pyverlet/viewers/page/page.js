@@ -351,7 +351,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   for (const tool of tools()) tool.addEventListener("change", () => ((root.dataset.tool = tool.value), tool.blur()));
   $("sheet-close").addEventListener("click", () => $("sheet").close());
   fillSheet($("sheet").querySelector("tbody"), act, film);
-  listen(address || film ? document : root, root, act, (key, again) => shape?.answers?.includes("keys") && (again || send("key", { key }), true));
+  listen(address || film ? document : root, root, act, (key, again) => shape?.callbacks?.includes("keys") && (again || send("key", { key }), true));
 
   const zoomed = () => ((numbersStale = true), refresh());
 

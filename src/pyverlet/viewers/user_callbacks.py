@@ -9,7 +9,7 @@ from pyverlet.ground.errors import InputError
 from pyverlet.scenes.sliders import Board, on_board
 
 
-class Answers(Protocol):
+class UserCallbacks(Protocol):
     """Functions by the names `draw`, `keys` and `click`, and sliders. `scenes.sketch.Sketch` is one."""
 
     sliders: Board
@@ -21,7 +21,7 @@ class Answers(Protocol):
         """Call it; an InputError says what is wrong, and it is not called any more."""
 
 
-class Functions:
+class CallbackFunctions:
     """Functions of a program, and its sliders.
 
     Args:
@@ -47,11 +47,11 @@ class Functions:
                 raise InputError(f"{name} is {given!r}; allowed is a function")
 
     def has(self, hook: str) -> bool:
-        """As `Answers.has`."""
+        """As `UserCallbacks.has`."""
         return hook in self._functions
 
     def call(self, hook: str, *arguments: Any) -> None:
-        """As `Answers.call`."""
+        """As `UserCallbacks.call`."""
         if hook not in self._functions:
             return
         try:

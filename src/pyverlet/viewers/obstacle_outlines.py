@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Sketch:
+class ObstacleOutlines:
     """Outlines of obstacles in the picture's coordinates."""
 
     outlines: tuple[Outline, ...] = ()
@@ -29,10 +29,10 @@ class Sketch:
         return [(np.round(points, 6).tolist(), filled) for points, filled in self.outlines]
 
 
-NOTHING = Sketch()
+NO_OUTLINES = ObstacleOutlines()
 
 
-class Sketcher:
+class OutlineCache:
     """Draws the obstacles of worlds side by side; the same object as long as none has moved.
 
     Args:
@@ -43,9 +43,9 @@ class Sketcher:
     def __init__(self, worlds: Sequence[World], *, moving: bool) -> None:
         self._worlds, self._moving = worlds, moving
         self._drawn: list[list[Outline]] = []
-        self._sketch = NOTHING
+        self._sketch = NO_OUTLINES
 
-    def draw(self, layout: Layout) -> Sketch:
+    def draw(self, layout: Layout) -> ObstacleOutlines:
         """As they are now."""
         found = [
             (layout.offset(k), obstacle.drawn(), world.boundary.seam)
@@ -58,5 +58,5 @@ class Sketcher:
             self._drawn = drawn
             images = [(offset, across.outlines(outlines, seam)) for offset, outlines, seam in found]
             moved = (Outline(points + offset, filled) for offset, outlines in images for points, filled in outlines)
-            self._sketch = Sketch(tuple(moved)) if drawn else NOTHING
+            self._sketch = ObstacleOutlines(tuple(moved)) if drawn else NO_OUTLINES
         return self._sketch

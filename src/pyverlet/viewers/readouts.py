@@ -6,12 +6,12 @@ import time
 from collections import deque
 from typing import TYPE_CHECKING
 
-from pyverlet.viewers import levers
+from pyverlet.viewers import controls
 from pyverlet.viewers.frames import Status
 from pyverlet.world.clock import FrameBudget
 
 if TYPE_CHECKING:
-    from pyverlet.viewers.stage import Stage
+    from pyverlet.viewers.view_state import ViewState
 
 SLOW_STATUS_S = 0.1
 """Energy and percentiles read every particle or many frames; ten times a second is as fast as anybody reads."""
@@ -20,8 +20,8 @@ PACE_S = 1.0
 """How fast the world goes is a mean over this long."""
 
 
-class Gauges:
-    """Reads a stage. Used by the physics thread only.
+class Readouts:
+    """Reads a `ViewState`. Used by the physics thread only.
 
     Args:
         budget: is told of every frame.
@@ -53,7 +53,7 @@ class Gauges:
 
     def read(
         self,
-        stage: Stage,
+        view_state: ViewState,
         *,
         dropped: int,
         speed: float,
@@ -67,15 +67,15 @@ class Gauges:
         now = time.perf_counter()
         if now >= self._due or at_once:
             self._due = now + SLOW_STATUS_S
-            self._read_slow(stage)
+            self._read_slow(view_state)
         stages: dict[str, float] = {}
-        for world in stage.worlds:
+        for world in view_state.worlds:
             for name, ms in world.profile.stages.items():
                 stages[name] = stages.get(name, 0.0) + ms
         return Status(
-            time=float(stage.panels.time),
-            frames=int(stage.panels.frames),
-            particles=len(stage),
+            time=float(view_state.panels.time),
+            frames=int(view_state.panels.frames),
+            particles=len(view_state),
             dropped=int(dropped),
             physics_ms=float(self.budget.last_ms),
             physics_median_ms=self._percentiles[0],
@@ -86,35 +86,35 @@ class Gauges:
             potential=self._potential,
             links=self._links,
             energy=sum(self._energies),
-            ledger=_booked(stage),
+            ledger=_booked(view_state),
             energies=self._energies,
-            **levers.read(stage.worlds[0]),
+            **controls.read(view_state.worlds[0]),
             speed=speed,
             pace=self.pace,
             paused=paused,
             busy=busy,
             error=error,
-            graph=stage.exhibit.graph and stage.exhibit.graph(stage.worlds[0]),
-            complaint=complaint or stage.complaint,
-            sliders=stage.sliders(),
+            graph=view_state.presentation.graph and view_state.presentation.graph(view_state.worlds[0]),
+            complaint=complaint or view_state.complaint,
+            sliders=view_state.sliders(),
             watched=self._watched,
-            undo=stage.history.depth,
+            undo=view_state.history.depth,
         )
 
-    def _read_slow(self, stage: Stage) -> None:
-        energies = [each.energy() for each in stage.worlds]
+    def _read_slow(self, view_state: ViewState) -> None:
+        energies = [each.energy() for each in view_state.worlds]
         self._kinetic = sum(float(energy.kinetic) for energy in energies)
         self._spin = sum(float(energy.spin) for energy in energies)
         self._potential = sum(float(energy.potential) for energy in energies)
         self._links = sum(float(energy.links) for energy in energies)
         self._energies = tuple(float(energy.total) for energy in energies)
         self._percentiles = (float(self.budget.median_ms), float(self.budget.p95_ms))
-        self._watched = stage.watched()
+        self._watched = view_state.watched()
 
 
-def _booked(stage: Stage) -> dict[str, float] | None:
+def _booked(view_state: ViewState) -> dict[str, float] | None:
     """What the ledgers of all worlds have under each account, J."""
-    if not all(world.keeps_ledger for world in stage.worlds):
+    if not all(world.keeps_ledger for world in view_state.worlds):
         return None
-    books = [world.ledger.as_dict() for world in stage.worlds]
+    books = [world.ledger.as_dict() for world in view_state.worlds]
     return {account: sum(book[account] for book in books) for account in books[0]}

@@ -24,7 +24,7 @@ CLOSEST = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class ViewOptions:
     """A tab's view.
 
     Attributes:

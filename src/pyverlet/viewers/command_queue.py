@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from pyverlet.viewers.commands import Command
 
 
-class Inbox:
+class CommandQueue:
     """First come, first served. Filled from any thread, emptied by one."""
 
     def __init__(self) -> None:

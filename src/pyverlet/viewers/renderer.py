@@ -24,7 +24,7 @@ def check_look(colour: Any, theme: Any) -> None:
         raise InputError(f"theme is {theme!r}; allowed are pyverlet.picture.DARK and LIGHT")
 
 
-class Painter:
+class Renderer:
     """Paints one world, as it is now, whenever asked.
 
     Args:
@@ -70,7 +70,7 @@ class Painter:
         """(height, width, 4) bytes R, G, B, A: a view on a buffer, good until the next call. A is no transparency; see Raster.
 
         Args:
-            view: what to show; None leaves the choice to the painter.
+            view: what to show; None leaves the choice to the renderer.
         """
         if self._boundary is not self._world.boundary:
             self._boundary = self._world.boundary

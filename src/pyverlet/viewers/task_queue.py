@@ -11,7 +11,7 @@ AGAIN_S = 0.1
 """How often somebody who waits looks whether the session has ended."""
 
 
-class Errands:
+class TaskQueue:
     """Filled from any thread, run by one."""
 
     def __init__(self) -> None:
@@ -19,9 +19,9 @@ class Errands:
         self._runner: int | None = None
         self._holder: int | None = None
 
-    def put(self, errand: Callable[[], object]) -> None:
+    def put(self, task: Callable[[], object]) -> None:
         """Have something done; returns at once."""
-        self._queue.put(errand)
+        self._queue.put(task)
 
     @property
     def here(self) -> bool:
@@ -32,10 +32,10 @@ class Errands:
         """Do what there is to do, here."""
         while True:
             try:
-                errand = self._queue.get_nowait()
+                task = self._queue.get_nowait()
             except queue.Empty:
                 return
-            errand()
+            task()
 
     @contextmanager
     def by_this_thread(self) -> Iterator[None]:
