@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -15,7 +15,7 @@ from pyverlet.cli import _check, _sweep
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.cli import _show as show
-from pyverlet.cli._integrators import integrators
+from pyverlet.cli._integrators import integrators, single
 from pyverlet.data.trajectory import Trajectory
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
@@ -76,19 +76,11 @@ def list_scenes(as_json: options.Json = False) -> None:
 
 
 @app.command()
+@options.with_settings(*options.SETTINGS)
 def run(
     scene: options.SceneName = "cage",
-    particles: options.Particles = None,
-    substeps: options.Substeps = None,
-    integrator: options.IntegratorName = None,
-    restitution: options.Restitution = None,
-    friction: options.Friction = None,
-    radius_spread: options.RadiusSpread = None,
-    seed: options.Seed = None,
-    threads: options.Threads = None,
-    dtype: options.Precision = None,
-    collisions: options.CollisionMethod = None,
-    picture: options.Picture = None,
+    *,
+    overrides: dict[str, Any],
     ledger: options.Ledger = False,
     dt: options.Dt = DEFAULT_DT,
     seconds: options.Seconds = None,
@@ -122,19 +114,8 @@ def run(
 
     --seconds, --frames, --json, --trajectory and --plot ask for a run that ends, and imply --headless.
     """
-    overrides = options.overrides(
-        particles=particles,
-        substeps=substeps,
-        restitution=restitution,
-        friction=friction,
-        radius_spread=radius_spread,
-        seed=seed,
-        threads=threads,
-        dtype=dtype,
-        collisions=collisions,
-        picture=picture,
-    )
-    methods = integrators(integrator)
+    typed = overrides.pop("integrator")
+    methods = integrators(typed)
     ends = headless or as_json or plot or trajectory or seconds is not None or frames is not None
     if patience is not None and not watch:
         raise InputError(f"patience is {patience:g}; allowed is none without --watch")
@@ -150,7 +131,7 @@ def run(
             dt=dt,
             port=DEFAULT_PORT if port is None else port,
             open_browser=not no_open,
-            patience=None if patience is None else checks.number("patience", patience, above=0.0),
+            time_limit=None if patience is None else checks.number("patience", patience, above=0.0),
         )
         return
     chosen = scenes.get(scene)
@@ -163,7 +144,7 @@ def run(
         raise InputError("window is asked for together with a run that ends or with options of the page; allowed is one of them")
     if window:
         if len(methods) > 1:
-            raise InputError(f"integrators is {integrator!r}; allowed is one in a window, which shows a single world")
+            raise InputError(f"integrators is {typed!r}; allowed is one in a window, which shows a single world")
         show.window(chosen, chosen.settings(**overrides, integrator=methods[0] if methods else None), dt=dt)
         return
     if not ends:
@@ -190,24 +171,17 @@ def run(
     if trajectory:
         raise InputError(f"trajectory is '{trajectory}' and plot is '{plot}'; allowed is one of them")
     if len(methods) > 1:
-        raise InputError(f"integrators is {integrator!r}; allowed is one for plot (several: pyverlet compare)")
+        raise InputError(f"integrators is {typed!r}; allowed is one for plot (several: pyverlet compare)")
     settings = chosen.settings(**overrides, integrator=methods[0] if methods else None, ledger=ledger)
     _tell(_run_and_plot(chosen, settings, count, dt, plot), as_json)
 
 
 @app.command()
+@options.with_settings(*(name for name in options.SETTINGS if name != "picture"))
 def bench(
     scene: options.SceneName = "cage",
-    particles: options.Particles = None,
-    substeps: options.Substeps = None,
-    integrator: options.IntegratorName = None,
-    restitution: options.Restitution = None,
-    friction: options.Friction = None,
-    radius_spread: options.RadiusSpread = None,
-    seed: options.Seed = None,
-    threads: options.Threads = None,
-    dtype: options.Precision = None,
-    collisions: options.CollisionMethod = None,
+    *,
+    overrides: dict[str, Any],
     dt: options.Dt = DEFAULT_DT,
     seconds: options.Seconds = None,
     frames: options.Frames = None,
@@ -222,23 +196,9 @@ def bench(
     can be compared.
     """
     chosen = scenes.get(scene)
-    overrides = options.overrides(
-        particles=particles,
-        substeps=substeps,
-        restitution=restitution,
-        friction=friction,
-        radius_spread=radius_spread,
-        seed=seed,
-        threads=threads,
-        dtype=dtype,
-        collisions=collisions,
-    )
     count = report.frame_count(seconds=seconds, frames=frames, dt=dt, default_seconds=DEFAULT_SECONDS)
     warm = report.settle_count(settle, dt)
-    methods = integrators(integrator)
-    if len(methods) > 1:
-        raise InputError(f"integrators is {integrator!r}; allowed is one")
-    world = chosen.world(**overrides, integrator=methods[0] if methods else None)
+    world = chosen.world(**overrides | {"integrator": single(overrides["integrator"])})
     with Progress("settling, frame") as progress:
         for done in range(warm):
             world.step(dt)

@@ -25,6 +25,18 @@ def integrators(names: str | None) -> tuple[Integrator, ...]:
     return found
 
 
+def single(name: str | None) -> Integrator | None:
+    """The integrator of this name; None for None.
+
+    Raises:
+        InputError: it is unknown, or there are several.
+    """
+    found = integrators(name)
+    if len(found) > 1:
+        raise InputError(f"integrator is {name!r}; allowed is one")
+    return found[0] if found else None
+
+
 def integrator(name: str) -> Integrator:
     """The integrator called `name`, or the one at the import path `module:Class`; the working folder is searched too.
 

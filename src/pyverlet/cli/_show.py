@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pyverlet.cli import _print as out
-from pyverlet.ground.patience import Patience
 from pyverlet.ground.progress import Progress
+from pyverlet.ground.time_limit import TimeLimit
 from pyverlet.laws.integrators import Integrator
 from pyverlet.scenes import SCENES, Scene, Settings
 from pyverlet.scenes.sketch import Sketch
@@ -32,7 +32,7 @@ def page(
 ) -> None:
     """Show the scene on the live page until Ctrl-C, and keep what happens there in a journal if one is asked for."""
     if scene.sketch is not None:
-        scene.sketch.patience = Patience()  # a screen waits for what is called with each picture
+        scene.sketch.time_limit = TimeLimit()  # a screen waits for what is called with each picture
     from pyverlet.viewers import serve
     from pyverlet.viewers.presentation import Presentation, Repertoire
 
@@ -62,22 +62,22 @@ def watched(
     dt: float,
     port: int,
     open_browser: bool,
-    patience: float | None,
+    time_limit: float | None,
 ) -> None:
     """Show a sketch on the live page until Ctrl-C, and build it anew whenever it is saved."""
     from pyverlet.viewers import serve
-    from pyverlet.viewers.watching import PATIENCE_S, Watcher, Workshop
+    from pyverlet.viewers.watching import BUILD_LIMIT_S, SketchBuilder, Watcher
 
-    workshop = Workshop(
-        path, dt=dt, integrators=integrators, overrides=overrides, patience=PATIENCE_S if patience is None else patience
+    builder = SketchBuilder(
+        path, dt=dt, integrators=integrators, overrides=overrides, time_limit=BUILD_LIMIT_S if time_limit is None else time_limit
     )
     Sketch.read(path)  # one that is not there is told here, not on a page
 
     def beside(session: Session) -> AbstractContextManager[None]:
-        return Watcher(workshop, session).at_work()
+        return Watcher(builder, session).at_work()
 
     options: dict[str, Any] = {"port": port, "open_browser": open_browser, "dt": dt, "beside": beside}
-    serve(workshop.first, scene_name=path.stem, **options)
+    serve(builder.first, scene_name=path.stem, **options)
 
 
 def window(scene: Scene, settings: Settings, *, dt: float) -> None:

@@ -19,7 +19,7 @@ from pyverlet.data.sweep import Measure, Status, Study
 from pyverlet.data.sweep import sweep as make
 from pyverlet.data.sweep_open import open_study
 from pyverlet.ground.errors import InputError
-from pyverlet.ground.patience import Patience
+from pyverlet.ground.time_limit import TimeLimit
 from pyverlet.viewers import DEFAULT_PORT
 
 FAILED = 1
@@ -121,7 +121,7 @@ def show_world(
         return replace(Presentation.of(study.world(number), f"{study.scene.name}, run {number}"), callbacks=study.scene.sketch)
 
     if study.scene.sketch is not None:
-        study.scene.sketch.patience = Patience()  # a screen waits for what is called with each picture
+        study.scene.sketch.time_limit = TimeLimit()  # a screen waits for what is called with each picture
     serve(build, scene_name=study.scene.name, port=port, open_browser=not no_browser)
 
 

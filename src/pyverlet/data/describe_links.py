@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.data import memory
+from pyverlet.data import serialize
 from pyverlet.data.describe import OBJECT, STATE, TYPE
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.fields import Field
@@ -127,7 +127,7 @@ def _append(world: World, name: str, table: dict[str, Any], own: dict[str, type]
 
 
 def _column(name: str, key: str, table: dict[str, Any], field: Field, world: World, sizes: dict[str, int]) -> Any:
-    column = memory.unpack(table[key])
+    column = serialize.unpack(table[key])
     if not isinstance(column, np.ndarray):
         raise InputError(f"{name}: {key} is {column!r}; allowed is an array")
     field.check(f"{name}: {key}", column, world.dtype, sizes)

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.data import describe_links, memory
+from pyverlet.data import describe_links, serialize
+from pyverlet.data.atomic_file import replacing
 from pyverlet.data.describe import Builder, describe
-from pyverlet.data.durable import replacing
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
@@ -130,7 +130,7 @@ class Recipe:
         """The other way round."""
         if settings.picture is not None:
             raise InputError(f"picture is '{settings.picture}'; allowed in a scene file is none")
-        found: Table = memory.plain(
+        found: Table = serialize.plain(
             {
                 "particles": settings.particles,
                 "substeps": settings.substeps,
@@ -340,9 +340,9 @@ def _columns(table: Table) -> Table:
     """The lists of a frozen link as arrays again."""
     state = {
         key: np.array(value, np.uint8 if key == "intact" else float)
-        for key, value in memory.unpack(table.get("state", {})).items()
+        for key, value in serialize.unpack(table.get("state", {})).items()
     }
-    found = {key: np.array(value, float) if isinstance(value, list) else value for key, value in memory.unpack(table).items()}
+    found = {key: np.array(value, float) if isinstance(value, list) else value for key, value in serialize.unpack(table).items()}
     particles = np.array(table.get("particles"), np.int64)
     return found | {"particles": particles, "state": state}
 

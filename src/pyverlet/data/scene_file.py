@@ -11,7 +11,7 @@ from typing import Any
 
 from pyverlet import scenes
 from pyverlet.data import toml
-from pyverlet.data.durable import replacing
+from pyverlet.data.atomic_file import replacing
 from pyverlet.data.scene_build import Recipe
 from pyverlet.data.scene_freeze import freeze
 from pyverlet.ground.errors import InputError

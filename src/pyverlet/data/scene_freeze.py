@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.data import describe_links, memory
+from pyverlet.data import describe_links, serialize
+from pyverlet.data.atomic_file import replacing
 from pyverlet.data.describe import OBJECT, describe
-from pyverlet.data.durable import replacing
 from pyverlet.data.scene_build import COLUMNS, Table, hash_of
 from pyverlet.ground.errors import InputError
 from pyverlet.world.world import World
@@ -63,7 +63,7 @@ def freeze(world: World, path: Path) -> Table:
         group["hash"] = hash_of(content.getvalue())
     with replacing(beside) as file:
         file.write(content.getvalue())
-    found: Table = memory.plain(tables)
+    found: Table = serialize.plain(tables)
     return {"groups": groups} | {key: value for key, value in found.items() if value != []}
 
 

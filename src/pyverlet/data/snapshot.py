@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.core.sources import sources_hash
-from pyverlet.data import archive, describe_links, memory, own_arrays
+from pyverlet.data import archive, describe_links, own_arrays, serialize
+from pyverlet.data.atomic_file import replacing
 from pyverlet.data.describe import Builder, describe
-from pyverlet.data.durable import replacing
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.threads import max_threads
@@ -80,7 +80,7 @@ def to_table(world: World, scene: Mapping[str, Any] | None = None) -> tuple[Head
     def put_aside(array: Array) -> dict[str, str]:
         name = f"extra.{sum(known.startswith('extra.') for known in arrays)}"
         arrays[name] = array
-        return {memory.ARRAY: name}
+        return {serialize.ARRAY: name}
 
     own = [name for name in arrays if name.startswith(apart.OWN)]
     kinds = [own_arrays.kind_of(name, arrays[key]) for key, name in zip(own, moving.facts["data"], strict=True)]
@@ -90,10 +90,10 @@ def to_table(world: World, scene: Mapping[str, Any] | None = None) -> tuple[Head
         "made_by": _made_by(),
         "kernels": sources_hash(),
         "particles": len(world),
-        "scene": memory.pack(dict(scene)) if scene is not None else None,
-        "world": memory.map_arrays(_settings(world), put_aside),
-        "facts": memory.pack(moving.facts),
-        "own": memory.pack(kinds),
+        "scene": serialize.pack(dict(scene)) if scene is not None else None,
+        "world": serialize.map_arrays(_settings(world), put_aside),
+        "facts": serialize.pack(moving.facts),
+        "own": serialize.pack(kinds),
     }
     return header, arrays
 
@@ -175,8 +175,8 @@ def from_table(header: Header, arrays: dict[str, Array], *, exact: bool = False,
         )
     settings = _with_arrays(header["world"], arrays)
     known = {name: array for name, array in _moving(arrays).items() if name not in apart.RETIRED}
-    moving = Parts(memory.unpack(header["facts"]), known)
-    for k, kind in enumerate(memory.unpack(header.get("own", []))):
+    moving = Parts(serialize.unpack(header["facts"]), known)
+    for k, kind in enumerate(serialize.unpack(header.get("own", []))):
         known[f"{apart.OWN}{k}"] = own_arrays.from_bytes(known[f"{apart.OWN}{k}"], *kind)
     if unknown := {name for name in known if not name.startswith(apart.OWN)} - set(apart.FIELDS):
         raise InputError(f"there is an array {min(unknown)!r}; allowed are those pyverlet knows")
@@ -209,8 +209,8 @@ def _with_arrays(value: Any, arrays: dict[str, Array]) -> Any:
     if isinstance(value, list):
         return [_with_arrays(part, arrays) for part in value]
     if isinstance(value, dict):
-        if list(value) == [memory.ARRAY]:
-            return arrays[value[memory.ARRAY]]
+        if list(value) == [serialize.ARRAY]:
+            return arrays[value[serialize.ARRAY]]
         return {key: _with_arrays(part, arrays) for key, part in value.items()}
     return value
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pyverlet.data.known_sketch import KnownSketch, value_of
+from pyverlet.data.resolve_sketch import LazySketch, value_of
 from pyverlet.data.sweep import Measure, Study, basics
 from pyverlet.data.sweep_plan import SCENE_FILE, SKETCH, Plan
 from pyverlet.ground.errors import InputError
@@ -66,6 +66,6 @@ def _scene(told: Any, folder: str | Path, place: str | None) -> Scene:
         return get(str(Path(folder) / SCENE_FILE))
     if "sketch" in told:
         name = told["sketch"]
-        sketch = KnownSketch(name, told["source"], Path(place or name), Path(), Path(folder).parent)
+        sketch = LazySketch(name, told["source"], Path(place or name), Path(), Path(folder).parent)
         return replace(sketch.scene(), name=told["name"])
     raise InputError(f"'{folder}' is a study of a scene of its program's own; allowed is pyverlet.sweep with that scene")

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyverlet.data import memory
+from pyverlet.data import serialize
 from pyverlet.data.describe import KINDS, describe
 from pyverlet.ground.errors import InputError
 from pyverlet.scenes import SCENES, Scene
@@ -107,7 +107,7 @@ def _scene(scene: Scene) -> Any:
         return scene.name
     document = getattr(scene, "document", None)
     if document is not None:
-        return memory.plain(memory.pack(document))
+        return serialize.plain(serialize.pack(document))
     if scene.sketch is not None:
         return {"name": scene.name, "sketch": scene.sketch.name, "source": scene.sketch.digest}
     build = scene.build
@@ -137,5 +137,5 @@ def plain(name: str, value: Any) -> Any:
     if value is None or isinstance(value, bool | int | float | str):
         return value
     if type(value).__name__ in KINDS:
-        return memory.plain(describe(value))
+        return serialize.plain(describe(value))
     raise InputError(f"{name} is {value!r}; allowed are numbers, text and objects of pyverlet's")

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.core.sources import sources_hash
-from pyverlet.data.durable import replacing
+from pyverlet.data.atomic_file import replacing
 from pyverlet.data.sweep_plan import SCENE_FILE, Plan
 from pyverlet.ground import file_lock
 from pyverlet.ground.errors import InputError
@@ -87,7 +87,7 @@ def only_one(folder: Path) -> Iterator[None]:
     Raises:
         InputError: one is.
     """
-    with file_lock.turn(folder / ".lock", "rows", patience=0.0) as ours:
+    with file_lock.locked(folder / ".lock") as ours:
         if not ours:
             raise InputError(f"'{folder}' is a study that another process is making; allowed is one at a time")
         yield

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.data import archive, snapshot
-from pyverlet.data.crew import Crew, Keeper, Plan
+from pyverlet.data.process_pool import Plan, ProcessPool, Worker
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
@@ -72,7 +72,7 @@ class Worlds(Shown):
         first = self.scene.world(**settings, seed=seed_of(self.seed, 0))
         plan = Plan(self.scene, settings, self.seed, self._count, len(first), first.dtype.str)
         folder = Path(tempfile.mkdtemp(prefix="pyverlet-", dir=_shared_folder()))
-        self._keepers: Sequence[Keeper] = ()
+        self._workers: Sequence[Worker] = ()
         self._dropped: list[int] = []
         try:
             path = folder / "worlds"
@@ -82,14 +82,14 @@ class Worlds(Shown):
             ranges = list(itertools.pairwise(cuts))
             self._shared = plan.open(path)
             if processes == 1:
-                self._crew: Crew | None = None
-                self._keepers = [Keeper(plan, 0, self._count, self._shared)]
+                self._pool: ProcessPool | None = None
+                self._workers = [Worker(plan, 0, self._count, self._shared)]
             else:
-                self._crew = Crew(plan, ranges, path)
+                self._pool = ProcessPool(plan, ranges, path)
         finally:
             shutil.rmtree(folder, ignore_errors=True)  # it lives on as long as anyone has it open
         self._first = [begin for begin, _ in ranges]
-        self._finalizer = weakref.finalize(self, self._crew.close) if self._crew else None
+        self._finalizer = weakref.finalize(self, self._pool.close) if self._pool else None
 
     # ---- stepping ------------------------------------------------------------------------------------------------------
 
@@ -135,10 +135,10 @@ class Worlds(Shown):
         self._order(what, *arguments)
 
     def _order(self, what: str, *arguments: Any) -> None:
-        if self._crew is not None:
-            self._crew.tell(what, *arguments)
-        for keeper in self._keepers:
-            getattr(keeper, what)(*arguments)
+        if self._pool is not None:
+            self._pool.run_all(what, *arguments)
+        for worker in self._workers:
+            getattr(worker, what)(*arguments)
 
     def close(self) -> None:
         """End the processes that have the worlds. They cannot be stepped any more."""
@@ -211,7 +211,7 @@ class Worlds(Shown):
             raise IndexError(f"world {k} of {self._count}")
         k %= self._count
         part = int(np.searchsorted(self._first, k, side="right")) - 1
-        raw = self._crew.ask(part, "file", k) if self._crew else self._keepers[0].file(k)
+        raw = self._pool.run_one(part, "file", k) if self._pool else self._workers[0].file(k)
         table, arrays = archive.read_from(io.BytesIO(raw), len(raw))
         return snapshot.from_table(table, arrays)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.picture import ByOrigin, Colouring, Theme, View, across
+from pyverlet.picture import ByOrigin, Colouring, Theme, View, periodic_images
 from pyverlet.picture.marks import MARKED_PX
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ class Arrays:
         position, radius, angle, seam = world.position, world.radius, world.angle, world.boundary.seam
         colours = self._colour.colours(world, self._theme)
         if seam:  # who reaches through it is drawn on both sides
-            owner, place = across.copies(position, radius, seam)
+            owner, place = periodic_images.copies(position, radius, seam)
             position, colours = np.concatenate((position, place)), np.concatenate((colours, colours[owner]))
             radius, angle = np.concatenate((radius, radius[owner])), np.concatenate((angle, angle[owner]))
         return (

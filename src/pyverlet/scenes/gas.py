@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pyverlet.laws.rooms import Periodic
 from pyverlet.scenes import _start
-from pyverlet.scenes._graph import Gauge, Graph
+from pyverlet.scenes._graph import Graph, GraphReader
 from pyverlet.scenes._scene import Scene, Settings, Show
 from pyverlet.world.world import World
 
@@ -102,7 +102,7 @@ class Thermometer:
         self._weight = keep * self._weight + share
 
 
-def _graph(settings: Settings) -> Gauge:
+def _graph(settings: Settings) -> GraphReader:
     return Thermometer()
 
 

@@ -23,8 +23,8 @@ from typing import Any
 
 from pyverlet.ground.errors import InputError, Interrupted
 from pyverlet.ground.guess import did_you_mean
-from pyverlet.ground.patience import Patience, TooLong
 from pyverlet.ground.shown import Shown
+from pyverlet.ground.time_limit import TimeLimit, TooLong
 from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.scenes.sliders import Board, board
 from pyverlet.world.actors import Actor
@@ -68,7 +68,7 @@ class Sketch(Shown):
     def __init__(self, path: Path, source: bytes, before: Sketch | None = None) -> None:
         self.path, self.source, self.name = Path(path), source, Path(path).name
         self.sliders: Board = {}
-        self.patience: Patience | None = None
+        self.time_limit: TimeLimit | None = None
         self.settings = Settings()
         self._left: Board = dict(before.sliders) if before else {}
         self._brought: dict[str, Path] = dict(before._brought) if before else {}
@@ -135,7 +135,7 @@ class Sketch(Shown):
             return
         function = getattr(of or self.module, hook)
         try:
-            with self.at_work(), self.patience.within(HOOK_S) if self.patience else nullcontext():
+            with self.at_work(), self.time_limit.within(HOOK_S) if self.time_limit else nullcontext():
                 function(*arguments)
         except SketchError as error:
             self._off.add(hook)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pyverlet.core import unit
 from pyverlet.laws.rooms import Circle
-from pyverlet.picture import across
+from pyverlet.picture import periodic_images
 from pyverlet.picture.colour import USUAL_MULTIPLE
 from pyverlet.picture.pen import Drawing
 from pyverlet.scenes._graph import Graph
@@ -244,7 +244,7 @@ class Frame:
         found = [(np.empty(0, np.uint32), np.empty((0, 2), np.float32))]
         for first, count, seam in self.shape.seams:
             mine = slice(first, first + count)
-            owner, place = across.copies(self.position[mine], self.shape.radius[mine], seam)
+            owner, place = periodic_images.copies(self.position[mine], self.shape.radius[mine], seam)
             found.append((owner + np.uint32(first), place))
         owners, places = zip(*found, strict=True)
         return np.concatenate(owners), np.concatenate(places)
@@ -255,7 +255,7 @@ class Frame:
         ends, force, found = self.position[self.joined], self.force, []
         for first, count, seam in self.shape.seams:
             mine = (self.joined[:, 0] >= first) & (self.joined[:, 0] < first + count)
-            found.append(across.lines(ends[mine], force[mine], seam))
+            found.append(periodic_images.lines(ends[mine], force[mine], seam))
             ends, force = ends[~mine], force[~mine]
         return np.concatenate([ends, *(lines for lines, _ in found)]), np.concatenate([force, *(pulls for _, pulls in found)])
 

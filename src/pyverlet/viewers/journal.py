@@ -17,7 +17,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from pyverlet.data.known_sketch import told
+from pyverlet.data.resolve_sketch import settings_to_json
 from pyverlet.data.snapshot import save
 from pyverlet.ground.errors import InputError
 from pyverlet.scenes.sketch import Sketch
@@ -161,7 +161,7 @@ def _told(presentation: Presentation, world: World) -> dict[str, Any]:
             "name": sketch.name,
             "path": str(sketch.path.resolve()),
             "source": sketch.digest,
-            "settings": told(sketch.settings),
+            "settings": settings_to_json(sketch.settings),
             "sliders": {name: slider.value for name, slider in sketch.sliders.items()},
         },
         "hash": world.state_hash(),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pyverlet.laws.obstacles import Outline
-from pyverlet.picture import across
+from pyverlet.picture import periodic_images
 
 if TYPE_CHECKING:
     from pyverlet.viewers.layout import Layout
@@ -56,7 +56,7 @@ class OutlineCache:
         drawn = [outlines for _, outlines, _ in found]
         if len(drawn) != len(self._drawn) or any(a is not b for a, b in zip(drawn, self._drawn, strict=True)):
             self._drawn = drawn
-            images = [(offset, across.outlines(outlines, seam)) for offset, outlines, seam in found]
+            images = [(offset, periodic_images.outlines(outlines, seam)) for offset, outlines, seam in found]
             moved = (Outline(points + offset, filled) for offset, outlines in images for points, filled in outlines)
             self._sketch = ObstacleOutlines(tuple(moved)) if drawn else NO_OUTLINES
         return self._sketch

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pyverlet import scenes
 from pyverlet.laws.integrators import Integrator
 from pyverlet.scenes import Scene
-from pyverlet.scenes._graph import Gauge
+from pyverlet.scenes._graph import GraphReader
 from pyverlet.scenes.sketch import SketchScene
 from pyverlet.viewers.frames import Rect
 from pyverlet.viewers.user_callbacks import UserCallbacks
@@ -45,7 +45,7 @@ class Presentation:
     scene: str = ""
     colours: NDArray[np.uint8] | None = None
     part: Rect | None = None
-    graph: Gauge | None = None
+    graph: GraphReader | None = None
     callbacks: UserCallbacks | None = None
     countable: bool = True
 

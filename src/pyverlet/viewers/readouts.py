@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pyverlet.viewers import controls
 from pyverlet.viewers.frames import Status
@@ -51,19 +51,8 @@ class Readouts:
         (began, start), (ended, end) = self._passed[0], self._passed[-1]
         return (end - start) / max(ended - began, 1e-9)
 
-    def read(
-        self,
-        view_state: ViewState,
-        *,
-        dropped: int,
-        speed: float,
-        paused: bool,
-        busy: str | None,
-        error: str | None,
-        at_once: bool,
-        complaint: str | None = None,
-    ) -> Status:
-        """The numbers now. Slow ones are of a moment ago, unless wanted `at_once`."""
+    def read(self, view_state: ViewState, *, at_once: bool, complaint: str | None = None, **session: Any) -> Status:
+        """The numbers now. Slow ones are of a moment ago, unless wanted `at_once`; `session`: fields that the session knows."""
         now = time.perf_counter()
         if now >= self._due or at_once:
             self._due = now + SLOW_STATUS_S
@@ -76,7 +65,6 @@ class Readouts:
             time=float(view_state.panels.time),
             frames=int(view_state.panels.frames),
             particles=len(view_state),
-            dropped=int(dropped),
             physics_ms=float(self.budget.last_ms),
             physics_median_ms=self._percentiles[0],
             physics_p95_ms=self._percentiles[1],
@@ -86,19 +74,16 @@ class Readouts:
             potential=self._potential,
             links=self._links,
             energy=sum(self._energies),
-            ledger=_booked(view_state),
+            ledger=_ledger(view_state),
             energies=self._energies,
             **controls.read(view_state.worlds[0]),
-            speed=speed,
             pace=self.pace,
-            paused=paused,
-            busy=busy,
-            error=error,
             graph=view_state.presentation.graph and view_state.presentation.graph(view_state.worlds[0]),
             complaint=complaint or view_state.complaint,
             sliders=view_state.sliders(),
             watched=self._watched,
             undo=view_state.history.depth,
+            **session,
         )
 
     def _read_slow(self, view_state: ViewState) -> None:
@@ -112,9 +97,9 @@ class Readouts:
         self._watched = view_state.watched()
 
 
-def _booked(view_state: ViewState) -> dict[str, float] | None:
+def _ledger(view_state: ViewState) -> dict[str, float] | None:
     """What the ledgers of all worlds have under each account, J."""
     if not all(world.keeps_ledger for world in view_state.worlds):
         return None
-    books = [world.ledger.as_dict() for world in view_state.worlds]
-    return {account: sum(book[account] for book in books) for account in books[0]}
+    ledgers = [world.ledger.as_dict() for world in view_state.worlds]
+    return {account: sum(ledger[account] for ledger in ledgers) for account in ledgers[0]}

@@ -11,11 +11,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from pyverlet.data.known_sketch import asked, find
+from pyverlet.data.resolve_sketch import find, settings_from_json
 from pyverlet.data.snapshot import load
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, PyverletError
-from pyverlet.ground.patience import Patience
+from pyverlet.ground.time_limit import TimeLimit
 from pyverlet.scenes.sketch import Sketch, SketchError
 from pyverlet.viewers import commands
 from pyverlet.viewers.commands import Command, Reset
@@ -127,11 +127,11 @@ class Script:
         _ = sketch.module
         for name, value in about["sliders"].items():
             sketch.sliders[name].value = value
-        sketch.patience = Patience()  # a function that looped for ever does so again
+        sketch.time_limit = TimeLimit()  # a function that looped for ever does so again
         return sketch
 
     def _built(self, sketch: Sketch, told: dict[str, Any]) -> World:
-        world = sketch.scene().world(**asked(told["sketch"]["settings"]))
+        world = sketch.scene().world(**settings_from_json(told["sketch"]["settings"]))
         if world.state_hash() != told["hash"]:
             raise DivergedError(
                 f"{sketch.name} builds a world with the hash {world.state_hash()}, and built {told['hash']} in the session: "

@@ -21,12 +21,12 @@ from pyverlet.ground.errors import PyverletError
 from pyverlet.scenes.sketch import SketchError
 from pyverlet.viewers import commands as asked
 from pyverlet.viewers import controls
-from pyverlet.viewers.commands import Command
 from pyverlet.viewers.frame_pacing import PICTURE_S, FramePacing
 from pyverlet.viewers.frames import Frame, Shape, Status
 from pyverlet.viewers.presentation import Presentation, Repertoire
 from pyverlet.viewers.readouts import Readouts
 from pyverlet.viewers.session_handle import SessionHandle
+from pyverlet.viewers.task_queue import Item
 from pyverlet.viewers.view_state import ViewState
 from pyverlet.world.clock import Clock, FrameBudget
 from pyverlet.world.moments import Moment
@@ -113,7 +113,6 @@ class Session(SessionHandle):
         Returns:
             Seconds until the next frame is due.
         """
-        self._tasks.run()
         if self._apply_all() and self._held():
             self._publish()
         now = time.perf_counter()
@@ -163,21 +162,21 @@ class Session(SessionHandle):
 
     def _apply_next(self) -> None:
         """Wait for a command and apply it and all behind it."""
-        if self._apply_each(self._commands.waiting(IDLE_S)):
+        if self._apply_each(self._tasks.waiting(IDLE_S)):
             self._publish()
 
     def _apply_all(self) -> bool:
         """Whether there was anything to apply."""
-        return self._apply_each(self._commands.all())
+        return self._apply_each(self._tasks.all())
 
-    def _apply_each(self, commands: Iterator[Command | None]) -> bool:
+    def _apply_each(self, commands: Iterator[Item]) -> bool:
         any_at_all = False
         for command in commands:
             self._apply(command)
             any_at_all = True
         return any_at_all
 
-    def _apply(self, command: Command | None) -> None:
+    def _apply(self, command: Item) -> None:
         held = self._held()
         try:
             self._do(command)
@@ -189,7 +188,7 @@ class Session(SessionHandle):
         if held and not self._held():
             self._last = time.perf_counter()  # time spent paused is not time to catch up with
 
-    def _do(self, command: Command | None) -> None:
+    def _do(self, command: Item) -> None:
         match command:
             case None:
                 pass  # only wakes the thread up
@@ -208,6 +207,8 @@ class Session(SessionHandle):
                 self._before = None
             case asked.Build(scene, particles):
                 self._build(scene, particles)
+            case _ if callable(command):
+                command()
             case _:
                 self._view_state.do(command)
                 if isinstance(command, asked.Reset):
@@ -291,7 +292,7 @@ class Session(SessionHandle):
     def _look_on(self, moment: Moment) -> None:
         """Between two substeps of a frame that takes longer than a picture may."""
         if not self._paused:  # a step asked for is as it was when it was asked for
-            self._apply_each(self._commands.while_(self._view_state.takes_at_once))
+            self._apply_each(self._tasks.while_(self._view_state.takes_at_once))
         if self._wanted() and self._due() and self._shape_of == self._view_state.version:
             self._publish(moment)
 

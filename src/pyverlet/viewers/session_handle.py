@@ -10,7 +10,6 @@ from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from pyverlet.viewers.command_queue import CommandQueue
 from pyverlet.viewers.commands import Command
 from pyverlet.viewers.frame_pacing import Audience
 from pyverlet.viewers.frames import Frame
@@ -27,7 +26,7 @@ class SessionHandle(ABC):
     """The narrow door of a session: from any thread."""
 
     def __init__(self) -> None:
-        self._commands, self._tasks, self._audience = CommandQueue(), TaskQueue(), Audience()
+        self._tasks, self._audience = TaskQueue(), Audience()
         self._listeners: tuple[Callable[[], None], ...] = ()
         self._listeners_lock = threading.Lock()
         self._thread: threading.Thread | None = None
@@ -50,7 +49,7 @@ class SessionHandle(ABC):
 
         A world that is slow takes another gravity, or where a pointer that is down moves, between two substeps.
         """
-        self._commands.put(command)
+        self._tasks.put(command)
 
     def take(self, frame: Frame, *, velocity: bool = False) -> None:
         """Say that a viewer has this frame and would like the next: a world that is slow makes some between its substeps then.
@@ -82,16 +81,14 @@ class SessionHandle(ABC):
     def put_on(self, presentation: Presentation) -> None:
         """Show something else from the next frame on; how the user looks at it stays."""
         self._tasks.put(partial(self._put_on, presentation))
-        self._commands.put(None)
 
     def tell(self, *, complaint: str | None = None, busy: str | None = None) -> None:
         """What is wrong with the program that made the worlds, or keeps them waiting, while they go on; None: nothing."""
         self._tasks.put(partial(self._say, complaint, busy))
-        self._commands.put(None)
 
     def held(self) -> AbstractContextManager[None]:
         """Meanwhile the worlds stand between two frames, and are the caller's."""
-        return self._tasks.held(lambda: self._commands.put(None))
+        return self._tasks.held()
 
     def start(self) -> None:
         """Run in a thread of the session's own."""
@@ -104,7 +101,7 @@ class SessionHandle(ABC):
     def stop(self) -> None:
         """Have the frame under way be the last; wait for it if the session has its own thread. Twice is once."""
         self._stopping.set()
-        self._commands.put(None)
+        self._tasks.put(None)
         if self._thread is not None:
             self._thread.join(STOP_TIMEOUT_S)
 

@@ -25,6 +25,7 @@ from pyverlet.viewers.layout import Layout
 from pyverlet.viewers.obstacle_outlines import ObstacleOutlines, OutlineCache
 from pyverlet.viewers.pointers import Pointers
 from pyverlet.viewers.presentation import Presentation
+from pyverlet.viewers.task_queue import Item
 from pyverlet.world.moments import Moment
 
 GREY = 0x9A
@@ -203,7 +204,7 @@ class ViewState:
             world.actors[:] = [actor for actor in world.actors if not isinstance(actor, Updates)]
         return sum(len(world.actors) for world in self.worlds) < before
 
-    def takes_at_once(self, command: Command | None) -> bool:
+    def takes_at_once(self, command: Item) -> bool:
         """Whether this may be done between two substeps: gravity and pointers that hold something are asked for in each of them.
 
         All else is gathered once a frame. Not in worlds with a ledger: it measures heights by what gravity was at the beginning.

@@ -66,8 +66,8 @@ class Window:
     ) -> None:
         check_extra()
         self._world, self._title, self._dt = world, title, checks.number("dt", dt, above=0.0)
-        self._new_renderer: Callable[[tuple[int, int]], Renderer] = partial(_renderer, world, colour, theme, part, draw)
-        self._renderer = self._new_renderer(check_size(size))
+        self._new_renderer = partial(Renderer, world, colour=colour, theme=theme, part=part, draw=draw)
+        self._renderer = self._new_renderer(size=check_size(size))
         self._saved = world.save()
         self._pointers = Pointers(world)
         self._clock, self._budget = Clock(dt=self._dt), FrameBudget()
@@ -165,7 +165,7 @@ class Window:
         elif event.type == pygame.KEYDOWN and event.key in self._do:
             self._do[event.key]()
         elif event.type == pygame.VIDEORESIZE:
-            self._renderer, self.view = self._new_renderer((max(event.w, 1), max(event.h, 1))), None
+            self._renderer, self.view = self._new_renderer(size=(max(event.w, 1), max(event.h, 1))), None
         elif event.type == pygame.MOUSEWHEEL:
             self.view = self._seen().zoomed(ZOOM**event.y, pygame.mouse.get_pos())
         elif event.type == pygame.MOUSEBUTTONUP and event.button == 1:
@@ -213,12 +213,6 @@ class Window:
     def _rect(self) -> Rect:
         view = self._seen()
         return (view.left, view.top - view.height / view.scale, view.left + view.width / view.scale, view.top)
-
-
-def _renderer(
-    world: World, colour: Colouring | None, theme: Theme, part: Rect | None, draw: Draw | None, size: tuple[int, int]
-) -> Renderer:
-    return Renderer(world, size=size, colour=colour, theme=theme, part=part, draw=draw)
 
 
 def check_extra() -> None:

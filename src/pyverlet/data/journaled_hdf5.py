@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 
-class WholeFile:
+class JournaledFile:
     """A binary file for h5py to write to. What lay in it at the last commit stays as it was until the next.
 
     New bytes behind the end of then are written at once: nothing refers to them yet. Changes before it, some 27 kB of

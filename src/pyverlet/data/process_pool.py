@@ -1,4 +1,4 @@
-"""Who has the worlds of `Worlds`: a `Keeper` some of them, and a `Crew` of processes each a keeper.
+"""Who has the worlds of `Worlds`: a `Worker` some of them, and a `ProcessPool` of processes each a worker.
 
 Processes are started by themselves rather than by `multiprocessing`, which would run the user's script anew in each of them. They
 take orders by their standard input, and share the particles in a file mapped to memory.
@@ -37,7 +37,7 @@ _ROWS = {"position": 2, "velocity": 2, "spin": 1, "radius": 1, "mass": 1}
 
 @dataclass(frozen=True)
 class Plan:
-    """What all keepers know.
+    """What all workers know.
 
     Attributes:
         scene, settings, seed: of the worlds.
@@ -87,7 +87,7 @@ class Plan:
         return arrays
 
 
-class Keeper:
+class Worker:
     """Some of the worlds, and what is done to them.
 
     Args:
@@ -168,8 +168,8 @@ def _named(error: PyverletError, k: int) -> PyverletError:
     return error
 
 
-class Crew:
-    """Processes that are keepers.
+class ProcessPool:
+    """Processes that are workers.
 
     Args:
         plan: of all worlds.
@@ -184,7 +184,7 @@ class Crew:
             raise InputError(
                 f"scene cannot be sent to other processes ({error}); allowed is one of a module, or processes=1"
             ) from None
-        command = [sys.executable, "-c", "from pyverlet.data.crew import main; main()"]
+        command = [sys.executable, "-c", "from pyverlet.data.process_pool import main; main()"]
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         self._processes = [
             subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment) for _ in ranges
@@ -192,24 +192,24 @@ class Crew:
         try:
             for process, (first, stop) in zip(self._processes, ranges, strict=True):
                 _send(_in(process), (sent, first, stop, str(path)))
-            self._hear()
+            self._wait()
         except BaseException:
             self.close()
             raise
 
-    def tell(self, *order: Any) -> None:
+    def run_all(self, *order: Any) -> None:
         """Have all of them do something, and wait until it is done."""
         with self._alive():
             for process in self._processes:
                 _send(_in(process), order)
-            self._hear()
+            self._wait()
 
-    def ask(self, part: int, *order: Any) -> Any:
+    def run_one(self, part: int, *order: Any) -> Any:
         """Have one of them do something, and return what it returns."""
         process = self._processes[part]
         with self._alive():
             _send(_in(process), order)
-            return _heard([_receive(_out(process))])[0]
+            return _results([_receive(_out(process))])[0]
 
     @contextlib.contextmanager
     def _alive(self) -> Iterator[None]:
@@ -221,9 +221,9 @@ class Crew:
             self.close()
             raise PyverletError("a process that had some of the worlds has ended; they are lost, build them anew") from None
 
-    def _hear(self) -> None:
+    def _wait(self) -> None:
         # All of them, before any error is raised: who is not heard now would be heard for an answer to the next order.
-        _heard([_receive(_out(process)) for process in self._processes])
+        _results([_receive(_out(process)) for process in self._processes])
 
     def close(self) -> None:
         """End them."""
@@ -245,7 +245,7 @@ def _out(process: subprocess.Popen[bytes]) -> BinaryIO:
     return process.stdout  # type: ignore[return-value]
 
 
-def _heard(answers: list[Any]) -> list[Any]:
+def _results(answers: list[Any]) -> list[Any]:
     for error, _ in answers:
         if error is not None:
             raise error
@@ -271,18 +271,18 @@ def main() -> None:
     orders = sys.stdin.buffer
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what a scene prints is no answer
-    keeper: Keeper | None = None
+    worker: Worker | None = None
     with contextlib.suppress(EOFError, BrokenPipeError):
         while True:
             order = _receive(orders)
             error, value = None, None
             try:
-                if keeper is None:
+                if worker is None:
                     sent, first, stop, path = order
                     plan: Plan = _unpickled(sent)
-                    keeper = Keeper(plan, first, stop, plan.open(Path(path)))
+                    worker = Worker(plan, first, stop, plan.open(Path(path)))
                 else:
-                    value = getattr(keeper, order[0])(*order[1:])
+                    value = getattr(worker, order[0])(*order[1:])
             except PyverletError as raised:
                 error = raised
             except Exception as raised:  # of a scene's own code

@@ -22,7 +22,7 @@ _FORK_S = 10.0
 """Seconds that a fork waits for the frames under way to end."""
 
 
-class Turn:
+class StepLock:
     """A lock that its holder may take again. Those that wait come before those that have just had it: no loop starves others.
 
     Attributes:
@@ -86,7 +86,7 @@ class _Frame:
 
     __slots__ = ("_turn",)
 
-    def __init__(self, turn: Turn) -> None:
+    def __init__(self, turn: StepLock) -> None:
         self._turn = turn
 
     def __enter__(self) -> None:
@@ -111,7 +111,7 @@ def in_turn(method: Callable[Concatenate[S, P], R]) -> Callable[Concatenate[S, P
 
     @functools.wraps(method)
     def waiting(self: S, /, *arguments: P.args, **options: P.kwargs) -> R:
-        turn: Turn = self._state.turn
+        turn: StepLock = self._state.turn
         if turn.in_frame and turn.mine:
             raise InputError(
                 f"{method.__name__.strip('_')} is called in the middle of a frame of this world; "
@@ -136,9 +136,9 @@ def of_one_frame(method: Callable[Concatenate[S, P], R]) -> Callable[Concatenate
 
 # ---- forks -------------------------------------------------------------------------------------------------------------
 
-_all: weakref.WeakSet[Turn] = weakref.WeakSet()
+_all: weakref.WeakSet[StepLock] = weakref.WeakSet()
 _all_lock = threading.Lock()
-_taken: list[Turn] = []
+_taken: list[StepLock] = []
 
 
 def _before_fork() -> None:

@@ -16,7 +16,7 @@ class TooLong(BaseException):
     """Raised in the code that took too long, at the line where it was."""
 
 
-class Patience:
+class TimeLimit:
     """Interrupts what runs in a `within` for too long, between two of its steps in Python; of one thread at a time.
 
     A thread that waits in C (`time.sleep`, a compiled kernel) is interrupted when it comes back. The interpreter's own means are
@@ -34,7 +34,7 @@ class Patience:
     def within(self, seconds: float) -> Iterator[None]:
         """Raise `TooLong` in the calling thread if the block takes longer; again each time that it goes on all the same."""
         if self._watcher is None:
-            self._watcher = threading.Thread(target=self._watch, name="pyverlet-patience", daemon=True)
+            self._watcher = threading.Thread(target=self._watch, name="pyverlet-time-limit", daemon=True)
             self._watcher.start()
         with self._lock:
             self._thread, self._deadline = threading.get_ident(), time.monotonic() + seconds

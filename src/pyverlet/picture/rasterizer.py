@@ -19,7 +19,7 @@ SLICES = 8
 """Lines a row of pixels is cut into where something is filled: steps of an eighth at rims that lie flat."""
 
 
-def put(pixels: Packed, drawing: Drawing, view: View, theme: Theme) -> None:
+def draw(pixels: Packed, drawing: Drawing, view: View, theme: Theme) -> None:
     """Draw on (h, w) pixels of the view, in the order in which it was drawn.
 
     Raises:
