@@ -17,6 +17,7 @@ from pyverlet.data.atomic_file import replacing
 from pyverlet.data.describe import Builder, describe
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
+from pyverlet.ground.outside import file_errors
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
 from pyverlet.laws.integrators import Integrator, PositionVerlet
 from pyverlet.laws.links import Angle, Area, Pin, Rope, Spring, Stick
@@ -103,10 +104,8 @@ class Recipe:
 
     def _read_beside(self, name: str) -> bytes:
         beside = self._beside(name)
-        try:
+        with file_errors("file", beside, "read"):
             return beside.read_bytes()
-        except OSError as error:
-            raise InputError(f"file is '{beside}', which cannot be read: {error.strerror or error}") from None
 
     # ---- settings ------------------------------------------------------------------------------------------------------
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pyverlet.data.frames import Array, Frame, Reader, Writer
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, PyverletError
+from pyverlet.ground.outside import file_errors, require
 from pyverlet.ground.shown import Shown
 
 if TYPE_CHECKING:
@@ -55,10 +56,8 @@ class Trajectory(Shown):
         self.frames = 0
         self._last: tuple[int, float] | None = None
         kind = _kind(self.path, "Writer")
-        try:
+        with file_errors("path", self.path, "written"):
             self._writer: Writer | None = kind(self.path)
-        except OSError as error:
-            raise InputError(f"path is '{self.path}', which cannot be written: {error.strerror or error}") from None
 
     def __enter__(self) -> Trajectory:
         return self
@@ -230,6 +229,5 @@ def _kind(path: Path, what: str) -> Any:
         raise InputError(f"path is '{path}'; allowed for a trajectory is a name that ends in {', '.join(FORMATS)}")
     module, _, name = found.partition(".")
     kind = getattr(importlib.import_module(f"pyverlet.data.{module}"), name + what)
-    if kind.needs is not None and importlib.util.find_spec(kind.needs) is None:
-        raise InputError(f"a {path.suffix} file needs {kind.needs!r}, which is not installed: pip install 'pyverlet[data]'")
+    require(f"a {path.suffix} file", *([kind.needs] if kind.needs else []), extra="data")
     return kind

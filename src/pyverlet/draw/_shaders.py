@@ -79,10 +79,7 @@ class Arrays:
         world = self._world
         position, radius, angle, seam = world.position, world.radius, world.angle, world.boundary.seam
         colours = self._colour.colours(world, self._theme)
-        if seam:  # who reaches through it is drawn on both sides
-            owner, place = periodic_images.copies(position, radius, seam)
-            position, colours = np.concatenate((position, place)), np.concatenate((colours, colours[owner]))
-            radius, angle = np.concatenate((radius, radius[owner])), np.concatenate((angle, angle[owner]))
+        position, radius, angle, colours = periodic_images.with_copies(seam, position, radius, angle, colours)
         return (
             np.ascontiguousarray(position, dtype=np.float32),
             np.ascontiguousarray(radius, dtype=np.float32),

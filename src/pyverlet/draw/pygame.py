@@ -64,10 +64,7 @@ def draw(
     pixels = np.bitwise_and(own, np.uint32(0x00FFFFFF), dtype=np.uint32)  # the raster keeps count of coverage up there
     ground = pixels.copy()
     position, radius, angle, seam = world.position, world.radius, world.angle, world.boundary.seam
-    if seam:
-        owner, place = periodic_images.copies(position, radius, seam)
-        position, colours = np.concatenate((position, place)), np.concatenate((colours, colours[owner]))
-        radius, angle = np.concatenate((radius, radius[owner])), np.concatenate((angle, angle[owner]))
+    position, radius, angle, colours = periodic_images.with_copies(seam, position, radius, angle, colours)
     unit("tools", position.dtype).draw_discs(pixels, ground, position, radius, colours, view.left, view.top, view.scale)
     marks.draw(pixels, position, radius, angle, colours, view)
     if len(world.links):

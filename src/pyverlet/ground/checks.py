@@ -12,25 +12,25 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from pyverlet.ground.errors import InputError
 
 
-def number(name: str, value: SupportsFloat, *, above: float | None = None, least: float | None = None) -> float:
-    """A finite float, greater than `above` or at least `least` where given."""
+def number(
+    name: str, value: SupportsFloat, *, above: float | None = None, least: float | None = None, most: float | None = None
+) -> float:
+    """A finite float; greater than `above`, at least `least` and at most `most` where given."""
     try:
         result = float(value)
     except (TypeError, ValueError):
-        raise InputError(f"{name} is {value!r}; allowed is {_allowed(above, least)}") from None
-    low = (above is not None and result <= above) or (least is not None and result < least)
-    if not math.isfinite(result) or low:
-        raise InputError(f"{name} is {result:g}; allowed is {_allowed(above, least)}")
+        raise InputError(f"{name} is {value!r}; allowed is {_allowed(above, least, most)}") from None
+    outside = (above is not None and result <= above) or (least is not None and result < least)
+    if not math.isfinite(result) or outside or (most is not None and result > most):
+        raise InputError(f"{name} is {result:g}; allowed is {_allowed(above, least, most)}")
     return result
 
 
-def _allowed(above: float | None, least: float | None) -> str:
-    allowed = "a finite number"
-    if above is not None:
-        allowed += f" greater than {above:g}"
-    if least is not None:
-        allowed += f" of at least {least:g}"
-    return allowed
+def _allowed(above: float | None, least: float | None, most: float | None) -> str:
+    if least is not None and most is not None:
+        return f"a number from {least:g} to {most:g}"
+    limits = ("greater than", above), ("of at least", least), ("of at most", most)
+    return "a finite number" + "".join(f" {text} {limit:g}" for text, limit in limits if limit is not None)
 
 
 def whole(name: str, value: Any, *, least: int = 1, most: int | None = None, most_is: str = "") -> int:
@@ -47,10 +47,7 @@ def whole(name: str, value: Any, *, least: int = 1, most: int | None = None, mos
 
 def fraction(name: str, value: SupportsFloat) -> float:
     """A float from 0 to 1."""
-    result = number(name, value)
-    if not 0.0 <= result <= 1.0:
-        raise InputError(f"{name} is {result:g}; allowed is a number from 0 to 1")
-    return result
+    return number(name, value, least=0.0, most=1.0)
 
 
 def vector(name: str, value: Sequence[SupportsFloat] | NDArray[Any]) -> tuple[float, float]:

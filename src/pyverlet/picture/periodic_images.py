@@ -34,6 +34,15 @@ def copies(position: Array, radius: Array, seam: Seam) -> tuple[NDArray[np.uint3
     return np.concatenate(owner), np.concatenate(place)
 
 
+def with_copies(seam: Seam, position: Array, radius: Array, *columns: Array) -> tuple[Array, ...]:
+    """Positions, radii and further columns (n, ...), with the copies of `copies` behind them; as they are in other rooms."""
+    if not seam:
+        return (position, radius, *columns)
+    owner, place = copies(position, radius, seam)
+    more = (np.concatenate((column, column[owner])) for column in (radius, *columns))
+    return (np.concatenate((position, place)), *more)
+
+
 def lines(ends: Array, force: Array, seam: Seam) -> tuple[Array, Array]:
     """Links (m, 2, 2) in m and what they pull with, and once more, from their second end, those that reach through the seam."""
     way = seam.nearest(ends[:, 1] - ends[:, 0])

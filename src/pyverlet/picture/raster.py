@@ -85,9 +85,7 @@ class Raster(Shown):
         links, seam = world.links.segments() if len(world.links) else None, world.boundary.seam
         position, radius, angle = world.position, world.radius, world.angle
         if seam:
-            owner, place = periodic_images.copies(position, radius, seam)
-            position, colours = np.concatenate((position, place)), np.concatenate((colours, colours[owner]))
-            radius, angle = np.concatenate((radius, radius[owner])), np.concatenate((angle, angle[owner]))
+            position, radius, angle, colours = periodic_images.with_copies(seam, position, radius, angle, colours)
             obstacles = periodic_images.outlines(obstacles, seam)
             links = links and periodic_images.lines(world.position[world.links.pulls()[0]], links[1], seam)
         picture = self.discs(

@@ -5,7 +5,6 @@ A page draws by itself: what it is given are the numbers of the world, not pixel
 
 from __future__ import annotations
 
-import importlib.util
 import re
 import struct
 from abc import ABC, abstractmethod
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.outside import file_errors, require
 from pyverlet.picture import Colouring, Theme
 from pyverlet.picture.pen import Draw
 from pyverlet.picture.raster import check_size
@@ -277,10 +277,8 @@ class Frames(Film):
         super().__init__(path, size, fps)
         self._template = str(path)
         first = self._named(0)
-        try:
+        with file_errors("path", first, "written"):
             first.open("ab").close()  # tell now, not after a long run, if it cannot be written
-        except OSError as error:
-            raise InputError(f"path is '{first}', which cannot be written: {error.strerror or error}") from None
 
     def add(self, picture: Pixels) -> None:
         try:
@@ -309,7 +307,7 @@ def film_for(path: Path) -> type[Film]:
     """
     suffix = path.suffix.lower()
     if suffix in FILMS:
-        check_extra(*FILMS[suffix].needs)
+        require("recording", *FILMS[suffix].needs, extra="record")
         return FILMS[suffix]
     if suffix != PICTURE:
         known = ", ".join((*FILMS, PICTURE))
@@ -321,15 +319,8 @@ def film_for(path: Path) -> type[Film]:
             numbered = False
         if not numbered:
             raise InputError(f"path is '{path}'; allowed for numbered pictures is one number, such as frame-{{:04d}}.png")
-    check_extra(*Frames.needs)
+    require("recording", *Frames.needs, extra="record")
     return Frames
-
-
-def check_extra(*modules: str) -> None:
-    """Raise InputError with the command that installs what is missing."""
-    for module in modules:
-        if importlib.util.find_spec(module) is None:
-            raise InputError(f"recording needs {module!r}, which is not installed: pip install 'pyverlet[record]'")
 
 
 def write_picture(path: Path, pixels: Pixels) -> None:

@@ -23,6 +23,7 @@ from typing import Any
 
 from pyverlet.ground.errors import InputError, Interrupted
 from pyverlet.ground.guess import did_you_mean
+from pyverlet.ground.outside import file_errors
 from pyverlet.ground.shown import Shown
 from pyverlet.ground.time_limit import TimeLimit, TooLong
 from pyverlet.scenes._scene import Scene, Settings
@@ -84,10 +85,8 @@ class Sketch(Shown):
             InputError: it cannot be read.
         """
         path = Path(path)
-        try:
+        with file_errors("path", path, "read"):
             source = path.read_bytes()
-        except OSError as error:
-            raise InputError(f"path is '{path}', which cannot be read: {error.strerror or error}") from None
         if len(source) > LARGEST:
             raise InputError(f"'{path}' has {len(source):,} bytes; allowed are {LARGEST:,}")
         return cls(path, source, before)

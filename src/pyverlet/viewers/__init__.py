@@ -147,13 +147,9 @@ def widget(world: World | Panels, *, title: str = "pyverlet", dt: float = 1 / 60
     Raises:
         InputError: the extra `notebook` is missing, or an argument is outside what is allowed.
     """
-    import importlib.util
+    from pyverlet.ground.outside import require
 
-    from pyverlet.ground.errors import InputError
-
-    for module in ("anywidget", "PIL"):
-        if importlib.util.find_spec(module) is None:
-            raise InputError(f"a widget needs '{module}', which is not installed: pip install 'pyverlet[notebook]'")
+    require("a widget", "anywidget", "PIL", extra="notebook")
     from pyverlet.viewers.notebook import Widget
 
     return Widget(world, title=title, dt=dt, height=height)

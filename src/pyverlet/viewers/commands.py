@@ -38,17 +38,6 @@ SLOWEST = 1 / 64
 """Least speed: a second takes a minute."""
 
 
-def _finite(name: str, value: float, limit: float) -> None:
-    checks.number(name, value)
-    if abs(value) > limit:
-        raise InputError(f"{name} is {value:g}; allowed is a number from {-limit:g} to {limit:g}")
-
-
-def _between(name: str, value: float, low: float, high: float) -> None:
-    if not low <= checks.number(name, value) <= high:
-        raise InputError(f"{name} is {value:g}; allowed is a number from {low:g} to {high:g}")
-
-
 @dataclass(frozen=True, slots=True)
 class Pause:
     """Hold the world still (`on`) or let it run."""
@@ -78,7 +67,7 @@ class SetSpeed:
     value: float
 
     def __post_init__(self) -> None:
-        _between("speed", self.value, SLOWEST, 1.0)
+        checks.number("speed", self.value, least=SLOWEST, most=1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,8 +97,8 @@ class SetGravity(Setting):
     y: float
 
     def __post_init__(self) -> None:
-        _finite("gravity x", self.x, MAX_GRAVITY)
-        _finite("gravity y", self.y, MAX_GRAVITY)
+        checks.number("gravity x", self.x, least=-MAX_GRAVITY, most=MAX_GRAVITY)
+        checks.number("gravity y", self.y, least=-MAX_GRAVITY, most=MAX_GRAVITY)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +128,7 @@ class SetFriction(Setting):
     value: float
 
     def __post_init__(self) -> None:
-        _between("friction", self.value, 0.0, MAX_FRICTION)
+        checks.number("friction", self.value, least=0.0, most=MAX_FRICTION)
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,8 +151,8 @@ class _AtPoint:
     y: float
 
     def __post_init__(self) -> None:
-        _finite("x", self.x, FARTHEST)
-        _finite("y", self.y, FARTHEST)
+        checks.number("x", self.x, least=-FARTHEST, most=FARTHEST)
+        checks.number("y", self.y, least=-FARTHEST, most=FARTHEST)
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +163,7 @@ class _Picking(_AtPoint):
 
     def __post_init__(self) -> None:
         _AtPoint.__post_init__(self)
-        _between("reach", self.reach, 0.0, FARTHEST)
+        checks.number("reach", self.reach, least=0.0, most=FARTHEST)
 
 
 @dataclass(frozen=True, slots=True)

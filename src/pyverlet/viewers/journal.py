@@ -20,6 +20,7 @@ from typing import Any
 from pyverlet.data.resolve_sketch import settings_to_json
 from pyverlet.data.snapshot import save
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.outside import file_errors
 from pyverlet.scenes.sketch import Sketch
 from pyverlet.viewers.commands import Command
 from pyverlet.viewers.presentation import Presentation
@@ -57,10 +58,8 @@ class Journal:
         self._known: dict[str, Any] = {}
         self._broken = False
         self._view_state: ViewState | None = None
-        try:
+        with file_errors("journal", path, "written"):
             self._file = self.path.open("wb", buffering=0)
-        except OSError as error:
-            raise InputError(f"journal is '{path}', which cannot be written: {error.strerror or error}") from None
         self.note(pvlog=FORMAT, dt=dt)
 
     def view_state(self, presentation: Presentation) -> ViewState:

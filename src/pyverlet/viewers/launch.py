@@ -13,13 +13,13 @@ import sys
 import threading
 import webbrowser
 from collections.abc import Callable, Iterator
-from types import FrameType
 from typing import TYPE_CHECKING
 
 import uvicorn
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.interrupts import first_signal
 from pyverlet.viewers.jpeg_renderer import JpegRenderer, draws_here
 from pyverlet.viewers.presentation import Presentation, Repertoire
 from pyverlet.viewers.protocol import MAX_MESSAGE
@@ -96,28 +96,15 @@ def on_air(session: Session, listener: socket.socket, *, only_loopback: bool) ->
 
 @contextlib.contextmanager
 def _ended_by_signals(session: Session) -> Iterator[None]:
-    """Ctrl-C, or SIGTERM, lets the frame under way finish, so that the world is whole afterwards; a second one does not wait."""
-    if threading.current_thread() is not threading.main_thread():
-        yield  # only the main thread may listen to signals
-        return
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    """Ctrl-C, or SIGTERM, lets the frame under way finish, so that the world is complete afterwards."""
     caught: list[int] = []
 
-    def restore() -> None:
-        for number, handler in before.items():
-            signal.signal(number, signal.SIG_DFL if handler is None else handler)
-
-    def end(number: int, frame: FrameType | None) -> None:
+    def end(number: int) -> None:
         caught.append(number)
-        restore()
         session.stop()
 
-    for number in before:
-        signal.signal(number, end)
-    try:
+    with first_signal(end, signal.SIGINT, signal.SIGTERM):
         yield
-    finally:
-        restore()
     if signal.SIGTERM in caught:
         signal.raise_signal(signal.SIGTERM)
 

@@ -15,6 +15,7 @@ from pyverlet.data.resolve_sketch import find, settings_from_json
 from pyverlet.data.snapshot import load
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, PyverletError
+from pyverlet.ground.outside import file_errors
 from pyverlet.ground.time_limit import TimeLimit
 from pyverlet.scenes.sketch import Sketch, SketchError
 from pyverlet.viewers import commands
@@ -72,10 +73,8 @@ class Script:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        try:
+        with file_errors("journal", path, "read"):
             lines = self.path.read_bytes().split(b"\n")
-        except OSError as error:
-            raise InputError(f"journal is '{path}', which cannot be read: {error.strerror or error}") from None
         self.events: list[Event] = []
         for number, line in enumerate(lines[:-1]):  # behind the last end of a line is nothing, or a line that was cut
             try:

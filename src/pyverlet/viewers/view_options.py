@@ -61,8 +61,7 @@ class ViewOptions:
             raise InputError(f"colour is {self.colour[:40]!r}; allowed are {', '.join(COLOURINGS)}")
         if self.part is not None:
             for value in self.part:
-                if abs(checks.number("part", value)) > FARTHEST:
-                    raise InputError(f"part reaches to {value:g}; allowed is a number from {-FARTHEST:g} to {FARTHEST:g}")
+                checks.number("part", value, least=-FARTHEST, most=FARTHEST)
             x0, y0, x1, y1 = self.part
             if x1 - x0 < CLOSEST or y1 - y0 < CLOSEST:
                 raise InputError(f"part is {x1 - x0:g} x {y1 - y0:g} m; allowed is at least {CLOSEST:g} m each way")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import time
 from collections.abc import Callable
@@ -10,7 +9,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError, PyverletError
+from pyverlet.ground.errors import PyverletError
+from pyverlet.ground.outside import require
 from pyverlet.picture import DARK, Colouring, Theme, View
 from pyverlet.picture.pen import Draw
 from pyverlet.picture.raster import check_size
@@ -217,8 +217,7 @@ class Window:
 
 def check_extra() -> None:
     """Raise InputError with the command that installs what is missing."""
-    if importlib.util.find_spec("pygame") is None:
-        raise InputError("a window needs 'pygame', which is not installed: pip install 'pyverlet[window]'")
+    require("a window", "pygame", extra="window")
 
 
 def show(build: Callable[[], World], **options: Any) -> None:
