@@ -101,6 +101,15 @@ def test_what_was_done_between_substeps_is_done_there_again(tmp_path: Path) -> N
     assert Script(tmp_path / "a.pvlog").run()["state_hash"] == end
 
 
+def test_the_format_has_the_field_names_of_older_journals(tmp_path: Path) -> None:
+    end = session_of(tmp_path / "a.pvlog", [Step(2), Drag(7, 0, 3, 9), Step(5), Release(7), Step(3)])
+    lines = [json.loads(line) for line in (tmp_path / "a.pvlog").read_text().splitlines()]
+    kept = [line for line in lines if line.get("do") in ("Drag", "Release")]
+    assert [line["hand"] for line in kept] == [7, 7]
+    assert not any("pointer" in line for line in lines)
+    assert Script(tmp_path / "a.pvlog").run()["state_hash"] == end
+
+
 def test_other_scenes_and_worlds_side_by_side(tmp_path: Path) -> None:
     repertoire = Repertoire(pv.scenes.get("cage"), dt=DT, overrides={"particles": 30})
     commands = [Step(3), SetGravity(0, -3), Build("box", 20), Step(4), Build(None, 40), SetGravity(0, 2), Step(5)]

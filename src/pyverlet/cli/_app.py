@@ -35,7 +35,7 @@ pyverlet list                       the other scenes: pyverlet run cloth
 pyverlet new mysketch.py            a scene of your own to start from, 25 lines
 pyverlet run mysketch.py --watch    see it, change it, save: the page follows
 pyverlet --help                     all commands; pyverlet run --help, all options of one"""
-"""What to type next, for whoever has typed nothing."""
+"""What to type next, for those that typed nothing."""
 
 app = typer.Typer(
     name="pyverlet",

@@ -2,7 +2,7 @@
 
 A description names a class of ours by `type`, and its arguments by the names they have there; what has changed since it was built
 is under `state`. Rooms, collisions, integrators, forces, obstacles and actors are all there is; links are in `describe_links`.
-Of an object of a user's own class it says only `{"object": name}`: whoever builds hands such objects in, and nothing is ever
+Of an object of a user's own class it says only `{"object": name}`: the caller passes such objects in, and nothing is ever
 imported because a file says so.
 """
 

@@ -1,4 +1,4 @@
-"""Who has the worlds of `Worlds`: a `Worker` some of them, and a `ProcessPool` of processes each a worker.
+"""The processes of `Worlds`: a `Worker` has some of the worlds, a `ProcessPool` is a worker per process.
 
 Processes are started by themselves rather than by `multiprocessing`, which would run the user's script anew in each of them. They
 take orders by their standard input, and share the particles in a file mapped to memory.
@@ -121,7 +121,7 @@ class Worker:
             shared["gravity"][k] = world.gravity
 
     def step(self, dt: float, frames: int = 1) -> None:
-        """All of them; the first that fails is told of when all have been stepped."""
+        """All of them; the first error is raised when all have been stepped."""
         failed: PyverletError | None = None
         gravity = self._shared["gravity"][self._first : self._first + len(self.worlds)].tolist()
         for number, world in enumerate(self.worlds):
@@ -150,7 +150,7 @@ class Worker:
                 self._note(number, self.worlds[number])
 
     def drop(self, token: int) -> None:
-        """Nobody will go back there."""
+        """Forget a saved state."""
         self._saved.pop(token, None)
 
     def file(self, k: int) -> bytes:
@@ -245,11 +245,11 @@ def _out(process: subprocess.Popen[bytes]) -> BinaryIO:
     return process.stdout  # type: ignore[return-value]
 
 
-def _results(answers: list[Any]) -> list[Any]:
-    for error, _ in answers:
+def _results(replies: list[Any]) -> list[Any]:
+    for error, _ in replies:
         if error is not None:
             raise error
-    return [value for _, value in answers]
+    return [value for _, value in replies]
 
 
 def _send(file: BinaryIO, message: Any) -> None:
@@ -269,7 +269,7 @@ def main() -> None:
     """Keep worlds as the standard input says, until that ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started us decides
     orders = sys.stdin.buffer
-    answers = os.fdopen(os.dup(1), "wb")
+    replies = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what a scene prints is no answer
     worker: Worker | None = None
     with contextlib.suppress(EOFError, BrokenPipeError):
@@ -287,7 +287,7 @@ def main() -> None:
                 error = raised
             except Exception as raised:  # of a scene's own code
                 error = PyverletError(f"{type(raised).__name__}: {raised}")
-            _send(answers, (error, value))
+            _send(replies, (error, value))
 
 
 def _unpickled(sent: bytes) -> Any:

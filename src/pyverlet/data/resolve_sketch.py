@@ -82,7 +82,7 @@ def settings_to_json(settings: Settings) -> dict[str, Any]:
     """What was asked for, as JSON has it; for `settings_from_json`.
 
     Raises:
-        InputError: an object of a class that nobody could describe.
+        InputError: an object of a class that cannot be described.
     """
     names = settings.given if isinstance(settings, Given) else [field.name for field in dataclasses.fields(Settings)]
     return {name: plain(name, _switched(name, getattr(settings, name))) for name in sorted(names)}

@@ -51,7 +51,7 @@ class OtherBits(UserWarning):
 def save(world: World, path: str | Path, *, scene: Mapping[str, Any] | None = None) -> None:
     """Write a world to a file, from which `load` goes on with the same bits: all at once, or not at all.
 
-    Everything that moves, remembers or acts is kept; the profile and the onlooker are not. Objects of classes of
+    Everything that moves, remembers or acts is kept; the profile and the observer are not. Objects of classes of
     your own are kept by name, and with what their `save` returns if they are actors.
 
     Args:

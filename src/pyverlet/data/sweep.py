@@ -232,7 +232,7 @@ class Study:
             for done, run in enumerate(picked):
                 row, told = sweep_run.one(self._plan, run), known.get(run.key)
                 assert told is not None
-                if row["values"] == {}:  # of a measure nobody knows here
+                if row["values"] == {}:  # of a measure that is not known here
                     row["values"] = told["values"]
                 if any(row[name] != told[name] for name in ("start", "end", "values", "error")):
                     differ.append(run.number)

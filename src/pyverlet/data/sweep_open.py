@@ -1,4 +1,4 @@
-"""A study from its folder alone: for whoever looks at one that another program made."""
+"""A study from its folder alone: also one that another program made."""
 
 from __future__ import annotations
 

@@ -122,7 +122,7 @@ def plain(name: str, value: Any) -> Any:
     """A setting as JSON has it.
 
     Raises:
-        InputError: it is NaN, or an object nobody could describe.
+        InputError: it is NaN, or an object that cannot be described.
     """
     if isinstance(value, float | np.floating) and not math.isfinite(value):
         raise InputError(f"{name} is {float(value)}; allowed are finite numbers")

@@ -1,7 +1,7 @@
 """The folder of a study: rows as they arrive, and the table of all of them.
 
 A row is a line of `rows.jsonl`, written when it is known and never changed. Times are no part of it: they are in `timing.jsonl`,
-so that the table is the same whoever made it, and however long that took.
+so that the table is the same on every machine, however long the runs took.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ def one(plan: Plan, run: Run) -> Row:
             world.step(plan.dt)
         row["values"] = _values(plan.measure(world))
         row["end"] = world.state_hash()
-    except Exception as error:  # of the scene or the measure, which are anybody's
+    except Exception as error:  # of the scene or the measure, which are the user's code
         row |= {"values": None, "end": None, "error": f"{type(error).__name__}: {' '.join(str(error).split())}"}
     return row
 
@@ -152,7 +152,7 @@ class _Pool(ProcessPoolExecutor):
 
 
 def _watch_parent() -> None:
-    """End with the process that started this one, however that ends: killed, it leaves nobody who would tell."""
+    """End with the process that started this one, however that ends: one that is killed tells nothing."""
     Thread(target=_end_with_parent, daemon=True).start()
 
 
@@ -164,7 +164,7 @@ def _end_with_parent() -> None:
 
 
 class _Dispatcher:
-    """Hands tasks to an executor, and the rows of those that are done to whoever asks.
+    """Hands tasks to an executor, and gives back the rows of those that are done.
 
     When a process ends, the executor cannot say whose run has ended it. All tasks that were out are suspects then, and made
     alone, one after the other: a run that ends its process twice is the culprit, and its row says so.

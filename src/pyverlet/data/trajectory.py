@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.data.frames import Array, Frame, Reader, Writer
+from pyverlet.data.frames import Array, Column, Frame, Reader, Writer
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, PyverletError
 from pyverlet.ground.outside import file_errors, require
@@ -167,30 +167,11 @@ class Moments(Sequence[Frame]):
         """Of each frame."""
         return [frame.state_hash for frame in self]
 
-    @property
-    def position(self) -> Array:
-        """(m, n, 2) m. This and all that follow: InputError unless all frames have the same particles."""
-        return self._column("position")
-
-    @property
-    def velocity(self) -> Array:
-        """(m, n, 2) m/s."""
-        return self._column("velocity")
-
-    @property
-    def spin(self) -> Array:
-        """(m, n) rad/s."""
-        return self._column("spin")
-
-    @property
-    def radius(self) -> Array:
-        """(m, n) m."""
-        return self._column("radius")
-
-    @property
-    def mass(self) -> Array:
-        """(m, n) kg."""
-        return self._column("mass")
+    position = Column("(m, n, 2) m. This and all that follow: InputError unless all frames have the same particles.")
+    velocity = Column("(m, n, 2) m/s.")
+    spin = Column("(m, n) rad/s.")
+    radius = Column("(m, n) m.")
+    mass = Column("(m, n) kg.")
 
     def _column(self, name: str) -> Array:
         columns = []

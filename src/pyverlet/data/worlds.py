@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.data import archive, snapshot
+from pyverlet.data.frames import Column
 from pyverlet.data.process_pool import Plan, ProcessPool, Worker
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
@@ -45,7 +46,7 @@ class Worlds(Shown):
     """Worlds of one scene that differ in their seeds, stepped together on all cores.
 
     The arrays are those of the worlds themselves: reading copies nothing, and what is written there is what the next frame begins
-    with. A world's bits are those it would have alone, however many there are and whoever steps them. Close them when done, or
+    with. A world's bits are those it would have alone, however many there are, in any process. Close them when done, or
     use them in a `with` block.
 
     Args:
@@ -103,7 +104,7 @@ class Worlds(Shown):
         self._tell("step", checks.number("dt", dt, above=0.0))
 
     def run(self, *, seconds: float, dt: float = 1 / 60) -> None:
-        """Advance by as many frames of dt as come nearest to `seconds`: in one go, so that nobody waits between frames."""
+        """Advance by as many frames of dt as come nearest to `seconds`: in one go, without waiting between frames."""
         frames = round(checks.number("seconds", seconds, least=0.0) / checks.number("dt", dt, above=0.0))
         self._tell("step", dt, frames)
 
@@ -111,7 +112,7 @@ class Worlds(Shown):
         """A copy of everything that moves in all worlds, for `restore`. It stays where the worlds are."""
         start = Start(weakref.ref(self), next(_tokens))
         self._tell("save", start.token)
-        weakref.finalize(start, self._dropped.append, start.token)  # nobody can go back to what nobody has
+        weakref.finalize(start, self._dropped.append, start.token)  # without the object there is no going back
         return start
 
     def restore(self, saved: Start, which: ArrayLike | None = None) -> None:
@@ -130,7 +131,7 @@ class Worlds(Shown):
         self._tell("restore", saved.token, chosen.tolist())
 
     def _tell(self, what: str, *arguments: Any) -> None:
-        while self._dropped:  # noted whenever the collector pleases, and told between two orders
+        while self._dropped:  # filled by the garbage collector at any time, sent between two orders
             self._order("drop", self._dropped.pop())
         self._order(what, *arguments)
 
@@ -153,7 +154,7 @@ class Worlds(Shown):
 
     # ---- to look at ----------------------------------------------------------------------------------------------------
 
-    def _array(self, name: str) -> Array:
+    def _column(self, name: str) -> Array:
         counts = self._shared["count"]
         if (counts != self._shared[name].shape[1]).any():
             raise InputError(
@@ -162,30 +163,11 @@ class Worlds(Shown):
             )
         return self._shared[name]
 
-    @property
-    def position(self) -> Array:
-        """(n, k, 2) centres of the k particles of each world, m."""
-        return self._array("position")
-
-    @property
-    def velocity(self) -> Array:
-        """(n, k, 2) m/s."""
-        return self._array("velocity")
-
-    @property
-    def spin(self) -> Array:
-        """(n, k) rad/s."""
-        return self._array("spin")
-
-    @property
-    def radius(self) -> Array:
-        """(n, k) m."""
-        return self._array("radius")
-
-    @property
-    def mass(self) -> Array:
-        """(n, k) kg."""
-        return self._array("mass")
+    position = Column("(n, k, 2) centres of the k particles of each world, m.")
+    velocity = Column("(n, k, 2) m/s.")
+    spin = Column("(n, k) rad/s.")
+    radius = Column("(n, k) m.")
+    mass = Column("(n, k) kg.")
 
     @property
     def gravity(self) -> Array:

@@ -71,7 +71,7 @@ class Arrays:
 
     @property
     def marked(self) -> float:
-        """Radius in pixels from which on circles have a mark: none as long as nobody has turned."""
+        """Radius in pixels from which on circles have a mark: none until one has turned."""
         return MARKED_PX if self._world.angle.any() else float("inf")
 
     def now(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:

@@ -39,7 +39,7 @@ class _Whole:
             return
         self._depth -= 1
         if self._depth == 0:
-            if _signal.getsignal(_CTRL_C) == self._note:  # nobody has set another meanwhile
+            if _signal.getsignal(_CTRL_C) == self._note:  # no other was set meanwhile
                 _signal.signal(_CTRL_C, self._before)
             pressed, self._pressed = self._pressed, None
             if pressed:

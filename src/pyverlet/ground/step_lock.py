@@ -1,4 +1,4 @@
-"""Threads that share a world take turns: a frame is a turn, and so is a change or a look between two frames."""
+"""The step lock of a world: access from other threads blocks until the current frame ends."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def in_turn(method: Callable[Concatenate[S, P], R]) -> Callable[Concatenate[S, P
     """A method that changes a world: it waits for its turn, and for a page that steps the world; Ctrl-C waits for its end.
 
     Raises:
-        InputError: it is called from within a frame of the same world, by a force or an onlooker.
+        InputError: it is called from within a frame of the same world, by a force or an observer.
     """
 
     @functools.wraps(method)

@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterator
 
 LOOK_S = 0.2
-"""How often somebody looks at the clock."""
+"""Poll interval of the clock, in seconds."""
 
 
 class TooLong(BaseException):
@@ -50,7 +50,7 @@ class TimeLimit:
     def _stop(self) -> bool:
         """Raise nothing from now on; what has been raised, and may not have arrived yet, arrives here.
 
-        To withdraw it leaves CPython 3.11 looking for it at each step, and whoever profiles such code waits for ever.
+        To withdraw it leaves CPython 3.11 looking for it at each step, and a profiler of such code waits for ever.
         """
         with self._lock:
             self._deadline = None
@@ -73,7 +73,7 @@ class TimeLimit:
 
 
 def interrupt(thread: threading.Thread) -> None:
-    """Raise `TooLong` in a thread that nobody waits for any more."""
+    """Raise `TooLong` in a thread whose result is not needed any more."""
     if thread.ident is not None and thread.is_alive():
         _raise(thread.ident, TooLong)
 

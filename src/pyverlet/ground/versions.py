@@ -18,7 +18,7 @@ def _plain(version: tuple[int, ...]) -> str:
 
 
 def complaint(package: str, version: str) -> str | None:
-    """What is wrong with this version; None if nothing is, or nobody could tell."""
+    """What is wrong with this version; None if nothing is, or it cannot be told."""
     least, below = ALLOWED[package]
     number = tuple(int(part) for part in version.split(".")[:2] if part.isdigit())
     if len(number) < 2 or least <= number < below:

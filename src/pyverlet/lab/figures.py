@@ -1,4 +1,4 @@
-"""What all figures of the laboratory share: refusing early what would fail late, colours everybody can tell apart, saving."""
+"""What all figures of the laboratory share: refusing early what would fail late, distinct colours, saving."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ MARK_PX = 1.4
 def draw(
     pixels: Packed, position: NDArray[Any], radius: NDArray[Any], angle: NDArray[np.float64], colours: Packed, view: View
 ) -> None:
-    """Mark the discs on a picture, in half of their own brightness; none as long as nobody has turned.
+    """Mark the discs on a picture, in half of their own brightness; none until one has turned.
 
     Args:
         pixels: (h, w) of the view.

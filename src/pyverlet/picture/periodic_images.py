@@ -35,7 +35,7 @@ def copies(position: Array, radius: Array, seam: Seam) -> tuple[NDArray[np.uint3
 
 
 def with_copies(seam: Seam, position: Array, radius: Array, *columns: Array) -> tuple[Array, ...]:
-    """Positions, radii and further columns (n, ...), with the copies of `copies` behind them; as they are in other rooms."""
+    """Positions, radii and further columns (n, ...), followed by the copies; unchanged without periodic bounds."""
     if not seam:
         return (position, radius, *columns)
     owner, place = copies(position, radius, seam)

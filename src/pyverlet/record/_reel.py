@@ -1,4 +1,4 @@
-"""A world's pictures as numbers, for a page that draws them itself: what it looks at, and how that is made small.
+"""A world's pictures as numbers, for a page that draws them itself: what is in a frame, and how it is compressed.
 
 A film is blocks: shapes, as the live page gets them, and chunks of up to a second. Positions are whole steps of a grid, and a
 frame of a chunk is written as the difference from where the two frames before would have taken each circle; velocities as the

@@ -226,7 +226,7 @@ class Scene(Shown):
     def freeze(self, path: str | Path, **overrides: Any) -> None:
         """Write the start of the scene's world to a file, .toml or .json, with its arrays in a .npz beside it.
 
-        Whoever reads it gets the same start, to the last bit, whatever a later version would draw by chance.
+        Reading it gives the same start, to the last bit, whatever a later version would draw by chance.
 
         Args:
             path: of the file; old ones are replaced.

@@ -281,7 +281,7 @@ class Sketch(Shown):
 
 @dataclass(frozen=True)
 class Given(Settings):
-    """Settings that know which of them somebody has asked for."""
+    """Settings that know which of them were asked for."""
 
     given: frozenset[str] = frozenset()
 

@@ -20,7 +20,7 @@ MOST = 24
 
 
 class Slider:
-    """A number that whoever looks at the page may change: made by `slider`.
+    """A number that may be changed on the page: made by `slider`.
 
     Attributes:
         name: beside it on the page.

@@ -66,14 +66,14 @@ def view(
 
     Args:
         world: the world, or the panels, to step and show.
-        block: until Ctrl-C, and nobody else may touch the world meanwhile; False returns at once, and shares it.
+        block: until Ctrl-C; the program may not touch the world meanwhile. False returns at once, and shares it.
         port: TCP port on this machine, 1 to 65535; 0 takes any free one. 8000 unless said, and any free one without `block`.
         open_browser: open a tab when there is a screen to open it on.
         title: heading of the page.
         dt: simulated seconds per frame.
         draw: of (world, pen), a `pyverlet.picture.Pen`: called for each picture, draws over it.
         keys: of (world, key): called when a key is pressed on the page, named as in browsers: "a", " ", "ArrowLeft".
-        click: of (world, point, button): called when somebody clicks; (2,) m, and "left", "middle" or "right".
+        click: of (world, point, button): called on a click; (2,) m, and "left", "middle" or "right".
 
     Returns:
         None; without `block` a handle with `url` and `close()`.

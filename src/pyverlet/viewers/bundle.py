@@ -64,7 +64,7 @@ def film(title: str, *, fps: int, colour: str, theme: str) -> str:
     Args:
         title: heading.
         fps: pictures a second.
-        colour: what the colours say at first, one of `looks.COLOURINGS`.
+        colour: what the colours say at first, one of `view_options.COLOURINGS`.
         theme: "dark" or "light", at first.
     """
     head = page_file("index.html")

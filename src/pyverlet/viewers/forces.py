@@ -43,7 +43,7 @@ class Forces:
     """Of worlds side by side.
 
     Attributes:
-        wanted: whether somebody looks.
+        wanted: whether a viewer shows forces.
     """
 
     def __init__(self, worlds: Sequence[World]) -> None:

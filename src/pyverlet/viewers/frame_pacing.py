@@ -1,4 +1,4 @@
-"""When the next picture of a slow world is due, and for whom."""
+"""Frame pacing: when the next picture of a slow world is due, and what viewers need of it."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class FramePacing:
 
 
 class Audience:
-    """What viewers have taken, and what they look at. Told from any thread."""
+    """What viewers have taken, and what they look at. Called from any thread."""
 
     def __init__(self) -> None:
         self._newest = self._velocity_until = self._force_until = 0
@@ -53,7 +53,7 @@ class Audience:
         return seq <= self._force_until
 
     def has(self, seq: int) -> bool:
-        """Whether anybody has this picture."""
+        """Whether a viewer has this picture."""
         return self._newest >= seq
 
     def needs_velocity(self, seq: int) -> bool:

@@ -172,7 +172,7 @@ class Frame:
     rows: NDArray[np.float32]
     """(n, 2) positions in metres, read-only copy, in the order the particles were added or that of `whose`."""
     moving: NDArray[np.float32]
-    """(n, 2) velocities in m/s, likewise by `whose_moving`; of an earlier moment unless somebody asks for them."""
+    """(n, 2) velocities in m/s, likewise by `whose_moving`; of an earlier moment unless a viewer asks for them."""
     obstacles: ObstacleOutlines = NO_OUTLINES
     """Those that move."""
     joined: NDArray[np.uint32] = field(default_factory=lambda: np.empty((0, 2), np.uint32))
@@ -180,14 +180,14 @@ class Frame:
     force: NDArray[np.float32] = field(default_factory=lambda: np.empty(0, np.float32))
     """(m,) what it pulls with, N; negative if it pushes."""
     turned: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, np.uint8))
-    """(n,) how far each circle has turned, in 1/256 of a turn, counter-clockwise; empty as long as nobody has."""
+    """(n,) how far each circle has turned, in 1/256 of a turn, counter-clockwise; empty until one has."""
     whose: NDArray[np.int32] | None = None
     """(n,) which particle each row is of, between the substeps of a frame; None: row k is particle k."""
     whose_moving: NDArray[np.int32] | None = None
     drawing: Drawing = ()
     """What the user's own function has drawn over it; of the frame before, between its substeps."""
     contacts: Contacts = NO_CONTACTS
-    """Who pushes whom, where somebody looks at it; of a moment ago."""
+    """Forces of contacts, if a viewer shows them; of a moment ago."""
 
     def moved(self, moment: Moment, seq: int, status: Status, *, velocity: bool) -> Frame:
         """The same a little later, between two substeps; its velocities are those of this frame unless they are asked for."""
@@ -202,7 +202,7 @@ class Frame:
 
     @cached_property
     def position(self) -> NDArray[np.float32]:
-        """(n, 2) metres, read-only, in the order the particles were added. Sorted by whoever asks first, as in `grid`."""
+        """(n, 2) metres, read-only, in the order the particles were added. Sorted in the thread that asks first, as in `grid`."""
         return _sorted(self.rows, self.whose)
 
     @cached_property
@@ -226,7 +226,7 @@ class Frame:
         return np.asarray(np.clip(np.rint(force / np.float32(unit or 1.0)), 0, 255), np.uint8), unit
 
     @cached_property
-    def lean(self) -> NDArray[np.uint8]:
+    def normals(self) -> NDArray[np.uint8]:
         """(m,) which way each contact's normal points, in 1/256 of a turn."""
         return np.asarray(np.rint(self.contacts.angle * (128 / np.pi)).astype(np.int64).astype(np.uint8))
 
@@ -234,7 +234,7 @@ class Frame:
     def grid(self) -> NDArray[np.uint16]:
         """(n, 2) positions on the 16-bit grid over `view`, as `quantise` makes it.
 
-        Computed when first asked for, by whoever sends the frame, so that the physics thread never pays for it.
+        Computed when first asked for, in the thread that sends the frame: it costs the physics thread nothing.
         """
         return quantise(self.position, self.view)
 
@@ -353,7 +353,7 @@ class Camera:
 
 
 def _middle_and_reach(position: NDArray[np.float32]) -> tuple[float, float, float]:
-    """The median of (n, 2) positions, which no runaway moves, and the farthest anybody is from it in x or y; metres."""
+    """The median of (n, 2) positions, which no runaway moves, and the farthest distance from it in x or y; metres."""
     if not len(position):
         return 0.0, 0.0, 0.0
     middle = np.median(position[:: 1 + len(position) // MEDIAN_SAMPLE], axis=0)

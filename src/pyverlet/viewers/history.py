@@ -1,4 +1,4 @@
-"""Undo and redo: worlds as they were before somebody changed them by hand."""
+"""Undo and redo: worlds as they were before they were changed by hand."""
 
 from __future__ import annotations
 

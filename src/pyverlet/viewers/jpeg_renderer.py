@@ -114,7 +114,7 @@ class JpegRenderer:
         return self._still_sorted[1], self._sorted[2]
 
     def _angles(self, frame: Frame, owner: NDArray[np.uint32]) -> NDArray[np.float64] | None:
-        """How the circles of the frame's rows, and copies of `owner`, have turned, rad; None as long as nobody has."""
+        """How the circles of the frame's rows, and copies of `owner`, have turned, rad; None until one has."""
         if not len(frame.turned):
             return None
         turned = frame.turned if frame.whose is None else frame.turned[frame.whose]

@@ -72,9 +72,9 @@ class Widget(anywidget.AnyWidget):
         self._eyes: dict[str, _Eye] = {}
         self._pointers = 0
         super().__init__(height=checks.whole("height", height, least=100, most=4096))
-        self.on_msg(self._hear)
+        self.on_msg(self._on_message)
 
-    def _hear(self, widget: Any, content: Any, buffers: Sequence[Any]) -> None:
+    def _on_message(self, widget: Any, content: Any, buffers: Sequence[Any]) -> None:
         """Apply what a page says, let the world catch up, and answer with what is new."""
         if not isinstance(content, dict) or not isinstance(content.get("view"), str):
             return
@@ -82,10 +82,10 @@ class Widget(anywidget.AnyWidget):
             self._forget(content["view"])
             return
         eye = self._eye(content["view"])
-        answers = self._apply(eye, content.get("words"))
+        replies = self._apply(eye, content.get("words"))
         self._session.turn(longest=LONGEST_S)
-        answers += self._news(eye)
-        self.send({"view": content["view"]}, buffers=answers)
+        replies += self._news(eye)
+        self.send({"view": content["view"]}, buffers=replies)
 
     def _eye(self, view: str) -> _Eye:
         if view not in self._eyes:

@@ -78,7 +78,7 @@ def encode_frame(frame: Frame, part: Rect | None = None, *, velocity: bool = Fal
         frame: to encode.
         part: of the plane, metres; None is all that the camera shows.
         velocity: also send velocities.
-        force: also send who pushes whom.
+        force: also send the forces of contacts.
     """
     grid = frame.grid if part is None else quantise(frame.position, part)
     head = _head("frame", frame, part)
@@ -99,7 +99,7 @@ def encode_frame(frame: Frame, part: Rect | None = None, *, velocity: bool = Fal
     if force and len(frame.contacts.pairs):
         push, head["push"] = frame.push
         head["contacts"] = len(push)
-        body += frame.contacts.pairs.tobytes() + push.tobytes() + frame.lean.tobytes()
+        body += frame.contacts.pairs.tobytes() + push.tobytes() + frame.normals.tobytes()
     return _join(head, body)
 
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pyverlet.viewers.view_state import ViewState
 
 SLOW_STATUS_S = 0.1
-"""Energy and percentiles read every particle or many frames; ten times a second is as fast as anybody reads."""
+"""Energy and percentiles read every particle or many frames; ten times a second is as fast as people read."""
 
 PACE_S = 1.0
 """How fast the world goes is a mean over this long."""
@@ -45,7 +45,7 @@ class Readouts:
 
     @property
     def pace(self) -> float | None:
-        """Seconds of the world in a second of the wall, lately."""
+        """Simulated seconds per wall-clock second, averaged over the last `PACE_S`."""
         if len(self._passed) < 2:
             return None
         (began, start), (ended, end) = self._passed[0], self._passed[-1]

@@ -174,7 +174,7 @@ class Script:
 
 
 class ReplayState(ViewState):
-    """A view on which a script is played: nobody else's commands are applied, but for going back to the start.
+    """A view on which a script is played: commands of viewers are ignored, except reset.
 
     Attributes:
         frame: how many have been made. checked: hashes that were as they should be.

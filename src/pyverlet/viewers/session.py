@@ -1,4 +1,4 @@
-"""The narrow door between a world and whoever watches it: commands go in, frames come out.
+"""The interface between worlds and their viewers: commands go in, frames come out.
 
 A session owns the worlds, their clock and the one thread that steps them, the physics thread: the caller's (`run`, `turn`) or one
 of its own (`start`). It knows nothing of how commands arrive or where frames go.
@@ -92,7 +92,7 @@ class Session(SessionHandle):
     # -- the physics thread -------------------------------------------------------------------------------------------
 
     def run(self) -> None:
-        """Run in the calling thread until somebody calls `stop`; afterwards the world is the caller's again."""
+        """Run in the calling thread until `stop` is called; afterwards the world is the caller's again."""
         self._last = time.perf_counter()
         with self._tasks.by_this_thread():
             while not self._stopping.is_set():
@@ -297,7 +297,7 @@ class Session(SessionHandle):
             self._publish(moment)
 
     def _wanted(self) -> bool:
-        """Whether the world is slow, and somebody has the last picture and waits for more."""
+        """Whether the world is slow, and a viewer has the last picture and waits for more."""
         return self._late and self._audience.has(self.latest.seq)
 
     def _due(self) -> bool:
@@ -343,5 +343,5 @@ class Session(SessionHandle):
         return [seam.wrapped(a + alpha * seam.nearest(b - a)) for a, b, seam in zip(before, now, seams, strict=True)]
 
 
-class _Stopped(Exception):  # noqa: N818  (no error: somebody has asked for it)
+class _Stopped(Exception):  # noqa: N818  (no error: it was asked for)
     """The session ends while a scene is being built."""

@@ -23,7 +23,7 @@ STOP_TIMEOUT_S = 10.0
 
 
 class SessionHandle(ABC):
-    """The narrow door of a session: from any thread."""
+    """The thread-safe interface of a session."""
 
     def __init__(self) -> None:
         self._tasks, self._audience = TaskQueue(), Audience()
@@ -34,7 +34,7 @@ class SessionHandle(ABC):
 
     @abstractmethod
     def run(self) -> None:
-        """Step the worlds in the calling thread until somebody calls `stop`."""
+        """Step the worlds in the calling thread until `stop` is called."""
 
     @abstractmethod
     def _put_on(self, presentation: Presentation) -> None:
@@ -56,7 +56,7 @@ class SessionHandle(ABC):
 
         Args:
             frame: that it has.
-            velocity: whether it looks at velocities. Frames made between substeps have new ones only if somebody does.
+            velocity: whether it looks at velocities. Frames made between substeps have new ones only if a viewer does.
         """
         self._audience.take(frame.seq, velocity=velocity)
 

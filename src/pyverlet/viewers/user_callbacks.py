@@ -1,4 +1,4 @@
-"""What a program of the user's adds to a picture, and how it answers: the sketch's functions, or those given to `view`."""
+"""Callbacks of the user's program, which draw over pictures and receive keys and clicks: a sketch's, or those given to `view`."""
 
 from __future__ import annotations
 

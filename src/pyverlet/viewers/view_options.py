@@ -1,4 +1,4 @@
-"""What one tab wants to see of a frame: which part, how large, in which colours. Every tab looks for itself."""
+"""The view options of one tab: which part of a frame, how large, in which colours."""
 
 from __future__ import annotations
 

@@ -66,7 +66,7 @@ class ViewState:
         self.capture()
 
     def capture(self) -> tuple[list[NDArray[np.float32]], NDArray[np.float32]]:
-        """Point the camera at where everybody is now; each world's positions, and all velocities (n, 2), copied."""
+        """Point the camera at where the particles are now; each world's positions, and all velocities (n, 2), copied."""
         positions = [np.array(world.position, dtype=np.float32) for world in self.worlds]
         velocities = [np.array(world.velocity, dtype=np.float32) for world in self.worlds]
         self.layout = Layout(self._camera.view(_joined(positions)), len(positions), self._bounded())
@@ -238,7 +238,7 @@ class ViewState:
         return np.concatenate(pairs), np.concatenate(force)
 
     def turned(self) -> NDArray[np.uint8]:
-        """(n,) how far each circle has turned, in 1/256 of a turn; none as long as nobody has."""
+        """(n,) how far each circle has turned, in 1/256 of a turn; none until one has."""
         angles = [world.angle for world in self.worlds]
         if not any(angle.any() for angle in angles):
             return np.empty(0, np.uint8)
@@ -307,13 +307,13 @@ class ViewState:
         return any(world.boundary.extent() is not None for world in self.worlds)
 
     def _kinds(self) -> NDArray[np.uint32] | None:
-        """Category and mask of everybody."""
+        """Category and mask of each particle."""
         kinds = [np.column_stack((world.category, world.mask)) * np.uint32(world.collisions is not None) for world in self.worlds]
         joined = np.concatenate(kinds)
         return None if (joined == (1, EVERYONE)).all() else _kept(joined)
 
     def _colours(self) -> NDArray[np.uint8] | None:
-        """Everybody's own, grey for those that came later."""
+        """The particles' own colours, grey for those that came later."""
         given = self.presentation.colours
         if given is None:
             return None

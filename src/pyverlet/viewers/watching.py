@@ -84,7 +84,7 @@ class SketchBuilder:
         built = self.build()
         return built if built else Presentation(self.path.stem, Panels([Panel("", World())]))
 
-    def stamps(self) -> dict[Path, Stamp]:
+    def file_times(self) -> dict[Path, Stamp]:
         """Of the sketch's files as they are now; without those that are not there, or still empty: they are being saved."""
         files = self._sketch.files if self._sketch else [self.path]
         return {file: stamp for file in files if (stamp := _stamp(file))}
@@ -115,7 +115,7 @@ class Watcher:
 
     @contextmanager
     def at_work(self) -> Iterator[None]:
-        """Meanwhile it looks."""
+        """Meanwhile the files are watched."""
         if self._builder.fault:
             self._session.tell(complaint=self._builder.fault)
         thread = threading.Thread(target=self._look, name="pyverlet-watch", daemon=True)
@@ -127,9 +127,9 @@ class Watcher:
             thread.join(20 * LOOK_S)
 
     def _look(self) -> None:
-        known, began = self._builder.stamps(), 0.0
+        known, began = self._builder.file_times(), 0.0
         while not self._ended.wait(LOOK_S):
-            now = self._builder.stamps()
+            now = self._builder.file_times()
             if any(known[file] != stamp for file, stamp in now.items() if file in known):
                 began = time.monotonic()
                 self._build()

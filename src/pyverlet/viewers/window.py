@@ -32,7 +32,7 @@ ZOOM = 1.15
 """A notch of the wheel."""
 
 CAPTION_S = 0.25
-"""Time between updates of the numbers in the title bar; nobody reads faster."""
+"""Time between updates of the numbers in the title bar."""
 
 KEYS = "space pause, . step, r reset, f fit, q quit; drag a circle, shift-drag pokes, wheel zooms, right button moves"
 
@@ -41,7 +41,7 @@ class Window:
     """Steps a world in real time and shows it, in the calling thread.
 
     Args:
-        world: nobody else may step it meanwhile. Reset goes back to its present state.
+        world: stepped by the window only, while it is open. Reset goes back to its present state.
         title: in the title bar.
         dt: simulated seconds a frame, and the pace.
         size: (width, height) at the start, pixels.
