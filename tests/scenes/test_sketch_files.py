@@ -13,7 +13,7 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.cli import main
-from pyverlet.data.sweep_open import open_study
+from pyverlet.data.sweep import open_study
 from pyverlet.ground.time_limit import TimeLimit, TooLong
 from pyverlet.picture import LIGHT, Pen
 from pyverlet.picture.pen import Lettering, Stroke

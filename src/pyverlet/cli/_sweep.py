@@ -15,9 +15,8 @@ from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.cli._imported import imported
 from pyverlet.cli._integrators import integrator
-from pyverlet.data.sweep import Measure, Status, Study
+from pyverlet.data.sweep import Measure, Status, Study, open_study
 from pyverlet.data.sweep import sweep as make
-from pyverlet.data.sweep_open import open_study
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.time_limit import TimeLimit
 from pyverlet.viewers import DEFAULT_PORT

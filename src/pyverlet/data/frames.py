@@ -83,8 +83,7 @@ class Writer(ABC):
         """Append a moment. Raises OSError where the disk does not take it."""
 
     @abstractmethod
-    def close(self) -> None:
-        """Close the file."""
+    def close(self) -> None: ...
 
 
 class Reader(ABC):
@@ -104,8 +103,7 @@ class Reader(ABC):
         """Moment k, from 0."""
 
     @abstractmethod
-    def close(self) -> None:
-        """Close the file."""
+    def close(self) -> None: ...
 
 
 class Walls:

@@ -226,7 +226,6 @@ class ProcessPool:
         _results([_receive(_out(process)) for process in self._processes])
 
     def close(self) -> None:
-        """End them."""
         for process in self._processes:
             with contextlib.suppress(OSError):
                 _in(process).close()

@@ -56,7 +56,6 @@ class LazySketch(Sketch):
 
     @property
     def digest(self) -> str:
-        """As it was."""
         return self._digest
 
     def _run(self) -> Any:

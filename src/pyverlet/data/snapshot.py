@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.core.sources import sources_hash
-from pyverlet.data import archive, describe_links, own_arrays, serialize
+from pyverlet.data import archive, describe_links, serialize
 from pyverlet.data.atomic_file import replacing
 from pyverlet.data.describe import Builder, describe
 from pyverlet.ground import checks
@@ -83,8 +83,8 @@ def to_table(world: World, scene: Mapping[str, Any] | None = None) -> tuple[Head
         return {serialize.ARRAY: name}
 
     own = [name for name in arrays if name.startswith(apart.OWN)]
-    kinds = [own_arrays.kind_of(name, arrays[key]) for key, name in zip(own, moving.facts["data"], strict=True)]
-    arrays |= {key: own_arrays.to_bytes(arrays[key]) for key in own}
+    kinds = [_kind_of(name, arrays[key]) for key, name in zip(own, moving.facts["data"], strict=True)]
+    arrays |= {key: _to_bytes(arrays[key]) for key in own}
     header: Header = {
         "format": FORMAT,
         "made_by": _made_by(),
@@ -177,7 +177,7 @@ def from_table(header: Header, arrays: dict[str, Array], *, exact: bool = False,
     known = {name: array for name, array in _moving(arrays).items() if name not in apart.RETIRED}
     moving = Parts(serialize.unpack(header["facts"]), known)
     for k, kind in enumerate(serialize.unpack(header.get("own", []))):
-        known[f"{apart.OWN}{k}"] = own_arrays.from_bytes(known[f"{apart.OWN}{k}"], *kind)
+        known[f"{apart.OWN}{k}"] = _from_bytes(known[f"{apart.OWN}{k}"], *kind)
     if unknown := {name for name in known if not name.startswith(apart.OWN)} - set(apart.FIELDS):
         raise InputError(f"there is an array {min(unknown)!r}; allowed are those pyverlet knows")
     with ThreadPoolExecutor(1) as beside:
@@ -274,3 +274,35 @@ def about(path: str | Path) -> About:
         )  # fmt: skip
     except (KeyError, TypeError) as error:
         raise InputError(f"'{path}' lacks {error}; allowed is a file that pyverlet.save wrote") from None
+
+
+# ---- arrays of the user's own, as bytes and a dtype ---------------------------------------------------------------------
+
+
+def _kind_of(name: str, column: Array) -> tuple[Any, list[int]]:
+    """The dtype of a column, as `numpy.lib.format` describes it, and the shape of a row.
+
+    Raises:
+        InputError: it holds Python objects.
+    """
+    if column.dtype.hasobject:
+        raise InputError(f"data[{name!r}] holds Python objects; allowed in files are numbers, texts and dates of NumPy's dtypes")
+    return np.lib.format.dtype_to_descr(column.dtype.newbyteorder("<")), list(column.shape[1:])
+
+
+def _to_bytes(column: Array) -> NDArray[np.uint8]:
+    """(rows, bytes of each) of a column."""
+    little = column.astype(column.dtype.newbyteorder("<"))
+    return np.frombuffer(little.tobytes(), np.uint8).reshape(len(column), little.nbytes // len(column))
+
+
+def _from_bytes(content: NDArray[np.uint8], described: Any, row: list[int]) -> Array:
+    """The column again.
+
+    Raises:
+        InputError: it cannot be one.
+    """
+    dtype = np.lib.format.descr_to_dtype(described)
+    if dtype.hasobject:
+        raise InputError(f"an array of data is of dtype {dtype}; allowed are dtypes without Python objects")
+    return np.frombuffer(content.tobytes(), dtype).reshape(len(content), *row).astype(dtype.newbyteorder("="))

@@ -147,7 +147,6 @@ class Moments(Sequence[Frame]):
         self.close()
 
     def close(self) -> None:
-        """Close the file."""
         if not self._closed:
             self._closed = True
             self._reader.close()

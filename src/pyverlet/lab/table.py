@@ -22,6 +22,5 @@ class Table:
     values: Sequence[Mapping[str, Any]]
 
     def markdown(self) -> str:
-        """As Markdown."""
         lines = [self.head, ["---"] * len(self.head), *self.rows]
         return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)

@@ -291,7 +291,6 @@ class SketchScene(Scene):
     """A scene made by `build()`."""
 
     def settings(self, **overrides: Any) -> Settings:
-        """As `Scene.settings`."""
         named = frozenset(name for name, value in overrides.items() if value is not None and (name, value) != ("ledger", False))
         settings = super().settings(**overrides)
         assert isinstance(settings, Given)

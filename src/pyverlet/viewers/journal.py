@@ -97,7 +97,6 @@ class Journal:
         self.close()
 
     def close(self) -> None:
-        """The session has ended."""
         if self._view_state is not None:
             self.note(hash=self._view_state.panels.state_hash(), end=True)
         self._file.close()

@@ -47,11 +47,9 @@ class CallbackFunctions:
                 raise InputError(f"{name} is {given!r}; allowed is a function")
 
     def has(self, hook: str) -> bool:
-        """As `UserCallbacks.has`."""
         return hook in self._functions
 
     def call(self, hook: str, *arguments: Any) -> None:
-        """As `UserCallbacks.call`."""
         if hook not in self._functions:
             return
         try:
