@@ -11,11 +11,7 @@ from pyverlet.laws.integrators import BY_NAME, Integrator
 
 
 def integrators(names: str | None) -> tuple[Integrator, ...]:
-    """The integrators in a list with commas; none for None.
-
-    Raises:
-        InputError: one is unknown, or given twice.
-    """
+    """The integrators in a list with commas; none for None. InputError if one is unknown, or given twice."""
     if names is None:
         return ()
     found = tuple(integrator(name.strip()) for name in names.split(","))
@@ -26,11 +22,7 @@ def integrators(names: str | None) -> tuple[Integrator, ...]:
 
 
 def single(name: str | None) -> Integrator | None:
-    """The integrator of this name; None for None.
-
-    Raises:
-        InputError: it is unknown, or there are several.
-    """
+    """The integrator of this name; None for None. InputError if it is unknown, or there are several."""
     found = integrators(name)
     if len(found) > 1:
         raise InputError(f"integrator is {name!r}; allowed is one")

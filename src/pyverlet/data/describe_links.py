@@ -39,11 +39,7 @@ _MOVING = {
 
 
 def describe(world: World) -> list[dict[str, Any]]:
-    """A table for each link of a world, in their order; `strength` is what it breaks at, N or N m.
-
-    Raises:
-        InputError: one is of a class that derives from none of ours.
-    """
+    """A table for each link of a world, in their order; `strength` is what it breaks at, N or N m."""
     return [_described(link) for link in world.links]
 
 
@@ -71,12 +67,7 @@ def _names(kind: type) -> tuple[str, ...]:
 
 
 def build(world: World, tables: Any, objects: Iterable[Any] = ()) -> None:
-    """Append to a world the links that these tables describe; columns are arrays.
-
-    Args:
-        world: one that has their particles.
-        tables: what `describe` returned.
-        objects: a user's own classes of links.
+    """Append to a world the links of tables that `describe` returned; `objects`: a user's own classes of links.
 
     Raises:
         InputError: a table lacks something, or a number is outside what is allowed.

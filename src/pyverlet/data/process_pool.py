@@ -37,14 +37,7 @@ _ROWS = {"position": 2, "velocity": 2, "spin": 1, "radius": 1, "mass": 1}
 
 @dataclass(frozen=True)
 class Plan:
-    """What all workers know.
-
-    Attributes:
-        scene, settings, seed: of the worlds.
-        count: of all worlds.
-        particles: of each, as they begin.
-        dtype: of their arrays.
-    """
+    """What all workers know: how each world is built, how many there are, and the particles and dtype of each at the start."""
 
     scene: Scene
     settings: dict[str, Any]
@@ -88,13 +81,7 @@ class Plan:
 
 
 class Worker:
-    """Some of the worlds, and what is done to them.
-
-    Args:
-        plan: of all.
-        first, stop: which of them it has.
-        shared: arrays of all worlds; the particles of those it has live in them.
-    """
+    """Worlds `first` to `stop` - 1 of a plan. Their particles live in the arrays `shared` of all worlds."""
 
     def __init__(self, plan: Plan, first: int, stop: int, shared: dict[str, Array]) -> None:
         from pyverlet.data.worlds import seed_of
@@ -169,13 +156,7 @@ def _named(error: PyverletError, k: int) -> PyverletError:
 
 
 class ProcessPool:
-    """Processes that are workers.
-
-    Args:
-        plan: of all worlds.
-        ranges: first and stop of those that each process has.
-        path: of the file they share.
-    """
+    """Processes that are workers of the worlds in `ranges`, and share the file at `path`."""
 
     def __init__(self, plan: Plan, ranges: Sequence[tuple[int, int]], path: Path) -> None:
         try:

@@ -41,11 +41,7 @@ def find(name: str, digest: str, *places: Path) -> Sketch:
 
 
 class LazySketch(Sketch):
-    """A sketch that is looked for when it is first needed.
-
-    Args:
-        name, digest, places: as for `find`.
-    """
+    """A sketch that is looked for, as `find` does, when it is first needed."""
 
     def __init__(self, name: str, digest: str, *places: Path) -> None:
         super().__init__(places[0], b"")

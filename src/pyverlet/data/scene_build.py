@@ -43,12 +43,7 @@ _COMMON = ("velocity", "spin", "restitution", "friction", *LATER, "category", "m
 
 
 class Recipe:
-    """Builds the world of a document that was validated.
-
-    Args:
-        document: its keys as in the file.
-        path: of the file, for errors, and to find what lies beside it.
-    """
+    """Builds the world of a validated document, read from the file at `path`."""
 
     def __init__(self, document: Table, path: Path) -> None:
         self._document, self._path = document, path

@@ -280,11 +280,7 @@ def about(path: str | Path) -> About:
 
 
 def _kind_of(name: str, column: Array) -> tuple[Any, list[int]]:
-    """The dtype of a column, as `numpy.lib.format` describes it, and the shape of a row.
-
-    Raises:
-        InputError: it holds Python objects.
-    """
+    """The dtype of a column, as `numpy.lib.format` describes it, and the shape of a row. Python objects are refused."""
     if column.dtype.hasobject:
         raise InputError(f"data[{name!r}] holds Python objects; allowed in files are numbers, texts and dates of NumPy's dtypes")
     return np.lib.format.dtype_to_descr(column.dtype.newbyteorder("<")), list(column.shape[1:])
@@ -297,11 +293,7 @@ def _to_bytes(column: Array) -> NDArray[np.uint8]:
 
 
 def _from_bytes(content: NDArray[np.uint8], described: Any, row: list[int]) -> Array:
-    """The column again.
-
-    Raises:
-        InputError: it cannot be one.
-    """
+    """The column again; InputError if it cannot be one."""
     dtype = np.lib.format.descr_to_dtype(described)
     if dtype.hasobject:
         raise InputError(f"an array of data is of dtype {dtype}; allowed are dtypes without Python objects")

@@ -39,15 +39,9 @@ class Run(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """A study.
+    """A study: settings of all runs and values by setting, and what is measured after so many `frames` of `dt` s.
 
-    Attributes:
-        scene: of all worlds.
-        grid: values by setting.
-        settings: of all runs.
-        measure: of a world at the end.
-        frames: to run; None leaves that to `measure`.
-        dt: seconds a frame.
+    Without `frames` the measure steps the world itself.
     """
 
     scene: Scene

@@ -82,11 +82,7 @@ def _briefly(value: Any) -> str:
 
 @contextlib.contextmanager
 def only_one(folder: Path) -> Iterator[None]:
-    """While no other process is making rows here.
-
-    Raises:
-        InputError: one is.
-    """
+    """While no other process is making rows here; InputError if one is."""
     with file_lock.locked(folder / ".lock") as ours:
         if not ours:
             raise InputError(f"'{folder}' is a study that another process is making; allowed is one at a time")
@@ -94,12 +90,7 @@ def only_one(folder: Path) -> Iterator[None]:
 
 
 class Rows:
-    """The rows of a study by key, and the files they are added to.
-
-    Args:
-        folder: of the study.
-        read_only: leave the files alone.
-    """
+    """The rows of a study by key, and the files they are added to; `read_only` leaves those alone."""
 
     def __init__(self, folder: Path, *, read_only: bool = False) -> None:
         self._path, self._timing = folder / "rows.jsonl", folder / "timing.jsonl"

@@ -56,13 +56,7 @@ def window(view: View) -> tuple[float, float, float, float]:
 
 
 class Arrays:
-    """The arrays of a world as the shaders want them: float32, and four bytes a colour. float32 worlds are not copied.
-
-    Args:
-        world: only read.
-        colour: what the colours say; by default where each circle started.
-        theme: whether the colours are for a dark or a light background.
-    """
+    """The arrays of a world as the shaders want them: float32, and four bytes a colour. float32 worlds are not copied."""
 
     def __init__(self, world: World, colour: Colouring | None, theme: Theme) -> None:
         self._world = world

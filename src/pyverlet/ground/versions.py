@@ -28,11 +28,7 @@ def complaint(package: str, version: str) -> str | None:
 
 
 def check() -> None:
-    """Look at what is installed.
-
-    Raises:
-        ImportError: another version.
-    """
+    """Refuse a NumPy that is too old or too new, with ImportError."""
     wrong = complaint("numpy", np.__version__)
     if wrong and loading.is_the_command():  # whose users get sentences, no tracebacks
         sys.stderr.write(f"pyverlet: {wrong}\n")

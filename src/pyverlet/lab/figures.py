@@ -47,11 +47,7 @@ def tidy(axes: Axes) -> None:
 
 
 def save(picture: Figure, path: Path) -> None:
-    """Write a figure to `path`.
-
-    Raises:
-        InputError: as `check_can_plot`, or the file cannot be written.
-    """
+    """Write a figure to `path`; InputError as in `check_can_plot`, or if the file cannot be written."""
     check_can_plot(path)
     with file_errors("plot", path, "written"):
         picture.savefig(path)

@@ -9,13 +9,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Table:
-    """What a series of runs has found.
-
-    Attributes:
-        head: of the columns.
-        rows: of text, as for reading.
-        values: a mapping for each run, for programs.
-    """
+    """A series of runs: head and rows of text for reading, and a mapping of values for each run."""
 
     head: Sequence[str]
     rows: Sequence[Sequence[str]]

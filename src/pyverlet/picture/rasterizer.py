@@ -19,11 +19,7 @@ SLICES = 8
 
 
 def draw(pixels: Packed, drawing: Drawing, view: View, theme: Theme) -> None:
-    """Draw on (h, w) pixels of the view, in the order in which it was drawn.
-
-    Raises:
-        InputError: there is text, and Pillow is missing.
-    """
+    """Draw on (h, w) pixels of the view, in the order in which it was drawn. Text needs Pillow."""
     for mark in drawing:
         colour = swapped(theme.text if mark.colour is None else mark.colour)
         if isinstance(mark, Lettering):

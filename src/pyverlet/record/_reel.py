@@ -47,11 +47,7 @@ _COLOURS: dict[type[Colouring], str] = {ByOrigin: "order", BySpeed: "speed", ByM
 
 
 def page_colour(colour: Colouring | None) -> str:
-    """What the page calls this colouring; `picture` for colours of the user's own.
-
-    Raises:
-        InputError: the page has none like it.
-    """
+    """What the page calls this colouring, `picture` for colours of the user's own; InputError if it has none like it."""
     if colour is None:
         return "order"
     if getattr(colour, "_full", None) is not None:
@@ -62,17 +58,7 @@ def page_colour(colour: Colouring | None) -> str:
 
 
 class Watch:
-    """Looks at one world as the live page does: `picture` is its frame now.
-
-    Args:
-        world: only read.
-        title: heading of the page.
-        fps: pictures a second.
-        colour: what the colours say at first; the page offers all.
-        theme: dark or light, which decides on colours of the user's own.
-        part: of the plane to show, m.
-        draw: what is drawn over it.
-    """
+    """Looks at one world as the live page does: `picture` is its frame now. Arguments as for `to_video`."""
 
     def __init__(
         self, world: World, *, title: str, fps: int, colour: Colouring | None, theme: Theme, part: Rect | None,
@@ -109,11 +95,7 @@ class Watch:
 
 
 class Reel:
-    """Turns frames into the blocks of a film.
-
-    Args:
-        fps: pictures a second.
-    """
+    """Turns frames into the blocks of a film."""
 
     def __init__(self, fps: int) -> None:
         self._fps = fps

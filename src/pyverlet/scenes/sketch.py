@@ -79,11 +79,7 @@ class Sketch(Shown):
 
     @classmethod
     def read(cls, path: str | Path, before: Sketch | None = None) -> Sketch:
-        """The sketch in a file.
-
-        Raises:
-            InputError: it cannot be read.
-        """
+        """The sketch in a file; InputError if it cannot be read."""
         path = Path(path)
         with file_errors("path", path, "read"):
             source = path.read_bytes()

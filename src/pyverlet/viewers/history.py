@@ -20,9 +20,6 @@ class History:
     """What was done to worlds by hand, each with what they were before it: all of it, their time too.
 
     A stroke is one thing done, from when a pointer comes down until it is released.
-
-    Args:
-        panels: the worlds.
     """
 
     def __init__(self, panels: Panels) -> None:

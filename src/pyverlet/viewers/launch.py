@@ -139,11 +139,7 @@ def open_tab(url: str) -> None:
 
 
 def take_port(host: str, port: int) -> socket.socket:
-    """A socket that listens there.
-
-    Raises:
-        InputError: that cannot be.
-    """
+    """A socket that listens there; InputError if that cannot be."""
     checks.whole("port", port, least=0, most=65535)
     try:
         family, kind, protocol, _, where = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]

@@ -33,12 +33,7 @@ NO_OUTLINES = ObstacleOutlines()
 
 
 class OutlineCache:
-    """Draws the obstacles of worlds side by side; the same object as long as none has moved.
-
-    Args:
-        worlds: whose obstacles; only read.
-        moving: those that move, or those that stand still.
-    """
+    """Outlines of the obstacles that move, or do not, in worlds side by side; the same object until an obstacle moves."""
 
     def __init__(self, worlds: Sequence[World], *, moving: bool) -> None:
         self._worlds, self._moving = worlds, moving

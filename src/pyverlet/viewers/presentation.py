@@ -56,14 +56,7 @@ class Presentation:
 
 
 class Repertoire:
-    """The scenes a viewer may pick from, and how to build them.
-
-    Args:
-        scene: the one to begin with.
-        dt: simulated seconds a frame.
-        integrators: of the first scene; several stand side by side.
-        overrides: settings of the first scene, as for `Scene.settings`.
-    """
+    """The scenes a viewer may pick from. `integrators` and `overrides` are of the first one, as for `Scene.panels`."""
 
     def __init__(
         self, scene: Scene, *, dt: float, integrators: Sequence[Integrator] = (), overrides: Mapping[str, Any] | None = None
@@ -81,12 +74,7 @@ class Repertoire:
         return self.build(self._scene.name, None, progress)
 
     def build(self, name: str, particles: int | None, progress: Progress | None = None) -> Presentation:
-        """A scene with this many particles, None for its own number.
-
-        Args:
-            name: of the scene.
-            particles: how many.
-            progress: called as progress(done, total) while a scene finds out its colours.
+        """A scene with this many particles, None for its own number; progress(done, total) while it finds out its colours.
 
         Raises:
             InputError: there is no such scene, or it cannot have so many particles.

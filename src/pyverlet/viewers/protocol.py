@@ -72,14 +72,7 @@ def decode(text: str, pointer: int) -> Request:
 
 
 def encode_frame(frame: Frame, part: Rect | None = None, *, velocity: bool = False, force: bool = False) -> bytes:
-    """A frame as one binary message.
-
-    Args:
-        frame: to encode.
-        part: of the plane, metres; None is all that the camera shows.
-        velocity: also send velocities.
-        force: also send the forces of contacts.
-    """
+    """A frame as one binary message, of a part of the plane or all that the camera shows; with velocities and forces if asked."""
     grid = frame.grid if part is None else quantise(frame.position, part)
     head = _head("frame", frame, part)
     body = grid.tobytes()
@@ -133,13 +126,7 @@ def written(drawing: Drawing) -> list[Any]:
 
 
 def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = None) -> bytes:
-    """A shape as one binary message.
-
-    Args:
-        shape: to encode.
-        drawn_here: pictures will follow in place of frames: the page need not know the circles.
-        note: something the page should tell about how it is drawn.
-    """
+    """A shape as one binary message; without circles if the server draws them, and with a note for the page, if any."""
     coloured = shape.colours is not None
     head = {
         "kind": "shape",

@@ -174,11 +174,7 @@ class Script:
 
 
 class ReplayState(ViewState):
-    """A view on which a script is played: commands of viewers are ignored, except reset.
-
-    Attributes:
-        frame: how many have been made. checked: hashes that were as they should be.
-    """
+    """A view on which a script is played: commands of viewers are ignored, except reset."""
 
     def __init__(self, script: Script, presentation: Presentation) -> None:
         self._script = script

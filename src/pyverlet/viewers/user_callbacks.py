@@ -22,16 +22,7 @@ class UserCallbacks(Protocol):
 
 
 class CallbackFunctions:
-    """Functions of a program, and its sliders.
-
-    Args:
-        draw: of (world, pen).
-        keys: of (world, key).
-        click: of (world, point, button).
-
-    Raises:
-        InputError: one is no function.
-    """
+    """Functions draw(world, pen), keys(world, key) and click(world, point, button) of a program, and its sliders."""
 
     def __init__(
         self,

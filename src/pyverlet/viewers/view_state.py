@@ -33,11 +33,7 @@ GREY = 0x9A
 
 
 class ViewState:
-    """Worlds as a viewer sees them. Used by the physics thread only.
-
-    Args:
-        presentation: what to show. Reset goes back to its present state.
-    """
+    """A presentation as a viewer sees it; reset goes back to its present state. Used by the physics thread only."""
 
     def __init__(self, presentation: Presentation) -> None:
         self.presentation = presentation
@@ -85,9 +81,7 @@ class ViewState:
     def step(self, dt: float, observer: Callable[[Moment], None] | None = None) -> None:
         """One frame of every world, the pointers following their mice.
 
-        Args:
-            dt: s.
-            observer: called between the substeps of a single world, but where obstacles move: their way is known by the frame.
+        `observer` is called between the substeps of a single world, unless obstacles move: their way is known by the frame.
         """
         self.pointers.move(self.view_size)
         world = self.worlds[0]

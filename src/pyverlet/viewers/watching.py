@@ -33,15 +33,7 @@ Stamp = tuple[int, int]
 
 
 class SketchBuilder:
-    """Builds a sketch, again and again.
-
-    Args:
-        path: of its file.
-        dt: simulated seconds a frame.
-        integrators: in place of the sketch's; several stand side by side.
-        overrides: settings, as for `Scene.settings`.
-        time_limit: seconds a build may take.
-    """
+    """Builds the sketch in a file again and again, in at most `time_limit` s; other arguments as for `Repertoire`."""
 
     def __init__(
         self,
@@ -99,12 +91,7 @@ def _stamp(file: Path) -> Stamp | None:
 
 
 class Watcher:
-    """Looks at the files of a sketch, and has it built in a thread of its own when one is saved.
-
-    Args:
-        builder: which has built what is on show.
-        session: that shows it.
-    """
+    """Watches the files of a sketch on show, and has it built in a thread of its own when one is saved."""
 
     def __init__(self, builder: SketchBuilder, session: Session) -> None:
         self._builder, self._session = builder, session

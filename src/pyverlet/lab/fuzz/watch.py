@@ -63,12 +63,7 @@ _EDGE = 1e-5
 
 
 class Broken(Exception):  # noqa: N818  (a promise, not an error)
-    """A promise that a world has broken.
-
-    Attributes:
-        check: which, a name of the list above.
-        frame: before which frames had gone well.
-    """
+    """A promise, `check`, that a world has broken before this frame."""
 
     def __init__(self, check: str, frame: int, what: str) -> None:
         super().__init__(f"{check}, frame {frame}: {what}")
@@ -76,15 +71,9 @@ class Broken(Exception):  # noqa: N818  (a promise, not an error)
 
 
 def check(build: Build, deed: Deed, *, frames: int, dt: float, only: str | None = None, without: Sequence[str] = ()) -> None:
-    """Run a world and hold it to what is promised.
+    """Run a world that `build` makes, `deed` changing it before each frame, and hold it to what is promised.
 
-    Args:
-        build: makes it, on at most so many threads.
-        deed: does to it what is due before a frame.
-        frames: how many are run.
-        dt: s, each.
-        only: the one check to be made; None makes all.
-        without: checks that are not made.
+    only, without: the one check to be made, and checks that are left out.
 
     Raises:
         Broken: a promise does not hold.
@@ -127,12 +116,7 @@ def _check(build: Build, deed: Deed, frames: int, dt: float, made: frozenset[str
 
 
 class _Seen:
-    """What has been seen of a world.
-
-    Attributes:
-        recent: energies before the last frames that nothing drove, with their scale.
-        most: J, the largest sum of all its accounts without their signs, of which sums in float64 keep 1e-16.
-    """
+    """What was seen of a world: recent energies with their scale, and the largest sum of its accounts without signs, J."""
 
     def __init__(self) -> None:
         self.recent, self.most = deque[tuple[float, float]](maxlen=_SWING), 0.0
