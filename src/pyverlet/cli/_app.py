@@ -81,7 +81,6 @@ def run(
     scene: options.SceneName = "cage",
     *,
     overrides: dict[str, Any],
-    ledger: options.Ledger = False,
     dt: options.Dt = DEFAULT_DT,
     seconds: options.Seconds = None,
     frames: options.Frames = None,
@@ -119,20 +118,15 @@ def run(
     ends = headless or as_json or plot or trajectory or seconds is not None or frames is not None
     if patience is not None and not watch:
         raise InputError(f"patience is {patience:g}; allowed is none without --watch")
+    what: dict[str, Any] = {"integrators": methods, "overrides": overrides, "dt": dt}
+    page = {"port": DEFAULT_PORT if port is None else port, "open_browser": not no_open}
     if watch:
         if Path(scene).suffix.lower() != sketch.SUFFIX:
             raise InputError(f"watch is asked for with {scene!r}; allowed is a sketch, such as mysketch.py")
         if ends or window or journal:
             raise InputError("watch is asked for with a run that ends, a window or a journal; allowed is the page alone")
-        show.watched(
-            Path(scene),
-            integrators=methods,
-            overrides={**overrides, "ledger": ledger},
-            dt=dt,
-            port=DEFAULT_PORT if port is None else port,
-            open_browser=not no_open,
-            time_limit=None if patience is None else checks.number("patience", patience, above=0.0),
-        )
+        limit = {} if patience is None else {"time_limit": checks.number("patience", patience, above=0.0)}
+        show.watched(Path(scene), options=page, **what, **limit)
         return
     chosen = scenes.get(scene)
     chosen.settings(**overrides)  # refuse what is wrong before anything starts
@@ -140,7 +134,7 @@ def run(
         raise InputError(f"every is {every}; allowed is none without --trajectory")
     if journal and (ends or window):
         raise InputError(f"journal is '{journal}' for a run without a page; allowed is one with the page")
-    if window and (ends or port is not None or no_open or ledger):
+    if window and (ends or port is not None or no_open or overrides["ledger"]):
         raise InputError("window is asked for together with a run that ends or with options of the page; allowed is one of them")
     if window:
         if len(methods) > 1:
@@ -148,22 +142,13 @@ def run(
         show.window(chosen, chosen.settings(**overrides, integrator=methods[0] if methods else None), dt=dt)
         return
     if not ends:
-        port = DEFAULT_PORT if port is None else port
-        show.page(
-            chosen,
-            integrators=methods,
-            overrides={**overrides, "ledger": ledger},
-            dt=dt,
-            port=port,
-            open_browser=not no_open,
-            journal=journal,
-        )
+        show.page(chosen, options=page, journal=journal, **what)
         return
     if port is not None:
         raise InputError(f"port is {port}; allowed is none, since this run has no live page")
     count = report.frame_count(seconds=seconds, frames=frames, dt=dt, default_seconds=DEFAULT_SECONDS)
     if plot is None:
-        panels = chosen.panels(integrators=methods, **overrides, ledger=ledger)
+        panels = chosen.panels(integrators=methods, **overrides)
         with _kept(panels, trajectory, every) as observe:
             results = [_measure(panel, chosen, count, dt, observe) for panel in panels]
         _tell_all(chosen, panels, results, as_json)
@@ -172,12 +157,12 @@ def run(
         raise InputError(f"trajectory is '{trajectory}' and plot is '{plot}'; allowed is one of them")
     if len(methods) > 1:
         raise InputError(f"integrators is {typed!r}; allowed is one for plot (several: pyverlet compare)")
-    settings = chosen.settings(**overrides, integrator=methods[0] if methods else None, ledger=ledger)
+    settings = chosen.settings(**overrides, integrator=methods[0] if methods else None)
     _tell(_run_and_plot(chosen, settings, count, dt, plot), as_json)
 
 
 @app.command()
-@options.with_settings(*(name for name in options.SETTINGS if name != "picture"))
+@options.with_settings(*(name for name in options.SETTINGS if name not in ("picture", "ledger")))
 def bench(
     scene: options.SceneName = "cage",
     *,

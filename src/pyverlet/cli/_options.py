@@ -118,6 +118,7 @@ SETTINGS: dict[str, Any] = {
     "dtype": Precision,
     "collisions": CollisionMethod,
     "picture": Picture,
+    "ledger": Ledger,
 }
 """Options of commands that build a scene: what the user gives in place of the scene's defaults."""
 
@@ -131,7 +132,9 @@ def with_settings(*names: str) -> Callable[[Callable[..., None]], Callable[..., 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
         parameters: list[inspect.Parameter] = []
         for own in inspect.signature(command, eval_str=True).parameters.values():
-            shared = [own.replace(name=name, annotation=SETTINGS[name], default=None) for name in names]
+            shared = [
+                own.replace(name=name, annotation=SETTINGS[name], default=False if name == "ledger" else None) for name in names
+            ]
             parameters += shared if own.name == "overrides" else [own]
 
         def called(**given: Any) -> None:

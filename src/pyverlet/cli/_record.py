@@ -20,7 +20,7 @@ DEFAULT_SECONDS = 10.0
 
 
 @app.command()
-@options.with_settings(*options.SETTINGS)
+@options.with_settings(*(name for name in options.SETTINGS if name != "ledger"))
 def record(
     scene: options.SceneName,
     path: Annotated[

@@ -356,8 +356,3 @@ def _nearest(name: str, known: tuple[str, ...]) -> str:
 def _brief(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
-
-
-def build(name: str, description: Any, wanted: Any, *, objects: Iterable[Any] = ()) -> Any:
-    """As `Builder.build`, for a thing that names no group."""
-    return Builder(objects).build(name, description, wanted)

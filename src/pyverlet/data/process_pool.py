@@ -18,7 +18,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -172,7 +172,7 @@ class ProcessPool:
         ]
         try:
             for process, (first, stop) in zip(self._processes, ranges, strict=True):
-                _send(_in(process), (sent, first, stop, str(path)))
+                _send(process.stdin, (sent, first, stop, str(path)))
             self._wait()
         except BaseException:
             self.close()
@@ -182,15 +182,15 @@ class ProcessPool:
         """Have all of them do something, and wait until it is done."""
         with self._alive():
             for process in self._processes:
-                _send(_in(process), order)
+                _send(process.stdin, order)
             self._wait()
 
     def run_one(self, part: int, *order: Any) -> Any:
         """Have one of them do something, and return what it returns."""
         process = self._processes[part]
         with self._alive():
-            _send(_in(process), order)
-            return _results([_receive(_out(process))])[0]
+            _send(process.stdin, order)
+            return _results([_receive(process.stdout)])[0]
 
     @contextlib.contextmanager
     def _alive(self) -> Iterator[None]:
@@ -204,25 +204,17 @@ class ProcessPool:
 
     def _wait(self) -> None:
         # All of them, before any error is raised: who is not heard now would be heard for an answer to the next order.
-        _results([_receive(_out(process)) for process in self._processes])
+        _results([_receive(process.stdout) for process in self._processes])
 
     def close(self) -> None:
         for process in self._processes:
+            assert process.stdin
             with contextlib.suppress(OSError):
-                _in(process).close()
+                process.stdin.close()
         for process in self._processes:
+            assert process.stdout
             process.wait()
-            _out(process).close()
-
-
-def _in(process: subprocess.Popen[bytes]) -> BinaryIO:
-    assert process.stdin is not None
-    return process.stdin  # type: ignore[return-value]
-
-
-def _out(process: subprocess.Popen[bytes]) -> BinaryIO:
-    assert process.stdout is not None
-    return process.stdout  # type: ignore[return-value]
+            process.stdout.close()
 
 
 def _results(replies: list[Any]) -> list[Any]:
@@ -232,13 +224,15 @@ def _results(replies: list[Any]) -> list[Any]:
     return [value for _, value in replies]
 
 
-def _send(file: BinaryIO, message: Any) -> None:
+def _send(file: IO[bytes] | None, message: Any) -> None:
+    assert file is not None
     data = pickle.dumps(message)
     file.write(struct.pack("<q", len(data)) + data)
     file.flush()
 
 
-def _receive(file: BinaryIO) -> Any:
+def _receive(file: IO[bytes] | None) -> Any:
+    assert file is not None
     head = file.read(8)
     if len(head) < 8:
         raise EOFError

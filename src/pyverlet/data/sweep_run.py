@@ -87,9 +87,9 @@ def _plan(sent: bytes) -> Plan:
     return plan
 
 
-def work(sent: bytes, task: Task) -> list[tuple[Row, float]]:
+def work(sent: bytes | Plan, task: Task) -> list[tuple[Row, float]]:
     """Make some runs of a plan, in whatever process: their rows, and the seconds each took."""
-    plan, made = _plan(sent), []
+    plan, made = _plan(sent) if isinstance(sent, bytes) else sent, []
     for run in task:
         begin = perf_counter()
         row = one(plan, run)
@@ -171,8 +171,8 @@ class _Dispatcher:
     """
 
     def __init__(self, plan: Plan, runs: Sequence[Run], makes: Any, workers: int, *, own: bool) -> None:
-        self._sent = b"" if makes is Here else _packed(plan)
-        self._plan, self._makes, self._own, self._workers = plan, makes, own, workers
+        self._sent = plan if makes is Here else _packed(plan)
+        self._makes, self._own, self._workers = makes, own, workers
         self._waiting, self._suspects = deque(runs), deque[Task]()
         self._out: dict[Future[Any], Task] = {}
         self._tries: dict[str, int] = {}
@@ -213,19 +213,11 @@ class _Dispatcher:
 
     def _submit(self, task: Task) -> None:
         try:
-            if self._makes is Here:
-                future = self._executor.submit(lambda: [(row, took) for run in task for row, took in [self._timed(run)]])
-            else:
-                future = self._executor.submit(work, self._sent, task)
+            future = self._executor.submit(work, self._sent, task)
         except BrokenExecutor:
             future = Future()
             future.set_exception(BrokenExecutor())
         self._out[future] = task
-
-    def _timed(self, run: Run) -> tuple[Row, float]:
-        begin = perf_counter()
-        row = one(self._plan, run)
-        return row, perf_counter() - begin
 
     def _done(self, future: Future[Any], task: Task) -> Iterator[tuple[Row, float]]:
         alone = not self._out

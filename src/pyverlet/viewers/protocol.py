@@ -127,43 +127,32 @@ def written(drawing: Drawing) -> list[Any]:
 
 def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = None) -> bytes:
     """A shape as one binary message; without circles if the server draws them, and with a note for the page, if any."""
-    coloured = shape.colours is not None
-    head = {
+    arrays = {"radius", "mass", "number", "group", "kinds", "apart", "colours"}
+    head = {_camel(name): value for name, value in vars(shape).items() if name not in arrays}
+    head |= {
         "kind": "shape",
-        "title": shape.title,
-        "dt": shape.dt,
-        "budgetMs": shape.budget_ms,
-        "bounded": shape.bounded,
-        "parted": shape.parted,
-        "outlines": shape.outlines,
-        "seams": shape.seams,
-        "lines": shape.lines,
         "panels": [dataclasses.asdict(panel) for panel in shape.panels],
-        "differing": shape.differing,
         "obstacles": shape.obstacles.lines,
-        "scene": shape.scene,
-        "scenes": shape.scenes,
-        "callbacks": shape.callbacks,
-        "countable": shape.countable,
         "integrators": list(integrators.BY_NAME),
         "count": len(shape.radius),
         "groups": [] if drawn_here else _runs(shape.group),
         "apart": 0 if drawn_here else len(shape.apart),
         "kinds": shape.kinds is not None,
-        "coloured": coloured,
+        "coloured": shape.colours is not None,
         "drawnHere": drawn_here,
         "note": note,
         "maxSubsteps": MAX_SUBSTEPS,
         "maxParticles": MAX_PARTICLES,
         "pokeRadius": POKE_RADIUS,
     }
-    if drawn_here:
-        return _join(head, b"")
-    colours = b"" if shape.colours is None else shape.colours.tobytes()
-    kinds = b"" if shape.kinds is None else shape.kinds.tobytes()
-    return _join(
-        head, shape.radius.tobytes() + shape.mass.tobytes() + shape.number.tobytes() + shape.apart.tobytes() + kinds + colours
-    )
+    sent = () if drawn_here else (shape.radius, shape.mass, shape.number, shape.apart, shape.kinds, shape.colours)
+    return _join(head, b"".join(array.tobytes() for array in sent if array is not None))
+
+
+def _camel(name: str) -> str:
+    """`budgetMs` of `budget_ms`."""
+    first, *others = name.split("_")
+    return first + "".join(map(str.capitalize, others))
 
 
 def _runs(group: NDArray[np.int64]) -> list[list[int]]:
