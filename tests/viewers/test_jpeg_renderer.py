@@ -29,9 +29,9 @@ def frame() -> Frame:
 
 def shuffled(frame: Frame, seed: int) -> Frame:
     """The same, as it would come from between two substeps."""
-    whose = np.random.default_rng(seed).permutation(len(frame.rows)).astype(np.int32)
-    rows, moving = frame.rows[whose], frame.moving[whose]
-    return replace(frame, seq=frame.seq + seed, rows=rows, moving=moving, whose=whose, whose_moving=whose)
+    order = np.random.default_rng(seed).permutation(len(frame.rows)).astype(np.int32)
+    rows, moving = frame.rows[order], frame.moving[order]
+    return replace(frame, seq=frame.seq + seed, rows=rows, moving=moving, order=order, moving_order=order)
 
 
 def test_the_users_order_comes_back(frame: Frame) -> None:

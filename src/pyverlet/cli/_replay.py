@@ -37,10 +37,10 @@ def replay(
     from pyverlet.viewers.replay import ReplayState, Script
 
     script = Script(path)
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         first = script.open()
-    for warning in told:
+    for warning in caught:
         out.note(f"note: {warning.message}")
     if not (headless or as_json):
 

@@ -57,7 +57,7 @@ def watched(path: Path, *, dt: float, options: Mapping[str, Any], **build: Any) 
     from pyverlet.viewers.watching import SketchBuilder, Watcher
 
     builder = SketchBuilder(path, dt=dt, **build)
-    Sketch.read(path)  # one that is not there is told here, not on a page
+    Sketch.read(path)  # a missing one is an error here, not on a page
 
     def beside(session: Session) -> AbstractContextManager[None]:
         return Watcher(builder, session).at_work()

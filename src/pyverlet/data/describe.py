@@ -20,6 +20,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.fields import Field
 from pyverlet.ground.guess import did_you_mean
+from pyverlet.ground.shown import cut
 from pyverlet.laws import forces, integrators, naive, obstacles, rooms
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
 from pyverlet.state.group import Group, Picked
@@ -354,5 +355,4 @@ def _nearest(name: str, known: tuple[str, ...]) -> str:
 
 
 def _brief(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    return cut(repr(value))

@@ -69,7 +69,7 @@ class Plan:
         return max(self._layout()[""][0], 1)
 
     def open(self, path: Path) -> dict[str, Array]:
-        """(count, ...) arrays that all who open the file share."""
+        """(count, ...) arrays that all processes with the file share."""
         with path.open("r+b") as file:
             memory = mmap.mmap(file.fileno(), self.size)
         arrays = {}
@@ -203,7 +203,7 @@ class ProcessPool:
             raise PyverletError("a process that had some of the worlds has ended; they are lost, build them anew") from None
 
     def _wait(self) -> None:
-        # All of them, before any error is raised: who is not heard now would be heard for an answer to the next order.
+        # All replies, before any error is raised: one left in a pipe would be taken for the reply to the next order.
         _results([_receive(process.stdout) for process in self._processes])
 
     def close(self) -> None:
@@ -241,7 +241,7 @@ def _receive(file: IO[bytes] | None) -> Any:
 
 def main() -> None:
     """Keep worlds as the standard input says, until that ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started us decides
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process decides
     orders = sys.stdin.buffer
     replies = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what a scene prints is no answer

@@ -19,6 +19,7 @@ from pyverlet.data.describe import OBJECT, describe
 from pyverlet.data.scene_build import COLUMNS, Recipe, Table, hash_of
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
+from pyverlet.ground.shown import cut
 from pyverlet.scenes import Scene, Settings
 from pyverlet.scenes._scene import Show
 from pyverlet.world.world import World
@@ -243,9 +244,8 @@ def _sentence(errors: list[Any], models: Any) -> str:
         return f"{where} has the type {given!r}{did_you_mean(given, tags, alike=0.4)}; allowed are {', '.join(tags)}"
     if error["type"] == "union_tag_not_found":
         return f"{where} lacks 'type'"
-    given = repr(error["input"])
     said = error["msg"][0].lower() + error["msg"][1:]
-    return f"{where} is {given if len(given) <= 60 else given[:57] + '...'}; {said}"
+    return f"{where} is {cut(repr(error['input']))}; {said}"
 
 
 def _path(loc: tuple[Any, ...], models: Any) -> str:

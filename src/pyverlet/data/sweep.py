@@ -201,7 +201,7 @@ class Study:
         return pd.DataFrame({name: array[name] for name in array.dtype.names or ()})
 
     def array(self) -> NDArray[Any]:
-        """The rows there are as a structured array: run, settings, what was measured, hashes, error, and who made it."""
+        """The rows there are as a structured array: run, settings, what was measured, hashes, error, and versions."""
         return sweep_rows.as_array(self._plan, self._table_rows(self._read()))
 
     @property
@@ -230,14 +230,14 @@ class Study:
         picked = sorted((ready[k] for k in chosen), key=lambda run: run.number)
         differ = []
         if self.scene.sketch is not None:
-            _ = self.scene.sketch.module  # one that is lost or has changed is told of, not a difference
+            _ = self.scene.sketch.module  # one that is lost or has changed is an error, not a difference
         with Progress("verifying, run") as progress:
             for done, run in enumerate(picked):
-                row, told = sweep_run.one(self._plan, run), known.get(run.key)
-                assert told is not None
+                row, known_row = sweep_run.one(self._plan, run), known.get(run.key)
+                assert known_row is not None
                 if row["values"] == {}:  # of a measure that is not known here
-                    row["values"] = told["values"]
-                if any(row[name] != told[name] for name in ("start", "end", "values", "error")):
+                    row["values"] = known_row["values"]
+                if any(row[name] != known_row[name] for name in ("start", "end", "values", "error")):
                     differ.append(run.number)
                 progress(done + 1, len(picked))
         return Verified([run.number for run in picked], differ)
@@ -276,9 +276,9 @@ def open_study(folder: str | Path, measure: Measure | None = None) -> Study:
     path = Path(folder) / "plan.json"
     try:
         about = json.loads(path.read_text(encoding="utf-8"))
-        told, settings, grid = about["measure"], about["settings"], about["grid"]
+        measured, settings, grid = about["measure"], about["settings"], about["grid"]
         scene = _scene(about["scene"], folder, about.get(SKETCH))
-        known = measure or (basics if told == basics.__qualname__ else Unknown(told))
+        known = measure or (basics if measured == basics.__qualname__ else Unknown(measured))
         plan = Plan(
             scene,
             {name: [value_of(name, value) for value in values] for name, values in grid.items()},
@@ -306,15 +306,15 @@ class Unknown:
         return {}
 
 
-def _scene(told: Any, folder: str | Path, place: str | None) -> Scene:
-    if isinstance(told, str):
-        return get(told)
-    if "format" in told:  # a document: `Study` has written it there
+def _scene(about: Any, folder: str | Path, place: str | None) -> Scene:
+    if isinstance(about, str):
+        return get(about)
+    if "format" in about:  # a document: `Study` has written it there
         return get(str(Path(folder) / SCENE_FILE))
-    if "sketch" in told:
-        name = told["sketch"]
-        sketch = LazySketch(name, told["source"], Path(place or name), Path(), Path(folder).parent)
-        return replace(sketch.scene(), name=told["name"])
+    if "sketch" in about:
+        name = about["sketch"]
+        sketch = LazySketch(name, about["source"], Path(place or name), Path(), Path(folder).parent)
+        return replace(sketch.scene(), name=about["name"])
     raise InputError(f"'{folder}' is a study of a scene of its program's own; allowed is pyverlet.sweep with that scene")
 
 

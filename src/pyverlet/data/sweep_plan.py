@@ -57,7 +57,7 @@ class Plan:
             "format": FORMAT,
             "scene": _scene(self.scene),
             "settings": {name: plain(name, value) for name, value in sorted(self.settings.items())},
-            # Without its module, which is another for who runs a script than for who imports it.
+            # Without its module, which differs between running and importing a script.
             "measure": getattr(self.measure, "__qualname__", type(self.measure).__qualname__),
             "frames": self.frames,
             "dt": self.dt,

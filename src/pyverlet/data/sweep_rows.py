@@ -27,6 +27,7 @@ from pyverlet.data.atomic_file import replacing
 from pyverlet.data.sweep_plan import SCENE_FILE, Plan
 from pyverlet.ground import file_lock
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import cut
 
 _SYNC_S = 1.0
 """Rows that a power cut may cost are those of the last so many seconds."""
@@ -77,7 +78,7 @@ def open_folder(folder: Path, plan: Plan) -> None:
 def _briefly(value: Any) -> str:
     """Of a scene's document its name; of anything else the beginning."""
     text = repr(value["name"] if isinstance(value, dict) and "name" in value else value)
-    return text if len(text) <= 80 else f"{text[:77]}..."
+    return cut(text, 80)
 
 
 @contextlib.contextmanager

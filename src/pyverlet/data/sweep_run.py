@@ -1,4 +1,4 @@
-"""Makes the runs of a study on any executor: one run, a task of some of them, and who gets which task when."""
+"""Makes the runs of a study on any executor: one run, a task of some of them, and which worker gets which task when."""
 
 from __future__ import annotations
 

@@ -202,7 +202,7 @@ class Worlds(Shown):
 
 
 def seed_of(seed: int, k: int) -> int:
-    """The seed of world or run k: independent of all others, and of who makes it."""
+    """The seed of world or run k: independent of all others, and of the process that makes it."""
     return int(np.random.SeedSequence((seed, k)).generate_state(1, np.uint64)[0])
 
 

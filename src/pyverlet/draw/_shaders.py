@@ -1,4 +1,4 @@
-"""What a graphics card is told: one point a circle, its position straight from the world's array, in metres."""
+"""What a graphics card gets: one point a circle, its position straight from the world's array, in metres."""
 
 from __future__ import annotations
 

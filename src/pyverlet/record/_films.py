@@ -107,7 +107,7 @@ class _Stream(Film):
         return {}
 
     def _set_up(self, fps: int) -> None:
-        """What else the encoder is told before the first picture."""
+        """Further settings of the encoder, before the first picture."""
 
     @abstractmethod
     def _frame(self, pixels: Pixels) -> Any:
@@ -162,7 +162,7 @@ class Mp4(_Stream):
     def _set_up(self, fps: int) -> None:
         context = self._stream.codec_context
         context.gop_size = fps
-        # ITU-R BT.709, said in the file as well: else players guess by the size of the picture, and colours shift.
+        # ITU-R BT.709, named in the file as well: else players guess by the size of the picture, and colours shift.
         context.color_primaries = context.color_trc = context.colorspace = 1
         context.color_range = 1
 
@@ -214,7 +214,7 @@ class WebP(_Stream):
 
     def close(self) -> None:
         super().close()
-        if self.error is not None:  # the length of the file is said in its head
+        if self.error is not None:  # the length of the file is in its header
             with self._disk.path.open("r+b") as file:
                 length = file.seek(0, 2)
                 file.seek(4)

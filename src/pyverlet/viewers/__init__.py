@@ -110,7 +110,7 @@ def serve(
 ) -> None:
     """Build a world and show it on a live page until Ctrl-C. What the command line uses.
 
-    The port is taken before the world is built, so that a taken one is told at once.
+    The port is taken before the world is built, so that a taken one is refused at once.
 
     Args:
         build: makes the world, the panels or the presentation.

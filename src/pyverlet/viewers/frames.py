@@ -34,7 +34,7 @@ VELOCITY_MAX = 32767
 """Largest velocity component as a 16-bit number; the fastest circle has it."""
 
 PUSH_MULTIPLE = 6.0
-"""The hardest push that can be told, in terms of the mean."""
+"""The largest force that is encoded, in terms of the mean."""
 
 VIEW_MARGIN = 0.03
 """Free space around the bounds, as a fraction of their longer side."""
@@ -170,9 +170,9 @@ class Frame:
     view: Rect
     status: Status
     rows: NDArray[np.float32]
-    """(n, 2) positions in metres, read-only copy, in the order the particles were added or that of `whose`."""
+    """(n, 2) positions in metres, read-only copy, in the order the particles were added or that of `order`."""
     moving: NDArray[np.float32]
-    """(n, 2) velocities in m/s, likewise by `whose_moving`; of an earlier moment unless a viewer asks for them."""
+    """(n, 2) velocities in m/s, likewise by `moving_order`; of an earlier moment unless a viewer asks for them."""
     obstacles: ObstacleOutlines = NO_OUTLINES
     """Those that move."""
     joined: NDArray[np.uint32] = field(default_factory=lambda: np.empty((0, 2), np.uint32))
@@ -181,9 +181,9 @@ class Frame:
     """(m,) what it pulls with, N; negative if it pushes."""
     turned: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, np.uint8))
     """(n,) how far each circle has turned, in 1/256 of a turn, counter-clockwise; empty until one has."""
-    whose: NDArray[np.int32] | None = None
+    order: NDArray[np.int32] | None = None
     """(n,) which particle each row is of, between the substeps of a frame; None: row k is particle k."""
-    whose_moving: NDArray[np.int32] | None = None
+    moving_order: NDArray[np.int32] | None = None
     drawing: Drawing = ()
     """What the user's own function has drawn over it; of the frame before, between its substeps."""
     contacts: Contacts = NO_CONTACTS
@@ -191,24 +191,24 @@ class Frame:
 
     def moved(self, moment: Moment, seq: int, status: Status, *, velocity: bool) -> Frame:
         """The same a little later, between two substeps; its velocities are those of this frame unless they are asked for."""
-        moving, whose_moving = self.moving, self.whose_moving
+        moving, moving_order = self.moving, self.moving_order
         if velocity:
-            rows, moving, whose = moment.look()
-            moving.flags.writeable, whose_moving = False, whose
+            rows, moving, order = moment.look()
+            moving.flags.writeable, moving_order = False, order
         else:
-            rows, whose = moment.positions()
+            rows, order = moment.positions()
         rows.flags.writeable = False
-        return replace(self, seq=seq, status=status, rows=rows, moving=moving, whose=whose, whose_moving=whose_moving)
+        return replace(self, seq=seq, status=status, rows=rows, moving=moving, order=order, moving_order=moving_order)
 
     @cached_property
     def position(self) -> NDArray[np.float32]:
         """(n, 2) metres, read-only, in the order the particles were added. Sorted in the thread that asks first, as in `grid`."""
-        return _sorted(self.rows, self.whose)
+        return _sorted(self.rows, self.order)
 
     @cached_property
     def velocity(self) -> NDArray[np.float32]:
         """(n, 2) m/s, likewise."""
-        return _sorted(self.moving, self.whose_moving)
+        return _sorted(self.moving, self.moving_order)
 
     @cached_property
     def strain(self) -> NDArray[np.uint8]:
@@ -272,10 +272,10 @@ class Frame:
         return np.asarray(np.rint(counts), dtype=np.int16)
 
 
-def _sorted(rows: NDArray[np.float32], whose: NDArray[np.int32] | None) -> NDArray[np.float32]:
-    if whose is not None:
+def _sorted(rows: NDArray[np.float32], order: NDArray[np.int32] | None) -> NDArray[np.float32]:
+    if order is not None:
         result = np.empty_like(rows)
-        unit("tools").put_rows(result, rows, whose)
+        unit("tools").put_rows(result, rows, order)
         rows = result
     rows.flags.writeable = False
     return rows

@@ -120,10 +120,10 @@ class _RecordedState(ViewState):
 
     def do(self, command: Command) -> None:
         self._journal.note_news(room=self.layout.room)  # how far a poke reaches depends on it
-        said = {"do": type(command).__name__} | {
+        line = {"do": type(command).__name__} | {
             FIELDS.get(key, key): value for key, value in dataclasses.asdict(command).items()
         }
-        self._journal.note(**said, **({"substep": self._substep} if self._substep else {}))
+        self._journal.note(**line, **({"substep": self._substep} if self._substep else {}))
         super().do(command)
 
     def step(self, dt: float, observer: Callable[[Moment], None] | None = None) -> None:

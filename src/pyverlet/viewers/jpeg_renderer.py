@@ -103,21 +103,21 @@ class JpegRenderer:
 
     def _in_rows(self, frame: Frame, colours: Packed) -> tuple[Packed, NDArray[np.float32]]:
         """Colours and radii in the order of the frame's rows: that changes seldom, and sorting what does not saves much."""
-        radius, whose = frame.shape.radius, frame.whose
-        if whose is None:
+        radius, order = frame.shape.radius, frame.order
+        if order is None:
             return colours, radius
-        if self._sorted[0] is not whose or self._sorted[1] is not radius:
-            self._sorted = (whose, radius, radius[whose])
+        if self._sorted[0] is not order or self._sorted[1] is not radius:
+            self._sorted = (order, radius, radius[order])
             self._still_sorted = (None, colours)
         if self._still_sorted[0] is not colours:
-            self._still_sorted = (colours, colours[whose])
+            self._still_sorted = (colours, colours[order])
         return self._still_sorted[1], self._sorted[2]
 
     def _angles(self, frame: Frame, owner: NDArray[np.uint32]) -> NDArray[np.float64] | None:
         """How the circles of the frame's rows, and copies of `owner`, have turned, rad; None until one has."""
         if not len(frame.turned):
             return None
-        turned = frame.turned if frame.whose is None else frame.turned[frame.whose]
+        turned = frame.turned if frame.order is None else frame.turned[frame.order]
         return np.asarray(np.concatenate((turned, frame.turned[owner])) * (np.pi / 128), float)
 
     def _obstacles(self, frame: Frame) -> Sequence[Outline]:

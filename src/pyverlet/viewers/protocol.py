@@ -6,7 +6,7 @@
   not collide, if "kinds" n pairs of uint32, category and mask, and if "coloured" n times three bytes R, G, B; of a frame n pairs
   of uint16 on the grid over "view", if the tab looks at velocities n pairs of int16 in units of "unit" m/s, of "copies", circles
   that reach through a seam and are drawn once more, a uint32 each, whose they are, and then a pair of uint16, of "links" two
-  uint32, who they join, each, and then a byte each, how hard they pull, if "turned" n bytes, in 1/256 of a turn, and of
+  uint32, the circles they join, each, and then a byte each, how hard they pull, if "turned" n bytes, in 1/256 of a turn, and of
   "contacts" two uint32 each, then a byte each, how hard they push in units of "push" N, and a byte each, where the normal points;
   of a picture a JPEG.
 """
@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import cut
 from pyverlet.laws import integrators
 from pyverlet.picture.pen import Drawing, Stroke
 from pyverlet.viewers.commands import COMMANDS, MAX_PARTICLES, MAX_SUBSTEPS, Command, SetIntegrator, Step
@@ -115,14 +116,14 @@ def _head(kind: str, frame: Frame, part: Rect | None) -> dict[str, Any]:
 
 def written(drawing: Drawing) -> list[Any]:
     """What a `Pen` drew, ready for JSON: lines and areas [points, closed, filled, colour, px], texts [x, y, text, colour, px]."""
-    said: list[Any] = []
+    marks: list[Any] = []
     for mark in drawing:
         colour = None if mark.colour is None else f"#{mark.colour:06x}"
         if isinstance(mark, Stroke):
-            said.append([mark.points, mark.closed, mark.filled, colour, mark.width])
+            marks.append([mark.points, mark.closed, mark.filled, colour, mark.width])
         else:
-            said.append([mark.x, mark.y, mark.text, colour, mark.size])
-    return said
+            marks.append([mark.x, mark.y, mark.text, colour, mark.size])
+    return marks
 
 
 def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = None) -> bytes:
@@ -185,8 +186,7 @@ def finite(value: Any) -> Any:
 
 
 def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    return cut(repr(value))
 
 
 _ALLOWED = {"float": "a number", "int": "a whole number", "bool": "true and false", "str": "a text"}

@@ -21,7 +21,7 @@ PACE_S = 1.0
 
 
 class Readouts:
-    """Reads a `ViewState`; `budget` is told of every frame. Used by the physics thread only."""
+    """Reads a `ViewState`; `budget` records every frame. Used by the physics thread only."""
 
     def __init__(self, budget: FrameBudget) -> None:
         self.budget = budget

@@ -119,9 +119,9 @@ class Script:
             path.write_bytes(base64.b64decode(snapshot, validate=True))
             return load(path)
 
-    def _sketch(self, told: dict[str, Any]) -> Sketch:
+    def _sketch(self, about: dict[str, Any]) -> Sketch:
         """The sketch of then, with its sliders where they were; in the folder it was in, in this one or beside the journal."""
-        about = told["sketch"]
+        about = about["sketch"]
         sketch = find(str(about["name"]), about["source"], Path(about["path"]), Path(), self.path.parent)
         _ = sketch.module
         for name, value in about["sliders"].items():
@@ -129,11 +129,11 @@ class Script:
         sketch.time_limit = TimeLimit()  # a function that looped for ever does so again
         return sketch
 
-    def _built(self, sketch: Sketch, told: dict[str, Any]) -> World:
-        world = sketch.scene().world(**settings_from_json(told["sketch"]["settings"]))
-        if world.state_hash() != told["hash"]:
+    def _built(self, sketch: Sketch, about: dict[str, Any]) -> World:
+        world = sketch.scene().world(**settings_from_json(about["sketch"]["settings"]))
+        if world.state_hash() != about["hash"]:
             raise DivergedError(
-                f"{sketch.name} builds a world with the hash {world.state_hash()}, and built {told['hash']} in the session: "
+                f"{sketch.name} builds a world with the hash {world.state_hash()}, and built {about['hash']} in the session: "
                 "it draws by chance without a seed, or what it imports or reads has changed"
             )
         return world

@@ -181,7 +181,7 @@ class ViewState:
         return tuple((each.name, each.low, each.high, each.step, each.value) for each in list(board.values()))
 
     def watched(self) -> dict[str, float]:
-        """What the worlds were told to watch; of the same name, the first world's."""
+        """Values that the worlds watch; of the same name, the first world's."""
         found: dict[str, float] = {}
         for world in self.worlds:
             try:

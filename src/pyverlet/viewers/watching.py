@@ -23,7 +23,7 @@ LOOK_S = 0.05
 """How often the files are looked at."""
 
 SAY_S = 1.0
-"""A build that takes longer is told of on the page."""
+"""A build that takes longer is shown on the page."""
 
 BUILD_LIMIT_S = 10.0
 """A sketch that is not done by then is given up; see --patience."""
@@ -126,7 +126,7 @@ class Watcher:
                 began = 0.0
 
     def _say_busy(self) -> None:
-        with self._lock:  # said after the end of the building, it would be said for ever
+        with self._lock:  # shown after the build has ended, it would stay for ever
             if self._building:
                 self._session.tell(complaint=self._builder.fault, busy=f"building {self._builder.path.name}")
 

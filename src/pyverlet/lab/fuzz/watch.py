@@ -139,7 +139,7 @@ class _TouchedError(Exception):
     pass
 
 
-class _Refused(Exception):  # noqa: N818  (what was asked for was too much, and the world has said so)
+class _Refused(Exception):  # noqa: N818  (the world has refused what was asked for)
     pass
 
 
@@ -199,8 +199,8 @@ def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str]
     """One frame, `settling` if so many are to come in which the world may gain by what was done to it; then how many there are.
 
     Velocities are of half a step before, so the frame after a deed knows of it too; and overlap that a coarse step has left
-    holds more energy when steps become shorter, until it is gone. So do links that an obstacle has stretched by pushing out who
-    was in it at the beginning, or that who moved their circles has.
+    holds more energy when steps become shorter, until it is gone. So do links that an obstacle has stretched by pushing
+    out particles that started inside it, or that a deed has stretched by moving their circles.
     """
     before_deed, forces, places = (world.version, world.substeps), tuple(world.forces), world.position.copy()
     energy_then, linked = world.energy().total, bool(world.links)
@@ -303,7 +303,7 @@ def _energy(name: str, world: World, frame: int, dt: float, recent: deque[tuple[
 
 
 def _alone(world: World) -> bool:
-    """Whether nothing outside acts on who is in it."""
+    """Whether nothing outside acts on the particles."""
     held = any(isinstance(link, Pin) for link in world.links) or not np.isfinite(world.mass).all()
     return not (held or any(world.gravity) or world.forces or world.obstacles) and isinstance(world.boundary, Open)
 

@@ -1,4 +1,4 @@
-"""J5 to J7: what is said of the formula itself."""
+"""J5 to J7: claims about the formula itself."""
 
 from __future__ import annotations
 
