@@ -17,7 +17,7 @@ class Account:
     """Milliseconds so far.
 
     Attributes:
-        ran: by who it was: "physics" is the thread that steps the world, "workers" those that help it, "web" and "artist" the
+        ran: by who it was: "physics" is the thread that steps the world, "workers" those that help it, "web" and "renderer" the
             server's others; "renderer", "gpu-process", "utility" and "browser" are Chromium's processes.
         queued: of the server's threads, ready to run while others had the cores.
         idle: of all cores together.

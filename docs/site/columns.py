@@ -12,7 +12,7 @@ class Columns(griffe.Extension):
     """Reads it."""
 
     def on_attribute_instance(self, *, node: Any, attr: griffe.Attribute, **_: Any) -> None:
-        """`name = Column("doc")` documents `name`, whose value is nobody's business."""
+        """`name = Column("doc")` documents `name`, without showing its value."""
         value = getattr(node, "value", None)
         if not (isinstance(value, ast.Call) and isinstance(value.func, ast.Name) and value.func.id == "Column" and value.args):
             return

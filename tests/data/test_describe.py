@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.data import memory
+from pyverlet.data import serialize
 from pyverlet.data.describe import KINDS, Builder, describe
 from pyverlet.laws.forces import Grip, Push
 from pyverlet.scenes.boids import Flock
@@ -51,10 +51,10 @@ def test_every_kind_is_tried() -> None:
 
 @pytest.mark.parametrize("thing", THINGS, ids=lambda thing: type(thing).__name__)
 def test_there_and_back(thing: Any) -> None:
-    described = json.loads(json.dumps(memory.plain(describe(thing)), allow_nan=False))
+    described = json.loads(json.dumps(serialize.plain(describe(thing)), allow_nan=False))
     again = Builder().build("it", described, object)
     assert type(again) is type(thing)
-    assert memory.plain(describe(again)) == described
+    assert serialize.plain(describe(again)) == described
     if isinstance(thing, pv.Obstacle):
         assert again.points.tobytes() == thing.points.tobytes()
         assert again.one_way == thing.one_way

@@ -16,8 +16,7 @@ import pytest
 import pyverlet as pv
 from pyverlet.cli import main
 from pyverlet.data import toml
-from pyverlet.data.scene_file import schema, validated
-from pyverlet.data.scene_freeze import freeze
+from pyverlet.data.scene_file import freeze, schema, validated
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "scenes").glob("*.*"))
 

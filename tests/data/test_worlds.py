@@ -143,8 +143,8 @@ def test_worlds_whose_particles_come_and_go() -> None:
 @pytest.mark.slow
 def test_a_process_that_is_killed_is_said_to_be() -> None:
     many = pv.Worlds("box", 2, processes=2, particles=5)
-    assert many._crew is not None
-    many._crew._processes[0].kill()
+    assert many._pool is not None
+    many._pool._processes[0].kill()
     with pytest.raises(pv.PyverletError, match="has ended"):
         many.step(1 / 60)
 

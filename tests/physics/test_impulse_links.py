@@ -417,8 +417,8 @@ def test_any_number_of_threads_has_the_same_bits(monkeypatch: pytest.MonkeyPatch
 
 def test_a_taut_chain_with_a_heavy_end_does_not_go_through_what_it_hits() -> None:
     # A ball of 200 kg sweeps a chain through a tower of discs of 1 kg. What drives a bead comes from its neighbours: a contact
-    # that is solved before links only sees the bead. Solved once more between them, overlaps are half as deep: 3 to 5 % in the worst
-    # tenth of the frames, 8 % in one of eight such worlds; they were 6 to 10 %.
+    # that is solved before links only sees the bead. Solved once more between them, overlaps are half as deep: 3 to 5 % in the
+    # worst tenth of the frames, 8 % in one of eight such worlds; they were 6 to 10 %.
     worst = []
     for mass in (4.6, 5.4, 10.0, 20.0, 30.0):
         world = pv.World(boundary=pv.Box((-12, 0), (16, 20), friction=0.6), collisions=pv.Collisions(friction=0.6))

@@ -45,8 +45,8 @@ def test_circles_between_a_wall_and_a_pinned_circle_that_moves_into_it(
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 @pytest.mark.parametrize("friction", [0.8, 2.0])
 def test_what_lets_go_of_a_wedge_takes_back_its_friction_and_its_roll(friction: float, restitution: float) -> None:
-    # Where friction would hold a circle in a wedge that closes, surfaces are solved once more without it. What they gave along the
-    # tangent and against rolling is not given, and not remembered: |j_t| <= mu j and |L| <= c r j.
+    # Where friction would hold a circle in a wedge that closes, surfaces are solved once more without it. What they gave along
+    # the tangent and against rolling is not given, and not remembered: |j_t| <= mu j and |L| <= c r j.
     rough: dict[str, Any] = {"restitution": restitution, "friction": friction, "rolling_resistance": 0.3}
     law = pv.Collisions(restitution=restitution, friction=friction, rolling_resistance=0.3)
     world = pv.World(boundary=pv.Box((-10, -10), (10, 10), **rough), gravity=(0, 0), collisions=law, dtype="float64")

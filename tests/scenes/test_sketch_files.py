@@ -13,8 +13,8 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.cli import main
-from pyverlet.data.sweep_open import open_study
-from pyverlet.ground.patience import Patience, TooLong
+from pyverlet.data.sweep import open_study
+from pyverlet.ground.time_limit import TimeLimit, TooLong
 from pyverlet.picture import LIGHT, Pen
 from pyverlet.picture.pen import Lettering, Stroke
 from pyverlet.scenes.sketch import Sketch, SketchError
@@ -255,7 +255,7 @@ def test_update_that_fails_stops_a_run_that_ends(run: Any, folder: Path) -> None
     assert "balls.py, line 15: AttributeError" in err
 
 
-# -- sliders, pens, patience -------------------------------------------------------------------------------------------------
+# -- sliders, pens, time limits----------------------------------------------------------------------------------------------
 
 
 def test_a_slider_is_the_same_when_asked_for_again() -> None:
@@ -344,25 +344,25 @@ def test_watched_numbers() -> None:
         world.watch("more", len)
 
 
-def test_patience_ends_what_loops_and_nothing_else() -> None:
-    patience = Patience()
+def test_a_time_limit_ends_what_loops_and_nothing_else() -> None:
+    limit = TimeLimit()
 
     def forever() -> None:
         while True:
             pass
 
-    with patience.within(0.01), pytest.raises(TooLong):
+    with limit.within(0.01), pytest.raises(TooLong):
         forever()
-    with patience.within(60):
+    with limit.within(60):
         total = sum(range(1000))
     assert total == 499_500
     for _ in range(50):
-        with patience.within(1e-9):  # over before anybody looks, or just then
+        with limit.within(1e-9):  # over before anybody looks, or just then
             pass
     sketch = Sketch(Path("loops.py"), b"def build():\n    while True:\n        pass\n")
     scene = sketch.scene()
     with (
         pytest.raises(SketchError, match=r"loops.py, line [23] does not come back; does it loop for ever\?"),
-        patience.within(0.01),
+        limit.within(0.01),
     ):
         scene.world()

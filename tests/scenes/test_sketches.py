@@ -10,8 +10,8 @@ import pytest
 
 import pyverlet as pv
 from pyverlet import scenes
-from pyverlet.scenes import _drop
-from pyverlet.scenes.bounce_rest import GRAVITY
+from pyverlet.scenes import bounce
+from pyverlet.scenes.bounce import GRAVITY
 
 DT, G = 1 / 60, 9.81
 
@@ -36,13 +36,13 @@ def test_bounce_euler_climbs() -> None:
     ((_, y, _),) = heights("bounce-euler", 30)
     tops = apexes(y)
     assert (np.diff(tops) > 0).all()
-    assert tops[-1] > 1.5 * _drop.HEIGHT
+    assert tops[-1] > 1.5 * bounce.HEIGHT
 
 
 def test_bounce_order_gains_on_the_left_and_loses_on_the_right() -> None:
     (_, first, _), (_, second, _) = heights("bounce-order", 30)
-    assert apexes(first)[-1] > 1.5 * _drop.HEIGHT
-    assert apexes(second)[-1] < 0.9 * _drop.HEIGHT
+    assert apexes(first)[-1] > 1.5 * bounce.HEIGHT
+    assert apexes(second)[-1] < 0.9 * bounce.HEIGHT
 
 
 def test_bounce_rest_keeps_its_height_to_the_last_bit() -> None:
@@ -51,7 +51,7 @@ def test_bounce_rest_keeps_its_height_to_the_last_bit() -> None:
     assert len(tops) > 30
     assert set(tops) == {tops[0]}
     # The first bounce lands on the lattice: n (n + 1) / 2 of g h^2 above the wall.
-    cells = (tops[0] - _drop.RADIUS) / (-GRAVITY * DT**2)
+    cells = (tops[0] - bounce.RADIUS) / (-GRAVITY * DT**2)
     n = round((np.sqrt(1 + 8 * cells) - 1) / 2)
     assert cells == pytest.approx(n * (n + 1) / 2, rel=1e-9)
 
@@ -59,7 +59,7 @@ def test_bounce_rest_keeps_its_height_to_the_last_bit() -> None:
 def test_bounce_rest_is_a_coincidence() -> None:
     # The least change of gravity, and rounding or the lattice takes energy at some bounces.
     ((_, y, _),) = heights("bounce-rest", 60, gravity=(0.0, -9.81))
-    assert apexes(y)[-1] < 0.8 * _drop.HEIGHT
+    assert apexes(y)[-1] < 0.8 * bounce.HEIGHT
 
 
 def test_bounce_random_loses() -> None:
@@ -80,12 +80,12 @@ def test_frame_rate_matters_raw_and_not_with_the_clock() -> None:
 
 def test_bounce_verlet() -> None:
     (_, flipped, _), (_, projected, _), (_, met, real) = heights("bounce-verlet", 20)
-    assert apexes(flipped)[-1] < 0.95 * _drop.HEIGHT
+    assert apexes(flipped)[-1] < 0.95 * bounce.HEIGHT
     assert len(apexes(projected[60:])) == 0
-    assert projected[-1] == pytest.approx(_drop.RADIUS)
+    assert projected[-1] == pytest.approx(bounce.RADIUS)
     # A frame rarely falls on the apex: at most g dt^2 / 8 below it.
-    assert apexes(met).min() == pytest.approx(_drop.HEIGHT, abs=G * DT**2 / 8 * 1.001)
-    assert real.energy().total == pytest.approx(G * _drop.HEIGHT, rel=1e-9)
+    assert apexes(met).min() == pytest.approx(bounce.HEIGHT, abs=G * DT**2 / 8 * 1.001)
+    assert real.energy().total == pytest.approx(G * bounce.HEIGHT, rel=1e-9)
 
 
 @pytest.mark.parametrize("name", ["energy-1-substep", "energy-10-substeps"])

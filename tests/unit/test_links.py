@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.viewers.hands import Hands
+from pyverlet.viewers.pointers import Pointers
 
 DT = 1 / 60
 
@@ -330,14 +330,14 @@ def test_the_mouse_pulls_what_is_linked() -> None:
     group = world.add(position=np.column_stack((np.zeros(10), -0.5 * np.arange(10))), radius=0.2, mass=1.0)
     group.pin(0)
     world.links.append(pv.Stick(group, np.arange(9), np.arange(1, 10), collide=False))
-    hands = Hands(world)
+    pointers = Pointers(world)
     for _ in range(180):
-        hands.drag(1, 3.0, -2.5, 1.0) if hands._held else hands.drag(1, 0.0, -4.5, 1.0)
-        hands.move(20.0)
+        pointers.drag(1, 3.0, -2.5, 1.0) if pointers._held else pointers.drag(1, 0.0, -4.5, 1.0)
+        pointers.move(20.0)
         world.step(DT)
     assert group.position[-1, 0] > 1.5
     assert np.hypot(*np.diff(group.position, axis=0).T) == pytest.approx(np.full(9, 0.5), abs=1e-4)
-    hands.release(1)
+    pointers.release(1)
     world.run(seconds=0.5)
     assert np.isfinite(world.position).all()
 

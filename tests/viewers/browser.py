@@ -20,7 +20,7 @@ import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Page, expect
 
-NOTHING = "\N{EN DASH}"
+NO_OUTLINES = "\N{EN DASH}"
 """What the page shows where there is no number."""
 
 FLAGS = [
@@ -38,10 +38,10 @@ SERVE = """
 import sys
 from pyverlet.scenes import get
 from pyverlet.viewers import serve
-from pyverlet.viewers.exhibit import Repertoire
+from pyverlet.viewers.presentation import Repertoire
 if len(sys.argv) > 3:
-    from pyverlet.viewers import artist
-    artist.PICTURES_FROM = int(sys.argv[3])
+    from pyverlet.viewers import jpeg_renderer
+    jpeg_renderer.PICTURES_FROM = int(sys.argv[3])
 repertoire = Repertoire(get(sys.argv[1]), dt=1 / 60, overrides={"particles": int(sys.argv[2]), "ledger": sys.argv[4:] == ["1"]})
 serve(repertoire.open, scene_name=sys.argv[1], repertoire=repertoire, port=0, open_browser=False)
 """
@@ -99,7 +99,7 @@ def comes_true(page: Page, condition: Callable[[], bool]) -> bool:
 
 def visit(page: Page, address: str) -> None:
     page.goto(address)
-    expect(page.get_by_test_id("particles")).not_to_have_text(NOTHING)
+    expect(page.get_by_test_id("particles")).not_to_have_text(NO_OUTLINES)
 
 
 def where(page: Page, particle: int) -> dict[str, float]:

@@ -11,7 +11,7 @@ import pytest
 
 import pyverlet as pv
 from pyverlet import scenes
-from pyverlet.viewers import levers
+from pyverlet.viewers import controls
 from pyverlet.viewers.commands import (
     Build,
     Delete,
@@ -28,7 +28,7 @@ from pyverlet.viewers.commands import (
     Spawn,
     Step,
 )
-from pyverlet.viewers.exhibit import Exhibit, Repertoire
+from pyverlet.viewers.presentation import Presentation, Repertoire
 from pyverlet.viewers.session import Session
 
 WaitUntil = Callable[[Callable[[], bool]], None]
@@ -54,7 +54,7 @@ def test_restitution_changed_by_hand_bounces() -> None:
     """A ball that falls from h comes back to e^2 h: the setting is not only on show."""
     world = pv.World(boundary=pv.Box((-5, 0), (5, 20)), dtype=np.float64)
     ball = world.add(position=(0, 5.5), radius=0.5)
-    levers.pull(world, SetRestitution(0.8))
+    controls.change(world, SetRestitution(0.8))
     heights = []
     for _ in range(120):  # down in sqrt(2 h / g) = 1.01 s, up again within 0.81 s
         world.step(1 / 60)
@@ -64,14 +64,14 @@ def test_restitution_changed_by_hand_bounces() -> None:
 
 
 def test_a_world_without_collisions_and_walls_has_no_friction(world: pv.World) -> None:
-    nothing = levers.read(pv.World(collisions=None))
+    nothing = controls.read(pv.World(collisions=None))
     assert nothing["restitution"] is None
     assert nothing["friction"] is None
     naive = pv.World(collisions=None, boundary=pv.ClampAndFlip(pv.Box((0, 0), (1, 1), restitution=0.25)))
-    assert (levers.read(naive)["restitution"], levers.read(naive)["friction"]) == (0.25, None)
-    levers.pull(naive, SetRestitution(0.5))
-    levers.pull(naive, SetFriction(0.5))
-    assert levers.read(naive)["restitution"] == 0.5
+    assert (controls.read(naive)["restitution"], controls.read(naive)["friction"]) == (0.25, None)
+    controls.change(naive, SetRestitution(0.5))
+    controls.change(naive, SetFriction(0.5))
+    assert controls.read(naive)["restitution"] == 0.5
 
 
 def test_an_integrator_of_ones_own_has_its_own_name() -> None:
@@ -79,8 +79,8 @@ def test_an_integrator_of_ones_own_has_its_own_name() -> None:
         pass
 
     world = pv.World(integrator=Mine())
-    assert levers.read(world)["integrator"] == "mine"
-    assert not any(isinstance(command, SetIntegrator) for command in levers.present(world))
+    assert controls.read(world)["integrator"] == "mine"
+    assert not any(isinstance(command, SetIntegrator) for command in controls.present(world))
 
 
 def test_a_pinned_circle_stays_until_it_is_let_go(paused: Session, world: pv.World, wait_until: WaitUntil) -> None:
@@ -160,7 +160,7 @@ def test_the_dragged_circle_may_be_deleted(session: Session, world: pv.World, wa
 
 def test_colours_belong_to_their_circles(wait_until: WaitUntil, world: pv.World) -> None:
     colours = np.arange(27, dtype=np.uint8).reshape(9, 3)
-    with Session(Exhibit("nine", pv.Panels.of(world), colours=colours)) as session:
+    with Session(Presentation("nine", pv.Panels.of(world), colours=colours)) as session:
         for command in (Pause(True), Delete(1, -8.0, 0.5, 0.2), Spawn(1, 0.0, 10.0)):
             session.submit(command)
         wait_until(lambda: session.latest.shape.number.tolist() == list(range(1, 10)))

@@ -165,7 +165,7 @@ def test_colours_of_ones_own_come_along(page: Page, tmp_path: Path) -> None:
     world = pv.scenes.get("box").world(particles=3)
     record.to_video(world, tmp_path / "a.html", seconds=0.1, colour=Fixed([(255, 0, 0), (0, 255, 0), (0, 0, 255)]))
     visit(page, tmp_path / "a.html")
-    assert [page.evaluate("(i) => pyverlet.ink(i)", i) for i in range(3)] == [0x0000FF, 0x00FF00, 0xFF0000]
+    assert [page.evaluate("(i) => pyverlet.tint(i)", i) for i in range(3)] == [0x0000FF, 0x00FF00, 0xFF0000]
 
 
 def test_it_is_small_and_the_same_every_time(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import pytest
 from matplotlib import image
 from playwright.sync_api import Browser, Page, Playwright, expect
 
-from .browser import FLAGS, NOTHING, Serve, chromium, comes_true, everywhere, number, pause, visit, where
+from .browser import FLAGS, NO_OUTLINES, Serve, chromium, comes_true, everywhere, number, pause, visit, where
 
 
 @pytest.mark.slow
@@ -66,7 +66,7 @@ def test_pause_step_and_reset(page: Page, program: Serve) -> None:
     visit(page, program("cage", 500).address)
     assert comes_true(page, lambda: number(page, "time") > 0.5)
     pause(page)
-    expect(page.get_by_test_id("fps")).to_have_text(NOTHING)
+    expect(page.get_by_test_id("fps")).to_have_text(NO_OUTLINES)
     held = number(page, "time")
     page.wait_for_timeout(300)
     assert number(page, "time") == held

@@ -15,7 +15,7 @@ from playwright.sync_api import Browser, Page, Playwright, expect
 
 import pyverlet as pv
 
-from .browser import FLAGS, NOTHING, Serve, chromium, comes_true, everywhere, number, pause, status, visit, where
+from .browser import FLAGS, NO_OUTLINES, Serve, chromium, comes_true, everywhere, number, pause, status, visit, where
 
 
 def reads(page: Page, name: str, value: Any) -> bool:
@@ -137,7 +137,7 @@ def test_another_number_of_circles_and_another_scene(page: Page, program: Serve)
 def test_the_scene_image_shows_its_colours(page: Page, program: Serve) -> None:
     visit(page, program("image", 40).address)
     expect(page.get_by_test_id("colour")).to_have_value("picture")
-    inks = page.evaluate("() => Array.from({length: 40}, (_, i) => window.pyverlet.ink(i))")
+    inks = page.evaluate("() => Array.from({length: 40}, (_, i) => window.pyverlet.tint(i))")
     pause(page)
     colours = np.array([[(ink >> shift) & 255 for shift in (0, 8, 16)] for ink in inks]) / 255
     seen = picture(page)
@@ -147,7 +147,7 @@ def test_the_scene_image_shows_its_colours(page: Page, program: Serve) -> None:
     for i in inside:
         assert seen[round(places[i, 3]), round(places[i, 2])] == pytest.approx(colours[i], abs=0.02)
     page.get_by_test_id("colour").select_option("order")
-    assert page.evaluate("() => window.pyverlet.ink(0)") != inks[0]
+    assert page.evaluate("() => window.pyverlet.tint(0)") != inks[0]
 
 
 @pytest.mark.slow
@@ -160,7 +160,7 @@ def test_colours_say_what_they_say(page: Page, program: Serve, colouring: str) -
     pause(page)  # before the choice: the scale follows what was usual, and lags behind what is while the circles land
     page.get_by_test_id("colour").select_option(colouring)
     page.wait_for_timeout(500)
-    inks = np.array(page.evaluate("() => Array.from({length: 100}, (_, i) => window.pyverlet.ink(i))"))
+    inks = np.array(page.evaluate("() => Array.from({length: 100}, (_, i) => window.pyverlet.tint(i))"))
     light = sum(((inks >> shift) & 255) * weight for shift, weight in ((0, 0.3), (8, 0.59), (16, 0.11)))
     mass = np.array(page.evaluate("() => Array.from({length: 100}, (_, i) => window.pyverlet.mass(i))"))
     assert np.ptp(light) > 40
@@ -175,7 +175,7 @@ def test_groups_have_a_colour_each(page: Page, program: Serve) -> None:
     groups = page.evaluate("() => window.pyverlet.groups()")
     assert len(groups) == 6  # the grains, and five bodies
     assert sum(count for _, count in groups) == 2200
-    inks = page.evaluate("() => Array.from({length: 2200}, (_, i) => window.pyverlet.ink(i))")
+    inks = page.evaluate("() => Array.from({length: 2200}, (_, i) => window.pyverlet.tint(i))")
     first, hues = 0, []
     for _, count in groups:
         own = np.array([[(ink >> shift) & 255 for shift in (0, 8, 16)] for ink in inks[first : first + count]])
@@ -185,9 +185,9 @@ def test_groups_have_a_colour_each(page: Page, program: Serve) -> None:
     apart = np.hypot.reduce(np.array(hues)[1:] - np.array(hues)[:-1], axis=1)
     assert apart.min() > 60  # neighbours in the order of adding are told apart
     page.keyboard.press("4")
-    page.mouse.click(500, 120)  # a circle added by hand is a group of its own
+    page.mouse.click(500, 120)  # a circle added by pointer is a group of its own
     assert comes_true(page, lambda: len(page.evaluate("() => window.pyverlet.groups()")) == len(groups) + 1)
-    assert page.evaluate("() => window.pyverlet.ink(0)") == inks[0]
+    assert page.evaluate("() => window.pyverlet.tint(0)") == inks[0]
 
 
 @pytest.mark.slow
@@ -208,7 +208,7 @@ def test_slow_motion(page: Page, program: Serve) -> None:
     assert reads(page, "speed", 1)
     pause(page)
     expect(page.locator("#link")).to_have_text("paused")
-    expect(page.get_by_test_id("pace")).to_have_text(NOTHING)
+    expect(page.get_by_test_id("pace")).to_have_text(NO_OUTLINES)
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Several worlds in one picture: where they stand, what is said about each, and which one a hand touches."""
+"""Several worlds in one picture: where they stand, what is said about each, and which one a pointer touches."""
 
 from __future__ import annotations
 

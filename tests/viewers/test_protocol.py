@@ -13,12 +13,12 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.viewers import commands
-from pyverlet.viewers.exhibit import Exhibit
 from pyverlet.viewers.frames import Frame
-from pyverlet.viewers.looks import Look
+from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.protocol import MAX_MESSAGE, Ack, decode, encode_frame, encode_refusal, encode_shape
 from pyverlet.viewers.session import Session
-from pyverlet.viewers.stage import Stage
+from pyverlet.viewers.view_options import ViewOptions
+from pyverlet.viewers.view_state import ViewState
 
 LOOK = '{"type": "look", "part": %s, "width": 800, "height": 600, "colour": "speed", "dark": false, "velocity": true}'
 
@@ -50,13 +50,13 @@ def unpack(data: bytes) -> tuple[dict[str, Any], bytes]:
         ('{"type": "pin", "x": 1, "y": 2, "reach": 0.5}', commands.Pin(7, 1.0, 2.0, 0.5)),
         ('{"type": "spawn", "x": 1, "y": 2}', commands.Spawn(7, 1.0, 2.0)),
         ('{"type": "delete", "x": 1, "y": 2, "reach": 0}', commands.Delete(7, 1.0, 2.0, 0.0)),
-        (LOOK % "[0, 0, 4, 3]", Look((0.0, 0.0, 4.0, 3.0), 800, 600, "speed", False, True)),
-        (LOOK % "null", Look(None, 800, 600, "speed", False, True)),
-        ('{"type": "release", "hand": 3}', commands.Release(7)),  # a tab has its own hand and no other
+        (LOOK % "[0, 0, 4, 3]", ViewOptions((0.0, 0.0, 4.0, 3.0), 800, 600, "speed", False, True)),
+        (LOOK % "null", ViewOptions(None, 800, 600, "speed", False, True)),
+        ('{"type": "release", "pointer": 3}', commands.Release(7)),  # a tab has its own pointer and no other
     ],
 )
 def test_understood(text: str, expected: object) -> None:
-    assert decode(text, hand=7) == expected
+    assert decode(text, pointer=7) == expected
 
 
 @pytest.mark.parametrize(
@@ -113,7 +113,7 @@ def test_understood(text: str, expected: object) -> None:
 )
 def test_refused_in_one_short_sentence(text: str, named: str) -> None:
     with pytest.raises(pv.InputError, match=named) as refusal:
-        decode(text, hand=0)
+        decode(text, pointer=0)
     assert len(str(refusal.value)) < 400  # the scenes are all named
     assert "allowed" in str(refusal.value)
 
@@ -177,17 +177,17 @@ def test_who_collides_with_whom_follows_in_the_shape(world: pv.World) -> None:
 def test_a_link_that_goes_changes_the_shape(world: pv.World) -> None:
     stick = pv.Stick(world.add(position=[(0, 5), (3, 5)]), 0, 1, collide=False)
     world.links.append(stick)
-    stage = Stage(Exhibit.of(world, "nine"))
-    before = stage.version
-    assert stage.version == before
+    view_state = ViewState(Presentation.of(world, "nine"))
+    before = view_state.version
+    assert view_state.version == before
     world.links.remove(stick)
-    assert stage.version != before
-    assert len(stage.shape(dt=1 / 60, budget_ms=5.0, scenes=()).apart) == 0
+    assert view_state.version != before
+    assert len(view_state.shape(dt=1 / 60, budget_ms=5.0, scenes=()).apart) == 0
 
 
 def test_own_colours_follow_in_the_shape(world: pv.World) -> None:
     colours = np.arange(27, dtype=np.uint8).reshape(9, 3)
-    shape = Session(Exhibit("nine", pv.Panels.of(world), colours=colours)).latest.shape
+    shape = Session(Presentation("nine", pv.Panels.of(world), colours=colours)).latest.shape
     head, body = unpack(encode_shape(shape))
     assert head["coloured"]
     assert body[108:] == bytes(range(27))

@@ -32,9 +32,9 @@ from pyverlet.viewers.commands import (
     Spawn,
     Step,
 )
-from pyverlet.viewers.exhibit import Exhibit, Repertoire
 from pyverlet.viewers.journal import Journal
-from pyverlet.viewers.replay import DivergedError, EndError, ReplayStage, Script
+from pyverlet.viewers.presentation import Presentation, Repertoire
+from pyverlet.viewers.replay import DivergedError, EndError, ReplayState, Script
 from pyverlet.viewers.session import Session
 from pyverlet.world.panels import Panel, Panels
 
@@ -42,7 +42,7 @@ DT = 1 / 60
 
 
 def crowd() -> pv.World:
-    """Without bounds, so that the camera follows, and how far hands reach with it."""
+    """Without bounds, so that the camera follows, and how far pointers reach with it."""
     world = pv.World(collisions=pv.Collisions(restitution=0.3, friction=0.3))
     world.obstacles.append(pv.Segment((-20, 0), (20, 0)))
     rng = np.random.default_rng(5)
@@ -54,12 +54,12 @@ def crowd() -> pv.World:
 def session_of(path: Path, commands: list[Any], world: Any = None, **options: Any) -> str:
     """A session in which these are asked for one after the other; the hash at its end."""
     with Journal(path, dt=DT) as journal:
-        session = Session(crowd() if world is None else world, dt=DT, stage=journal.stage, **options)
+        session = Session(crowd() if world is None else world, dt=DT, view_state=journal.view_state, **options)
         for command in (Pause(True), *commands):
             session.submit(command)
             session.turn()
         assert session.latest.status.error is None
-        return session._stage.panels.state_hash()
+        return session._view_state.panels.state_hash()
 
 
 def test_everything_a_mouse_can_do_is_done_again(tmp_path: Path) -> None:
@@ -81,23 +81,32 @@ def test_everything_a_mouse_can_do_is_done_again(tmp_path: Path) -> None:
 
 def test_what_was_done_between_substeps_is_done_there_again(tmp_path: Path) -> None:
     with Journal(tmp_path / "a.pvlog", dt=DT) as journal:
-        stage = journal.stage(Exhibit("crowd", Panels.of(crowd())))
+        view_state = journal.view_state(Presentation("crowd", Panels.of(crowd())))
         looks: list[float] = []
 
-        def onlooker(moment: Any) -> None:
+        def observer(moment: Any) -> None:
             looks.append(moment.time)
             if len(looks) % 5 == 0:
-                stage.do(Drag(0, 0.1 * len(looks), 3.0, 9.0))
+                view_state.do(Drag(0, 0.1 * len(looks), 3.0, 9.0))
             if len(looks) == 23:
-                stage.do(SetGravity(0.0, 3.0))
+                view_state.do(SetGravity(0.0, 3.0))
 
-        stage.do(Drag(0, 0.0, 3.0, 9.0))
+        view_state.do(Drag(0, 0.0, 3.0, 9.0))
         for frame in range(30):
-            stage.look()  # somebody watches now and then, which moves the camera
-            stage.step(DT, onlooker if 5 < frame < 20 else None)
-        end = stage.panels.state_hash()
+            view_state.capture()  # somebody watches now and then, which moves the camera
+            view_state.step(DT, observer if 5 < frame < 20 else None)
+        end = view_state.panels.state_hash()
     lines = [json.loads(line) for line in (tmp_path / "a.pvlog").read_text().splitlines()]
     assert {line.get("substep") for line in lines} > {None, 5}
+    assert Script(tmp_path / "a.pvlog").run()["state_hash"] == end
+
+
+def test_the_format_has_the_field_names_of_older_journals(tmp_path: Path) -> None:
+    end = session_of(tmp_path / "a.pvlog", [Step(2), Drag(7, 0, 3, 9), Step(5), Release(7), Step(3)])
+    lines = [json.loads(line) for line in (tmp_path / "a.pvlog").read_text().splitlines()]
+    kept = [line for line in lines if line.get("do") in ("Drag", "Release")]
+    assert [line["hand"] for line in kept] == [7, 7]
+    assert not any("pointer" in line for line in lines)
     assert Script(tmp_path / "a.pvlog").run()["state_hash"] == end
 
 
@@ -117,12 +126,12 @@ def test_a_world_that_stopped_stops_again(tmp_path: Path) -> None:
     world.add(position=[(0, 0), (0, 9)], mass=1e-9)
     world.forces.append(pv.ConstantForce((1e38, 0)))  # over so small a mass it is infinite in float32
     with Journal(tmp_path / "a.pvlog", dt=DT) as journal:
-        session = Session(world, dt=DT, stage=journal.stage)
+        session = Session(world, dt=DT, view_state=journal.view_state)
         for command in (Pause(True), Step(50), SetGravity(0, 1), Reset(), Step(1)):
             session.submit(command)
             session.turn()
         said = session.latest.status.error
-        end = session._stage.panels.state_hash()
+        end = session._view_state.panels.state_hash()
     done = Script(tmp_path / "a.pvlog").run()
     assert said is not None
     assert done["stopped"] == said
@@ -157,17 +166,17 @@ def test_a_journal_that_was_cut_off_is_gone_through_as_far_as_it_goes(tmp_path: 
 def test_on_the_page_nobody_interferes_and_reset_starts_over(tmp_path: Path) -> None:
     end = session_of(tmp_path / "a.pvlog", [Step(30), SetGravity(2, -5), Step(40)])
     script = Script(tmp_path / "a.pvlog")
-    session = Session(script.open(), dt=script.dt, stage=lambda exhibit: ReplayStage(script, exhibit))
+    session = Session(script.open(), dt=script.dt, view_state=lambda presentation: ReplayState(script, presentation))
     for command in (SetGravity(0, 0), Step(50), Spawn(0, 0, 9), Reset(), Step(70)):
         session.submit(command)
         session.turn()
-    assert session._stage.panels.state_hash() == end
+    assert session._view_state.panels.state_hash() == end
     session.submit(Step(5))
     session.turn()
     assert session.latest.status.error is not None
     assert "the journal ends here, after 70 frames; 2 hashes are as they were" in session.latest.status.error
     with pytest.raises(EndError):
-        session._stage.step(DT)
+        session._view_state.step(DT)
 
 
 @pytest.mark.parametrize(
@@ -198,7 +207,7 @@ def test_bad_use_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[s
     with pytest.raises(pv.InputError, match="cannot be written"):
         Journal(tmp_path / "none" / "a.pvlog", dt=DT)
     with Journal(tmp_path / "a.pvlog", dt=DT) as journal, pytest.raises(pv.InputError, match="pace of their own"):
-        Session(pv.scenes.get("frame-rate").panels(), stage=journal.stage)
+        Session(pv.scenes.get("frame-rate").panels(), view_state=journal.view_state)
 
 
 @pytest.mark.slow
@@ -285,4 +294,4 @@ def test_a_sketch_answers_as_it_did(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         Journal(tmp_path / "b.pvlog", dt=DT) as journal,
         pytest.raises(pv.InputError, match=r"2 worlds of kicks\.py side by side"),
     ):
-        journal.stage(Exhibit("kicks", panels, answers=scene.sketch))
+        journal.view_state(Presentation("kicks", panels, callbacks=scene.sketch))

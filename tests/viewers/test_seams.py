@@ -16,7 +16,7 @@ from playwright.sync_api import Page, expect
 
 import pyverlet as pv
 from pyverlet import record
-from pyverlet.picture import Fixed, across
+from pyverlet.picture import Fixed, periodic_images
 from pyverlet.viewers.protocol import encode_frame
 from pyverlet.viewers.session import Session
 
@@ -43,7 +43,7 @@ def _world(axes: str = "xy") -> pv.World:
 )
 def test_copies(axes: str, wanted: set[tuple[float, float]]) -> None:
     world = _world(axes)
-    owner, place = across.copies(np.array(PLACES), world.radius, world.boundary.seam)
+    owner, place = periodic_images.copies(np.array(PLACES), world.radius, world.boundary.seam)
     assert {tuple(row) for row in np.round(place, 6).tolist()} == wanted
     way = place - np.array(PLACES)[owner]
     period = np.array(world.boundary.seam.period)

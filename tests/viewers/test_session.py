@@ -14,7 +14,7 @@ import pyverlet as pv
 from pyverlet.laws.forces import Push
 from pyverlet.state.slots import Slots
 from pyverlet.viewers.commands import Command, Drag, Pause, Poke, Release, Reset, SetGravity, SetSubsteps, Step
-from pyverlet.viewers.hands import LEASH
+from pyverlet.viewers.pointers import LEASH
 from pyverlet.viewers.session import Session
 
 WaitUntil = Callable[[Callable[[], bool]], None]
@@ -120,7 +120,7 @@ def test_run_steps_in_the_calling_thread_until_stopped(world: pv.World, monkeypa
 
     monkeypatch.setattr(world, "step", spy)
     session = Session(world)
-    session.submit(Poke(hand=1, x=0.0, y=0.5))
+    session.submit(Poke(pointer=1, x=0.0, y=0.5))
     timer = threading.Timer(0.3, session.stop)
     timer.start()
     session.run()
@@ -327,9 +327,9 @@ def test_a_hand_that_is_down_in_a_slow_world_moves_between_substeps(wait_until: 
         session.take(frame)
         if not asked and witness.seen and 0.01 < frame.status.time * 60 - frame.status.frames < 0.6:
             asked.append(world.frames)
-            session.submit(Poke(hand=1, x=7.0, y=0.0))
+            session.submit(Poke(pointer=1, x=7.0, y=0.0))
 
-    session.submit(Poke(hand=1, x=3.0, y=0.0))
+    session.submit(Poke(pointer=1, x=3.0, y=0.0))
     session.subscribe(ask)
     with session:
         wait_until(lambda: bool(asked) and world.frames > asked[0] + 1)
@@ -355,38 +355,38 @@ def test_the_pace_is_that_of_the_wall(wait_until: WaitUntil) -> None:
 
 @pytest.mark.slow
 def test_drag_takes_the_nearest_circle_moves_it_and_lets_go(session: Session, world: pv.World, wait_until: WaitUntil) -> None:
-    session.submit(Drag(hand=1, x=2.3, y=0.9, reach=0.3))  # particle 5 stands at (2, 0.5)
-    session.submit(Drag(hand=1, x=2.0, y=8.0))
+    session.submit(Drag(pointer=1, x=2.3, y=0.9, reach=0.3))  # particle 5 stands at (2, 0.5)
+    session.submit(Drag(pointer=1, x=2.0, y=8.0))
     wait_until(lambda: session.latest.position[5, 1] > 7.0)
     others = np.delete(session.latest.position, 5, axis=0)
     assert others[:, 1].max() < 1.0
-    session.submit(Release(hand=1))
+    session.submit(Release(pointer=1))
     wait_until(lambda: session.latest.position[5, 1] < 1.0)
     assert world.forces == []
 
 
 def test_a_hand_that_missed_stays_empty(paused: Session, world: pv.World, wait_until: WaitUntil) -> None:
-    paused.submit(Drag(hand=1, x=2.0, y=5.0, reach=0.3))
-    paused.submit(Drag(hand=1, x=2.0, y=0.5, reach=0.3))
+    paused.submit(Drag(pointer=1, x=2.0, y=5.0, reach=0.3))
+    paused.submit(Drag(pointer=1, x=2.0, y=0.5, reach=0.3))
     paused.submit(SetSubsteps(7))
     wait_until(lambda: paused.latest.status.substeps == 7)
     assert world.forces == []
 
 
 def test_two_hands_hold_two_circles(paused: Session, world: pv.World, wait_until: WaitUntil) -> None:
-    paused.submit(Drag(hand=1, x=-8.0, y=0.5, reach=0.1))
-    paused.submit(Drag(hand=2, x=8.0, y=0.5, reach=0.1))
+    paused.submit(Drag(pointer=1, x=-8.0, y=0.5, reach=0.1))
+    paused.submit(Drag(pointer=2, x=8.0, y=0.5, reach=0.1))
     paused.submit(SetSubsteps(7))
     wait_until(lambda: paused.latest.status.substeps == 7)
     assert sorted(force.particle for force in world.forces if isinstance(force, pv.forces.Grip)) == [0, 8]
-    paused.submit(Release(hand=1))
-    paused.submit(Release(hand=3))  # never held anything
+    paused.submit(Release(pointer=1))
+    paused.submit(Release(pointer=3))  # never held anything
     wait_until(lambda: len(world.forces) == 1)
 
 
 def test_the_grip_is_leashed(paused: Session, world: pv.World, wait_until: WaitUntil) -> None:
-    paused.submit(Drag(hand=1, x=0.0, y=0.5, reach=0.1))
-    paused.submit(Drag(hand=1, x=0.0, y=19.0))
+    paused.submit(Drag(pointer=1, x=0.0, y=0.5, reach=0.1))
+    paused.submit(Drag(pointer=1, x=0.0, y=19.0))
     frames = paused.latest.status.frames
     paused.submit(Step())
     wait_until(lambda: paused.latest.status.frames == frames + 1)
@@ -398,9 +398,9 @@ def test_the_grip_is_leashed(paused: Session, world: pv.World, wait_until: WaitU
 
 def test_poke_pushes_everything_near_away(session: Session, world: pv.World, wait_until: WaitUntil) -> None:
     start = session.latest.position
-    session.submit(Poke(hand=1, x=1.0, y=0.5))  # between particles 4 and 5
+    session.submit(Poke(pointer=1, x=1.0, y=0.5))  # between particles 4 and 5
     wait_until(lambda: bool(session.latest.position[5, 0] - session.latest.position[4, 0] > 2.5))
-    session.submit(Release(hand=1))
+    session.submit(Release(pointer=1))
     wait_until(lambda: world.forces == [])
     np.testing.assert_allclose(session.latest.position[[0, 8]], start[[0, 8]], atol=0.2)
 
@@ -436,7 +436,7 @@ def test_unsubscribed_listeners_hear_nothing(session: Session, wait_until: WaitU
 def test_stop_gives_the_world_back(world: pv.World) -> None:
     session = Session(world)
     session.start()
-    session.submit(Drag(hand=1, x=0.0, y=0.5, reach=1.0))
+    session.submit(Drag(pointer=1, x=0.0, y=0.5, reach=1.0))
     time.sleep(0.1)
     session.stop()
     session.stop()
@@ -449,7 +449,7 @@ def test_stop_gives_the_world_back(world: pv.World) -> None:
 
 def test_an_empty_world_can_be_watched(wait_until: WaitUntil) -> None:
     with Session(pv.World()) as session:
-        session.submit(Drag(hand=1, x=0.0, y=0.0, reach=1.0))
+        session.submit(Drag(pointer=1, x=0.0, y=0.0, reach=1.0))
         wait_until(lambda: session.latest.status.frames > 3)
     assert session.latest.grid.shape == (0, 2)
 

@@ -11,8 +11,8 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.viewers.commands import Click, Delete, Drag, Key, Pause, Pin, Redo, Release, SetSlider, Spawn, Undo
-from pyverlet.viewers.exhibit import Exhibit
-from pyverlet.viewers.stage import Stage
+from pyverlet.viewers.presentation import Presentation
+from pyverlet.viewers.view_state import ViewState
 
 from .conftest import WaitUntil, nine_circles
 
@@ -73,12 +73,12 @@ def test_draw_keys_click_and_sliders_of_a_program(wait_until: WaitUntil) -> None
     def wrong(world: pv.World, pen: object) -> None:
         raise RuntimeError("no pen")
 
-    from pyverlet.viewers.answers import Functions
     from pyverlet.viewers.session import Session
+    from pyverlet.viewers.user_callbacks import CallbackFunctions
 
-    answers = Functions(draw=wrong, keys=lambda world, key: told.append(key), click=lambda *what: told.append(what[2]))
-    exhibit = Exhibit("mine", pv.Panels.of(world), answers=answers)
-    with Session(exhibit) as session:
+    answers = CallbackFunctions(draw=wrong, keys=lambda world, key: told.append(key), click=lambda *what: told.append(what[2]))
+    presentation = Presentation("mine", pv.Panels.of(world), callbacks=answers)
+    with Session(presentation) as session:
         for command in (Key("a"), Click(0, 1.0, 2.0, "middle"), SetSlider("lift of the test", 99.0)):
             session.submit(command)
         wait_until(lambda: told == ["a", "middle"] and lift.value == 10)
@@ -88,14 +88,14 @@ def test_draw_keys_click_and_sliders_of_a_program(wait_until: WaitUntil) -> None
         now = world.time
         wait_until(lambda: world.time > now)
     with pytest.raises(pv.InputError, match="keys is 3"):
-        Functions(keys=3)  # type: ignore[arg-type]
+        CallbackFunctions(keys=3)  # type: ignore[arg-type]
 
 
 def test_undo_gives_back_every_bit() -> None:
     world = nine_circles()
-    stage = Stage(Exhibit.of(world, "nine"))
+    view_state = ViewState(Presentation.of(world, "nine"))
     for _ in range(5):
-        stage.step(1 / 60)
+        view_state.step(1 / 60)
     x, y = (float(value) for value in world.position[3])
     hashes = [world.state_hash()]
     strokes: list[list[Any]] = [
@@ -106,34 +106,34 @@ def test_undo_gives_back_every_bit() -> None:
     ]
     for stroke in strokes:
         for command in stroke:
-            stage.do(command)
+            view_state.do(command)
         for _ in range(3):
-            stage.step(1 / 60)
-        stage.do(Release(0))
+            view_state.step(1 / 60)
+        view_state.do(Release(0))
         hashes.append(world.state_hash())
-    assert stage.history.depth == (4, 0)
+    assert view_state.history.depth == (4, 0)
     for known in reversed(hashes[:-1]):
-        stage.do(Undo())
+        view_state.do(Undo())
         assert world.state_hash() == known
-    stage.do(Undo())  # there is nothing more
-    assert (world.state_hash(), stage.history.depth) == (hashes[0], (0, 4))
+    view_state.do(Undo())  # there is nothing more
+    assert (world.state_hash(), view_state.history.depth) == (hashes[0], (0, 4))
     for known in hashes[1:]:
-        stage.do(Redo())
+        view_state.do(Redo())
         assert world.state_hash() == known
     # What is done after an undo takes the place of what could be redone; what hits nothing is nothing done.
-    stage.do(Undo())
-    stage.do(Delete(0, 100.0, 100.0, 0.1))
-    assert stage.history.depth == (3, 1)
-    stage.do(Delete(0, 8.0, 0.5, 0.3))
-    assert stage.history.depth == (4, 0)
+    view_state.do(Undo())
+    view_state.do(Delete(0, 100.0, 100.0, 0.1))
+    assert view_state.history.depth == (3, 1)
+    view_state.do(Delete(0, 8.0, 0.5, 0.3))
+    assert view_state.history.depth == (4, 0)
     # It goes on from there as it would have.
     twin = nine_circles()
-    other = Stage(Exhibit.of(twin, "nine"))
+    other = ViewState(Presentation.of(twin, "nine"))
     for _ in range(5):
         other.step(1 / 60)
-    while stage.history.depth[0]:
-        stage.do(Undo())
-    for each in (stage, other):
+    while view_state.history.depth[0]:
+        view_state.do(Undo())
+    for each in (view_state, other):
         for _ in range(20):
             each.step(1 / 60)
     assert world.state_hash() == twin.state_hash()

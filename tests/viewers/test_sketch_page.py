@@ -367,9 +367,9 @@ def test_forces_are_drawn_as_wide_as_they_are(page: Page, sketching: Start) -> N
     page.get_by_test_id("forces").uncheck()
     assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.overlay.forces") == 0)
     page.get_by_test_id("colour").select_option("force")
-    assert comes_true(page, lambda: len({page.evaluate(f"() => window.pyverlet.ink({i})") for i in range(4)}) >= 3)
+    assert comes_true(page, lambda: len({page.evaluate(f"() => window.pyverlet.tint({i})") for i in range(4)}) >= 3)
     page.get_by_test_id("colour").select_option("group")
-    assert comes_true(page, lambda: len({page.evaluate(f"() => window.pyverlet.ink({i} >> 2)") for i in range(4)}) == 1)
+    assert comes_true(page, lambda: len({page.evaluate(f"() => window.pyverlet.tint({i} >> 2)") for i in range(4)}) == 1)
     mine.end()
 
 

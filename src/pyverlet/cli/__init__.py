@@ -24,7 +24,7 @@ INTERRUPTED = 130
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code: 0 done, 2 bad input, 1 failed, 130 interrupted.
 
-    Whatever goes wrong is told in one sentence on standard error. With PYVERLET_TRACEBACK=1 in the environment the
+    Errors are one sentence on standard error. With PYVERLET_TRACEBACK=1 in the environment the
     traceback of an unexpected error comes along.
     """
     loading.done()
@@ -42,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return _complain("interrupted", INTERRUPTED)
     except BrokenPipeError:
-        # Whoever read our output (`| head`) has gone. Python would complain once more when it flushes at exit.
+        # The reader of our output (`| head`) has gone. Python would complain once more when it flushes at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return FAILED
     except MemoryError as error:

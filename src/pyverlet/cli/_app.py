@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -15,7 +15,7 @@ from pyverlet.cli import _check, _sweep
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.cli import _show as show
-from pyverlet.cli._integrators import integrators
+from pyverlet.cli._integrators import integrators, single
 from pyverlet.data.trajectory import Trajectory
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
@@ -35,7 +35,7 @@ pyverlet list                       the other scenes: pyverlet run cloth
 pyverlet new mysketch.py            a scene of your own to start from, 25 lines
 pyverlet run mysketch.py --watch    see it, change it, save: the page follows
 pyverlet --help                     all commands; pyverlet run --help, all options of one"""
-"""What to type next, for whoever has typed nothing."""
+"""What to type next, for those that typed nothing."""
 
 app = typer.Typer(
     name="pyverlet",
@@ -76,20 +76,11 @@ def list_scenes(as_json: options.Json = False) -> None:
 
 
 @app.command()
+@options.with_settings(*options.SETTINGS)
 def run(
     scene: options.SceneName = "cage",
-    particles: options.Particles = None,
-    substeps: options.Substeps = None,
-    integrator: options.IntegratorName = None,
-    restitution: options.Restitution = None,
-    friction: options.Friction = None,
-    radius_spread: options.RadiusSpread = None,
-    seed: options.Seed = None,
-    threads: options.Threads = None,
-    dtype: options.Precision = None,
-    collisions: options.CollisionMethod = None,
-    picture: options.Picture = None,
-    ledger: options.Ledger = False,
+    *,
+    overrides: dict[str, Any],
     dt: options.Dt = DEFAULT_DT,
     seconds: options.Seconds = None,
     frames: options.Frames = None,
@@ -122,36 +113,20 @@ def run(
 
     --seconds, --frames, --json, --trajectory and --plot ask for a run that ends, and imply --headless.
     """
-    overrides = options.overrides(
-        particles=particles,
-        substeps=substeps,
-        restitution=restitution,
-        friction=friction,
-        radius_spread=radius_spread,
-        seed=seed,
-        threads=threads,
-        dtype=dtype,
-        collisions=collisions,
-        picture=picture,
-    )
-    methods = integrators(integrator)
+    typed = overrides.pop("integrator")
+    methods = integrators(typed)
     ends = headless or as_json or plot or trajectory or seconds is not None or frames is not None
     if patience is not None and not watch:
         raise InputError(f"patience is {patience:g}; allowed is none without --watch")
+    what: dict[str, Any] = {"integrators": methods, "overrides": overrides, "dt": dt}
+    page = {"port": DEFAULT_PORT if port is None else port, "open_browser": not no_open}
     if watch:
         if Path(scene).suffix.lower() != sketch.SUFFIX:
             raise InputError(f"watch is asked for with {scene!r}; allowed is a sketch, such as mysketch.py")
         if ends or window or journal:
             raise InputError("watch is asked for with a run that ends, a window or a journal; allowed is the page alone")
-        show.watched(
-            Path(scene),
-            integrators=methods,
-            overrides={**overrides, "ledger": ledger},
-            dt=dt,
-            port=DEFAULT_PORT if port is None else port,
-            open_browser=not no_open,
-            patience=None if patience is None else checks.number("patience", patience, above=0.0),
-        )
+        limit = {} if patience is None else {"time_limit": checks.number("patience", patience, above=0.0)}
+        show.watched(Path(scene), options=page, **what, **limit)
         return
     chosen = scenes.get(scene)
     chosen.settings(**overrides)  # refuse what is wrong before anything starts
@@ -159,30 +134,21 @@ def run(
         raise InputError(f"every is {every}; allowed is none without --trajectory")
     if journal and (ends or window):
         raise InputError(f"journal is '{journal}' for a run without a page; allowed is one with the page")
-    if window and (ends or port is not None or no_open or ledger):
+    if window and (ends or port is not None or no_open or overrides["ledger"]):
         raise InputError("window is asked for together with a run that ends or with options of the page; allowed is one of them")
     if window:
         if len(methods) > 1:
-            raise InputError(f"integrators is {integrator!r}; allowed is one in a window, which shows a single world")
+            raise InputError(f"integrators is {typed!r}; allowed is one in a window, which shows a single world")
         show.window(chosen, chosen.settings(**overrides, integrator=methods[0] if methods else None), dt=dt)
         return
     if not ends:
-        port = DEFAULT_PORT if port is None else port
-        show.page(
-            chosen,
-            integrators=methods,
-            overrides={**overrides, "ledger": ledger},
-            dt=dt,
-            port=port,
-            open_browser=not no_open,
-            journal=journal,
-        )
+        show.page(chosen, options=page, journal=journal, **what)
         return
     if port is not None:
         raise InputError(f"port is {port}; allowed is none, since this run has no live page")
     count = report.frame_count(seconds=seconds, frames=frames, dt=dt, default_seconds=DEFAULT_SECONDS)
     if plot is None:
-        panels = chosen.panels(integrators=methods, **overrides, ledger=ledger)
+        panels = chosen.panels(integrators=methods, **overrides)
         with _kept(panels, trajectory, every) as observe:
             results = [_measure(panel, chosen, count, dt, observe) for panel in panels]
         _tell_all(chosen, panels, results, as_json)
@@ -190,24 +156,17 @@ def run(
     if trajectory:
         raise InputError(f"trajectory is '{trajectory}' and plot is '{plot}'; allowed is one of them")
     if len(methods) > 1:
-        raise InputError(f"integrators is {integrator!r}; allowed is one for plot (several: pyverlet compare)")
-    settings = chosen.settings(**overrides, integrator=methods[0] if methods else None, ledger=ledger)
+        raise InputError(f"integrators is {typed!r}; allowed is one for plot (several: pyverlet compare)")
+    settings = chosen.settings(**overrides, integrator=methods[0] if methods else None)
     _tell(_run_and_plot(chosen, settings, count, dt, plot), as_json)
 
 
 @app.command()
+@options.with_settings(*(name for name in options.SETTINGS if name not in ("picture", "ledger")))
 def bench(
     scene: options.SceneName = "cage",
-    particles: options.Particles = None,
-    substeps: options.Substeps = None,
-    integrator: options.IntegratorName = None,
-    restitution: options.Restitution = None,
-    friction: options.Friction = None,
-    radius_spread: options.RadiusSpread = None,
-    seed: options.Seed = None,
-    threads: options.Threads = None,
-    dtype: options.Precision = None,
-    collisions: options.CollisionMethod = None,
+    *,
+    overrides: dict[str, Any],
     dt: options.Dt = DEFAULT_DT,
     seconds: options.Seconds = None,
     frames: options.Frames = None,
@@ -222,23 +181,9 @@ def bench(
     can be compared.
     """
     chosen = scenes.get(scene)
-    overrides = options.overrides(
-        particles=particles,
-        substeps=substeps,
-        restitution=restitution,
-        friction=friction,
-        radius_spread=radius_spread,
-        seed=seed,
-        threads=threads,
-        dtype=dtype,
-        collisions=collisions,
-    )
     count = report.frame_count(seconds=seconds, frames=frames, dt=dt, default_seconds=DEFAULT_SECONDS)
     warm = report.settle_count(settle, dt)
-    methods = integrators(integrator)
-    if len(methods) > 1:
-        raise InputError(f"integrators is {integrator!r}; allowed is one")
-    world = chosen.world(**overrides, integrator=methods[0] if methods else None)
+    world = chosen.world(**overrides | {"integrator": single(overrides["integrator"])})
     with Progress("settling, frame") as progress:
         for done in range(warm):
             world.step(dt)

@@ -11,11 +11,7 @@ from pyverlet.ground.errors import InputError
 
 
 def imported(option: str, path: str, allowed: str) -> Any:
-    """The object at the path; `option` and `allowed` are for the sentence that says what is wrong.
-
-    Raises:
-        InputError: there is no such module, or it has no such name.
-    """
+    """The object at the path; `option` and `allowed` are for the sentence of the InputError if there is none."""
     module_name, _, attribute = path.partition(":")
     if not all(part.isidentifier() for part in (*module_name.split("."), attribute)):
         raise InputError(f"{option} is {path!r}; {allowed}")

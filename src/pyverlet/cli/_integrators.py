@@ -11,11 +11,7 @@ from pyverlet.laws.integrators import BY_NAME, Integrator
 
 
 def integrators(names: str | None) -> tuple[Integrator, ...]:
-    """The integrators in a list with commas; none for None.
-
-    Raises:
-        InputError: one is unknown, or given twice.
-    """
+    """The integrators in a list with commas; none for None. InputError if one is unknown, or given twice."""
     if names is None:
         return ()
     found = tuple(integrator(name.strip()) for name in names.split(","))
@@ -23,6 +19,14 @@ def integrators(names: str | None) -> tuple[Integrator, ...]:
     if twice := [label for label in labels if labels.count(label) > 1]:
         raise InputError(f"integrators names {twice[0]!r} twice; allowed is each once")
     return found
+
+
+def single(name: str | None) -> Integrator | None:
+    """The integrator of this name; None for None. InputError if it is unknown, or there are several."""
+    found = integrators(name)
+    if len(found) > 1:
+        raise InputError(f"integrator is {name!r}; allowed is one")
+    return found[0] if found else None
 
 
 def integrator(name: str) -> Integrator:

@@ -155,7 +155,7 @@ def _problems(path: str | None) -> list[Any]:
 
 @contextmanager
 def _own(problem: str | None) -> Iterator[None]:
-    """What goes wrong in a problem of the user's own is said in a sentence."""
+    """What goes wrong in a problem of the user's own becomes a sentence."""
     try:
         yield
     except PyverletError:

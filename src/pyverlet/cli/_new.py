@@ -11,6 +11,7 @@ import typer
 from pyverlet.cli import _print as out
 from pyverlet.cli._app import app
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.outside import file_errors
 from pyverlet.scenes.sketch import SUFFIX
 
 __all__ = ["app"]
@@ -27,11 +28,8 @@ def new(
     if path.suffix.lower() != SUFFIX or not path.stem.isidentifier():
         raise InputError(f"path is '{path}'; allowed is a name such as mysketch.py")
     text = (resources.files("pyverlet.cli") / "sketches" / f"{kind}.txt").read_text(encoding="utf-8")
-    try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text.replace("NAME", path.name))
-    except FileExistsError:
-        raise InputError(f"path is '{path}', which is there already; allowed is a new name") from None
-    except OSError as error:
-        raise InputError(f"path is '{path}', which cannot be written: {error.strerror or error}") from None
+    if path.exists():
+        raise InputError(f"path is '{path}', which is there already; allowed is a new name")
+    with file_errors("path", path, "written"), path.open("x", encoding="utf-8") as file:
+        file.write(text.replace("NAME", path.name))
     out.note(f"wrote '{path}'; now: pyverlet run {path} --watch")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -82,7 +83,7 @@ Seconds = Annotated[float | None, typer.Option(parser=real, help="Simulated seco
 Frames = Annotated[
     int | None, typer.Option(parser=whole, help="Frames to run, in place of --seconds.", metavar="N", show_default=False)
 ]
-Look = Annotated[ThemeName, typer.Option("--theme", help="Behind the circles.")]
+ThemeOption = Annotated[ThemeName, typer.Option("--theme", help="Behind the circles.")]
 Size = Annotated[str | None, typer.Option(help="Width and height in pixels.", metavar="WxH", show_default="1280x720")]
 Picture = Annotated[
     Path | None,
@@ -105,29 +106,48 @@ THEMES: dict[ThemeName, Theme] = {"dark": DARK, "light": LIGHT}
 METHODS: dict[Method, Any] = {"fast": Fast(), "brute": BruteForce(), "none": False}
 
 
-def overrides(
-    *,
-    particles: int | None,
-    substeps: int | None,
-    restitution: float | None,
-    friction: float | None,
-    radius_spread: float | None,
-    seed: int | None,
-    threads: int | None,
-    dtype: DType | None,
-    collisions: Method | None,
-    picture: Path | None = None,
-) -> dict[str, Any]:
-    """What the user gave in place of a scene's defaults, as `Scene.settings` takes it; None where nothing was given."""
-    return {
-        "particles": particles,
-        "substeps": substeps,
-        "restitution": restitution,
-        "friction": friction,
-        "radius_spread": radius_spread,
-        "seed": seed,
-        "threads": threads,
-        "dtype": None if dtype is None else {"float32": np.float32, "float64": np.float64}[dtype],
-        "collisions": None if collisions is None else METHODS[collisions],
-        "picture": picture,
-    }
+SETTINGS: dict[str, Any] = {
+    "particles": Particles,
+    "substeps": Substeps,
+    "integrator": IntegratorName,
+    "restitution": Restitution,
+    "friction": Friction,
+    "radius_spread": RadiusSpread,
+    "seed": Seed,
+    "threads": Threads,
+    "dtype": Precision,
+    "collisions": CollisionMethod,
+    "picture": Picture,
+    "ledger": Ledger,
+}
+"""Options of commands that build a scene: what the user gives in place of the scene's defaults."""
+
+
+def with_settings(*names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Decorator: the command has these of SETTINGS as options, and gets them as its argument `overrides`.
+
+    That is a dictionary as `Scene.settings` takes it, None where nothing was given, but for `integrator`: as it was typed.
+    """
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        parameters: list[inspect.Parameter] = []
+        for own in inspect.signature(command, eval_str=True).parameters.values():
+            shared = [
+                own.replace(name=name, annotation=SETTINGS[name], default=False if name == "ledger" else None) for name in names
+            ]
+            parameters += shared if own.name == "overrides" else [own]
+
+        def called(**given: Any) -> None:
+            overrides = {name: given.pop(name) for name in names}
+            if overrides.get("dtype") is not None:
+                overrides["dtype"] = np.dtype(overrides["dtype"]).type
+            if overrides.get("collisions") is not None:
+                overrides["collisions"] = METHODS[overrides["collisions"]]
+            command(**given, overrides=overrides)
+
+        called.__name__, called.__doc__ = command.__name__, command.__doc__
+        setattr(called, "__signature__", inspect.Signature(parameters))  # noqa: B010  (typer reads it)
+        called.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+        return called
+
+    return decorate

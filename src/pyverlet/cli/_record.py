@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -12,8 +12,7 @@ from pyverlet import scenes
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.cli._app import app
-from pyverlet.cli._integrators import integrators
-from pyverlet.ground.errors import InputError
+from pyverlet.cli._integrators import single
 from pyverlet.ground.progress import Progress
 from pyverlet.picture import Fixed
 
@@ -21,6 +20,7 @@ DEFAULT_SECONDS = 10.0
 
 
 @app.command()
+@options.with_settings(*(name for name in options.SETTINGS if name != "ledger"))
 def record(
     scene: options.SceneName,
     path: Annotated[
@@ -38,18 +38,9 @@ def record(
         options.ColourName | None,
         typer.Option(help="What the colours of the circles say.", show_default="origin, or the scene's"),
     ] = None,
-    theme: options.Look = "dark",
-    particles: options.Particles = None,
-    substeps: options.Substeps = None,
-    integrator: options.IntegratorName = None,
-    restitution: options.Restitution = None,
-    friction: options.Friction = None,
-    radius_spread: options.RadiusSpread = None,
-    seed: options.Seed = None,
-    threads: options.Threads = None,
-    dtype: options.Precision = None,
-    collisions: options.CollisionMethod = None,
-    picture: options.Picture = None,
+    theme: options.ThemeOption = "dark",
+    *,
+    overrides: dict[str, Any],
 ) -> None:
     """Record a scene as a film (.mp4, .gif, .webp), a page that plays it (.html), numbered pictures (frame-{:04d}.png), or its
     last moment (.png).
@@ -57,22 +48,7 @@ def record(
     Needs no screen. The same command gives the same pictures. Ctrl-C keeps what was recorded until then.
     """
     chosen = scenes.get(scene)
-    methods = integrators(integrator)
-    if len(methods) > 1:
-        raise InputError(f"integrator is {integrator!r}; allowed is one")
-    overrides = options.overrides(
-        particles=particles,
-        substeps=substeps,
-        restitution=restitution,
-        friction=friction,
-        radius_spread=radius_spread,
-        seed=seed,
-        threads=threads,
-        dtype=dtype,
-        collisions=collisions,
-        picture=picture,
-    )
-    settings = chosen.settings(**overrides, integrator=methods[0] if methods else None)
+    settings = chosen.settings(**overrides | {"integrator": single(overrides["integrator"])})
     show = chosen.show
     if seconds is None:
         seconds = show.seconds(settings) if show.seconds else DEFAULT_SECONDS

@@ -33,22 +33,22 @@ def replay(
     --json implies --headless. The exit code is 1 where a hash differs.
     """
     from pyverlet.viewers import serve
-    from pyverlet.viewers.exhibit import Exhibit
-    from pyverlet.viewers.replay import ReplayStage, Script
+    from pyverlet.viewers.presentation import Presentation
+    from pyverlet.viewers.replay import ReplayState, Script
 
     script = Script(path)
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         first = script.open()
-    for warning in told:
+    for warning in caught:
         out.note(f"note: {warning.message}")
     if not (headless or as_json):
 
-        def stage(exhibit: Exhibit) -> ReplayStage:
-            return ReplayStage(script, exhibit)
+        def view_state(presentation: Presentation) -> ReplayState:
+            return ReplayState(script, presentation)
 
         port = DEFAULT_PORT if port is None else port
-        serve(lambda: first, scene_name=first.title, port=port, open_browser=not no_open, dt=script.dt, stage=stage)
+        serve(lambda: first, scene_name=first.title, port=port, open_browser=not no_open, dt=script.dt, view_state=view_state)
         return
     if port is not None or no_open:
         raise InputError("port or no-open is given for a replay without a page; allowed is none of them")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -41,31 +41,17 @@ def check(path: SceneFile, as_json: options.Json = False) -> None:
 
 
 @scene_app.command()
+@options.with_settings("particles", "radius_spread", "restitution", "friction", "seed", "dtype")
 def freeze(
     scene: options.SceneName,
     path: Annotated[Path, typer.Argument(metavar="FILE", help="To write, .toml or .json; arrays go into a .npz beside it.")],
-    particles: options.Particles = None,
-    radius_spread: options.RadiusSpread = None,
-    restitution: options.Restitution = None,
-    friction: options.Friction = None,
-    seed: options.Seed = None,
-    dtype: options.Precision = None,
+    *,
+    overrides: dict[str, Any],
 ) -> None:
     """Write the start of a scene as numbers: the same in every version, whatever a later one would draw by chance."""
     chosen = scenes.get(scene)
     if path.resolve() == Path(scene).resolve():
         raise InputError(f"path is '{path}', the very scene that is read; allowed is another name")
-    overrides = options.overrides(
-        particles=particles,
-        substeps=None,
-        restitution=restitution,
-        friction=friction,
-        radius_spread=radius_spread,
-        seed=seed,
-        threads=None,
-        dtype=dtype,
-        collisions=None,
-    )
     chosen.freeze(path, **overrides)
     out.note(f"wrote '{path}' and '{path.with_suffix('.npz')}'")
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pyverlet.cli import _print as out
-from pyverlet.ground.patience import Patience
 from pyverlet.ground.progress import Progress
+from pyverlet.ground.time_limit import TimeLimit
 from pyverlet.laws.integrators import Integrator
 from pyverlet.scenes import SCENES, Scene, Settings
 from pyverlet.scenes.sketch import Sketch
@@ -26,58 +26,43 @@ def page(
     integrators: Sequence[Integrator],
     overrides: Mapping[str, Any],
     dt: float,
-    port: int,
-    open_browser: bool,
     journal: Path | None,
+    options: Mapping[str, Any],
 ) -> None:
     """Show the scene on the live page until Ctrl-C, and keep what happens there in a journal if one is asked for."""
     if scene.sketch is not None:
-        scene.sketch.patience = Patience()  # a screen waits for what is called with each picture
+        scene.sketch.time_limit = TimeLimit()  # a screen waits for what is called with each picture
     from pyverlet.viewers import serve
-    from pyverlet.viewers.exhibit import Exhibit, Repertoire
+    from pyverlet.viewers.journal import Journal
+    from pyverlet.viewers.presentation import Presentation, Repertoire
 
     SCENES.setdefault(scene.name, scene)  # one from a file may be picked on the page like the others
     repertoire = Repertoire(scene, dt=dt, integrators=integrators, overrides=overrides)
 
-    def build() -> Exhibit:
+    def build() -> Presentation:
         with Progress("where each circle ends") as progress:
             return repertoire.open(progress)
 
-    options: dict[str, Any] = {"repertoire": repertoire, "port": port, "open_browser": open_browser, "dt": dt}
     if journal is None:
-        serve(build, scene_name=scene.name, **options)
+        serve(build, scene_name=scene.name, repertoire=repertoire, dt=dt, **options)
         return
-    from pyverlet.viewers.journal import Journal
-
     with Journal(journal, dt=dt) as kept:
-        serve(build, scene_name=scene.name, stage=kept.stage, **options)
+        serve(build, scene_name=scene.name, repertoire=repertoire, dt=dt, view_state=kept.view_state, **options)
     out.note(f"'{journal}' holds {kept.frame:,} frames: pyverlet replay '{journal}'")
 
 
-def watched(
-    path: Path,
-    *,
-    integrators: Sequence[Integrator],
-    overrides: Mapping[str, Any],
-    dt: float,
-    port: int,
-    open_browser: bool,
-    patience: float | None,
-) -> None:
-    """Show a sketch on the live page until Ctrl-C, and build it anew whenever it is saved."""
+def watched(path: Path, *, dt: float, options: Mapping[str, Any], **build: Any) -> None:
+    """Show a sketch on the live page until Ctrl-C, and build it anew whenever it is saved; `build`: as for `SketchBuilder`."""
     from pyverlet.viewers import serve
-    from pyverlet.viewers.watching import PATIENCE_S, Watcher, Workshop
+    from pyverlet.viewers.watching import SketchBuilder, Watcher
 
-    workshop = Workshop(
-        path, dt=dt, integrators=integrators, overrides=overrides, patience=PATIENCE_S if patience is None else patience
-    )
-    Sketch.read(path)  # one that is not there is told here, not on a page
+    builder = SketchBuilder(path, dt=dt, **build)
+    Sketch.read(path)  # a missing one is an error here, not on a page
 
     def beside(session: Session) -> AbstractContextManager[None]:
-        return Watcher(workshop, session).at_work()
+        return Watcher(builder, session).at_work()
 
-    options: dict[str, Any] = {"port": port, "open_browser": open_browser, "dt": dt, "beside": beside}
-    serve(workshop.first, scene_name=path.stem, **options)
+    serve(builder.first, scene_name=path.stem, dt=dt, beside=beside, **options)
 
 
 def window(scene: Scene, settings: Settings, *, dt: float) -> None:

@@ -15,11 +15,10 @@ from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.cli._imported import imported
 from pyverlet.cli._integrators import integrator
-from pyverlet.data.sweep import Measure, Status, Study
+from pyverlet.data.sweep import Measure, Status, Study, open_study
 from pyverlet.data.sweep import sweep as make
-from pyverlet.data.sweep_open import open_study
 from pyverlet.ground.errors import InputError
-from pyverlet.ground.patience import Patience
+from pyverlet.ground.time_limit import TimeLimit
 from pyverlet.viewers import DEFAULT_PORT
 
 FAILED = 1
@@ -113,15 +112,15 @@ def show_world(
 ) -> None:
     """Show the world of a run on the live page, from its start."""
     from pyverlet.viewers import serve
-    from pyverlet.viewers.exhibit import Exhibit
+    from pyverlet.viewers.presentation import Presentation
 
     study = open_study(folder)
 
-    def build() -> Exhibit:
-        return replace(Exhibit.of(study.world(number), f"{study.scene.name}, run {number}"), answers=study.scene.sketch)
+    def build() -> Presentation:
+        return replace(Presentation.of(study.world(number), f"{study.scene.name}, run {number}"), callbacks=study.scene.sketch)
 
     if study.scene.sketch is not None:
-        study.scene.sketch.patience = Patience()  # a screen waits for what is called with each picture
+        study.scene.sketch.time_limit = TimeLimit()  # a screen waits for what is called with each picture
     serve(build, scene_name=study.scene.name, port=port, open_browser=not no_browser)
 
 

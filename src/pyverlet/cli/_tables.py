@@ -57,7 +57,7 @@ def check_pressure(
     as_json: options.Json = False,
 ) -> None:
     """What an elastic gas loses of its pressure, and how far circles overlap, when they move by much in a substep."""
-    checks.number("seconds", seconds, least=1.0)  # before, hardly anybody has met a wall
+    checks.number("seconds", seconds, least=1.0)  # before, few circles have met a wall
     with Progress("run") as progress:
         found = pressure.table(seconds=seconds, progress=progress)
     _tell(found, markdown=markdown, as_json=as_json)

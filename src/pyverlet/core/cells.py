@@ -2,9 +2,10 @@
 """Particles sorted by cell: nested grids, each with cells half as large as those of the one before.
 
 A circle stands in the smallest cells that its diameter and the skin fit into. Very few that are much larger than all others
-(`bulk` and up), and a few that get farther in a substep than the skin, stand in no cell. Rows of cells follow each other along v, columns along u; u and v are x and y, or y and x in
-rooms that are much longer than high. Columns are a third as wide as rows are high, so that the neighbours of a circle, which
-stand together along a row, are cut out more closely. In a periodic room the last row, or column, is followed by the first.
+(`bulk` and up), and a few that get farther in a substep than the skin, stand in no cell. Rows of cells follow each other along
+v, columns along u; u and v are x and y, or y and x in rooms that are much longer than high. Columns are a third as wide as rows
+are high, so that the neighbours of a circle, which stand together along a row, are cut out more closely. In a periodic room the
+last row, or column, is followed by the first.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ Cells = cython.struct(
     skin=real,  # rims that are nearer are listed, m
     velocity=cython.pointer(real),  # m/s, of particle i at stride * i
     stride=cython.Py_ssize_t,
-    pace=real,  # seconds at that velocity by which particles may come nearer while a list lasts; 0: all by less than half the skin
+    pace=real,  # seconds at that velocity that a list has to last; 0: no particle gets farther than half the skin
     farthest=real,  # reach in a periodic room, m: a pair may be near on one side only
     # ---- the grids
     swapped=cython.int,  # 1: u is y

@@ -53,7 +53,8 @@ def fast_ones(
     """Those of the pairs from k on that meet in this substep, and bounce.
 
     They have restitution or friction or, the first time in a substep, come from so far that normals would turn before they touch;
-    meet faster than contacts at rest, and than what their contact has borne lately is worth; were apart a substep ago; and would meet without the impulses of contacts, too: what only these push together carries load.
+    meet faster than contacts at rest, and than what their contact has borne lately is worth; were apart a substep ago; and would
+    meet without the impulses of contacts, too: what only these push together carries load.
     """
     rest: lanes = spread(-w.least_bounce)
     # Who comes to touch at the very end of the substep is left to the next: a spring would stop it, for a rounding of the depth.

@@ -1,7 +1,7 @@
 """Named arrays and a table in one file: npz without pickles, and the table in it as JSON.
 
 `numpy.load` reads it, too. Arrays are stored as they are, but for four kinds: rows that are all alike stand there once, numbers
-that count up are told by the first, of arrays that are equal to others only the name is kept, and where few rows differ each of
+that count up are stored by the first, of arrays that are equal to others only the name is kept, and where few rows differ each of
 these stands there once, beside numbers that say which it is. The table's `arrays` tells how each is stored.
 Nothing is allocated before it is known that the file is large enough for it, and nothing used before its checksum is right.
 """
@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import cut
 
 Array = NDArray[Any]
 
@@ -232,4 +233,4 @@ def _member(archive: zipfile.ZipFile, name: str, shape: tuple[int, ...], dtype: 
 
 def _brief(error: BaseException) -> str:
     text = " ".join(str(error).split()) or type(error).__name__
-    return text if len(text) <= 100 else f"{text[:97]}..."
+    return cut(text, 100)

@@ -2,7 +2,7 @@
 
 A description names a class of ours by `type`, and its arguments by the names they have there; what has changed since it was built
 is under `state`. Rooms, collisions, integrators, forces, obstacles and actors are all there is; links are in `describe_links`.
-Of an object of a user's own class it says only `{"object": name}`: whoever builds hands such objects in, and nothing is ever
+Of an object of a user's own class it says only `{"object": name}`: the caller passes such objects in, and nothing is ever
 imported because a file says so.
 """
 
@@ -15,11 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.data import memory
+from pyverlet.data import serialize
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.fields import Field
 from pyverlet.ground.guess import did_you_mean
+from pyverlet.ground.shown import cut
 from pyverlet.laws import forces, integrators, naive, obstacles, rooms
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
 from pyverlet.scenes.boids import Flock
@@ -228,7 +229,7 @@ _kind(Sink, "region", "outside", state=lambda sink: {"removed": sink.removed}, r
 def describe(thing: Any) -> Description:
     """Describe a room, collisions, an integrator, a force, an obstacle or an actor.
 
-    Values are numbers, text, lists, further descriptions and NumPy arrays; `memory.plain` makes lists of the arrays, too.
+    Values are numbers, text, lists, further descriptions and NumPy arrays; `serialize.plain` makes lists of the arrays, too.
 
     Raises:
         InputError: an object of a user's own class remembers what a description cannot hold.
@@ -251,7 +252,7 @@ def _value(value: Any) -> Any:
         return {"first": value._first, "count": value._added}
     if type(value).__name__ in KINDS:
         return describe(value)
-    return memory.pack(list(value) if isinstance(value, tuple) else value)
+    return serialize.pack(list(value) if isinstance(value, tuple) else value)
 
 
 def _own(thing: Any) -> Description:
@@ -260,7 +261,7 @@ def _own(thing: Any) -> Description:
         kept = thing.save()
         if kept is not None:
             try:
-                description[STATE] = memory.pack(kept)
+                description[STATE] = serialize.pack(kept)
             except InputError as error:
                 raise InputError(f"what {description[OBJECT]}.save() returns cannot be kept: {error}") from None
     return description
@@ -310,7 +311,7 @@ class Builder:
         with _one_sentence(name):
             values = {key: self._argument(f"{name}: {key}", key, value) for key, value in arguments.items()}
             thing = kind.cls(**values)
-            kind.recall(thing, memory.unpack(description.get(STATE, {})))
+            kind.recall(thing, serialize.unpack(description.get(STATE, {})))
             return thing
 
     def _argument(self, name: str, key: str, value: Any) -> Any:
@@ -318,7 +319,7 @@ class Builder:
             return None if value is None else self._group(name, value)
         if isinstance(value, Mapping) and (TYPE in value or OBJECT in value):
             return self.build(name, value, object)
-        value = memory.unpack(value)
+        value = serialize.unpack(value)
         return tuple(value) if isinstance(value, list) and not any(isinstance(part, list) for part in value) else value
 
     def _group(self, name: str, value: Any) -> Group:
@@ -327,7 +328,7 @@ class Builder:
         if self.world is None:
             raise InputError(f"{name} is {_brief(value)}; allowed is none where there is no world")
         if "numbers" in value:
-            numbers = np.asarray(memory.unpack(value["numbers"]))
+            numbers = np.asarray(serialize.unpack(value["numbers"]))
             Field(np.int64, "numbers", least=0, most=2**31).check(f"{name}: numbers", numbers, self.world.dtype, {})
             return Picked(self.world._state, numbers, self.world.remove)
         first, count = checks.whole("first", value["first"], least=0), checks.whole("count", value["count"], least=0)
@@ -343,7 +344,7 @@ class Builder:
             raise InputError(f"{name} is of a class of your own, {wanted!r}; allowed is a file whose `objects` are handed in")
         if isinstance(thing, Actor) and STATE in description:
             with _one_sentence(name):
-                thing.restore(memory.unpack(description[STATE]))
+                thing.restore(serialize.unpack(description[STATE]))
         return thing
 
 
@@ -376,10 +377,4 @@ def _nearest(name: str, known: tuple[str, ...]) -> str:
 
 
 def _brief(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
-
-
-def build(name: str, description: Any, wanted: Any, *, objects: Iterable[Any] = ()) -> Any:
-    """As `Builder.build`, for a thing that names no group."""
-    return Builder(objects).build(name, description, wanted)
+    return cut(repr(value))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.data import memory
+from pyverlet.data import serialize
 from pyverlet.data.describe import OBJECT, STATE, TYPE
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.fields import Field
@@ -53,11 +53,7 @@ _MOVING = {
 
 
 def describe(world: World) -> list[dict[str, Any]]:
-    """A table for each link of a world, in their order; `strength` is what it breaks at, N or N m.
-
-    Raises:
-        InputError: one is of a class that derives from none of ours.
-    """
+    """A table for each link of a world, in their order; `strength` is what it breaks at, N or N m."""
     return [_described(link) for link in world.links]
 
 
@@ -81,12 +77,7 @@ def _kind_of(cls: type) -> type:
 
 
 def build(world: World, tables: Any, objects: Iterable[Any] = ()) -> None:
-    """Append to a world the links that these tables describe; columns are arrays.
-
-    Args:
-        world: one that has their particles.
-        tables: what `describe` returned.
-        objects: a user's own classes of links.
+    """Append to a world the links of tables that `describe` returned; `objects`: a user's own classes of links.
 
     Raises:
         InputError: a table lacks something, or a number is outside what is allowed.
@@ -137,7 +128,7 @@ def _append(world: World, name: str, table: dict[str, Any], own: dict[str, type]
 
 
 def _column(name: str, key: str, table: dict[str, Any], field: Field, world: World, sizes: dict[str, int]) -> Any:
-    column = memory.unpack(table[key])
+    column = serialize.unpack(table[key])
     if not isinstance(column, np.ndarray):
         raise InputError(f"{name}: {key} is {column!r}; allowed is an array")
     field.check(f"{name}: {key}", column, world.dtype, sizes)

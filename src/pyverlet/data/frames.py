@@ -53,6 +53,23 @@ class Frame:
         return cls(float(world.time), *columns, world.state_hash())
 
 
+class Column:
+    """A read-only array of an object, documented by its text: what the object's `_column(name)` returns."""
+
+    def __init__(self, doc: str) -> None:
+        self.__doc__ = doc
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, owner: Any, kind: type) -> Array:
+        array: Any = self if owner is None else owner._column(self._name)
+        return array  # type: ignore[no-any-return]
+
+    def __set__(self, owner: Any, value: Any) -> None:
+        raise AttributeError(f"{self._name} of {type(owner).__name__} cannot be replaced; allowed is to read it")
+
+
 class Writer(ABC):
     """Appends moments to a new file. What `add` has written can be read whatever happens to this program afterwards."""
 
@@ -66,8 +83,7 @@ class Writer(ABC):
         """Append a moment. Raises OSError where the disk does not take it."""
 
     @abstractmethod
-    def close(self) -> None:
-        """Close the file."""
+    def close(self) -> None: ...
 
 
 class Reader(ABC):
@@ -87,8 +103,7 @@ class Reader(ABC):
         """Moment k, from 0."""
 
     @abstractmethod
-    def close(self) -> None:
-        """Close the file."""
+    def close(self) -> None: ...
 
 
 class Walls:

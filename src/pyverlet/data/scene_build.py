@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.data import describe_links, memory
+from pyverlet.data import describe_links, serialize
+from pyverlet.data.atomic_file import replacing
 from pyverlet.data.describe import Builder, describe
-from pyverlet.data.durable import replacing
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
+from pyverlet.ground.outside import file_errors
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
 from pyverlet.laws.integrators import Integrator, PositionVerlet
 from pyverlet.laws.links import Angle, AngleLimit, Area, Motor, Pin, Rope, Spring, Stick
@@ -42,12 +43,7 @@ _COMMON = ("velocity", "spin", "restitution", "friction", *LATER, "category", "m
 
 
 class Recipe:
-    """Builds the world of a document that was validated.
-
-    Args:
-        document: its keys as in the file.
-        path: of the file, for errors, and to find what lies beside it.
-    """
+    """Builds the world of a validated document, read from the file at `path`."""
 
     def __init__(self, document: Table, path: Path) -> None:
         self._document, self._path = document, path
@@ -103,10 +99,8 @@ class Recipe:
 
     def _read_beside(self, name: str) -> bytes:
         beside = self._beside(name)
-        try:
+        with file_errors("file", beside, "read"):
             return beside.read_bytes()
-        except OSError as error:
-            raise InputError(f"file is '{beside}', which cannot be read: {error.strerror or error}") from None
 
     # ---- settings ------------------------------------------------------------------------------------------------------
 
@@ -130,7 +124,7 @@ class Recipe:
         """The other way round."""
         if settings.picture is not None:
             raise InputError(f"picture is '{settings.picture}'; allowed in a scene file is none")
-        found: Table = memory.plain(
+        found: Table = serialize.plain(
             {
                 "particles": settings.particles,
                 "substeps": settings.substeps,
@@ -340,9 +334,9 @@ def _columns(table: Table) -> Table:
     """The lists of a frozen link as arrays again."""
     state = {
         key: np.array(value, np.uint8 if key == "intact" else float)
-        for key, value in memory.unpack(table.get("state", {})).items()
+        for key, value in serialize.unpack(table.get("state", {})).items()
     }
-    found = {key: np.array(value, float) if isinstance(value, list) else value for key, value in memory.unpack(table).items()}
+    found = {key: np.array(value, float) if isinstance(value, list) else value for key, value in serialize.unpack(table).items()}
     particles = np.array(table.get("particles"), np.int64)
     return found | {"particles": particles, "state": state}
 

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import importlib.util
+import io
 import json
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from pyverlet import scenes
-from pyverlet.data import toml
-from pyverlet.data.durable import replacing
-from pyverlet.data.scene_build import Recipe
-from pyverlet.data.scene_freeze import freeze
+from pyverlet.data import describe_links, serialize, toml
+from pyverlet.data.atomic_file import replacing
+from pyverlet.data.describe import OBJECT, describe
+from pyverlet.data.scene_build import COLUMNS, Recipe, Table, hash_of
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
+from pyverlet.ground.shown import cut
 from pyverlet.scenes import Scene, Settings
 from pyverlet.scenes._scene import Show
+from pyverlet.world.world import World
 
 SUFFIXES = (".toml", ".json")
 
@@ -112,6 +117,65 @@ def schema() -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | found | {"title": "pyverlet scene"}
 
 
+def freeze(world: World, path: Path) -> Table:
+    """What a document says about a world at its start, whose arrays go into a file beside `path`.
+
+    Raises:
+        InputError: there are objects of a user's own class in it, or arrays of the user's own, which no such file can hold.
+    """
+    if world.data:
+        raise InputError(
+            f"world.data has {next(iter(world.data))!r}; allowed in scene files are no arrays, which pyverlet.save keeps"
+        )
+    arrays: dict[str, Any] = {}
+    groups, number = [], world.group_number
+    beside = path.with_suffix(".npz")
+    for k in np.unique(number):
+        name = f"group{k}"
+        arrays |= {f"{name}.{key}": getattr(world, key)[number == k] for key in COLUMNS}
+        groups.append({"type": "arrays", "name": name, "file": beside.name, "hash": ""})
+    tables = {
+        "world": {
+            "gravity": list(world.gravity),
+            "integrator": describe(world.integrator),
+            "substeps": world.substeps,
+            "dtype": world.dtype.name,
+            "ledger": world.keeps_ledger,
+            "events": world.tells_events,
+            "sleep": world._sleep is not None,
+        },
+        "room": describe(world.boundary),
+        "collisions": False if world.collisions is None else describe(world.collisions),
+        "joined": describe_links.describe(world),
+        "forces": [_grouped(describe(force), world) for force in world.forces],
+        "obstacles": [describe(obstacle) for obstacle in world.obstacles],
+        "actors": [describe(actor) for actor in world.actors],
+        "start_hash": world.state_hash(),
+    }
+    for key, value in tables.items():
+        for table in value if isinstance(value, list) else [value]:
+            if isinstance(table, dict) and OBJECT in table:
+                raise InputError(
+                    f"{key} has an object of a class of your own, {table[OBJECT]!r}; allowed in a file are pyverlet's"
+                )
+    content = io.BytesIO()
+    np.savez(content, **arrays)
+    for group in groups:
+        group["hash"] = hash_of(content.getvalue())
+    with replacing(beside) as file:
+        file.write(content.getvalue())
+    found: Table = serialize.plain(tables)
+    return {"groups": groups} | {key: value for key, value in found.items() if value != []}
+
+
+def _grouped(force: Table, world: World) -> Table:
+    """A force on a group, by the name that the group has in the file."""
+    group = force.get("group")
+    if not isinstance(group, dict):
+        return {key: value for key, value in force.items() if value is not None}
+    return force | {"group": f"group{np.searchsorted(world._state.begun, group['first'], side='right') - 1}"}
+
+
 # ---- reading -----------------------------------------------------------------------------------------------------------
 
 
@@ -180,9 +244,8 @@ def _sentence(errors: list[Any], models: Any) -> str:
         return f"{where} has the type {given!r}{did_you_mean(given, tags, alike=0.4)}; allowed are {', '.join(tags)}"
     if error["type"] == "union_tag_not_found":
         return f"{where} lacks 'type'"
-    given = repr(error["input"])
     said = error["msg"][0].lower() + error["msg"][1:]
-    return f"{where} is {given if len(given) <= 60 else given[:57] + '...'}; {said}"
+    return f"{where} is {cut(repr(error['input']))}; {said}"
 
 
 def _path(loc: tuple[Any, ...], models: Any) -> str:

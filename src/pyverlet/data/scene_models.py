@@ -37,7 +37,7 @@ class Part(BaseModel):
 
 
 MODELS: dict[str, type[BaseModel]] = {}
-"""By the `type` of a table, for who looks for the nearest key."""
+"""By the `type` of a table, to suggest the nearest key."""
 
 
 def _named(name: str, fields: dict[str, Any], doc: str | None) -> type[BaseModel]:
@@ -99,7 +99,7 @@ def _fields(what: Callable[..., Any], *, skip: tuple[str, ...] = ()) -> dict[str
         if default is parameter.empty:
             fields[name] = (kind, ...)
         elif isinstance(default, int | float | tuple | str | None):
-            # Infinity is said by leaving the key out: JSON has none.
+            # Infinity is the absence of the key: JSON has none.
             fields[name] = (kind, default) if default not in (float("inf"),) else (kind | None, None)
         else:
             fields[name] = (kind, None)

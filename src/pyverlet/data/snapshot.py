@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.core.sources import sources_hash
-from pyverlet.data import archive, describe_links, memory, own_arrays
+from pyverlet.data import archive, describe_links, serialize
+from pyverlet.data.atomic_file import replacing
 from pyverlet.data.describe import Builder, describe
-from pyverlet.data.durable import replacing
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.threads import max_threads
@@ -51,7 +51,7 @@ class OtherBits(UserWarning):
 def save(world: World, path: str | Path, *, scene: Mapping[str, Any] | None = None) -> None:
     """Write a world to a file, from which `load` goes on with the same bits: all at once, or not at all.
 
-    Everything that moves, remembers or acts is kept; the profile and the onlooker are not. Objects of classes of
+    Everything that moves, remembers or acts is kept; the profile and the observer are not. Objects of classes of
     your own are kept by name, and with what their `save` returns if they are actors.
 
     Args:
@@ -80,20 +80,20 @@ def to_table(world: World, scene: Mapping[str, Any] | None = None) -> tuple[Head
     def put_aside(array: Array) -> dict[str, str]:
         name = f"extra.{sum(known.startswith('extra.') for known in arrays)}"
         arrays[name] = array
-        return {memory.ARRAY: name}
+        return {serialize.ARRAY: name}
 
     own = [name for name in arrays if name.startswith(apart.OWN)]
-    kinds = [own_arrays.kind_of(name, arrays[key]) for key, name in zip(own, moving.facts["data"], strict=True)]
-    arrays |= {key: own_arrays.to_bytes(arrays[key]) for key in own}
+    kinds = [_kind_of(name, arrays[key]) for key, name in zip(own, moving.facts["data"], strict=True)]
+    arrays |= {key: _to_bytes(arrays[key]) for key in own}
     header: Header = {
         "format": FORMAT,
         "made_by": _made_by(),
         "kernels": sources_hash(),
         "particles": len(world),
-        "scene": memory.pack(dict(scene)) if scene is not None else None,
-        "world": memory.map_arrays(_settings(world), put_aside),
-        "facts": memory.pack(moving.facts),
-        "own": memory.pack(kinds),
+        "scene": serialize.pack(dict(scene)) if scene is not None else None,
+        "world": serialize.map_arrays(_settings(world), put_aside),
+        "facts": serialize.pack(moving.facts),
+        "own": serialize.pack(kinds),
     }
     return header, arrays
 
@@ -175,9 +175,9 @@ def from_table(header: Header, arrays: dict[str, Array], *, exact: bool = False,
         )
     settings = _with_arrays(header["world"], arrays)
     known = {name: array for name, array in _moving(arrays).items() if name not in apart.RETIRED}
-    moving = Parts(memory.unpack(header["facts"]), known)
-    for k, kind in enumerate(memory.unpack(header.get("own", []))):
-        known[f"{apart.OWN}{k}"] = own_arrays.from_bytes(known[f"{apart.OWN}{k}"], *kind)
+    moving = Parts(serialize.unpack(header["facts"]), known)
+    for k, kind in enumerate(serialize.unpack(header.get("own", []))):
+        known[f"{apart.OWN}{k}"] = _from_bytes(known[f"{apart.OWN}{k}"], *kind)
     if unknown := {name for name in known if not name.startswith(apart.OWN)} - set(apart.FIELDS):
         raise InputError(f"there is an array {min(unknown)!r}; allowed are those pyverlet knows")
     with ThreadPoolExecutor(1) as beside:
@@ -209,8 +209,8 @@ def _with_arrays(value: Any, arrays: dict[str, Array]) -> Any:
     if isinstance(value, list):
         return [_with_arrays(part, arrays) for part in value]
     if isinstance(value, dict):
-        if list(value) == [memory.ARRAY]:
-            return arrays[value[memory.ARRAY]]
+        if list(value) == [serialize.ARRAY]:
+            return arrays[value[serialize.ARRAY]]
         return {key: _with_arrays(part, arrays) for key, part in value.items()}
     return value
 
@@ -274,3 +274,27 @@ def about(path: str | Path) -> About:
         )  # fmt: skip
     except (KeyError, TypeError) as error:
         raise InputError(f"'{path}' lacks {error}; allowed is a file that pyverlet.save wrote") from None
+
+
+# ---- arrays of the user's own, as bytes and a dtype ---------------------------------------------------------------------
+
+
+def _kind_of(name: str, column: Array) -> tuple[Any, list[int]]:
+    """The dtype of a column, as `numpy.lib.format` describes it, and the shape of a row. Python objects are refused."""
+    if column.dtype.hasobject:
+        raise InputError(f"data[{name!r}] holds Python objects; allowed in files are numbers, texts and dates of NumPy's dtypes")
+    return np.lib.format.dtype_to_descr(column.dtype.newbyteorder("<")), list(column.shape[1:])
+
+
+def _to_bytes(column: Array) -> NDArray[np.uint8]:
+    """(rows, bytes of each) of a column."""
+    little = column.astype(column.dtype.newbyteorder("<"))
+    return np.frombuffer(little.tobytes(), np.uint8).reshape(len(column), little.nbytes // len(column))
+
+
+def _from_bytes(content: NDArray[np.uint8], described: Any, row: list[int]) -> Array:
+    """The column again; InputError if it cannot be one."""
+    dtype = np.lib.format.descr_to_dtype(described)
+    if dtype.hasobject:
+        raise InputError(f"an array of data is of dtype {dtype}; allowed are dtypes without Python objects")
+    return np.frombuffer(content.tobytes(), dtype).reshape(len(content), *row).astype(dtype.newbyteorder("="))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.data import sweep_rows, sweep_run
-from pyverlet.data.sweep_plan import Plan, plain
+from pyverlet.data.resolve_sketch import LazySketch, value_of
+from pyverlet.data.sweep_plan import SCENE_FILE, SKETCH, Plan, plain
 from pyverlet.data.sweep_rows import Rows
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
@@ -198,7 +201,7 @@ class Study:
         return pd.DataFrame({name: array[name] for name in array.dtype.names or ()})
 
     def array(self) -> NDArray[Any]:
-        """The rows there are as a structured array: run, settings, what was measured, hashes, error, and who made it."""
+        """The rows there are as a structured array: run, settings, what was measured, hashes, error, and versions."""
         return sweep_rows.as_array(self._plan, self._table_rows(self._read()))
 
     @property
@@ -227,14 +230,14 @@ class Study:
         picked = sorted((ready[k] for k in chosen), key=lambda run: run.number)
         differ = []
         if self.scene.sketch is not None:
-            _ = self.scene.sketch.module  # one that is lost or has changed is told of, not a difference
+            _ = self.scene.sketch.module  # one that is lost or has changed is an error, not a difference
         with Progress("verifying, run") as progress:
             for done, run in enumerate(picked):
-                row, told = sweep_run.one(self._plan, run), known.get(run.key)
-                assert told is not None
-                if row["values"] == {}:  # of a measure nobody knows here
-                    row["values"] = told["values"]
-                if any(row[name] != told[name] for name in ("start", "end", "values", "error")):
+                row, known_row = sweep_run.one(self._plan, run), known.get(run.key)
+                assert known_row is not None
+                if row["values"] == {}:  # of a measure that is not known here
+                    row["values"] = known_row["values"]
+                if any(row[name] != known_row[name] for name in ("start", "end", "values", "error")):
                     differ.append(run.number)
                 progress(done + 1, len(picked))
         return Verified([run.number for run in picked], differ)
@@ -259,4 +262,60 @@ class _Columns:
             )
 
 
-__all__ = ["Status", "Study", "Verified", "basics", "sweep"]
+def open_study(folder: str | Path, measure: Measure | None = None) -> Study:
+    """The study in a folder.
+
+    Args:
+        folder: of the study.
+        measure: the one it was made with. Nothing is imported because a file says so: without it the study can be looked at, and
+            verified but for what was measured. A sketch is run when a world is asked for, if it is what it was.
+
+    Raises:
+        InputError: there is none, or it is of a scene that only the program that made it knows.
+    """
+    path = Path(folder) / "plan.json"
+    try:
+        about = json.loads(path.read_text(encoding="utf-8"))
+        measured, settings, grid = about["measure"], about["settings"], about["grid"]
+        scene = _scene(about["scene"], folder, about.get(SKETCH))
+        known = measure or (basics if measured == basics.__qualname__ else Unknown(measured))
+        plan = Plan(
+            scene,
+            {name: [value_of(name, value) for value in values] for name, values in grid.items()},
+            {name: value_of(name, value) for name, value in settings.items()},
+            known, about["frames"], about["dt"],
+        )  # fmt: skip
+        return Study(plan, Path(folder))
+    except FileNotFoundError:
+        raise InputError(f"'{folder}' has no study (no plan.json in it); allowed is the folder of one") from None
+    except OSError as error:
+        raise InputError(f"'{path}' cannot be read ({error.strerror}); allowed is the folder of a study") from None
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"'{path}' is no plan of a study ({error}); allowed is the folder of one") from None
+
+
+class Unknown:
+    """A measure of which only the name is known."""
+
+    def __init__(self, name: str) -> None:
+        self.__qualname__ = name
+
+    def __call__(self, world: World) -> dict[str, Any]:
+        return {}
+
+
+def _scene(about: Any, folder: str | Path, place: str | None) -> Scene:
+    if isinstance(about, str):
+        return get(about)
+    if "format" in about:  # a document: `Study` has written it there
+        return get(str(Path(folder) / SCENE_FILE))
+    if "sketch" in about:
+        name = about["sketch"]
+        sketch = LazySketch(name, about["source"], Path(place or name), Path(), Path(folder).parent)
+        return replace(sketch.scene(), name=about["name"])
+    raise InputError(f"'{folder}' is a study of a scene of its program's own; allowed is pyverlet.sweep with that scene")
+
+
+__all__ = ["Status", "Study", "Verified", "basics", "open_study", "sweep"]

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyverlet.data import memory
+from pyverlet.data import serialize
 from pyverlet.data.describe import KINDS, describe
 from pyverlet.ground.errors import InputError
 from pyverlet.scenes import SCENES, Scene
@@ -39,15 +39,9 @@ class Run(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """A study.
+    """A study: settings of all runs and values by setting, and what is measured after so many `frames` of `dt` s.
 
-    Attributes:
-        scene: of all worlds.
-        grid: values by setting.
-        settings: of all runs.
-        measure: of a world at the end.
-        frames: to run; None leaves that to `measure`.
-        dt: seconds a frame.
+    Without `frames` the measure steps the world itself.
     """
 
     scene: Scene
@@ -63,7 +57,7 @@ class Plan:
             "format": FORMAT,
             "scene": _scene(self.scene),
             "settings": {name: plain(name, value) for name, value in sorted(self.settings.items())},
-            # Without its module, which is another for who runs a script than for who imports it.
+            # Without its module, which differs between running and importing a script.
             "measure": getattr(self.measure, "__qualname__", type(self.measure).__qualname__),
             "frames": self.frames,
             "dt": self.dt,
@@ -107,7 +101,7 @@ def _scene(scene: Scene) -> Any:
         return scene.name
     document = getattr(scene, "document", None)
     if document is not None:
-        return memory.plain(memory.pack(document))
+        return serialize.plain(serialize.pack(document))
     if scene.sketch is not None:
         return {"name": scene.name, "sketch": scene.sketch.name, "source": scene.sketch.digest}
     build = scene.build
@@ -122,7 +116,7 @@ def plain(name: str, value: Any) -> Any:
     """A setting as JSON has it.
 
     Raises:
-        InputError: it is NaN, or an object nobody could describe.
+        InputError: it is NaN, or an object that cannot be described.
     """
     if isinstance(value, float | np.floating) and not math.isfinite(value):
         raise InputError(f"{name} is {float(value)}; allowed are finite numbers")
@@ -137,5 +131,5 @@ def plain(name: str, value: Any) -> Any:
     if value is None or isinstance(value, bool | int | float | str):
         return value
     if type(value).__name__ in KINDS:
-        return memory.plain(describe(value))
+        return serialize.plain(describe(value))
     raise InputError(f"{name} is {value!r}; allowed are numbers, text and objects of pyverlet's")

@@ -1,7 +1,7 @@
 """The folder of a study: rows as they arrive, and the table of all of them.
 
 A row is a line of `rows.jsonl`, written when it is known and never changed. Times are no part of it: they are in `timing.jsonl`,
-so that the table is the same whoever made it, and however long that took.
+so that the table is the same on every machine, however long the runs took.
 """
 
 from __future__ import annotations
@@ -23,10 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.core.sources import sources_hash
-from pyverlet.data.durable import replacing
+from pyverlet.data.atomic_file import replacing
 from pyverlet.data.sweep_plan import SCENE_FILE, Plan
 from pyverlet.ground import file_lock
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import cut
 
 _SYNC_S = 1.0
 """Rows that a power cut may cost are those of the last so many seconds."""
@@ -77,29 +78,20 @@ def open_folder(folder: Path, plan: Plan) -> None:
 def _briefly(value: Any) -> str:
     """Of a scene's document its name; of anything else the beginning."""
     text = repr(value["name"] if isinstance(value, dict) and "name" in value else value)
-    return text if len(text) <= 80 else f"{text[:77]}..."
+    return cut(text, 80)
 
 
 @contextlib.contextmanager
 def only_one(folder: Path) -> Iterator[None]:
-    """While no other process is making rows here.
-
-    Raises:
-        InputError: one is.
-    """
-    with file_lock.turn(folder / ".lock", "rows", patience=0.0) as ours:
+    """While no other process is making rows here; InputError if one is."""
+    with file_lock.locked(folder / ".lock") as ours:
         if not ours:
             raise InputError(f"'{folder}' is a study that another process is making; allowed is one at a time")
         yield
 
 
 class Rows:
-    """The rows of a study by key, and the files they are added to.
-
-    Args:
-        folder: of the study.
-        read_only: leave the files alone.
-    """
+    """The rows of a study by key, and the files they are added to; `read_only` leaves those alone."""
 
     def __init__(self, folder: Path, *, read_only: bool = False) -> None:
         self._path, self._timing = folder / "rows.jsonl", folder / "timing.jsonl"

@@ -1,4 +1,4 @@
-"""Makes the runs of a study on any executor: one run, a task of some of them, and who gets which task when."""
+"""Makes the runs of a study on any executor: one run, a task of some of them, and which worker gets which task when."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def one(plan: Plan, run: Run) -> Row:
             world.step(plan.dt)
         row["values"] = _values(plan.measure(world))
         row["end"] = world.state_hash()
-    except Exception as error:  # of the scene or the measure, which are anybody's
+    except Exception as error:  # of the scene or the measure, which are the user's code
         row |= {"values": None, "end": None, "error": f"{type(error).__name__}: {' '.join(str(error).split())}"}
     return row
 
@@ -87,9 +87,9 @@ def _plan(sent: bytes) -> Plan:
     return plan
 
 
-def work(sent: bytes, task: Task) -> list[tuple[Row, float]]:
+def work(sent: bytes | Plan, task: Task) -> list[tuple[Row, float]]:
     """Make some runs of a plan, in whatever process: their rows, and the seconds each took."""
-    plan, made = _plan(sent), []
+    plan, made = _plan(sent) if isinstance(sent, bytes) else sent, []
     for run in task:
         begin = perf_counter()
         row = one(plan, run)
@@ -152,7 +152,7 @@ class _Pool(ProcessPoolExecutor):
 
 
 def _watch_parent() -> None:
-    """End with the process that started this one, however that ends: killed, it leaves nobody who would tell."""
+    """End with the process that started this one, however that ends: one that is killed tells nothing."""
     Thread(target=_end_with_parent, daemon=True).start()
 
 
@@ -164,15 +164,15 @@ def _end_with_parent() -> None:
 
 
 class _Dispatcher:
-    """Hands tasks to an executor, and the rows of those that are done to whoever asks.
+    """Hands tasks to an executor, and gives back the rows of those that are done.
 
     When a process ends, the executor cannot say whose run has ended it. All tasks that were out are suspects then, and made
     alone, one after the other: a run that ends its process twice is the culprit, and its row says so.
     """
 
     def __init__(self, plan: Plan, runs: Sequence[Run], makes: Any, workers: int, *, own: bool) -> None:
-        self._sent = b"" if makes is Here else _packed(plan)
-        self._plan, self._makes, self._own, self._workers = plan, makes, own, workers
+        self._sent = plan if makes is Here else _packed(plan)
+        self._makes, self._own, self._workers = makes, own, workers
         self._waiting, self._suspects = deque(runs), deque[Task]()
         self._out: dict[Future[Any], Task] = {}
         self._tries: dict[str, int] = {}
@@ -213,19 +213,11 @@ class _Dispatcher:
 
     def _submit(self, task: Task) -> None:
         try:
-            if self._makes is Here:
-                future = self._executor.submit(lambda: [(row, took) for run in task for row, took in [self._timed(run)]])
-            else:
-                future = self._executor.submit(work, self._sent, task)
+            future = self._executor.submit(work, self._sent, task)
         except BrokenExecutor:
             future = Future()
             future.set_exception(BrokenExecutor())
         self._out[future] = task
-
-    def _timed(self, run: Run) -> tuple[Row, float]:
-        begin = perf_counter()
-        row = one(self._plan, run)
-        return row, perf_counter() - begin
 
     def _done(self, future: Future[Any], task: Task) -> Iterator[tuple[Row, float]]:
         alone = not self._out

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.data.frames import Array, Frame, Reader, Writer
+from pyverlet.data.frames import Array, Column, Frame, Reader, Writer
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, PyverletError
+from pyverlet.ground.outside import file_errors, require
 from pyverlet.ground.shown import Shown
 
 if TYPE_CHECKING:
@@ -55,10 +56,8 @@ class Trajectory(Shown):
         self.frames = 0
         self._last: tuple[int, float] | None = None
         kind = _kind(self.path, "Writer")
-        try:
+        with file_errors("path", self.path, "written"):
             self._writer: Writer | None = kind(self.path)
-        except OSError as error:
-            raise InputError(f"path is '{self.path}', which cannot be written: {error.strerror or error}") from None
 
     def __enter__(self) -> Trajectory:
         return self
@@ -148,7 +147,6 @@ class Moments(Sequence[Frame]):
         self.close()
 
     def close(self) -> None:
-        """Close the file."""
         if not self._closed:
             self._closed = True
             self._reader.close()
@@ -168,30 +166,11 @@ class Moments(Sequence[Frame]):
         """Of each frame."""
         return [frame.state_hash for frame in self]
 
-    @property
-    def position(self) -> Array:
-        """(m, n, 2) m. This and all that follow: InputError unless all frames have the same particles."""
-        return self._column("position")
-
-    @property
-    def velocity(self) -> Array:
-        """(m, n, 2) m/s."""
-        return self._column("velocity")
-
-    @property
-    def spin(self) -> Array:
-        """(m, n) rad/s."""
-        return self._column("spin")
-
-    @property
-    def radius(self) -> Array:
-        """(m, n) m."""
-        return self._column("radius")
-
-    @property
-    def mass(self) -> Array:
-        """(m, n) kg."""
-        return self._column("mass")
+    position = Column("(m, n, 2) m. This and all that follow: InputError unless all frames have the same particles.")
+    velocity = Column("(m, n, 2) m/s.")
+    spin = Column("(m, n) rad/s.")
+    radius = Column("(m, n) m.")
+    mass = Column("(m, n) kg.")
 
     def _column(self, name: str) -> Array:
         columns = []
@@ -230,6 +209,5 @@ def _kind(path: Path, what: str) -> Any:
         raise InputError(f"path is '{path}'; allowed for a trajectory is a name that ends in {', '.join(FORMATS)}")
     module, _, name = found.partition(".")
     kind = getattr(importlib.import_module(f"pyverlet.data.{module}"), name + what)
-    if kind.needs is not None and importlib.util.find_spec(kind.needs) is None:
-        raise InputError(f"a {path.suffix} file needs {kind.needs!r}, which is not installed: pip install 'pyverlet[data]'")
+    require(f"a {path.suffix} file", *([kind.needs] if kind.needs else []), extra="data")
     return kind

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pyverlet.data.frames import Array, Frame, Reader, Writer
-from pyverlet.data.whole import WholeFile
+from pyverlet.data.journaled_hdf5 import JournaledFile
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
@@ -39,7 +39,7 @@ class VtkHdfWriter(Writer):
     def __init__(self, path: Path) -> None:
         import h5py
 
-        self._disk = WholeFile(path)
+        self._disk = JournaledFile(path)
         self._file: Any = h5py.File(self._disk, "w", libver=("v110", "v110"))
         self._root: Any = None
         self._cells = 0  # the first vertex of the part under way

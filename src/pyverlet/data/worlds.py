@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.data import archive, snapshot
-from pyverlet.data.crew import Crew, Keeper, Plan
+from pyverlet.data.frames import Column
+from pyverlet.data.process_pool import Plan, ProcessPool, Worker
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
@@ -45,7 +46,7 @@ class Worlds(Shown):
     """Worlds of one scene that differ in their seeds, stepped together on all cores.
 
     The arrays are those of the worlds themselves: reading copies nothing, and what is written there is what the next frame begins
-    with. A world's bits are those it would have alone, however many there are and whoever steps them. Close them when done, or
+    with. A world's bits are those it would have alone, however many there are, in any process. Close them when done, or
     use them in a `with` block.
 
     Args:
@@ -72,7 +73,7 @@ class Worlds(Shown):
         first = self.scene.world(**settings, seed=seed_of(self.seed, 0))
         plan = Plan(self.scene, settings, self.seed, self._count, len(first), first.dtype.str)
         folder = Path(tempfile.mkdtemp(prefix="pyverlet-", dir=_shared_folder()))
-        self._keepers: Sequence[Keeper] = ()
+        self._workers: Sequence[Worker] = ()
         self._dropped: list[int] = []
         try:
             path = folder / "worlds"
@@ -82,14 +83,14 @@ class Worlds(Shown):
             ranges = list(itertools.pairwise(cuts))
             self._shared = plan.open(path)
             if processes == 1:
-                self._crew: Crew | None = None
-                self._keepers = [Keeper(plan, 0, self._count, self._shared)]
+                self._pool: ProcessPool | None = None
+                self._workers = [Worker(plan, 0, self._count, self._shared)]
             else:
-                self._crew = Crew(plan, ranges, path)
+                self._pool = ProcessPool(plan, ranges, path)
         finally:
             shutil.rmtree(folder, ignore_errors=True)  # it lives on as long as anyone has it open
         self._first = [begin for begin, _ in ranges]
-        self._finalizer = weakref.finalize(self, self._crew.close) if self._crew else None
+        self._finalizer = weakref.finalize(self, self._pool.close) if self._pool else None
 
     # ---- stepping ------------------------------------------------------------------------------------------------------
 
@@ -103,7 +104,7 @@ class Worlds(Shown):
         self._tell("step", checks.number("dt", dt, above=0.0))
 
     def run(self, *, seconds: float, dt: float = 1 / 60) -> None:
-        """Advance by as many frames of dt as come nearest to `seconds`: in one go, so that nobody waits between frames."""
+        """Advance by as many frames of dt as come nearest to `seconds`: in one go, without waiting between frames."""
         frames = round(checks.number("seconds", seconds, least=0.0) / checks.number("dt", dt, above=0.0))
         self._tell("step", dt, frames)
 
@@ -111,7 +112,7 @@ class Worlds(Shown):
         """A copy of everything that moves in all worlds, for `restore`. It stays where the worlds are."""
         start = Start(weakref.ref(self), next(_tokens))
         self._tell("save", start.token)
-        weakref.finalize(start, self._dropped.append, start.token)  # nobody can go back to what nobody has
+        weakref.finalize(start, self._dropped.append, start.token)  # without the object there is no going back
         return start
 
     def restore(self, saved: Start, which: ArrayLike | None = None) -> None:
@@ -130,15 +131,15 @@ class Worlds(Shown):
         self._tell("restore", saved.token, chosen.tolist())
 
     def _tell(self, what: str, *arguments: Any) -> None:
-        while self._dropped:  # noted whenever the collector pleases, and told between two orders
+        while self._dropped:  # filled by the garbage collector at any time, sent between two orders
             self._order("drop", self._dropped.pop())
         self._order(what, *arguments)
 
     def _order(self, what: str, *arguments: Any) -> None:
-        if self._crew is not None:
-            self._crew.tell(what, *arguments)
-        for keeper in self._keepers:
-            getattr(keeper, what)(*arguments)
+        if self._pool is not None:
+            self._pool.run_all(what, *arguments)
+        for worker in self._workers:
+            getattr(worker, what)(*arguments)
 
     def close(self) -> None:
         """End the processes that have the worlds. They cannot be stepped any more."""
@@ -153,7 +154,7 @@ class Worlds(Shown):
 
     # ---- to look at ----------------------------------------------------------------------------------------------------
 
-    def _array(self, name: str) -> Array:
+    def _column(self, name: str) -> Array:
         counts = self._shared["count"]
         if (counts != self._shared[name].shape[1]).any():
             raise InputError(
@@ -162,30 +163,11 @@ class Worlds(Shown):
             )
         return self._shared[name]
 
-    @property
-    def position(self) -> Array:
-        """(n, k, 2) centres of the k particles of each world, m."""
-        return self._array("position")
-
-    @property
-    def velocity(self) -> Array:
-        """(n, k, 2) m/s."""
-        return self._array("velocity")
-
-    @property
-    def spin(self) -> Array:
-        """(n, k) rad/s."""
-        return self._array("spin")
-
-    @property
-    def radius(self) -> Array:
-        """(n, k) m."""
-        return self._array("radius")
-
-    @property
-    def mass(self) -> Array:
-        """(n, k) kg."""
-        return self._array("mass")
+    position = Column("(n, k, 2) centres of the k particles of each world, m.")
+    velocity = Column("(n, k, 2) m/s.")
+    spin = Column("(n, k) rad/s.")
+    radius = Column("(n, k) m.")
+    mass = Column("(n, k) kg.")
 
     @property
     def gravity(self) -> Array:
@@ -211,7 +193,7 @@ class Worlds(Shown):
             raise IndexError(f"world {k} of {self._count}")
         k %= self._count
         part = int(np.searchsorted(self._first, k, side="right")) - 1
-        raw = self._crew.ask(part, "file", k) if self._crew else self._keepers[0].file(k)
+        raw = self._pool.run_one(part, "file", k) if self._pool else self._workers[0].file(k)
         table, arrays = archive.read_from(io.BytesIO(raw), len(raw))
         return snapshot.from_table(table, arrays)
 
@@ -220,7 +202,7 @@ class Worlds(Shown):
 
 
 def seed_of(seed: int, k: int) -> int:
-    """The seed of world or run k: independent of all others, and of who makes it."""
+    """The seed of world or run k: independent of all others, and of the process that makes it."""
     return int(np.random.SeedSequence((seed, k)).generate_state(1, np.uint64)[0])
 
 

@@ -1,4 +1,4 @@
-"""What a graphics card is told: one point a circle, its position straight from the world's array, in metres."""
+"""What a graphics card gets: one point a circle, its position straight from the world's array, in metres."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.picture import ByOrigin, Colouring, Theme, View, across
+from pyverlet.picture import ByOrigin, Colouring, Theme, View, periodic_images
 from pyverlet.picture.marks import MARKED_PX
 
 if TYPE_CHECKING:
@@ -56,13 +56,7 @@ def window(view: View) -> tuple[float, float, float, float]:
 
 
 class Arrays:
-    """The arrays of a world as the shaders want them: float32, and four bytes a colour. float32 worlds are not copied.
-
-    Args:
-        world: only read.
-        colour: what the colours say; by default where each circle started.
-        theme: whether the colours are for a dark or a light background.
-    """
+    """The arrays of a world as the shaders want them: float32, and four bytes a colour. float32 worlds are not copied."""
 
     def __init__(self, world: World, colour: Colouring | None, theme: Theme) -> None:
         self._world = world
@@ -71,7 +65,7 @@ class Arrays:
 
     @property
     def marked(self) -> float:
-        """Radius in pixels from which on circles have a mark: none as long as nobody has turned."""
+        """Radius in pixels from which on circles have a mark: none until one has turned."""
         return MARKED_PX if self._world.angle.any() else float("inf")
 
     def now(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
@@ -79,10 +73,7 @@ class Arrays:
         world = self._world
         position, radius, angle, seam = world.position, world.radius, world.angle, world.boundary.seam
         colours = self._colour.colours(world, self._theme)
-        if seam:  # who reaches through it is drawn on both sides
-            owner, place = across.copies(position, radius, seam)
-            position, colours = np.concatenate((position, place)), np.concatenate((colours, colours[owner]))
-            radius, angle = np.concatenate((radius, radius[owner])), np.concatenate((angle, angle[owner]))
+        position, radius, angle, colours = periodic_images.with_copies(seam, position, radius, angle, colours)
         return (
             np.ascontiguousarray(position, dtype=np.float32),
             np.ascontiguousarray(radius, dtype=np.float32),

@@ -9,7 +9,7 @@ import pygame
 
 from pyverlet.core import unit
 from pyverlet.ground.errors import InputError
-from pyverlet.picture import DARK, ByOrigin, Colouring, Theme, View, across, marks
+from pyverlet.picture import DARK, ByOrigin, Colouring, Theme, View, marks, periodic_images
 from pyverlet.picture.colour import by_force
 from pyverlet.picture.palette import Packed
 from pyverlet.picture.raster import LINK_PX
@@ -64,16 +64,13 @@ def draw(
     pixels = np.bitwise_and(own, np.uint32(0x00FFFFFF), dtype=np.uint32)  # the raster keeps count of coverage up there
     ground = pixels.copy()
     position, radius, angle, seam = world.position, world.radius, world.angle, world.boundary.seam
-    if seam:
-        owner, place = across.copies(position, radius, seam)
-        position, colours = np.concatenate((position, place)), np.concatenate((colours, colours[owner]))
-        radius, angle = np.concatenate((radius, radius[owner])), np.concatenate((angle, angle[owner]))
+    position, radius, angle, colours = periodic_images.with_copies(seam, position, radius, angle, colours)
     unit("tools", position.dtype).draw_discs(pixels, ground, position, radius, colours, view.left, view.top, view.scale)
     marks.draw(pixels, position, radius, angle, colours, view)
     if len(world.links):
         ends, force = world.links.segments()
         if seam:
-            ends, force = across.lines(world.position[world.links.pulls()[0]], force, seam)
+            ends, force = periodic_images.lines(world.position[world.links.pulls()[0]], force, seam)
         pulls = by_force(force, theme)
         pulls = _red_and_blue_swapped(pulls) if shifts[:3] == (16, 8, 0) else pulls
         unit("tools", ends.dtype).draw_lines(pixels, ends, pulls, view.left, view.top, view.scale, LINK_PX / 2)

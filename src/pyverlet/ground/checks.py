@@ -12,25 +12,25 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from pyverlet.ground.errors import InputError
 
 
-def number(name: str, value: SupportsFloat, *, above: float | None = None, least: float | None = None) -> float:
-    """A finite float, greater than `above` or at least `least` where given."""
+def number(
+    name: str, value: SupportsFloat, *, above: float | None = None, least: float | None = None, most: float | None = None
+) -> float:
+    """A finite float; greater than `above`, at least `least` and at most `most` where given."""
     try:
         result = float(value)
     except (TypeError, ValueError):
-        raise InputError(f"{name} is {value!r}; allowed is {_allowed(above, least)}") from None
-    low = (above is not None and result <= above) or (least is not None and result < least)
-    if not math.isfinite(result) or low:
-        raise InputError(f"{name} is {result:g}; allowed is {_allowed(above, least)}")
+        raise InputError(f"{name} is {value!r}; allowed is {_allowed(above, least, most)}") from None
+    outside = (above is not None and result <= above) or (least is not None and result < least)
+    if not math.isfinite(result) or outside or (most is not None and result > most):
+        raise InputError(f"{name} is {result:g}; allowed is {_allowed(above, least, most)}")
     return result
 
 
-def _allowed(above: float | None, least: float | None) -> str:
-    allowed = "a finite number"
-    if above is not None:
-        allowed += f" greater than {above:g}"
-    if least is not None:
-        allowed += f" of at least {least:g}"
-    return allowed
+def _allowed(above: float | None, least: float | None, most: float | None) -> str:
+    if least is not None and most is not None:
+        return f"a number from {least:g} to {most:g}"
+    limits = ("greater than", above), ("of at least", least), ("of at most", most)
+    return "a finite number" + "".join(f" {text} {limit:g}" for text, limit in limits if limit is not None)
 
 
 def whole(name: str, value: Any, *, least: int = 1, most: int | None = None, most_is: str = "") -> int:
@@ -47,10 +47,7 @@ def whole(name: str, value: Any, *, least: int = 1, most: int | None = None, mos
 
 def fraction(name: str, value: SupportsFloat) -> float:
     """A float from 0 to 1."""
-    result = number(name, value)
-    if not 0.0 <= result <= 1.0:
-        raise InputError(f"{name} is {result:g}; allowed is a number from 0 to 1")
-    return result
+    return number(name, value, least=0.0, most=1.0)
 
 
 def vector(name: str, value: Sequence[SupportsFloat] | NDArray[Any]) -> tuple[float, float]:
@@ -133,12 +130,10 @@ def at_most(name: str, array: NDArray[Any], most: float) -> None:
 
 def bits(name: str, value: ArrayLike, count: int) -> NDArray[np.uint32]:
     """A (n,) array of 32 bits each, from whole numbers of 0 to 2^32 - 1: `count` of them or one for all."""
-    try:
-        array = np.asarray(value)
-    except ValueError:
-        raise InputError(f"{name} is not an array of numbers; allowed are whole numbers of 32 bits, 0 to 4294967295") from None
-    if array.dtype.kind not in "iu" or (array.size and not (int(array.min()) >= 0 and int(array.max()) < 2**32)):
-        raise InputError(f"{name} is {value!r}; allowed are whole numbers of 32 bits, 0 to 4294967295")
+    allowed = "are whole numbers of 32 bits, 0 to 4294967295"
+    array = _integers(name, value, allowed)
+    if array.size and not (int(array.min()) >= 0 and int(array.max()) < 2**32):
+        raise InputError(f"{name} is {value!r}; allowed {allowed}")
     return column(name, array, np.dtype(np.uint32), count)
 
 
@@ -174,13 +169,10 @@ def direction(name: str, value: Sequence[SupportsFloat] | NDArray[Any] | None) -
 def indices(name: str, value: ArrayLike, count: int) -> NDArray[np.int64]:
     """Sorted indices without repetition from an index, several, or a mask of `count` bools."""
     allowed = f"are whole numbers from 0 to {count - 1}, or {count} bools"
-    try:
-        array = np.atleast_1d(np.asarray(value))
-    except ValueError:
-        raise InputError(f"{name} is {value!r}; allowed {allowed}") from None
-    if array.dtype == bool and array.shape == (count,):
+    array = np.atleast_1d(_integers(name, value, allowed, bools=count))
+    if array.dtype == bool:
         return np.flatnonzero(array)
-    if array.ndim != 1 or (array.size and array.dtype.kind not in "iu"):
+    if array.ndim != 1:
         raise InputError(f"{name} is {value!r}; allowed {allowed}")
     wrong = (array < 0) | (array >= count)
     if wrong.any():
@@ -190,13 +182,19 @@ def indices(name: str, value: ArrayLike, count: int) -> NDArray[np.int64]:
 
 def numbers(name: str, value: ArrayLike) -> NDArray[np.int64]:
     """Whole numbers in an array of any shape."""
+    return _integers(name, value, "are whole numbers").astype(np.int64)
+
+
+def _integers(name: str, value: ArrayLike, allowed: str, *, bools: int | None = None) -> NDArray[Any]:
+    """An array of whole numbers, or of so many bools."""
     try:
         array = np.asarray(value)
     except ValueError:
-        raise InputError(f"{name} is {value!r}; allowed are whole numbers") from None
-    if array.size and array.dtype.kind not in "iu":
-        raise InputError(f"{name} is {value!r}; allowed are whole numbers")
-    return array.astype(np.int64)
+        raise InputError(f"{name} is {value!r}; allowed {allowed}") from None
+    mask = array.dtype == bool and bools is not None and np.atleast_1d(array).shape == (bools,)
+    if array.size and array.dtype.kind not in "iu" and not mask:
+        raise InputError(f"{name} is {value!r}; allowed {allowed}")
+    return array
 
 
 def _array(name: str, value: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:

@@ -1,4 +1,4 @@
-"""What somebody meant who wrote a name that is not there."""
+"""The nearest known name, for a name that is unknown."""
 
 from __future__ import annotations
 

@@ -1,9 +1,11 @@
-"""Ctrl-C in the middle of a frame waits for its end, so that the world is whole afterwards; a second one does not wait."""
+"""Ctrl-C and SIGTERM: in the middle of a frame they wait for its end, so the world is complete; a second one does not wait."""
 
 from __future__ import annotations
 
 import signal
 import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from types import FrameType
 from typing import Any
@@ -37,7 +39,7 @@ class _Whole:
             return
         self._depth -= 1
         if self._depth == 0:
-            if _signal.getsignal(_CTRL_C) == self._note:  # nobody has set another meanwhile
+            if _signal.getsignal(_CTRL_C) == self._note:  # no other was set meanwhile
                 _signal.signal(_CTRL_C, self._before)
             pressed, self._pressed = self._pressed, None
             if pressed:
@@ -53,3 +55,27 @@ class _Whole:
 
 
 whole = _Whole()
+
+
+@contextmanager
+def first_signal(act: Callable[[int], object], *numbers: int) -> Iterator[None]:
+    """Meanwhile the first of these signals calls `act(number)`; a second one does what it did before. In the main thread only."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # other threads may not listen to signals
+        return
+    before = {number: signal.getsignal(number) for number in numbers}
+
+    def restore() -> None:
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+
+    def first(number: int, frame: FrameType | None) -> None:
+        restore()
+        act(number)
+
+    for number in numbers:
+        signal.signal(number, first)
+    try:
+        yield
+    finally:
+        restore()

@@ -1,7 +1,7 @@
-"""Ctrl-C while the command still loads: one sentence, as at any later time, and no traceback out of somebody's import.
+"""Ctrl-C while the command still loads: one sentence, as at any later time, and no traceback from within an import.
 
 Imported before anything that takes long. It does something only in a process that is the command, `pyverlet` or
-`python -m pyverlet`; whoever imports the library keeps the signals as they are.
+`python -m pyverlet`; imported as a library, it leaves the signals alone.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def done() -> None:
 
 
 def is_the_command() -> bool:
-    """Whether this process is the command, or a library of somebody's."""
+    """Whether this process is the command, or a program that imports the library."""
     if not sys.argv or sys.argv[0] != "-m":
         return bool(sys.argv) and Path(sys.argv[0]).stem == "pyverlet"
     # Python looks for the module that it is to run: is it this one, or one that uses it?

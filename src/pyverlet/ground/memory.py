@@ -2,7 +2,7 @@
 
 A processor remembers where some thousand pages of memory are, and has to look up each of the others. A world of a million circles
 lies in 70,000 pages of 4 kB, and a frame was a fourth slower for it than in pages of 2 MB. NumPy asks for those, but gets them
-only where nobody has written before.
+only for memory that was not written before.
 """
 
 from __future__ import annotations
@@ -56,9 +56,9 @@ def copy(array: Array) -> Array:
     return result
 
 
-def room(worn: Array, count: int) -> Array:
-    """(count or more,) numbers of the kind of `worn`, whatever they are: that itself, if neither too small nor too large."""
-    return worn if count <= len(worn) <= 2 * count + 64 else empty(count + count // 8, worn.dtype)
+def room(old: Array, count: int) -> Array:
+    """(count or more,) numbers of the dtype of `old`, whatever they are: that itself, if neither too small nor too large."""
+    return old if count <= len(old) <= 2 * count + 64 else empty(count + count // 8, old.dtype)
 
 
 def taken(array: Array, index: Array) -> Array:

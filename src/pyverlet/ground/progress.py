@@ -1,4 +1,4 @@
-"""Progress of long work on standard error, where it disturbs nobody who reads standard output."""
+"""Progress of long work on standard error, which leaves standard output alone."""
 
 from __future__ import annotations
 

@@ -14,6 +14,11 @@ _FIRST = 3
 """Entries of a list that are shown."""
 
 
+def cut(text: str, most: int = 60) -> str:
+    """The text, cut to at most so many letters."""
+    return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
 def text(value: Any) -> str:
     """A value in few letters and one line."""
     if isinstance(value, float | np.floating):
@@ -23,8 +28,8 @@ def text(value: Any) -> str:
     if isinstance(value, tuple):
         return f"({', '.join(map(text, value))}{',' * (len(value) == 1)})"
     name = getattr(value, "__qualname__", None)
-    said = " ".join((name if isinstance(name, str) else repr(value)).split())
-    return said if len(said) <= _WIDEST else f"{said[: _WIDEST - 3]}..."
+    words = " ".join((name if isinstance(name, str) else repr(value)).split())
+    return cut(words, _WIDEST)
 
 
 def line(kind: str, /, **values: Any) -> str:

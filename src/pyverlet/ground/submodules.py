@@ -10,12 +10,7 @@ from typing import Any
 
 
 def lazily(package: str, listed: Callable[[], list[str]] | None = None) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """`__getattr__` and `__dir__` of a package whose public submodules are imported when they are first named.
-
-    Args:
-        package: its name.
-        listed: other names that it has, for `dir`.
-    """
+    """`__getattr__` and `__dir__` of a package that imports its public submodules when first named; `listed`: its other names."""
     module = sys.modules[package]
     known = {found.name for found in iter_modules(module.__path__) if not found.name.startswith("_")}
 

@@ -15,11 +15,11 @@ def max_threads() -> int:
     Raises:
         InputError: it says something else than a whole number of at least 1.
     """
-    said = os.environ.get("PYVERLET_THREADS", "")
-    if said:
-        if not said.isdecimal() or int(said) < 1:
-            raise InputError(f"PYVERLET_THREADS is {said!r}; allowed is a whole number of at least 1")
-        return int(said)
+    asked = os.environ.get("PYVERLET_THREADS", "")
+    if asked:
+        if not asked.isdecimal() or int(asked) < 1:
+            raise InputError(f"PYVERLET_THREADS is {asked!r}; allowed is a whole number of at least 1")
+        return int(asked)
     if hasattr(os, "sched_getaffinity"):
         return max(len(os.sched_getaffinity(0)), 1)
     return os.cpu_count() or 1

@@ -18,7 +18,7 @@ def _plain(version: tuple[int, ...]) -> str:
 
 
 def complaint(package: str, version: str) -> str | None:
-    """What is wrong with this version; None if nothing is, or nobody could tell."""
+    """What is wrong with this version; None if nothing is, or it cannot be told."""
     least, below = ALLOWED[package]
     number = tuple(int(part) for part in version.split(".")[:2] if part.isdigit())
     if len(number) < 2 or least <= number < below:
@@ -28,11 +28,7 @@ def complaint(package: str, version: str) -> str | None:
 
 
 def check() -> None:
-    """Look at what is installed.
-
-    Raises:
-        ImportError: another version.
-    """
+    """Refuse a NumPy that is too old or too new, with ImportError."""
     wrong = complaint("numpy", np.__version__)
     if wrong and loading.is_the_command():  # whose users get sentences, no tracebacks
         sys.stderr.write(f"pyverlet: {wrong}\n")

@@ -1,12 +1,12 @@
-"""What all figures of the laboratory share: refusing early what would fail late, colours everybody can tell apart, saving."""
+"""What all figures of the laboratory share: refusing early what would fail late, distinct colours, saving."""
 
 from __future__ import annotations
 
-import importlib.util
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.outside import file_errors, require
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,8 +30,7 @@ def check_can_plot(path: Path) -> None:
     Raises:
         InputError: matplotlib is missing, the folder does not exist, or the suffix is not one of a picture.
     """
-    if importlib.util.find_spec("matplotlib") is None:
-        raise InputError("plot needs matplotlib, which is not installed: pip install 'pyverlet[plot]'")
+    require("plot", "matplotlib", extra="plot")
     if not path.parent.is_dir():
         raise InputError(f"plot is '{path}'; allowed is a file in a folder that exists")
     if path.is_dir():
@@ -48,13 +47,7 @@ def tidy(axes: Axes) -> None:
 
 
 def save(picture: Figure, path: Path) -> None:
-    """Write a figure to `path`.
-
-    Raises:
-        InputError: as `check_can_plot`, or the file cannot be written.
-    """
+    """Write a figure to `path`; InputError as in `check_can_plot`, or if the file cannot be written."""
     check_can_plot(path)
-    try:
+    with file_errors("plot", path, "written"):
         picture.savefig(path)
-    except OSError as error:
-        raise InputError(f"plot is '{path}', which cannot be written: {error.strerror or error}") from None

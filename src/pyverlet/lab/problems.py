@@ -174,7 +174,6 @@ class Pendulum:
     velocity_dependent = False
 
     def apply(self, state: Slots, t: float) -> None:
-        """Add the force."""
         state.force[:, 1] += state.mass * (G / LENGTH) * np.sin(state.position[:, 1])
 
     def potential(self, state: State) -> float:
@@ -212,7 +211,6 @@ class Sun:
     velocity_dependent = False
 
     def apply(self, state: Slots, t: float) -> None:
-        """Add the force."""
         x = state.position
         square = x[:, 0] * x[:, 0] + x[:, 1] * x[:, 1]
         state.force -= (state.mass / (square * np.sqrt(square)))[:, None] * x

@@ -9,19 +9,12 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Table:
-    """What a series of runs has found.
-
-    Attributes:
-        head: of the columns.
-        rows: of text, as for reading.
-        values: a mapping for each run, for programs.
-    """
+    """A series of runs: head and rows of text for reading, and a mapping of values for each run."""
 
     head: Sequence[str]
     rows: Sequence[Sequence[str]]
     values: Sequence[Mapping[str, Any]]
 
     def markdown(self) -> str:
-        """As Markdown."""
         lines = [self.head, ["---"] * len(self.head), *self.rows]
         return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)

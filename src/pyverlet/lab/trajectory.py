@@ -23,13 +23,7 @@ MOST_CURVES = 8
 
 @dataclass(frozen=True)
 class Heights:
-    """Simulated and exact heights of the same circles.
-
-    Attributes:
-        time: (m,) seconds.
-        simulated: (m, n) metres.
-        exact: (m, n) metres.
-    """
+    """Simulated and exact heights (m, n) of the same circles in metres, at times (m,) in seconds."""
 
     time: Floats
     simulated: Floats
@@ -54,11 +48,7 @@ class HeightRecorder:
         self._height.append(np.array(world.position[:, 1], dtype=np.float64))
 
     def against(self, scene: Scene, settings: Settings) -> Heights:
-        """What was recorded, beside the closed form of `scene`.
-
-        Raises:
-            InputError: the scene has no closed form.
-        """
+        """What was recorded, beside the closed form of `scene`; InputError if it has none."""
         if scene.closed_form is None:
             raise InputError(f"scene is {scene.name!r}; allowed is one that has a closed form")
         time = np.array(self._time)

@@ -21,14 +21,7 @@ MARK_PX = 1.4
 def draw(
     pixels: Packed, position: NDArray[Any], radius: NDArray[Any], angle: NDArray[np.float64], colours: Packed, view: View
 ) -> None:
-    """Mark the discs on a picture, in half of their own brightness; none as long as nobody has turned.
-
-    Args:
-        pixels: (h, w) of the view.
-        position, radius, angle: (n, 2) and (n,) in metres, (n,) in rad.
-        colours: (n,) of the discs.
-        view: of the picture.
-    """
+    """Mark discs (n, 2) and (n,) in m, turned by (n,) rad, in half of their own brightness; none until one has turned."""
     if not angle.any():
         return
     shown = np.flatnonzero(radius * view.scale >= MARKED_PX)

@@ -82,7 +82,7 @@ def hues(dark: bool) -> Packed:
 
 @cache
 def heat(dark: bool) -> Packed:
-    """STEPS * TONES colours from a calm blue to a loud yellow (dark) or red (light): for speeds and other amounts."""
+    """STEPS * TONES colours from a dull blue to a bright yellow (dark) or red (light): for speeds and other amounts."""
     if dark:
         return _shaded(lambda t: (0.5 + 0.4 * t, 0.12 + 0.03 * t, 275 - 185 * t))
     return _shaded(lambda t: (0.8 - 0.28 * t, 0.1 + 0.08 * t, 250 + 120 * t))

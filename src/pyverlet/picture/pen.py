@@ -104,8 +104,7 @@ class Pen(Shown):
         """A text that begins at a point, `size` pixels high."""
         x, y = (_point("point", point) + self._offset).tolist()
         self._count(1)
-        said = str(text)[:1000]
-        self._marks.append(Lettering(x, y, said, _rgb(colour), checks.number("size", size, above=0.0)))
+        self._marks.append(Lettering(x, y, str(text)[:1000], _rgb(colour), checks.number("size", size, above=0.0)))
 
     def _stroke(self, points: Any, closed: bool, filled: bool, colour: Colour, width: float) -> None:
         self._count(len(points))

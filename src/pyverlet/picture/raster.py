@@ -14,7 +14,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.obstacles import Outline
-from pyverlet.picture import across, ink, marks
+from pyverlet.picture import marks, periodic_images, rasterizer
 from pyverlet.picture.colour import by_force
 from pyverlet.picture.palette import DARK, Packed, Theme, swapped
 from pyverlet.picture.pen import Drawing
@@ -85,16 +85,14 @@ class Raster(Shown):
         links, seam = world.links.segments() if len(world.links) else None, world.boundary.seam
         position, radius, angle = world.position, world.radius, world.angle
         if seam:
-            owner, place = across.copies(position, radius, seam)
-            position, colours = np.concatenate((position, place)), np.concatenate((colours, colours[owner]))
-            radius, angle = np.concatenate((radius, radius[owner])), np.concatenate((angle, angle[owner]))
-            obstacles = across.outlines(obstacles, seam)
-            links = links and across.lines(world.position[world.links.pulls()[0]], links[1], seam)
+            position, radius, angle, colours = periodic_images.with_copies(seam, position, radius, angle, colours)
+            obstacles = periodic_images.outlines(obstacles, seam)
+            links = links and periodic_images.lines(world.position[world.links.pulls()[0]], links[1], seam)
         picture = self.discs(
             position, radius, view, outlines=outlines, obstacles=obstacles, colours=colours, links=links, angle=angle
         )
         if drawing:
-            ink.put(self._pixels, drawing, view, self.theme)
+            rasterizer.draw(self._pixels, drawing, view, self.theme)
         return picture
 
     def discs(

@@ -7,12 +7,9 @@ from __future__ import annotations
 
 import math
 import signal
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,13 +17,14 @@ from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, Interrupted, PyverletError
+from pyverlet.ground.interrupts import first_signal
 from pyverlet.ground.submodules import lazily
 from pyverlet.picture import DARK, Colouring, Theme
 from pyverlet.picture.pen import Draw
 from pyverlet.record import _films
 from pyverlet.scenes.report import frame_count
 from pyverlet.viewers.frames import Rect
-from pyverlet.viewers.painter import Painter, check_look
+from pyverlet.viewers.renderer import Renderer, check_look
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
@@ -156,10 +154,12 @@ def shoot(
     film = film_plan.film(film_plan.path, film_plan.size, film_plan.fps)
     picture = film.watch(world, colour=colour, theme=theme, part=part, draw=draw)
     before, total = film_plan.frames_before, film_plan.frames_before + film_plan.pictures
-    with _interruptions() as interrupted:
+    pressed: list[int] = []  # Ctrl-C: the picture under way is finished first
+    ignored = signal.getsignal(signal.SIGINT) in (signal.SIG_IGN, None)
+    with first_signal(pressed.append, *(() if ignored else (signal.SIGINT,))):
         try:
             for frame in range(before):
-                if interrupted():
+                if pressed:
                     break
                 world.step(film_plan.dt)
                 if progress:
@@ -170,15 +170,14 @@ def shoot(
                 film.add(picture())
                 if progress:
                     progress(before + number + 1, total)
-                if film.error or interrupted():
+                if film.error or pressed:
                     break
         finally:
             film.close()
-        cut = interrupted()
     done = Recorded(film_plan.path, film.kept, film.kept / film_plan.fps if film_plan.pictures > 1 else 0.0)
     if film.error:
         raise PyverletError(f"{film.error.strerror or film.error}; {_holds(done, world)}")
-    if cut:
+    if pressed:
         raise Interrupted(f"interrupted; {_holds(done, world)}")
     return done
 
@@ -212,7 +211,7 @@ def to_image(
         if not _is_still(Path(path)):
             raise InputError(f"path is '{path}'; allowed is a name that ends in {_films.PICTURE}")
         film = _films.film_for(Path(path))(Path(path), size, 1)
-    pixels = np.ascontiguousarray(Painter(world, size=size, colour=colour, theme=theme, part=part, draw=draw).paint()[..., :3])
+    pixels = np.ascontiguousarray(Renderer(world, size=size, colour=colour, theme=theme, part=part, draw=draw).paint()[..., :3])
     if film:
         film.add(pixels)
         if film.error:
@@ -230,24 +229,3 @@ def _holds(done: Recorded, world: World) -> str:
     if "{" in str(done.path):
         return f"the first {done.pictures} pictures are written"
     return f"'{done.path}' holds the first {done.pictures} pictures, {done.seconds:.4g} s, and plays"
-
-
-@contextmanager
-def _interruptions() -> Iterator[Callable[[], bool]]:
-    """Whether Ctrl-C was pressed since: the picture under way is finished first. A second one does not wait."""
-    pressed: list[int] = []
-    if threading.current_thread() is not threading.main_thread():
-        yield lambda: False  # only the main thread may listen to signals
-        return
-    before = signal.getsignal(signal.SIGINT)
-
-    def note(number: int, frame: FrameType | None) -> None:
-        pressed.append(number)
-        signal.signal(signal.SIGINT, before)
-
-    if before is not signal.SIG_IGN and before is not None:
-        signal.signal(signal.SIGINT, note)
-    try:
-        yield lambda: bool(pressed)
-    finally:
-        signal.signal(signal.SIGINT, before)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from pyverlet.ground.errors import InputError
+from pyverlet.ground.outside import file_errors
 
 
 class Disk:
@@ -18,26 +18,20 @@ class Disk:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.error: OSError | None = None
-        try:
+        with file_errors("path", path, "written"):
             self._file = path.open("w+b", buffering=0)
-        except OSError as error:
-            raise InputError(f"path is '{path}', which cannot be written: {error.strerror or error}") from None
         self._at = self.end = self._whole = 0
 
     def writable(self) -> bool:
-        """It is."""
         return True
 
     def seekable(self) -> bool:
-        """It is."""
         return True
 
     def tell(self) -> int:
-        """Where the next byte goes."""
         return self._at
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        """Go elsewhere."""
         self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self.end}[whence]
         return self._at
 

@@ -5,7 +5,6 @@ A page draws by itself: what it is given are the numbers of the world, not pixel
 
 from __future__ import annotations
 
-import importlib.util
 import re
 import struct
 from abc import ABC, abstractmethod
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.outside import file_errors, require
 from pyverlet.picture import Colouring, Theme
 from pyverlet.picture.pen import Draw
 from pyverlet.picture.raster import check_size
@@ -25,7 +25,7 @@ from pyverlet.record import _reel
 from pyverlet.record._disk import Disk
 from pyverlet.viewers import bundle
 from pyverlet.viewers.frames import Frame, Rect
-from pyverlet.viewers.painter import Painter
+from pyverlet.viewers.renderer import Renderer
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
@@ -64,7 +64,7 @@ class Film(ABC):
         self, world: World, *, colour: Colouring | None, theme: Theme, part: Rect | None, draw: Draw | None = None
     ) -> Callable[[], Any]:
         """What gives a picture of the world, as it is whenever that is called, in the form that `add` takes."""
-        return Painter(world, size=self.size, colour=colour, theme=theme, part=part, draw=draw).paint
+        return Renderer(world, size=self.size, colour=colour, theme=theme, part=part, draw=draw).paint
 
     def __init__(self, path: Path, size: tuple[int, int], fps: int) -> None:
         self.path, self.size, self.fps = path, size, fps
@@ -107,7 +107,7 @@ class _Stream(Film):
         return {}
 
     def _set_up(self, fps: int) -> None:
-        """What else the encoder is told before the first picture."""
+        """Further settings of the encoder, before the first picture."""
 
     @abstractmethod
     def _frame(self, pixels: Pixels) -> Any:
@@ -162,7 +162,7 @@ class Mp4(_Stream):
     def _set_up(self, fps: int) -> None:
         context = self._stream.codec_context
         context.gop_size = fps
-        # ITU-R BT.709, said in the file as well: else players guess by the size of the picture, and colours shift.
+        # ITU-R BT.709, named in the file as well: else players guess by the size of the picture, and colours shift.
         context.color_primaries = context.color_trc = context.colorspace = 1
         context.color_range = 1
 
@@ -214,7 +214,7 @@ class WebP(_Stream):
 
     def close(self) -> None:
         super().close()
-        if self.error is not None:  # the length of the file is said in its head
+        if self.error is not None:  # the length of the file is in its header
             with self._disk.path.open("r+b") as file:
                 length = file.seek(0, 2)
                 file.seek(4)
@@ -277,10 +277,8 @@ class Frames(Film):
         super().__init__(path, size, fps)
         self._template = str(path)
         first = self._named(0)
-        try:
+        with file_errors("path", first, "written"):
             first.open("ab").close()  # tell now, not after a long run, if it cannot be written
-        except OSError as error:
-            raise InputError(f"path is '{first}', which cannot be written: {error.strerror or error}") from None
 
     def add(self, picture: Pixels) -> None:
         try:
@@ -309,7 +307,7 @@ def film_for(path: Path) -> type[Film]:
     """
     suffix = path.suffix.lower()
     if suffix in FILMS:
-        check_extra(*FILMS[suffix].needs)
+        require("recording", *FILMS[suffix].needs, extra="record")
         return FILMS[suffix]
     if suffix != PICTURE:
         known = ", ".join((*FILMS, PICTURE))
@@ -321,15 +319,8 @@ def film_for(path: Path) -> type[Film]:
             numbered = False
         if not numbered:
             raise InputError(f"path is '{path}'; allowed for numbered pictures is one number, such as frame-{{:04d}}.png")
-    check_extra(*Frames.needs)
+    require("recording", *Frames.needs, extra="record")
     return Frames
-
-
-def check_extra(*modules: str) -> None:
-    """Raise InputError with the command that installs what is missing."""
-    for module in modules:
-        if importlib.util.find_spec(module) is None:
-            raise InputError(f"recording needs {module!r}, which is not installed: pip install 'pyverlet[record]'")
 
 
 def write_picture(path: Path, pixels: Pixels) -> None:

@@ -1,4 +1,4 @@
-"""A world's pictures as numbers, for a page that draws them itself: what it looks at, and how that is made small.
+"""A world's pictures as numbers, for a page that draws them itself: what is in a frame, and how it is compressed.
 
 A film is blocks: shapes, as the live page gets them, and chunks of up to a second. Positions are whole steps of a grid, and a
 frame of a chunk is written as the difference from where the two frames before would have taken each circle; velocities as the
@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 from pyverlet.ground.errors import InputError
 from pyverlet.picture import ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Groups, Pen, Theme
 from pyverlet.picture.pen import Draw
-from pyverlet.viewers.exhibit import Exhibit
 from pyverlet.viewers.frames import Frame, Rect, Shape, Status
-from pyverlet.viewers.gauges import Gauges
+from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.protocol import encode_shape, finite, written
-from pyverlet.viewers.stage import Stage
+from pyverlet.viewers.readouts import Readouts
+from pyverlet.viewers.view_state import ViewState
 from pyverlet.world.clock import FrameBudget
 from pyverlet.world.panels import Panels
 
@@ -47,11 +47,7 @@ _COLOURS: dict[type[Colouring], str] = {ByOrigin: "order", BySpeed: "speed", ByM
 
 
 def page_colour(colour: Colouring | None) -> str:
-    """What the page calls this colouring; `picture` for colours of the user's own.
-
-    Raises:
-        InputError: the page has none like it.
-    """
+    """What the page calls this colouring, `picture` for colours of the user's own; InputError if it has none like it."""
     if colour is None:
         return "order"
     if getattr(colour, "_full", None) is not None:
@@ -62,17 +58,7 @@ def page_colour(colour: Colouring | None) -> str:
 
 
 class Watch:
-    """Looks at one world as the live page does: `picture` is its frame now.
-
-    Args:
-        world: only read.
-        title: heading of the page.
-        fps: pictures a second.
-        colour: what the colours say at first; the page offers all.
-        theme: dark or light, which decides on colours of the user's own.
-        part: of the plane to show, m.
-        draw: what is drawn over it.
-    """
+    """Looks at one world as the live page does: `picture` is its frame now. Arguments as for `to_video`."""
 
     def __init__(
         self, world: World, *, title: str, fps: int, colour: Colouring | None, theme: Theme, part: Rect | None,
@@ -82,38 +68,34 @@ class Watch:
         if page_colour(colour) == "picture" and colour is not None:
             packed = colour.colours(world, theme)
             rgb = np.stack([(packed >> shift) & 255 for shift in (0, 8, 16)], axis=1).astype(np.uint8)
-        self._stage = Stage(Exhibit(title, Panels.of(world), colours=rgb, part=part))
+        self._view_state = ViewState(Presentation(title, Panels.of(world), colours=rgb, part=part))
         self._world, self._draw = world, draw
-        self._gauges, self._budget, self._dt = Gauges(FrameBudget()), FrameBudget().limit_ms, 1.0 / fps
+        self._readouts, self._budget, self._dt = Readouts(FrameBudget()), FrameBudget().limit_ms, 1.0 / fps
         self._version: object = None
         self._shape: Any = None
         self._seq = 0
 
     def picture(self) -> Frame:
         """The world now."""
-        stage = self._stage
-        positions, velocity = stage.look()
-        if self._version != stage.version:
-            self._version = stage.version
-            self._shape = stage.shape(dt=self._dt, budget_ms=self._budget, scenes=())
+        view_state = self._view_state
+        positions, velocity = view_state.capture()
+        if self._version != view_state.version:
+            self._version = view_state.version
+            self._shape = view_state.shape(dt=self._dt, budget_ms=self._budget, scenes=())
         self._seq += 1
-        status = self._gauges.read(stage, dropped=0, speed=1.0, paused=False, busy=None, error=None, at_once=True)
-        place = stage.place(positions)
+        status = self._readouts.read(view_state, dropped=0, speed=1.0, paused=False, busy=None, error=None, at_once=True)
+        place = view_state.place(positions)
         pen = Pen()
         if self._draw:
             self._draw(self._world, pen)
         return Frame(
-            self._seq, self._shape, stage.layout.view, status, place, velocity, stage.moving(), *stage.links(),
+            self._seq, self._shape, view_state.layout.view, status, place, velocity, view_state.moving(), *view_state.links(),
             drawing=pen.drawing,
         )  # fmt: skip
 
 
 class Reel:
-    """Turns frames into the blocks of a film.
-
-    Args:
-        fps: pictures a second.
-    """
+    """Turns frames into the blocks of a film."""
 
     def __init__(self, fps: int) -> None:
         self._fps = fps

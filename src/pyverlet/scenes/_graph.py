@@ -29,5 +29,5 @@ class Graph:
     note: str
 
 
-Gauge = Callable[[World], Graph]
+GraphReader = Callable[[World], Graph]
 """Called with the world for each picture; it may remember what it has seen."""

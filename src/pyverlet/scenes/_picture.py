@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import warnings
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.outside import require
 
 Pixels = NDArray[np.uint8]
 """(height, width, 3) bytes R, G, B."""
@@ -27,8 +27,7 @@ def read(path: Path) -> Pixels:
     Raises:
         InputError: there is no file, it is not a picture, it is too long and thin, or Pillow is missing.
     """
-    if importlib.util.find_spec("PIL") is None:
-        raise InputError("picture needs 'PIL', which is not installed: pip install 'pyverlet[record]'")
+    require("picture", "PIL", extra="record")
     from PIL import Image, ImageOps
 
     try:

@@ -18,7 +18,7 @@ from pyverlet.ground.guess import did_you_mean
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
 from pyverlet.laws.integrators import Integrator, PositionVerlet
-from pyverlet.scenes._graph import Gauge
+from pyverlet.scenes._graph import GraphReader
 from pyverlet.world.panels import Pace, Panel, Panels, every_frame
 from pyverlet.world.world import World
 
@@ -108,7 +108,7 @@ class Show(Shown):
     colours: Callable[[Settings, float, Callable[[int, int], None] | None], NDArray[np.uint8]] | None = None
     view: Callable[[Settings], tuple[float, float, float, float]] | None = None
     seconds: Callable[[Settings], float] | None = None
-    graph: Callable[[Settings], Gauge] | None = None
+    graph: Callable[[Settings], GraphReader] | None = None
 
 
 @dataclass(frozen=True, repr=False)
@@ -226,7 +226,7 @@ class Scene(Shown):
     def freeze(self, path: str | Path, **overrides: Any) -> None:
         """Write the start of the scene's world to a file, .toml or .json, with its arrays in a .npz beside it.
 
-        Whoever reads it gets the same start, to the last bit, whatever a later version would draw by chance.
+        Reading it gives the same start, to the last bit, whatever a later version would draw by chance.
 
         Args:
             path: of the file; old ones are replaced.

@@ -38,7 +38,7 @@ LEAST = 12
 def build(settings: Settings) -> World:
     """A cloth hangs from nine pegs, a wide one from more.
 
-    Each thread breaks beyond a force, so that whoever drags hard enough tears it; colours in a window or a film show the pull. Of
+    Each thread breaks beyond a force, so that a hard pull tears it; colours in a window or a film show the pull. Of
     the particles those that do not fill a row lie on the floor.
     """
     if settings.particles < LEAST:

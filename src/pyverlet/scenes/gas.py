@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pyverlet.laws.rooms import Periodic
 from pyverlet.scenes import _start
-from pyverlet.scenes._graph import Gauge, Graph
+from pyverlet.scenes._graph import Graph, GraphReader
 from pyverlet.scenes._scene import Scene, Settings, Show
 from pyverlet.world.world import World
 
@@ -30,7 +30,7 @@ MEMORY_S = 4.0
 
 
 def build(settings: Settings) -> World:
-    """1,000 elastic circles without gravity; who leaves on one side comes in on the other. All begin equally fast.
+    """1,000 elastic circles without gravity; what leaves on one side comes in on the other. All begin equally fast.
 
     They cover 30 % of the area. Within a second impacts have made the speeds Maxwell and Boltzmann's: of two dimensions,
     f(u) = 2 u exp(-u^2) with u = v / sqrt(2 k T / m). The pressure, from the virial of the impacts, is beside that of Henderson's
@@ -102,7 +102,7 @@ class Thermometer:
         self._weight = keep * self._weight + share
 
 
-def _graph(settings: Settings) -> Gauge:
+def _graph(settings: Settings) -> GraphReader:
     return Thermometer()
 
 

@@ -27,7 +27,7 @@ def build(settings: Settings) -> World:
     """2,000 grains run from the upper bulb into the lower one.
 
     The glass is one closed chain of segments, 5 grains wide at the neck, and no bound holds the grains besides: none gets through
-    the corners. Sand that rubs (--friction) runs more slowly, and heaps up below.
+    the corners. Sand with friction (--friction) runs more slowly, and heaps up below.
     """
     rng = np.random.default_rng(settings.seed)
     radii = _start.draw_radii(rng, settings.particles, settings.radius_spread, RADIUS)

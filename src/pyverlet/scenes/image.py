@@ -73,10 +73,7 @@ def build(settings: Settings) -> World:
 def colours(settings: Settings, dt: float, progress: Callable[[int, int], None] | None = None) -> NDArray[np.uint8]:
     """(n, 3) bytes R, G, B: what the picture shows where each circle ends, found out by running the scene once.
 
-    Args:
-        settings: of the run to be shown.
-        dt: of its frames, s: other frames would end elsewhere.
-        progress: called as progress(done, total) after every frame.
+    Frames of another length `dt` would end elsewhere. progress(done, total) is called after every frame.
     """
     pixels = _pixels(settings)
     world = build(settings)

@@ -89,16 +89,9 @@ def run(
     observe: Callable[[World], None] | None = None,
     step: Callable[[float], None] | None = None,
 ) -> Report:
-    """Step `world` by `frames` frames of `dt` seconds and report on them.
+    """Step `world` by `frames` frames of `dt` seconds, each by `step` if given, and report on them.
 
-    Args:
-        world: stepped in place.
-        scene: name to report.
-        frames: at least 1.
-        dt: seconds a frame.
-        progress: called with (frames done, frames) after every frame.
-        observe: called with the world after every frame, outside the measured time.
-        step: makes one frame of dt seconds; world.step unless given.
+    progress(frames done, frames) and observe(world) are called after every frame, outside the measured time.
 
     Raises:
         NonFiniteError: the state turned NaN or infinite.

@@ -23,8 +23,9 @@ from typing import Any
 
 from pyverlet.ground.errors import InputError, Interrupted
 from pyverlet.ground.guess import did_you_mean
-from pyverlet.ground.patience import Patience, TooLong
+from pyverlet.ground.outside import file_errors
 from pyverlet.ground.shown import Shown
+from pyverlet.ground.time_limit import TimeLimit, TooLong
 from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.scenes.sliders import Board, board
 from pyverlet.world.actors import Actor
@@ -68,7 +69,7 @@ class Sketch(Shown):
     def __init__(self, path: Path, source: bytes, before: Sketch | None = None) -> None:
         self.path, self.source, self.name = Path(path), source, Path(path).name
         self.sliders: Board = {}
-        self.patience: Patience | None = None
+        self.time_limit: TimeLimit | None = None
         self.settings = Settings()
         self._left: Board = dict(before.sliders) if before else {}
         self._brought: dict[str, Path] = dict(before._brought) if before else {}
@@ -78,16 +79,10 @@ class Sketch(Shown):
 
     @classmethod
     def read(cls, path: str | Path, before: Sketch | None = None) -> Sketch:
-        """The sketch in a file.
-
-        Raises:
-            InputError: it cannot be read.
-        """
+        """The sketch in a file; InputError if it cannot be read."""
         path = Path(path)
-        try:
+        with file_errors("path", path, "read"):
             source = path.read_bytes()
-        except OSError as error:
-            raise InputError(f"path is '{path}', which cannot be read: {error.strerror or error}") from None
         if len(source) > LARGEST:
             raise InputError(f"'{path}' has {len(source):,} bytes; allowed are {LARGEST:,}")
         return cls(path, source, before)
@@ -117,7 +112,7 @@ class Sketch(Shown):
         return hook not in self._off and callable(getattr(self.module, hook, None))
 
     @property
-    def answers(self) -> bool:
+    def has_callbacks(self) -> bool:
         """Whether what the user does reaches the sketch: then its worlds are more than what they started with."""
         return bool(self.sliders) or any(self.has(hook) for hook in ("update", "keys", "click"))
 
@@ -135,7 +130,7 @@ class Sketch(Shown):
             return
         function = getattr(of or self.module, hook)
         try:
-            with self.at_work(), self.patience.within(HOOK_S) if self.patience else nullcontext():
+            with self.at_work(), self.time_limit.within(HOOK_S) if self.time_limit else nullcontext():
                 function(*arguments)
         except SketchError as error:
             self._off.add(hook)
@@ -282,7 +277,7 @@ class Sketch(Shown):
 
 @dataclass(frozen=True)
 class Given(Settings):
-    """Settings that know which of them somebody has asked for."""
+    """Settings that know which of them were asked for."""
 
     given: frozenset[str] = frozenset()
 
@@ -292,7 +287,6 @@ class SketchScene(Scene):
     """A scene made by `build()`."""
 
     def settings(self, **overrides: Any) -> Settings:
-        """As `Scene.settings`."""
         named = frozenset(name for name, value in overrides.items() if value is not None and (name, value) != ("ledger", False))
         settings = super().settings(**overrides)
         assert isinstance(settings, Given)

@@ -20,7 +20,7 @@ MOST = 24
 
 
 class Slider:
-    """A number that whoever looks at the page may change: made by `slider`.
+    """A number that may be changed on the page: made by `slider`.
 
     Attributes:
         name: beside it on the page.
@@ -40,10 +40,7 @@ class Slider:
 
     @value.setter
     def value(self, value: float) -> None:
-        number = checks.number(self.name, value)
-        if not self.low <= number <= self.high:
-            raise InputError(f"{self.name} is {number:g}; allowed is a number from {self.low:g} to {self.high:g}")
-        self._value = number
+        self._value = checks.number(self.name, value, least=self.low, most=self.high)
 
     def __float__(self) -> float:
         return self._value
@@ -79,9 +76,7 @@ def slider(name: str, low: float, high: float, value: float | None = None, *, st
         raise InputError(f"name is {name!r}; allowed is a text of 1 to 60 letters")
     low = checks.number("low", low)
     high = checks.number("high", high, above=low)
-    start = checks.number("value", 0.5 * (low + high) if value is None else value)
-    if not low <= start <= high:
-        raise InputError(f"value is {start:g}; allowed is a number from {low:g} to {high:g}")
+    start = checks.number("value", 0.5 * (low + high) if value is None else value, least=low, most=high)
     step = checks.number("step", step, least=0.0)
     name, board = str(name), on_board()
     made = Slider(name, low, high, start, step)

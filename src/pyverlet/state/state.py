@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import memory
-from pyverlet.ground.turns import Turn
+from pyverlet.ground.step_lock import StepLock
 from pyverlet.state import seam
 from pyverlet.state.data import Columns
 
@@ -83,7 +83,7 @@ class State:
     crossed: NDArray[np.float64]
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
-        self.dtype, self.turn = dtype, Turn()
+        self.dtype, self.turn = dtype, StepLock()
         self._store: dict[str, Array] = {name: np.empty((0, 2), dtype) for name in ROWS}
         self._store |= {name: np.empty(0, dtype) for name in COLUMNS}
         for names, kind in ((MARKS, np.uint32), (("number",), np.int64), (("angle",), np.float64)):
@@ -119,7 +119,7 @@ class State:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
-        self.turn = Turn()
+        self.turn = StepLock()
         self._show(len(self._store["number"]))
 
     def arrays(self) -> Iterator[tuple[str, Array]]:

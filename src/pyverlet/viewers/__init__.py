@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 from pyverlet.ground.submodules import lazily
 
 if TYPE_CHECKING:
-    from pyverlet.viewers.exhibit import Exhibit, Repertoire
     from pyverlet.viewers.handle import Page
+    from pyverlet.viewers.presentation import Presentation, Repertoire
     from pyverlet.world.panels import Panels
     from pyverlet.world.world import World
 
@@ -66,14 +66,14 @@ def view(
 
     Args:
         world: the world, or the panels, to step and show.
-        block: until Ctrl-C, and nobody else may touch the world meanwhile; False returns at once, and shares it.
+        block: until Ctrl-C; the program may not touch the world meanwhile. False returns at once, and shares it.
         port: TCP port on this machine, 1 to 65535; 0 takes any free one. 8000 unless said, and any free one without `block`.
         open_browser: open a tab when there is a screen to open it on.
         title: heading of the page.
         dt: simulated seconds per frame.
         draw: of (world, pen), a `pyverlet.picture.Pen`: called for each picture, draws over it.
         keys: of (world, key): called when a key is pressed on the page, named as in browsers: "a", " ", "ArrowLeft".
-        click: of (world, point, button): called when somebody clicks; (2,) m, and "left", "middle" or "right".
+        click: of (world, point, button): called on a click; (2,) m, and "left", "middle" or "right".
 
     Returns:
         None; without `block` a handle with `url` and `close()`.
@@ -81,11 +81,11 @@ def view(
     Raises:
         InputError: the port is taken or not a port, or another argument is outside what is allowed.
     """
-    from pyverlet.viewers.answers import Functions
-    from pyverlet.viewers.exhibit import Exhibit
+    from pyverlet.viewers.presentation import Presentation
+    from pyverlet.viewers.user_callbacks import CallbackFunctions
 
-    shown = Exhibit.of(world, title)
-    shown = replace(shown, answers=Functions(draw=draw, keys=keys, click=click))
+    shown = Presentation.of(world, title)
+    shown = replace(shown, callbacks=CallbackFunctions(draw=draw, keys=keys, click=click))
     if block:
         from pyverlet.viewers import launch
 
@@ -98,7 +98,7 @@ def view(
 
 
 def serve(
-    build: Callable[[], World | Panels | Exhibit],
+    build: Callable[[], World | Panels | Presentation],
     *,
     scene_name: str,
     repertoire: Repertoire | None = None,
@@ -110,10 +110,10 @@ def serve(
 ) -> None:
     """Build a world and show it on a live page until Ctrl-C. What the command line uses.
 
-    The port is taken before the world is built, so that a taken one is told at once.
+    The port is taken before the world is built, so that a taken one is refused at once.
 
     Args:
-        build: makes the world, the panels or the exhibit.
+        build: makes the world, the panels or the presentation.
         scene_name: heading of the page.
         repertoire: scenes to pick from on the page; None: none.
         host: address to listen on; anything but this machine's own lets the whole network in.
@@ -147,13 +147,9 @@ def widget(world: World | Panels, *, title: str = "pyverlet", dt: float = 1 / 60
     Raises:
         InputError: the extra `notebook` is missing, or an argument is outside what is allowed.
     """
-    import importlib.util
+    from pyverlet.ground.outside import require
 
-    from pyverlet.ground.errors import InputError
-
-    for module in ("anywidget", "PIL"):
-        if importlib.util.find_spec(module) is None:
-            raise InputError(f"a widget needs '{module}', which is not installed: pip install 'pyverlet[notebook]'")
+    require("a widget", "anywidget", "PIL", extra="notebook")
     from pyverlet.viewers.notebook import Widget
 
     return Widget(world, title=title, dt=dt, height=height)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import get_args
 
 from pyverlet import scenes
 from pyverlet.ground import checks
@@ -25,7 +26,7 @@ MAX_STEPS = 600
 """Frames one Step may ask for: ten seconds at 60 a second."""
 
 FARTHEST = 1e9
-"""m. Hands further out than this would leave what float32 can tell."""
+"""m. Pointers further out than this would leave what float32 can tell."""
 
 LONGEST_KEY = 24
 """Letters of a key's name."""
@@ -35,17 +36,6 @@ BUTTONS = ("left", "middle", "right")
 
 SLOWEST = 1 / 64
 """Least speed: a second takes a minute."""
-
-
-def _finite(name: str, value: float, limit: float) -> None:
-    checks.number(name, value)
-    if abs(value) > limit:
-        raise InputError(f"{name} is {value:g}; allowed is a number from {-limit:g} to {limit:g}")
-
-
-def _between(name: str, value: float, low: float, high: float) -> None:
-    if not low <= checks.number(name, value) <= high:
-        raise InputError(f"{name} is {value:g}; allowed is a number from {low:g} to {high:g}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +67,7 @@ class SetSpeed:
     value: float
 
     def __post_init__(self) -> None:
-        _between("speed", self.value, SLOWEST, 1.0)
+        checks.number("speed", self.value, least=SLOWEST, most=1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,19 +85,24 @@ class Build:
 
 
 @dataclass(frozen=True, slots=True)
-class SetGravity:
+class Setting:
+    """A setting of the worlds that a viewer may change."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetGravity(Setting):
     """Set the gravity vector, m/s^2, y up."""
 
     x: float
     y: float
 
     def __post_init__(self) -> None:
-        _finite("gravity x", self.x, MAX_GRAVITY)
-        _finite("gravity y", self.y, MAX_GRAVITY)
+        checks.number("gravity x", self.x, least=-MAX_GRAVITY, most=MAX_GRAVITY)
+        checks.number("gravity y", self.y, least=-MAX_GRAVITY, most=MAX_GRAVITY)
 
 
 @dataclass(frozen=True, slots=True)
-class SetSubsteps:
+class SetSubsteps(Setting):
     """Set the substeps of a frame."""
 
     value: int
@@ -117,7 +112,7 @@ class SetSubsteps:
 
 
 @dataclass(frozen=True, slots=True)
-class SetRestitution:
+class SetRestitution(Setting):
     """Set the restitution of circles and bounds."""
 
     value: float
@@ -127,17 +122,17 @@ class SetRestitution:
 
 
 @dataclass(frozen=True, slots=True)
-class SetFriction:
+class SetFriction(Setting):
     """Set the friction of circles and bounds."""
 
     value: float
 
     def __post_init__(self) -> None:
-        _between("friction", self.value, 0.0, MAX_FRICTION)
+        checks.number("friction", self.value, least=0.0, most=MAX_FRICTION)
 
 
 @dataclass(frozen=True, slots=True)
-class SetIntegrator:
+class SetIntegrator(Setting):
     """Set how the circles move between contacts, by the method's name."""
 
     name: str
@@ -149,31 +144,31 @@ class SetIntegrator:
 
 @dataclass(frozen=True, slots=True)
 class _AtPoint:
-    """Something a hand does at (x, y), metres."""
+    """Something a pointer does at (x, y), metres."""
 
-    hand: int
+    pointer: int
     x: float
     y: float
 
     def __post_init__(self) -> None:
-        _finite("x", self.x, FARTHEST)
-        _finite("y", self.y, FARTHEST)
+        checks.number("x", self.x, least=-FARTHEST, most=FARTHEST)
+        checks.number("y", self.y, least=-FARTHEST, most=FARTHEST)
 
 
 @dataclass(frozen=True, slots=True)
 class _Picking(_AtPoint):
-    """Something a hand does to the particle whose rim is nearest to (x, y), if it is within `reach` metres."""
+    """Something a pointer does to the particle whose rim is nearest to (x, y), if it is within `reach` metres."""
 
     reach: float = 0.0
 
     def __post_init__(self) -> None:
         _AtPoint.__post_init__(self)
-        _between("reach", self.reach, 0.0, FARTHEST)
+        checks.number("reach", self.reach, least=0.0, most=FARTHEST)
 
 
 @dataclass(frozen=True, slots=True)
 class Drag(_Picking):
-    """Pull a particle towards (x, y). The first one of a hand picks it; if there is none within reach, the hand stays empty
+    """Pull a particle towards (x, y). The first one of a pointer picks it; if there is none within reach, the pointer stays empty
     until it is released.
     """
 
@@ -190,7 +185,7 @@ class Delete(_Picking):
 
 @dataclass(frozen=True, slots=True)
 class Poke(_AtPoint):
-    """Push everything near (x, y) away from it until the hand is released."""
+    """Push everything near (x, y) away from it until the pointer is released."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,14 +195,14 @@ class Spawn(_AtPoint):
 
 @dataclass(frozen=True, slots=True)
 class Release:
-    """Let go of whatever this hand drags or pokes."""
+    """Let go of whatever this pointer drags or pokes."""
 
-    hand: int
+    pointer: int
 
 
 @dataclass(frozen=True, slots=True)
 class Undo:
-    """Go back to before the last thing that a hand did; time goes back, too."""
+    """Go back to before the last thing that a pointer did; time goes back, too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,8 +244,15 @@ class Click(_AtPoint):
             raise InputError(f"button is {self.button[:40]!r}; allowed are {', '.join(BUTTONS)}")
 
 
-Setting = SetGravity | SetSubsteps | SetRestitution | SetFriction | SetIntegrator
-Answered = SetSlider | Key | Click
-Command = (
-    Pause | Step | Reset | SetSpeed | Build | Setting | Drag | Poke | Pin | Spawn | Delete | Release | Undo | Redo | Answered
-)
+Settings = SetGravity | SetSubsteps | SetRestitution | SetFriction | SetIntegrator
+PointerTool = Drag | Poke | Pin | Spawn | Delete
+UserInput = SetSlider | Key | Click
+Command = Pause | Step | Reset | SetSpeed | Build | Settings | PointerTool | Release | Undo | Redo | UserInput
+
+COMMANDS: dict[str, type[Command]] = {kind.__name__.removeprefix("Set").lower(): kind for kind in get_args(Command)}
+"""By the names that pages call them, such as "gravity"."""
+
+
+def name_of(command: Command) -> str:
+    """What pages call this command, and worlds this setting."""
+    return type(command).__name__.removeprefix("Set").lower()

@@ -40,11 +40,7 @@ NONE = Contacts(np.empty((0, 2), np.uint32), np.empty(0, np.float32), np.empty(0
 
 
 class Forces:
-    """Of worlds side by side.
-
-    Attributes:
-        wanted: whether somebody looks.
-    """
+    """Forces of contacts in worlds side by side; `wanted`: whether a viewer shows them."""
 
     def __init__(self, worlds: Sequence[World]) -> None:
         self._worlds = worlds

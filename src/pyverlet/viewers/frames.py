@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from pyverlet.core import unit
 from pyverlet.laws.rooms import Circle
-from pyverlet.picture import across
+from pyverlet.picture import periodic_images
 from pyverlet.picture.colour import USUAL_MULTIPLE
 from pyverlet.picture.pen import Drawing
 from pyverlet.scenes._graph import Graph
 from pyverlet.state.seam import Seam
 from pyverlet.viewers.forces import NONE as NO_CONTACTS
 from pyverlet.viewers.forces import Contacts
-from pyverlet.viewers.sketch import NOTHING, Sketch
+from pyverlet.viewers.obstacle_outlines import NO_OUTLINES, ObstacleOutlines
 
 if TYPE_CHECKING:
     from pyverlet.world.moments import Moment
@@ -34,7 +34,7 @@ VELOCITY_MAX = 32767
 """Largest velocity component as a 16-bit number; the fastest circle has it."""
 
 PUSH_MULTIPLE = 6.0
-"""The hardest push that can be told, in terms of the mean."""
+"""The largest force that is encoded, in terms of the mean."""
 
 VIEW_MARGIN = 0.03
 """Free space around the bounds, as a fraction of their longer side."""
@@ -84,13 +84,13 @@ class Shape:
     """Several worlds side by side; empty for a single one."""
     differing: tuple[str, ...]
     """Settings in which the panels differ, and which therefore stay as they are."""
-    obstacles: Sketch
+    obstacles: ObstacleOutlines
     """Those that stand still."""
     scene: str
     """Name of the scene, or "" for worlds of the user's own."""
     scenes: tuple[tuple[str, str], ...]
     """Name and one line of each scene that can be picked; empty where none can."""
-    answers: tuple[str, ...]
+    callbacks: tuple[str, ...]
     """Of "keys" and "click", what the user's own program wants to know of."""
     countable: bool
     """Whether another number of circles can be asked for."""
@@ -170,45 +170,45 @@ class Frame:
     view: Rect
     status: Status
     rows: NDArray[np.float32]
-    """(n, 2) positions in metres, read-only copy, in the order the particles were added or that of `whose`."""
+    """(n, 2) positions in metres, read-only copy, in the order the particles were added or that of `order`."""
     moving: NDArray[np.float32]
-    """(n, 2) velocities in m/s, likewise by `whose_moving`; of an earlier moment unless somebody asks for them."""
-    obstacles: Sketch = NOTHING
+    """(n, 2) velocities in m/s, likewise by `moving_order`; of an earlier moment unless a viewer asks for them."""
+    obstacles: ObstacleOutlines = NO_OUTLINES
     """Those that move."""
     joined: NDArray[np.uint32] = field(default_factory=lambda: np.empty((0, 2), np.uint32))
     """(m, 2) which circles each link joins."""
     force: NDArray[np.float32] = field(default_factory=lambda: np.empty(0, np.float32))
     """(m,) what it pulls with, N; negative if it pushes."""
     turned: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, np.uint8))
-    """(n,) how far each circle has turned, in 1/256 of a turn, counter-clockwise; empty as long as nobody has."""
-    whose: NDArray[np.int32] | None = None
+    """(n,) how far each circle has turned, in 1/256 of a turn, counter-clockwise; empty until one has."""
+    order: NDArray[np.int32] | None = None
     """(n,) which particle each row is of, between the substeps of a frame; None: row k is particle k."""
-    whose_moving: NDArray[np.int32] | None = None
+    moving_order: NDArray[np.int32] | None = None
     drawing: Drawing = ()
     """What the user's own function has drawn over it; of the frame before, between its substeps."""
     contacts: Contacts = NO_CONTACTS
-    """Who pushes whom, where somebody looks at it; of a moment ago."""
+    """Forces of contacts, if a viewer shows them; of a moment ago."""
 
     def moved(self, moment: Moment, seq: int, status: Status, *, velocity: bool) -> Frame:
         """The same a little later, between two substeps; its velocities are those of this frame unless they are asked for."""
-        moving, whose_moving = self.moving, self.whose_moving
+        moving, moving_order = self.moving, self.moving_order
         if velocity:
-            rows, moving, whose = moment.look()
-            moving.flags.writeable, whose_moving = False, whose
+            rows, moving, order = moment.look()
+            moving.flags.writeable, moving_order = False, order
         else:
-            rows, whose = moment.positions()
+            rows, order = moment.positions()
         rows.flags.writeable = False
-        return replace(self, seq=seq, status=status, rows=rows, moving=moving, whose=whose, whose_moving=whose_moving)
+        return replace(self, seq=seq, status=status, rows=rows, moving=moving, order=order, moving_order=moving_order)
 
     @cached_property
     def position(self) -> NDArray[np.float32]:
-        """(n, 2) metres, read-only, in the order the particles were added. Sorted by whoever asks first, as in `grid`."""
-        return _sorted(self.rows, self.whose)
+        """(n, 2) metres, read-only, in the order the particles were added. Sorted in the thread that asks first, as in `grid`."""
+        return _sorted(self.rows, self.order)
 
     @cached_property
     def velocity(self) -> NDArray[np.float32]:
         """(n, 2) m/s, likewise."""
-        return _sorted(self.moving, self.whose_moving)
+        return _sorted(self.moving, self.moving_order)
 
     @cached_property
     def strain(self) -> NDArray[np.uint8]:
@@ -226,7 +226,7 @@ class Frame:
         return np.asarray(np.clip(np.rint(force / np.float32(unit or 1.0)), 0, 255), np.uint8), unit
 
     @cached_property
-    def lean(self) -> NDArray[np.uint8]:
+    def normals(self) -> NDArray[np.uint8]:
         """(m,) which way each contact's normal points, in 1/256 of a turn."""
         return np.asarray(np.rint(self.contacts.angle * (128 / np.pi)).astype(np.int64).astype(np.uint8))
 
@@ -234,7 +234,7 @@ class Frame:
     def grid(self) -> NDArray[np.uint16]:
         """(n, 2) positions on the 16-bit grid over `view`, as `quantise` makes it.
 
-        Computed when first asked for, by whoever sends the frame, so that the physics thread never pays for it.
+        Computed when first asked for, in the thread that sends the frame: it costs the physics thread nothing.
         """
         return quantise(self.position, self.view)
 
@@ -244,7 +244,7 @@ class Frame:
         found = [(np.empty(0, np.uint32), np.empty((0, 2), np.float32))]
         for first, count, seam in self.shape.seams:
             mine = slice(first, first + count)
-            owner, place = across.copies(self.position[mine], self.shape.radius[mine], seam)
+            owner, place = periodic_images.copies(self.position[mine], self.shape.radius[mine], seam)
             found.append((owner + np.uint32(first), place))
         owners, places = zip(*found, strict=True)
         return np.concatenate(owners), np.concatenate(places)
@@ -255,7 +255,7 @@ class Frame:
         ends, force, found = self.position[self.joined], self.force, []
         for first, count, seam in self.shape.seams:
             mine = (self.joined[:, 0] >= first) & (self.joined[:, 0] < first + count)
-            found.append(across.lines(ends[mine], force[mine], seam))
+            found.append(periodic_images.lines(ends[mine], force[mine], seam))
             ends, force = ends[~mine], force[~mine]
         return np.concatenate([ends, *(lines for lines, _ in found)]), np.concatenate([force, *(pulls for _, pulls in found)])
 
@@ -272,10 +272,10 @@ class Frame:
         return np.asarray(np.rint(counts), dtype=np.int16)
 
 
-def _sorted(rows: NDArray[np.float32], whose: NDArray[np.int32] | None) -> NDArray[np.float32]:
-    if whose is not None:
+def _sorted(rows: NDArray[np.float32], order: NDArray[np.int32] | None) -> NDArray[np.float32]:
+    if order is not None:
         result = np.empty_like(rows)
-        unit("tools").put_rows(result, rows, whose)
+        unit("tools").put_rows(result, rows, order)
         rows = result
     rows.flags.writeable = False
     return rows
@@ -353,7 +353,7 @@ class Camera:
 
 
 def _middle_and_reach(position: NDArray[np.float32]) -> tuple[float, float, float]:
-    """The median of (n, 2) positions, which no runaway moves, and the farthest anybody is from it in x or y; metres."""
+    """The median of (n, 2) positions, which no runaway moves, and the farthest distance from it in x or y; metres."""
     if not len(position):
         return 0.0, 0.0, 0.0
     middle = np.median(position[:: 1 + len(position) // MEDIAN_SAMPLE], axis=0)

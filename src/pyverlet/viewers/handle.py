@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from types import TracebackType
 
 from pyverlet.viewers import launch
-from pyverlet.viewers.exhibit import Exhibit
+from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.session import Session
 from pyverlet.viewers.web import LOOPBACK_NAMES
 
@@ -22,13 +22,13 @@ class Page:
         url: its address.
     """
 
-    def __init__(self, exhibit: Exhibit, *, host: str, port: int, open_browser: bool, dt: float) -> None:
-        self._worlds = exhibit.panels.worlds
+    def __init__(self, presentation: Presentation, *, host: str, port: int, open_browser: bool, dt: float) -> None:
+        self._worlds = presentation.panels.worlds
         self._stack = ExitStack()
         self._held: list[contextlib.AbstractContextManager[None]] = []
         with ExitStack() as opening:
             listener = opening.enter_context(launch.take_port(host, port))
-            self._session = Session(exhibit, dt=dt)
+            self._session = Session(presentation, dt=dt)
             opening.enter_context(launch.on_air(self._session, listener, only_loopback=host in LOOPBACK_NAMES))
             self.url = launch.address(host, listener)
             for world in self._worlds:
@@ -36,7 +36,7 @@ class Page:
             self._session.start()
             self._stack = opening.pop_all()
         self._stack.callback(self._session.stop)
-        launch.announce(exhibit.title, self.url, host, open_browser, blocks=False)
+        launch.announce(presentation.title, self.url, host, open_browser, blocks=False)
         if open_browser and launch.has_screen():
             launch.open_tab(self.url)
 

@@ -1,4 +1,4 @@
-"""Undo and redo: worlds as they were before somebody laid hands on them."""
+"""Undo and redo: worlds as they were before they were changed by hand."""
 
 from __future__ import annotations
 
@@ -19,10 +19,7 @@ EACH = 400
 class History:
     """What was done to worlds by hand, each with what they were before it: all of it, their time too.
 
-    A stroke is one thing done, from when a hand comes down until it is released.
-
-    Args:
-        panels: the worlds.
+    A stroke is one thing done, from when a pointer comes down until it is released.
     """
 
     def __init__(self, panels: Panels) -> None:
@@ -37,23 +34,23 @@ class History:
         """How often one can undo, and redo."""
         return len(self._back), len(self._forth)
 
-    def open(self, hand: int) -> None:
-        """A hand is about to do something."""
-        self._before = None if hand in self._strokes else self._panels.save()
+    def open(self, pointer: int) -> None:
+        """A pointer is about to do something."""
+        self._before = None if pointer in self._strokes else self._panels.save()
 
-    def close(self, hand: int, *, changed: bool) -> None:
+    def close(self, pointer: int, *, changed: bool) -> None:
         """It has; or nothing has come of it."""
         if changed and self._before is not None:
             self._back.append(self._before)
             self._forth.clear()
-            self._strokes.add(hand)
+            self._strokes.add(pointer)
             most = max(2, min(MOST, ROOM // (EACH * max(1, sum(map(len, self._panels.worlds))))))
             del self._back[:-most]
         self._before = None
 
-    def release(self, hand: int) -> None:
-        """What this hand does next is another thing."""
-        self._strokes.discard(hand)
+    def release(self, pointer: int) -> None:
+        """What this pointer does next is another thing."""
+        self._strokes.discard(pointer)
 
     def undo(self) -> bool:
         """Go back to before the last thing done; whether there was one."""

@@ -17,13 +17,14 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from pyverlet.data.known_sketch import told
+from pyverlet.data.resolve_sketch import settings_to_json
 from pyverlet.data.snapshot import save
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.outside import file_errors
 from pyverlet.scenes.sketch import Sketch
 from pyverlet.viewers.commands import Command
-from pyverlet.viewers.exhibit import Exhibit
-from pyverlet.viewers.stage import Stage
+from pyverlet.viewers.presentation import Presentation
+from pyverlet.viewers.view_state import ViewState
 from pyverlet.world.moments import Moment
 from pyverlet.world.panels import every_frame
 from pyverlet.world.world import World
@@ -31,6 +32,9 @@ from pyverlet.world.world import World
 _log = logging.getLogger(__name__)
 
 FORMAT = 1
+
+FIELDS = {"pointer": "hand"}
+"""Fields of commands that journals have under another name, so that old and new ones can be read."""
 
 HASH_S = 1.0
 """Seconds of the world from one hash to the next."""
@@ -53,17 +57,15 @@ class Journal:
         self._every = max(1, round(HASH_S / dt))
         self._known: dict[str, Any] = {}
         self._broken = False
-        self._stage: Stage | None = None
-        try:
+        self._view_state: ViewState | None = None
+        with file_errors("journal", path, "written"):
             self._file = self.path.open("wb", buffering=0)
-        except OSError as error:
-            raise InputError(f"journal is '{path}', which cannot be written: {error.strerror or error}") from None
         self.note(pvlog=FORMAT, dt=dt)
 
-    def stage(self, exhibit: Exhibit) -> Stage:
-        """A stage whose worlds and commands are kept."""
-        self._stage = _RecordedStage(exhibit, self)
-        return self._stage
+    def view_state(self, presentation: Presentation) -> ViewState:
+        """A view whose worlds and commands are kept."""
+        self._view_state = _RecordedState(presentation, self)
+        return self._view_state
 
     def note(self, **what: Any) -> None:
         """A line. A disk that is full ends the journal, not the session."""
@@ -95,46 +97,47 @@ class Journal:
         self.close()
 
     def close(self) -> None:
-        """The session has ended."""
-        if self._stage is not None:
-            self.note(hash=self._stage.panels.state_hash(), end=True)
+        if self._view_state is not None:
+            self.note(hash=self._view_state.panels.state_hash(), end=True)
         self._file.close()
 
 
-class _RecordedStage(Stage):
-    def __init__(self, exhibit: Exhibit, journal: Journal) -> None:
-        if any(panel.pace is not every_frame for panel in exhibit.panels):
+class _RecordedState(ViewState):
+    def __init__(self, presentation: Presentation, journal: Journal) -> None:
+        if any(panel.pace is not every_frame for panel in presentation.panels):
             allowed = "a scene whose worlds make a frame for each of the screen's"
             raise InputError(
-                f"journal is asked for with {exhibit.title!r}, whose worlds keep a pace of their own; allowed is {allowed}"
+                f"journal is asked for with {presentation.title!r}, whose worlds keep a pace of their own; allowed is {allowed}"
             )
-        super().__init__(exhibit)
+        super().__init__(presentation)
         self._journal, self._substep = journal, 0
         journal.note(
-            worlds=[{"name": panel.name, **_told(exhibit, panel.world)} for panel in exhibit.panels],
-            title=exhibit.title,
-            part=exhibit.part,
-            line=exhibit.panels.line,
+            worlds=[{"name": panel.name, **_told(presentation, panel.world)} for panel in presentation.panels],
+            title=presentation.title,
+            part=presentation.part,
+            line=presentation.panels.line,
         )
 
     def do(self, command: Command) -> None:
         self._journal.note_news(room=self.layout.room)  # how far a poke reaches depends on it
-        said = {"do": type(command).__name__, **dataclasses.asdict(command)}
-        self._journal.note(**said, **({"substep": self._substep} if self._substep else {}))
+        line = {"do": type(command).__name__} | {
+            FIELDS.get(key, key): value for key, value in dataclasses.asdict(command).items()
+        }
+        self._journal.note(**line, **({"substep": self._substep} if self._substep else {}))
         super().do(command)
 
-    def step(self, dt: float, onlooker: Callable[[Moment], None] | None = None) -> None:
-        self._journal.note_news(looked_on=onlooker is not None)  # then hands follow their mice between substeps, too
-        if self.hands.busy:
+    def step(self, dt: float, observer: Callable[[Moment], None] | None = None) -> None:
+        self._journal.note_news(looked_on=observer is not None)  # then pointers follow their mice between substeps, too
+        if self.pointers.busy:
             self._journal.note_news(room=self.layout.room)
 
         def counted(moment: Moment) -> None:
             self._substep += 1
-            assert onlooker
-            onlooker(moment)
+            assert observer
+            observer(moment)
 
         try:
-            super().step(dt, onlooker and counted)
+            super().step(dt, observer and counted)
         except Exception as error:
             self._journal.note(stopped=str(error))
             raise
@@ -143,20 +146,20 @@ class _RecordedStage(Stage):
         self._journal.passed(self.panels.state_hash)
 
 
-def _told(exhibit: Exhibit, world: World) -> dict[str, Any]:
+def _told(presentation: Presentation, world: World) -> dict[str, Any]:
     """How to have this world again."""
-    sketch = exhibit.answers
-    if not isinstance(sketch, Sketch) or (len(exhibit.panels) > 1 and not sketch.answers):
+    sketch = presentation.callbacks
+    if not isinstance(sketch, Sketch) or (len(presentation.panels) > 1 and not sketch.has_callbacks):
         return {"snapshot": _snapshot(world)}
-    if len(exhibit.panels) > 1:
-        side_by_side = f"{len(exhibit.panels)} worlds of {sketch.name} side by side"
+    if len(presentation.panels) > 1:
+        side_by_side = f"{len(presentation.panels)} worlds of {sketch.name} side by side"
         raise InputError(f"journal is asked for with {side_by_side}; allowed is one world of a sketch with functions or sliders")
     return {
         "sketch": {
             "name": sketch.name,
             "path": str(sketch.path.resolve()),
             "source": sketch.digest,
-            "settings": told(sketch.settings),
+            "settings": settings_to_json(sketch.settings),
             "sliders": {name: slider.value for name, slider in sketch.sliders.items()},
         },
         "hash": world.state_hash(),

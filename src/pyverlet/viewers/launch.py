@@ -13,19 +13,19 @@ import sys
 import threading
 import webbrowser
 from collections.abc import Callable, Iterator
-from types import FrameType
 from typing import TYPE_CHECKING
 
 import uvicorn
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
-from pyverlet.viewers.artist import Artist, draws_here
-from pyverlet.viewers.exhibit import Exhibit, Repertoire
-from pyverlet.viewers.looks import Look
+from pyverlet.ground.interrupts import first_signal
+from pyverlet.viewers.jpeg_renderer import JpegRenderer, draws_here
+from pyverlet.viewers.presentation import Presentation, Repertoire
 from pyverlet.viewers.protocol import MAX_MESSAGE
 from pyverlet.viewers.session import Session
-from pyverlet.viewers.stage import Stage
+from pyverlet.viewers.view_options import ViewOptions
+from pyverlet.viewers.view_state import ViewState
 from pyverlet.viewers.web import LOOPBACK_NAMES, make_app
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ GOODBYE_S = 1
 
 
 def serve(
-    build: Callable[[], World | Panels | Exhibit],
+    build: Callable[[], World | Panels | Presentation],
     *,
     title: str,
     host: str,
@@ -47,7 +47,7 @@ def serve(
     open_browser: bool,
     dt: float,
     repertoire: Repertoire | None = None,
-    stage: Callable[[Exhibit], Stage] = Stage,
+    view_state: Callable[[Presentation], ViewState] = ViewState,
     beside: Callable[[Session], contextlib.AbstractContextManager[None]] | None = None,
 ) -> None:
     """Show the world that `build` makes until Ctrl-C. See `pyverlet.viewers.serve`.
@@ -56,10 +56,10 @@ def serve(
     """
     _refuse_running_loop()
     with contextlib.suppress(KeyboardInterrupt), take_port(host, port) as listener:
-        exhibit = Exhibit.of(build(), title)
-        session = Session(exhibit, dt=dt, repertoire=repertoire, stage=stage)
+        presentation = Presentation.of(build(), title)
+        session = Session(presentation, dt=dt, repertoire=repertoire, view_state=view_state)
         if draws_here(session.latest.shape):
-            Artist().jpeg(session.latest, Look())  # loads what it needs: no tab shall wait for that
+            JpegRenderer().jpeg(session.latest, ViewOptions())  # loads what it needs: no tab shall wait for that
         with on_air(session, listener, only_loopback=host in LOOPBACK_NAMES), _ended_by_signals(session):
             url = address(host, listener)
             announce(title, url, host, open_browser)
@@ -96,28 +96,15 @@ def on_air(session: Session, listener: socket.socket, *, only_loopback: bool) ->
 
 @contextlib.contextmanager
 def _ended_by_signals(session: Session) -> Iterator[None]:
-    """Ctrl-C, or SIGTERM, lets the frame under way finish, so that the world is whole afterwards; a second one does not wait."""
-    if threading.current_thread() is not threading.main_thread():
-        yield  # only the main thread may listen to signals
-        return
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    """Ctrl-C, or SIGTERM, lets the frame under way finish, so that the world is complete afterwards."""
     caught: list[int] = []
 
-    def restore() -> None:
-        for number, handler in before.items():
-            signal.signal(number, signal.SIG_DFL if handler is None else handler)
-
-    def end(number: int, frame: FrameType | None) -> None:
+    def end(number: int) -> None:
         caught.append(number)
-        restore()
         session.stop()
 
-    for number in before:
-        signal.signal(number, end)
-    try:
+    with first_signal(end, signal.SIGINT, signal.SIGTERM):
         yield
-    finally:
-        restore()
     if signal.SIGTERM in caught:
         signal.raise_signal(signal.SIGTERM)
 
@@ -152,11 +139,7 @@ def open_tab(url: str) -> None:
 
 
 def take_port(host: str, port: int) -> socket.socket:
-    """A socket that listens there.
-
-    Raises:
-        InputError: that cannot be.
-    """
+    """A socket that listens there; InputError if that cannot be."""
     checks.whole("port", port, least=0, most=65535)
     try:
         family, kind, protocol, _, where = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]

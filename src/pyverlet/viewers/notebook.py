@@ -1,7 +1,7 @@
 """A world in a cell of a notebook: the live page as an anywidget. Needs the extra `notebook`.
 
 The world moves in the kernel's own thread and only when the page asks, between two cells: what other cells do with it is safe,
-and while one of them runs, or nobody looks, it stands still.
+and while one of them runs, or no page looks, it stands still.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from PIL import Image
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.viewers import bundle
-from pyverlet.viewers.artist import Artist, draws_here
 from pyverlet.viewers.commands import Release
-from pyverlet.viewers.exhibit import Exhibit
 from pyverlet.viewers.frames import Frame, Shape
-from pyverlet.viewers.looks import Look
-from pyverlet.viewers.painter import Painter
+from pyverlet.viewers.jpeg_renderer import JpegRenderer, draws_here
+from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.protocol import Ack, decode, encode_frame, encode_picture, encode_refusal, encode_shape
+from pyverlet.viewers.renderer import Renderer
 from pyverlet.viewers.session import Session
+from pyverlet.viewers.view_options import ViewOptions
 
 if TYPE_CHECKING:
     from pyverlet.world.panels import Panels
@@ -47,11 +47,11 @@ STILL_WIDTH = 720
 class _Eye:
     """One place that shows the widget: what it looks at, and what it was sent."""
 
-    def __init__(self, hand: int) -> None:
-        self.hand = hand
-        self.look = Look()
+    def __init__(self, pointer: int) -> None:
+        self.pointer = pointer
+        self.options = ViewOptions()
         self.shape: Shape | None = None
-        self.sent: tuple[int, Look] | None = None
+        self.sent: tuple[int, ViewOptions] | None = None
 
 
 class Widget(anywidget.AnyWidget):
@@ -67,72 +67,72 @@ class Widget(anywidget.AnyWidget):
 
     def __init__(self, world: World | Panels, *, title: str, dt: float, height: int) -> None:
         self.world = world
-        self._session = Session(Exhibit.of(world, title), dt=dt)
-        self._artist = Artist()
+        self._session = Session(Presentation.of(world, title), dt=dt)
+        self._jpegs = JpegRenderer()
         self._eyes: dict[str, _Eye] = {}
-        self._hands = 0
+        self._pointers = 0
         super().__init__(height=checks.whole("height", height, least=100, most=4096))
-        self.on_msg(self._hear)
+        self.on_msg(self._on_message)
 
-    def _hear(self, widget: Any, content: Any, buffers: Sequence[Any]) -> None:
-        """Obey what a page says, let the world catch up, and answer with what is new."""
+    def _on_message(self, widget: Any, content: Any, buffers: Sequence[Any]) -> None:
+        """Apply what a page says, let the world catch up, and answer with what is new."""
         if not isinstance(content, dict) or not isinstance(content.get("view"), str):
             return
         if content.get("gone"):
             self._forget(content["view"])
             return
         eye = self._eye(content["view"])
-        answers = self._obey(eye, content.get("words"))
+        replies = self._apply(eye, content.get("words"))
         self._session.turn(longest=LONGEST_S)
-        answers += self._news(eye)
-        self.send({"view": content["view"]}, buffers=answers)
+        replies += self._news(eye)
+        self.send({"view": content["view"]}, buffers=replies)
 
     def _eye(self, view: str) -> _Eye:
         if view not in self._eyes:
             while len(self._eyes) >= MOST_VIEWS:
                 self._forget(next(iter(self._eyes)))
-            self._hands += 1
-            self._eyes[view] = _Eye(self._hands)
+            self._pointers += 1
+            self._eyes[view] = _Eye(self._pointers)
         return self._eyes[view]
 
     def _forget(self, view: str) -> None:
         if eye := self._eyes.pop(view, None):
-            self._session.submit(Release(eye.hand))
+            self._session.submit(Release(eye.pointer))
 
-    def _obey(self, eye: _Eye, words: Any) -> list[bytes]:
-        """The refusals of what cannot be obeyed."""
+    def _apply(self, eye: _Eye, words: Any) -> list[bytes]:
+        """The refusals of what cannot be applied."""
         refusals = []
         for text in words[:MOST_WORDS] if isinstance(words, list) else []:
             try:
                 if not isinstance(text, str):
                     raise InputError("message is no text; allowed is a JSON text")
-                request = decode(text, eye.hand)
+                request = decode(text, eye.pointer)
             except InputError as error:
                 refusals.append(encode_refusal(str(error)))
                 continue
-            if isinstance(request, Look):
-                eye.look = request
+            if isinstance(request, ViewOptions):
+                eye.options = request
             elif not isinstance(request, Ack):
                 self._session.submit(request)
         return refusals
 
     def _news(self, eye: _Eye) -> list[bytes]:
         frame = self._session.latest
-        if (frame.seq, eye.look) == eye.sent:
+        if (frame.seq, eye.options) == eye.sent:
             return []
         news = []
         if frame.shape is not eye.shape:
             eye.shape = frame.shape
             news.append(encode_shape(frame.shape, drawn_here=draws_here(frame.shape)))
-        eye.sent = (frame.seq, eye.look)
-        return [*news, self._encode(frame, eye.look)]
+        eye.sent = (frame.seq, eye.options)
+        return [*news, self._encode(frame, eye.options)]
 
-    def _encode(self, frame: Frame, look: Look) -> bytes:
+    def _encode(self, frame: Frame, options: ViewOptions) -> bytes:
         if draws_here(frame.shape):
-            return encode_picture(frame, look.part, self._artist.jpeg(frame, look))
-        if look.pushes:
-            self._session.weigh(frame)
-        return encode_frame(frame, look.part, velocity=look.velocity, force=look.pushes)
+            return encode_picture(frame, options.part, self._jpegs.jpeg(frame, options))
+        if options.pushes:
+            self._session.want_forces(frame)
+        return encode_frame(frame, options.part, velocity=options.velocity, force=options.pushes)
 
     # -- where widgets do not run -------------------------------------------------------------------------------------
 
@@ -141,7 +141,7 @@ class Widget(anywidget.AnyWidget):
         from pyverlet.world.panels import Panels
 
         world = Panels.of(self.world).worlds[0]
-        pixels = Painter(world, size=(STILL_WIDTH, self.height)).paint()
+        pixels = Renderer(world, size=(STILL_WIDTH, self.height)).paint()
         file = io.BytesIO()
         Image.fromarray(pixels[..., :3]).save(file, "PNG", optimize=True)
         return file.getvalue()

@@ -6,7 +6,7 @@
   not collide, if "kinds" n pairs of uint32, category and mask, and if "coloured" n times three bytes R, G, B; of a frame n pairs
   of uint16 on the grid over "view", if the tab looks at velocities n pairs of int16 in units of "unit" m/s, of "copies", circles
   that reach through a seam and are drawn once more, a uint32 each, whose they are, and then a pair of uint16, of "links" two
-  uint32, who they join, each, and then a byte each, how hard they pull, if "turned" n bytes, in 1/256 of a turn, and of
+  uint32, the circles they join, each, and then a byte each, how hard they pull, if "turned" n bytes, in 1/256 of a turn, and of
   "contacts" two uint32 each, then a byte each, how hard they push in units of "push" N, and a byte each, where the normal points;
   of a picture a JPEG.
 """
@@ -17,7 +17,7 @@ import dataclasses
 import json
 import math
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,37 +25,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import cut
 from pyverlet.laws import integrators
 from pyverlet.picture.pen import Drawing, Stroke
-from pyverlet.viewers.commands import (
-    MAX_PARTICLES,
-    MAX_SUBSTEPS,
-    Build,
-    Click,
-    Command,
-    Delete,
-    Drag,
-    Key,
-    Pause,
-    Pin,
-    Poke,
-    Redo,
-    Release,
-    Reset,
-    SetFriction,
-    SetGravity,
-    SetIntegrator,
-    SetRestitution,
-    SetSlider,
-    SetSpeed,
-    SetSubsteps,
-    Spawn,
-    Step,
-    Undo,
-)
+from pyverlet.viewers.commands import COMMANDS, MAX_PARTICLES, MAX_SUBSTEPS, Command, SetIntegrator, Step
 from pyverlet.viewers.frames import Frame, Rect, Shape, quantise
-from pyverlet.viewers.hands import POKE_RADIUS
-from pyverlet.viewers.looks import Look
+from pyverlet.viewers.pointers import POKE_RADIUS
+from pyverlet.viewers.view_options import ViewOptions
 
 MAX_MESSAGE = 4096
 """Bytes. The longest honest message is about a hundred."""
@@ -68,11 +44,11 @@ class Ack:
     seq: int
 
 
-Request = Command | Ack | Look
+Request = Command | Ack | ViewOptions
 
 
-def decode(text: str, hand: int) -> Request:
-    """Read one message of a page. `hand` is the tab's own number: no tab moves another's hand.
+def decode(text: str, pointer: int) -> Request:
+    """Read one message of a page. `pointer` is the tab's own number: no tab moves another's pointer.
 
     Raises:
         InputError: the message is too long, no JSON object, of no known type, or a field is missing or wrong.
@@ -86,21 +62,18 @@ def decode(text: str, hand: int) -> Request:
     if not isinstance(message, dict):
         raise InputError(f"message {_short(text)} is not an object; allowed is one JSON object")
     kind = message.get("type")
-    maker = _MAKERS.get(kind) if isinstance(kind, str) else None
-    if maker is None:
-        raise InputError(f"message type is {_short(kind)}; allowed are {', '.join(_MAKERS)}")
-    return maker(message, hand)
+    if kind == "ack":
+        return Ack(_field(message, "seq", "int"))
+    if kind == "look":
+        return _options(message)
+    command = COMMANDS.get(kind) if isinstance(kind, str) else None
+    if command is None:
+        raise InputError(f"message type is {_short(kind)}; allowed are {', '.join(('ack', 'look', *COMMANDS))}")
+    return _command(command, message, pointer)
 
 
 def encode_frame(frame: Frame, part: Rect | None = None, *, velocity: bool = False, force: bool = False) -> bytes:
-    """A frame as one binary message.
-
-    Args:
-        frame: to encode.
-        part: of the plane, metres; None is all that the camera shows.
-        velocity: also send velocities.
-        force: also send who pushes whom.
-    """
+    """A frame as one binary message, of a part of the plane or all that the camera shows; with velocities and forces if asked."""
     grid = frame.grid if part is None else quantise(frame.position, part)
     head = _head("frame", frame, part)
     body = grid.tobytes()
@@ -120,7 +93,7 @@ def encode_frame(frame: Frame, part: Rect | None = None, *, velocity: bool = Fal
     if force and len(frame.contacts.pairs):
         push, head["push"] = frame.push
         head["contacts"] = len(push)
-        body += frame.contacts.pairs.tobytes() + push.tobytes() + frame.lean.tobytes()
+        body += frame.contacts.pairs.tobytes() + push.tobytes() + frame.normals.tobytes()
     return _join(head, body)
 
 
@@ -143,61 +116,44 @@ def _head(kind: str, frame: Frame, part: Rect | None) -> dict[str, Any]:
 
 def written(drawing: Drawing) -> list[Any]:
     """What a `Pen` drew, ready for JSON: lines and areas [points, closed, filled, colour, px], texts [x, y, text, colour, px]."""
-    said: list[Any] = []
+    marks: list[Any] = []
     for mark in drawing:
         colour = None if mark.colour is None else f"#{mark.colour:06x}"
         if isinstance(mark, Stroke):
-            said.append([mark.points, mark.closed, mark.filled, colour, mark.width])
+            marks.append([mark.points, mark.closed, mark.filled, colour, mark.width])
         else:
-            said.append([mark.x, mark.y, mark.text, colour, mark.size])
-    return said
+            marks.append([mark.x, mark.y, mark.text, colour, mark.size])
+    return marks
 
 
 def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = None) -> bytes:
-    """A shape as one binary message.
-
-    Args:
-        shape: to encode.
-        drawn_here: pictures will follow in place of frames: the page need not know the circles.
-        note: something the page should tell about how it is drawn.
-    """
-    coloured = shape.colours is not None
-    head = {
+    """A shape as one binary message; without circles if the server draws them, and with a note for the page, if any."""
+    arrays = {"radius", "mass", "number", "group", "kinds", "apart", "colours"}
+    head = {_camel(name): value for name, value in vars(shape).items() if name not in arrays}
+    head |= {
         "kind": "shape",
-        "title": shape.title,
-        "dt": shape.dt,
-        "budgetMs": shape.budget_ms,
-        "bounded": shape.bounded,
-        "parted": shape.parted,
-        "outlines": shape.outlines,
-        "seams": shape.seams,
-        "lines": shape.lines,
         "panels": [dataclasses.asdict(panel) for panel in shape.panels],
-        "differing": shape.differing,
         "obstacles": shape.obstacles.lines,
-        "scene": shape.scene,
-        "scenes": shape.scenes,
-        "answers": shape.answers,
-        "countable": shape.countable,
         "integrators": list(integrators.BY_NAME),
         "count": len(shape.radius),
         "groups": [] if drawn_here else _runs(shape.group),
         "apart": 0 if drawn_here else len(shape.apart),
         "kinds": shape.kinds is not None,
-        "coloured": coloured,
+        "coloured": shape.colours is not None,
         "drawnHere": drawn_here,
         "note": note,
         "maxSubsteps": MAX_SUBSTEPS,
         "maxParticles": MAX_PARTICLES,
         "pokeRadius": POKE_RADIUS,
     }
-    if drawn_here:
-        return _join(head, b"")
-    colours = b"" if shape.colours is None else shape.colours.tobytes()
-    kinds = b"" if shape.kinds is None else shape.kinds.tobytes()
-    return _join(
-        head, shape.radius.tobytes() + shape.mass.tobytes() + shape.number.tobytes() + shape.apart.tobytes() + kinds + colours
-    )
+    sent = () if drawn_here else (shape.radius, shape.mass, shape.number, shape.apart, shape.kinds, shape.colours)
+    return _join(head, b"".join(array.tobytes() for array in sent if array is not None))
+
+
+def _camel(name: str) -> str:
+    """`budgetMs` of `budget_ms`."""
+    first, *others = name.split("_")
+    return first + "".join(map(str.capitalize, others))
 
 
 def _runs(group: NDArray[np.int64]) -> list[list[int]]:
@@ -208,7 +164,7 @@ def _runs(group: NDArray[np.int64]) -> list[list[int]]:
 
 
 def encode_refusal(reason: str) -> bytes:
-    """Tells a page why its message was not obeyed."""
+    """Tells a page why its message was not applied."""
     return _join({"kind": "refused", "reason": reason}, b"")
 
 
@@ -230,85 +186,44 @@ def finite(value: Any) -> Any:
 
 
 def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    return cut(repr(value))
 
 
-def _real(message: Mapping[str, Any], name: str) -> float:
+_ALLOWED = {"float": "a number", "int": "a whole number", "bool": "true and false", "str": "a text"}
+
+
+def _field(message: Mapping[str, Any], name: str, kind: str) -> Any:
+    """A field of a message as a value of this type, named as in annotations."""
     value = message.get(name)
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(f"{name} is {_short(value)}; allowed is a number")
+    if kind.endswith(" | None") and value is None:
+        return None
+    kind = kind.removesuffix(" | None")
+    types = {"float": int | float, "int": int, "bool": bool, "str": str}[kind]
+    if not isinstance(value, types) or isinstance(value, bool) != (kind == "bool"):
+        raise InputError(f"{name} is {_short(value)}; allowed {'are' if kind == 'bool' else 'is'} {_ALLOWED[kind]}")
     try:
-        return float(value)
+        return float(value) if kind == "float" else value
     except OverflowError:
         raise InputError(f"{name} is {_short(value)}; allowed is a number that fits a float") from None
 
 
-def _whole(message: Mapping[str, Any], name: str) -> int:
-    value = message.get(name)
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise InputError(f"{name} is {_short(value)}; allowed is a whole number")
-    return value
+def _command(kind: type[Command], message: Mapping[str, Any], pointer: int) -> Command:
+    """A command of the fields that its class has."""
+    if kind is Step:  # one frame at a time
+        return Step()
+    values: dict[str, Any] = {}
+    for field in dataclasses.fields(kind):
+        name = "value" if kind is SetIntegrator else field.name
+        values[field.name] = pointer if name == "pointer" else _field(message, name, str(field.type))
+    command: Command = kind(**values)
+    return command
 
 
-def _flag(message: Mapping[str, Any], name: str) -> bool:
-    value = message.get(name)
-    if not isinstance(value, bool):
-        raise InputError(f"{name} is {_short(value)}; allowed are true and false")
-    return value
-
-
-def _text(message: Mapping[str, Any], name: str) -> str:
-    value = message.get(name)
-    if not isinstance(value, str):
-        raise InputError(f"{name} is {_short(value)}; allowed is a text")
-    return value
-
-
-def _look(message: Mapping[str, Any]) -> Look:
+def _options(message: Mapping[str, Any]) -> ViewOptions:
     part = message.get("part")
     if part is not None:
         if not isinstance(part, list) or len(part) != 4:
             raise InputError(f"part is {_short(part)}; allowed are four numbers [x0, y0, x1, y1], and null")
-        part = tuple(_real({"part": value}, "part") for value in part)
-    return Look(
-        part,
-        _whole(message, "width"),
-        _whole(message, "height"),
-        _text(message, "colour"),
-        _flag(message, "dark"),
-        _flag(message, "velocity"),
-        _flag({"force": False} | dict(message), "force"),
-    )
-
-
-def _build(message: Mapping[str, Any]) -> Build:
-    scene = None if message.get("scene") is None else _text(message, "scene")
-    return Build(scene, None if message.get("particles") is None else _whole(message, "particles"))
-
-
-_MAKERS: dict[str, Callable[[Mapping[str, Any], int], Request]] = {
-    "ack": lambda m, hand: Ack(_whole(m, "seq")),
-    "look": lambda m, hand: _look(m),
-    "pause": lambda m, hand: Pause(_flag(m, "on")),
-    "step": lambda m, hand: Step(),
-    "reset": lambda m, hand: Reset(),
-    "speed": lambda m, hand: SetSpeed(_real(m, "value")),
-    "build": lambda m, hand: _build(m),
-    "gravity": lambda m, hand: SetGravity(_real(m, "x"), _real(m, "y")),
-    "substeps": lambda m, hand: SetSubsteps(_whole(m, "value")),
-    "restitution": lambda m, hand: SetRestitution(_real(m, "value")),
-    "friction": lambda m, hand: SetFriction(_real(m, "value")),
-    "integrator": lambda m, hand: SetIntegrator(_text(m, "value")),
-    "drag": lambda m, hand: Drag(hand, _real(m, "x"), _real(m, "y"), _real(m, "reach")),
-    "poke": lambda m, hand: Poke(hand, _real(m, "x"), _real(m, "y")),
-    "pin": lambda m, hand: Pin(hand, _real(m, "x"), _real(m, "y"), _real(m, "reach")),
-    "spawn": lambda m, hand: Spawn(hand, _real(m, "x"), _real(m, "y")),
-    "delete": lambda m, hand: Delete(hand, _real(m, "x"), _real(m, "y"), _real(m, "reach")),
-    "release": lambda m, hand: Release(hand),
-    "undo": lambda m, hand: Undo(),
-    "redo": lambda m, hand: Redo(),
-    "slider": lambda m, hand: SetSlider(_text(m, "name"), _real(m, "value")),
-    "key": lambda m, hand: Key(_text(m, "key")),
-    "click": lambda m, hand: Click(hand, _real(m, "x"), _real(m, "y"), _text(m, "button")),
-}
+        part = tuple(_field({"part": value}, "part", "float") for value in part)
+    kinds = {"width": "int", "height": "int", "colour": "str", "dark": "bool", "velocity": "bool", "force": "bool"}
+    return ViewOptions(part, **{name: _field({"force": False} | dict(message), name, kind) for name, kind in kinds.items()})

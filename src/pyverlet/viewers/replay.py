@@ -7,30 +7,30 @@ import binascii
 import dataclasses
 import json
 import tempfile
-import typing
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from pyverlet.data.known_sketch import asked, find
+from pyverlet.data.resolve_sketch import find, settings_from_json
 from pyverlet.data.snapshot import load
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, PyverletError
-from pyverlet.ground.patience import Patience
+from pyverlet.ground.outside import file_errors
+from pyverlet.ground.time_limit import TimeLimit
 from pyverlet.scenes.sketch import Sketch, SketchError
 from pyverlet.viewers import commands
 from pyverlet.viewers.commands import Command, Reset
-from pyverlet.viewers.exhibit import Exhibit
-from pyverlet.viewers.journal import FORMAT
+from pyverlet.viewers.journal import FIELDS, FORMAT
 from pyverlet.viewers.layout import Layout
-from pyverlet.viewers.stage import Stage
+from pyverlet.viewers.presentation import Presentation
+from pyverlet.viewers.view_state import ViewState
 from pyverlet.world.moments import Moment
 from pyverlet.world.panels import Panel, Panels
 from pyverlet.world.world import World
 
 Progress = Callable[[int, int], None]
 
-_COMMANDS: dict[str, Any] = {command.__name__: command for command in typing.get_args(commands.Command)}
+_COMMANDS: dict[str, Any] = {command.__name__: command for command in commands.COMMANDS.values()}
 
 
 class EndError(PyverletError):
@@ -73,10 +73,8 @@ class Script:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        try:
+        with file_errors("journal", path, "read"):
             lines = self.path.read_bytes().split(b"\n")
-        except OSError as error:
-            raise InputError(f"journal is '{path}', which cannot be read: {error.strerror or error}") from None
         self.events: list[Event] = []
         for number, line in enumerate(lines[:-1]):  # behind the last end of a line is nothing, or a line that was cut
             try:
@@ -100,7 +98,7 @@ class Script:
         self.checks = sum("hash" in event.what for event in self.events)
         self.whole = "end" in self.events[-1].what
 
-    def exhibit(self, event: Event) -> Exhibit:
+    def presentation(self, event: Event) -> Presentation:
         """The worlds of an event that has some."""
         what = event.what
         try:
@@ -111,7 +109,7 @@ class Script:
                 panels = [Panel(str(what["worlds"][0]["name"]), self._built(sketch, what["worlds"][0]))]
             part = what.get("part") and tuple(checks.number("part", value) for value in what["part"])
             line = what.get("line") if what.get("line") is None else checks.number("line", what["line"])
-            return Exhibit(str(what["title"]), Panels(panels, line=line), part=part, answers=sketch)
+            return Presentation(str(what["title"]), Panels(panels, line=line), part=part, callbacks=sketch)
         except (KeyError, TypeError, IndexError, AttributeError, binascii.Error) as error:
             raise InputError(f"'{self.path}' is no journal of pyverlet's: its worlds lack something ({error})") from None
 
@@ -121,28 +119,28 @@ class Script:
             path.write_bytes(base64.b64decode(snapshot, validate=True))
             return load(path)
 
-    def _sketch(self, told: dict[str, Any]) -> Sketch:
+    def _sketch(self, about: dict[str, Any]) -> Sketch:
         """The sketch of then, with its sliders where they were; in the folder it was in, in this one or beside the journal."""
-        about = told["sketch"]
+        about = about["sketch"]
         sketch = find(str(about["name"]), about["source"], Path(about["path"]), Path(), self.path.parent)
         _ = sketch.module
         for name, value in about["sliders"].items():
             sketch.sliders[name].value = value
-        sketch.patience = Patience()  # a function that looped for ever does so again
+        sketch.time_limit = TimeLimit()  # a function that looped for ever does so again
         return sketch
 
-    def _built(self, sketch: Sketch, told: dict[str, Any]) -> World:
-        world = sketch.scene().world(**asked(told["sketch"]["settings"]))
-        if world.state_hash() != told["hash"]:
+    def _built(self, sketch: Sketch, about: dict[str, Any]) -> World:
+        world = sketch.scene().world(**settings_from_json(about["sketch"]["settings"]))
+        if world.state_hash() != about["hash"]:
             raise DivergedError(
-                f"{sketch.name} builds a world with the hash {world.state_hash()}, and built {told['hash']} in the session: "
+                f"{sketch.name} builds a world with the hash {world.state_hash()}, and built {about['hash']} in the session: "
                 "it draws by chance without a seed, or what it imports or reads has changed"
             )
         return world
 
-    def open(self) -> Exhibit:
+    def open(self) -> Presentation:
         """The first worlds, for a viewer."""
-        return self.exhibit(self.events[0])
+        return self.presentation(self.events[0])
 
     def run(self, progress: Progress | None = None) -> dict[str, Any]:
         """Go through all of it without a viewer.
@@ -153,39 +151,35 @@ class Script:
         Raises:
             DivergedError: a hash is not what it was.
         """
-        stage, stopped = ReplayStage(self, self.open()), None
+        view_state, stopped = ReplayState(self, self.open()), None
         try:
             while True:
                 try:
-                    stage.step(self.dt)
+                    view_state.step(self.dt)
                 except StoppedError as error:
                     stopped = str(error)
                 if progress:
-                    progress(stage.frame, max(self.frames, 1))
+                    progress(view_state.frame, max(self.frames, 1))
         except EndError:
             pass
         return {
-            "frames": stage.frame,
-            "seconds": stage.frame * self.dt,
+            "frames": view_state.frame,
+            "seconds": view_state.frame * self.dt,
             "commands": sum(event.command is not None for event in self.events),
-            "checked": stage.checked,
-            "state_hash": stage.panels.state_hash(),
-            "stopped": stopped or stage.complaint,
+            "checked": view_state.checked,
+            "state_hash": view_state.panels.state_hash(),
+            "stopped": stopped or view_state.complaint,
             "whole": self.whole,
         }
 
 
-class ReplayStage(Stage):
-    """A stage on which a script is played: nobody else's commands are obeyed, but for going back to the start.
+class ReplayState(ViewState):
+    """A view on which a script is played: commands of viewers are ignored, except reset."""
 
-    Attributes:
-        frame: how many have been made. checked: hashes that were as they should be.
-    """
-
-    def __init__(self, script: Script, exhibit: Exhibit) -> None:
+    def __init__(self, script: Script, presentation: Presentation) -> None:
         self._script = script
         self._begin()
-        super().__init__(exhibit)
+        super().__init__(presentation)
 
     def _begin(self) -> None:
         self.frame, self.checked = 0, 0
@@ -201,9 +195,9 @@ class ReplayStage(Stage):
             super().__init__(self._script.open())
             self._pinned = changes + 1
 
-    def step(self, dt: float, onlooker: Callable[[Moment], None] | None = None) -> None:
+    def step(self, dt: float, observer: Callable[[Moment], None] | None = None) -> None:
         self._substep = 0
-        self._obey()
+        self._apply()
         events = self._script.events
         if self._at == len(events) and self.frame >= self._script.frames:
             raise EndError(f"the journal ends here, after {self.frame:,} frames; {self.checked} hashes are as they were")
@@ -211,10 +205,10 @@ class ReplayStage(Stage):
 
         def between(moment: Moment) -> None:
             self._substep += 1
-            self._obey()
+            self._apply()
             self._set_room()
-            if onlooker:
-                onlooker(moment)
+            if observer:
+                observer(moment)
 
         stop = next((k for k in range(self._at, len(events)) if "stopped" in events[k].what), None)
         stops = stop is not None and events[stop].frame == self.frame
@@ -236,7 +230,7 @@ class ReplayStage(Stage):
             self._check(events[self._at].what["hash"])
             self._at += 1
 
-    def _obey(self) -> None:
+    def _apply(self) -> None:
         """All that was done before this frame, or up to this substep of it."""
         events = self._script.events
         while self._at < len(events):
@@ -250,7 +244,7 @@ class ReplayStage(Stage):
                 super().do(event.command)
             elif "worlds" in what:
                 changes = self._pinned
-                super().__init__(self._script.exhibit(event))
+                super().__init__(self._script.presentation(event))
                 self._pinned = changes + 1
             elif "hash" in what:
                 self._check(what["hash"])
@@ -258,7 +252,7 @@ class ReplayStage(Stage):
             self._room = what.get("room", self._room)
 
     def _set_room(self) -> None:
-        """How far hands reach is as it was, whatever is looked at now."""
+        """How far pointers reach is as it was, whatever is looked at now."""
         if self._room is not None:
             self.layout = Layout(tuple(map(float, self._room)), len(self.worlds), self.layout.bounded)  # type: ignore[arg-type]
 
@@ -276,5 +270,6 @@ def _command(what: dict[str, Any]) -> Command:
     kind = _COMMANDS.get(what.pop("do"))
     if kind is None:
         raise InputError(f"a command is none of {', '.join(_COMMANDS)}")
-    command: Command = kind(**what)
+    names = {old: new for new, old in FIELDS.items()}
+    command: Command = kind(**{names.get(name, name): value for name, value in what.items()})
     return command

@@ -1,4 +1,4 @@
-"""The narrow door between a world and whoever watches it: commands go in, frames come out.
+"""The interface between worlds and their viewers: commands go in, frames come out.
 
 A session owns the worlds, their clock and the one thread that steps them, the physics thread: the caller's (`run`, `turn`) or one
 of its own (`start`). It knows nothing of how commands arrive or where frames go.
@@ -20,14 +20,14 @@ from pyverlet.ground.constants import FRAME_BUDGET_MS
 from pyverlet.ground.errors import PyverletError
 from pyverlet.scenes.sketch import SketchError
 from pyverlet.viewers import commands as asked
-from pyverlet.viewers import levers
-from pyverlet.viewers.commands import Command
-from pyverlet.viewers.door import Door
-from pyverlet.viewers.exhibit import Exhibit, Repertoire
+from pyverlet.viewers import controls
+from pyverlet.viewers.frame_pacing import PICTURE_S, FramePacing
 from pyverlet.viewers.frames import Frame, Shape, Status
-from pyverlet.viewers.gauges import Gauges
-from pyverlet.viewers.rhythm import PICTURE_S, Rhythm
-from pyverlet.viewers.stage import Stage
+from pyverlet.viewers.presentation import Presentation, Repertoire
+from pyverlet.viewers.readouts import Readouts
+from pyverlet.viewers.session_handle import SessionHandle
+from pyverlet.viewers.task_queue import Item
+from pyverlet.viewers.view_state import ViewState
 from pyverlet.world.clock import Clock, FrameBudget
 from pyverlet.world.moments import Moment
 
@@ -44,18 +44,18 @@ IDLE_S = 0.1
 """Longest nap while nothing moves: on some systems Ctrl-C waits for it to end."""
 
 
-class Session(Door):
+class Session(SessionHandle):
     """Runs one world in real time: in the calling thread with `run`, or in one of its own as a context manager.
 
-    Several worlds side by side run as one: every command is for all of them, but a hand works in the one it touches.
+    Several worlds side by side run as one: every command is for all of them, but a pointer works in the one it touches.
 
     Args:
-        world: a world, panels or an exhibit, stepped by this session only, while it runs. Reset goes back to the present state.
+        world: a world, panels or a presentation, stepped by this session only while it runs. Reset restores the present state.
         title: what the viewer calls it.
         dt: simulated seconds per frame, also the pace: 1/dt frames a second.
         budget_ms: milliseconds of physics a frame may take, for the figures on show.
         repertoire: scenes a viewer may put in place of the world; None: the world is all there is.
-        stage: of an exhibit: where it is shown; a journal's keeps what happens there.
+        view_state: of a presentation: where it is shown; a journal's keeps what happens there.
 
     Raises:
         InputError: dt or budget_ms is not a positive finite number.
@@ -63,19 +63,19 @@ class Session(Door):
 
     def __init__(
         self,
-        world: World | Panels | Exhibit,
+        world: World | Panels | Presentation,
         *,
         title: str = "pyverlet",
         dt: float = 1 / 60,
         budget_ms: float = FRAME_BUDGET_MS,
         repertoire: Repertoire | None = None,
-        stage: Callable[[Exhibit], Stage] = Stage,
+        view_state: Callable[[Presentation], ViewState] = ViewState,
     ) -> None:
         self._dt = checks.number("dt", dt, above=0.0)
         self._budget_ms = checks.number("budget_ms", budget_ms, above=0.0)
         super().__init__()
         self._repertoire = repertoire
-        self._staged = stage
+        self._make_view_state = view_state
         self._paused = False
         self._speed = 1.0
         self._busy: str | None = None
@@ -84,28 +84,28 @@ class Session(Door):
         self._before: list[NDArray[np.float32]] | None = None
         self._shape: Shape
         self._seq = self._begun = 0
-        self._rhythm, self._last = Rhythm(), time.perf_counter()
-        self._enter(Exhibit.of(world, title))
+        self._pacing, self._last = FramePacing(), time.perf_counter()
+        self._enter(Presentation.of(world, title))
         self.latest: Frame = self._picture()
         """The newest frame. Replaced, never changed; read it from any thread."""
 
     # -- the physics thread -------------------------------------------------------------------------------------------
 
     def run(self) -> None:
-        """Run in the calling thread until somebody calls `stop`; afterwards the world is the caller's again."""
+        """Run in the calling thread until `stop` is called; afterwards the world is the caller's again."""
         self._last = time.perf_counter()
-        with self._errands.by_this_thread():
+        with self._tasks.by_this_thread():
             while not self._stopping.is_set():
                 wait = self.turn()
                 if self._held():
-                    self._obey_next()
+                    self._apply_next()
                 elif wait > 0.0:
                     # Sleeping, not waiting on the queue: on some systems a timed wait only wakes at every 15 ms.
                     time.sleep(wait)
-            self._stage.hands.release_all()
+            self._view_state.pointers.release_all()
 
     def turn(self, *, longest: float | None = None) -> float:
-        """Obey what was asked, make the frames that are due since the last turn, and publish.
+        """Apply what was asked, make the frames that are due since the last turn, and publish.
 
         Args:
             longest: most seconds of the wall that may have passed; None counts all of them.
@@ -113,8 +113,7 @@ class Session(Door):
         Returns:
             Seconds until the next frame is due.
         """
-        self._errands.run()
-        if self._obey_all() and self._held():
+        if self._apply_all() and self._held():
             self._publish()
         now = time.perf_counter()
         elapsed, self._last = now - self._last, now
@@ -127,7 +126,7 @@ class Session(Door):
             self._advance()
             if self._speed == 1.0:
                 self._publish_if_due()
-            self._obey_all()
+            self._apply_all()
             if self._held() or self._stopping.is_set():
                 break
         if self._held():
@@ -145,39 +144,39 @@ class Session(Door):
         """One frame. An error stops the stepping, not the session: the page stays readable and Reset works."""
         began, self._begun = time.perf_counter(), self._seq
         # With the frame before in mind: what is late by more than a picture is shown on its way.
-        self._late = self._gauges.budget.last_ms * self._speed > 1000.0 * max(self._dt, PICTURE_S)
-        self._before = self._stage.look()[0] if self._speed < 1.0 and not self._late else None
-        self._stage.forces.wanted = self._audience.looks_at_force(self._seq)
+        self._late = self._readouts.budget.last_ms * self._speed > 1000.0 * max(self._dt, PICTURE_S)
+        self._before = self._view_state.capture()[0] if self._speed < 1.0 and not self._late else None
+        self._view_state.forces.wanted = self._audience.needs_force(self._seq)
         try:
-            self._stage.step(self._dt, self._look_on if self._late else None)
+            self._view_state.step(self._dt, self._look_on if self._late else None)
         except SketchError as error:
-            self._error = None if self._stage.mend(error) else str(error)
+            self._error = None if self._view_state.mend(error) else str(error)
         except PyverletError as error:
             self._error = str(error)
         except Exception as error:  # a user's own force may raise anything
-            _log.exception("the world stopped at %.6g s", self._stage.panels.time)
+            _log.exception("the world stopped at %.6g s", self._view_state.panels.time)
             self._error = f"{type(error).__name__}: {error}"
         else:
-            self._gauges.budget.record(1000.0 * (time.perf_counter() - began))
-            self._gauges.passed(float(self._stage.panels.time))
+            self._readouts.budget.record(1000.0 * (time.perf_counter() - began))
+            self._readouts.passed(float(self._view_state.panels.time))
 
-    def _obey_next(self) -> None:
-        """Wait for a command and obey it and all behind it."""
-        if self._obey_each(self._commands.waiting(IDLE_S)):
+    def _apply_next(self) -> None:
+        """Wait for a command and apply it and all behind it."""
+        if self._apply_each(self._tasks.waiting(IDLE_S)):
             self._publish()
 
-    def _obey_all(self) -> bool:
-        """Whether there was anything to obey."""
-        return self._obey_each(self._commands.all())
+    def _apply_all(self) -> bool:
+        """Whether there was anything to apply."""
+        return self._apply_each(self._tasks.all())
 
-    def _obey_each(self, commands: Iterator[Command | None]) -> bool:
+    def _apply_each(self, commands: Iterator[Item]) -> bool:
         any_at_all = False
         for command in commands:
-            self._obey(command)
+            self._apply(command)
             any_at_all = True
         return any_at_all
 
-    def _obey(self, command: Command | None) -> None:
+    def _apply(self, command: Item) -> None:
         held = self._held()
         try:
             self._do(command)
@@ -189,13 +188,13 @@ class Session(Door):
         if held and not self._held():
             self._last = time.perf_counter()  # time spent paused is not time to catch up with
 
-    def _do(self, command: Command | None) -> None:
+    def _do(self, command: Item) -> None:
         match command:
             case None:
                 pass  # only wakes the thread up
             case asked.Pause(on):
                 self._paused = on
-                self._gauges.held()
+                self._readouts.held()
             case asked.Step(frames):
                 self._paused = True
                 for _ in range(frames):
@@ -204,25 +203,27 @@ class Session(Door):
                 self._before = None  # show where it is, not what was between
             case asked.SetSpeed(value):
                 self._speed = value
-                self._gauges.held()
+                self._readouts.held()
                 self._before = None
             case asked.Build(scene, particles):
                 self._build(scene, particles)
+            case _ if callable(command):
+                command()
             case _:
-                self._stage.do(command)
+                self._view_state.do(command)
                 if isinstance(command, asked.Reset):
                     self._fresh_start()
 
     # -- what is on show ----------------------------------------------------------------------------------------------
 
-    def _enter(self, exhibit: Exhibit) -> None:
-        self._stage = self._staged(exhibit)
+    def _enter(self, presentation: Presentation) -> None:
+        self._view_state = self._make_view_state(presentation)
         self._fresh_start()
 
-    def _put_on(self, exhibit: Exhibit) -> None:
-        self._stage.hands.release_all()
+    def _put_on(self, presentation: Presentation) -> None:
+        self._view_state.pointers.release_all()
         self._complaint = self._busy = None
-        self._enter(exhibit)
+        self._enter(presentation)
         self._last = time.perf_counter()
         self._publish()
 
@@ -235,28 +236,28 @@ class Session(Door):
         self._before = None
         self._late = False
         self._clock = Clock(dt=self._dt, max_catch_up=MAX_CATCH_UP)
-        self._gauges: Gauges = Gauges(FrameBudget(limit_ms=self._budget_ms))
+        self._readouts: Readouts = Readouts(FrameBudget(limit_ms=self._budget_ms))
         self._shape_of: object = None
 
     def _build(self, scene: str | None, particles: int | None) -> None:
         """Put another scene on, or the same with another number of circles, whose settings then stay as the sliders say."""
         if self._repertoire is None:
             return
-        old = self._stage
-        name = scene or old.exhibit.scene
-        old.hands.release_all()
+        old = self._view_state
+        name = scene or old.presentation.scene
+        old.pointers.release_all()
         self._say_busy(f"building {name}")
         try:
-            exhibit = self._repertoire.build(name, particles, self._on_the_way(name))
-            self._enter(exhibit)
+            presentation = self._repertoire.build(name, particles, self._on_the_way(name))
+            self._enter(presentation)
         except _Stopped:
             return
         finally:
             self._busy = None
             self._last = time.perf_counter()
         if scene is None:
-            for command in levers.present(old.worlds[0]):
-                self._stage.do(command)
+            for command in controls.present(old.worlds[0]):
+                self._view_state.do(command)
         self._publish()
 
     def _on_the_way(self, name: str) -> Callable[[int, int], None]:
@@ -276,7 +277,7 @@ class Session(Door):
 
     def _publish(self, moment: Moment | None = None) -> None:
         self._seq += 1
-        self._rhythm.made(time.perf_counter())
+        self._pacing.made(time.perf_counter())
         self.latest = self._picture() if moment is None else self._picture_of(moment)
         for listener in self._listeners:
             listener()
@@ -291,38 +292,38 @@ class Session(Door):
     def _look_on(self, moment: Moment) -> None:
         """Between two substeps of a frame that takes longer than a picture may."""
         if not self._paused:  # a step asked for is as it was when it was asked for
-            self._obey_each(self._commands.while_(self._stage.takes_at_once))
-        if self._wanted() and self._due() and self._shape_of == self._stage.version:
+            self._apply_each(self._tasks.while_(self._view_state.takes_at_once))
+        if self._wanted() and self._due() and self._shape_of == self._view_state.version:
             self._publish(moment)
 
     def _wanted(self) -> bool:
-        """Whether the world is slow, and somebody has the last picture and waits for more."""
+        """Whether the world is slow, and a viewer has the last picture and waits for more."""
         return self._late and self._audience.has(self.latest.seq)
 
     def _due(self) -> bool:
-        return self._rhythm.due(time.perf_counter())
+        return self._pacing.due(time.perf_counter())
 
     def _picture_of(self, moment: Moment) -> Frame:
         """As `_picture`; what is read off the world only once a frame is that of the last."""
-        status = replace(self._status, time=moment.time, **levers.read(self._stage.worlds[0]))
-        return self.latest.moved(moment, self._seq, status, velocity=self._audience.looks_at_velocity(self._seq))
+        status = replace(self._status, time=moment.time, **controls.read(self._view_state.worlds[0]))
+        return self.latest.moved(moment, self._seq, status, velocity=self._audience.needs_velocity(self._seq))
 
     def _picture(self) -> Frame:
-        stage = self._stage
-        positions, velocity = stage.look()
-        if self._shape_of != stage.version:
-            self._shape_of = stage.version
+        view_state = self._view_state
+        positions, velocity = view_state.capture()
+        if self._shape_of != view_state.version:
+            self._shape_of = view_state.version
             scenes = tuple(self._repertoire.summaries.items()) if self._repertoire else ()
-            self._shape = stage.shape(dt=self._dt, budget_ms=self._budget_ms, scenes=scenes)
-        position = stage.place(self._between(positions))
+            self._shape = view_state.shape(dt=self._dt, budget_ms=self._budget_ms, scenes=scenes)
+        position = view_state.place(self._between(positions))
         position.flags.writeable = velocity.flags.writeable = False
         self._status = self._read()
-        seen = (self._seq, self._shape, stage.layout.view, self._status, position, velocity, *stage.drawn())
-        return Frame(*seen, drawing=stage.drawing(), contacts=stage.forces.now())
+        seen = (self._seq, self._shape, view_state.layout.view, self._status, position, velocity, *view_state.drawn())
+        return Frame(*seen, drawing=view_state.drawing(), contacts=view_state.forces.now())
 
     def _read(self) -> Status:
-        return self._gauges.read(
-            self._stage,
+        return self._readouts.read(
+            self._view_state,
             dropped=self._clock.dropped,
             speed=self._speed,
             paused=self._paused,
@@ -338,9 +339,9 @@ class Session(Door):
         if self._speed == 1.0 or self._paused or before is None or list(map(len, before)) != list(map(len, now)):
             return now
         alpha = np.float32(self._clock.alpha)
-        seams = [world.boundary.seam for world in self._stage.worlds]
+        seams = [world.boundary.seam for world in self._view_state.worlds]
         return [seam.wrapped(a + alpha * seam.nearest(b - a)) for a, b, seam in zip(before, now, seams, strict=True)]
 
 
-class _Stopped(Exception):  # noqa: N818  (no error: somebody has asked for it)
+class _Stopped(Exception):  # noqa: N818  (no error: it was asked for)
     """The session ends while a scene is being built."""

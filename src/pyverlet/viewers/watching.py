@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from pyverlet.ground.errors import PyverletError
-from pyverlet.ground.patience import Patience, TooLong, interrupt
+from pyverlet.ground.time_limit import TimeLimit, TooLong, interrupt
 from pyverlet.laws.integrators import Integrator
 from pyverlet.scenes.sketch import Sketch
-from pyverlet.viewers.exhibit import Exhibit, Repertoire
+from pyverlet.viewers.presentation import Presentation, Repertoire
 from pyverlet.viewers.session import Session
 from pyverlet.world.panels import Panel, Panels
 from pyverlet.world.world import World
@@ -23,25 +23,17 @@ LOOK_S = 0.05
 """How often the files are looked at."""
 
 SAY_S = 1.0
-"""A build that takes longer is told of on the page."""
+"""A build that takes longer is shown on the page."""
 
-PATIENCE_S = 10.0
+BUILD_LIMIT_S = 10.0
 """A sketch that is not done by then is given up; see --patience."""
 
 Stamp = tuple[int, int]
 """When a file was saved, and how large it is."""
 
 
-class Workshop:
-    """Builds a sketch, again and again.
-
-    Args:
-        path: of its file.
-        dt: simulated seconds a frame.
-        integrators: in place of the sketch's; several stand side by side.
-        overrides: settings, as for `Scene.settings`.
-        patience: seconds a build may take.
-    """
+class SketchBuilder:
+    """Builds the sketch in a file again and again, in at most `time_limit` s; other arguments as for `Repertoire`."""
 
     def __init__(
         self,
@@ -50,25 +42,25 @@ class Workshop:
         dt: float,
         integrators: Sequence[Integrator] = (),
         overrides: Mapping[str, Any] | None = None,
-        patience: float = PATIENCE_S,
+        time_limit: float = BUILD_LIMIT_S,
     ) -> None:
         self.path, self._dt, self._integrators, self._overrides = path, dt, integrators, overrides
-        self._patience = patience
+        self._time_limit = time_limit
         self._sketch: Sketch | None = None
         self.fault: str | None = None
         """Why the last build has come to nothing."""
 
-    def build(self) -> Exhibit | None:
+    def build(self) -> Presentation | None:
         """The sketch as it is now; None if that cannot be: see `fault`."""
         try:
             sketch = Sketch.read(self.path, self._sketch)
             self._sketch = sketch
-            with Patience().within(self._patience):
+            with TimeLimit().within(self._time_limit):
                 scene = sketch.scene()
-                exhibit = Repertoire(scene, dt=self._dt, integrators=self._integrators, overrides=self._overrides).open()
-            sketch.patience = Patience()  # a screen waits for what is called with each picture
+                presentation = Repertoire(scene, dt=self._dt, integrators=self._integrators, overrides=self._overrides).open()
+            sketch.time_limit = TimeLimit()  # a screen waits for what is called with each picture
         except TooLong:
-            self.fault = f"{self.path.name} is not built after {self._patience:g} s"
+            self.fault = f"{self.path.name} is not built after {self._time_limit:g} s"
             return None
         except PyverletError as error:
             self.fault = str(error)
@@ -77,14 +69,14 @@ class Workshop:
             self.fault = f"{self.path.name} needs more memory than there is"
             return None
         self.fault = None
-        return exhibit
+        return presentation
 
-    def first(self) -> Exhibit:
+    def first(self) -> Presentation:
         """The sketch, or an empty world while it cannot be built."""
         built = self.build()
-        return built if built else Exhibit(self.path.stem, Panels([Panel("", World())]))
+        return built if built else Presentation(self.path.stem, Panels([Panel("", World())]))
 
-    def stamps(self) -> dict[Path, Stamp]:
+    def file_times(self) -> dict[Path, Stamp]:
         """Of the sketch's files as they are now; without those that are not there, or still empty: they are being saved."""
         files = self._sketch.files if self._sketch else [self.path]
         return {file: stamp for file in files if (stamp := _stamp(file))}
@@ -99,25 +91,20 @@ def _stamp(file: Path) -> Stamp | None:
 
 
 class Watcher:
-    """Looks at the files of a sketch, and has it built in a thread of its own when one is saved.
+    """Watches the files of a sketch on show, and has it built in a thread of its own when one is saved."""
 
-    Args:
-        workshop: which has built what is on show.
-        session: that shows it.
-    """
-
-    def __init__(self, workshop: Workshop, session: Session) -> None:
-        self._workshop, self._session = workshop, session
+    def __init__(self, builder: SketchBuilder, session: Session) -> None:
+        self._builder, self._session = builder, session
         self._ended = threading.Event()
-        self._builder: threading.Thread | None = None
+        self._building_thread: threading.Thread | None = None
         self._lock, self._interruptible, self._building = threading.Lock(), False, False
         self._turn = 0
 
     @contextmanager
     def at_work(self) -> Iterator[None]:
-        """Meanwhile it looks."""
-        if self._workshop.fault:
-            self._session.tell(complaint=self._workshop.fault)
+        """Meanwhile the files are watched."""
+        if self._builder.fault:
+            self._session.tell(complaint=self._builder.fault)
         thread = threading.Thread(target=self._look, name="pyverlet-watch", daemon=True)
         thread.start()
         try:
@@ -127,9 +114,9 @@ class Watcher:
             thread.join(20 * LOOK_S)
 
     def _look(self) -> None:
-        known, began = self._workshop.stamps(), 0.0
+        known, began = self._builder.file_times(), 0.0
         while not self._ended.wait(LOOK_S):
-            now = self._workshop.stamps()
+            now = self._builder.file_times()
             if any(known[file] != stamp for file, stamp in now.items() if file in known):
                 began = time.monotonic()
                 self._build()
@@ -139,27 +126,27 @@ class Watcher:
                 began = 0.0
 
     def _say_busy(self) -> None:
-        with self._lock:  # said after the end of the building, it would be said for ever
+        with self._lock:  # shown after the build has ended, it would stay for ever
             if self._building:
-                self._session.tell(complaint=self._workshop.fault, busy=f"building {self._workshop.path.name}")
+                self._session.tell(complaint=self._builder.fault, busy=f"building {self._builder.path.name}")
 
     def _build(self) -> None:
         with self._lock:
-            if self._interruptible and self._builder is not None:
-                interrupt(self._builder)  # what it builds is old
+            if self._interruptible and self._building_thread is not None:
+                interrupt(self._building_thread)  # what it builds is old
             self._turn, self._building = self._turn + 1, True
-        self._builder = threading.Thread(target=self._put_on, args=(self._turn,), name="pyverlet-build", daemon=True)
-        self._builder.start()
+        self._building_thread = threading.Thread(target=self._put_on, args=(self._turn,), name="pyverlet-build", daemon=True)
+        self._building_thread.start()
 
     def _put_on(self, turn: int) -> None:
         with contextlib.suppress(TooLong):
             self._interruptible = True
             try:
-                built = self._workshop.build()
+                built = self._builder.build()
             finally:
                 with self._lock:
                     self._interruptible = False
-            fault = self._workshop.fault
+            fault = self._builder.fault
             with self._lock:
                 if turn != self._turn:
                     return

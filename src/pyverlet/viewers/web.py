@@ -21,12 +21,12 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from pyverlet.ground.errors import InputError
-from pyverlet.viewers.artist import Artist, advice, draws_here
 from pyverlet.viewers.commands import Release
 from pyverlet.viewers.frames import Frame, Rect, Shape
-from pyverlet.viewers.looks import Look
+from pyverlet.viewers.jpeg_renderer import JpegRenderer, advice, draws_here
 from pyverlet.viewers.protocol import Ack, decode, encode_frame, encode_picture, encode_refusal, encode_shape
 from pyverlet.viewers.session import Session
+from pyverlet.viewers.view_options import ViewOptions
 
 MAX_IN_FLIGHT = 3
 """Frames sent to a tab and not drawn yet. One would halve the rate; with two a screen missed one in a hundred, since neither the
@@ -59,15 +59,15 @@ def make_app(session: Session, *, only_loopback: bool = True) -> Starlette:
         only_loopback: refuse WebSockets that did not ask for this machine by one of its own names. Every page in the
             world may ask the browser to connect to localhost, or point a name of its own at 127.0.0.1.
     """
-    encoder, artist = _Encoder(), Artist()
-    hands = itertools.count()
+    encoder, renderer = _Encoder(), JpegRenderer()
+    pointers = itertools.count()
 
     async def socket(websocket: WebSocket) -> None:
         if not welcome(websocket.headers.get("origin"), websocket.headers.get("host", ""), only_loopback):
             await websocket.close(POLICY_VIOLATION)
             return
         await websocket.accept()
-        await Tab(websocket, session, encoder, artist, next(hands)).serve()
+        await Tab(websocket, session, encoder, renderer, next(pointers)).serve()
 
     routes = [Route("/" if name == "index.html" else f"/{name}", _file(name)) for name in page_files()]
     return Starlette(routes=[*routes, WebSocketRoute("/socket", socket)])
@@ -115,12 +115,12 @@ class _Encoder:
         self._shape: Shape | None = None
         self._shape_bytes = b""
 
-    def frame(self, frame: Frame, look: Look) -> bytes:
+    def frame(self, frame: Frame, options: ViewOptions) -> bytes:
         if frame is not self._frame:
             self._frame, self._frames = frame, {}
-        key = (look.part, look.velocity, look.pushes)
+        key = (options.part, options.velocity, options.pushes)
         if key not in self._frames:
-            self._frames[key] = encode_frame(frame, look.part, velocity=look.velocity, force=look.pushes)
+            self._frames[key] = encode_frame(frame, options.part, velocity=options.velocity, force=options.pushes)
         return self._frames[key]
 
     def shape(self, shape: Shape) -> bytes:
@@ -133,13 +133,13 @@ class _Encoder:
 class Tab:
     """One WebSocket: a reader of commands and acknowledgements, a writer of frames."""
 
-    def __init__(self, websocket: WebSocket, session: Session, encoder: _Encoder, artist: Artist, hand: int) -> None:
+    def __init__(self, websocket: WebSocket, session: Session, encoder: _Encoder, renderer: JpegRenderer, pointer: int) -> None:
         self._websocket = websocket
         self._session = session
         self._encoder = encoder
-        self._artist = artist
-        self._hand = hand
-        self._look = Look()
+        self._jpegs = renderer
+        self._hand = pointer
+        self._options = ViewOptions()
         self._in_flight: deque[int] = deque()
         self._wake = asyncio.Event()
 
@@ -177,8 +177,8 @@ class Tab:
                 request = decode(text, self._hand)
                 if isinstance(request, Ack):
                     self._acknowledge(request.seq)
-                elif isinstance(request, Look):
-                    self._look = request
+                elif isinstance(request, ViewOptions):
+                    self._options = request
                     self._wake.set()
                 else:
                     self._session.submit(request)
@@ -196,31 +196,31 @@ class Tab:
             raise InputError(f"seq is {seq}; allowed are frames on the way: {list(self._in_flight)}")
         while self._in_flight[0] < seq:
             self._in_flight.popleft()
-        self._in_flight.popleft()  # one only: a frame is sent again when the tab looks elsewhere
+        self._in_flight.popleft()  # one only: a frame is sent again when the tab views elsewhere
         self._wake.set()
 
     async def _write(self) -> None:
         shape: Shape | None = None
-        sent: tuple[int, Look] | None = None
+        sent: tuple[int, ViewOptions] | None = None
         while True:
-            frame, look = self._session.latest, self._look
-            if (frame.seq, look) == sent or len(self._in_flight) >= MAX_IN_FLIGHT:
+            frame, options = self._session.latest, self._options
+            if (frame.seq, options) == sent or len(self._in_flight) >= MAX_IN_FLIGHT:
                 await self._wake.wait()
                 self._wake.clear()
                 continue
             if frame.shape is not shape:
                 shape = frame.shape
                 await self._send(self._encoder.shape(shape))
-            self._session.take(frame, velocity=look.moving)
-            if look.pushes:
-                self._session.weigh(frame)
-            sent = (frame.seq, look)
+            self._session.take(frame, velocity=options.moving)
+            if options.pushes:
+                self._session.want_forces(frame)
+            sent = (frame.seq, options)
             self._in_flight.append(frame.seq)
-            await self._send(await self._encode(frame, look))
+            await self._send(await self._encode(frame, options))
 
-    async def _encode(self, frame: Frame, look: Look) -> bytes:
+    async def _encode(self, frame: Frame, options: ViewOptions) -> bytes:
         if not draws_here(frame.shape):
-            return self._encoder.frame(frame, look)
+            return self._encoder.frame(frame, options)
         loop = asyncio.get_running_loop()
-        jpeg = await loop.run_in_executor(self._artist.thread, self._artist.jpeg, frame, look)
-        return encode_picture(frame, look.part, jpeg)
+        jpeg = await loop.run_in_executor(self._jpegs.thread, self._jpegs.jpeg, frame, options)
+        return encode_picture(frame, options.part, jpeg)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import time
 from collections.abc import Callable
@@ -10,19 +9,20 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError, PyverletError
+from pyverlet.ground.errors import PyverletError
+from pyverlet.ground.outside import require
 from pyverlet.picture import DARK, Colouring, Theme, View
 from pyverlet.picture.pen import Draw
 from pyverlet.picture.raster import check_size
 from pyverlet.viewers.frames import Rect
-from pyverlet.viewers.hands import Hands
-from pyverlet.viewers.painter import Painter
+from pyverlet.viewers.pointers import Pointers
+from pyverlet.viewers.renderer import Renderer
 from pyverlet.world.clock import Clock, FrameBudget
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
 
-HAND = 0
+POINTER = 0
 """There is one mouse."""
 
 REACH_PX = 9.0
@@ -32,7 +32,7 @@ ZOOM = 1.15
 """A notch of the wheel."""
 
 CAPTION_S = 0.25
-"""Time between updates of the numbers in the title bar; nobody reads faster."""
+"""Time between updates of the numbers in the title bar."""
 
 KEYS = "space pause, . step, r reset, f fit, q quit; drag a circle, shift-drag pokes, wheel zooms, right button moves"
 
@@ -41,7 +41,7 @@ class Window:
     """Steps a world in real time and shows it, in the calling thread.
 
     Args:
-        world: nobody else may step it meanwhile. Reset goes back to its present state.
+        world: stepped by the window only, while it is open. Reset goes back to its present state.
         title: in the title bar.
         dt: simulated seconds a frame, and the pace.
         size: (width, height) at the start, pixels.
@@ -66,16 +66,16 @@ class Window:
     ) -> None:
         check_extra()
         self._world, self._title, self._dt = world, title, checks.number("dt", dt, above=0.0)
-        self._new_painter: Callable[[tuple[int, int]], Painter] = partial(_painter, world, colour, theme, part, draw)
-        self._painter = self._new_painter(check_size(size))
+        self._new_renderer = partial(Renderer, world, colour=colour, theme=theme, part=part, draw=draw)
+        self._renderer = self._new_renderer(size=check_size(size))
         self._saved = world.save()
-        self._hands = Hands(world)
+        self._pointers = Pointers(world)
         self._clock, self._budget = Clock(dt=self._dt), FrameBudget()
         self._last = time.perf_counter()
         self._caption_due = self._pictures_since = 0.0
         self._pictures = 0
         self.view: View | None = None
-        """What the user has zoomed to; None shows the painter's own."""
+        """What the user has zoomed to; None shows the renderer's own."""
         self.paused = False
         self.ended = False
         self.error: str | None = None
@@ -110,13 +110,13 @@ class Window:
             while not self.ended:
                 self.turn()
         finally:
-            self._hands.release_all()
+            self._pointers.release_all()
             self._pygame.display.quit()
 
     def turn(self) -> None:
-        """Obey what the user did, make the frames that are due, show one picture."""
+        """Apply what the user did, make the frames that are due, show one picture."""
         for event in self._pygame.event.get():
-            self._obey(event)
+            self._apply(event)
         now = time.perf_counter()
         due = self._clock.advance(now - self._last)
         self._last = now
@@ -131,7 +131,7 @@ class Window:
         if self.error is not None:
             return
         x0, y0, x1, y1 = self._rect()
-        self._hands.move(max(x1 - x0, y1 - y0))
+        self._pointers.move(max(x1 - x0, y1 - y0))
         try:
             self._world.step(self._dt)
         except PyverletError as error:
@@ -140,9 +140,9 @@ class Window:
 
     def _show(self) -> None:
         pygame, screen = self._pygame, self._pygame.display.get_surface()
-        pixels = self._painter.paint(self.view)
+        pixels = self._renderer.paint(self.view)
         # The surface has no pixels of its own: it looks at the raster's.
-        screen.blit(pygame.image.frombuffer(pixels, self._painter.size, "RGBX"), (0, 0))
+        screen.blit(pygame.image.frombuffer(pixels, self._renderer.size, "RGBX"), (0, 0))
         pygame.display.flip()
         self._pictures += 1
         now = time.perf_counter()
@@ -158,36 +158,36 @@ class Window:
 
     # -- what the user does -------------------------------------------------------------------------------------------
 
-    def _obey(self, event: Any) -> None:
+    def _apply(self, event: Any) -> None:
         pygame = self._pygame
         if event.type == pygame.QUIT:
             self._end()
         elif event.type == pygame.KEYDOWN and event.key in self._do:
             self._do[event.key]()
         elif event.type == pygame.VIDEORESIZE:
-            self._painter, self.view = self._new_painter((max(event.w, 1), max(event.h, 1))), None
+            self._renderer, self.view = self._new_renderer(size=(max(event.w, 1), max(event.h, 1))), None
         elif event.type == pygame.MOUSEWHEEL:
             self.view = self._seen().zoomed(ZOOM**event.y, pygame.mouse.get_pos())
         elif event.type == pygame.MOUSEBUTTONUP and event.button == 1:
-            self._hands.release(HAND)
+            self._pointers.release(POINTER)
         elif event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
             self._poking = bool(pygame.key.get_mods() & pygame.KMOD_SHIFT)
-            self._hand_at(event.pos)
+            self._point_at(event.pos)
         elif event.type == pygame.MOUSEMOTION and event.buttons[0]:
-            self._hand_at(event.pos)
+            self._point_at(event.pos)
         elif event.type == pygame.MOUSEMOTION and event.buttons[2]:
             self.view = self._seen().moved(event.rel)
 
     _poking = False
 
-    def _hand_at(self, pixel: tuple[int, int]) -> None:
+    def _point_at(self, pixel: tuple[int, int]) -> None:
         view = self._seen()
         x, y = (float(value) for value in view.to_world(pixel))
         if self._poking:
             x0, y0, x1, y1 = self._rect()
-            self._hands.poke(HAND, x, y, max(x1 - x0, y1 - y0))
+            self._pointers.poke(POINTER, x, y, max(x1 - x0, y1 - y0))
         else:
-            self._hands.drag(HAND, x, y, REACH_PX / view.scale)
+            self._pointers.drag(POINTER, x, y, REACH_PX / view.scale)
 
     def _pause(self) -> None:
         self.paused = not self.paused
@@ -197,7 +197,7 @@ class Window:
         self._advance()
 
     def _reset(self) -> None:
-        self._hands.release_all()
+        self._pointers.release_all()
         self._world.restore(self._saved)
         self._clock, self.error = Clock(dt=self._dt), None
 
@@ -208,23 +208,16 @@ class Window:
         self.ended = True
 
     def _seen(self) -> View:
-        return self._painter.view if self.view is None else self.view
+        return self._renderer.view if self.view is None else self.view
 
     def _rect(self) -> Rect:
         view = self._seen()
         return (view.left, view.top - view.height / view.scale, view.left + view.width / view.scale, view.top)
 
 
-def _painter(
-    world: World, colour: Colouring | None, theme: Theme, part: Rect | None, draw: Draw | None, size: tuple[int, int]
-) -> Painter:
-    return Painter(world, size=size, colour=colour, theme=theme, part=part, draw=draw)
-
-
 def check_extra() -> None:
     """Raise InputError with the command that installs what is missing."""
-    if importlib.util.find_spec("pygame") is None:
-        raise InputError("a window needs 'pygame', which is not installed: pip install 'pyverlet[window]'")
+    require("a window", "pygame", extra="window")
 
 
 def show(build: Callable[[], World], **options: Any) -> None:

@@ -12,8 +12,8 @@ from pyverlet.core import unit
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import count
+from pyverlet.ground.step_lock import of_one_frame
 from pyverlet.ground.threads import max_threads
-from pyverlet.ground.turns import of_one_frame
 from pyverlet.laws.naive import Naive
 from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.rooms import Boundary, Box, Circle, Periodic

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pyverlet.core import unit
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Records
-from pyverlet.ground.turns import of_one_frame
+from pyverlet.ground.step_lock import of_one_frame
 from pyverlet.laws.collisions import Collisions, Overlap, measure_overlap
 from pyverlet.laws.energy import Energy, energy
 from pyverlet.laws.events import Events, Place

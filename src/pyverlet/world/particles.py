@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
-from pyverlet.ground.turns import Shared, in_turn, of_one_frame
+from pyverlet.ground.step_lock import Shared, in_turn, of_one_frame
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceList, Numbered

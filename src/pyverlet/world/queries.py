@@ -11,7 +11,7 @@ from pyverlet.core import unit
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import count
-from pyverlet.ground.turns import Shared, of_one_frame
+from pyverlet.ground.step_lock import Shared, of_one_frame
 from pyverlet.state.neighbours import Near, check_range, near
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import State

@@ -11,8 +11,8 @@ from numpy.typing import DTypeLike, NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.constants import ALL_THREADS_FROM, MOST_SUBSTEPS, ONE_THREAD_BELOW, STANDARD_GRAVITY
 from pyverlet.ground.errors import InputError, PyverletError
+from pyverlet.ground.step_lock import in_turn
 from pyverlet.ground.threads import max_threads
-from pyverlet.ground.turns import in_turn
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceList, ForceSum

@@ -33,7 +33,7 @@ def rounded(world: World, held: float, stiff: float) -> float:
 
 
 def rolled(world: World, h: float) -> float:
-    """J a frame, of who rolls along a wall: a step of order 2 moves it freely, and friction then mends its velocity alone.
+    """J a frame, of circles that roll along a wall: a step of order 2 moves them freely, and friction corrects only the velocity.
 
     By a third of a h^2 / 2 too far for a disc that rolls, along a: measured is 0.21 m (a h)^2 a substep with what friction takes.
     """
@@ -44,7 +44,7 @@ def rolled(world: World, h: float) -> float:
 
 
 def of_rounding(world: World, dt: float) -> float:
-    """J, the energy of who moves by a rounding error of its place in a frame."""
+    """J, the energy of particles that move by a rounding error of their position in a frame."""
     slowest = float(np.finfo(world.dtype).eps * np.abs(world.position).max(initial=0.0)) / dt  # m/s
     return 0.5 * _free_mass(world) * slowest**2
 

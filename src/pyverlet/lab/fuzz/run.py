@@ -14,14 +14,7 @@ from pyverlet.lab.fuzz.watch import Broken, check
 
 @dataclass(frozen=True)
 class Finding:
-    """One world.
-
-    Attributes:
-        seed: of `drawn`.
-        refused: why it could not be built, for two of the things drawn do not go together; None if it could.
-        check: the promise that was broken, in which frame and how; None if all hold.
-        program: the smallest that breaks it; None if all hold.
-    """
+    """One world: why it could not be built, or the promise it broke and the smallest program that does; None if all hold."""
 
     seed: int
     refused: str | None = None

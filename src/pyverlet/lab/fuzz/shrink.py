@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
@@ -47,18 +48,10 @@ def _simpler(program: Program) -> Iterator[Program]:
 
 
 def _shorter(line: str) -> Iterator[str]:
-    """The call of a line with one of its named arguments left out."""
-    start = line.find("=")
-    while start > 0:
-        name = start
-        while line[name - 1].isidentifier():
-            name -= 1
-        depth, end = 0, start
-        while end < len(line) and not (depth == 0 and line[end] in ",)"):
-            depth += (line[end] in "([") - (line[end] in ")]")
-            end += 1
-        if line[name - 2 : name] == ", ":
-            yield line[: name - 2] + line[end:]
-        elif line[name - 1] == "(" and line[end : end + 2] == ", ":
-            yield line[:name] + line[end + 2 :]
-        start = line.find("=", start + 1)
+    """The line with one named argument of a call left out."""
+    tree = ast.parse(line)
+    for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
+        for k in range(len(call.keywords)):
+            argument = call.keywords.pop(k)
+            yield ast.unparse(tree)
+            call.keywords.insert(k, argument)

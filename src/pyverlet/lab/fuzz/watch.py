@@ -1,7 +1,7 @@
 """What is promised of every world, looked at in each frame of one.
 
 `finite`      nothing is NaN or infinite
-`room`        nobody who is free leaves a closed room
+`room`        no free particle leaves a closed room
 `energy`      never rises by more than 1e-4 of its scale in a frame where nothing drives the world
 `links`       nor, in a world with links, above what it was in any of the last frames
 `momentum`    stays where nothing outside acts
@@ -63,12 +63,7 @@ _EDGE = 1e-5
 
 
 class Broken(Exception):  # noqa: N818  (a promise, not an error)
-    """A promise that a world has broken.
-
-    Attributes:
-        check: which, a name of the list above.
-        frame: before which frames had gone well.
-    """
+    """A promise, `check`, that a world has broken before this frame."""
 
     def __init__(self, check: str, frame: int, what: str) -> None:
         super().__init__(f"{check}, frame {frame}: {what}")
@@ -76,15 +71,9 @@ class Broken(Exception):  # noqa: N818  (a promise, not an error)
 
 
 def check(build: Build, deed: Deed, *, frames: int, dt: float, only: str | None = None, without: Sequence[str] = ()) -> None:
-    """Run a world and hold it to what is promised.
+    """Run a world that `build` makes, `deed` changing it before each frame, and hold it to what is promised.
 
-    Args:
-        build: makes it, on at most so many threads.
-        deed: does to it what is due before a frame.
-        frames: how many are run.
-        dt: s, each.
-        only: the one check to be made; None makes all.
-        without: checks that are not made.
+    only, without: the one check to be made, and checks that are left out.
 
     Raises:
         Broken: a promise does not hold.
@@ -99,14 +88,14 @@ def check(build: Build, deed: Deed, *, frames: int, dt: float, only: str | None 
 def _check(build: Build, deed: Deed, frames: int, dt: float, made: frozenset[str]) -> None:
     world = build(1)
     half = frames // 2
-    unsettled, seen = 0, _Seen()
+    settling, seen = 0, _Seen()
     for frame in range(half):
-        unsettled = _frame(world, deed, frame, dt, made, seen, unsettled=unsettled)
+        settling = _frame(world, deed, frame, dt, made, seen, settling=settling)
     saved, file = world.save(), None
     if "file" in made and not world.actors and _is_plain(world):
         file = _through_a_file(world)
     for frame in range(half, frames):
-        unsettled = _frame(world, deed, frame, dt, made, seen, unsettled=unsettled)
+        settling = _frame(world, deed, frame, dt, made, seen, settling=settling)
     end = world.state_hash()
     if "contacts" in made:
         _compare_contacts(world, frames)
@@ -127,18 +116,13 @@ def _check(build: Build, deed: Deed, frames: int, dt: float, made: frozenset[str
 
 
 class _Seen:
-    """What has been seen of a world.
-
-    Attributes:
-        lately: energies before the last frames that nothing drove, with their scale.
-        most: J, the largest sum of all its accounts without their signs, of which sums in float64 keep 1e-16.
-    """
+    """What was seen of a world: recent energies with their scale, and the largest sum of its accounts without signs, J."""
 
     def __init__(self) -> None:
-        self.lately, self.most = deque[tuple[float, float]](maxlen=_SWING), 0.0
+        self.recent, self.most = deque[tuple[float, float]](maxlen=_SWING), 0.0
 
 
-class _Noted:
+class _Untouchable:
     """Stands for a world to see whether a deed would touch it."""
 
     def __getattr__(self, name: str) -> object:
@@ -155,7 +139,7 @@ class _TouchedError(Exception):
     pass
 
 
-class _Refused(Exception):  # noqa: N818  (what was asked for was too much, and the world has said so)
+class _Refused(Exception):  # noqa: N818  (the world has refused what was asked for)
     pass
 
 
@@ -172,7 +156,7 @@ def _silent(deed: Deed, frames: range) -> bool:
     """Whether nothing is done to the world in these frames. Laws that were changed are no part of what `restore` brings back."""
     try:
         for frame in frames:
-            deed(_Noted(), frame)  # type: ignore[arg-type]
+            deed(_Untouchable(), frame)  # type: ignore[arg-type]
     except _TouchedError:
         return False
     return True
@@ -211,12 +195,12 @@ def _told(name: str, frame: int) -> Iterator[None]:
         raise Broken(name, frame, f"{type(error).__name__}: {error}") from error
 
 
-def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str], seen: _Seen, *, unsettled: int) -> int:
-    """One frame, `unsettled` if so many are to come in which the world may gain by what was done to it; then how many there are.
+def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str], seen: _Seen, *, settling: int) -> int:
+    """One frame, `settling` if so many are to come in which the world may gain by what was done to it; then how many there are.
 
     Velocities are of half a step before, so the frame after a deed knows of it too; and overlap that a coarse step has left
-    holds more energy when steps become shorter, until it is gone. So do links that an obstacle has stretched by pushing out who
-    was in it at the beginning, or that who moved their circles has.
+    holds more energy when steps become shorter, until it is gone. So do links that an obstacle has stretched by pushing
+    out particles that started inside it, or that a deed has stretched by moving their circles.
     """
     before_deed, forces, places = (world.version, world.substeps), tuple(world.forces), world.position.copy()
     energy_then, linked = world.energy().total, bool(world.links)
@@ -224,7 +208,7 @@ def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str]
     looks: list[Callable[[], None]] = []
     touched = before_deed != (world.version, world.substeps) or energy_then != world.energy().total
     touched |= bool(linked and not world.links)
-    touched |= frame == 0 and len(world.obstacles) > 0  # which lift whoever starts inside them
+    touched |= frame == 0 and len(world.obstacles) > 0  # which push out particles that start inside them
     moved = not np.array_equal(places, world.position)
     touched |= moved
     eases = (moved and linked) or before_deed[1] != world.substeps
@@ -232,12 +216,12 @@ def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str]
     h = dt / world.substeps
     about_energy = "links" if world.links else "energy"
     is_driven = world._frames.held.h not in (0.0, h) or not undriven(world)  # some methods need a constant step
-    driven = world.actors or touched or unsettled or pinned_move(world._state) or is_driven
+    driven = world.actors or touched or settling or pinned_move(world._state) or is_driven
     driven = driven or not _uniform(world) or bool(world.links and world.overlap().max > _APART)
     if driven:
-        seen.lately.clear()
+        seen.recent.clear()
     elif about_energy in made:
-        looks.append(_energy(about_energy, world, frame, dt, seen.lately))
+        looks.append(_energy(about_energy, world, frame, dt, seen.recent))
     other_forces = forces != tuple(world.forces)  # each pulls from half a substep before it is there
     if "momentum" in made and not (other_forces or world.actors or (touched and linked)) and _alone(world):
         looks.append(_momentum(world, frame, dt))
@@ -263,11 +247,11 @@ def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str]
         seen.most = max(seen.most, abs(now), sum(map(abs, world.ledger.as_dict().values())))
         if abs(world.ledger.total - now) > _CLOSED * size + of_rounding(world, dt) + 1e-14 * seen.most:
             raise Broken("ledger", frame, f"accounts add up to {world.ledger.total:.9g} J, energy is {now:.9g} J")
-    return max(unsettled - 1, _EASED if eases else int(touched))
+    return max(settling - 1, _EASED if eases else int(touched))
 
 
 def _in_obstacles(world: World) -> bool:
-    """Whether anybody is, if only with its rim."""
+    """Whether any particle overlaps an obstacle, if only with its rim."""
     course = world._course
     course.covering(world.position)  # obstacles are placed for that
     near = course.facing(world.position, marks=(world.category, world.mask))
@@ -293,7 +277,7 @@ def _uniform(world: World) -> bool:
     return all(isinstance(force, ConstantForce | Drag) and not isinstance(force, Wind) for force in world.forces)
 
 
-def _energy(name: str, world: World, frame: int, dt: float, lately: deque[tuple[float, float]]) -> Callable[[], None]:
+def _energy(name: str, world: World, frame: int, dt: float, recent: deque[tuple[float, float]]) -> Callable[[], None]:
     h = dt / world.substeps
 
     def total() -> tuple[float, float, float, float]:
@@ -303,8 +287,8 @@ def _energy(name: str, world: World, frame: int, dt: float, lately: deque[tuple[
 
     shown, able, held, _ = total()
     size = scale(world, _FALL_S) + held
-    lately.append((shown, able))
-    shown, able = map(max, zip(*lately, strict=True)) if world.links else (shown, able)
+    recent.append((shown, able))
+    shown, able = map(max, zip(*recent, strict=True)) if world.links else (shown, able)
 
     def look() -> None:
         now_shown, now_able, held, stiff = total()
@@ -319,7 +303,7 @@ def _energy(name: str, world: World, frame: int, dt: float, lately: deque[tuple[
 
 
 def _alone(world: World) -> bool:
-    """Whether nothing outside acts on who is in it."""
+    """Whether nothing outside acts on the particles."""
     held = any(isinstance(link, Pin) for link in world.links) or not np.isfinite(world.mass).all()
     return not (held or any(world.gravity) or world.forces or world.obstacles) and isinstance(world.boundary, Open)
 
@@ -339,7 +323,7 @@ def _momentum(world: World, frame: int, dt: float) -> Callable[[], None]:
     moved, tension, asleep = size(world.velocity), _tension(world), world.asleep
 
     def look() -> None:
-        if world.asleep.any() or asleep.any():  # sleepers are in the way of who hardly moves, and keep nothing of it
+        if world.asleep.any() or asleep.any():  # sleeping particles stop slow ones, and take no momentum
             return
         change = float(np.hypot(*(world.momentum() - before)))
         pulled = dt * max(tension, _tension(world))  # N s, which are rounded too
@@ -350,7 +334,7 @@ def _momentum(world: World, frame: int, dt: float) -> Callable[[], None]:
         # Pushes and links look at places, and those are rounded: of the heaviest by m eps |x|.
         allowed += eps * far * float(mass.max(initial=0.0)) / h
         if world.links:
-            # Of who touches another, half a substep of what links do is not shown, and of whom they hold to it, it is.
+            # Half a substep of the links' impulse is not shown for particles in contact; for those that links hold, it is.
             allowed += h / dt * pulled if world.collisions else 0.0
         if change > allowed:
             raise Broken("momentum", frame, f"changed by {change:.3g} N s, rounding explains {allowed:.3g}")

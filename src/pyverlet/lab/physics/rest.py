@@ -128,7 +128,7 @@ def left_alone(particles: int, seconds: float, friction: float, creep: float = 0
     moving = mean if swings else most
     apart = "apart from the swing of the whole, " if swings else ""
     return Result(
-        f"a pile of {particles}, friction {friction:g}, left alone for {seconds:g} s after 30: {apart}nobody moves by "
+        f"a pile of {particles}, friction {friction:g}, left alone for {seconds:g} s after 30: {apart}no circle moves by "
         f"{creep:g} R or turns by {turn:g} rad a minute, kinetic energy {'on average' if swings else 'always'} < {STILL:g} m g R",
         f"moved {moved.max():.2g} R (median {np.median(moved):.2g}), turned {np.abs(turned).max():.2g} rad, mean {mean:.1e}, "
         f"worst {most:.1e}" + (f", swing {np.ptp(angle):.2g} rad" if swings else ""),

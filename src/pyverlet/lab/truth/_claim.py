@@ -1,4 +1,4 @@
-"""An experiment on a claim: what is said, what is true, how it is tried, the numbers that come out, and the verdict."""
+"""An experiment on a claim: the claim, what is true, how it is tried, the numbers that come out, and the verdict."""
 
 from __future__ import annotations
 

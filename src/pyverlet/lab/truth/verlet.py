@@ -1,4 +1,4 @@
-"""J5 to J7: what is said of the formula itself."""
+"""J5 to J7: claims about the formula itself."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ OSCILLATOR = PROBLEMS["oscillator"]
     claim="The Verlet update is x' = 2 x - x_prev + F h².",
     mathematics="""
         Newton's law is F = m a, so the last term is (F / m) h². The weight is F = m g in newtons, g itself is in m/s².
-        Without the division a mass of 5 kg falls five times as far, and only at 1 kg does nobody notice.
+        Without the division a mass of 5 kg falls five times as far, and only at 1 kg is it not noticed.
     """,
     setting="1 kg and 5 kg fall from rest for a second, by the update without the division, and in pyverlet.",
     verdict="Wrong by the factor m.",

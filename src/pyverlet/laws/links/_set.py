@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import listed
-from pyverlet.ground.turns import Shared, in_turn, of_one_frame
+from pyverlet.ground.step_lock import Shared, in_turn, of_one_frame
 from pyverlet.laws.links._link import Array, Link
 from pyverlet.laws.links._pool import Pool
 from pyverlet.state.seam import Seam

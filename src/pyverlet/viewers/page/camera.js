@@ -74,7 +74,7 @@ export class Camera {
     return [Math.max(x0, rx0), Math.max(y0, ry0), Math.min(x1, rx1), Math.min(y1, ry1)];
   }
 
-  /** The centre stays within the room: nobody gets lost. */
+  /** The centre stays within the room: the view cannot leave it. */
   #near(own) {
     if (!this.bounded) return own;
     const [x0, y0, x1, y1] = this.room, inside = (value, low, high) => Math.min(Math.max(value, low), high);

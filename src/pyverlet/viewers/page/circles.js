@@ -22,7 +22,7 @@ export class Circles {
   }
 
   /** Draw a frame, onto a canvas just as large as the part of the world that it shows. */
-  draw(frame, shape, camera, ratio, ink) {
+  draw(frame, shape, camera, ratio, tint) {
     if (frame.bitmap) {
       const { width, height } = frame.bitmap;
       if (this.photo.width !== width || this.photo.height !== height) Object.assign(this.photo, { width, height });
@@ -42,7 +42,7 @@ export class Circles {
       this.radiusFor = pixels;
       this.radius = shape.radius.map((metres) => metres * pixels);
     }
-    renderer.draw(...withCopies(frame, this.radius, ink));
+    renderer.draw(...withCopies(frame, this.radius, tint));
   }
 
   /** Bring the canvases to their place on the page, CSS pixels. */

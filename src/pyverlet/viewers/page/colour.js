@@ -41,24 +41,24 @@ export function oklch(l, c, degrees) {
 /** Whether this colouring looks at velocities. */
 export const isLively = (colouring) => colouring === "speed" || colouring === "energy";
 
-/** The colours of all circles, kept up to date: `ink`, n numbers 0xBBGGRR. */
-export class Inks {
+/** The colours of all circles, kept up to date: `tint`, n numbers 0xBBGGRR. */
+export class Tints {
   constructor() {
-    this.ink = new Uint32Array(0);
+    this.tint = new Uint32Array(0);
   }
 
   /** Colours that stay: after a new shape, another colouring or another theme. `within(i)`: [its number among those alike, how many these are]. */
   begin(colouring, shape, within, dark) {
     const { radius, mass, rgb } = shape, n = radius.length;
     this.colouring = colouring === "picture" && !rgb ? "order" : colouring;
-    if (this.ink.length !== n) this.ink = new Uint32Array(n);
+    if (this.tint.length !== n) this.tint = new Uint32Array(n);
     this.lut = palette(this.colouring !== "order" && this.colouring !== "group", dark);
     this.mass = mass;
     this.usual = 0;
     this.time = -Infinity;
-    const ink = this.ink;
+    const tint = this.tint;
     if (this.colouring === "picture") {
-      for (let i = 0; i < n; i++) ink[i] = rgb[3 * i] | (rgb[3 * i + 1] << 8) | (rgb[3 * i + 2] << 16);
+      for (let i = 0; i < n; i++) tint[i] = rgb[3 * i] | (rgb[3 * i + 1] << 8) | (rgb[3 * i + 2] << 16);
     } else if (this.colouring === "mass") {
       this.#byMass();
     } else if (this.colouring === "group") {
@@ -66,7 +66,7 @@ export class Inks {
     } else {
       for (let i = 0; i < n; i++) {
         const [own, count] = within(i);
-        ink[i] = this.lut[shade(this.colouring === "order" ? Math.floor((own * STEPS) / count) : 0, own)];
+        tint[i] = this.lut[shade(this.colouring === "order" ? Math.floor((own * STEPS) / count) : 0, own)];
       }
     }
   }
@@ -76,7 +76,7 @@ export class Inks {
     let i = 0;
     for (const [number, count] of groups) {
       const step = Math.floor(((number * GOLDEN) % 1) * STEPS);
-      for (const end = i + count; i < end; i++) this.ink[i] = this.lut[shade(step, i)];
+      for (const end = i + count; i < end; i++) this.tint[i] = this.lut[shade(step, i)];
     }
   }
 
@@ -86,34 +86,34 @@ export class Inks {
     let low = Infinity, high = -Infinity;
     for (const value of logarithm) if (Number.isFinite(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
     const scale = high > low ? (STEPS - 1) / (high - low) : 0;
-    for (let i = 0; i < logarithm.length; i++) this.ink[i] = this.lut[shade(scale ? Math.min((logarithm[i] - low) * scale, STEPS - 1) | 0 : 0, i)];
+    for (let i = 0; i < logarithm.length; i++) this.tint[i] = this.lut[shade(scale ? Math.min((logarithm[i] - low) * scale, STEPS - 1) | 0 : 0, i)];
   }
 
   /** By what each circle is pushed with, of all it touches; a frame without forces leaves the colours as they are. */
-  weigh({ touching, pushes }) {
+  byForce({ touching, pushes }) {
     if (this.colouring !== "force" || !pushes?.length) return;
-    const { ink, lut } = this, load = new Float32Array(ink.length);
+    const { tint, lut } = this, load = new Float32Array(tint.length);
     for (let k = 0; k < pushes.length; k++) {
       load[touching[2 * k]] += pushes[k];
       if (touching[2 * k] !== touching[2 * k + 1]) load[touching[2 * k + 1]] += pushes[k];
     }
     let sum = 0;
     for (const value of load) sum += value;
-    const full = (STEPS - 1) / (USUAL_MULTIPLE * (sum / ink.length) || Infinity);
-    for (let i = 0; i < ink.length; i++) ink[i] = lut[shade(Math.min(STEPS - 1, (load[i] * full) | 0), i)];
+    const full = (STEPS - 1) / (USUAL_MULTIPLE * (sum / tint.length) || Infinity);
+    for (let i = 0; i < tint.length; i++) tint[i] = lut[shade(Math.min(STEPS - 1, (load[i] * full) | 0), i)];
   }
 
   /** Colours that change with every frame: (n, 2) velocities in whole `unit` m/s, at this time in s. */
   follow(velocity, unit, time) {
     if (!isLively(this.colouring) || !velocity) return;
-    const { ink, lut, mass } = this, n = ink.length, energies = this.colouring === "energy", unit2 = unit * unit;
+    const { tint, lut, mass } = this, n = tint.length, energies = this.colouring === "energy", unit2 = unit * unit;
     const full = (STEPS - 1) / (USUAL_MULTIPLE * this.usual || Infinity);
     let sum = 0;
     for (let i = 0; i < n; i++) {
       const u = velocity[2 * i], v = velocity[2 * i + 1], square = (u * u + v * v) * unit2;
       const amount = energies ? (mass[i] === Infinity ? 0 : 0.5 * mass[i] * square) : Math.sqrt(square);
       sum += amount;
-      ink[i] = lut[shade(Math.min(STEPS - 1, (amount * full) | 0), i)];
+      tint[i] = lut[shade(Math.min(STEPS - 1, (amount * full) | 0), i)];
     }
     const passed = time - this.time, mean = sum / Math.max(n, 1), first = this.usual === 0;
     this.usual += (mean - this.usual) * (passed >= 0 ? 1 - Math.exp(-passed / FOLLOW_S) : 1);

@@ -1,4 +1,4 @@
-// Which circles touch, found here from where they are and who collides with whom: an overlay costs the physics nothing.
+// Which circles touch, found here from where they are and which categories collide: an overlay costs the physics nothing.
 
 const TOUCH = 0.004; // of the contact distance: circles at rest are that near, and the 16-bit grid is no finer
 

@@ -1,10 +1,10 @@
 // Periodic rooms: circles that reach through a seam are drawn once more, on the other side, and links through it from both ends.
 
-/** Grid, radii and inks of all circles of a frame, and behind them those of its copies. */
-export function withCopies({ grid, copies }, radius, ink) {
-  if (!copies) return [grid, radius, ink];
+/** Grid, radii and tints of all circles of a frame, and behind them those of its copies. */
+export function withCopies({ grid, copies }, radius, tint) {
+  if (!copies) return [grid, radius, tint];
   const { owner, places } = copies;
-  return [joined(grid, places), joined(radius, radius.constructor.from(owner, (i) => radius[i])), joined(ink, ink.constructor.from(owner, (i) => ink[i]))];
+  return [joined(grid, places), joined(radius, radius.constructor.from(owner, (i) => radius[i])), joined(tint, tint.constructor.from(owner, (i) => tint[i]))];
 }
 
 function joined(one, other) {

@@ -35,11 +35,11 @@ class Raster {
   resize(width, height) {
     this.image = this.context.createImageData(width, height);
     this.pixels = new Uint32Array(this.image.data.buffer);
-    this.stamps = new Stamps(width);
+    this.discs = new DiscCache(width);
   }
 
-  /** grid: 2n of 16 bits; radius: n in pixels; ink: n of 0xBBGGRR. */
-  draw(grid, radius, ink) {
+  /** grid: 2n of 16 bits; radius: n in pixels; tint: n of 0xBBGGRR. */
+  draw(grid, radius, tint) {
     const { width, height } = this.image;
     const pixels = this.pixels.fill(0);
     const sx = width / GRID_MAX, sy = height / GRID_MAX;
@@ -49,8 +49,8 @@ class Raster {
       // A circle thinner than a pixel is drawn a pixel wide, else it would flicker.
       const x = u * sx - 0.5, y = height - v * sy - 0.5, r = radius[i] > 0.5 ? radius[i] : 0.5;
       const reach = r + 2; // of its stamp, and a little more
-      if (r > SMALL || x < reach || y < reach || x >= width - reach - 1 || y >= height - reach - 1) circle(pixels, width, height, x, y, r, ink[i]);
-      else this.stamps.put(pixels, x, y, r, ink[i]);
+      if (r > SMALL || x < reach || y < reach || x >= width - reach - 1 || y >= height - reach - 1) circle(pixels, width, height, x, y, r, tint[i]);
+      else this.discs.put(pixels, x, y, r, tint[i]);
     }
     this.context.putImageData(this.image, 0, 0);
   }
@@ -60,7 +60,7 @@ const SMALL = 6; // radius in pixels up to which circles are stamped
 const FINE = 16; // places within a pixel, and radii within one, that are told apart
 
 /** Small circles, worked out beforehand: which pixels each covers, and how much of them. Half the time of `circle`. */
-class Stamps {
+class DiscCache {
   constructor(width) {
     this.width = width;
     this.made = []; // by radius, for each place of the centre within its pixel: where its pixels begin in the two lists
@@ -136,14 +136,14 @@ function circle(pixels, width, height, cx, cy, radius, colour) {
 }
 
 const VERTEX = `#version 300 es
-in vec2 place; in float radius; in vec4 ink;
+in vec2 place; in float radius; in vec4 tint;
 out vec3 colour; out float reach;
 void main() {
   bool outside = any(equal(place, vec2(0.0))) || any(equal(place, vec2(1.0)));
   gl_Position = outside ? vec4(2.0, 2.0, 0.0, 1.0) : vec4(place * 2.0 - 1.0, 0.0, 1.0);
   reach = max(radius, 0.5);
   gl_PointSize = 2.0 * reach + 2.0;
-  colour = ink.rgb;
+  colour = tint.rgb;
 }`;
 const FRAGMENT = `#version 300 es
 precision highp float;
@@ -174,7 +174,7 @@ class Points {
     this.attributes = {
       place: this.#attribute(program, "place", 2, gl.UNSIGNED_SHORT, true),
       radius: this.#attribute(program, "radius", 1, gl.FLOAT, false),
-      ink: this.#attribute(program, "ink", 4, gl.UNSIGNED_BYTE, true),
+      tint: this.#attribute(program, "tint", 4, gl.UNSIGNED_BYTE, true),
     };
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
@@ -192,9 +192,9 @@ class Points {
     this.gl.viewport(0, 0, width, height);
   }
 
-  draw(grid, radius, ink) {
+  draw(grid, radius, tint) {
     const gl = this.gl;
-    for (const [name, array] of [["place", grid], ["radius", radius], ["ink", ink]]) {
+    for (const [name, array] of [["place", grid], ["radius", radius], ["tint", tint]]) {
       gl.bindBuffer(gl.ARRAY_BUFFER, this.attributes[name]);
       gl.bufferData(gl.ARRAY_BUFFER, array, gl.STREAM_DRAW);
     }

@@ -10,8 +10,8 @@ const FASTER = [2, 4, 8]; // times real time
 
 /** Plays a reel: where it is, how fast it goes, and what it tells the page. */
 class Player {
-  constructor(reel, fps, hear, moved) {
-    Object.assign(this, { reel, fps, hear, moved, at: 0, speed: 1, paused: false, part: null });
+  constructor(reel, fps, onMessage, moved) {
+    Object.assign(this, { reel, fps, onMessage, moved, at: 0, speed: 1, paused: false, part: null });
     this.shape = null; // number of the shape the page has
     this.sent = ""; // what is on the page
     this.seq = 0;
@@ -57,7 +57,7 @@ class Player {
         this.shape = here.chunk.shape;
         this.about = shape;
         this.sent = "";
-        this.hear(shape);
+        this.onMessage(shape);
         this.show();
       });
       return;
@@ -69,7 +69,7 @@ class Player {
     this.sent = wish;
     const frame = message(here, ++this.seq, this.part, next, fine, this.about);
     frame.status = { ...frame.status, paused: this.paused, speed: this.speed, pace: this.paused ? null : this.speed };
-    this.hear(frame);
+    this.onMessage(frame);
   }
 }
 

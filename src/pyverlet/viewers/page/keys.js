@@ -33,7 +33,7 @@ const GESTURES = [
 const FILMED = { turn: "a second back, on", slower: "faster, slow motion", reset: "from the start" };
 const WRITTEN = { " ": "space", ArrowLeft: "←", ArrowRight: "→" };
 
-/** Obey the keyboard wherever `target` gets it. */
+/** Handle the keyboard wherever `target` gets it. */
 export function listen(target, root, act, own) {
   target.addEventListener("keydown", (event) => {
     root.classList.toggle("shift", event.shiftKey);

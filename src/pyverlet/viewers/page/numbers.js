@@ -1,6 +1,6 @@
 // The numbers beside the picture, and their curves.
 
-import { fillBooks } from "./books.js";
+import { fillLedger } from "./ledger.js";
 import { Chart } from "./chart.js";
 import { fillGraph } from "./graph.js";
 
@@ -62,7 +62,7 @@ export class Numbers {
     this.energies.push(status.kinetic, status.potential, status.links || null, status.energy);
     this.energies.draw();
     this.stages.draw();
-    fillBooks(this.#id("ledger"), status.ledger, signed);
+    fillLedger(this.#id("ledger"), status.ledger, signed);
     fillGraph(this.#id("graph"), status.graph);
     this.#legend(status.stages);
   }

@@ -60,7 +60,7 @@ export class Overlay {
         context.lineTo(xs[pairs[k + 1]], ys[pairs[k + 1]]);
       }
       this.contacts = pairs.length / 2;
-      ink(context, colour("--text"), 1.2);
+      setStroke(context, colour("--text"), 1.2);
     }
     context.beginPath();
     if (wants.velocities && frame.velocity) {
@@ -72,7 +72,7 @@ export class Overlay {
         arrow(context, x(i), y(i), dx, dy, Math.min(5, 0.4 * length) / length);
         this.arrows++;
       }
-      ink(context, colour("--text"), 1.2);
+      setStroke(context, colour("--text"), 1.2);
     }
     context.fillStyle = colour("--text");
     context.beginPath();
@@ -120,13 +120,13 @@ function drawLinks(context, { joined, strain }, at, dark, period) {
       }
       drawn++;
     }
-    ink(context, shades[load], LINK_PX);
+    setStroke(context, shades[load], LINK_PX);
   }
   return drawn;
 }
 
 /** Contacts as lines as wide as what pushes, through the middles of the circles; returns how many. */
-function drawForces(context, { touching, pushes, lean }, radius, scale, at, dark) {
+function drawForces(context, { touching, pushes, normals }, radius, scale, at, dark) {
   if (!pushes?.length) return 0;
   const shades = heat(LOADS, dark), groups = shades.map(() => []);
   let usual = 0, drawn = 0;
@@ -140,13 +140,13 @@ function drawForces(context, { touching, pushes, lean }, radius, scale, at, dark
     for (const k of group) {
       const a = touching[2 * k], b = touching[2 * k + 1];
       if (!at.seen(a) || !at.seen(b)) continue;
-      const angle = (lean[k] * Math.PI) / 128, reach = radius[a] * scale;
+      const angle = (normals[k] * Math.PI) / 128, reach = radius[a] * scale;
       context.moveTo(at.x(a), at.y(a));
       if (a === b) context.lineTo(at.x(a) + reach * Math.cos(angle), at.y(a) - reach * Math.sin(angle));
       else context.lineTo(at.x(b), at.y(b));
       drawn++;
     }
-    ink(context, shades[load], Math.max(0.5, (1.6 * usual * scale * (load + 0.5)) / LOADS));
+    setStroke(context, shades[load], Math.max(0.5, (1.6 * usual * scale * (load + 0.5)) / LOADS));
   }
   context.lineCap = "butt";
   return drawn;
@@ -163,7 +163,7 @@ function drawMarks(context, turned, radius, scale, at) {
     context.lineTo(at.x(i) + reach * Math.cos(angle), at.y(i) - reach * Math.sin(angle));
     drawn++;
   }
-  ink(context, "rgb(0 0 0 / 50%)", 1.4);
+  setStroke(context, "rgb(0 0 0 / 50%)", 1.4);
   return drawn;
 }
 
@@ -182,7 +182,7 @@ function dashes(context, lines, camera, colour) {
     context.moveTo(...camera.toScreen(...from));
     context.lineTo(...camera.toScreen(...to));
   }
-  ink(context, colour, 1);
+  setStroke(context, colour, 1);
   context.setLineDash([]);
 }
 
@@ -194,7 +194,7 @@ function arrow(context, x, y, dx, dy, head) {
   context.lineTo(x + dx - head * (dx - 0.5 * dy), y + dy - head * (dy + 0.5 * dx));
 }
 
-function ink(context, colour, width) {
+function setStroke(context, colour, width) {
   context.strokeStyle = colour;
   context.lineWidth = width;
   context.stroke();

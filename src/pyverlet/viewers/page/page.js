@@ -3,7 +3,7 @@
 
 import { Backdrop } from "./backdrop.js";
 import { Camera } from "./camera.js";
-import { Inks, isLively } from "./colour.js";
+import { Tints, isLively } from "./colour.js";
 import { Capture } from "./capture.js";
 import { Circles } from "./circles.js";
 import { Controls } from "./controls.js";
@@ -19,7 +19,7 @@ import { Queue } from "./queue.js";
 import { tell } from "./text.js";
 import { unpack } from "./wire.js";
 
-const NUMBERS_EVERY_MS = 200; // nobody reads faster
+const NUMBERS_EVERY_MS = 200; // as fast as people read
 const QUICK_MS = 25; // between two ticks of a page that keeps up with the screen
 const SLOW = 0.95; // of real time: less is said
 const HEADER_PX = 62; // names of panels, and walls, stay clear of the title
@@ -35,7 +35,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   const $ = (id) => root.querySelector(`#${id}`);
   const circles = new Circles($("stage"), $("photo"), wanted), { renderer } = circles;
   const darkness = matchMedia("(prefers-color-scheme: dark)");
-  const backdrop = new Backdrop($("backdrop")), overlay = new Overlay($("overlay")), camera = new Camera(), inks = new Inks();
+  const backdrop = new Backdrop($("backdrop")), overlay = new Overlay($("overlay")), camera = new Camera(), tints = new Tints();
   const panels = new Panels($("panels"), root), numbers = new Numbers(root);
   root.dataset.renderer = renderer.name;
 
@@ -158,7 +158,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
       camera.room = frame.room;
       if (!begun) arrive();
       if (before && frame.status.time < before.status.time) startOver();
-      if (frame.grid) inks.follow(frame.velocity, frame.unit, frame.status.time), inks.weigh(frame);
+      if (frame.grid) tints.follow(frame.velocity, frame.unit, frame.status.time), tints.byForce(frame);
       drawCircles();
       send("ack", { seq: frame.seq });
       numbers.count(frame.status, now);
@@ -179,7 +179,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
 
   function drawCircles() {
     measure();
-    circles.draw(frame, shape, camera, ratio(), inks.ink);
+    circles.draw(frame, shape, camera, ratio(), tints.tint);
   }
 
   /** What lies behind, over and beside the circles; and the canvas of the circles to its place. */
@@ -241,9 +241,9 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     root.dataset.theme = dark() ? "dark" : "light";
     if (!shape) return;
     const { number } = shape, ever = (number.at(-1) ?? 0) + 1; // circles keep their colours when others come and go
-    inks.begin($("colour").value, shape, shape.panels.length ? (i) => panels.within(i) : (i) => [number[i], ever], dark());
+    tints.begin($("colour").value, shape, shape.panels.length ? (i) => panels.within(i) : (i) => [number[i], ever], dark());
     if (!frame) return;
-    if (frame.grid) inks.follow(frame.velocity, frame.unit, frame.status.time), inks.weigh(frame), drawCircles();
+    if (frame.grid) tints.follow(frame.velocity, frame.unit, frame.status.time), tints.byForce(frame), drawCircles();
     refresh();
   }
 
@@ -351,7 +351,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   for (const tool of tools()) tool.addEventListener("change", () => ((root.dataset.tool = tool.value), tool.blur()));
   $("sheet-close").addEventListener("click", () => $("sheet").close());
   fillSheet($("sheet").querySelector("tbody"), act, film);
-  listen(address || film ? document : root, root, act, (key, again) => shape?.answers?.includes("keys") && (again || send("key", { key }), true));
+  listen(address || film ? document : root, root, act, (key, again) => shape?.callbacks?.includes("keys") && (again || send("key", { key }), true));
 
   const zoomed = () => ((numbersStale = true), refresh());
 
@@ -383,7 +383,7 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
     status: () => last,
     mass: (i) => shape.mass[i],
     groups: () => shape.groups,
-    ink: (i) => inks.ink[i],
+    tint: (i) => tints.tint[i],
     overlay,
     capture,
     camera,

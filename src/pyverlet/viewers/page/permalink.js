@@ -1,4 +1,4 @@
-// A link that carries the scene and its settings, after the #: whoever opens it gets the same, whatever is on show there.
+// A link that carries the scene and its settings, after the #: opening it gives the same, whatever is on show there.
 
 const VIEW = ["colour", "theme"]; // of this tab; the others belong to the world
 

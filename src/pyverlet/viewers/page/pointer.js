@@ -47,7 +47,7 @@ export class Pointer {
     if (this.hand || event.button > 2) return;
     const tool = event.button || event.altKey ? "move" : event.shiftKey ? "poke" : this.page.tool();
     const [left, top] = this.#at(event), [x, y] = this.page.camera.toWorld(left, top);
-    if (this.page.shape().answers?.includes("click")) this.page.send("click", { x, y, button: BUTTON_NAMES[event.button] });
+    if (this.page.shape().callbacks?.includes("click")) this.page.send("click", { x, y, button: BUTTON_NAMES[event.button] });
     if (tool === "pin") return this.page.send("pin", { x, y, reach: this.#reach(event) });
     this.hand = tool;
     this.last = null;

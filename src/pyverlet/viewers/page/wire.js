@@ -26,7 +26,7 @@ export function unpack(data) {
     const last = data.byteLength - 10 * touches; // at any byte: copied, since an array of numbers must begin at a multiple of four
     head.touching = new Uint32Array(data.slice(last, last + 8 * touches));
     head.pushes = new Uint8Array(data, last + 8 * touches, touches);
-    head.lean = new Uint8Array(data, last + 9 * touches, touches);
+    head.normals = new Uint8Array(data, last + 9 * touches, touches);
     head.turned = head.turned ? new Uint8Array(data, behind + 9 * links, pairs) : null;
   } else if (head.kind === "picture") {
     head.jpeg = new Blob([new Uint8Array(data, start)], { type: "image/jpeg" });

@@ -1,4 +1,4 @@
-"""Who has the worlds of `Worlds`: a `Keeper` some of them, and a `Crew` of processes each a keeper.
+"""The processes of `Worlds`: a `Worker` has some of the worlds, a `ProcessPool` is a worker per process.
 
 Processes are started by themselves rather than by `multiprocessing`, which would run the user's script anew in each of them. They
 take orders by their standard input, and share the particles in a file mapped to memory.
@@ -18,7 +18,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,14 +37,7 @@ _ROWS = {"position": 2, "velocity": 2, "spin": 1, "radius": 1, "mass": 1}
 
 @dataclass(frozen=True)
 class Plan:
-    """What all keepers know.
-
-    Attributes:
-        scene, settings, seed: of the worlds.
-        count: of all worlds.
-        particles: of each, as they begin.
-        dtype: of their arrays.
-    """
+    """What all workers know: how each world is built, how many there are, and the particles and dtype of each at the start."""
 
     scene: Scene
     settings: dict[str, Any]
@@ -76,7 +69,7 @@ class Plan:
         return max(self._layout()[""][0], 1)
 
     def open(self, path: Path) -> dict[str, Array]:
-        """(count, ...) arrays that all who open the file share."""
+        """(count, ...) arrays that all processes with the file share."""
         with path.open("r+b") as file:
             memory = mmap.mmap(file.fileno(), self.size)
         arrays = {}
@@ -87,14 +80,8 @@ class Plan:
         return arrays
 
 
-class Keeper:
-    """Some of the worlds, and what is done to them.
-
-    Args:
-        plan: of all.
-        first, stop: which of them it has.
-        shared: arrays of all worlds; the particles of those it has live in them.
-    """
+class Worker:
+    """Worlds `first` to `stop` - 1 of a plan. Their particles live in the arrays `shared` of all worlds."""
 
     def __init__(self, plan: Plan, first: int, stop: int, shared: dict[str, Array]) -> None:
         from pyverlet.data.worlds import seed_of
@@ -121,7 +108,7 @@ class Keeper:
             shared["gravity"][k] = world.gravity
 
     def step(self, dt: float, frames: int = 1) -> None:
-        """All of them; the first that fails is told of when all have been stepped."""
+        """All of them; the first error is raised when all have been stepped."""
         failed: PyverletError | None = None
         gravity = self._shared["gravity"][self._first : self._first + len(self.worlds)].tolist()
         for number, world in enumerate(self.worlds):
@@ -150,7 +137,7 @@ class Keeper:
                 self._note(number, self.worlds[number])
 
     def drop(self, token: int) -> None:
-        """Nobody will go back there."""
+        """Forget a saved state."""
         self._saved.pop(token, None)
 
     def file(self, k: int) -> bytes:
@@ -168,14 +155,8 @@ def _named(error: PyverletError, k: int) -> PyverletError:
     return error
 
 
-class Crew:
-    """Processes that are keepers.
-
-    Args:
-        plan: of all worlds.
-        ranges: first and stop of those that each process has.
-        path: of the file they share.
-    """
+class ProcessPool:
+    """Processes that are workers of the worlds in `ranges`, and share the file at `path`."""
 
     def __init__(self, plan: Plan, ranges: Sequence[tuple[int, int]], path: Path) -> None:
         try:
@@ -184,32 +165,32 @@ class Crew:
             raise InputError(
                 f"scene cannot be sent to other processes ({error}); allowed is one of a module, or processes=1"
             ) from None
-        command = [sys.executable, "-c", "from pyverlet.data.crew import main; main()"]
+        command = [sys.executable, "-c", "from pyverlet.data.process_pool import main; main()"]
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         self._processes = [
             subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment) for _ in ranges
         ]
         try:
             for process, (first, stop) in zip(self._processes, ranges, strict=True):
-                _send(_in(process), (sent, first, stop, str(path)))
-            self._hear()
+                _send(process.stdin, (sent, first, stop, str(path)))
+            self._wait()
         except BaseException:
             self.close()
             raise
 
-    def tell(self, *order: Any) -> None:
+    def run_all(self, *order: Any) -> None:
         """Have all of them do something, and wait until it is done."""
         with self._alive():
             for process in self._processes:
-                _send(_in(process), order)
-            self._hear()
+                _send(process.stdin, order)
+            self._wait()
 
-    def ask(self, part: int, *order: Any) -> Any:
+    def run_one(self, part: int, *order: Any) -> Any:
         """Have one of them do something, and return what it returns."""
         process = self._processes[part]
         with self._alive():
-            _send(_in(process), order)
-            return _heard([_receive(_out(process))])[0]
+            _send(process.stdin, order)
+            return _results([_receive(process.stdout)])[0]
 
     @contextlib.contextmanager
     def _alive(self) -> Iterator[None]:
@@ -221,44 +202,37 @@ class Crew:
             self.close()
             raise PyverletError("a process that had some of the worlds has ended; they are lost, build them anew") from None
 
-    def _hear(self) -> None:
-        # All of them, before any error is raised: who is not heard now would be heard for an answer to the next order.
-        _heard([_receive(_out(process)) for process in self._processes])
+    def _wait(self) -> None:
+        # All replies, before any error is raised: one left in a pipe would be taken for the reply to the next order.
+        _results([_receive(process.stdout) for process in self._processes])
 
     def close(self) -> None:
-        """End them."""
         for process in self._processes:
+            assert process.stdin
             with contextlib.suppress(OSError):
-                _in(process).close()
+                process.stdin.close()
         for process in self._processes:
+            assert process.stdout
             process.wait()
-            _out(process).close()
+            process.stdout.close()
 
 
-def _in(process: subprocess.Popen[bytes]) -> BinaryIO:
-    assert process.stdin is not None
-    return process.stdin  # type: ignore[return-value]
-
-
-def _out(process: subprocess.Popen[bytes]) -> BinaryIO:
-    assert process.stdout is not None
-    return process.stdout  # type: ignore[return-value]
-
-
-def _heard(answers: list[Any]) -> list[Any]:
-    for error, _ in answers:
+def _results(replies: list[Any]) -> list[Any]:
+    for error, _ in replies:
         if error is not None:
             raise error
-    return [value for _, value in answers]
+    return [value for _, value in replies]
 
 
-def _send(file: BinaryIO, message: Any) -> None:
+def _send(file: IO[bytes] | None, message: Any) -> None:
+    assert file is not None
     data = pickle.dumps(message)
     file.write(struct.pack("<q", len(data)) + data)
     file.flush()
 
 
-def _receive(file: BinaryIO) -> Any:
+def _receive(file: IO[bytes] | None) -> Any:
+    assert file is not None
     head = file.read(8)
     if len(head) < 8:
         raise EOFError
@@ -267,27 +241,27 @@ def _receive(file: BinaryIO) -> Any:
 
 def main() -> None:
     """Keep worlds as the standard input says, until that ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started us decides
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process decides
     orders = sys.stdin.buffer
-    answers = os.fdopen(os.dup(1), "wb")
+    replies = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what a scene prints is no answer
-    keeper: Keeper | None = None
+    worker: Worker | None = None
     with contextlib.suppress(EOFError, BrokenPipeError):
         while True:
             order = _receive(orders)
             error, value = None, None
             try:
-                if keeper is None:
+                if worker is None:
                     sent, first, stop, path = order
                     plan: Plan = _unpickled(sent)
-                    keeper = Keeper(plan, first, stop, plan.open(Path(path)))
+                    worker = Worker(plan, first, stop, plan.open(Path(path)))
                 else:
-                    value = getattr(keeper, order[0])(*order[1:])
+                    value = getattr(worker, order[0])(*order[1:])
             except PyverletError as raised:
                 error = raised
             except Exception as raised:  # of a scene's own code
                 error = PyverletError(f"{type(raised).__name__}: {raised}")
-            _send(answers, (error, value))
+            _send(replies, (error, value))
 
 
 def _unpickled(sent: bytes) -> Any:

@@ -4,28 +4,24 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from pyverlet.viewers import levers
+from pyverlet.viewers import controls
 from pyverlet.viewers.frames import Status
 from pyverlet.world.clock import FrameBudget
 
 if TYPE_CHECKING:
-    from pyverlet.viewers.stage import Stage
+    from pyverlet.viewers.view_state import ViewState
 
 SLOW_STATUS_S = 0.1
-"""Energy and percentiles read every particle or many frames; ten times a second is as fast as anybody reads."""
+"""Energy and percentiles read every particle or many frames; ten times a second is as fast as people read."""
 
 PACE_S = 1.0
 """How fast the world goes is a mean over this long."""
 
 
-class Gauges:
-    """Reads a stage. Used by the physics thread only.
-
-    Args:
-        budget: is told of every frame.
-    """
+class Readouts:
+    """Reads a `ViewState`; `budget` records every frame. Used by the physics thread only."""
 
     def __init__(self, budget: FrameBudget) -> None:
         self.budget = budget
@@ -45,38 +41,26 @@ class Gauges:
 
     @property
     def pace(self) -> float | None:
-        """Seconds of the world in a second of the wall, lately."""
+        """Simulated seconds per wall-clock second, averaged over the last `PACE_S`."""
         if len(self._passed) < 2:
             return None
         (began, start), (ended, end) = self._passed[0], self._passed[-1]
         return (end - start) / max(ended - began, 1e-9)
 
-    def read(
-        self,
-        stage: Stage,
-        *,
-        dropped: int,
-        speed: float,
-        paused: bool,
-        busy: str | None,
-        error: str | None,
-        at_once: bool,
-        complaint: str | None = None,
-    ) -> Status:
-        """The numbers now. Slow ones are of a moment ago, unless wanted `at_once`."""
+    def read(self, view_state: ViewState, *, at_once: bool, complaint: str | None = None, **session: Any) -> Status:
+        """The numbers now. Slow ones are of a moment ago, unless wanted `at_once`; `session`: fields that the session knows."""
         now = time.perf_counter()
         if now >= self._due or at_once:
             self._due = now + SLOW_STATUS_S
-            self._read_slow(stage)
+            self._read_slow(view_state)
         stages: dict[str, float] = {}
-        for world in stage.worlds:
+        for world in view_state.worlds:
             for name, ms in world.profile.stages.items():
                 stages[name] = stages.get(name, 0.0) + ms
         return Status(
-            time=float(stage.panels.time),
-            frames=int(stage.panels.frames),
-            particles=len(stage),
-            dropped=int(dropped),
+            time=float(view_state.panels.time),
+            frames=int(view_state.panels.frames),
+            particles=len(view_state),
             physics_ms=float(self.budget.last_ms),
             physics_median_ms=self._percentiles[0],
             physics_p95_ms=self._percentiles[1],
@@ -86,35 +70,32 @@ class Gauges:
             potential=self._potential,
             links=self._links,
             energy=sum(self._energies),
-            ledger=_booked(stage),
+            ledger=_ledger(view_state),
             energies=self._energies,
-            **levers.read(stage.worlds[0]),
-            speed=speed,
+            **controls.read(view_state.worlds[0]),
             pace=self.pace,
-            paused=paused,
-            busy=busy,
-            error=error,
-            graph=stage.exhibit.graph and stage.exhibit.graph(stage.worlds[0]),
-            complaint=complaint or stage.complaint,
-            sliders=stage.sliders(),
+            graph=view_state.presentation.graph and view_state.presentation.graph(view_state.worlds[0]),
+            complaint=complaint or view_state.complaint,
+            sliders=view_state.sliders(),
             watched=self._watched,
-            undo=stage.history.depth,
+            undo=view_state.history.depth,
+            **session,
         )
 
-    def _read_slow(self, stage: Stage) -> None:
-        energies = [each.energy() for each in stage.worlds]
+    def _read_slow(self, view_state: ViewState) -> None:
+        energies = [each.energy() for each in view_state.worlds]
         self._kinetic = sum(float(energy.kinetic) for energy in energies)
         self._spin = sum(float(energy.spin) for energy in energies)
         self._potential = sum(float(energy.potential) for energy in energies)
         self._links = sum(float(energy.links) for energy in energies)
         self._energies = tuple(float(energy.total) for energy in energies)
         self._percentiles = (float(self.budget.median_ms), float(self.budget.p95_ms))
-        self._watched = stage.watched()
+        self._watched = view_state.watched()
 
 
-def _booked(stage: Stage) -> dict[str, float] | None:
+def _ledger(view_state: ViewState) -> dict[str, float] | None:
     """What the ledgers of all worlds have under each account, J."""
-    if not all(world.keeps_ledger for world in stage.worlds):
+    if not all(world.keeps_ledger for world in view_state.worlds):
         return None
-    books = [world.ledger.as_dict() for world in stage.worlds]
-    return {account: sum(book[account] for book in books) for account in books[0]}
+    ledgers = [world.ledger.as_dict() for world in view_state.worlds]
+    return {account: sum(ledger[account] for ledger in ledgers) for account in ledgers[0]}

@@ -6,22 +6,22 @@ from itertools import pairwise
 
 import pytest
 
-from pyverlet.viewers.rhythm import KEEN, PICTURE_S, Audience, Rhythm
+from pyverlet.viewers.frame_pacing import KEEN, PICTURE_S, Audience, FramePacing
 
 
-def made(rhythm: Rhythm, ends: list[float]) -> list[float]:
+def made(pacing: FramePacing, ends: list[float]) -> list[float]:
     """Which of these times, the ends of substeps, have a picture."""
     shown = []
     for end in ends:
-        if rhythm.due(end):
-            rhythm.made(end)
+        if pacing.due(end):
+            pacing.made(end)
             shown.append(end)
     return shown
 
 
 @pytest.mark.parametrize("substep_ms", [0.4, 5.6, 6.0, 8.0, 9.5, 12.0, 16.0])
 def test_a_world_of_short_substeps_has_as_many_pictures_as_a_screen(substep_ms: float) -> None:
-    shown = made(Rhythm(), [1.0 + k * substep_ms / 1000 for k in range(round(10_000 / substep_ms))])
+    shown = made(FramePacing(), [1.0 + k * substep_ms / 1000 for k in range(round(10_000 / substep_ms))])
     assert len(shown) == pytest.approx(600, abs=2)
     gaps = [b - a for a, b in pairwise(shown[1:])]
     assert max(gaps) < PICTURE_S + substep_ms / 1000 + 1e-9
@@ -30,12 +30,12 @@ def test_a_world_of_short_substeps_has_as_many_pictures_as_a_screen(substep_ms: 
 
 def test_a_world_of_long_substeps_has_one_after_each() -> None:
     ends = [0.03 * k for k in range(1, 100)]
-    assert made(Rhythm(), ends) == ends
+    assert made(FramePacing(), ends) == ends
 
 
 def test_of_what_was_missed_one_is_made_up_for() -> None:
-    rhythm = Rhythm()
-    assert made(rhythm, [1.0, 3.0, 3.001, 3.002, 3.003, 3.0167]) == [1.0, 3.0, 3.001, 3.0167]
+    pacing = FramePacing()
+    assert made(pacing, [1.0, 3.0, 3.001, 3.002, 3.003, 3.0167]) == [1.0, 3.0, 3.001, 3.0167]
 
 
 def test_velocities_are_looked_at_for_a_while_after_somebody_has_asked() -> None:
@@ -43,7 +43,7 @@ def test_velocities_are_looked_at_for_a_while_after_somebody_has_asked() -> None
     audience.take(1, velocity=False)
     assert audience.has(1)
     assert not audience.has(2)
-    assert not audience.looks_at_velocity(2)
+    assert not audience.needs_velocity(2)
     audience.take(2, velocity=True)
     audience.take(3, velocity=False)  # another tab
-    assert [audience.looks_at_velocity(seq) for seq in (3, 2 + KEEN, 3 + KEEN)] == [True, True, False]
+    assert [audience.needs_velocity(seq) for seq in (3, 2 + KEEN, 3 + KEEN)] == [True, True, False]

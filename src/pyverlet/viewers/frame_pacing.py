@@ -1,4 +1,4 @@
-"""When the next picture of a slow world is due, and for whom."""
+"""Frame pacing: when the next picture of a slow world is due, and what viewers need of it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ KEEN_ON_FORCES = 60
 """The same for forces, which are worked out a few times a second."""
 
 
-class Rhythm:
+class FramePacing:
     """As many pictures a second as a screen shows, made at moments that do not fit that pace: between two substeps.
 
     Each is due so long after the last was due, not after it was made. With substeps of 6 ms every third would come after 18 ms
@@ -33,7 +33,7 @@ class Rhythm:
 
 
 class Audience:
-    """What viewers have taken, and what they look at. Told from any thread."""
+    """What viewers have taken, and what they look at. Called from any thread."""
 
     def __init__(self) -> None:
         self._newest = self._velocity_until = self._force_until = 0
@@ -44,18 +44,18 @@ class Audience:
         if velocity:
             self._velocity_until = max(self._velocity_until, seq + KEEN)
 
-    def weigh(self, seq: int) -> None:
+    def want_forces(self, seq: int) -> None:
         """A viewer that has this picture looks at forces."""
         self._force_until = max(self._force_until, seq + KEEN_ON_FORCES)
 
-    def looks_at_force(self, seq: int) -> bool:
+    def needs_force(self, seq: int) -> bool:
         """Whether this picture needs forces."""
         return seq <= self._force_until
 
     def has(self, seq: int) -> bool:
-        """Whether anybody has this picture."""
+        """Whether a viewer has this picture."""
         return self._newest >= seq
 
-    def looks_at_velocity(self, seq: int) -> bool:
+    def needs_velocity(self, seq: int) -> bool:
         """Whether this picture needs velocities."""
         return seq <= self._velocity_until

@@ -1,4 +1,4 @@
-"""Threads that share a world take turns: a frame is a turn, and so is a change or a look between two frames."""
+"""The step lock of a world: access from other threads blocks until the current frame ends."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _FORK_S = 10.0
 """Seconds that a fork waits for the frames under way to end."""
 
 
-class Turn:
+class StepLock:
     """A lock that its holder may take again. Those that wait come before those that have just had it: no loop starves others.
 
     Attributes:
@@ -86,7 +86,7 @@ class _Frame:
 
     __slots__ = ("_turn",)
 
-    def __init__(self, turn: Turn) -> None:
+    def __init__(self, turn: StepLock) -> None:
         self._turn = turn
 
     def __enter__(self) -> None:
@@ -106,12 +106,12 @@ def in_turn(method: Callable[Concatenate[S, P], R]) -> Callable[Concatenate[S, P
     """A method that changes a world: it waits for its turn, and for a page that steps the world; Ctrl-C waits for its end.
 
     Raises:
-        InputError: it is called from within a frame of the same world, by a force or an onlooker.
+        InputError: it is called from within a frame of the same world, by a force or an observer.
     """
 
     @functools.wraps(method)
     def waiting(self: S, /, *arguments: P.args, **options: P.kwargs) -> R:
-        turn: Turn = self._state.turn
+        turn: StepLock = self._state.turn
         if turn.in_frame and turn.mine:
             raise InputError(
                 f"{method.__name__.strip('_')} is called in the middle of a frame of this world; "
@@ -136,9 +136,9 @@ def of_one_frame(method: Callable[Concatenate[S, P], R]) -> Callable[Concatenate
 
 # ---- forks -------------------------------------------------------------------------------------------------------------
 
-_all: weakref.WeakSet[Turn] = weakref.WeakSet()
+_all: weakref.WeakSet[StepLock] = weakref.WeakSet()
 _all_lock = threading.Lock()
-_taken: list[Turn] = []
+_taken: list[StepLock] = []
 
 
 def _before_fork() -> None:

@@ -1,4 +1,4 @@
-"""What one tab wants to see of a frame: which part, how large, in which colours. Every tab looks for itself."""
+"""The view options of one tab: which part of a frame, how large, in which colours."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CLOSEST = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class ViewOptions:
     """A tab's view.
 
     Attributes:
@@ -61,8 +61,7 @@ class Look:
             raise InputError(f"colour is {self.colour[:40]!r}; allowed are {', '.join(COLOURINGS)}")
         if self.part is not None:
             for value in self.part:
-                if abs(checks.number("part", value)) > FARTHEST:
-                    raise InputError(f"part reaches to {value:g}; allowed is a number from {-FARTHEST:g} to {FARTHEST:g}")
+                checks.number("part", value, least=-FARTHEST, most=FARTHEST)
             x0, y0, x1, y1 = self.part
             if x1 - x0 < CLOSEST or y1 - y0 < CLOSEST:
                 raise InputError(f"part is {x1 - x0:g} x {y1 - y0:g} m; allowed is at least {CLOSEST:g} m each way")

@@ -9,14 +9,14 @@ import time
 from collections.abc import Iterator
 
 LOOK_S = 0.2
-"""How often somebody looks at the clock."""
+"""Poll interval of the clock, in seconds."""
 
 
 class TooLong(BaseException):
     """Raised in the code that took too long, at the line where it was."""
 
 
-class Patience:
+class TimeLimit:
     """Interrupts what runs in a `within` for too long, between two of its steps in Python; of one thread at a time.
 
     A thread that waits in C (`time.sleep`, a compiled kernel) is interrupted when it comes back. The interpreter's own means are
@@ -34,7 +34,7 @@ class Patience:
     def within(self, seconds: float) -> Iterator[None]:
         """Raise `TooLong` in the calling thread if the block takes longer; again each time that it goes on all the same."""
         if self._watcher is None:
-            self._watcher = threading.Thread(target=self._watch, name="pyverlet-patience", daemon=True)
+            self._watcher = threading.Thread(target=self._watch, name="pyverlet-time-limit", daemon=True)
             self._watcher.start()
         with self._lock:
             self._thread, self._deadline = threading.get_ident(), time.monotonic() + seconds
@@ -50,7 +50,7 @@ class Patience:
     def _stop(self) -> bool:
         """Raise nothing from now on; what has been raised, and may not have arrived yet, arrives here.
 
-        To withdraw it leaves CPython 3.11 looking for it at each step, and whoever profiles such code waits for ever.
+        To withdraw it leaves CPython 3.11 looking for it at each step, and a profiler of such code waits for ever.
         """
         with self._lock:
             self._deadline = None
@@ -73,7 +73,7 @@ class Patience:
 
 
 def interrupt(thread: threading.Thread) -> None:
-    """Raise `TooLong` in a thread that nobody waits for any more."""
+    """Raise `TooLong` in a thread whose result is not needed any more."""
     if thread.ident is not None and thread.is_alive():
         _raise(thread.ident, TooLong)
 

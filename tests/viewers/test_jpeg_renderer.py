@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.viewers.artist import Artist
 from pyverlet.viewers.frames import Frame
-from pyverlet.viewers.looks import COLOURINGS, Look
+from pyverlet.viewers.jpeg_renderer import JpegRenderer
 from pyverlet.viewers.session import Session
+from pyverlet.viewers.view_options import COLOURINGS, ViewOptions
 
 
 @pytest.fixture
@@ -29,9 +29,9 @@ def frame() -> Frame:
 
 def shuffled(frame: Frame, seed: int) -> Frame:
     """The same, as it would come from between two substeps."""
-    whose = np.random.default_rng(seed).permutation(len(frame.rows)).astype(np.int32)
-    rows, moving = frame.rows[whose], frame.moving[whose]
-    return replace(frame, seq=frame.seq + seed, rows=rows, moving=moving, whose=whose, whose_moving=whose)
+    order = np.random.default_rng(seed).permutation(len(frame.rows)).astype(np.int32)
+    rows, moving = frame.rows[order], frame.moving[order]
+    return replace(frame, seq=frame.seq + seed, rows=rows, moving=moving, order=order, moving_order=order)
 
 
 def test_the_users_order_comes_back(frame: Frame) -> None:
@@ -46,17 +46,17 @@ def test_the_users_order_comes_back(frame: Frame) -> None:
 
 @pytest.mark.parametrize("colour", COLOURINGS)
 def test_rows_in_any_order_give_the_same_picture(frame: Frame, colour: str) -> None:
-    look = Look(width=300, height=300, colour=colour)
-    artist = Artist()
-    expected = artist.jpeg(frame, look)
+    options = ViewOptions(width=300, height=300, colour=colour)
+    renderer = JpegRenderer()
+    expected = renderer.jpeg(frame, options)
     for seed in (1, 2, 2):
-        assert artist.jpeg(shuffled(frame, seed), look) == expected
-    artist.thread.shutdown()
+        assert renderer.jpeg(shuffled(frame, seed), options) == expected
+    renderer.thread.shutdown()
 
 
 def test_one_artist_serves_looks_of_different_colours_in_turn(frame: Frame) -> None:
-    artist, other = Artist(), shuffled(frame, 3)
-    looks = [Look(width=200, height=200, colour=colour) for colour in ("order", "mass", "speed")]
-    expected = [Artist().jpeg(frame, look) for look in looks]
+    renderer, other = JpegRenderer(), shuffled(frame, 3)
+    views = [ViewOptions(width=200, height=200, colour=colour) for colour in ("order", "mass", "speed")]
+    expected = [JpegRenderer().jpeg(frame, options) for options in views]
     assert len(set(expected)) == 3
-    assert [artist.jpeg(other, look) for look in looks + looks[::-1]] == expected + expected[::-1]
+    assert [renderer.jpeg(other, options) for options in views + views[::-1]] == expected + expected[::-1]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pyverlet.laws.obstacles import Outline
-from pyverlet.picture import across
+from pyverlet.picture import periodic_images
 
 if TYPE_CHECKING:
     from pyverlet.viewers.layout import Layout
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Sketch:
+class ObstacleOutlines:
     """Outlines of obstacles in the picture's coordinates."""
 
     outlines: tuple[Outline, ...] = ()
@@ -29,23 +29,18 @@ class Sketch:
         return [(np.round(points, 6).tolist(), filled) for points, filled in self.outlines]
 
 
-NOTHING = Sketch()
+NO_OUTLINES = ObstacleOutlines()
 
 
-class Sketcher:
-    """Draws the obstacles of worlds side by side; the same object as long as none has moved.
-
-    Args:
-        worlds: whose obstacles; only read.
-        moving: those that move, or those that stand still.
-    """
+class OutlineCache:
+    """Outlines of the obstacles that move, or do not, in worlds side by side; the same object until an obstacle moves."""
 
     def __init__(self, worlds: Sequence[World], *, moving: bool) -> None:
         self._worlds, self._moving = worlds, moving
         self._drawn: list[list[Outline]] = []
-        self._sketch = NOTHING
+        self._sketch = NO_OUTLINES
 
-    def draw(self, layout: Layout) -> Sketch:
+    def draw(self, layout: Layout) -> ObstacleOutlines:
         """As they are now."""
         found = [
             (layout.offset(k), obstacle.drawn(), world.boundary.seam)
@@ -56,7 +51,7 @@ class Sketcher:
         drawn = [outlines for _, outlines, _ in found]
         if len(drawn) != len(self._drawn) or any(a is not b for a, b in zip(drawn, self._drawn, strict=True)):
             self._drawn = drawn
-            images = [(offset, across.outlines(outlines, seam)) for offset, outlines, seam in found]
+            images = [(offset, periodic_images.outlines(outlines, seam)) for offset, outlines, seam in found]
             moved = (Outline(points + offset, filled) for offset, outlines in images for points, filled in outlines)
-            self._sketch = Sketch(tuple(moved)) if drawn else NOTHING
+            self._sketch = ObstacleOutlines(tuple(moved)) if drawn else NO_OUTLINES
         return self._sketch

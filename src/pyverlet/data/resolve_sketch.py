@@ -40,23 +40,18 @@ def find(name: str, digest: str, *places: Path) -> Sketch:
     raise InputError(f"the sketch '{places[0]}' is not there any more; allowed is the file as it was, also in this folder")
 
 
-class KnownSketch(Sketch):
-    """A sketch that is looked for when it is first needed.
-
-    Args:
-        name, digest, places: as for `find`.
-    """
+class LazySketch(Sketch):
+    """A sketch that is looked for, as `find` does, when it is first needed."""
 
     def __init__(self, name: str, digest: str, *places: Path) -> None:
         super().__init__(places[0], b"")
         self.name, self._digest, self._places = name, digest, places
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return KnownSketch, (self.name, self._digest, *(place.resolve() for place in self._places))
+        return LazySketch, (self.name, self._digest, *(place.resolve() for place in self._places))
 
     @property
     def digest(self) -> str:
-        """As it was."""
         return self._digest
 
     def _run(self) -> Any:
@@ -78,18 +73,18 @@ class KnownSketch(Sketch):
 # ---- the settings it was built with ------------------------------------------------------------------------------------
 
 
-def told(settings: Settings) -> dict[str, Any]:
-    """What was asked for, as JSON has it; for `asked`.
+def settings_to_json(settings: Settings) -> dict[str, Any]:
+    """What was asked for, as JSON has it; for `settings_from_json`.
 
     Raises:
-        InputError: an object of a class that nobody could describe.
+        InputError: an object of a class that cannot be described.
     """
     names = settings.given if isinstance(settings, Given) else [field.name for field in dataclasses.fields(Settings)]
     return {name: plain(name, _switched(name, getattr(settings, name))) for name in sorted(names)}
 
 
-def asked(table: Mapping[str, Any]) -> dict[str, Any]:
-    """What `Scene.settings` takes, of what `told` returned."""
+def settings_from_json(table: Mapping[str, Any]) -> dict[str, Any]:
+    """What `Scene.settings` takes, of what `settings_to_json` returned."""
     return {name: value_of(name, value) for name, value in table.items()}
 
 

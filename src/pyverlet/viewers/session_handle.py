@@ -11,23 +11,22 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from pyverlet.viewers.commands import Command
-from pyverlet.viewers.errands import Errands
+from pyverlet.viewers.frame_pacing import Audience
 from pyverlet.viewers.frames import Frame
-from pyverlet.viewers.inbox import Inbox
-from pyverlet.viewers.rhythm import Audience
+from pyverlet.viewers.task_queue import TaskQueue
 
 if TYPE_CHECKING:
-    from pyverlet.viewers.exhibit import Exhibit
+    from pyverlet.viewers.presentation import Presentation
 
 STOP_TIMEOUT_S = 10.0
 """Longest wait for a frame under way when a session stops."""
 
 
-class Door(ABC):
-    """The narrow door of a session: from any thread."""
+class SessionHandle(ABC):
+    """The thread-safe interface of a session."""
 
     def __init__(self) -> None:
-        self._commands, self._errands, self._audience = Inbox(), Errands(), Audience()
+        self._tasks, self._audience = TaskQueue(), Audience()
         self._listeners: tuple[Callable[[], None], ...] = ()
         self._listeners_lock = threading.Lock()
         self._thread: threading.Thread | None = None
@@ -35,10 +34,10 @@ class Door(ABC):
 
     @abstractmethod
     def run(self) -> None:
-        """Step the worlds in the calling thread until somebody calls `stop`."""
+        """Step the worlds in the calling thread until `stop` is called."""
 
     @abstractmethod
-    def _put_on(self, exhibit: Exhibit) -> None:
+    def _put_on(self, presentation: Presentation) -> None:
         """In the thread that steps the worlds."""
 
     @abstractmethod
@@ -48,22 +47,22 @@ class Door(ABC):
     def submit(self, command: Command) -> None:
         """Ask for something. Returns at once; the physics thread does it between two frames, in the order asked.
 
-        A world that is slow takes another gravity, or where a hand that is down moves, between two substeps.
+        A world that is slow takes another gravity, or where a pointer that is down moves, between two substeps.
         """
-        self._commands.put(command)
+        self._tasks.put(command)
 
     def take(self, frame: Frame, *, velocity: bool = False) -> None:
         """Say that a viewer has this frame and would like the next: a world that is slow makes some between its substeps then.
 
         Args:
             frame: that it has.
-            velocity: whether it looks at velocities. Frames made between substeps have new ones only if somebody does.
+            velocity: whether it looks at velocities. Frames made between substeps have new ones only if a viewer does.
         """
         self._audience.take(frame.seq, velocity=velocity)
 
-    def weigh(self, frame: Frame) -> None:
+    def want_forces(self, frame: Frame) -> None:
         """Say that a viewer that has this frame looks at forces between circles."""
-        self._audience.weigh(frame.seq)
+        self._audience.want_forces(frame.seq)
 
     def subscribe(self, listener: Callable[[], None]) -> Callable[[], None]:
         """Have `listener()` called on the physics thread after every new frame; it must return at once and not raise.
@@ -79,19 +78,17 @@ class Door(ABC):
 
         return unsubscribe
 
-    def put_on(self, exhibit: Exhibit) -> None:
+    def put_on(self, presentation: Presentation) -> None:
         """Show something else from the next frame on; how the user looks at it stays."""
-        self._errands.put(partial(self._put_on, exhibit))
-        self._commands.put(None)
+        self._tasks.put(partial(self._put_on, presentation))
 
     def tell(self, *, complaint: str | None = None, busy: str | None = None) -> None:
         """What is wrong with the program that made the worlds, or keeps them waiting, while they go on; None: nothing."""
-        self._errands.put(partial(self._say, complaint, busy))
-        self._commands.put(None)
+        self._tasks.put(partial(self._say, complaint, busy))
 
     def held(self) -> AbstractContextManager[None]:
         """Meanwhile the worlds stand between two frames, and are the caller's."""
-        return self._errands.held(lambda: self._commands.put(None))
+        return self._tasks.held()
 
     def start(self) -> None:
         """Run in a thread of the session's own."""
@@ -104,7 +101,7 @@ class Door(ABC):
     def stop(self) -> None:
         """Have the frame under way be the last; wait for it if the session has its own thread. Twice is once."""
         self._stopping.set()
-        self._commands.put(None)
+        self._tasks.put(None)
         if self._thread is not None:
             self._thread.join(STOP_TIMEOUT_S)
 

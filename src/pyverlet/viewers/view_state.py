@@ -1,4 +1,4 @@
-"""The worlds on show and all that is replaced together with them: their start, the hands in them, the camera, how they stand."""
+"""The worlds on show, and what is replaced together with them: their saved start, the mouse tools, the camera and the layout."""
 
 from __future__ import annotations
 
@@ -15,77 +15,54 @@ from pyverlet.picture.pen import Drawing
 from pyverlet.scenes.sketch import SketchError, Updates
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import EVERYONE
-from pyverlet.viewers import levers
-from pyverlet.viewers.commands import (
-    Answered,
-    Click,
-    Command,
-    Delete,
-    Drag,
-    Key,
-    Pin,
-    Poke,
-    Redo,
-    Release,
-    Reset,
-    SetFriction,
-    SetGravity,
-    SetIntegrator,
-    SetRestitution,
-    SetSlider,
-    SetSubsteps,
-    Setting,
-    Spawn,
-    Undo,
-)
-from pyverlet.viewers.exhibit import Exhibit
+from pyverlet.viewers import commands as asked
+from pyverlet.viewers import controls
+from pyverlet.viewers.commands import Command, Drag, Pin, PointerTool, Poke, SetGravity, Setting, UserInput, name_of
 from pyverlet.viewers.forces import Forces
 from pyverlet.viewers.frames import Camera, PanelShape, Shape, outline
-from pyverlet.viewers.hands import HandsOnPanels
 from pyverlet.viewers.history import History
 from pyverlet.viewers.layout import Layout
-from pyverlet.viewers.sketch import Sketch, Sketcher
+from pyverlet.viewers.obstacle_outlines import ObstacleOutlines, OutlineCache
+from pyverlet.viewers.pointers import Pointers
+from pyverlet.viewers.presentation import Presentation
+from pyverlet.viewers.task_queue import Item
 from pyverlet.world.moments import Moment
 
 GREY = 0x9A
 """R, G and B of circles that joined a picture later."""
 
 
-class Stage:
-    """Worlds as a viewer sees them. Used by the physics thread only.
+class ViewState:
+    """A presentation as a viewer sees it; reset goes back to its present state. Used by the physics thread only."""
 
-    Args:
-        exhibit: what to show. Reset goes back to its present state.
-    """
-
-    def __init__(self, exhibit: Exhibit) -> None:
-        self.exhibit = exhibit
-        self.panels = exhibit.panels
+    def __init__(self, presentation: Presentation) -> None:
+        self.presentation = presentation
+        self.panels = presentation.panels
         self.worlds = self.panels.worlds
-        self.hands = HandsOnPanels(self.worlds)
+        self.pointers = Pointers(*self.worlds)
         self.history, self.forces = History(self.panels), Forces(self.worlds)
         self.complaint: str | None = None
         """What is wrong with the program, while the world goes on."""
         self._pinned = 0
         self._apart: list[NDArray[Any]] = []
         self._parted = 0  # how often these have changed
-        self.differing = levers.differing(self.worlds)
+        self.differing = controls.differing(self.worlds)
         self._saved = self.panels.save()
         self._coloured = [np.array(world.number) for world in self.worlds]
-        self._standing, self._moving = (Sketcher(self.worlds, moving=moving) for moving in (False, True))
+        self._standing, self._moving = (OutlineCache(self.worlds, moving=moving) for moving in (False, True))
         self._start_energies = [float(each.energy().total) for each in self.worlds]
-        self.look_anew()
+        self.reset_camera()
 
     def __len__(self) -> int:
         return sum(map(len, self.worlds))
 
-    def look_anew(self) -> None:
+    def reset_camera(self) -> None:
         """Forget where the camera has followed to."""
-        self._camera = Camera(*self.worlds, part=self.exhibit.part)
-        self.look()
+        self._camera = Camera(*self.worlds, part=self.presentation.part)
+        self.capture()
 
-    def look(self) -> tuple[list[NDArray[np.float32]], NDArray[np.float32]]:
-        """Point the camera at where everybody is now; each world's positions, and all velocities (n, 2), copied."""
+    def capture(self) -> tuple[list[NDArray[np.float32]], NDArray[np.float32]]:
+        """Point the camera at where the particles are now; each world's positions, and all velocities (n, 2), copied."""
         positions = [np.array(world.position, dtype=np.float32) for world in self.worlds]
         velocities = [np.array(world.velocity, dtype=np.float32) for world in self.worlds]
         self.layout = Layout(self._camera.view(_joined(positions)), len(positions), self._bounded())
@@ -101,101 +78,95 @@ class Stage:
         x0, y0, x1, y1 = self.layout.room
         return max(x1 - x0, y1 - y0)
 
-    def step(self, dt: float, onlooker: Callable[[Moment], None] | None = None) -> None:
-        """One frame of every world, the hands following their mice.
+    def step(self, dt: float, observer: Callable[[Moment], None] | None = None) -> None:
+        """One frame of every world, the pointers following their mice.
 
-        Args:
-            dt: s.
-            onlooker: called between the substeps of a single world, but where obstacles move: their way is known by the frame.
+        `observer` is called between the substeps of a single world, unless obstacles move: their way is known by the frame.
         """
-        self.hands.move(self.view_size)
+        self.pointers.move(self.view_size)
         world = self.worlds[0]
         if len(self.worlds) == 1 and not any(obstacle.moves for obstacle in world.obstacles):
-            world.onlooker = onlooker and partial(self._between, onlooker)
+            world.onlooker = observer and partial(self._between, observer)
         try:
             with self.forces.look():
                 self.panels.step(dt)
         finally:
             world.onlooker = None
 
-    def _between(self, onlooker: Callable[[Moment], None], moment: Moment) -> None:
-        onlooker(moment)
-        self.hands.move(self.view_size)  # where they aim may be new
-
-    def pull(self, command: Setting) -> None:
-        """Change a setting of all worlds, unless they are side by side because they differ in it."""
-        if levers.NAMES[type(command)] not in self.differing:
-            for world in self.worlds:
-                levers.pull(world, command)
+    def _between(self, observer: Callable[[Moment], None], moment: Moment) -> None:
+        observer(moment)
+        self.pointers.move(self.view_size)  # where they aim may be new
 
     def do(self, command: Command) -> None:
-        """Obey a command that is about the worlds; those about time are the session's."""
+        """Apply a command that is about the worlds; those about time are the session's."""
         match command:
-            case SetGravity() | SetSubsteps() | SetRestitution() | SetFriction() | SetIntegrator():
-                self.pull(command)
-            case Drag() | Poke() | Pin() | Spawn() | Delete():
-                self.history.open(command.hand)
-                self.history.close(command.hand, changed=self._handle(command))
-                if isinstance(command, Pin):
-                    self.history.release(command.hand)
-            case Release(hand):
-                self.hands.release(hand)
-                self.history.release(hand)
-            case Undo() | Redo():
-                self.hands.release_all()
-                self._pinned += self.history.undo() if isinstance(command, Undo) else self.history.redo()
-            case SetSlider() | Key() | Click():
+            case Setting():
+                if name_of(command) not in self.differing:  # side by side because they differ in it
+                    for world in self.worlds:
+                        controls.change(world, command)
+            case asked.Release(pointer):
+                self.pointers.release(pointer)
+                self.history.release(pointer)
+            case asked.Undo() | asked.Redo():
+                self.pointers.release_all()
+                self._pinned += self.history.undo() if isinstance(command, asked.Undo) else self.history.redo()
+            case asked.SetSlider() | asked.Key() | asked.Click():
                 self._answer(command)
-            case Reset():
+            case asked.Reset():
                 self.reset()
+            case Drag() | Poke() | Pin() | asked.Spawn() | asked.Delete():
+                self.history.open(command.pointer)
+                self.history.close(command.pointer, changed=self._use_tool(command))
+                if isinstance(command, Pin):
+                    self.history.release(command.pointer)
 
-    def _handle(self, command: Drag | Poke | Pin | Spawn | Delete) -> bool:
-        """What a hand does; whether that is anything."""
-        known = [world.version for world in self.worlds]
+    def _use_tool(self, command: PointerTool) -> bool:
+        """Returns whether it changed anything."""
+        known, pointers = [world.version for world in self.worlds], self.pointers
         match command:
-            case Drag(hand, x, y, reach):
-                return self.hands.drag(hand, x, y, reach, self.layout)
-            case Poke(hand, x, y):
-                self.hands.poke(hand, x, y, self.view_size, self.layout)
+            case Drag(pointer, x, y, reach):
+                return pointers.drag(pointer, x, y, reach, self.layout)
+            case Poke(pointer, x, y):
+                pointers.poke(pointer, x, y, self.view_size, self.layout)
                 return True
             case Pin(_, x, y, reach):
-                pinned = self.hands.pin(x, y, reach, self.layout)
+                pinned = pointers.pin(x, y, reach, self.layout)
                 self._pinned += pinned
                 return pinned
-            case Spawn(_, x, y):
-                self.hands.spawn(x, y, self.layout)
-            case Delete(_, x, y, reach):
-                self.hands.delete(x, y, reach, self.layout)
+            case asked.Spawn(_, x, y):
+                pointers.spawn(x, y, self.layout)
+            case asked.Delete(_, x, y, reach):
+                pointers.delete(x, y, reach, self.layout)
         return known != [world.version for world in self.worlds]
 
     # -- the user's program ---------------------------------------------------------------------------------------------
 
-    def _answer(self, command: Answered) -> None:
+    def _answer(self, command: UserInput) -> None:
         """Tell the program what the user did."""
-        answers, world = self.exhibit.answers, self.worlds[0]
+        callbacks, world = self.presentation.callbacks, self.worlds[0]
         match command:
-            case SetSlider(name, value):
-                if answers and (slider := answers.sliders.get(name)):
+            case asked.SetSlider(name, value):
+                if callbacks and (slider := callbacks.sliders.get(name)):
                     slider.value = min(max(value, slider.low), slider.high)
-            case Key(key):
+            case asked.Key(key):
                 self._call("keys", world, key)
-            case Click(_, x, y, button):
+            case asked.Click(_, x, y, button):
                 panel = self.layout.at(x, y)
                 dx, dy = self.layout.offset(panel)
                 self._call("click", self.worlds[panel], np.array([x - dx, y - dy]), button)
 
     def _call(self, hook: str, *arguments: Any) -> None:
         """One of the program's functions; one that fails is not called any more, and the world goes on."""
-        if self.exhibit.answers is None:
+        if self.presentation.callbacks is None:
             return
         try:
-            self.exhibit.answers.call(hook, *arguments)
+            self.presentation.callbacks.call(hook, *arguments)
         except InputError as error:
             self.complaint = str(error)
 
     def drawing(self) -> Drawing:
         """What the program draws over this picture."""
-        if self.exhibit.answers is None or not self.exhibit.answers.has("draw"):
+        if self.presentation.callbacks is None or not self.presentation.callbacks.has("draw"):
             return ()
         marks: Drawing = ()
         for k, world in enumerate(self.worlds):
@@ -206,11 +177,11 @@ class Stage:
 
     def sliders(self) -> tuple[tuple[str, float, float, float, float], ...]:
         """Name, ends, step and value of each."""
-        board = self.exhibit.answers.sliders if self.exhibit.answers else {}
+        board = self.presentation.callbacks.sliders if self.presentation.callbacks else {}
         return tuple((each.name, each.low, each.high, each.step, each.value) for each in list(board.values()))
 
     def watched(self) -> dict[str, float]:
-        """What the worlds were told to watch; of the same name, the first world's."""
+        """Values that the worlds watch; of the same name, the first world's."""
         found: dict[str, float] = {}
         for world in self.worlds:
             try:
@@ -227,12 +198,14 @@ class Stage:
             world.actors[:] = [actor for actor in world.actors if not isinstance(actor, Updates)]
         return sum(len(world.actors) for world in self.worlds) < before
 
-    def takes_at_once(self, command: Command | None) -> bool:
-        """Whether this may be done between two substeps: gravity and hands that hold something are asked for in each of them.
+    def takes_at_once(self, command: Item) -> bool:
+        """Whether this may be done between two substeps: gravity and pointers that hold something are asked for in each of them.
 
         All else is gathered once a frame. Not in worlds with a ledger: it measures heights by what gravity was at the beginning.
         """
-        asked_for = isinstance(command, SetGravity) or (isinstance(command, Drag | Poke) and self.hands.hold(command.hand))
+        asked_for = isinstance(command, SetGravity) or (
+            isinstance(command, Drag | Poke) and self.pointers.is_down(command.pointer)
+        )
         return command is None or (asked_for and not self.worlds[0].keeps_ledger)
 
     @property
@@ -243,7 +216,7 @@ class Stage:
             self._apart, self._parted = apart, self._parted + 1
         return (*(world.version for world in self.worlds), id(self._standing.draw(self.layout)), self._pinned, self._parted)
 
-    def moving(self) -> Sketch:
+    def moving(self) -> ObstacleOutlines:
         """The obstacles that move, where they are now."""
         return self._moving.draw(self.layout)
 
@@ -259,23 +232,23 @@ class Stage:
         return np.concatenate(pairs), np.concatenate(force)
 
     def turned(self) -> NDArray[np.uint8]:
-        """(n,) how far each circle has turned, in 1/256 of a turn; none as long as nobody has."""
+        """(n,) how far each circle has turned, in 1/256 of a turn; none until one has."""
         angles = [world.angle for world in self.worlds]
         if not any(angle.any() for angle in angles):
             return np.empty(0, np.uint8)
         return np.concatenate([np.rint(angle * (128 / np.pi)).astype(np.int64).astype(np.uint8) for angle in angles])
 
-    def drawn(self) -> tuple[Sketch, NDArray[np.uint32], NDArray[np.float32], NDArray[np.uint8]]:
+    def drawn(self) -> tuple[ObstacleOutlines, NDArray[np.uint32], NDArray[np.float32], NDArray[np.uint8]]:
         """What a frame has beside circles: `moving`, `links`, and how they have `turned`."""
         return self.moving(), *self.links(), self.turned()
 
     def reset(self) -> None:
         """Back to the start; settings stay."""
-        self.hands.release_all()
+        self.pointers.release_all()
         self.panels.restore(self._saved)
         self.history = History(self.panels)
         self._pinned += 1  # masses are what they were
-        self.look_anew()
+        self.reset_camera()
 
     def shape(self, *, dt: float, budget_ms: float, scenes: tuple[tuple[str, str], ...]) -> Shape:
         """What stays from frame to frame, as it is now."""
@@ -296,20 +269,22 @@ class Stage:
             starts.append(first)
             first += len(world)
         return Shape(
-            title=self.exhibit.title,
+            title=self.presentation.title,
             dt=dt,
             budget_ms=budget_ms,
             bounded=self._bounded(),
-            parted=self.exhibit.part is not None,
+            parted=self.presentation.part is not None,
             outlines=tuple(outlines),
             lines=tuple(lines),
             panels=tuple(panels),
             differing=self.differing,
             obstacles=self._standing.draw(self.layout),
-            scene=self.exhibit.scene,
+            scene=self.presentation.scene,
             scenes=scenes,
-            answers=tuple(name for name in ("keys", "click") if self.exhibit.answers and self.exhibit.answers.has(name)),
-            countable=self.exhibit.countable,
+            callbacks=tuple(
+                name for name in ("keys", "click") if self.presentation.callbacks and self.presentation.callbacks.has(name)
+            ),
+            countable=self.presentation.countable,
             radius=_kept(np.concatenate([world.radius for world in self.worlds], dtype=np.float32)),
             mass=_kept(np.concatenate([world.mass for world in self.worlds], dtype=np.float32)),
             number=_kept(np.concatenate([world.number for world in self.worlds], dtype=np.uint32, casting="unsafe")),
@@ -326,14 +301,14 @@ class Stage:
         return any(world.boundary.extent() is not None for world in self.worlds)
 
     def _kinds(self) -> NDArray[np.uint32] | None:
-        """Category and mask of everybody."""
+        """Category and mask of each particle."""
         kinds = [np.column_stack((world.category, world.mask)) * np.uint32(world.collisions is not None) for world in self.worlds]
         joined = np.concatenate(kinds)
         return None if (joined == (1, EVERYONE)).all() else _kept(joined)
 
     def _colours(self) -> NDArray[np.uint8] | None:
-        """Everybody's own, grey for those that came later."""
-        given = self.exhibit.colours
+        """The particles' own colours, grey for those that came later."""
+        given = self.presentation.colours
         if given is None:
             return None
         (world,), (first,) = self.worlds, self._coloured

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 
-class WholeFile:
+class JournaledFile:
     """A binary file for h5py to write to. What lay in it at the last commit stays as it was until the next.
 
     New bytes behind the end of then are written at once: nothing refers to them yet. Changes before it, some 27 kB of
@@ -19,12 +19,10 @@ class WholeFile:
         self._changes: list[tuple[int, bytes]] = []
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        """Go elsewhere."""
         self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self._end}[whence]
         return self._at
 
     def tell(self) -> int:
-        """Where the next byte goes."""
         return self._at
 
     def write(self, data: bytes) -> int:
@@ -39,13 +37,11 @@ class WholeFile:
         return len(content)
 
     def readinto(self, buffer: memoryview) -> int:
-        """What is there, changes and all."""
         data = self.read(len(buffer))
         buffer[: len(data)] = data
         return len(data)
 
     def read(self, count: int) -> bytes:
-        """The same."""
         self._file.seek(self._at)
         data = bytearray(self._file.read(count))
         data.extend(bytes(max(min(self._end - self._at, count) - len(data), 0)))
@@ -57,7 +53,6 @@ class WholeFile:
         return bytes(data)
 
     def truncate(self, size: int | None = None) -> int:
-        """Set the end."""
         self._end = self._at if size is None else size
         if self._end >= self._committed:
             self._file.truncate(self._end)
@@ -74,7 +69,6 @@ class WholeFile:
         self._committed = self._end
 
     def close(self) -> None:
-        """Commit and close."""
         self.commit()
         self._file.close()
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from pyverlet.ground.errors import InputError
 from pyverlet.laws import integrators
 from pyverlet.viewers.commands import (
-    MAX_FRICTION,
-    MAX_GRAVITY,
-    MAX_SUBSTEPS,
+    Command,
     SetFriction,
     SetGravity,
     SetIntegrator,
@@ -22,13 +22,7 @@ from pyverlet.viewers.commands import (
 if TYPE_CHECKING:
     from pyverlet.world.world import World
 
-NAMES: dict[type[Setting], str] = {
-    SetGravity: "gravity",
-    SetSubsteps: "substeps",
-    SetRestitution: "restitution",
-    SetFriction: "friction",
-    SetIntegrator: "integrator",
-}
+SETTINGS: tuple[Any, ...] = (SetGravity, SetSubsteps, SetRestitution, SetFriction, SetIntegrator)
 
 
 def read(world: World) -> dict[str, Any]:
@@ -49,7 +43,7 @@ def differing(worlds: Sequence[World]) -> tuple[str, ...]:
     return tuple(name for name in all_of_them[0] if len({settings[name] for settings in all_of_them}) > 1)
 
 
-def pull(world: World, command: Setting) -> None:
+def change(world: World, command: Setting) -> None:
     """Change one setting of the world."""
     match command:
         case SetGravity(x, y):
@@ -64,21 +58,14 @@ def pull(world: World, command: Setting) -> None:
             world.integrator = integrators.BY_NAME[name]()
 
 
-def present(world: World) -> list[Setting]:
+def present(world: World) -> list[Command]:
     """The commands that would give another world the settings of this one, as far as a viewer may set them."""
-    settings = read(world)
-    (gx, gy), substeps = settings["gravity"], settings["substeps"]
-    commands: list[Setting] = []
-    if max(abs(gx), abs(gy)) <= MAX_GRAVITY:
-        commands.append(SetGravity(gx, gy))
-    if substeps <= MAX_SUBSTEPS:
-        commands.append(SetSubsteps(substeps))
-    if settings["restitution"] is not None:
-        commands.append(SetRestitution(settings["restitution"]))
-    if settings["friction"] is not None and settings["friction"] <= MAX_FRICTION:
-        commands.append(SetFriction(settings["friction"]))
-    if settings["integrator"] in integrators.BY_NAME:
-        commands.append(SetIntegrator(settings["integrator"]))
+    values = read(world)
+    commands: list[Command] = []
+    for kind in SETTINGS:
+        value = values[kind.__name__.removeprefix("Set").lower()]
+        with contextlib.suppress(InputError):  # beyond what a viewer may set, or the world has no such setting
+            commands.append(kind(*value) if isinstance(value, tuple) else kind(value))
     return commands
 
 

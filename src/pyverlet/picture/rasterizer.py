@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from functools import lru_cache
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.core import unit
-from pyverlet.ground.errors import InputError
+from pyverlet.ground.outside import require
 from pyverlet.picture.palette import Packed, Theme, swapped
 from pyverlet.picture.pen import Drawing, Lettering, Stroke
 from pyverlet.picture.view import View
@@ -19,12 +18,8 @@ SLICES = 8
 """Lines a row of pixels is cut into where something is filled: steps of an eighth at rims that lie flat."""
 
 
-def put(pixels: Packed, drawing: Drawing, view: View, theme: Theme) -> None:
-    """Draw on (h, w) pixels of the view, in the order in which it was drawn.
-
-    Raises:
-        InputError: there is text, and Pillow is missing.
-    """
+def draw(pixels: Packed, drawing: Drawing, view: View, theme: Theme) -> None:
+    """Draw on (h, w) pixels of the view, in the order in which it was drawn. Text needs Pillow."""
     for mark in drawing:
         colour = swapped(theme.text if mark.colour is None else mark.colour)
         if isinstance(mark, Lettering):
@@ -67,8 +62,7 @@ def _write(pixels: Packed, mark: Lettering, view: View, colour: int) -> None:
 @lru_cache(256)
 def _letters(text: str, size: float) -> NDArray[np.float32]:
     """(h, w) what part of each pixel a text covers."""
-    if importlib.util.find_spec("PIL") is None:
-        raise InputError("text in a picture needs 'PIL', which is not installed: pip install 'pyverlet[record]'")
+    require("text in a picture", "PIL", extra="record")
     from PIL import Image, ImageDraw, ImageFont
 
     font: Any = ImageFont.load_default(size)

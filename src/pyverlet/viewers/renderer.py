@@ -24,16 +24,8 @@ def check_look(colour: Any, theme: Any) -> None:
         raise InputError(f"theme is {theme!r}; allowed are pyverlet.picture.DARK and LIGHT")
 
 
-class Painter:
-    """Paints one world, as it is now, whenever asked.
-
-    Args:
-        world: only read.
-        size: (width, height) of the picture, pixels.
-        colour: what the colours say; by default where each circle started.
-        theme: `picture.DARK` or `picture.LIGHT`.
-        part: of the plane to show, (x0, y0, x1, y1) in metres; by default the bounds, or where the particles are.
-        draw: a function of (world, pen) that draws over each picture.
+class Renderer:
+    """Paints one world, as it is now, whenever asked. Arguments as for `pyverlet.record.to_image`.
 
     Attributes:
         view: the part of the plane on the last picture; before the first, that of the world as it is.
@@ -67,11 +59,7 @@ class Painter:
         return self._raster.size
 
     def paint(self, view: View | None = None) -> NDArray[np.uint8]:
-        """(height, width, 4) bytes R, G, B, A: a view on a buffer, good until the next call. A is no transparency; see Raster.
-
-        Args:
-            view: what to show; None leaves the choice to the painter.
-        """
+        """(height, width, 4) bytes R, G, B, A of a view, by default the renderer's own; good until the next call."""
         if self._boundary is not self._world.boundary:
             self._boundary = self._world.boundary
             self._outlines = outline(self._boundary)

@@ -16,7 +16,7 @@ const MEANS = {
 };
 
 /** Fill `element` with the accounts in joules that are not empty, null hides it; `text` writes a number. */
-export function fillBooks(element, accounts, text) {
+export function fillLedger(element, accounts, text) {
   element.hidden = !accounts;
   if (!accounts) return;
   const shown = Object.entries(accounts).filter(([name, joules]) => joules || name === "residual");

@@ -19,11 +19,7 @@ _NUMBERS = {"inf": math.inf, "-inf": -math.inf, "nan": math.nan}
 
 
 def pack(value: Any) -> Any:
-    """The value with tuples and infinities in the form JSON has for them; arrays stay arrays.
-
-    Raises:
-        InputError: it holds something else.
-    """
+    """The value with tuples and infinities in the form JSON has for them; arrays stay arrays. InputError for anything else."""
     if value is None or isinstance(value, bool | str | np.ndarray):
         return value
     if isinstance(value, int | np.integer):

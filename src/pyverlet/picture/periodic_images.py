@@ -28,10 +28,19 @@ def copies(position: Array, radius: Array, seam: Seam) -> tuple[NDArray[np.uint3
             x = position[:, axis]
             near[:, axis] = (x - low[axis] < radius).astype(np.int8) - (low[axis] + period[axis] - x < radius)
     for ways in ((1, 0), (0, 1), (1, 1)):
-        who = np.flatnonzero((near[:, np.array(ways, bool)] != 0).all(axis=1))
-        owner.append(who.astype(np.uint32))
-        place.append((position[who] + near[who] * ways * period).astype(position.dtype))
+        rows = np.flatnonzero((near[:, np.array(ways, bool)] != 0).all(axis=1))
+        owner.append(rows.astype(np.uint32))
+        place.append((position[rows] + near[rows] * ways * period).astype(position.dtype))
     return np.concatenate(owner), np.concatenate(place)
+
+
+def with_copies(seam: Seam, position: Array, radius: Array, *columns: Array) -> tuple[Array, ...]:
+    """Positions, radii and further columns (n, ...), followed by the copies; unchanged without periodic bounds."""
+    if not seam:
+        return (position, radius, *columns)
+    owner, place = copies(position, radius, seam)
+    more = (np.concatenate((column, column[owner])) for column in (radius, *columns))
+    return (np.concatenate((position, place)), *more)
 
 
 def lines(ends: Array, force: Array, seam: Seam) -> tuple[Array, Array]:

@@ -16,8 +16,8 @@ from pyverlet.laws.obstacles import Outline
 from pyverlet.picture import DARK, LIGHT, ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Fixed, Groups, Raster, Theme, View
 from pyverlet.picture.palette import Packed
 from pyverlet.viewers.frames import Frame, Shape
-from pyverlet.viewers.looks import MOST_PIXELS, Look
-from pyverlet.viewers.sketch import NOTHING, Sketch
+from pyverlet.viewers.obstacle_outlines import NO_OUTLINES, ObstacleOutlines
+from pyverlet.viewers.view_options import MOST_PIXELS, ViewOptions
 
 PICTURES_FROM = 150_000
 """Circles. A browser takes 40 to 60 ms to receive a message of 2 MB, and as long again to draw so many; a picture is smaller."""
@@ -55,39 +55,39 @@ class _Seen:
         return len(self.mass)
 
 
-class Artist:
+class JpegRenderer:
     """Makes JPEGs of frames, in one thread of its own: drawing and encoding hold no lock that the physics needs.
 
     Every picture wanted by several tabs is drawn once.
     """
 
     def __init__(self) -> None:
-        self.thread = ThreadPoolExecutor(1, thread_name_prefix="pyverlet-artist")
+        self.thread = ThreadPoolExecutor(1, thread_name_prefix="pyverlet-renderer")
         self._raster: Raster | None = None
         self._colouring: Colouring = ByOrigin()
         self._colouring_of: tuple[str, Shape | None] = ("", None)
         self._still: tuple[Any, Packed] | None = None
         self._sorted: tuple[Any, Any, NDArray[np.float32]] = (None, None, np.empty(0, np.float32))
         self._still_sorted: tuple[Any, Packed] = (None, np.empty(0, np.uint32))
-        self._sketched: tuple[Sketch, Sketch, tuple[Outline, ...]] = (NOTHING, NOTHING, ())
-        self._done: dict[Look, bytes] = {}
+        self._sketched: tuple[ObstacleOutlines, ObstacleOutlines, tuple[Outline, ...]] = (NO_OUTLINES, NO_OUTLINES, ())
+        self._done: dict[ViewOptions, bytes] = {}
         self._frame: Frame | None = None
 
-    def jpeg(self, frame: Frame, look: Look) -> bytes:
-        """The frame as this look has it. Runs in the artist's thread."""
+    def jpeg(self, frame: Frame, options: ViewOptions) -> bytes:
+        """The frame as these options ask for. Runs in the renderer's thread."""
         if frame is not self._frame:
             self._frame, self._done = frame, {}
-        if look not in self._done:
-            self._done[look] = self._encode(self._paint(frame, look))
-        return self._done[look]
+        if options not in self._done:
+            self._done[options] = self._encode(self._paint(frame, options))
+        return self._done[options]
 
-    def _paint(self, frame: Frame, look: Look) -> NDArray[np.uint8]:
-        part = frame.view if look.part is None else look.part
-        theme = DARK if look.dark else LIGHT
-        size = fit(part, (look.width, look.height))
+    def _paint(self, frame: Frame, options: ViewOptions) -> NDArray[np.uint8]:
+        part = frame.view if options.part is None else options.part
+        theme = DARK if options.dark else LIGHT
+        size = fit(part, (options.width, options.height))
         if self._raster is None or (self._raster.size, self._raster.theme) != (size, theme):
             self._raster = Raster(size, theme=theme)
-        own = self._colours(frame, look.colour, theme)
+        own = self._colours(frame, options.colour, theme)
         (colours, radius), (owner, place) = self._in_rows(frame, own), frame.copies
         view = View(part[0], part[3], size[0] / (part[2] - part[0]), *size)
         return self._raster.discs(
@@ -103,21 +103,21 @@ class Artist:
 
     def _in_rows(self, frame: Frame, colours: Packed) -> tuple[Packed, NDArray[np.float32]]:
         """Colours and radii in the order of the frame's rows: that changes seldom, and sorting what does not saves much."""
-        radius, whose = frame.shape.radius, frame.whose
-        if whose is None:
+        radius, order = frame.shape.radius, frame.order
+        if order is None:
             return colours, radius
-        if self._sorted[0] is not whose or self._sorted[1] is not radius:
-            self._sorted = (whose, radius, radius[whose])
+        if self._sorted[0] is not order or self._sorted[1] is not radius:
+            self._sorted = (order, radius, radius[order])
             self._still_sorted = (None, colours)
         if self._still_sorted[0] is not colours:
-            self._still_sorted = (colours, colours[whose])
+            self._still_sorted = (colours, colours[order])
         return self._still_sorted[1], self._sorted[2]
 
     def _angles(self, frame: Frame, owner: NDArray[np.uint32]) -> NDArray[np.float64] | None:
-        """How the circles of the frame's rows, and copies of `owner`, have turned, rad; None as long as nobody has."""
+        """How the circles of the frame's rows, and copies of `owner`, have turned, rad; None until one has."""
         if not len(frame.turned):
             return None
-        turned = frame.turned if frame.whose is None else frame.turned[frame.whose]
+        turned = frame.turned if frame.order is None else frame.turned[frame.order]
         return np.asarray(np.concatenate((turned, frame.turned[owner])) * (np.pi / 128), float)
 
     def _obstacles(self, frame: Frame) -> Sequence[Outline]:

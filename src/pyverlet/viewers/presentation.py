@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from pyverlet import scenes
 from pyverlet.laws.integrators import Integrator
 from pyverlet.scenes import Scene
-from pyverlet.scenes._graph import Gauge
+from pyverlet.scenes._graph import GraphReader
 from pyverlet.scenes.sketch import SketchScene
-from pyverlet.viewers.answers import Answers
 from pyverlet.viewers.frames import Rect
+from pyverlet.viewers.user_callbacks import UserCallbacks
 from pyverlet.world.panels import Panels
 from pyverlet.world.world import World
 
@@ -26,7 +26,7 @@ CARRIED = ("seed", "threads", "dtype", "ledger")
 
 
 @dataclass(frozen=True)
-class Exhibit:
+class Presentation:
     """Worlds, ready to be shown.
 
     Attributes:
@@ -36,7 +36,7 @@ class Exhibit:
         colours: (n, 3) bytes R, G, B, the circles' own; None leaves colours to the viewer.
         part: of the plane to show, metres; None shows the bounds, or where the circles are.
         graph: what measures the one world for a graph beside it; None shows none.
-        answers: what the program adds to the picture, and what it wants to know of; None: nothing.
+        callbacks: what the program adds to the picture, and what it wants to know of; None: nothing.
         countable: whether the scene can be built with another number of circles.
     """
 
@@ -45,25 +45,18 @@ class Exhibit:
     scene: str = ""
     colours: NDArray[np.uint8] | None = None
     part: Rect | None = None
-    graph: Gauge | None = None
-    answers: Answers | None = None
+    graph: GraphReader | None = None
+    callbacks: UserCallbacks | None = None
     countable: bool = True
 
     @classmethod
-    def of(cls, shown: World | Panels | Exhibit, title: str) -> Exhibit:
-        """Worlds under a title; an exhibit as it is."""
-        return shown if isinstance(shown, Exhibit) else cls(title, Panels.of(shown))
+    def of(cls, shown: World | Panels | Presentation, title: str) -> Presentation:
+        """Worlds under a title; a presentation as it is."""
+        return shown if isinstance(shown, Presentation) else cls(title, Panels.of(shown))
 
 
 class Repertoire:
-    """The scenes a viewer may pick from, and how to build them.
-
-    Args:
-        scene: the one to begin with.
-        dt: simulated seconds a frame.
-        integrators: of the first scene; several stand side by side.
-        overrides: settings of the first scene, as for `Scene.settings`.
-    """
+    """The scenes a viewer may pick from. `integrators` and `overrides` are of the first one, as for `Scene.panels`."""
 
     def __init__(
         self, scene: Scene, *, dt: float, integrators: Sequence[Integrator] = (), overrides: Mapping[str, Any] | None = None
@@ -76,17 +69,12 @@ class Repertoire:
         """Name and one line of every scene, and of the one to begin with if it is none of these."""
         return {scene.name: scene.summary for scene in (*scenes.SCENES.values(), self._scene)}
 
-    def open(self, progress: Progress | None = None) -> Exhibit:
+    def open(self, progress: Progress | None = None) -> Presentation:
         """The scene to begin with."""
         return self.build(self._scene.name, None, progress)
 
-    def build(self, name: str, particles: int | None, progress: Progress | None = None) -> Exhibit:
-        """A scene with this many particles, None for its own number.
-
-        Args:
-            name: of the scene.
-            particles: how many.
-            progress: called as progress(done, total) while a scene finds out its colours.
+    def build(self, name: str, particles: int | None, progress: Progress | None = None) -> Presentation:
+        """A scene with this many particles, None for its own number; progress(done, total) while it finds out its colours.
 
         Raises:
             InputError: there is no such scene, or it cannot have so many particles.
@@ -105,4 +93,4 @@ class Repertoire:
         part = scene.show.view(settings) if scene.show.view else None
         graph = scene.show.graph(settings) if scene.show.graph and len(panels) == 1 else None
         countable = not isinstance(scene, SketchScene) or scene.takes("particles")
-        return Exhibit(scene.name, panels, scene.name, colours, part, graph, scene.sketch, countable)
+        return Presentation(scene.name, panels, scene.name, colours, part, graph, scene.sketch, countable)

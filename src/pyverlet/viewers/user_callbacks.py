@@ -1,4 +1,4 @@
-"""What a program of the user's adds to a picture, and how it answers: the sketch's functions, or those given to `view`."""
+"""Callbacks of the user's program, which draw over pictures and receive keys and clicks: a sketch's, or those given to `view`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pyverlet.ground.errors import InputError
 from pyverlet.scenes.sliders import Board, on_board
 
 
-class Answers(Protocol):
+class UserCallbacks(Protocol):
     """Functions by the names `draw`, `keys` and `click`, and sliders. `scenes.sketch.Sketch` is one."""
 
     sliders: Board
@@ -21,17 +21,8 @@ class Answers(Protocol):
         """Call it; an InputError says what is wrong, and it is not called any more."""
 
 
-class Functions:
-    """Functions of a program, and its sliders.
-
-    Args:
-        draw: of (world, pen).
-        keys: of (world, key).
-        click: of (world, point, button).
-
-    Raises:
-        InputError: one is no function.
-    """
+class CallbackFunctions:
+    """Functions draw(world, pen), keys(world, key) and click(world, point, button) of a program, and its sliders."""
 
     def __init__(
         self,
@@ -47,11 +38,9 @@ class Functions:
                 raise InputError(f"{name} is {given!r}; allowed is a function")
 
     def has(self, hook: str) -> bool:
-        """As `Answers.has`."""
         return hook in self._functions
 
     def call(self, hook: str, *arguments: Any) -> None:
-        """As `Answers.call`."""
         if hook not in self._functions:
             return
         try:

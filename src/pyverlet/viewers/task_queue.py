@@ -1,0 +1,95 @@
+"""A multi-producer, single-consumer queue of what the physics thread is to do: commands of viewers and tasks of other threads."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from pyverlet.viewers.commands import Command
+
+POLL_S = 0.1
+"""Poll interval of waiting threads, seconds: the session may have ended."""
+
+Task = Callable[[], object]
+Item = Command | Task | None
+"""None only wakes the thread up."""
+
+
+class TaskQueue:
+    """First in, first out. Filled from any thread, emptied by one."""
+
+    def __init__(self) -> None:
+        self._queue: queue.SimpleQueue[Item] = queue.SimpleQueue()
+        self._peeked: deque[Item] = deque()
+        self._runner: int | None = None
+        self._holder: int | None = None
+
+    def put(self, item: Item) -> None:
+        """Add an item; returns at once."""
+        self._queue.put(item)
+
+    def waiting(self, longest: float) -> Iterator[Item]:
+        """All items; if there are none, what comes within so many seconds and all behind it."""
+        if not self._peeked:
+            try:
+                self._peeked.append(self._queue.get(timeout=longest))
+            except queue.Empty:
+                return
+        yield from self.all()
+
+    def all(self) -> Iterator[Item]:
+        """All items."""
+        yield from self.while_(lambda item: True)
+
+    def while_(self, may: Callable[[Item], bool]) -> Iterator[Item]:
+        """The items up to the first that may not be taken yet, which stays."""
+        while True:
+            if not self._peeked:
+                try:
+                    self._peeked.append(self._queue.get_nowait())
+                except queue.Empty:
+                    return
+            if not may(self._peeked[0]):
+                return
+            yield self._peeked.popleft()
+
+    @contextmanager
+    def by_this_thread(self) -> Iterator[None]:
+        """Meanwhile this thread empties the queue; at the end it does the tasks that are left: nothing waits for ever."""
+        self._runner = threading.get_ident()
+        try:
+            yield
+        finally:
+            self._runner = None
+            for item in self.all():
+                if callable(item):
+                    item()
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Meanwhile the worlds stand between two frames, and are the caller's. It may be nested.
+
+        Where no thread empties the queue, or this one does, the worlds are the caller's already.
+        """
+        me = threading.get_ident()
+        if self._runner is None or me in (self._runner, self._holder):
+            yield
+            return
+        reached, done = threading.Event(), threading.Event()
+
+        def stand() -> None:
+            reached.set()
+            done.wait()
+
+        self.put(stand)
+        while not reached.wait(POLL_S) and self._runner is not None:
+            pass
+        self._holder = me
+        try:
+            yield
+        finally:
+            self._holder = None
+            done.set()
