@@ -1,0 +1,223 @@
+# mypy: ignore-errors
+"""A tree of squares over particles, with the mass, its centre and the second moments of each (Barnes and Hut 1986).
+
+Particles are sorted by the Morton code of their place, so that a square is a range of them. A square with a single part is left
+out: so there are fewer squares than twice the particles, however close to each other these are. Lengths are in units of a power of
+two, which rounds nothing, and masses in units of their sum: float32 neither overflows nor underflows by the choice of units.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import INFINITY
+from cython.cimports.libc.stdint import int32_t, uint32_t, uint64_t
+from cython.cimports.team import thread_team
+
+LEVELS = cython.declare(cython.int, 21)
+"""Squares of 2^-21 of the whole are not divided, whatever is in them."""
+
+LEAF = cython.declare(cython.int, 8)
+"""Squares with at most so many particles are not divided."""
+
+TARGETS = cython.declare(cython.int, 32)
+"""Most particles that are summed for together."""
+
+DIGITS = cython.declare(cython.int, 2048)  # of 11 bits, by which codes are sorted: four times
+
+WIDTH = cython.declare(cython.double, 1.2)
+"""Times the distance from its centre of mass to its farthest corner, that is how large a square counts as."""
+
+Tree = cython.struct(
+    count=cython.Py_ssize_t,
+    code=cython.pointer(uint64_t),  # (2, count) Morton codes, and room to sort them
+    order=cython.pointer(int32_t),  # (2, count) which particle stands at a place, and room to sort
+    x=cython.pointer(real),  # (count,) in the order of the codes
+    y=cython.pointer(real),
+    m=cython.pointer(real),
+    nodes=cython.int,  # in the order of the codes, each before its parts
+    begin=cython.pointer(int32_t),  # (nodes,) its first particle, and the one after its last
+    end=cython.pointer(int32_t),
+    parts=cython.pointer(int32_t),  # how many parts it has, 0 to 4, and which
+    part=cython.pointer(uint32_t),  # (nodes, 4)
+    node=cython.pointer(real),  # (nodes + 1, 4) centre of mass, x and y, mass, and square of its size; the last one is empty
+    second=cython.pointer(real),  # (nodes + 1, 4) sum of m (x - X)^2, m (x - X) (y - Y), m (y - Y)^2
+    corner=cython.pointer(cython.double),  # (nodes, 4) the rectangle: lowest x and y, highest x and y
+    groups=cython.int,
+    group=cython.pointer(int32_t),  # (groups, 2) particles that are summed for together: the first, and the one after the last
+    theta2=real,
+    softening2=real,
+    least=real,  # cubes of distances below count as none
+    items=cython.int,
+    room=cython.pointer(real),  # (items, ROOM) and (items, STACK + 2 LIST), see `core.gravity_sums`
+    found=cython.pointer(uint32_t),
+    pull=cython.pointer(cython.double),  # (count, 3) acceleration and potential, at the place in the order
+    team=cython.pointer(thread_team),
+)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def spread_bits(n: uint64_t) -> uint64_t:
+    """Bits 0 to 20 at the even places."""
+    words_: uint64_t = 0x0000FFFF0000FFFF
+    octets_: uint64_t = 0x00FF00FF00FF00FF
+    fours: uint64_t = 0x0F0F0F0F0F0F0F0F
+    pairs: uint64_t = 0x3333333333333333
+    singles_: uint64_t = 0x5555555555555555
+    n = (n | (n << 16)) & words_
+    n = (n | (n << 8)) & octets_
+    n = (n | (n << 4)) & fours
+    n = (n | (n << 2)) & pairs
+    return (n | (n << 1)) & singles_
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def sort_codes(t: cython.pointer(Tree), tally: cython.pointer(int32_t)) -> cython.void:
+    """Sort codes and order by digits of 11 bits, the lowest first; equal codes stay in the order of the particles."""
+    n: cython.Py_ssize_t = t.count
+    turn: cython.int
+    k: cython.Py_ssize_t
+    d: cython.int
+    for turn in range(4):
+        here: cython.Py_ssize_t = n * (turn % 2)
+        there: cython.Py_ssize_t = n - here
+        shift: cython.int = 11 * turn
+        for d in range(DIGITS + 1):
+            tally[d] = 0
+        for k in range(n):
+            d = cython.cast(cython.int, (t.code[here + k] >> shift) & 2047)
+            tally[d + 1] += 1
+        for d in range(DIGITS):
+            tally[d + 1] += tally[d]
+        for k in range(n):
+            d = cython.cast(cython.int, (t.code[here + k] >> shift) & 2047)
+            t.code[there + tally[d]] = t.code[here + k]
+            t.order[there + tally[d]] = t.order[here + k]
+            tally[d] += 1
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def first_with(t: cython.pointer(Tree), begin: cython.int, end: cython.int, bit: cython.int) -> cython.int:
+    """The first of these places whose code has this bit; all have the same bits above it."""
+    while begin < end:
+        middle: cython.int = (begin + end) // 2
+        if (t.code[middle] >> bit) & 1:
+            end = middle
+        else:
+            begin = middle + 1
+    return begin
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def divide(t: cython.pointer(Tree), stack: cython.pointer(int32_t)) -> cython.void:
+    """Make the nodes, each before its parts, and the groups. stack: (3 LEVELS + 1, 4) first, end, whether in a group, and the whole."""
+    depth: cython.int = 1
+    quarter: cython.int
+    k: cython.int
+    cut: cython.int[5]
+    stack[0], stack[1], stack[2], stack[3] = 0, cython.cast(int32_t, t.count), 0, -1
+    while depth > 0:
+        depth -= 1
+        begin: cython.int = stack[4 * depth]
+        end: cython.int = stack[4 * depth + 1]
+        grouped: cython.int = stack[4 * depth + 2]
+        whole: cython.int = stack[4 * depth + 3]
+        node: cython.int = t.nodes
+        t.nodes = node + 1
+        t.begin[node], t.end[node], t.parts[node] = begin, end, 0
+        for k in range(4):
+            t.part[4 * node + k] = 0
+        if whole >= 0:
+            t.part[4 * whole + t.parts[whole]] = node
+            t.parts[whole] += 1
+        differing: uint64_t = t.code[begin] ^ t.code[end - 1]
+        leaf: cython.bint = end - begin <= LEAF or differing == 0
+        if not grouped and (leaf or end - begin <= TARGETS):
+            grouped = 1
+            for k in range(begin, end, 32):  # TARGETS; only what is not divided has more
+                t.group[2 * t.groups], t.group[2 * t.groups + 1] = k, min(k + TARGETS, end)
+                t.groups += 1
+        if leaf:
+            continue
+        bit: cython.int = 0  # the higher bit of the highest pair in which they differ
+        while differing >> (bit + 2) > 0:
+            bit += 2
+        bit += 1
+        cut[0], cut[4] = begin, end
+        cut[2] = first_with(t, begin, end, bit)
+        cut[1] = first_with(t, begin, cut[2], bit - 1)
+        cut[3] = first_with(t, cut[2], end, bit - 1)
+        for quarter in range(3, -1, -1):
+            if cut[quarter] < cut[quarter + 1]:
+                stack[4 * depth], stack[4 * depth + 1] = cut[quarter], cut[quarter + 1]
+                stack[4 * depth + 2], stack[4 * depth + 3] = grouped, node
+                depth += 1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def measure_nodes(t: cython.pointer(Tree)) -> cython.void:
+    """Mass, its centre, second moments and size of all nodes, parts before wholes.
+
+    Of a whole made of parts with mass m at x and second moments s: S = sum of s + m (x - X)^2 (Huygens and Steiner).
+    """
+    k: cython.int
+    p: cython.int
+    turn: cython.int
+    for k in range(t.nodes - 1, -1, -1):
+        leaf: cython.bint = t.parts[k] == 0
+        count: cython.int = t.end[k] - t.begin[k] if leaf else t.parts[k]
+        mass: cython.double = 0
+        x: cython.double = 0
+        y: cython.double = 0
+        low_x: cython.double = t.x[t.begin[k]]
+        low_y: cython.double = t.y[t.begin[k]]
+        high_x: cython.double = low_x
+        high_y: cython.double = low_y
+        xx: cython.double = 0
+        xy: cython.double = 0
+        yy: cython.double = 0
+        for turn in range(2):
+            for p in range(count):
+                part: cython.int = t.begin[k] + p if leaf else t.part[4 * k + p]
+                m: cython.double = t.m[part] if leaf else t.node[4 * part + 2]
+                part_x: cython.double = t.x[part] if leaf else t.node[4 * part]
+                part_y: cython.double = t.y[part] if leaf else t.node[4 * part + 1]
+                if turn == 0:
+                    mass += m
+                    x += m * part_x
+                    y += m * part_y
+                    low_x = min(low_x, part_x if leaf else t.corner[4 * part])
+                    low_y = min(low_y, part_y if leaf else t.corner[4 * part + 1])
+                    high_x = max(high_x, part_x if leaf else t.corner[4 * part + 2])
+                    high_y = max(high_y, part_y if leaf else t.corner[4 * part + 3])
+                else:
+                    xx += m * (part_x - x) * (part_x - x) + (0 if leaf else t.second[4 * part])
+                    xy += m * (part_x - x) * (part_y - y) + (0 if leaf else t.second[4 * part + 1])
+                    yy += m * (part_y - y) * (part_y - y) + (0 if leaf else t.second[4 * part + 2])
+            if turn == 0:
+                x = cython.cast(real, x / mass)
+                y = cython.cast(real, y / mass)
+        t.corner[4 * k], t.corner[4 * k + 1], t.corner[4 * k + 2], t.corner[4 * k + 3] = low_x, low_y, high_x, high_y
+        wide: cython.double = WIDTH * max(high_x - x, x - low_x)
+        high: cython.double = WIDTH * max(high_y - y, y - low_y)
+        single: cython.bint = leaf and count <= LEAF  # summed one by one, which takes no longer
+        t.node[4 * k], t.node[4 * k + 1], t.node[4 * k + 2] = cython.cast(real, x), cython.cast(real, y), cython.cast(real, mass)
+        t.node[4 * k + 3] = cython.cast(real, INFINITY if single else wide * wide + high * high)
+        t.second[4 * k], t.second[4 * k + 1] = cython.cast(real, xx), cython.cast(real, xy)
+        t.second[4 * k + 2] = cython.cast(real, yy)
+    for p in range(4):
+        t.node[4 * t.nodes + p], t.second[4 * t.nodes + p] = 0, 0
+    t.node[4 * t.nodes], t.node[4 * t.nodes + 3] = 4, INFINITY
+    t.begin[t.nodes], t.end[t.nodes], t.parts[t.nodes] = 0, 0, 0
