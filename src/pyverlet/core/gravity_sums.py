@@ -239,33 +239,22 @@ def pull_all(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def balance(t: cython.pointer(Tree)) -> cython.void:
-    """Take from all alike what the sums have of a force and of a torque about the centre of mass: a -= F / M + (T / I) x r."""
+    """Take what all forces add up to, which should be nothing, from each in proportion to its size: F_i -= |F_i| sum F / sum |F|."""
     k: cython.Py_ssize_t
-    x: cython.double = 0
-    y: cython.double = 0
-    ax: cython.double = 0
-    ay: cython.double = 0
-    torque: cython.double = 0
-    inertia: cython.double = 0
-    total: cython.double = 0
+    fx: cython.double = 0
+    fy: cython.double = 0
+    sizes: cython.double = 0
     for k in range(t.count):
         m: cython.double = t.m[k]
-        total += m
-        x += m * t.x[k]
-        y += m * t.y[k]
-        ax += m * t.pull[3 * k]
-        ay += m * t.pull[3 * k + 1]
-    x, y, ax, ay = x / total, y / total, ax / total, ay / total
+        fx += m * t.pull[3 * k]
+        fy += m * t.pull[3 * k + 1]
+        sizes += m * sqrt(t.pull[3 * k] * t.pull[3 * k] + t.pull[3 * k + 1] * t.pull[3 * k + 1])
+    if sizes > 0:
+        fx, fy = fx / sizes, fy / sizes
     for k in range(t.count):
-        m = t.m[k]
-        t.pull[3 * k] -= ax
-        t.pull[3 * k + 1] -= ay
-        torque += m * ((t.x[k] - x) * t.pull[3 * k + 1] - (t.y[k] - y) * t.pull[3 * k])
-        inertia += m * ((t.x[k] - x) * (t.x[k] - x) + (t.y[k] - y) * (t.y[k] - y))
-    turn: cython.double = torque / inertia if inertia > 0 else 0
-    for k in range(t.count):
-        t.pull[3 * k] += turn * (t.y[k] - y)
-        t.pull[3 * k + 1] -= turn * (t.x[k] - x)
+        size: cython.double = sqrt(t.pull[3 * k] * t.pull[3 * k] + t.pull[3 * k + 1] * t.pull[3 * k + 1])
+        t.pull[3 * k] -= size * fx
+        t.pull[3 * k + 1] -= size * fy
 
 
 @cython.cfunc
@@ -281,7 +270,7 @@ def gravitate_by_tree(
     force, position, mass, slot, strength: cython.double, softening: cython.double, theta: cython.double,
     team: cython.size_t, parts: cython.int,
 ) -> float:
-    """As `gravitate`, by a tree; returns the potential energy, J. Force and torque of all together are 0 to rounding.
+    """As `gravitate`, by a tree; returns the potential energy, J. All forces together are 0 to rounding.
 
     slot: (k,) int32. team: address of one, of which so many threads take part; 0 is none. Who is nowhere, at NaN, feels NaN.
     """  # fmt: skip

@@ -28,6 +28,9 @@ DIGITS = cython.declare(cython.int, 2048)  # of 11 bits, by which codes are sort
 WIDTH = cython.declare(cython.double, 1.2)
 """Times the distance from its centre of mass to its farthest corner, that is how large a square counts as."""
 
+LEAF_WIDTH = cython.declare(cython.double, 1.5)
+"""The same for squares of few particles, times WIDTH: to sum these one by one takes hardly longer."""
+
 Tree = cython.struct(
     count=cython.Py_ssize_t,
     code=cython.pointer(uint64_t),  # (2, count) Morton codes, and room to sort them
@@ -212,9 +215,9 @@ def measure_nodes(t: cython.pointer(Tree)) -> cython.void:
         t.corner[4 * k], t.corner[4 * k + 1], t.corner[4 * k + 2], t.corner[4 * k + 3] = low_x, low_y, high_x, high_y
         wide: cython.double = WIDTH * max(high_x - x, x - low_x)
         high: cython.double = WIDTH * max(high_y - y, y - low_y)
-        single: cython.bint = leaf and count <= LEAF  # summed one by one, which takes no longer
+        single: cython.bint = leaf and count <= LEAF
         t.node[4 * k], t.node[4 * k + 1], t.node[4 * k + 2] = cython.cast(real, x), cython.cast(real, y), cython.cast(real, mass)
-        t.node[4 * k + 3] = cython.cast(real, INFINITY if single else wide * wide + high * high)
+        t.node[4 * k + 3] = cython.cast(real, (LEAF_WIDTH * LEAF_WIDTH if single else 1.0) * (wide * wide + high * high))
         t.second[4 * k], t.second[4 * k + 1] = cython.cast(real, xx), cython.cast(real, xy)
         t.second[4 * k + 2] = cython.cast(real, yy)
     for p in range(4):

@@ -111,7 +111,7 @@ _kind(forces.Attractor, "center", "strength", "softening")
 _kind(forces.ConstantForce, "newtons", "group")
 _kind(forces.Drag, "linear", "quadratic")
 _kind(forces.Wind, "velocity", "linear", "quadratic")
-_kind(forces.Gravitation, "group", "strength", "softening")
+_kind(forces.Gravitation, "group", "strength", "softening", "theta")
 _kind(forces.PointSpring, "center", "stiffness")
 _kind(forces.Push, "center", "radius", "acceleration")
 
