@@ -21,7 +21,7 @@ from pyverlet.laws import forces, integrators
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast, Overlap
 from pyverlet.laws.energy import Energy
 from pyverlet.laws.events import Events
-from pyverlet.laws.forces import Attractor, ConstantForce, Drag, Gravitation, PointSpring, Wind, force
+from pyverlet.laws.forces import Attractor, ConstantForce, Drag, Fluid, Gravitation, PointSpring, Wind, force
 from pyverlet.laws.integrators import (
     RK4,
     ExplicitEuler,
@@ -90,6 +90,7 @@ __all__ = [
     "ExplicitEuler",
     "Fast",
     "FrameBudget",
+    "Fluid",
     "Gravitation",
     "Group",
     "InputError",

@@ -98,7 +98,9 @@ class Page:
         self._books, self._state, self._links, self._done = books, state, links or None, done
         self._gravity, self._t = forces.gravity, t
         self._holding = [force for force in forces.forces if has_potential(force)]
-        self._working = [force for force in forces.forces if not has_potential(force)]
+        # Of a force with a potential that takes energy, too, that part alone.
+        parts = [getattr(force, "dissipation", force) for force in forces.forces]
+        self._working = [part for part in parts if not has_potential(part)]
         self._open, self._resting, self._rolled = replace(books.ledger), books._resting, books._rolled
         self._now = _Instant(0.0, {})
         self._begun = self._risen = 0.0  # J when the frame began; of those at its end, of who is beyond the seam

@@ -14,11 +14,12 @@ from pyverlet.laws.forces._base import Conservative, Force, ForceList, ForceSum,
 from pyverlet.laws.forces.attraction import Attractor, Gravitation
 from pyverlet.laws.forces.constant import ConstantForce
 from pyverlet.laws.forces.drag import Drag, Wind
+from pyverlet.laws.forces.fluid import Fluid
 from pyverlet.laws.forces.function import FunctionForce, force
 from pyverlet.laws.forces.mouse import Grip, Push
 from pyverlet.laws.forces.spring import PointSpring
 
 __all__ = [
-    "Attractor", "Conservative", "ConstantForce", "Drag", "Force", "ForceList", "ForceSum", "FunctionForce", "Gravitation",
+    "Attractor", "Conservative", "ConstantForce", "Drag", "Fluid", "Force", "ForceList", "ForceSum", "FunctionForce", "Gravitation",
     "Grip", "Numbered", "PointSpring", "Push", "Wind", "force", "has_potential", "soften",
 ]  # fmt: skip
