@@ -112,22 +112,22 @@ class Fluid(Shown):
         density: Array, pressure: Array,
     ) -> float:  # fmt: skip
         """Add to `force`, if there is one, and fill density and pressure; else return the energy of compression, J."""
-        where = state.position[who]
-        flows = np.isfinite(state.mass[who]) & np.isfinite(where).all(axis=1)
-        if not (whole := bool(flows.all())):
-            who, where = who[flows], where[flows]
+        where, mass = state.position.take(who, axis=0), state.mass.take(who)
+        total, motion = float(mass.sum(dtype=float)), core.unit("motion", where.dtype)
+        flows = None
+        if not (np.isfinite(total) and motion.all_finite(where, where)):
+            flows = np.isfinite(mass) & np.isfinite(where).all(axis=1)
+            who, where, total = who[flows], where[flows], float(mass[flows].sum(dtype=float))
         if not len(who):
             return 0.0
-        spacing = float(np.sqrt(state.mass[who].mean(dtype=float) / self.rest_density))
+        spacing = float(np.sqrt(total / len(who) / self.rest_density))
         if force is not None:
             self._check(spacing, state.h)  # type: ignore[union-attr]
         where, owner = _with_images(where, state.seam, SUPPORT * spacing)
-        kernel = core.unit("motion", where.dtype).flow_of_fluid
-        team = getattr(state, "team", (0, 1))
-        found = (density, pressure) if whole else np.empty((2, len(who)))
-        law_ = SUPPORT * spacing, self.rest_density, *law
-        energy = kernel(force, where, velocity, state.mass, who, owner, *law_, *team, *found)
-        if not whole:
+        found = (density, pressure) if flows is None else np.empty((2, len(who)))
+        team, law = getattr(state, "team", (0, 1)), (SUPPORT * spacing, self.rest_density, *law)
+        energy = motion.flow_of_fluid(force, where, velocity, state.mass, who, owner, *law, *team, *found)
+        if flows is not None:
             density[flows], pressure[flows] = found
         return float(energy)
 
