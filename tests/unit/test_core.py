@@ -137,6 +137,7 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
 def results_of_motion(motion: Any, dtype: Any) -> list[bytes]:
     """What kernels of pairs within a range make of the same input."""
     position, velocity, _, _, mass = heap(dtype)
+    light = 1 / mass
     grid, spare = (-20.0, -20.0, 40.0, 40.0, 20, 20, 0.0, 40.0), (np.empty(60, np.int64), np.empty(402, np.int64))
     first, second = np.zeros((2, 2000), np.int32)
     listed = motion.list_near(position, 2.0, grid, *spare, np.empty(60, np.int64), first, second)
@@ -146,7 +147,10 @@ def results_of_motion(motion: Any, dtype: Any) -> list[bytes]:
     motion.add_along(force, near[0, :found], near[1, :found], way, np.sin(distance), np.cos(distance))
     moved = [motion.moved_beyond(position, velocity, limit, 0.0, 40.0) for limit in (1.0, 50.0)]
     assert found > 100
-    return [np.array(moved).tobytes(), *(array.tobytes() for array in (first, near, distance[:found], way[:found], force))]
+    who, law = (np.arange(60, dtype=np.int32), np.arange(60) * 3), ((7, 2**40, 3), 0.9, 0.5, 0.01)
+    gained = motion.thermalize(velocity, position, light, *who, *law)
+    arrays = (first, near, distance[:found], way[:found], force, velocity, position, np.array([*moved, gained]))
+    return [array.tobytes() for array in arrays]
 
 
 @PRECISIONS

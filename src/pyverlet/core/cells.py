@@ -14,6 +14,8 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import floor
 from cython.cimports.libc.stdint import int64_t, uint32_t
 
+from pyverlet.core.periodic import wrapped
+
 BLOCK = cython.declare(cython.Py_ssize_t, 512)
 """Particles that are gone through together by one thread."""
 
@@ -103,21 +105,6 @@ def level_of(c: cython.pointer(Cells), radius: real) -> cython.int:
     while level + 1 < c.levels and radius <= c.largest[level + 1]:
         level += 1
     return level
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def wrapped(value: real, low: cython.double, period: cython.double) -> real:
-    """The image of a coordinate inside the room; itself where the period is 0."""
-    if period > 0 and not (value >= low and value < low + period):
-        value = cython.cast(real, value - period * floor((value - low) / period))
-        if value >= low + period:  # rounding
-            value = cython.cast(real, value - period)
-        if value < low:
-            value = cython.cast(real, low)
-    return value
 
 
 @cython.cfunc

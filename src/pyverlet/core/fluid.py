@@ -174,7 +174,9 @@ def flow(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def sort_fluid(f: cython.pointer(Fluid), at: cython.pointer[cython.const[real]], grid: cython.pointer(cython.double)) -> cython.void:
+def sort_fluid(
+    f: cython.pointer(Fluid), at: cython.pointer[cython.const[real]], grid: cython.pointer(cython.double)
+) -> cython.void:
     """Find the place of each particle and image in the order of the cells. grid: lowest x and y, m, and rows a metre."""
     k: cython.Py_ssize_t
     for k in range(f.cells + 1):
@@ -198,8 +200,20 @@ def sort_fluid(f: cython.pointer(Fluid), at: cython.pointer[cython.const[real]],
 
 
 def flow_of_fluid(
-    force, position, velocity, mass, slot, owner, support: real, rest: real, stiffness: real, viscosity: real,
-    team: cython.size_t, parts: cython.int, density, pressure,
+    force,
+    position,
+    velocity,
+    mass,
+    slot,
+    owner,
+    support: real,
+    rest: real,
+    stiffness: real,
+    viscosity: real,
+    team: cython.size_t,
+    parts: cython.int,
+    density,
+    pressure,
 ) -> float:
     """Add the forces of a fluid; or, if `force` is None, return its energy of compression, J.
 

@@ -12,7 +12,21 @@ from __future__ import annotations
 import cython
 import numpy as np
 from cython.cimports.arrays import const_reals, const_small_integers, doubles, indices, reals, small_integers, words
-from cython.cimports.lanes import LANES, above, bits_of, choose, lanes, lanes4, larger, load, real, spread, square_root, store, take4
+from cython.cimports.lanes import (
+    LANES,
+    above,
+    bits_of,
+    choose,
+    lanes,
+    lanes4,
+    larger,
+    load,
+    real,
+    spread,
+    square_root,
+    store,
+    take4,
+)
 from cython.cimports.libc.math import INFINITY, NAN, fabs, isfinite, sqrt
 from cython.cimports.libc.stdint import int32_t, uint32_t, uint64_t
 from cython.cimports.team import team_free, team_new, team_run, team_stage, thread_team
@@ -36,7 +50,9 @@ TINY = cython.declare(cython.double, 1e-290)
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def add_particles(t: cython.pointer(Tree), room: cython.Py_ssize_t, n: cython.Py_ssize_t, first: cython.int, stop: cython.int) -> cython.void:
+def add_particles(
+    t: cython.pointer(Tree), room: cython.Py_ssize_t, n: cython.Py_ssize_t, first: cython.int, stop: cython.int
+) -> cython.void:
     """What those gathered do to the particles of a group."""
     zero: lanes = spread(0)
     soft: lanes = spread(t.softening2)
@@ -70,7 +86,9 @@ def add_particles(t: cython.pointer(Tree), room: cython.Py_ssize_t, n: cython.Py
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def add_squares(t: cython.pointer(Tree), room: cython.Py_ssize_t, n: cython.Py_ssize_t, first: cython.int, stop: cython.int) -> cython.void:
+def add_squares(
+    t: cython.pointer(Tree), room: cython.Py_ssize_t, n: cython.Py_ssize_t, first: cython.int, stop: cython.int
+) -> cython.void:
     """What squares gathered do to the particles of a group."""
     one: lanes = spread(1)
     half: lanes = spread(0.5)
@@ -113,8 +131,13 @@ def add_squares(t: cython.pointer(Tree), room: cython.Py_ssize_t, n: cython.Py_s
 @cython.nogil
 @cython.exceptval(check=False)
 def sum_found(
-    t: cython.pointer(Tree), room: cython.Py_ssize_t, stack: cython.Py_ssize_t, alone: cython.Py_ssize_t,
-    whole: cython.Py_ssize_t, first: cython.int, stop: cython.int,
+    t: cython.pointer(Tree),
+    room: cython.Py_ssize_t,
+    stack: cython.Py_ssize_t,
+    alone: cython.Py_ssize_t,
+    whole: cython.Py_ssize_t,
+    first: cython.int,
+    stop: cython.int,
 ) -> cython.void:
     """Gather particles of squares whose particles count, and the squares that count as a whole, and sum."""
     b: cython.pointer(real) = t.room
@@ -267,8 +290,15 @@ def code_of(x: cython.double, place: cython.double) -> uint64_t:
 
 
 def gravitate_by_tree(
-    force, position, mass, slot, strength: cython.double, softening: cython.double, theta: cython.double,
-    team: cython.size_t, parts: cython.int,
+    force,
+    position,
+    mass,
+    slot,
+    strength: cython.double,
+    softening: cython.double,
+    theta: cython.double,
+    team: cython.size_t,
+    parts: cython.int,
 ) -> float:
     """As `gravitate`, by a tree; returns the potential energy, J. All forces together are 0 to rounding.
 
@@ -321,7 +351,9 @@ def gravitate_by_tree(
             place: cython.double = cython.cast(cython.double, 1 << (LEVELS - 1))
             for k in range(t.count):
                 i = t.order[k]
-                t.code[k] = spread_bits(code_of(at[2 * i] / unit, place)) | (spread_bits(code_of(at[2 * i + 1] / unit, place)) << 1)
+                t.code[k] = spread_bits(code_of(at[2 * i] / unit, place)) | (
+                    spread_bits(code_of(at[2 * i + 1] / unit, place)) << 1
+                )
             sort_codes(t, tally)
             for k in range(t.count):
                 i = t.order[k]

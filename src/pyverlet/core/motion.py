@@ -19,6 +19,7 @@ from pyverlet.core.periodic import wrap
 from pyverlet.core.resting import find_edited, find_islands, time_at_rest
 from pyverlet.core.rows import any_differs, put_motion, take_motion
 from pyverlet.core.textbook_walls import clamp_to_box, clamp_to_circle
+from pyverlet.core.thermostat import thermalize
 from pyverlet.core.total_energy import energy_gained, total_energy
 
 __all__ = [
@@ -58,6 +59,7 @@ __all__ = [
     "soften",
     "take_energy",
     "take_motion",
+    "thermalize",
     "time_at_rest",
     "total_energy",
     "wrap",

@@ -12,10 +12,11 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import fabs, floor, sqrt
 from cython.cimports.libc.stdint import int32_t, int64_t
 
-from pyverlet.core.cells import BLOCK, wrapped
+from pyverlet.core.cells import BLOCK
 from pyverlet.core.impacts import NEVER, strike
 from pyverlet.core.obstacles import BODY_OF, FACES, LENGTH, PLACE, ROUNDING, SEGMENT, SENSOR, accepts, accepts_segment, head_of
 from pyverlet.core.one_way import is_one_way, stops
+from pyverlet.core.periodic import wrapped
 from pyverlet.core.step import CAGE, Step
 from pyverlet.core.work import book_place
 

@@ -26,6 +26,7 @@ class Ledger:
         rolling: taken by rolling resistance.
         drag: work of forces whose `account` is "drag".
         forces: work of all other forces without a potential, such as a user's own and the mouse.
+        thermostat: brought by heat baths, `pyverlet.Langevin`; negative where their friction takes more.
         links: taken by links: damping, and what stiff ones do not give back.
         projection: put in by moving overlapping circles apart, where contacts together gained more than they took in a frame.
         limiter: taken back by the energy limiter: what contacts had gained in a frame beyond what they may.
@@ -41,6 +42,7 @@ class Ledger:
     rolling: float = 0.0
     drag: float = 0.0
     forces: float = 0.0
+    thermostat: float = 0.0
     links: float = 0.0
     projection: float = 0.0
     limiter: float = 0.0
@@ -138,11 +140,14 @@ class Page:
         self._work(self._power(lag))
         self._state.acceleration[:] = acceleration
 
+    def gained(self, account: str, joules: float) -> None:
+        """So much was given between two substeps."""
+        setattr(self._open, account, getattr(self._open, account) + joules)
+        self._open.residual -= joules
+
     def _work(self, power: dict[str, float]) -> None:
         for account, now in power.items():
-            work = 0.5 * self._state.h * (self._now.power[account] + now)
-            setattr(self._open, account, getattr(self._open, account) + work)
-            self._open.residual -= work
+            self.gained(account, 0.5 * self._state.h * (self._now.power[account] + now))
         self._now = self._now._replace(power=power)
 
     def confined(self, confine: Any, *about: float) -> None:
@@ -195,6 +200,7 @@ class Page:
         held = self._links.energy(s.where()) if self._links and self._links.give else 0.0
         if self._holding:
             state = s.in_users_order()
+            state.seam.wrap(state.position)  # as they will be: rounded anew
             held += sum(force.potential(state) for force in self._holding)
         return _Instant(energy + held, self._power(lag) if works and self._working else {})
 

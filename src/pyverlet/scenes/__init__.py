@@ -7,6 +7,7 @@ from pathlib import Path
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
 from pyverlet.scenes import (
+    boids,
     bounce_euler,
     bounce_order,
     bounce_random,
@@ -17,6 +18,7 @@ from pyverlet.scenes import (
     cage_brute_force,
     cloth,
     conveyor,
+    droplets,
     drum,
     energy,
     fall,
@@ -27,6 +29,7 @@ from pyverlet.scenes import (
     image,
     newton_cradle,
     orbit,
+    particle_life,
     rope_bridge,
     sketch,
     soft_bodies,
@@ -63,6 +66,9 @@ SCENES: dict[str, Scene] = {
         soft_bodies.SCENE,
         newton_cradle.SCENE,
         wrecking_ball.SCENE,
+        particle_life.SCENE,
+        boids.SCENE,
+        droplets.SCENE,
     )
 }
 

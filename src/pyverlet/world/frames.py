@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pyverlet.core import unit
 from pyverlet.ground.constants import REST_ACCELERATIONS, SURPLUS
 from pyverlet.ground.errors import NonFiniteError
+from pyverlet.laws.forces import Substep
 from pyverlet.laws.integrators import PositionVerlet
 from pyverlet.laws.ledger import Page
 from pyverlet.laws.limiter import fall, limiter_for
@@ -195,6 +196,8 @@ class Frames:
                 own_walls.confine(state, page, h, lag, forces.strongest)
             if page:
                 page.moved(lag, self.held.gave, self.held.kick)
+            if forces.forces:
+                self._end_substep(world, step - 1, h, lag, page)
             world._show(step * h, half * h if by_core else 0.0) if step < substeps else None
         self.held.h = h
         if not alone:
@@ -218,6 +221,15 @@ class Frames:
         if state.seam:
             engine.wrap_seam(state.crossed)
         return True
+
+    @staticmethod
+    def _end_substep(world: Any, step: int, h: float, lag: float, page: Page | None) -> None:
+        """Let forces act that do so once a substep, such as heat baths."""
+        for account, joules in world._force_sum.end_substep(
+            world._slots, Substep(world._state.number, world.frames, step, h, lag)
+        ):
+            if page:
+                page.gained(account, joules)
 
     def _wake_met(self, world: Any, step: int, h: float, *, alone: bool, rough: bool) -> None:
         """Wake islands that are met in the substep that comes, and those that they may be thrown at."""

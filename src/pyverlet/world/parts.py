@@ -244,6 +244,7 @@ def put_together(world: World, parts: Parts) -> Saved:
         obstacles=world.obstacles.save(),
         actors=[(actor, actor.save()) for actor in world.actors],
         links=(links, pools, _broken(parts.arrays)),
+        forces=[(force, force.save()) for force in world.forces if hasattr(force, "save")],
         data=_data(parts),
     )
 

@@ -260,6 +260,7 @@ class World(Measures, Casts, Doors):
             obstacles=self.obstacles.save(),
             actors=[(actor, actor.save()) for actor in self.actors],
             links=self.links.save(),
+            forces=[(force, force.save()) for force in self.forces if hasattr(force, "save")],
             data={name: column.copy() for name, column in self._state.data.items()},
         )
 
@@ -277,6 +278,8 @@ class World(Measures, Casts, Doors):
             self._renumber(self._state.index_of(numbers))
         self.links.restore(saved.links)
         self.obstacles.restore(saved.obstacles)
+        for force, memory in saved.forces:
+            force.restore(memory)
         self.actors[:] = [actor for actor, _ in saved.actors]
         for actor, memory in saved.actors:
             actor.restore(memory)

@@ -73,9 +73,7 @@ class Gravitation(Shown):
 
     velocity_dependent = False
 
-    def __init__(
-        self, group: Group | None = None, *, strength: float, softening: float = 0.0, theta: float = 0.5
-    ) -> None:
+    def __init__(self, group: Group | None = None, *, strength: float, softening: float = 0.0, theta: float = 0.5) -> None:
         self.group = group
         self._last: tuple[NDArray[Any], ...] = ()
         self._pull: Any = None

@@ -72,9 +72,7 @@ class Fluid(Shown):
     velocity_dependent = True
     is_drag = True  # the velocity at the middle of the substep is asked for once, not by iteration
 
-    def __init__(
-        self, group: Group | None = None, *, rest_density: float, stiffness: float, viscosity: float = 0.0
-    ) -> None:
+    def __init__(self, group: Group | None = None, *, rest_density: float, stiffness: float, viscosity: float = 0.0) -> None:
         self.group = group
         self.rest_density = checks.number("rest_density", rest_density, above=0.0)
         self.stiffness = checks.number("stiffness", stiffness, above=0.0)
