@@ -31,7 +31,7 @@ THINGS: list[Any] = [
     pv.Collisions(restitution=0.3, friction=0.6, method=pv.BruteForce()),
     *(cls() for cls in pv.integrators.BY_NAME.values()), pv.PositionVerlet(naive_start=True),
     pv.Attractor(strength=2, softening=0.1), pv.ConstantForce((1, 2)), pv.Drag(linear=0.1), pv.Wind((1, 0), quadratic=0.5),
-    pv.Gravitation(strength=1.5), pv.PointSpring(stiffness=3), Push(center=(1, 1), radius=2, acceleration=9),
+    pv.Gravitation(strength=1.5, theta=0.3), pv.Fluid(rest_density=9.0, stiffness=7.0, viscosity=0.1), pv.PointSpring(stiffness=3), Push(center=(1, 1), radius=2, acceleration=9),
     pv.LennardJones(epsilon=1, sigma=0.1), pv.Yukawa(strength=2, screening_length=0.1, cutoff=0.5), bonded(),
     pv.SoftRepulsion(strength=3, range=0.2), pv.Langevin(temperature=1e-3, friction=2, seed=5),
     Likings(likes=[[0.1, -0.5], [1.0, 0.0]], kind=[0, 1, 1], pull=2.0, range=0.5), Flock(sight=1.0, apart=0.5, speed=2.0),

@@ -153,7 +153,17 @@ def flow_of_fluid(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     images, owner = where[slots] + np.array([0, 1], dtype), np.concatenate((np.arange(N - 2), np.arange(5))).astype(np.int32)
     places = np.concatenate((where[slots], images[:5]))
     law = 0.9, 2.0, 7.0, 0.3, 0, 1
-    return rows(chance, dtype), places, rows(chance, dtype), column(chance, dtype), slots, owner, *law, *np.empty((2, N - 2))
+    return (
+        rows(chance, dtype),
+        places,
+        np.repeat(rows(chance, dtype), 2, axis=0)[: len(places)],
+        column(chance, dtype),
+        slots,
+        owner,
+        *law,
+        *np.empty((2, N - 2)),
+        np.empty((5, 2), dtype),
+    )
 
 
 @kernel

@@ -47,6 +47,7 @@ Fluid = cython.struct(
     share=cython.pointer(real),  # p / rho^2
     at=cython.pointer(int32_t),  # (count,) which particle or image it is
     force=cython.pointer(real),  # (slots, 2) N
+    on_images=cython.pointer(real),  # (count - owned, 2) N
     slot=cython.pointer[cython.const[int32_t]],  # (owned,)
     density=cython.pointer(cython.double),  # (owned,) kg/m^2
     pressure=cython.pointer(cython.double),  # (owned,) N/m
@@ -150,10 +151,15 @@ def force_stage(what: cython.p_void, item: cython.int) -> cython.void:
                 fy = fy + push * dy
         store(f.sums, sums, fx)
         store(f.sums, sums + LANES, fy)
-        if f.at[i] < f.owned:  # no image
-            s: cython.Py_ssize_t = 2 * f.slot[f.at[i]]
-            f.force[s] += f.m[i] * (slope * sum_of_lanes(f.sums, sums))
-            f.force[s + 1] += f.m[i] * (slope * sum_of_lanes(f.sums, sums + LANES))
+        x_force: real = f.m[i] * (slope * sum_of_lanes(f.sums, sums))
+        y_force: real = f.m[i] * (slope * sum_of_lanes(f.sums, sums + LANES))
+        s: cython.Py_ssize_t = f.at[i] - f.owned
+        if s < 0:
+            s = 2 * f.slot[f.at[i]]
+            f.force[s] += x_force
+            f.force[s + 1] += y_force
+        else:
+            f.on_images[2 * s], f.on_images[2 * s + 1] = x_force, y_force
 
 
 @cython.cfunc
@@ -214,11 +220,13 @@ def flow_of_fluid(
     parts: cython.int,
     density,
     pressure,
+    on_images,
 ) -> float:
     """Add the forces of a fluid; or, if `force` is None, return its energy of compression, J.
 
-    position (k, 2): of n particles, and then of images of some of them beyond a seam; owner (k,) int32 has them by number. slot (n,)
-    int32: where force, velocity and mass have them. Written: density (n,) kg/m^2 and pressure (n,) N/m, float64. team: address of
+    position, velocity (k, 2): of n particles, and then of images of some of them beyond a seam or a wall; owner (k,) int32 has them
+    by number. slot (n,) int32: where force and mass have them. Written: density (n,) kg/m^2 and pressure (n,) N/m, float64, and
+    forces on images (k - n, 2), N. team: address of
     one, of which so many threads take part; 0 is none. stiffness: c^2, m^2/s^2; viscosity: nu, m^2/s.
     """  # fmt: skip
     at: cython.pointer[cython.const[real]] = const_reals(position)
@@ -230,7 +238,7 @@ def flow_of_fluid(
     f.owned, f.count, f.owner, f.slot = len(slot), len(position), const_small_integers(owner), who
     f.density, f.pressure, f.forces = doubles(density), doubles(pressure), force is not None
     if f.forces:
-        f.force = reals(force)
+        f.force, f.on_images = reals(force), reals(on_images)
     low_x: cython.double = INFINITY
     low_y: cython.double = INFINITY
     high_x: cython.double = -INFINITY
@@ -267,7 +275,7 @@ def flow_of_fluid(
         for k in range(f.count):
             i = who[f.owner[k]]
             p: cython.Py_ssize_t = f.place[k]
-            f.x[p], f.y[p], f.vx[p], f.vy[p], f.m[p] = at[2 * k], at[2 * k + 1], v[2 * i], v[2 * i + 1], weight[i]
+            f.x[p], f.y[p], f.vx[p], f.vy[p], f.m[p] = at[2 * k], at[2 * k + 1], v[2 * k], v[2 * k + 1], weight[i]
         team_run(f.team, flow, f, parts)
         if not f.forces:
             for k in range(f.owned):

@@ -18,6 +18,7 @@ from pyverlet.scenes import (
     cage_brute_force,
     cloth,
     conveyor,
+    dam_break,
     droplets,
     drum,
     energy,
@@ -69,6 +70,7 @@ SCENES: dict[str, Scene] = {
         particle_life.SCENE,
         boids.SCENE,
         droplets.SCENE,
+        dam_break.SCENE,
     )
 }
 

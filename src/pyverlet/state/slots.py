@@ -97,6 +97,7 @@ class Slots:
     rolling_resistance: Array
     inverse_mass: Array
     team = (0, 1)
+    room: Any = None
     seam = seam.NONE  # in a periodic room positions run on beyond it within a frame
     island: Array
     calm: Array
@@ -135,7 +136,7 @@ class Slots:
         if len(state) != len(self):
             self._keep(slice(None))
             self._resize(len(state))
-        self.seam = state.seam
+        self.seam, self.room = state.seam, state.room
         given = (state.position, state.velocity, state.acceleration, state.spin)
         if not self._given_back.recall(given):  # what the user has not changed is not copied again
             self.motion.take_motion(self.position, self.velocity, self.acceleration, self.spin, *given, self.particle)
@@ -219,7 +220,7 @@ class Slots:
     def in_users_order(self) -> State:
         """A state with the positions, velocities, spins, radii and masses of now."""
         state, names = State(self.dtype), (*ROWS, "spin", "radius", "mass")
-        state.seam = self.seam
+        state.seam, state.room = self.seam, self.room
         values = {name: np.empty_like(getattr(self, name)) for name in names}
         for name, array in values.items():
             array[self.particle] = getattr(self, name)
